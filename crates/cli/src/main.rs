@@ -1,0 +1,2 @@
+//! The `seafix` command.
+fn main() {}

@@ -1,0 +1,76 @@
+//! What a user writes to pick a component.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// The choice of a component: its name and the settings that differ from the defaults.
+///
+/// In TOML a bare name or a table: `solver = "triad"` or
+/// `solver = { name = "triad", choose = "first" }`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// The component's name, as its registry lists it.
+    pub name: String,
+    /// Settings by key; what is absent keeps its default.
+    pub settings: toml::Table,
+}
+
+impl Choice {
+    /// The named component with all its defaults.
+    pub fn named(name: &str) -> Self {
+        Self { name: name.to_owned(), settings: toml::Table::new() }
+    }
+
+    /// The same choice with one setting given.
+    #[must_use]
+    pub fn with(mut self, key: &str, value: impl Into<toml::Value>) -> Self {
+        self.settings.insert(key.to_owned(), value.into());
+        self
+    }
+}
+
+impl<'de> Deserialize<'de> for Choice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        use serde::de::Error;
+        match toml::Value::deserialize(deserializer)? {
+            toml::Value::String(name) => Ok(Self::named(&name)),
+            toml::Value::Table(mut settings) => match settings.remove("name") {
+                Some(toml::Value::String(name)) => Ok(Self { name, settings }),
+                Some(other) => Err(D::Error::custom(format!("`name` must be a string, found {other}"))),
+                None => Err(D::Error::custom("a component's table needs a `name`")),
+            },
+            other => Err(D::Error::custom(format!(
+                "a component is a name or a table with a `name`, found {other}"
+            ))),
+        }
+    }
+}
+
+impl Serialize for Choice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut table = toml::Table::new();
+        table.insert("name".to_owned(), self.name.clone().into());
+        table.extend(self.settings.clone());
+        table.serialize(serializer)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_and_a_table_are_both_choices() {
+        let table: toml::Table = toml::from_str("a = 'triad'\nb = { name = 'triad', least-sine = 0.2 }").unwrap();
+        let a: Choice = table["a"].clone().try_into().unwrap();
+        let b: Choice = table["b"].clone().try_into().unwrap();
+        assert_eq!(a, Choice::named("triad"));
+        assert_eq!(b, Choice::named("triad").with("least-sine", 0.2));
+        let printed = toml::to_string(&b).unwrap();
+        assert_eq!(toml::from_str::<Choice>(&printed).unwrap(), b);
+    }
+
+    #[test]
+    fn a_table_without_a_name_is_refused() {
+        assert!(toml::from_str::<Choice>("least-sine = 0.2").unwrap_err().to_string().contains("needs a `name`"));
+    }
+}

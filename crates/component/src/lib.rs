@@ -1,0 +1,49 @@
+//! Things with a name, settings and a source, built from TOML.
+//!
+//! Every choice a researcher compares (a detector, a search, a solver) is a *component*:
+//! a struct that **is** its settings, three constants that say what it is, and one small
+//! object-safe trait that says what it does. It joins its [`Registry`] by one line,
+//! [`entry!`]`(Kabsch)`, in the list of its folder. From that line follow its name in every
+//! experiment file, the lists the command prints, and the laws it is tested against.
+//!
+//! ```
+//! use seafix_component::{Choice, Component, Registry, entry};
+//! use serde::{Deserialize, Serialize};
+//!
+//! trait Greeting: Send + Sync + std::fmt::Debug {
+//!     fn greet(&self) -> String;
+//! }
+//!
+//! #[derive(Debug, Default, Serialize, Deserialize)]
+//! #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+//! struct Hello {
+//!     times: usize,
+//! }
+//!
+//! impl Component for Hello {
+//!     const NAME: &'static str = "hello";
+//!     const SUMMARY: &'static str = "says hello";
+//!     const SOURCE: &'static str = "common usage";
+//! }
+//!
+//! impl Greeting for Hello {
+//!     fn greet(&self) -> String {
+//!         "hello ".repeat(self.times)
+//!     }
+//! }
+//!
+//! static GREETINGS: Registry<dyn Greeting> = Registry::new("greeting", &[entry!(Hello)]);
+//!
+//! let choice: Choice = toml::from_str("name = 'hello'\ntimes = 2").unwrap();
+//! assert_eq!(GREETINGS.build(&choice).unwrap().greet(), "hello hello ");
+//! let unknown = GREETINGS.build(&Choice::named("helo")).unwrap_err();
+//! assert_eq!(unknown.to_string(), "no greeting is called `helo`, did you mean `hello`? There are hello");
+//! ```
+
+mod choice;
+mod registry;
+mod suggest;
+
+pub use choice::Choice;
+pub use registry::{BuildError, Component, Entry, Listing, Registry, SettingsError, settings};
+pub use suggest::{nearest, unknown};

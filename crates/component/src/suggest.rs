@@ -1,0 +1,32 @@
+//! The nearest right word to a wrong one.
+
+/// The option nearest to `word` in edit distance, if it is near enough to be what was meant.
+///
+/// ```
+/// assert_eq!(seafix_component::nearest("umeyma", ["horn", "umeyama"]), Some("umeyama"));
+/// assert_eq!(seafix_component::nearest("banana", ["horn", "umeyama"]), None);
+/// ```
+pub fn nearest<'a>(word: &str, options: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let limit = (word.chars().count() / 3).max(2);
+    options
+        .into_iter()
+        .map(|option| (strsim::damerau_levenshtein(&word.to_lowercase(), &option.to_lowercase()), option))
+        .filter(|(distance, _)| *distance <= limit)
+        .min()
+        .map(|(_, option)| option)
+}
+
+/// The second half of a message about an unknown word: the nearest option, then all of them.
+///
+/// ```
+/// assert_eq!(seafix_component::unknown("trad", &["kabsch", "triad"]), ", did you mean `triad`? There are kabsch, triad");
+/// assert_eq!(seafix_component::unknown("x", &["kabsch", "triad"]), "; there are kabsch, triad");
+/// assert_eq!(seafix_component::unknown("x", &[]), "; there are none");
+/// ```
+pub fn unknown(word: &str, options: &[&str]) -> String {
+    let all = if options.is_empty() { "none".to_owned() } else { options.join(", ") };
+    match nearest(word, options.iter().copied()) {
+        Some(near) => format!(", did you mean `{near}`? There are {all}"),
+        None => format!("; there are {all}"),
+    }
+}

@@ -1,0 +1,1 @@
+//! Errors of poses and rates of outcomes: pure functions of estimates and truth.

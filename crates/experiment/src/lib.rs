@@ -1,0 +1,1 @@
+//! Experiment files, trials, the runner and its results.

@@ -1,0 +1,37 @@
+//! Typed frames, rigid transforms, covariance, cameras, stereo rigs, triangulation.
+//!
+//! # Conventions
+//!
+//! - Column vectors inside: `p_a = a_from_b * p_b`. Adjacent names cancel:
+//!   `object_from_body = object_from_camera * camera_from_body`. Frames are types, so a chain
+//!   whose names do not cancel does not compile:
+//!
+//!   ```compile_fail
+//!   use seafix_geometry::{Camera, Object, Transform, World};
+//!   let object_from_camera = Transform::<Object, Camera>::identity();
+//!   let object_from_world = Transform::<Object, World>::identity();
+//!   let nonsense = object_from_camera * object_from_world; // Camera and World do not cancel
+//!   ```
+//! - The paper's row vectors, `p · H`, live in [`row_vector`] and nowhere else.
+//! - Metres, radians, pixels. The centre of the first pixel is (0, 0).
+//! - Perturbations: `T_true = T_estimate · Exp(ξ)`, ξ = (φ, ρ), rotation first; for
+//!   `object_from_camera` ξ lives in the camera frame ([`Covariance6`]).
+//! - Elementary functions come from `libm`: the same bits on every platform.
+
+mod covariance;
+mod frame;
+mod measured;
+mod pinhole;
+pub mod row_vector;
+pub mod so3;
+mod stereo;
+mod transform;
+mod triad;
+
+pub use covariance::{Covariance6, UncertainPoint};
+pub use measured::MeasuredPoint;
+pub use frame::{Body, Camera, Frame, Object, Point, RightCamera, Site, World};
+pub use pinhole::{BadCamera, Distortion, Pinhole, Pixel};
+pub use stereo::{BadRig, StereoPixels, StereoRig, Triangulation, Untriangulable};
+pub use transform::{NotRigid, Transform};
+pub use triad::{Collinear, triad};

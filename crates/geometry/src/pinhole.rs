@@ -1,0 +1,281 @@
+//! A pinhole camera with the lens distortion that calibration tools report.
+
+use nalgebra::{Matrix2, Matrix2x3, Vector2};
+
+use crate::{Frame, Point};
+
+/// A place in an image, in pixels; the centre of the first pixel is (0, 0), u to the right, v down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pixel {
+    /// Column.
+    pub u: f64,
+    /// Row.
+    pub v: f64,
+}
+
+impl Pixel {
+    /// The distance to another place, in pixels.
+    pub fn distance(&self, other: &Self) -> f64 {
+        ((self.u - other.u).powi(2) + (self.v - other.v).powi(2)).sqrt()
+    }
+}
+
+/// Brown–Conrady lens distortion, `plumb_bob`: k1 k2 p1 p2 \[k3 \[k4 k5 k6\]\].
+///
+/// On normalised coordinates (x, y) = (X/Z, Y/Z), r² = x² + y²:
+/// x' = x·ρ + 2 p1 x y + p2 (r² + 2x²), y' = y·ρ + p1 (r² + 2y²) + 2 p2 x y,
+/// ρ = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶).
+/// Source: Brown, *Decentering distortion of lenses*, 1966; the order is OpenCV's.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Distortion {
+    coefficients: [f64; 8],
+}
+
+impl Distortion {
+    /// The coefficients in the order k1 k2 p1 p2 k3 k4 k5 k6; the absent ones are zero.
+    pub fn coefficients(&self) -> &[f64; 8] {
+        &self.coefficients
+    }
+
+    /// ρ(r²) and dρ/d(r²).
+    fn radial(&self, r2: f64) -> (f64, f64) {
+        let [k1, k2, _, _, k3, k4, k5, k6] = self.coefficients;
+        let numerator = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let denominator = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
+        let d_numerator = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+        let d_denominator = k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6);
+        let rho = numerator / denominator;
+        (rho, (d_numerator - rho * d_denominator) / denominator)
+    }
+
+    /// The distorted place of `n` and the Jacobian of the map.
+    fn distort(&self, n: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let [_, _, p1, p2, ..] = self.coefficients;
+        let (x, y) = (n.x, n.y);
+        let r2 = x * x + y * y;
+        let (rho, d) = self.radial(r2);
+        let place = Vector2::new(
+            x * rho + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * rho + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        );
+        let cross = 2.0 * d * x * y + 2.0 * p1 * x + 2.0 * p2 * y;
+        let jacobian = Matrix2::new(
+            rho + 2.0 * d * x * x + 2.0 * p1 * y + 6.0 * p2 * x,
+            cross,
+            cross,
+            rho + 2.0 * d * y * y + 6.0 * p1 * y + 2.0 * p2 * x,
+        );
+        (place, jacobian)
+    }
+
+    /// The radius (normalised) up to which the radial map r·ρ(r²) grows: beyond it the lens model
+    /// folds back and means nothing.
+    fn monotone_radius(&self) -> f64 {
+        const FAR: f64 = 10.0; // 84 degrees off the axis
+        let slope = |r: f64| {
+            let (rho, d) = self.radial(r * r);
+            rho + 2.0 * d * r * r
+        };
+        let steps = 2000;
+        (1..=steps).map(|i| FAR * f64::from(i) / f64::from(steps)).find(|r| !(slope(*r) > 0.0)).unwrap_or(f64::INFINITY)
+    }
+}
+
+/// A camera: size of its image, focal lengths and principal point (px), lens distortion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pinhole {
+    size: [u32; 2],
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    distortion: Distortion,
+    monotone_radius: f64,
+}
+
+/// Why numbers describe no camera.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BadCamera {
+    /// Zero width or height.
+    #[error("size = [{0}, {1}]; an image needs a width and a height")]
+    Size(u32, u32),
+    /// A focal length that is zero, negative or not finite.
+    #[error("{name} = {value}; a focal length is a positive number of pixels")]
+    FocalLength {
+        /// `fx` or `fy`.
+        name: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// A principal point outside the image or not finite.
+    #[error("{name} = {value}; the principal point must lie in the image, 0 to {limit}")]
+    PrincipalPoint {
+        /// `cx` or `cy`.
+        name: &'static str,
+        /// The value.
+        value: f64,
+        /// Width or height of the image.
+        limit: u32,
+    },
+    /// Distortion coefficients of an unknown model.
+    #[error("distortion has {0} numbers; plumb_bob has 0, 4 (k1 k2 p1 p2), 5 (+ k3) or 8 (+ k4 k5 k6)")]
+    DistortionLength(usize),
+    /// A distortion coefficient that is not finite.
+    #[error("distortion[{index}] = {value}; give finite numbers")]
+    DistortionValue {
+        /// Place in the list, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+}
+
+impl Pinhole {
+    /// The camera of these numbers: image size, fx, fy, cx, cy (px), and 0, 4, 5 or 8 distortion
+    /// coefficients.
+    ///
+    /// # Errors
+    /// [`BadCamera`] names the number that is wrong.
+    pub fn new(size: [u32; 2], focal: [f64; 2], principal: [f64; 2], distortion: &[f64]) -> Result<Self, BadCamera> {
+        if size[0] == 0 || size[1] == 0 {
+            return Err(BadCamera::Size(size[0], size[1]));
+        }
+        for (name, value) in ["fx", "fy"].into_iter().zip(focal) {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(BadCamera::FocalLength { name, value });
+            }
+        }
+        for ((name, value), limit) in ["cx", "cy"].into_iter().zip(principal).zip(size) {
+            if !(value.is_finite() && value >= 0.0 && value <= f64::from(limit)) {
+                return Err(BadCamera::PrincipalPoint { name, value, limit });
+            }
+        }
+        if ![0, 4, 5, 8].contains(&distortion.len()) {
+            return Err(BadCamera::DistortionLength(distortion.len()));
+        }
+        let mut coefficients = [0.0; 8];
+        for (index, &value) in distortion.iter().enumerate() {
+            if !value.is_finite() {
+                return Err(BadCamera::DistortionValue { index, value });
+            }
+            coefficients[index] = value;
+        }
+        let distortion = Distortion { coefficients };
+        let monotone_radius = distortion.monotone_radius();
+        Ok(Self { size, fx: focal[0], fy: focal[1], cx: principal[0], cy: principal[1], distortion, monotone_radius })
+    }
+
+    /// Width and height of the image.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The focal lengths fx, fy (px).
+    pub fn focal(&self) -> [f64; 2] {
+        [self.fx, self.fy]
+    }
+
+    /// The principal point cx, cy (px).
+    pub fn principal(&self) -> [f64; 2] {
+        [self.cx, self.cy]
+    }
+
+    /// The lens distortion.
+    pub fn distortion(&self) -> &Distortion {
+        &self.distortion
+    }
+
+    /// Where the camera sees a point of its own frame, or `None` when the point is behind the
+    /// camera or beyond the angle at which the lens model still grows. The place may lie outside
+    /// the image: see [`contains`](Self::contains).
+    pub fn project<F: Frame>(&self, point: &Point<F>) -> Option<Pixel> {
+        self.project_with_jacobian(point).map(|(pixel, _)| pixel)
+    }
+
+    /// As [`project`](Self::project), with the derivative of the pixel by the point (px/m).
+    pub fn project_with_jacobian<F: Frame>(&self, point: &Point<F>) -> Option<(Pixel, Matrix2x3<f64>)> {
+        let [x, y, z] = point.coords.into();
+        if !(z > 0.0) {
+            return None;
+        }
+        let n = Vector2::new(x / z, y / z);
+        if !(n.norm() < self.monotone_radius) {
+            return None;
+        }
+        let (d, by_n) = self.distortion.distort(&n);
+        let n_by_point = Matrix2x3::new(1.0 / z, 0.0, -n.x / z, 0.0, 1.0 / z, -n.y / z);
+        let focal = Matrix2::new(self.fx, 0.0, 0.0, self.fy);
+        let pixel = Pixel { u: self.fx * d.x + self.cx, v: self.fy * d.y + self.cy };
+        Some((pixel, focal * by_n * n_by_point))
+    }
+
+    /// The undistorted direction (X/Z, Y/Z) in which the camera sees `pixel`, or `None` where the
+    /// lens model has no inverse.
+    ///
+    /// Newton's iteration on the distortion; it ends when the step falls below 1e-15.
+    pub fn normalize(&self, pixel: &Pixel) -> Option<Vector2<f64>> {
+        let target = Vector2::new((pixel.u - self.cx) / self.fx, (pixel.v - self.cy) / self.fy);
+        let mut n = target;
+        for _ in 0..50 {
+            let (place, jacobian) = self.distortion.distort(&n);
+            let step = jacobian.try_inverse()? * (target - place);
+            // Far from the axis a full step can leap over the fold of the lens model.
+            let limit = 0.2 * (1.0 + n.norm());
+            n += if step.norm() > limit { step * (limit / step.norm()) } else { step };
+            if step.norm() < 1e-15 {
+                break;
+            }
+        }
+        let (place, _) = self.distortion.distort(&n);
+        let missed = (place - target).norm() > 1e-12;
+        (!missed && n.norm() < self.monotone_radius).then_some(n)
+    }
+
+    /// Whether `pixel` lies in the image, at least `margin` pixels from the centres of its border pixels.
+    pub fn contains(&self, pixel: &Pixel, margin: f64) -> bool {
+        let inside = |x: f64, n: u32| x >= margin && x <= f64::from(n - 1) - margin;
+        inside(pixel.u, self.size[0]) && inside(pixel.v, self.size[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Camera;
+
+    fn camera(distortion: &[f64]) -> Pinhole {
+        Pinhole::new([640, 480], [533.4, 533.5], [342.5, 234.7], distortion).unwrap()
+    }
+
+    #[test]
+    fn a_point_on_the_axis_is_seen_at_the_principal_point() {
+        let pixel = camera(&[-0.28, 0.04, 0.001, -0.0001, 0.12]).project(&Point::<Camera>::new(0.0, 0.0, 2.0));
+        assert_eq!(pixel, Some(Pixel { u: 342.5, v: 234.7 }));
+    }
+
+    #[test]
+    fn undistorting_undoes_distortion_over_the_whole_image() {
+        for coefficients in [&[-0.28, 0.04, 0.001, -0.0001, 0.12][..], &[-0.3, 0.1, 1e-3, 2e-3], &[0.4, 0.2, 0.0, 0.0, 0.1, 0.5, 0.1, 0.02]] {
+            let camera = camera(coefficients);
+            for (u, v) in [(0.0, 0.0), (639.0, 479.0), (320.0, 0.0), (600.0, 240.0), (342.5, 234.7)] {
+                let n = camera.normalize(&Pixel { u, v }).unwrap();
+                let back = camera.project(&Point::<Camera>::new(n.x, n.y, 1.0)).unwrap();
+                assert!(back.distance(&Pixel { u, v }) < 1e-9, "{coefficients:?} at {u}, {v}: {back:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn beyond_the_fold_of_the_lens_nothing_is_seen() {
+        assert_eq!(camera(&[-0.28, 0.0, 0.0, 0.0]).project(&Point::<Camera>::new(5.0, 0.0, 1.0)), None);
+        assert_eq!(camera(&[]).project(&Point::<Camera>::new(0.0, 0.0, -1.0)), None);
+    }
+
+    #[test]
+    fn numbers_that_are_no_camera_are_refused() {
+        assert!(matches!(Pinhole::new([640, 480], [0.0, 1.0], [1.0, 1.0], &[]), Err(BadCamera::FocalLength { .. })));
+        assert!(matches!(Pinhole::new([640, 480], [1.0, f64::NAN], [1.0, 1.0], &[]), Err(BadCamera::FocalLength { .. })));
+        assert!(matches!(Pinhole::new([640, 480], [1.0, 1.0], [700.0, 1.0], &[]), Err(BadCamera::PrincipalPoint { .. })));
+        assert!(matches!(Pinhole::new([640, 480], [1.0, 1.0], [1.0, 1.0], &[0.1]), Err(BadCamera::DistortionLength(1))));
+    }
+}

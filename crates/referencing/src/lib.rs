@@ -1,0 +1,25 @@
+//! The heart: which points of the cloud are the feature points of a known object, and where is the
+//! camera relative to it.
+//!
+//! The order is the paper's. A [`Site`] tells what there is; a [`Target`] of it is looked for;
+//! [`candidates`] are the cloud points that the prior allows for each model point (Stage 1); a
+//! [`Search`] finds the largest structurally coherent set among them (Stage 2); a [`Solver`]
+//! computes the rigid motion; [`reference()`] puts them in a row and tests the answer before it
+//! believes it. This crate knows no image and no truth.
+
+mod candidates;
+mod observations;
+mod problem;
+pub mod problem_file;
+mod reference;
+mod search;
+mod site;
+mod solve;
+
+pub use candidates::{Candidates, Gate, candidates};
+pub use observations::{Observation, Observations};
+pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
+pub use reference::{Acceptance, Alternative, Outcome, Refusal, Reference, reference};
+pub use search::{Identification, SEARCHES, Search, Unidentified};
+pub use site::{BadSite, ModelPoint, Shell, Site, SiteObject, Target};
+pub use solve::{Degenerate, SOLVERS, Solver};

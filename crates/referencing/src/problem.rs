@@ -1,0 +1,86 @@
+//! What a search is given.
+
+use nalgebra::Vector3;
+use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Transform};
+
+use crate::{Candidates, ModelPoint};
+
+/// The rough pose known before the fix, and how far it may be off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// The rough pose.
+    pub object_from_camera: Transform<Object, Camera>,
+    /// How far it may be off.
+    pub bound: PriorBound,
+}
+
+/// How far a prior may be off.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PriorBound {
+    /// Gaussian: the covariance of ξ in `T_true = T_prior · Exp(ξ)`.
+    Gaussian(Covariance6<Object, Camera>),
+    /// Each visible model point lies within this distance (m) of its prediction along each camera
+    /// axis: the paper's shell.
+    Box(f64),
+}
+
+/// When two pairs (model point, cloud point) are coherent: their distances in model and cloud agree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Tolerance {
+    /// The paper's Δ (m), one for all pairs.
+    Fixed(f64),
+    /// Δ_ij = k·√(nᵀ(Σ_i + Σ_j)n + σ_i² + σ_j²): k standard deviations of this very distance, n its
+    /// direction in the cloud, σ the model's own.
+    Sigmas(f64),
+}
+
+/// A model point and the cloud point believed to be it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Correspondence {
+    /// Index of the model point.
+    pub model: usize,
+    /// Index of the cloud point.
+    pub cloud: usize,
+}
+
+/// One search: a model, a cloud, and which cloud points may be which model points.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// The feature points of the target.
+    pub model: &'a [ModelPoint],
+    /// The points that were measured.
+    pub cloud: &'a [MeasuredPoint],
+    /// For each model point, the cloud points that may be it.
+    pub candidates: &'a Candidates,
+    /// When two distances agree.
+    pub tolerance: Tolerance,
+}
+
+impl Problem<'_> {
+    /// The largest difference of the distances of `a` and `b` in model and cloud that still counts
+    /// as agreement (m).
+    pub fn delta(&self, a: Correspondence, b: Correspondence) -> f64 {
+        match self.tolerance {
+            Tolerance::Fixed(delta) => delta,
+            Tolerance::Sigmas(k) => {
+                let (p, q) = (&self.cloud[a.cloud].position, &self.cloud[b.cloud].position);
+                let step: Vector3<f64> = q.at - p.at;
+                let n = if step.norm() > 0.0 { step.normalize() } else { Vector3::z() };
+                let cloud = n.dot(&((p.covariance + q.covariance) * n));
+                let model = self.model[a.model].sigma.powi(2) + self.model[b.model].sigma.powi(2);
+                k * (cloud + model).sqrt()
+            }
+        }
+    }
+
+    /// Whether `a` and `b` are structurally coherent: two different model points, two different
+    /// cloud points, and | |P_a P_b| − |C_a C_b| | ≤ Δ (closed).
+    pub fn coherent(&self, a: Correspondence, b: Correspondence) -> bool {
+        if a.model == b.model || a.cloud == b.cloud {
+            return false;
+        }
+        let model = self.model[a.model].at.distance(&self.model[b.model].at);
+        let cloud = self.cloud[a.cloud].position.at.distance(&self.cloud[b.cloud].position.at);
+        (model - cloud).abs() <= self.delta(a, b)
+    }
+}

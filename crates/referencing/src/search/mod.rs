@@ -1,0 +1,73 @@
+//! Searches: which cloud points are which model points.
+
+use rand::Rng;
+use seafix_component::Registry;
+
+use crate::{Correspondence, Problem};
+
+/// Decides which cloud points are which model points.
+///
+/// Every search has a budget of pair tests beyond those that build its graph (default 10⁷); past
+/// it the answer is [`Unidentified::Budget`] or an identification that is not `optimal`.
+pub trait Search: Send + Sync + std::fmt::Debug {
+    /// The best set of correspondences by this search's own measure.
+    ///
+    /// # Errors
+    /// [`Unidentified`]: the data allow no answer, with the numbers that say why.
+    fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Unidentified>;
+}
+
+/// A coherent, one-to-one set of correspondences.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// The set, in the order of the model points.
+    pub pairs: Vec<Correspondence>,
+    /// Other sets of the same size, as far as the search looks for them.
+    pub rivals: Vec<Vec<Correspondence>>,
+    /// Whether it is proved that no admissible set is larger.
+    pub optimal: bool,
+    /// No admissible set has more pairs than this.
+    pub size_bound: usize,
+    /// Pair tests spent, those that built the graph included.
+    pub tests: u64,
+}
+
+/// Why nothing was identified.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unidentified {
+    /// Fewer than three model points have a candidate.
+    #[error("{with_candidates} model points have a candidate; a pose needs {needed}")]
+    TooFew {
+        /// Model points with at least one candidate.
+        with_candidates: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// The largest coherent set is too small.
+    #[error("the largest coherent set has {best} points; {needed} are needed")]
+    NoConsensus {
+        /// Size of the largest set.
+        best: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// The search ended before it could answer.
+    #[error("the budget of {budget} pair tests ended; best so far {best} points, at most {bound} are possible")]
+    Budget {
+        /// The budget (pair tests).
+        budget: u64,
+        /// Size of the largest set found.
+        best: usize,
+        /// No set is larger than this.
+        bound: usize,
+    },
+    /// Only mirror images of the model were found.
+    #[error("the largest coherent set, {best} points, is a mirror image of the model")]
+    Mirrored {
+        /// Its size.
+        best: usize,
+    },
+}
+
+/// All searches.
+pub static SEARCHES: Registry<dyn Search> = Registry::new("search", &[]);

@@ -1,0 +1,1 @@
+//! Seeded dives over a virtual production system: rendered images or noisy points, with truth.

@@ -1,0 +1,39 @@
+//! From matched pixels to measured points.
+
+use seafix_geometry::{MeasuredPoint, StereoPixels, StereoRig};
+use serde::{Deserialize, Serialize};
+
+/// What the triangulation is told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Triangulator {
+    /// Standard deviation of a key point's coordinate (px): the covariance of every point scales with it.
+    pub sigma_px: f64,
+    /// Largest distance from the epipolar line (px, Sampson).
+    pub epipolar_px: f64,
+    /// Largest depth worth keeping (m).
+    pub max_depth: f64,
+}
+
+impl Default for Triangulator {
+    fn default() -> Self {
+        Self { sigma_px: 0.25, epipolar_px: 1.5, max_depth: 20.0 }
+    }
+}
+
+/// The points whose two pixels pass the epipolar test and meet in front of the cameras, in the
+/// order of `pairs`.
+pub fn triangulate(pairs: &[StereoPixels], rig: &StereoRig, settings: &Triangulator) -> Vec<MeasuredPoint> {
+    pairs
+        .iter()
+        .filter(|pair| rig.epipolar_distance(pair).is_some_and(|distance| distance <= settings.epipolar_px))
+        .filter_map(|pair| {
+            let found = rig.triangulate(pair, settings.sigma_px).ok()?;
+            let near = found.point.coords.z <= settings.max_depth;
+            near.then(|| MeasuredPoint {
+                position: seafix_geometry::UncertainPoint { at: found.point, covariance: found.covariance },
+                pixels: Some(*pair),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,26 @@
+//! Detectors: where in an image there is something to find again.
+
+use seafix_component::Registry;
+use seafix_geometry::Pixel;
+
+use crate::Image;
+
+/// A place in an image that can be found again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keypoint {
+    /// Where, to a fraction of a pixel.
+    pub at: Pixel,
+    /// How strong, in the detector's own measure; larger is stronger.
+    pub response: f32,
+    /// The size of the structure (px): the standard deviation of the Gaussian it was found at.
+    pub scale: f32,
+}
+
+/// Finds the key points of an image.
+pub trait Detector: Send + Sync + std::fmt::Debug {
+    /// The key points, strongest first.
+    fn detect(&self, image: &Image) -> Vec<Keypoint>;
+}
+
+/// All detectors.
+pub static DETECTORS: Registry<dyn Detector> = Registry::new("detector", &[]);

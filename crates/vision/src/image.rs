@@ -1,0 +1,64 @@
+//! A grey image.
+
+/// A grey image, row by row from the top left; values 0 (black) to 255 (the white of 8 bits).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    width: usize,
+    height: usize,
+    pixels: Vec<f32>,
+}
+
+/// Why pixels are no image.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{pixels} pixels do not fill {width}×{height}")]
+pub struct BadImage {
+    width: usize,
+    height: usize,
+    pixels: usize,
+}
+
+impl Image {
+    /// The image of these pixels, row by row.
+    ///
+    /// # Errors
+    /// [`BadImage`] when the count of pixels is not width × height, or either is zero.
+    pub fn new(width: usize, height: usize, pixels: Vec<f32>) -> Result<Self, BadImage> {
+        if width == 0 || height == 0 || width.checked_mul(height) != Some(pixels.len()) {
+            return Err(BadImage { width, height, pixels: pixels.len() });
+        }
+        Ok(Self { width, height, pixels })
+    }
+
+    /// The image of these 8-bit pixels, row by row.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn from_u8(width: usize, height: usize, pixels: &[u8]) -> Result<Self, BadImage> {
+        Self::new(width, height, pixels.iter().map(|&p| f32::from(p)).collect())
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// All pixels, row by row.
+    pub fn pixels(&self) -> &[f32] {
+        &self.pixels
+    }
+
+    /// The pixels of row `y`.
+    pub fn row(&self, y: usize) -> &[f32] {
+        &self.pixels[y * self.width..(y + 1) * self.width]
+    }
+
+    /// The pixels rounded to 8 bits, clipped at black and white.
+    pub fn to_u8(&self) -> Vec<u8> {
+        self.pixels.iter().map(|p| p.round().clamp(0.0, 255.0) as u8).collect()
+    }
+}
