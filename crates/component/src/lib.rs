@@ -41,9 +41,11 @@
 //! ```
 
 mod choice;
+mod fault;
 mod registry;
 mod suggest;
 
 pub use choice::Choice;
+pub use fault::{Fault, line_at, line_of};
 pub use registry::{BuildError, Component, Entry, Listing, Registry, SettingsError, settings};
 pub use suggest::{nearest, unknown};

@@ -1,0 +1,158 @@
+//! What is wrong with a file, in one line.
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use crate::nearest;
+
+/// One fault of an input: what, in which file, on which line, the value, and the remedy.
+///
+/// Printed as `what in file:line: value; remedy`, one line whatever the input contains.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// What is wrong.
+    pub what: String,
+    /// The file.
+    pub file: PathBuf,
+    /// The line, from 1, where it is known.
+    pub line: Option<usize>,
+    /// The value at fault; empty where there is none.
+    pub value: String,
+    /// What to do about it; empty where nothing helps.
+    pub remedy: String,
+}
+
+impl Fault {
+    /// The fault `what` of `file`.
+    pub fn new(what: impl Into<String>, file: &Path) -> Self {
+        Self { what: what.into(), file: file.to_owned(), line: None, value: String::new(), remedy: String::new() }
+    }
+
+    /// The same fault on a line (from 1), if one is known.
+    #[must_use]
+    pub fn on_line(mut self, line: impl Into<Option<usize>>) -> Self {
+        self.line = line.into();
+        self
+    }
+
+    /// The same fault with the value that is wrong.
+    #[must_use]
+    pub fn value(mut self, value: impl fmt::Display) -> Self {
+        self.value = value.to_string();
+        self
+    }
+
+    /// The same fault with its remedy.
+    #[must_use]
+    pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
+        self.remedy = remedy.into();
+        self
+    }
+
+    /// The fault that the TOML reader found in `text`, the content of `file`; an unknown key is
+    /// answered with the nearest right one.
+    pub fn in_toml(file: &Path, text: &str, error: &toml::de::Error) -> Self {
+        let line = error.span().map(|span| line_at(text, span.start));
+        let message = error.message().trim_end();
+        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        match quoted.split_first() {
+            Some((key, known)) if message.starts_with("unknown field") => Self::new("unknown key", file)
+                .on_line(line)
+                .value(format!("`{key}`"))
+                .remedy(match nearest(key, known.iter().copied()) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("there are {}", known.join(", ")),
+                }),
+            _ => Self::new(message.lines().next().unwrap_or_default(), file)
+                .on_line(line)
+                .value(error.span().and_then(|span| text.get(span)).unwrap_or_default()),
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = format!("{} in {}", self.what, self.file.display());
+        if let Some(line) = self.line {
+            text += &format!(":{line}");
+        }
+        if !self.value.is_empty() {
+            let short: String = self.value.chars().take(120).collect();
+            text += &format!(": {short}");
+        }
+        if !self.remedy.is_empty() {
+            text += &format!("; {}", self.remedy);
+        }
+        // Names come from files: nothing in them may move the cursor or start a new line.
+        f.write_str(&text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>())
+    }
+}
+
+impl std::error::Error for Fault {}
+
+/// The line (from 1) of the byte at `offset`.
+pub fn line_at(text: &str, offset: usize) -> usize {
+    1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
+}
+
+/// The line (from 1) of the key at `path` in a TOML text, or of the nearest table above it that
+/// exists; numbers in the path are places in arrays: `["object", "2", "id"]`.
+pub fn line_of(text: &str, path: &[&str]) -> Option<usize> {
+    let document = toml::de::DeTable::parse(text).ok()?;
+    let mut line = None;
+    let mut table = Some(document.get_ref());
+    let mut array: Option<&toml::de::DeArray<'_>> = None;
+    for step in path {
+        let value = if let Some(items) = array {
+            items.get(step.parse::<usize>().ok()?)
+        } else {
+            table.and_then(|table| table.iter().find(|(key, _)| key.get_ref() == step)).map(|(key, value)| {
+                line = Some(line_at(text, key.span().start));
+                value
+            })
+        };
+        let Some(value) = value else { break };
+        if array.is_some() {
+            line = Some(line_at(text, value.span().start));
+        }
+        (table, array) = (value.get_ref().as_table(), value.get_ref().as_array());
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_key_names_line_and_nearest() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        #[expect(dead_code, reason = "only its keys matter")]
+        struct Experiment {
+            question: String,
+            seed: u64,
+        }
+        let text = "question = 'why'\nsede = 3\n";
+        let error = toml::from_str::<Experiment>(text).unwrap_err();
+        let fault = Fault::in_toml(Path::new("e.toml"), text, &error);
+        assert_eq!(fault.to_string(), "unknown key in e.toml:2: `sede`; did you mean `seed`?");
+    }
+
+    #[test]
+    fn a_path_leads_to_its_line() {
+        let text = "a = 1\n[b]\nc = 2\n[[d]]\ne = 3\n[[d]]\ne = 4\n";
+        assert_eq!(line_of(text, &["b", "c"]), Some(3));
+        assert_eq!(line_of(text, &["d", "1", "e"]), Some(7));
+        assert_eq!(line_of(text, &["d", "1", "missing"]), Some(6));
+        assert_eq!(line_of(text, &["nothing"]), None);
+    }
+
+    #[test]
+    fn control_characters_do_not_reach_the_terminal() {
+        let fault = Fault::new("bad name", Path::new("f")).value("\u{1b}[2J\nx");
+        assert_eq!(fault.to_string(), "bad name in f:  [2J x");
+    }
+}
