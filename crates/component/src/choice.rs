@@ -38,9 +38,7 @@ impl<'de> Deserialize<'de> for Choice {
                 Some(other) => Err(D::Error::custom(format!("`name` must be a string, found {other}"))),
                 None => Err(D::Error::custom("a component's table needs a `name`")),
             },
-            other => Err(D::Error::custom(format!(
-                "a component is a name or a table with a `name`, found {other}"
-            ))),
+            other => Err(D::Error::custom(format!("a component is a name or a table with a `name`, found {other}"))),
         }
     }
 }

@@ -110,7 +110,9 @@ pub fn settings<C: Component>(settings: toml::Table) -> Result<C, SettingsError>
             return Err(SettingsError { key: Some(key.clone()), message: error.message().to_owned() });
         }
     }
-    settings.try_into().map_err(|error: toml::de::Error| SettingsError { key: None, message: error.message().to_owned() })
+    settings
+        .try_into()
+        .map_err(|error: toml::de::Error| SettingsError { key: None, message: error.message().to_owned() })
 }
 
 fn defaults<C: Component>() -> toml::Table {

@@ -29,8 +29,8 @@ mod transform;
 mod triad;
 
 pub use covariance::{Covariance6, UncertainPoint};
-pub use measured::MeasuredPoint;
 pub use frame::{Body, Camera, Frame, Object, Point, RightCamera, Site, World};
+pub use measured::MeasuredPoint;
 pub use pinhole::{BadCamera, Distortion, Pinhole, Pixel};
 pub use stereo::{BadRig, StereoPixels, StereoRig, Triangulation, Untriangulable};
 pub use transform::{NotRigid, Transform};

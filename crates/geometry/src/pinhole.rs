@@ -255,7 +255,11 @@ mod tests {
 
     #[test]
     fn undistorting_undoes_distortion_over_the_whole_image() {
-        for coefficients in [&[-0.28, 0.04, 0.001, -0.0001, 0.12][..], &[-0.3, 0.1, 1e-3, 2e-3], &[0.4, 0.2, 0.0, 0.0, 0.1, 0.5, 0.1, 0.02]] {
+        for coefficients in [
+            &[-0.28, 0.04, 0.001, -0.0001, 0.12][..],
+            &[-0.3, 0.1, 1e-3, 2e-3],
+            &[0.4, 0.2, 0.0, 0.0, 0.1, 0.5, 0.1, 0.02],
+        ] {
             let camera = camera(coefficients);
             for (u, v) in [(0.0, 0.0), (639.0, 479.0), (320.0, 0.0), (600.0, 240.0), (342.5, 234.7)] {
                 let n = camera.normalize(&Pixel { u, v }).unwrap();
@@ -274,8 +278,17 @@ mod tests {
     #[test]
     fn numbers_that_are_no_camera_are_refused() {
         assert!(matches!(Pinhole::new([640, 480], [0.0, 1.0], [1.0, 1.0], &[]), Err(BadCamera::FocalLength { .. })));
-        assert!(matches!(Pinhole::new([640, 480], [1.0, f64::NAN], [1.0, 1.0], &[]), Err(BadCamera::FocalLength { .. })));
-        assert!(matches!(Pinhole::new([640, 480], [1.0, 1.0], [700.0, 1.0], &[]), Err(BadCamera::PrincipalPoint { .. })));
-        assert!(matches!(Pinhole::new([640, 480], [1.0, 1.0], [1.0, 1.0], &[0.1]), Err(BadCamera::DistortionLength(1))));
+        assert!(matches!(
+            Pinhole::new([640, 480], [1.0, f64::NAN], [1.0, 1.0], &[]),
+            Err(BadCamera::FocalLength { .. })
+        ));
+        assert!(matches!(
+            Pinhole::new([640, 480], [1.0, 1.0], [700.0, 1.0], &[]),
+            Err(BadCamera::PrincipalPoint { .. })
+        ));
+        assert!(matches!(
+            Pinhole::new([640, 480], [1.0, 1.0], [1.0, 1.0], &[0.1]),
+            Err(BadCamera::DistortionLength(1))
+        ));
     }
 }

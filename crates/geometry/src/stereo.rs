@@ -58,11 +58,7 @@ impl StereoRig {
     ///
     /// # Errors
     /// [`BadRig`] when the cameras are less than 1e-6 m apart.
-    pub fn new(
-        left: Pinhole,
-        right: Pinhole,
-        right_from_left: Transform<RightCamera, Camera>,
-    ) -> Result<Self, BadRig> {
+    pub fn new(left: Pinhole, right: Pinhole, right_from_left: Transform<RightCamera, Camera>) -> Result<Self, BadRig> {
         let baseline = right_from_left.translation().norm();
         if !(baseline >= 1e-6) {
             return Err(BadRig(baseline));

@@ -134,9 +134,7 @@ impl<A: Frame, B: Frame> Transform<A, B> {
     /// The ξ = (φ, ρ) with Exp(ξ) = self, |φ| ≤ π.
     pub fn log(&self) -> Vector6<f64> {
         let phi = so3::log(&self.rotation());
-        let rho = so3::left_jacobian(&phi)
-            .try_inverse()
-            .expect("the left Jacobian is regular for angles up to pi")
+        let rho = so3::left_jacobian(&phi).try_inverse().expect("the left Jacobian is regular for angles up to pi")
             * self.translation();
         let mut xi = Vector6::zeros();
         xi.fixed_rows_mut::<3>(0).copy_from(&phi);
@@ -201,7 +199,13 @@ impl<A, B> fmt::Debug for Transform<A, B> {
             "{}_from_{} {{ t: [{}, {}, {}], q_xyzw: [{}, {}, {}, {}] }}",
             name(std::any::type_name::<A>()),
             name(std::any::type_name::<B>()),
-            t.x, t.y, t.z, q.i, q.j, q.k, q.w
+            t.x,
+            t.y,
+            t.z,
+            q.i,
+            q.j,
+            q.k,
+            q.w
         )
     }
 }

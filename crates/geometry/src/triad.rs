@@ -6,7 +6,9 @@ use crate::{Frame, Point, Transform};
 
 /// Three points that define no frame: they lie on a line, or two of them coincide.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the three points are collinear: the sine of the angle at the first is {sine:.2e}, at least {least:.0e} is needed")]
+#[error(
+    "the three points are collinear: the sine of the angle at the first is {sine:.2e}, at least {least:.0e} is needed"
+)]
 pub struct Collinear {
     /// The sine of the angle between P1→P2 and P1→P3.
     pub sine: f64,
