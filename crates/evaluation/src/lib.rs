@@ -1,1 +1,9 @@
 //! Errors of poses and rates of outcomes: pure functions of estimates and truth.
+//!
+//! Nothing here can see which algorithm made a number.
+
+mod fix;
+mod statistics;
+
+pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
+pub use statistics::{clopper_pearson, quantile};

@@ -1,0 +1,120 @@
+//! The errors of one fix (FORMATS: m1, m2, m3, NEES).
+//!
+//! With E = object_from_camera_est · camera_from_object_true, an estimate is right when E is the
+//! identity.
+
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, so3};
+
+/// m1: root mean square of ‖object_from_camera · C − P‖ over identified points (m): what the
+/// paper reports. It holds the evaluated points' own noise. `None` without points.
+pub fn residual_rms(
+    object_from_camera: &Transform<Object, Camera>,
+    pairs: &[(Point<Camera>, Point<Object>)],
+) -> Option<f64> {
+    root_mean_square(pairs.iter().map(|(c, p)| (*object_from_camera * *c).distance(p)))
+}
+
+/// m2: root mean square of ‖E·p − p‖ over all model points of the target (m): how far the estimate
+/// transfers the model from its place. `None` without points.
+pub fn transfer_rms(
+    estimate: &Transform<Object, Camera>,
+    truth: &Transform<Object, Camera>,
+    model: &[Point<Object>],
+) -> Option<f64> {
+    let e = *estimate * truth.inverse();
+    root_mean_square(model.iter().map(|p| (e * *p).distance(p)))
+}
+
+/// m3, position: the distance between the left camera's estimated and true place in the object frame (m).
+pub fn position_error(estimate: &Transform<Object, Camera>, truth: &Transform<Object, Camera>) -> f64 {
+    (estimate.translation() - truth.translation()).norm()
+}
+
+/// m3, attitude: the rotation angle of E (rad).
+pub fn attitude_error(estimate: &Transform<Object, Camera>, truth: &Transform<Object, Camera>) -> f64 {
+    so3::angle(&(estimate.rotation() * truth.rotation().inverse()))
+}
+
+/// The normalised error squared of a pose with its covariance: εᵀ Σ⁻¹ ε, χ² with six degrees of
+/// freedom for an honest covariance.
+///
+/// ε = (φ, displacement of `centroid`), the covariance transported there: in this form it stays χ²
+/// when the rotation is weak. `centroid` is that of the used points, camera frame. `None` when the
+/// covariance is not positive definite.
+pub fn nees(
+    estimate: &Transform<Object, Camera>,
+    truth: &Transform<Object, Camera>,
+    covariance: &Covariance6<Object, Camera>,
+    centroid: &Point<Camera>,
+) -> Option<f64> {
+    // T_true = T_est·Exp(ξ): a point c of the camera frame moves to Exp(ξ)·c, by φ×c + ρ to first order.
+    let step = estimate.inverse() * *truth;
+    let phi = so3::log(&step.rotation());
+    let moved: Vector3<f64> = (step * *centroid) - *centroid;
+    let mut error = Vector6::zeros();
+    error.fixed_rows_mut::<3>(0).copy_from(&phi);
+    error.fixed_rows_mut::<3>(3).copy_from(&moved);
+    let mut transport = Matrix6::identity();
+    transport.fixed_view_mut::<3, 3>(3, 0).copy_from(&-so3::skew(&centroid.coords));
+    transport.fixed_view_mut::<3, 3>(3, 3).copy_from(&Matrix3::identity());
+    let information = (transport * covariance.matrix * transport.transpose()).cholesky()?;
+    Some(error.dot(&information.solve(&error)))
+}
+
+/// The error beyond which a fix is wrong (m): 0.10 m or 5 % of the object's diameter, the smaller.
+pub fn alert_limit(diameter: f64) -> f64 {
+    (0.05 * diameter).min(0.10)
+}
+
+fn root_mean_square(errors: impl Iterator<Item = f64>) -> Option<f64> {
+    let (n, sum) = errors.fold((0_usize, 0.0), |(n, sum), e| (n + 1, sum + e * e));
+    (n > 0).then(|| (sum / n as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(x: f64, turn: f64) -> Transform<Object, Camera> {
+        Transform::exp(&[0.0, 0.0, turn, 0.0, 0.0, 0.0].into())
+            * Transform::<Camera, Camera>::new(so3::exp(&Vector3::zeros()), Vector3::new(x, 0.0, 2.0))
+    }
+
+    #[test]
+    fn a_shift_moves_every_model_point_alike() {
+        let model = [Point::new(0.0, 0.0, 0.0), Point::new(1.0, 0.0, 0.0), Point::new(0.0, 1.0, 0.0)];
+        let (a, b) = (pose(0.01, 0.0), pose(0.0, 0.0));
+        assert!((transfer_rms(&a, &b, &model).unwrap() - 0.01).abs() < 1e-15);
+        assert!((position_error(&a, &b) - 0.01).abs() < 1e-15);
+        assert_eq!(attitude_error(&a, &b), 0.0);
+        assert_eq!(transfer_rms(&a, &b, &[]), None);
+    }
+
+    #[test]
+    fn a_turn_is_its_angle() {
+        assert!((attitude_error(&pose(0.0, 0.3), &pose(0.0, 0.1)) - 0.2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn truth_scores_zero() {
+        let t = pose(0.4, 0.2);
+        let c = Point::new(0.1, 0.2, 3.0);
+        assert!(residual_rms(&t, &[(c, t * c)]).unwrap() < 1e-15);
+        assert!(nees(&t, &t, &Covariance6::isotropic(0.01, 0.02), &c).unwrap() < 1e-20);
+    }
+
+    #[test]
+    fn one_sigma_off_scores_one() {
+        let t = pose(0.0, 0.0);
+        let truth = t.perturbed(&[0.0, 0.0, 0.0, 0.02, 0.0, 0.0].into());
+        let n = nees(&t, &truth, &Covariance6::isotropic(0.01, 0.02), &Point::origin()).unwrap();
+        assert!((n - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_limit_is_the_smaller() {
+        assert_eq!(alert_limit(10.0), 0.10);
+        assert_eq!(alert_limit(0.2), 0.05 * 0.2);
+    }
+}

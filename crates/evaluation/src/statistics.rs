@@ -1,0 +1,64 @@
+//! Rates with their intervals, and quantiles.
+
+use statrs::distribution::{Beta, ContinuousCDF};
+
+/// The exact confidence interval of a rate of `k` events in `n` trials (Clopper and Pearson, 1934).
+///
+/// The bounds are quantiles of beta distributions: B(α/2; k, n−k+1) and B(1−α/2; k+1, n−k),
+/// α = 1 − `confidence`. Without trials nothing is known: (0, 1).
+///
+/// ```
+/// let (low, high) = seafix_evaluation::clopper_pearson(0, 299, 0.90);
+/// assert_eq!(low, 0.0);
+/// assert!((high - 0.01).abs() < 1e-4); // no event in 299 trials: below 1 % with 95 % one-sided confidence
+/// ```
+pub fn clopper_pearson(k: usize, n: usize, confidence: f64) -> (f64, f64) {
+    let alpha = 1.0 - confidence;
+    let quantile = |a: usize, b: usize, p: f64| {
+        Beta::new(a as f64, b as f64).expect("both shape parameters are at least one").inverse_cdf(p)
+    };
+    let low = if k == 0 { 0.0 } else { quantile(k, n - k + 1, 0.5 * alpha) };
+    let high = if k >= n { 1.0 } else { quantile(k + 1, n - k, 1.0 - 0.5 * alpha) };
+    (low, high)
+}
+
+/// The `p` quantile of `values` (linear between order statistics, Hyndman and Fan's type 7);
+/// sorts them in place; NaN without values.
+///
+/// ```
+/// assert_eq!(seafix_evaluation::quantile(&mut [3.0, 1.0, 2.0], 0.5), 2.0);
+/// assert_eq!(seafix_evaluation::quantile(&mut [1.0, 2.0], 0.25), 1.25);
+/// ```
+pub fn quantile(values: &mut [f64], p: f64) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    values.sort_by(f64::total_cmp);
+    let place = p.clamp(0.0, 1.0) * (values.len() - 1) as f64;
+    let (below, share) = (place.floor() as usize, place.fract());
+    match values.get(below + 1) {
+        // An infinite neighbour (a failure counted as infinity) must not turn an exact hit into NaN.
+        Some(above) if share > 0.0 => values[below] + share * (above - values[below]),
+        _ => values[below],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_have_the_textbook_interval() {
+        // R: binom.test(12, 13)$conf.int
+        let (low, high) = clopper_pearson(12, 13, 0.95);
+        assert!((low - 0.6397).abs() < 1e-4 && (high - 0.998_05).abs() < 1e-4, "{low} {high}");
+        assert_eq!(clopper_pearson(0, 0, 0.95), (0.0, 1.0));
+        assert_eq!(clopper_pearson(5, 5, 0.95).1, 1.0);
+    }
+
+    #[test]
+    fn failures_at_infinity_keep_the_median() {
+        assert_eq!(quantile(&mut [f64::INFINITY, 1.0, 2.0], 0.5), 2.0);
+        assert!(quantile(&mut [], 0.5).is_nan());
+    }
+}
