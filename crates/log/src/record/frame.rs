@@ -1,0 +1,98 @@
+//! What one stereo pair gave.
+
+use super::{Matrix3, Matrix4, TargetRecord};
+
+/// One frame: what was seen, what was known, and what came of every attempted target.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameRecord {
+    /// Number of the frame in its trial, from 0.
+    pub frame: u64,
+    /// Time of capture (ns).
+    pub stamp_ns: u64,
+    /// The left and the right image, where there are images.
+    pub images: Option<[GreyImage; 2]>,
+    /// All key points detected in the left image (u, v), in pixels.
+    pub key_points: Vec<[f64; 2]>,
+    /// The triangulated points.
+    pub cloud: Vec<CloudPoint>,
+    /// The rough pose a method may use.
+    pub prior: Option<PriorRecord>,
+    /// What really was, where it is known.
+    pub truth: Option<TruthRecord>,
+    /// What came of each attempted target; a frame that attempted none has the one
+    /// [`TargetRecord::not_attempted`].
+    pub targets: Vec<TargetRecord>,
+    /// Times of the stages that serve all targets.
+    pub times: FrameTimes,
+}
+
+/// An 8-bit grey image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GreyImage {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width · height` bytes, row by row.
+    pub pixels: Vec<u8>,
+}
+
+/// One triangulated point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CloudPoint {
+    /// Where it is, camera frame (m).
+    pub at: [f64; 3],
+    /// Its covariance (m²).
+    pub covariance: Matrix3,
+    /// Where the images show it, if it comes from images.
+    pub pixels: Option<PixelPair>,
+}
+
+/// A place in both images (u, v), in pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PixelPair {
+    /// In the left image.
+    pub left: [f64; 2],
+    /// In the right image.
+    pub right: [f64; 2],
+}
+
+/// The rough pose known before the fix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PriorRecord {
+    /// The left camera's rough pose.
+    pub world_from_camera: Matrix4,
+}
+
+/// What really was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TruthRecord {
+    /// The left camera's true pose.
+    pub world_from_camera: Matrix4,
+    /// The true place of each target, by its id: `world_from_object`.
+    pub world_from_object: Vec<(String, Matrix4)>,
+    /// The feature points that both cameras really see.
+    pub visible: Vec<VisiblePoint>,
+}
+
+/// A feature point that both cameras see, by target and its place in the target's list.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct VisiblePoint {
+    /// Id of the target.
+    pub object: String,
+    /// Index into the target's points.
+    pub point: u32,
+}
+
+/// Times of the stages that serve all targets (ms); `None` where a stage did not run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FrameTimes {
+    /// Detection, both images.
+    pub detect_ms: Option<f64>,
+    /// Description, both images.
+    pub describe_ms: Option<f64>,
+    /// Matching.
+    pub match_ms: Option<f64>,
+    /// Triangulation.
+    pub triangulate_ms: Option<f64>,
+}

@@ -1,0 +1,192 @@
+//! What came of one attempt to fix one target in one frame.
+
+use std::{fmt, str::FromStr};
+
+use super::{Matrix4, Matrix6};
+
+/// One row of the results: a frame, a target, and what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TargetRecord {
+    /// Id of the target; empty in the row of a frame that attempted none.
+    pub object: String,
+    /// Name of the search.
+    pub search: String,
+    /// Name of the solver.
+    pub solver: String,
+    /// What came of it.
+    pub outcome: Outcome,
+    /// Why not, in one word of the results' vocabulary (`too-few`, `chance`, `budget`, …); empty when
+    /// referenced.
+    pub reason: String,
+    /// Why not, in a sentence with numbers; empty when referenced.
+    pub detail: String,
+    /// The estimated pose, when referenced.
+    pub object_from_camera: Option<Matrix4>,
+    /// Its covariance, of ξ in `T_true = T_est · Exp(ξ)`, camera frame, rotation first.
+    pub covariance: Option<Matrix6>,
+    /// For each point of the target, the indices of the cloud points that might be it.
+    pub candidates: Vec<Vec<u32>>,
+    /// The identified points.
+    pub pairs: Vec<Pair>,
+    /// Indices into `pairs` of the points that the solver used.
+    pub used: Vec<u32>,
+    /// Other poses that explain the data.
+    pub alternatives: Vec<Alternative>,
+    /// Whether the search proved that no larger set exists.
+    pub optimal: Option<bool>,
+    /// No admissible set has more pairs than this.
+    pub size_bound: Option<u64>,
+    /// Expected number of chance sets at least as large as the one found.
+    pub expected_chance_sets: Option<f64>,
+    /// Pair tests that the search spent.
+    pub tests: Option<u64>,
+    /// Root mean square of C·H − P over the pairs (m).
+    pub residual_rms: Option<f64>,
+    /// How it compares with truth.
+    pub evaluation: Evaluation,
+    /// Times of the stages that serve this target alone.
+    pub times: TargetTimes,
+}
+
+impl TargetRecord {
+    /// The row of `object`, attempted with this search and solver, refused for `reason`, with all that
+    /// is unknown left empty.
+    pub fn refused(object: &str, search: &str, solver: &str, reason: &str) -> Self {
+        Self {
+            object: object.to_owned(),
+            search: search.to_owned(),
+            solver: solver.to_owned(),
+            outcome: Outcome::Unidentified,
+            reason: reason.to_owned(),
+            detail: String::new(),
+            object_from_camera: None,
+            covariance: None,
+            candidates: Vec::new(),
+            pairs: Vec::new(),
+            used: Vec::new(),
+            alternatives: Vec::new(),
+            optimal: None,
+            size_bound: None,
+            expected_chance_sets: None,
+            tests: None,
+            residual_rms: None,
+            evaluation: Evaluation::default(),
+            times: TargetTimes::default(),
+        }
+    }
+
+    /// The row of a frame that attempted no target, for `reason` (`no-data`, `nothing-in-view`).
+    pub fn not_attempted(search: &str, solver: &str, reason: &str) -> Self {
+        Self::refused("", search, solver, reason)
+    }
+
+    /// Whether this row is an attempt at a target.
+    pub fn attempted(&self) -> bool {
+        !self.object.is_empty()
+    }
+}
+
+/// What came of an attempt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Outcome {
+    /// A pose that passed every test.
+    Referenced,
+    /// Several poses explain the data equally well.
+    Ambiguous,
+    /// No set of points was identified, or the set was not believed.
+    Unidentified,
+    /// The identified points determine no pose.
+    Degenerate,
+}
+
+impl Outcome {
+    /// All outcomes.
+    pub const ALL: [Self; 4] = [Self::Referenced, Self::Ambiguous, Self::Unidentified, Self::Degenerate];
+
+    /// The word for it in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Referenced => "referenced",
+            Self::Ambiguous => "ambiguous",
+            Self::Unidentified => "unidentified",
+            Self::Degenerate => "degenerate",
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Outcome {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|outcome| outcome.name() == word)
+            .ok_or_else(|| format!("no outcome is called `{word}`; there are {}", Self::ALL.map(Self::name).join(", ")))
+    }
+}
+
+/// A point of the target and the cloud point believed to be it, by their indices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Pair {
+    /// Index into the target's points.
+    pub model: u32,
+    /// Index into the frame's cloud.
+    pub cloud: u32,
+}
+
+/// Another pose that explains the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alternative {
+    /// The pose.
+    pub object_from_camera: Matrix4,
+    /// Its pairs.
+    pub pairs: Vec<Pair>,
+    /// How well it explains the data; larger is better.
+    pub score: f64,
+}
+
+/// How an attempt compares with truth; `None` where truth or a pose is missing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Evaluation {
+    /// Referenced, and m2 beyond the alert limit.
+    pub wrong: Option<bool>,
+    /// A false pair was used.
+    pub wrong_pairs: Option<bool>,
+    /// Points of the target that both cameras really see.
+    pub visible: Option<u32>,
+    /// Pairs that were identified.
+    pub identified: Option<u32>,
+    /// Pairs whose cloud point lies within 2 px of the true projections, in both images.
+    pub correct_pairs: Option<u32>,
+    /// m1 over the correctly identified pairs, RMS (m): the residual C·H − P.
+    pub m1_rms: Option<f64>,
+    /// m1 without the points the solver used (m).
+    pub m1_unused_rms: Option<f64>,
+    /// m2 over all points of the target, RMS (m): the error of transferred model points.
+    pub m2_rms: Option<f64>,
+    /// m3: error of the left camera's position in the object frame (m).
+    pub m3_position: Option<f64>,
+    /// m3: error of its attitude (rad).
+    pub m3_attitude: Option<f64>,
+    /// Normalised estimation error squared, six degrees of freedom.
+    pub nees: Option<f64>,
+}
+
+/// Times of the stages that serve one target (ms); `None` where a stage did not run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TargetTimes {
+    /// Choosing candidates.
+    pub candidates_ms: Option<f64>,
+    /// Search.
+    pub search_ms: Option<f64>,
+    /// Solve.
+    pub solve_ms: Option<f64>,
+    /// From the images to this target's answer.
+    pub total_ms: Option<f64>,
+}
