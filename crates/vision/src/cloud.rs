@@ -30,7 +30,7 @@ pub fn triangulate(pairs: &[StereoPixels], rig: &StereoRig, settings: &Triangula
         .filter_map(|pair| {
             let found = rig.triangulate(pair, settings.sigma_px).ok()?;
             let near = found.point.coords.z <= settings.max_depth;
-            near.then(|| MeasuredPoint {
+            near.then_some(MeasuredPoint {
                 position: seafix_geometry::UncertainPoint { at: found.point, covariance: found.covariance },
                 pixels: Some(*pair),
             })

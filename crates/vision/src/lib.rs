@@ -10,11 +10,14 @@
 mod cloud;
 mod describe;
 mod detect;
+mod gaussian;
 mod image;
 mod matching;
+mod refine;
 
 pub use cloud::{Triangulator, triangulate};
-pub use describe::{DESCRIPTORS, Descriptor, Descriptors};
-pub use detect::{DETECTORS, Detector, Keypoint};
+pub use describe::{DESCRIPTORS, Descriptor, Descriptors, Surf};
+pub use detect::{DETECTORS, Detector, Harris, Keypoint};
 pub use image::{BadImage, Image};
-pub use matching::{MATCHERS, Match, Matcher, View};
+pub use matching::{MATCHERS, Match, Matcher, MutualRatio, View};
+pub use refine::{Refine, stereo_pixels};

@@ -1,6 +1,10 @@
 //! Descriptors: what the surroundings of a key point look like.
 
-use seafix_component::Registry;
+mod integral;
+mod surf;
+
+use seafix_component::{Registry, entry};
+pub use surf::Surf;
 
 use crate::{Image, Keypoint};
 
@@ -14,13 +18,17 @@ pub struct Descriptors {
 impl Descriptors {
     /// Descriptors of `length` numbers each, one after the other.
     pub fn new(length: usize, values: Vec<f32>) -> Self {
-        assert!(length > 0 && values.len() % length == 0, "descriptors of {length} do not fill {}", values.len());
+        assert!(
+            length > 0 && values.len().is_multiple_of(length),
+            "descriptors of {length} do not fill {}",
+            values.len()
+        );
         Self { length, values }
     }
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        if self.length == 0 { 0 } else { self.values.len() / self.length }
+        self.values.len().checked_div(self.length).unwrap_or(0)
     }
 
     /// Whether there is none.
@@ -41,4 +49,4 @@ pub trait Descriptor: Send + Sync + std::fmt::Debug {
 }
 
 /// All descriptors.
-pub static DESCRIPTORS: Registry<dyn Descriptor> = Registry::new("descriptor", &[]);
+pub static DESCRIPTORS: Registry<dyn Descriptor> = Registry::new("descriptor", &[entry!(Surf)]);

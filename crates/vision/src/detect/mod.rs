@@ -1,6 +1,10 @@
 //! Detectors: where in an image there is something to find again.
 
-use seafix_component::Registry;
+mod harris;
+mod peaks;
+
+pub use harris::Harris;
+use seafix_component::{Registry, entry};
 use seafix_geometry::Pixel;
 
 use crate::Image;
@@ -23,4 +27,4 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
 }
 
 /// All detectors.
-pub static DETECTORS: Registry<dyn Detector> = Registry::new("detector", &[]);
+pub static DETECTORS: Registry<dyn Detector> = Registry::new("detector", &[entry!(Harris)]);

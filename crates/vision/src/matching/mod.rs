@@ -1,6 +1,11 @@
 //! Matchers: which key point of the right image is which of the left.
 
-use seafix_component::Registry;
+mod epipolar;
+mod mutual_ratio;
+mod nearest;
+
+pub use mutual_ratio::MutualRatio;
+use seafix_component::{Registry, entry};
 use seafix_geometry::StereoRig;
 
 use crate::{Descriptors, Image, Keypoint};
@@ -34,4 +39,4 @@ pub trait Matcher: Send + Sync + std::fmt::Debug {
 }
 
 /// All matchers.
-pub static MATCHERS: Registry<dyn Matcher> = Registry::new("matcher", &[]);
+pub static MATCHERS: Registry<dyn Matcher> = Registry::new("matcher", &[entry!(MutualRatio)]);

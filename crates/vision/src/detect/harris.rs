@@ -1,0 +1,274 @@
+//! Harris' corner detector.
+
+use seafix_component::Component;
+use seafix_geometry::Pixel;
+use serde::{Deserialize, Serialize};
+
+use super::{Detector, Keypoint, peaks};
+use crate::{Image, gaussian::half_kernel};
+
+/// Harris' corners: places whose surroundings change in every direction.
+///
+/// The gradient g (grey levels/px, Sobel's operator) gives the structure tensor
+/// A = G_σ ∗ g gᵀ, integrated with a Gaussian; the response is R = det A − k (tr A)²
+/// (grey levels⁴/px⁴): positive at corners, negative along edges, zero where nothing changes.
+/// A corner is a maximum of R, placed to a fraction of a pixel by the quadratic through its nine
+/// responses.
+///
+/// Nothing is found nearer to the border than the operator reaches, 3σ + 2 px; an image too small
+/// for that has no corner. The response of a convex corner peaks inside it by about σ/2, in both
+/// images of a pair alike.
+///
+/// Source: Harris and Stephens, *A combined corner and edge detector*, Alvey Vision Conference, 1988.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Harris {
+    /// Standard deviation of the Gaussian that integrates the structure tensor (px).
+    pub sigma: f64,
+    /// Harris' constant k: how strongly a straight edge is rejected; 0.04 to 0.06 is common.
+    pub k: f64,
+    /// The weakest response worth keeping, relative to the strongest of the image. The response goes
+    /// with the fourth power of contrast: 1e-4 keeps a tenth of the strongest contrast.
+    pub quality: f64,
+    /// No corner has a stronger one within this distance (px).
+    pub radius: usize,
+    /// At most so many corners.
+    pub features: usize,
+    /// Cells along the longer side of the image over which the budget is spread; in each round every
+    /// cell contributes its strongest corner left. 0: the strongest of the whole image.
+    pub balance: usize,
+}
+
+impl Default for Harris {
+    fn default() -> Self {
+        Self { sigma: 1.5, k: 0.04, quality: 1e-4, radius: 4, features: 1000, balance: 8 }
+    }
+}
+
+impl Component for Harris {
+    const NAME: &'static str = "harris";
+    const SUMMARY: &'static str = "corners by the structure tensor, to a fraction of a pixel, spread over the image";
+    const SOURCE: &'static str =
+        "Harris and Stephens, A combined corner and edge detector, Alvey Vision Conference, 1988";
+}
+
+impl Detector for Harris {
+    fn detect(&self, image: &Image) -> Vec<Keypoint> {
+        let response = self.response(image);
+        let strongest = response.iter().copied().fold(0.0_f32, f32::max);
+        let least = (f64::from(strongest) * self.quality) as f32;
+        let mut found = peaks::maxima(&response, image.width(), least, self.radius);
+        peaks::strongest(&mut found, [image.width(), image.height()], self.features, self.balance);
+        found
+            .into_iter()
+            .map(|peak| {
+                let at: Pixel = peaks::vertex(&response, image.width(), &peak);
+                Keypoint { at, response: peak.response, scale: self.sigma as f32 }
+            })
+            .collect()
+    }
+}
+
+impl Harris {
+    /// R at every pixel; zero nearer to the border than the operator reaches.
+    fn response(&self, image: &Image) -> Vec<f32> {
+        let (width, height) = (image.width(), image.height());
+        let kernel = half_kernel(self.sigma);
+        let reach = kernel.len() - 1;
+        let margin = reach + 1;
+        let mut response = vec![0.0; width * height];
+        if width <= 2 * margin || height <= 2 * margin {
+            return response;
+        }
+        // The tensor's rows, smoothed along x, of the last 2·reach + 1 rows; then smoothed along y.
+        // Indices of columns count from the first column that has a gradient, column 1.
+        let gradients = width - 2;
+        let inner = gradients - 2 * reach;
+        let rows = 2 * reach + 1;
+        let mut ring = vec![0.0; rows * 3 * inner];
+        let mut products = vec![0.0; 3 * gradients];
+        let mut tensor = vec![0.0; 3 * inner];
+        let k = self.k as f32;
+        for y in 1..height - 1 {
+            let (xx, rest) = products.split_at_mut(gradients);
+            let (xy, yy) = rest.split_at_mut(gradients);
+            tensor_row(image, y, xx, xy, yy);
+            let slot = &mut ring[(y % rows) * 3 * inner..][..3 * inner];
+            for (smooth, product) in slot.chunks_exact_mut(inner).zip(products.chunks_exact(gradients)) {
+                weigh(smooth, &product[reach..], kernel[0]);
+                for (step, &weight) in kernel.iter().enumerate().skip(1) {
+                    add_pair(smooth, &product[reach - step..], &product[reach + step..], weight);
+                }
+            }
+            let Some(centre) = y.checked_sub(reach).filter(|&centre| centre > reach) else { continue };
+            let row = |y: usize| &ring[(y % rows) * 3 * inner..][..3 * inner];
+            weigh(&mut tensor, row(centre), kernel[0]);
+            for (step, &weight) in kernel.iter().enumerate().skip(1) {
+                add_pair(&mut tensor, row(centre - step), row(centre + step), weight);
+            }
+            let (xx, rest) = tensor.split_at(inner);
+            let (xy, yy) = rest.split_at(inner);
+            let out = &mut response[centre * width + margin..][..inner];
+            for (((out, &xx), &xy), &yy) in out.iter_mut().zip(xx).zip(xy).zip(yy) {
+                let trace = xx + yy;
+                *out = (xx * yy - xy * xy) - k * (trace * trace);
+            }
+        }
+        response
+    }
+}
+
+/// The products gx gx, gx gy, gy gy of row `y`, without its first and last column.
+fn tensor_row(image: &Image, y: usize, xx: &mut [f32], xy: &mut [f32], yy: &mut [f32]) {
+    let n = xx.len();
+    let (above, here, below) = (image.row(y - 1), image.row(y), image.row(y + 1));
+    // Sobel's operator sums eight differences of one pixel.
+    const EIGHTH: f32 = 0.125;
+    let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..]];
+    let [h0, h2] = [&here[..n], &here[2..]];
+    let [b0, b1, b2] = [&below[..n], &below[1..=n], &below[2..]];
+    for x in 0..n {
+        let gx = (((a2[x] - a0[x]) + (b2[x] - b0[x])) + 2.0 * (h2[x] - h0[x])) * EIGHTH;
+        let gy = (((b0[x] - a0[x]) + (b2[x] - a2[x])) + 2.0 * (b1[x] - a1[x])) * EIGHTH;
+        xx[x] = gx * gx;
+        xy[x] = gx * gy;
+        yy[x] = gy * gy;
+    }
+}
+
+/// out = weight · a.
+fn weigh(out: &mut [f32], a: &[f32], weight: f32) {
+    for (out, &a) in out.iter_mut().zip(a) {
+        *out = weight * a;
+    }
+}
+
+/// out += weight · (a + b): both sides of a symmetric kernel at once.
+fn add_pair(out: &mut [f32], a: &[f32], b: &[f32], weight: f32) {
+    for ((out, &a), &b) in out.iter_mut().zip(a).zip(b) {
+        *out += weight * (a + b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Smooth blobs and ramps of many frequencies, 8 bits.
+    fn texture(width: usize, height: usize) -> Image {
+        let value = |x: usize, y: usize| {
+            let hash = |x: usize, y: usize| {
+                let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+                h ^= h >> 15;
+                h = h.wrapping_mul(0x2C1B_3C6D);
+                (h ^ (h >> 13)) % 200
+            };
+            // Cells of 7 px: corners where four cells meet.
+            hash(x / 7, y / 7) as f32 + (hash(x, y) % 5) as f32
+        };
+        Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
+    }
+
+    fn nearest(points: &[Keypoint], at: Pixel) -> f64 {
+        points.iter().map(|p| p.at.distance(&at)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// A quarter of the plane, x ≥ `x` and y ≥ `y`, brighter; blurred by one pixel's area.
+    fn quadrant(x: f64, y: f64, size: usize) -> Image {
+        let cover = |i: usize, edge: f64| (i as f64 + 0.5 - edge).clamp(0.0, 1.0);
+        let pixel = |i: usize| 50.0 + 100.0 * cover(i % size, x) * cover(i / size, y);
+        Image::new(size, size, (0..size * size).map(|i| pixel(i) as f32).collect()).unwrap()
+    }
+
+    /// Two opposite quarters brighter: the corner of a chessboard, at (x, y).
+    fn crossing(x: f64, y: f64, size: usize) -> Image {
+        let cover = |i: usize, edge: f64| (i as f64 + 0.5 - edge).clamp(0.0, 1.0);
+        let pixel = |i: usize| {
+            let (a, b) = (cover(i % size, x), cover(i / size, y));
+            50.0 + 100.0 * (a * b + (1.0 - a) * (1.0 - b))
+        };
+        Image::new(size, size, (0..size * size).map(|i| pixel(i) as f32).collect()).unwrap()
+    }
+
+    #[test]
+    fn a_chessboard_corner_is_found_where_it_is() {
+        for (x, y) in [(20.0, 20.0), (20.5, 19.5), (20.25, 20.7), (19.9, 20.3)] {
+            let found = Harris::default().detect(&crossing(x, y, 41));
+            assert_eq!(found.len(), 1, "{found:?}");
+            assert!(found[0].at.distance(&Pixel { u: x, v: y }) < 0.15, "{:?} for {x}, {y}", found[0].at);
+        }
+    }
+
+    #[test]
+    fn the_corner_of_a_box_is_found_a_little_inside_it() {
+        let found = Harris::default().detect(&quadrant(20.0, 20.0, 41));
+        assert_eq!(found.len(), 1);
+        let Pixel { u, v } = found[0].at;
+        assert!((u - v).abs() < 1e-4 && u > 20.2 && u < 21.5, "{u}, {v}");
+    }
+
+    #[test]
+    fn images_without_structure_have_no_corner() {
+        for (width, height) in [(1, 1), (2, 2), (1, 50), (64, 48), (300, 3)] {
+            let flat = Image::new(width, height, vec![128.0; width * height]).unwrap();
+            assert_eq!(Harris::default().detect(&flat), []);
+        }
+        let ramp = Image::new(64, 48, (0..64 * 48).map(|i| (i % 64) as f32).collect()).unwrap();
+        assert_eq!(Harris::default().detect(&ramp), [], "a straight edge is no corner");
+    }
+
+    #[test]
+    fn a_quarter_turn_of_the_image_turns_the_corners() {
+        let image = texture(90, 70);
+        // (x, y) goes to (y, width − 1 − x): a quarter turn to the left.
+        let turned = (0..90 * 70).map(|i| image.row(i % 70)[89 - i / 70]).collect();
+        let turned = Image::new(70, 90, turned).unwrap();
+        let (before, after) = (Harris::default().detect(&image), Harris::default().detect(&turned));
+        assert!(before.len() > 40);
+        assert_eq!(before.len(), after.len());
+        for point in &before {
+            let expected = Pixel { u: point.at.v, v: 89.0 - point.at.u };
+            assert!(nearest(&after, expected) < 1e-4, "{point:?}");
+        }
+    }
+
+    #[test]
+    fn a_shift_by_whole_pixels_shifts_the_corners() {
+        let big = texture(120, 100);
+        let crop = |x0: usize, y0: usize| {
+            let pixels = (0..80 * 60).map(|i| big.row(y0 + i / 80)[x0 + i % 80]).collect();
+            Image::new(80, 60, pixels).unwrap()
+        };
+        // No relative threshold: the strongest corner of one crop may be outside the other.
+        let harris = Harris { quality: 0.0, balance: 0, ..Harris::default() };
+        let (a, b) = (harris.detect(&crop(10, 10)), harris.detect(&crop(15, 17)));
+        let mut compared = 0;
+        for point in &a {
+            let shifted = Pixel { u: point.at.u - 5.0, v: point.at.v - 7.0 };
+            let inner = shifted.u > 14.0 && shifted.u < 65.0 && shifted.v > 14.0 && shifted.v < 45.0;
+            if inner {
+                assert!(nearest(&b, shifted) < 1e-12, "{point:?}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 10, "{compared}");
+    }
+
+    #[test]
+    fn more_light_everywhere_changes_nothing() {
+        let image = texture(80, 60);
+        let brighter = Image::new(80, 60, image.pixels().iter().map(|p| p + 40.0).collect()).unwrap();
+        assert_eq!(Harris::default().detect(&image), Harris::default().detect(&brighter));
+    }
+
+    #[test]
+    fn the_budget_is_kept_and_the_strongest_come_first() {
+        let image = texture(200, 150);
+        let all = Harris { features: usize::MAX, ..Harris::default() }.detect(&image);
+        assert!(all.len() > 100);
+        assert!(all.windows(2).all(|w| w[0].response >= w[1].response));
+        let some = Harris { features: 30, balance: 0, ..Harris::default() }.detect(&image);
+        assert_eq!(some, all[..30]);
+        assert!(Harris { features: 0, ..Harris::default() }.detect(&image).is_empty());
+    }
+}

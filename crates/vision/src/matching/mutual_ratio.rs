@@ -1,0 +1,229 @@
+//! Mutual nearest neighbours with the ratio test.
+
+use seafix_component::Component;
+use seafix_geometry::StereoRig;
+use serde::{Deserialize, Serialize};
+
+use super::{Match, Matcher, View, epipolar::Band, nearest::Nearest};
+
+/// Pairs of key points that are each other's nearest by descriptor, clearly nearer than the second.
+///
+/// Distance is Euclidean between descriptors; a pair passes when it is at most `ratio` times the
+/// distance to the second nearest, seen from either side. Only pairs that the rig allows compete, for
+/// the second place too: a pattern that repeats itself would otherwise have no clear nearest anywhere.
+/// A pair is allowed when the key points lie within `epipolar_px` of seeing one point (Sampson
+/// distance, as in [`StereoRig::epipolar_distance`]) whose depth lies between the limits; this holds
+/// for any rig, rectified or not.
+///
+/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct MutualRatio {
+    /// The greatest distance, as a share of the distance to the second nearest; 1 switches the test off.
+    pub ratio: f64,
+    /// The greatest distance between descriptors of unit length, whatever the second is: 2 − 2 cos of
+    /// their angle is its square.
+    pub max_distance: f64,
+    /// Half width of the epipolar band (px). 0: every pair is allowed, at any depth.
+    pub epipolar_px: f64,
+    /// Least depth in the left camera (m).
+    pub min_depth: f64,
+    /// Greatest depth in the left camera (m).
+    pub max_depth: f64,
+}
+
+impl Default for MutualRatio {
+    fn default() -> Self {
+        Self { ratio: 0.85, max_distance: 0.7, epipolar_px: 2.0, min_depth: 0.1, max_depth: 50.0 }
+    }
+}
+
+impl Component for MutualRatio {
+    const NAME: &'static str = "mutual-ratio";
+    const SUMMARY: &'static str = "mutual nearest neighbours along the epipolar band, with the ratio test";
+    const SOURCE: &'static str = "Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004";
+}
+
+impl Matcher for MutualRatio {
+    fn matches(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Vec<Match> {
+        let nearest = if self.epipolar_px > 0.0 {
+            let band =
+                Band::new(left.keypoints, right.keypoints, rig, self.epipolar_px, self.min_depth, self.max_depth);
+            Nearest::among(left.descriptors, right.descriptors, |i, j| band.allows(i, j))
+        } else {
+            Nearest::of_all(left.descriptors, right.descriptors)
+        };
+        let ratio = (self.ratio * self.ratio) as f32;
+        let greatest = (self.max_distance * self.max_distance) as f32;
+        nearest
+            .mutual()
+            .filter(|pair| pair.squared <= greatest && pair.squared <= ratio * pair.second)
+            .map(|pair| Match { left: pair.left, right: pair.right, distance: pair.squared.sqrt() })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Descriptors, Image, Keypoint};
+    use nalgebra::{UnitQuaternion, Vector3};
+    use seafix_geometry::{Pinhole, Pixel, Point, Transform};
+
+    /// The right camera `step` (m) from the left one and turned by `turn` (rad).
+    fn rig(step: Vector3<f64>, turn: Vector3<f64>) -> StereoRig {
+        let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[-0.05, 0.01, 0.001, 0.0]).unwrap();
+        let rotation = UnitQuaternion::from_scaled_axis(turn);
+        StereoRig::new(camera, camera, Transform::new(rotation, rotation * -step)).unwrap()
+    }
+
+    fn numbers(seed: u32) -> impl FnMut() -> f32 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        }
+    }
+
+    fn keypoints(pixels: &[Pixel]) -> Vec<Keypoint> {
+        pixels.iter().map(|&at| Keypoint { at, response: 1.0, scale: 1.0 }).collect()
+    }
+
+    fn unit(values: Vec<f32>, length: usize) -> Descriptors {
+        let unit = values.chunks_exact(length).flat_map(|v| {
+            let norm = v.iter().map(|x| x * x).sum::<f32>().sqrt();
+            v.iter().map(move |x| x / norm)
+        });
+        Descriptors::new(length, unit.collect())
+    }
+
+    fn matched(
+        matcher: &MutualRatio,
+        left: (&[Pixel], &Descriptors),
+        right: (&[Pixel], &Descriptors),
+        rig: &StereoRig,
+    ) -> Vec<Match> {
+        let image = Image::new(1, 1, vec![0.0]).unwrap();
+        let (l, r) = (keypoints(left.0), keypoints(right.0));
+        matcher.matches(
+            &View { image: &image, keypoints: &l, descriptors: left.1 },
+            &View { image: &image, keypoints: &r, descriptors: right.1 },
+            rig,
+        )
+    }
+
+    /// Points at random depths, their pixels in both images and random descriptors, noisy on the right,
+    /// where they come in reverse order.
+    fn scene(n: usize, rig: &StereoRig) -> (Vec<Pixel>, Vec<Pixel>, Descriptors, Descriptors) {
+        let mut next = numbers(7);
+        let (mut left, mut right, mut a, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        while left.len() < n {
+            let z = 1.0 + 4.0 * f64::from(next());
+            let point = Point::new(z * (f64::from(next()) - 0.5), z * (f64::from(next()) - 0.5), z);
+            let Some(seen) = rig.sees(&point, 5.0) else { continue };
+            left.push(seen.left);
+            right.insert(0, seen.right);
+            let d: Vec<f32> = (0..16).map(|_| next() - 0.5).collect();
+            b.splice(0..0, d.iter().map(|x| x + 0.2 * (next() - 0.5)).collect::<Vec<_>>());
+            a.extend(d);
+        }
+        (left, right, unit(a, 16), unit(b, 16))
+    }
+
+    /// The definition, word by word.
+    fn brute_force(
+        m: &MutualRatio,
+        left: (&[Pixel], &Descriptors),
+        right: (&[Pixel], &Descriptors),
+        rig: &StereoRig,
+    ) -> Vec<(usize, usize)> {
+        let allowed = |i: usize, j: usize| {
+            let seen = seafix_geometry::StereoPixels { left: left.0[i], right: right.0[j] };
+            m.epipolar_px == 0.0
+                || rig.epipolar_distance(&seen).is_some_and(|d| d <= m.epipolar_px)
+                    && rig
+                        .triangulate(&seen, 0.1)
+                        .is_ok_and(|t| (m.min_depth..=m.max_depth).contains(&t.point.coords.z))
+        };
+        let distance = |i: usize, j: usize| -> f32 {
+            left.1.get(i).iter().zip(right.1.get(j)).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
+        };
+        let mut pairs = Vec::new();
+        for i in 0..left.0.len() {
+            for j in 0..right.0.len() {
+                let d = distance(i, j);
+                let clear = |rivals: Vec<f32>| rivals.into_iter().all(|rival| d <= m.ratio as f32 * rival);
+                if allowed(i, j)
+                    && d <= m.max_distance as f32
+                    && clear((0..right.0.len()).filter(|&k| k != j && allowed(i, k)).map(|k| distance(i, k)).collect())
+                    && clear((0..left.0.len()).filter(|&k| k != i && allowed(k, j)).map(|k| distance(k, j)).collect())
+                {
+                    pairs.push((i, j));
+                }
+            }
+        }
+        pairs
+    }
+
+    #[test]
+    fn it_is_the_definition() {
+        for (step, turn) in [
+            (Vector3::new(0.25, 0.0, 0.0), Vector3::zeros()),
+            (Vector3::new(0.01, 0.3, 0.02), Vector3::new(0.05, -0.02, 0.1)),
+        ] {
+            let rig = rig(step, turn);
+            let (l, r, a, b) = scene(150, &rig);
+            for matcher in [
+                MutualRatio::default(),
+                MutualRatio { epipolar_px: 0.0, ..MutualRatio::default() },
+                MutualRatio { epipolar_px: 60.0, ratio: 0.95, max_distance: 1.2, ..MutualRatio::default() },
+                MutualRatio { min_depth: 2.0, max_depth: 3.0, ..MutualRatio::default() },
+            ] {
+                let found = matched(&matcher, (&l, &a), (&r, &b), &rig);
+                let pairs: Vec<_> = found.iter().map(|m| (m.left, m.right)).collect();
+                assert_eq!(pairs, brute_force(&matcher, (&l, &a), (&r, &b), &rig), "{matcher:?}");
+                // Left to right and back: the same pairs when the images change places (P54).
+                if matcher.epipolar_px == 0.0 {
+                    let mut back: Vec<_> =
+                        matched(&matcher, (&r, &b), (&l, &a), &rig).iter().map(|m| (m.right, m.left)).collect();
+                    back.sort_unstable();
+                    assert_eq!(pairs, back);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_point_of_a_vertical_rig_finds_its_own() {
+        let rig = rig(Vector3::new(0.0, 0.3, 0.0), Vector3::new(0.0, 0.0, 0.2));
+        let (l, r, a, b) = scene(100, &rig);
+        let found = matched(&MutualRatio::default(), (&l, &a), (&r, &b), &rig);
+        assert!(found.len() >= 98, "{}", found.len());
+        assert!(found.iter().all(|m| m.right == 99 - m.left));
+    }
+
+    #[test]
+    fn alike_points_are_told_apart_by_the_band_alone() {
+        let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
+        // A column of points that all look the same.
+        let seen: Vec<_> =
+            (0..9).map(|i| rig.project(&Point::new(0.0, f64::from(i) * 0.2 - 0.8, 2.0)).unwrap()).collect();
+        let (l, r): (Vec<_>, Vec<_>) = seen.iter().map(|s| (s.left, s.right)).unzip();
+        let same = Descriptors::new(2, [0.6, 0.8].repeat(9));
+        let found = matched(&MutualRatio::default(), (&l, &same), (&r, &same), &rig);
+        assert!(found.iter().map(|m| (m.left, m.right)).eq((0..9).map(|i| (i, i))));
+        let without = MutualRatio { epipolar_px: 0.0, ..MutualRatio::default() };
+        assert!(matched(&without, (&l, &same), (&r, &same), &rig).len() <= 1);
+    }
+
+    #[test]
+    fn nothing_matches_nothing() {
+        let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
+        let (l, _, a, _) = scene(3, &rig);
+        let none = Descriptors::new(16, Vec::new());
+        for matcher in [MutualRatio::default(), MutualRatio { epipolar_px: 0.0, ..MutualRatio::default() }] {
+            assert!(matched(&matcher, (&l, &a), (&[], &none), &rig).is_empty());
+            assert!(matched(&matcher, (&[], &none), (&l, &a), &rig).is_empty());
+        }
+    }
+}
