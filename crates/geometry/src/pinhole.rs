@@ -37,6 +37,14 @@ impl Distortion {
         &self.coefficients
     }
 
+    /// The coefficients without trailing zeros, as the shortest list that calibration files know: 0,
+    /// 4, 5 or 8 numbers.
+    pub fn shortest(&self) -> &[f64] {
+        let used = self.coefficients.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
+        let length = [0, 4, 5, 8].into_iter().find(|&length| length >= used).unwrap_or(8);
+        &self.coefficients[..length]
+    }
+
     /// ρ(r²) and dρ/d(r²).
     fn radial(&self, r2: f64) -> (f64, f64) {
         let [k1, k2, _, _, k3, k4, k5, k6] = self.coefficients;

@@ -87,6 +87,15 @@ impl StereoRig {
         self.right_from_left.translation().norm()
     }
 
+    /// Whether rows of the two images correspond: the same camera twice, without distortion, one
+    /// beside the other along x.
+    pub fn is_rectified(&self) -> bool {
+        let t = self.right_from_left.translation();
+        let aligned = crate::so3::angle(&self.right_from_left.rotation()) < 1e-12
+            && t.y.abs().max(t.z.abs()) < 1e-12 * self.baseline();
+        aligned && self.left == self.right && self.left.distortion().shortest().is_empty()
+    }
+
     /// Where both cameras see `point`, inside their images or not; `None` if one of them cannot.
     pub fn project(&self, point: &Point<Camera>) -> Option<StereoPixels> {
         let left = self.left.project(point)?;
