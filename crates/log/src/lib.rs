@@ -16,17 +16,22 @@
 //! - A file is written as `NAME.partial` and renamed when it is complete; what still carries
 //!   `.partial` was interrupted.
 
+mod check;
+mod convert;
 mod error;
+mod png;
+mod proto;
+mod read;
 mod record;
+mod topic;
+mod view;
 mod write;
 
 pub use error::LogError;
+pub use read::{Reader, TrialLog, read};
 pub use record::{
     Alternative, Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, Matrix3,
     Matrix4, Matrix6, ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord,
     TargetTimes, TrialHeader, TruthRecord, VisiblePoint,
 };
 pub use write::Writer;
-
-mod read;
-pub use read::{TrialLog, read};

@@ -1,0 +1,177 @@
+//! What came of the attempts of a frame: results, candidates, evaluations, times.
+
+use super::{Malformed, flat, matrix, matrix_if_any};
+use crate::{Alternative, Evaluation, FrameRecord, FrameTimes, Outcome, Pair, TargetRecord, TargetTimes, proto};
+
+/// The message that holds target `index` of `frame`, without candidates, evaluation and times.
+pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::ReferencingResult {
+    let target = &frame.targets[index];
+    let alternative = |other: &Alternative| proto::Alternative {
+        object_from_camera: flat(&other.object_from_camera),
+        pairs: pair_messages(&other.pairs),
+        score: other.score,
+    };
+    proto::ReferencingResult {
+        frame: frame.frame,
+        stamp_ns: frame.stamp_ns,
+        index: index as u32,
+        object: target.object.clone(),
+        search: target.search.clone(),
+        solver: target.solver.clone(),
+        outcome: outcome_message(target.outcome).into(),
+        reason: target.reason.clone(),
+        detail: target.detail.clone(),
+        object_from_camera: target.object_from_camera.as_ref().map(flat).unwrap_or_default(),
+        covariance: target.covariance.as_ref().map(flat).unwrap_or_default(),
+        pairs: pair_messages(&target.pairs),
+        used: target.used.clone(),
+        alternatives: target.alternatives.iter().map(alternative).collect(),
+        optimal: target.optimal,
+        size_bound: target.size_bound,
+        expected_chance_sets: target.expected_chance_sets,
+        tests: target.tests,
+        residual_rms: target.residual_rms,
+    }
+}
+
+fn pair_messages(pairs: &[Pair]) -> Vec<proto::Pair> {
+    pairs.iter().map(|&Pair { model, cloud }| proto::Pair { model, cloud }).collect()
+}
+
+fn outcome_message(outcome: Outcome) -> proto::Outcome {
+    match outcome {
+        Outcome::Referenced => proto::Outcome::Referenced,
+        Outcome::Ambiguous => proto::Outcome::Ambiguous,
+        Outcome::Unidentified => proto::Outcome::Unidentified,
+        Outcome::Degenerate => proto::Outcome::Degenerate,
+    }
+}
+
+/// The target that `message` and its `candidates` hold, still without evaluation and times.
+pub(crate) fn result_record(
+    message: proto::ReferencingResult,
+    candidates: proto::Candidates,
+) -> Result<TargetRecord, Malformed> {
+    let outcome = match message.outcome() {
+        proto::Outcome::Referenced => Outcome::Referenced,
+        proto::Outcome::Ambiguous => Outcome::Ambiguous,
+        proto::Outcome::Unidentified => Outcome::Unidentified,
+        proto::Outcome::Degenerate => Outcome::Degenerate,
+        proto::Outcome::Unspecified => return Err(Malformed(format!("outcome {} is unknown", message.outcome))),
+    };
+    let alternative = |other: proto::Alternative| {
+        Ok(Alternative {
+            object_from_camera: matrix("alternative.object_from_camera", &other.object_from_camera)?,
+            pairs: pair_records(&other.pairs),
+            score: other.score,
+        })
+    };
+    Ok(TargetRecord {
+        object: message.object,
+        search: message.search,
+        solver: message.solver,
+        outcome,
+        reason: message.reason,
+        detail: message.detail,
+        object_from_camera: matrix_if_any("object_from_camera", &message.object_from_camera)?,
+        covariance: matrix_if_any("covariance", &message.covariance)?,
+        candidates: candidates.lists.into_iter().map(|list| list.cloud).collect(),
+        pairs: pair_records(&message.pairs),
+        used: message.used,
+        alternatives: message.alternatives.into_iter().map(alternative).collect::<Result<_, _>>()?,
+        optimal: message.optimal,
+        size_bound: message.size_bound,
+        expected_chance_sets: message.expected_chance_sets,
+        tests: message.tests,
+        residual_rms: message.residual_rms,
+        evaluation: Evaluation::default(),
+        times: TargetTimes::default(),
+    })
+}
+
+fn pair_records(pairs: &[proto::Pair]) -> Vec<Pair> {
+    pairs.iter().map(|&proto::Pair { model, cloud }| Pair { model, cloud }).collect()
+}
+
+/// The message that holds the candidates of target `index` of `frame`.
+pub(crate) fn candidates_message(frame: &FrameRecord, index: usize) -> proto::Candidates {
+    let target = &frame.targets[index];
+    proto::Candidates {
+        frame: frame.frame,
+        stamp_ns: frame.stamp_ns,
+        index: index as u32,
+        object: target.object.clone(),
+        lists: target.candidates.iter().map(|list| proto::CandidateList { cloud: list.clone() }).collect(),
+    }
+}
+
+/// The message that holds the evaluation of target `index` of `frame`.
+pub(crate) fn evaluation_message(frame: &FrameRecord, index: usize) -> proto::Evaluation {
+    let target = &frame.targets[index];
+    let it = target.evaluation;
+    proto::Evaluation {
+        frame: frame.frame,
+        stamp_ns: frame.stamp_ns,
+        index: index as u32,
+        object: target.object.clone(),
+        wrong: it.wrong,
+        wrong_pairs: it.wrong_pairs,
+        visible: it.visible,
+        identified: it.identified,
+        correct_pairs: it.correct_pairs,
+        m1_rms: it.m1_rms,
+        m1_unused_rms: it.m1_unused_rms,
+        m2_rms: it.m2_rms,
+        m3_position: it.m3_position,
+        m3_attitude: it.m3_attitude,
+        nees: it.nees,
+    }
+}
+
+/// The evaluation that `message` holds.
+pub(crate) fn evaluation_record(message: &proto::Evaluation) -> Evaluation {
+    Evaluation {
+        wrong: message.wrong,
+        wrong_pairs: message.wrong_pairs,
+        visible: message.visible,
+        identified: message.identified,
+        correct_pairs: message.correct_pairs,
+        m1_rms: message.m1_rms,
+        m1_unused_rms: message.m1_unused_rms,
+        m2_rms: message.m2_rms,
+        m3_position: message.m3_position,
+        m3_attitude: message.m3_attitude,
+        nees: message.nees,
+    }
+}
+
+/// The message that holds all times of `frame`.
+pub(crate) fn timing_message(frame: &FrameRecord) -> proto::Timing {
+    let FrameTimes { detect_ms, describe_ms, match_ms, triangulate_ms } = frame.times;
+    let target = |target: &TargetRecord| {
+        let TargetTimes { candidates_ms, search_ms, solve_ms, total_ms } = target.times;
+        proto::TargetTiming { object: target.object.clone(), candidates_ms, search_ms, solve_ms, total_ms }
+    };
+    proto::Timing {
+        frame: frame.frame,
+        stamp_ns: frame.stamp_ns,
+        detect_ms,
+        describe_ms,
+        match_ms,
+        triangulate_ms,
+        targets: frame.targets.iter().map(target).collect(),
+    }
+}
+
+/// The times that `message` holds: of the frame, and of each target.
+pub(crate) fn target_times(message: &proto::Timing) -> (FrameTimes, Vec<TargetTimes>) {
+    let proto::Timing { detect_ms, describe_ms, match_ms, triangulate_ms, .. } = *message;
+    let target = |timing: &proto::TargetTiming| TargetTimes {
+        candidates_ms: timing.candidates_ms,
+        search_ms: timing.search_ms,
+        solve_ms: timing.solve_ms,
+        total_ms: timing.total_ms,
+    };
+    let times = FrameTimes { detect_ms, describe_ms, match_ms, triangulate_ms };
+    (times, message.targets.iter().map(target).collect())
+}

@@ -1,0 +1,108 @@
+//! Reading a trial's log.
+
+mod pending;
+mod source;
+
+use std::path::{Path, PathBuf};
+
+use crate::{FrameRecord, LogError, TrialHeader, convert, topic};
+use pending::Pending;
+use source::{Message, Source};
+
+/// A whole trial, as its log has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrialLog {
+    /// What the trial is.
+    pub header: TrialHeader,
+    /// Its frames, in order.
+    pub frames: Vec<FrameRecord>,
+}
+
+/// Reads the log at `path` back into the records it was written from, images included.
+///
+/// # Errors
+/// [`LogError`] when the file is no MCAP file, cut off, damaged, or no log of a trial: never a silent
+/// short result.
+pub fn read(path: &Path) -> Result<TrialLog, LogError> {
+    let mut reader = Reader::open(path)?;
+    let frames = reader.by_ref().collect::<Result<_, _>>()?;
+    Ok(TrialLog { header: reader.header, frames })
+}
+
+/// Reads a log frame by frame, in memory for one frame.
+///
+/// Check sums are verified as the reading goes; a log that is cut off or damaged ends in an error, after
+/// the frames before it.
+#[derive(Debug)]
+pub struct Reader {
+    source: Source,
+    header: TrialHeader,
+    pending: Pending,
+    images: bool,
+    ended: bool,
+}
+
+impl Reader {
+    /// Opens the log at `path` and reads its header.
+    ///
+    /// # Errors
+    /// [`LogError`] when the file is no MCAP file, cut off or damaged before the header, or no log of a
+    /// trial.
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let mut source = Source::open(path)?;
+        while let Some(message) = source.next_message()? {
+            if message.topic == topic::HEADER {
+                let header = message.decode(path, "TrialHeader").and_then(|header| {
+                    convert::header_record(header).map_err(|error| foreign(path, &message, &error.0))
+                })?;
+                return Ok(Self { source, header, pending: Pending::default(), images: true, ended: false });
+            }
+        }
+        Err(LogError::Foreign { path: path.to_owned(), what: format!("it has no message on {}", topic::HEADER) })
+    }
+
+    /// The same, without decoding images: frames come with `images: None`.
+    #[must_use]
+    pub fn without_images(mut self) -> Self {
+        self.images = false;
+        self
+    }
+
+    /// What the trial is.
+    pub fn header(&self) -> &TrialHeader {
+        &self.header
+    }
+
+    fn next_frame(&mut self) -> Result<Option<FrameRecord>, LogError> {
+        let path: PathBuf = self.source.path().to_owned();
+        while let Some(message) = self.source.next_message()? {
+            if let Some(frame) = self.pending.take(&path, &message, self.images)? {
+                return Ok(Some(frame));
+            }
+        }
+        if self.pending.is_empty() {
+            Ok(None)
+        } else {
+            Err(LogError::Foreign { path, what: "its last frame is not closed".to_owned() })
+        }
+    }
+}
+
+impl Iterator for Reader {
+    type Item = Result<FrameRecord, LogError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let frame = self.next_frame().transpose();
+        self.ended = !matches!(frame, Some(Ok(_)));
+        frame
+    }
+}
+
+/// The error that `message` is not what its topic promises.
+fn foreign(path: &Path, message: &Message, what: &str) -> LogError {
+    let what = format!("message {} on {} at {} ns: {what}", message.sequence, message.topic, message.log_time);
+    LogError::Foreign { path: path.to_owned(), what }
+}

@@ -1,0 +1,95 @@
+//! The messages of a frame until the one that closes it.
+
+use std::path::Path;
+
+use foxglove::messages::CompressedImage;
+
+use super::{foreign, source::Message};
+use crate::{FrameRecord, GreyImage, LogError, convert, png, proto, topic};
+
+/// What has come of the frame that is being read.
+#[derive(Debug, Default)]
+pub(super) struct Pending {
+    images: Vec<GreyImage>,
+    skipped_images: usize,
+    results: Vec<proto::ReferencingResult>,
+    candidates: Vec<proto::Candidates>,
+    evaluations: Vec<proto::Evaluation>,
+    timing: Option<proto::Timing>,
+}
+
+impl Pending {
+    /// Whether no frame is open.
+    pub(super) fn is_empty(&self) -> bool {
+        self.images.len() + self.skipped_images + self.results.len() + self.candidates.len() + self.evaluations.len()
+            == 0
+            && self.timing.is_none()
+    }
+
+    /// Takes in one message; the whole frame, if it closes one.
+    pub(super) fn take(
+        &mut self,
+        path: &Path,
+        message: &Message,
+        images: bool,
+    ) -> Result<Option<FrameRecord>, LogError> {
+        match &message.topic[..] {
+            topic if topic::IMAGES.contains(&topic) => {
+                if images {
+                    let image: CompressedImage = message.decode_as(path, "foxglove.CompressedImage")?;
+                    let image = png::decode(&image.data).map_err(|error| foreign(path, message, &error))?;
+                    self.images.push(image);
+                } else {
+                    self.skipped_images += 1;
+                }
+            }
+            topic::RESULT => self.results.push(message.decode(path, "ReferencingResult")?),
+            topic::CANDIDATES => self.candidates.push(message.decode(path, "Candidates")?),
+            topic::EVALUATION => self.evaluations.push(message.decode(path, "Evaluation")?),
+            topic::TIMING => self.timing = Some(message.decode(path, "Timing")?),
+            topic::FRAME => {
+                let frame = message.decode(path, "Frame")?;
+                return std::mem::take(self).close(frame).map(Some).map_err(|what| foreign(path, message, &what));
+            }
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    /// The frame that `closing` closes, or what it lacks.
+    fn close(self, closing: proto::Frame) -> Result<FrameRecord, String> {
+        let (number, images, results) = (closing.frame, closing.images as usize, closing.results as usize);
+        let timing = self.timing.ok_or_else(|| format!("frame {number} has no times"))?;
+        for (what, found, expected) in [
+            ("images", self.images.len() + self.skipped_images, images),
+            ("results", self.results.len(), results),
+            ("lists of candidates", self.candidates.len(), results),
+            ("evaluations", self.evaluations.len(), results),
+            ("times of targets", timing.targets.len(), results),
+        ] {
+            if found != expected {
+                return Err(format!("frame {number} has {found} {what} instead of {expected}"));
+            }
+        }
+        let (times, target_times) = convert::target_times(&timing);
+        let mut frame = convert::frame_record(closing).map_err(|error| error.0)?;
+        frame.times = times;
+        frame.images = <[GreyImage; 2]>::try_from(self.images).ok();
+        let attempts = self.results.into_iter().zip(self.candidates).zip(self.evaluations).zip(target_times);
+        for (index, (((result, candidates), evaluation), times)) in (0..).zip(attempts) {
+            let places = [
+                (result.frame, result.index),
+                (candidates.frame, candidates.index),
+                (evaluation.frame, evaluation.index),
+            ];
+            if places != [(number, index); 3] {
+                return Err(format!("result {index} of frame {number} is mixed with another"));
+            }
+            let mut target = convert::result_record(result, candidates).map_err(|error| error.0)?;
+            target.evaluation = convert::evaluation_record(&evaluation);
+            target.times = times;
+            frame.targets.push(target);
+        }
+        Ok(frame)
+    }
+}

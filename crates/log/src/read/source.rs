@@ -1,0 +1,206 @@
+//! Messages out of an MCAP file, with every check sum verified and memory bounded.
+
+use std::{
+    collections::HashMap,
+    fmt,
+    fs::File,
+    io::{BufReader, Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+};
+
+use mcap::{
+    McapError,
+    records::Record,
+    sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
+};
+
+use super::foreign;
+use crate::{LogError, proto};
+
+/// A message as it stands in the file.
+#[derive(Debug)]
+pub(super) struct Message {
+    pub(super) topic: String,
+    pub(super) schema: String,
+    pub(super) encoding: String,
+    pub(super) sequence: u32,
+    pub(super) log_time: u64,
+    pub(super) data: Vec<u8>,
+}
+
+impl Message {
+    /// The content, which must be this project's own message `name`.
+    pub(super) fn decode<M: prost::Message + Default>(&self, path: &Path, name: &str) -> Result<M, LogError> {
+        self.decode_as(path, &format!("{}.{name}", proto::PACKAGE))
+    }
+
+    /// The content, which must have this schema.
+    pub(super) fn decode_as<M: prost::Message + Default>(&self, path: &Path, schema: &str) -> Result<M, LogError> {
+        if self.encoding != "protobuf" || self.schema != schema {
+            let what = format!(
+                "it is a `{}` in `{}`; this version reads `{schema}` in `protobuf`",
+                self.schema, self.encoding
+            );
+            return Err(foreign(path, self, &what));
+        }
+        M::decode(&self.data[..]).map_err(|error| foreign(path, self, &error.to_string()))
+    }
+}
+
+/// A channel of the file: topic, schema's name, encoding of messages.
+#[derive(Debug)]
+struct Channel {
+    topic: String,
+    schema: String,
+    encoding: String,
+}
+
+/// An MCAP file read from start to end.
+pub(super) struct Source {
+    path: PathBuf,
+    file: BufReader<File>,
+    reader: LinearReader,
+    schemas: HashMap<u16, String>,
+    channels: HashMap<u16, Channel>,
+    fed: u64,
+    messages: u64,
+    last_ns: u64,
+    past_data: bool,
+}
+
+impl fmt::Debug for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Source").field("path", &self.path).field("messages", &self.messages).finish_non_exhaustive()
+    }
+}
+
+impl Source {
+    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        let io = |source| LogError::Io { doing: "read", path: path.to_owned(), source, remedy: "is the name right?" };
+        let mut file = BufReader::new(File::open(path).map_err(io)?);
+        let mut start = Vec::new();
+        file.by_ref().take(16).read_to_end(&mut start).map_err(io)?;
+        if !start.starts_with(mcap::MAGIC) {
+            return Err(LogError::NotMcap { path: path.to_owned(), looks_like: looks_like(&start) });
+        }
+        let size = file.seek(SeekFrom::End(0)).map_err(io)?;
+        file.seek(SeekFrom::Start(0)).map_err(io)?;
+        // What one record may claim: images are compressed already, so nothing honest grows more.
+        let limit = usize::try_from(size.saturating_mul(4).saturating_add(32 << 20)).unwrap_or(usize::MAX);
+        let reader = LinearReader::new_with_options(
+            LinearReaderOptions::default()
+                .with_prevalidate_chunk_crcs(true)
+                .with_validate_data_section_crc(true)
+                .with_validate_summary_section_crc(true)
+                .with_check_finishes_after_end_magic(true)
+                .with_record_length_limit(limit),
+        );
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            reader,
+            schemas: HashMap::new(),
+            channels: HashMap::new(),
+            fed: 0,
+            messages: 0,
+            last_ns: 0,
+            past_data: false,
+        })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The next message; `None` when the file has been read to its end and every check sum held.
+    pub(super) fn next_message(&mut self) -> Result<Option<Message>, LogError> {
+        loop {
+            let record = match self.reader.next_event() {
+                None => return Ok(None),
+                Some(Err(error)) => return Err(read_error(&self.path, error, self.fed, self.messages, self.last_ns)),
+                Some(Ok(LinearReadEvent::ReadRequest(need))) => {
+                    let read = self.file.read(self.reader.insert(need)).map_err(|source| LogError::Io {
+                        doing: "read",
+                        path: self.path.clone(),
+                        source,
+                        remedy: "is the disk still there?",
+                    })?;
+                    self.reader.notify_read(read);
+                    self.fed += read as u64;
+                    continue;
+                }
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => mcap::parse_record(opcode, data),
+            };
+            let record = match record {
+                Ok(record) => record,
+                Err(error) => return Err(read_error(&self.path, error, self.fed, self.messages, self.last_ns)),
+            };
+            match record {
+                Record::DataEnd(_) => self.past_data = true,
+                // The summary repeats schemas and channels.
+                _ if self.past_data => {}
+                Record::Schema { header, .. } => {
+                    self.schemas.insert(header.id, header.name);
+                }
+                Record::Channel(channel) => {
+                    let schema = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                    let known = Channel { topic: channel.topic, schema, encoding: channel.message_encoding };
+                    self.channels.insert(channel.id, known);
+                }
+                Record::Message { header, data } => {
+                    let Some(channel) = self.channels.get(&header.channel_id) else {
+                        let what = format!("a message on channel {}, which it never declares", header.channel_id);
+                        return Err(LogError::Damaged { path: self.path.clone(), what });
+                    };
+                    self.messages += 1;
+                    self.last_ns = header.log_time;
+                    return Ok(Some(Message {
+                        topic: channel.topic.clone(),
+                        schema: channel.schema.clone(),
+                        encoding: channel.encoding.clone(),
+                        sequence: header.sequence,
+                        log_time: header.log_time,
+                        data: data.into_owned(),
+                    }));
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// What a file that does not begin like an MCAP file looks like.
+fn looks_like(start: &[u8]) -> String {
+    let known: [(&[u8], &str); 5] = [
+        (b"#ROSBAG", "it looks like a ROS 1 bag; convert it with `mcap convert IN.bag OUT.mcap`"),
+        (
+            b"SQLite format 3",
+            "it looks like a ROS 2 bag in SQLite; convert it with `ros2 bag convert` or `mcap convert`",
+        ),
+        (b"PK\x03\x04", "it looks like a zip archive; unpack it first"),
+        (b"\x28\xb5\x2f\xfd", "it is compressed with zstd; decompress it with `zstd -d`"),
+        (b"PAR1", "it looks like Parquet; logs end in .mcap"),
+    ];
+    if start.is_empty() {
+        return "it is empty; was the run interrupted?".to_owned();
+    }
+    match known.iter().find(|(magic, _)| start.starts_with(magic)) {
+        Some((_, text)) => (*text).to_owned(),
+        None => format!("it begins with the bytes {start:02x?}; logs end in .mcap"),
+    }
+}
+
+fn read_error(path: &Path, error: McapError, fed: u64, messages: u64, last_ns: u64) -> LogError {
+    let path = path.to_owned();
+    match error {
+        McapError::UnexpectedEof => LogError::Truncated { path, messages, last_ns },
+        McapError::ChunkTooLarge(length) => {
+            LogError::TooLarge { path, what: format!("a chunk before byte {fed} declares {length} bytes") }
+        }
+        McapError::RecordTooLarge { opcode, len } => {
+            let what = format!("a record of kind {opcode:#04x} before byte {fed} declares {len} bytes");
+            LogError::TooLarge { path, what }
+        }
+        error => LogError::Damaged { path, what: format!("{error}, before byte {fed}") },
+    }
+}

@@ -1,0 +1,82 @@
+//! Topics, and the schema of each message on them.
+
+use std::borrow::Cow;
+
+use foxglove::{Encode, messages};
+
+use crate::proto;
+
+/// The header of the trial.
+pub(crate) const HEADER: &str = "/run/header";
+/// The exact record of a frame; it closes the frame.
+pub(crate) const FRAME: &str = "/referencing/frame";
+/// What came of each attempt.
+pub(crate) const RESULT: &str = "/referencing/result";
+/// Which cloud points might be which points of the target.
+pub(crate) const CANDIDATES: &str = "/referencing/candidates";
+/// Comparison with truth.
+pub(crate) const EVALUATION: &str = "/metrics/evaluation";
+/// Wall-clock times.
+pub(crate) const TIMING: &str = "/metrics/timing";
+
+/// Images, left and right.
+pub(crate) const IMAGES: [&str; 2] = ["/camera/left/image", "/camera/right/image"];
+/// Calibrations, left and right.
+pub(crate) const CALIBRATIONS: [&str; 2] = ["/camera/left/calibration", "/camera/right/calibration"];
+/// Marks in the images, left and right.
+pub(crate) const ANNOTATIONS: [&str; 2] = ["/camera/left/annotations", "/camera/right/annotations"];
+/// Transforms between frames.
+pub(crate) const TF: &str = "/tf";
+/// All triangulated points.
+pub(crate) const CLOUD: &str = "/cloud";
+/// Those that are a candidate of some model point.
+pub(crate) const CLOUD_CANDIDATES: &str = "/cloud/candidates";
+/// Those that were identified, in the colour of their target.
+pub(crate) const CLOUD_IDENTIFIED: &str = "/cloud/identified";
+/// The model's points, as a scene.
+pub(crate) const SCENE_MODEL: &str = "/scene/model";
+/// The model's points, as a cloud in the site's frame.
+pub(crate) const MODEL: &str = "/model";
+/// The vehicle, as estimated.
+pub(crate) const POSE_ESTIMATE: &str = "/pose/estimate";
+/// The vehicle, as it really was.
+pub(crate) const POSE_TRUTH: &str = "/pose/truth";
+/// The vehicle, as roughly known before.
+pub(crate) const POSE_PRIOR: &str = "/pose/prior";
+
+/// A message with a schema to publish.
+pub(crate) trait Logged: prost::Message {
+    /// The schema's name and its serialised `FileDescriptorSet`.
+    fn schema() -> (String, Cow<'static, [u8]>);
+}
+
+macro_rules! own {
+    ($($message:ident),*) => {$(
+        impl Logged for proto::$message {
+            fn schema() -> (String, Cow<'static, [u8]>) {
+                (format!("{}.{}", proto::PACKAGE, stringify!($message)), proto::DESCRIPTORS.into())
+            }
+        }
+    )*};
+}
+own!(TrialHeader, Frame, ReferencingResult, Candidates, Evaluation, Timing);
+
+macro_rules! well_known {
+    ($($message:ident),*) => {$(
+        impl Logged for messages::$message {
+            fn schema() -> (String, Cow<'static, [u8]>) {
+                let schema = <Self as Encode>::get_schema().expect("well-known messages have a schema");
+                (schema.name, schema.data)
+            }
+        }
+    )*};
+}
+well_known!(
+    CompressedImage,
+    CameraCalibration,
+    ImageAnnotations,
+    FrameTransforms,
+    PointCloud,
+    SceneUpdate,
+    PoseInFrame
+);

@@ -1,0 +1,79 @@
+//! Marks in the images: key points white, candidates blue, identified points ringed in the colour of
+//! their target and named.
+
+use std::collections::BTreeSet;
+
+use foxglove::messages::{
+    CircleAnnotation, Color, ImageAnnotations, KeyValuePair, Point2, PointsAnnotation, TextAnnotation,
+    points_annotation,
+};
+
+use super::{colour, colour_message, timestamp};
+use crate::{FrameRecord, TrialHeader};
+
+/// From the centre of the first pixel at (0, 0) to its corner at (0, 0).
+fn mark([u, v]: [f64; 2]) -> Point2 {
+    Point2 { x: u + 0.5, y: v + 0.5 }
+}
+
+/// The marks in the left (0) or right (1) image.
+pub(crate) fn annotations(header: &TrialHeader, frame: &FrameRecord, side: usize) -> ImageAnnotations {
+    let seen = |cloud: u32| {
+        frame.cloud[cloud as usize].pixels.map(|pixels| if side == 0 { pixels.left } else { pixels.right })
+    };
+    let key_points: Vec<Point2> = if side == 0 {
+        frame.key_points.iter().copied().map(mark).collect()
+    } else {
+        frame.cloud.iter().filter_map(|point| point.pixels).map(|pixels| mark(pixels.right)).collect()
+    };
+    let candidates: BTreeSet<u32> = frame.targets.iter().flat_map(|target| target.candidates.concat()).collect();
+    let candidates = candidates.into_iter().filter_map(seen).map(mark).collect();
+
+    let (mut circles, mut texts) = (Vec::new(), Vec::new());
+    for target in &frame.targets {
+        let Some(index) = header.targets.iter().position(|model| model.id == target.object) else { continue };
+        let colour = colour_message(colour(index));
+        for (place, pair) in target.pairs.iter().enumerate() {
+            let Some(at) = seen(pair.cloud).map(mark) else { continue };
+            let used = target.used.contains(&(place as u32));
+            let id = &header.targets[index].points[pair.model as usize].id;
+            circles.push(CircleAnnotation {
+                timestamp: Some(timestamp(frame.stamp_ns)),
+                position: Some(at),
+                diameter: 12.0,
+                thickness: if used { 3.0 } else { 1.5 },
+                fill_color: Some(Color { a: 0.0, ..colour }),
+                outline_color: Some(colour),
+                metadata: vec![
+                    KeyValuePair { key: "object".to_owned(), value: target.object.clone() },
+                    KeyValuePair { key: "point".to_owned(), value: id.clone() },
+                    KeyValuePair { key: "used".to_owned(), value: used.to_string() },
+                ],
+            });
+            texts.push(TextAnnotation {
+                timestamp: Some(timestamp(frame.stamp_ns)),
+                position: Some(Point2 { x: at.x + 8.0, y: at.y - 8.0 }),
+                text: id.clone(),
+                font_size: 12.0,
+                text_color: Some(colour),
+                background_color: Some(Color { r: 0.0, g: 0.0, b: 0.0, a: 0.5 }),
+                metadata: Vec::new(),
+            });
+        }
+    }
+    let points = |points, colour: [u8; 3], thickness| PointsAnnotation {
+        timestamp: Some(timestamp(frame.stamp_ns)),
+        r#type: points_annotation::Type::Points.into(),
+        points,
+        outline_color: Some(colour_message(colour)),
+        thickness,
+        ..PointsAnnotation::default()
+    };
+    ImageAnnotations {
+        timestamp: Some(timestamp(frame.stamp_ns)),
+        circles,
+        points: vec![points(key_points, [255; 3], 2.0), points(candidates, [86, 180, 233], 4.0)],
+        texts,
+        metadata: Vec::new(),
+    }
+}

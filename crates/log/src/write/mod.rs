@@ -1,0 +1,127 @@
+//! Writing a trial's log.
+
+mod sink;
+
+use std::{collections::BTreeMap, path::Path};
+
+use crate::{
+    FrameRecord, LogError, TrialHeader, check, convert, png, topic,
+    view::{self, Places},
+};
+use sink::Sink;
+
+/// Writes the log of one trial.
+///
+/// The file stands under `NAME.mcap.partial` until [`Writer::finish`]; a writer that is dropped before
+/// leaves it there.
+#[derive(Debug)]
+pub struct Writer {
+    sink: Sink,
+    header: TrialHeader,
+    places: Places,
+    last: Option<u64>,
+}
+
+impl Writer {
+    /// Begins the log of the trial `header` describes at `path` (`….mcap`), in `path` + `.partial`.
+    ///
+    /// # Errors
+    /// [`LogError`] when the file cannot be created or the header contradicts itself.
+    pub fn create(path: &Path, header: &TrialHeader) -> Result<Self, LogError> {
+        let record = |what| LogError::Record { path: path.to_owned(), what };
+        check::header(header).map_err(record)?;
+        let places = Places::of(header).map_err(record)?;
+        Ok(Self { sink: Sink::create(path)?, header: header.clone(), places, last: None })
+    }
+
+    /// Adds one frame; stamps must not decrease.
+    ///
+    /// # Errors
+    /// [`LogError`] when the record contradicts itself or the header (nothing of it is then written),
+    /// or nothing more can be written.
+    pub fn frame(&mut self, frame: &FrameRecord) -> Result<(), LogError> {
+        let path = self.sink.path().to_owned();
+        let record = |what| LogError::Record { path: path.clone(), what: format!("frame {}: {what}", frame.frame) };
+        check::frame(&self.header, frame, self.last).map_err(record)?;
+        let transforms = view::moving_transforms(&self.places, frame).map_err(record)?;
+        let poses = view::body_pose(&self.places, frame).map_err(record)?;
+        let pngs = match &frame.images {
+            Some([left, right]) => vec![png::encode(left).map_err(record)?, png::encode(right).map_err(record)?],
+            None => Vec::new(),
+        };
+
+        let stamp = frame.stamp_ns;
+        if self.last.is_none() {
+            self.begin(stamp)?;
+        }
+        self.last = Some(stamp);
+        let sink = &mut self.sink;
+        for (side, png) in pngs.into_iter().enumerate() {
+            sink.put(topic::IMAGES[side], stamp, &view::compressed(side, png, stamp))?;
+        }
+        if frame.images.is_some() {
+            for side in [0, 1] {
+                sink.put(topic::ANNOTATIONS[side], stamp, &view::annotations(&self.header, frame, side))?;
+            }
+        }
+        if !transforms.transforms.is_empty() {
+            sink.put(topic::TF, stamp, &transforms)?;
+        }
+        for (topic, pose) in poses {
+            sink.put(topic, stamp, &pose)?;
+        }
+        sink.put(topic::CLOUD, stamp, &view::measured_cloud(frame))?;
+        sink.put(topic::CLOUD_CANDIDATES, stamp, &view::candidate_cloud(frame))?;
+        sink.put(topic::CLOUD_IDENTIFIED, stamp, &view::identified_cloud(&self.header, frame))?;
+        for index in 0..frame.targets.len() {
+            sink.put(topic::CANDIDATES, stamp, &convert::candidates_message(frame, index))?;
+            sink.put(topic::RESULT, stamp, &convert::result_message(frame, index))?;
+            sink.put(topic::EVALUATION, stamp, &convert::evaluation_message(frame, index))?;
+        }
+        sink.put(topic::TIMING, stamp, &convert::timing_message(frame))?;
+        sink.put(topic::FRAME, stamp, &convert::frame_message(frame))
+    }
+
+    /// Completes the log: index, check sums, onto the disk, renamed to its own name.
+    ///
+    /// # Errors
+    /// [`LogError`] when any of it fails; the `.partial` then stays.
+    pub fn finish(mut self) -> Result<(), LogError> {
+        if self.last.is_none() {
+            self.begin(0)?;
+        }
+        self.sink.finish()
+    }
+
+    /// What stands before the first frame.
+    fn begin(&mut self, stamp: u64) -> Result<(), LogError> {
+        let (header, sink) = (&self.header, &mut self.sink);
+        sink.metadata("run", summary(header))?;
+        sink.attach("configuration.toml", &header.configuration, stamp)?;
+        sink.attach("site.toml", &header.site, stamp)?;
+        sink.put(topic::HEADER, stamp, &convert::header_message(header))?;
+        for (topic, calibration) in topic::CALIBRATIONS.into_iter().zip(view::calibrations(&header.rig, stamp)) {
+            sink.put(topic, stamp, &calibration)?;
+        }
+        sink.put(topic::TF, stamp, &view::fixed_transforms(&self.places, stamp))?;
+        sink.put(topic::SCENE_MODEL, stamp, &view::model_scene(header, stamp))?;
+        sink.put(topic::MODEL, stamp, &view::model_cloud(header, &self.places, stamp))
+    }
+}
+
+/// The metadata record `run`: what a person wants to know without opening a message.
+fn summary(header: &TrialHeader) -> BTreeMap<String, String> {
+    let own = [
+        ("run", &header.run),
+        ("trial", &header.trial),
+        ("title", &header.title),
+        ("question", &header.question),
+        ("command", &header.command),
+        ("source", &header.source),
+    ];
+    let own = own.into_iter().map(|(key, value)| (key.to_owned(), value.clone()));
+    let axes = header.axes.iter().map(|axis| (format!("axis.{}", axis.key), axis.value.clone()));
+    let seeds = header.seeds.iter().map(|(name, value)| (format!("seed.{name}"), value.to_string()));
+    let versions = header.versions.iter().map(|(name, value)| (format!("version.{name}"), value.clone()));
+    own.chain(axes).chain(seeds).chain(versions).collect()
+}

@@ -1,0 +1,127 @@
+//! The MCAP file behind a writer.
+
+use std::{
+    collections::BTreeMap,
+    ffi::OsString,
+    fmt,
+    fs::File,
+    io::{BufWriter, Write as _},
+    path::{Path, PathBuf},
+};
+
+use mcap::{
+    Attachment, McapError, WriteOptions,
+    records::{MessageHeader, Metadata},
+};
+
+use crate::{LogError, topic::Logged};
+
+/// An MCAP file that is renamed from `.partial` when it is complete.
+pub(super) struct Sink {
+    mcap: mcap::Writer<BufWriter<File>>,
+    path: PathBuf,
+    partial: PathBuf,
+    /// Identity of each topic's channel, and how many messages it has.
+    channels: BTreeMap<&'static str, (u16, u32)>,
+}
+
+impl fmt::Debug for Sink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Sink").field("partial", &self.partial).finish_non_exhaustive()
+    }
+}
+
+impl Sink {
+    pub(super) fn create(path: &Path) -> Result<Self, LogError> {
+        let mut partial = OsString::from(path);
+        partial.push(".partial");
+        let partial = PathBuf::from(partial);
+        let file = File::create(&partial).map_err(|source| LogError::Io {
+            doing: "create",
+            path: partial.clone(),
+            source,
+            remedy: "choose another folder with --out",
+        })?;
+        let mcap = WriteOptions::new()
+            .library(concat!("seafix-log/", env!("CARGO_PKG_VERSION")))
+            // The library's default depends on the machine's number of processors, and so do the bytes.
+            .compression_threads(0)
+            .create(BufWriter::new(file))
+            .map_err(|error| write_error(&partial, error))?;
+        Ok(Self { mcap, path: path.to_owned(), partial, channels: BTreeMap::new() })
+    }
+
+    /// The name the complete file will have.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes one message; its topic's channel is made by the first.
+    pub(super) fn put<M: Logged>(&mut self, topic: &'static str, stamp: u64, message: &M) -> Result<(), LogError> {
+        let (channel_id, sequence) = match self.channels.get(topic) {
+            Some(channel) => *channel,
+            None => (self.channel::<M>(topic).map_err(|error| write_error(&self.partial, error))?, 0),
+        };
+        self.channels.insert(topic, (channel_id, sequence.wrapping_add(1)));
+        let header = MessageHeader { channel_id, sequence, log_time: stamp, publish_time: stamp };
+        self.mcap
+            .write_to_known_channel(&header, &message.encode_to_vec())
+            .map_err(|error| write_error(&self.partial, error))
+    }
+
+    fn channel<M: Logged>(&mut self, topic: &str) -> Result<u16, McapError> {
+        let (name, descriptors) = M::schema();
+        let schema = self.mcap.add_schema(&name, "protobuf", &descriptors)?;
+        self.mcap.add_channel(schema, topic, "protobuf", &BTreeMap::new())
+    }
+
+    /// Writes a metadata record.
+    pub(super) fn metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result<(), LogError> {
+        let record = Metadata { name: name.to_owned(), metadata };
+        self.mcap.write_metadata(&record).map_err(|error| write_error(&self.partial, error))
+    }
+
+    /// Attaches a TOML text, unless it is empty.
+    pub(super) fn attach(&mut self, name: &str, text: &str, stamp: u64) -> Result<(), LogError> {
+        if text.is_empty() {
+            return Ok(());
+        }
+        let attachment = Attachment {
+            log_time: stamp,
+            create_time: stamp,
+            name: name.to_owned(),
+            media_type: "application/toml".to_owned(),
+            data: text.as_bytes().into(),
+        };
+        self.mcap.attach(&attachment).map_err(|error| write_error(&self.partial, error))
+    }
+
+    /// Index and check sums, onto the disk, renamed.
+    pub(super) fn finish(self) -> Result<(), LogError> {
+        let Self { mut mcap, path, partial, .. } = self;
+        let io = |doing| {
+            let path = partial.clone();
+            move |source| LogError::Io { doing, path, source, remedy: "the log so far is in that file" }
+        };
+        mcap.finish().map_err(|error| write_error(&partial, error))?;
+        let mut buffer = mcap.into_inner();
+        buffer.flush().map_err(io("write"))?;
+        buffer.get_ref().sync_all().map_err(io("put on the disk"))?;
+        drop(buffer);
+        std::fs::rename(&partial, &path).map_err(io("rename"))?;
+        // The new name itself has to reach the disk; systems that cannot open a folder do it unasked.
+        if let Some(Ok(folder)) = path.parent().map(File::open) {
+            folder.sync_all().map_err(io("put on the disk the folder of"))?;
+        }
+        Ok(())
+    }
+}
+
+fn write_error(partial: &Path, error: McapError) -> LogError {
+    match error {
+        McapError::Io(source) => {
+            LogError::Io { doing: "write", path: partial.to_owned(), source, remedy: "the log so far is in that file" }
+        }
+        error => LogError::Write { path: partial.to_owned(), message: error.to_string() },
+    }
+}

@@ -1,0 +1,88 @@
+//! What is written comes back, and nothing else does.
+
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+mod synthetic;
+
+use std::fs;
+
+use seafix_log::{LogError, Reader, Writer, read};
+
+#[test]
+fn every_record_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.mcap");
+    synthetic::write(&path, 7);
+    let log = read(&path).unwrap();
+    assert_eq!(log.header, synthetic::header());
+    assert_eq!(log.frames, (0..7).map(synthetic::frame).collect::<Vec<_>>());
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the .partial is gone");
+    if let Some(keep) = std::env::var_os("KEEP_LOG") {
+        fs::copy(&path, keep).unwrap();
+    }
+}
+
+#[test]
+fn images_can_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.mcap");
+    synthetic::write(&path, 3);
+    for (number, frame) in Reader::open(&path).unwrap().without_images().enumerate() {
+        let mut expected = synthetic::frame(number as u64);
+        expected.images = None;
+        assert_eq!(frame.unwrap(), expected);
+    }
+}
+
+#[test]
+fn the_same_records_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = ["a.mcap", "b.mcap"].map(|name| {
+        synthetic::write(&folder.path().join(name), 4);
+        fs::read(folder.path().join(name)).unwrap()
+    });
+    assert!(a == b);
+}
+
+#[test]
+fn a_trial_without_frames_is_a_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.mcap");
+    synthetic::write(&path, 0);
+    assert_eq!(read(&path).unwrap().frames, []);
+}
+
+#[test]
+fn a_dropped_writer_leaves_a_partial() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.mcap");
+    let mut writer = Writer::create(&path, &synthetic::header()).unwrap();
+    writer.frame(&synthetic::frame(0)).unwrap();
+    drop(writer);
+    assert!(!path.exists());
+    assert!(folder.path().join("t.mcap.partial").exists());
+}
+
+#[test]
+fn records_that_contradict_themselves_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = Writer::create(&folder.path().join("t.mcap"), &synthetic::header()).unwrap();
+    writer.frame(&synthetic::frame(1)).unwrap();
+    let complaint = |writer: &mut Writer, frame| match writer.frame(&frame) {
+        Err(LogError::Record { what, .. }) => what,
+        other => panic!("{other:?}"),
+    };
+    assert!(complaint(&mut writer, synthetic::frame(0)).contains("must not decrease"));
+    let mut frame = synthetic::frame(2);
+    frame.targets[0].pairs[0].cloud = 12;
+    assert!(complaint(&mut writer, frame).contains("cloud point 12 of 12"));
+    let mut frame = synthetic::frame(2);
+    frame.targets[0].object_from_camera.as_mut().unwrap()[0][0] = f64::NAN;
+    assert!(complaint(&mut writer, frame).contains("finite"));
+    let mut frame = synthetic::frame(2);
+    frame.images.as_mut().unwrap()[1].width = 63;
+    assert!(complaint(&mut writer, frame).contains("63 x 48"));
+    let mut frame = synthetic::frame(2);
+    frame.targets.clear();
+    assert!(complaint(&mut writer, frame).contains("empty object"));
+}

@@ -1,0 +1,141 @@
+//! A small made-up trial: every field filled somewhere, every optional field empty somewhere.
+
+use seafix_log::*;
+
+pub(crate) const EYE: Matrix4 =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+/// Numbers that look random and are the same everywhere.
+pub(crate) fn noise(seed: u64) -> f64 {
+    let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+}
+
+pub(crate) fn at(x: f64, y: f64, z: f64) -> Matrix4 {
+    let mut place = EYE;
+    (place[0][3], place[1][3], place[2][3]) = (x, y, z);
+    place
+}
+
+pub(crate) fn header() -> TrialHeader {
+    let camera = CameraRecord {
+        size: [64, 48],
+        matrix: [[50.0, 0.0, 31.5], [0.0, 50.0, 23.5], [0.0, 0.0, 1.0]],
+        distortion: vec![0.1, 0.01, 0.0, 0.0],
+    };
+    let target = |id: &str, x: f64| TargetModel {
+        id: id.to_owned(),
+        site_from_object: at(x, 0.0, 0.0),
+        points: (0..5)
+            .map(|i| ModelPoint { id: format!("{id}{i}"), at: [noise(i), noise(i + 9), noise(i + 20)], sigma: 0.001 })
+            .collect(),
+        alert_limit: 0.05,
+    };
+    TrialHeader {
+        run: "example".to_owned(),
+        trial: "0-kabsch".to_owned(),
+        title: "An example".to_owned(),
+        question: "Does <every> field come back?".to_owned(),
+        command: "seafix run example.toml".to_owned(),
+        axes: vec![Axis { key: "solver".to_owned(), value: "kabsch".to_owned() }],
+        components: vec![Component {
+            stage: "solver".to_owned(),
+            name: "kabsch".to_owned(),
+            summary: "least squares".to_owned(),
+            source: "Kabsch 1976".to_owned(),
+            settings: vec![("least".to_owned(), "3".to_owned())],
+        }],
+        configuration: "question = 'why'\n".to_owned(),
+        site: "format = 'seafix-site/1'\n".to_owned(),
+        source: "made up".to_owned(),
+        rig: RigRecord { left: camera.clone(), right: camera, right_from_left: at(-0.25, 0.0, 0.0), rectified: true },
+        body_from_camera: [[0.0, 0.0, 1.0, 0.1], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
+        world_from_site: Some(at(10.0, 20.0, 30.0)),
+        targets: vec![target("A", 0.0), target("B", 2.0)],
+        prior_position_sigma: Some(0.1),
+        prior_attitude_sigma: None,
+        pixel_sigma: Some(0.2),
+        disparity_sigma: Some(0.3),
+        seeds: vec![("experiment".to_owned(), u64::MAX)],
+        versions: vec![("seafix".to_owned(), "0.1.0".to_owned())],
+    }
+}
+
+pub(crate) fn frame(number: u64) -> FrameRecord {
+    let value = |i: u64| noise(1000 * number + i);
+    let image = |seed: u64| GreyImage {
+        width: 64,
+        height: 48,
+        pixels: (0..64 * 48).map(|i| (128.0 + 100.0 * noise(seed + i / 7)) as u8).collect(),
+    };
+    let cloud = (0..12)
+        .map(|i| CloudPoint {
+            at: [value(i), value(i + 50), 3.0 + value(i + 100)],
+            covariance: [[1e-6, 2e-7, 0.0], [2e-7, 1e-6, 0.0], [0.0, 0.0, 1e-4 * (1.0 + value(i))]],
+            pixels: (i % 3 != 0)
+                .then(|| PixelPair { left: [5.0 * i as f64, value(i) + 20.0], right: [i as f64, 20.0] }),
+        })
+        .collect();
+    let mut fixed = TargetRecord::refused("A", "maximum-clique", "kabsch", "");
+    fixed.outcome = Outcome::Referenced;
+    fixed.object_from_camera = Some(at(value(1), value(2), -3.0));
+    let mut covariance = [[0.0; 6]; 6];
+    (0..6).for_each(|i| covariance[i][i] = 1e-5 * (i + 1) as f64);
+    fixed.covariance = Some(covariance);
+    fixed.candidates = vec![vec![0, 1], vec![], vec![2, 5, 6], vec![3], vec![4, 11]];
+    fixed.pairs = vec![Pair { model: 0, cloud: 1 }, Pair { model: 2, cloud: 5 }, Pair { model: 4, cloud: 11 }];
+    fixed.used = vec![0, 2];
+    fixed.alternatives =
+        vec![Alternative { object_from_camera: EYE, pairs: vec![Pair { model: 1, cloud: 0 }], score: -7.5 }];
+    fixed.optimal = Some(true);
+    fixed.size_bound = Some(3);
+    fixed.expected_chance_sets = Some(1e-4);
+    fixed.tests = Some(1234);
+    fixed.residual_rms = Some(0.004);
+    fixed.evaluation = Evaluation {
+        wrong: Some(false),
+        wrong_pairs: Some(false),
+        visible: Some(4),
+        identified: Some(3),
+        correct_pairs: Some(3),
+        m1_rms: Some(0.004),
+        m1_unused_rms: None,
+        m2_rms: Some(0.006),
+        m3_position: Some(0.01),
+        m3_attitude: Some(0.002),
+        nees: Some(5.5),
+    };
+    fixed.times =
+        TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };
+    let mut refused = TargetRecord::refused("B", "maximum-clique", "kabsch", "too-few");
+    refused.detail = "2 points".to_owned();
+    let odd = number % 2 == 1;
+    FrameRecord {
+        frame: number,
+        stamp_ns: 1_600_000_000_000_000_000 + number * 100_000_000,
+        images: (!odd).then(|| [image(number), image(number + 1)]),
+        key_points: (0..30).map(|i| [32.0 + 60.0 * value(i + 200), 24.0 + 40.0 * value(i + 300)]).collect(),
+        cloud,
+        prior: odd.then(|| PriorRecord { world_from_camera: at(10.0, 20.0, 27.0) }),
+        truth: (number % 3 != 2).then(|| TruthRecord {
+            world_from_camera: at(10.0, 20.0, 27.0),
+            world_from_object: vec![("A".to_owned(), at(10.0, 20.0, 30.0))],
+            visible: vec![VisiblePoint { object: "A".to_owned(), point: 2 }],
+        }),
+        targets: if number == 3 {
+            vec![TargetRecord::not_attempted("maximum-clique", "kabsch", "nothing-in-view")]
+        } else {
+            vec![fixed, refused]
+        },
+        times: FrameTimes { detect_ms: Some(3.0), describe_ms: None, match_ms: Some(0.0), triangulate_ms: Some(1.0) },
+    }
+}
+
+/// Writes a trial of `frames` frames to `path`.
+pub(crate) fn write(path: &std::path::Path, frames: u64) {
+    let mut writer = Writer::create(path, &header()).unwrap();
+    (0..frames).for_each(|number| writer.frame(&frame(number)).unwrap());
+    writer.finish().unwrap();
+}
