@@ -1,10 +1,9 @@
 //! Harris' corner detector.
 
 use seafix_component::Component;
-use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
-use super::{Detector, Keypoint, peaks};
+use super::{Detector, Keypoint, junction::Junction, peaks};
 use crate::{Image, gaussian::half_kernel};
 
 /// Harris' corners: places whose surroundings change in every direction.
@@ -13,11 +12,11 @@ use crate::{Image, gaussian::half_kernel};
 /// A = G_σ ∗ g gᵀ, integrated with a Gaussian; the response is R = det A − k (tr A)²
 /// (grey levels⁴/px⁴): positive at corners, negative along edges, zero where nothing changes.
 /// A corner is a maximum of R, placed to a fraction of a pixel by the quadratic through its nine
-/// responses.
+/// responses, and then, where there is one, at the junction of the edges around it (Förstner):
+/// the response alone peaks 1 to 2 px inside a convex corner.
 ///
 /// Nothing is found nearer to the border than the operator reaches, 3σ + 2 px; an image too small
-/// for that has no corner. The response of a convex corner peaks inside it by about σ/2, in both
-/// images of a pair alike.
+/// for that has no corner.
 ///
 /// Source: Harris and Stephens, *A combined corner and edge detector*, Alvey Vision Conference, 1988.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,6 +31,9 @@ pub struct Harris {
     pub quality: f64,
     /// No corner has a stronger one within this distance (px).
     pub radius: usize,
+    /// Standard deviation of the window in which the edges around a corner are made to meet (px);
+    /// 0: corners stay at the peak of the response.
+    pub junction: f64,
     /// At most so many corners.
     pub features: usize,
     /// Cells along the longer side of the image over which the budget is spread; in each round every
@@ -41,7 +43,7 @@ pub struct Harris {
 
 impl Default for Harris {
     fn default() -> Self {
-        Self { sigma: 1.5, k: 0.04, quality: 1e-4, radius: 4, features: 1000, balance: 8 }
+        Self { sigma: 2.0, k: 0.04, quality: 1e-4, radius: 4, junction: 2.5, features: 1000, balance: 8 }
     }
 }
 
@@ -52,6 +54,9 @@ impl Component for Harris {
         "Harris and Stephens, A combined corner and edge detector, Alvey Vision Conference, 1988";
 }
 
+/// Corners nearer to each other than this are one (px).
+const SAME: f64 = 1.0;
+
 impl Detector for Harris {
     fn detect(&self, image: &Image) -> Vec<Keypoint> {
         let response = self.response(image);
@@ -59,13 +64,17 @@ impl Detector for Harris {
         let least = (f64::from(strongest) * self.quality) as f32;
         let mut found = peaks::maxima(&response, image.width(), least, self.radius);
         peaks::strongest(&mut found, [image.width(), image.height()], self.features, self.balance);
-        found
-            .into_iter()
-            .map(|peak| {
-                let at: Pixel = peaks::vertex(&response, image.width(), &peak);
-                Keypoint { at, response: peak.response, scale: self.sigma as f32 }
-            })
-            .collect()
+        let junction = (self.junction > 0.0).then(|| Junction::new(self.junction));
+        let mut corners: Vec<Keypoint> = Vec::with_capacity(found.len());
+        for peak in found {
+            let vertex = peaks::vertex(&response, image.width(), &peak);
+            let at = junction.as_ref().and_then(|junction| junction.near(image, &vertex)).unwrap_or(vertex);
+            // Two peaks around one junction are one corner: the stronger stands.
+            if corners.iter().all(|corner| corner.at.distance(&at) >= SAME) {
+                corners.push(Keypoint { at, response: peak.response, scale: self.sigma as f32 });
+            }
+        }
+        corners
     }
 }
 
@@ -153,6 +162,7 @@ fn add_pair(out: &mut [f32], a: &[f32], b: &[f32], weight: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use seafix_geometry::Pixel;
 
     /// Smooth blobs and ramps of many frequencies, 8 bits.
     fn texture(width: usize, height: usize) -> Image {
@@ -195,16 +205,23 @@ mod tests {
         for (x, y) in [(20.0, 20.0), (20.5, 19.5), (20.25, 20.7), (19.9, 20.3)] {
             let found = Harris::default().detect(&crossing(x, y, 41));
             assert_eq!(found.len(), 1, "{found:?}");
-            assert!(found[0].at.distance(&Pixel { u: x, v: y }) < 0.15, "{:?} for {x}, {y}", found[0].at);
+            assert!(found[0].at.distance(&Pixel { u: x, v: y }) < 0.1, "{:?} for {x}, {y}", found[0].at);
         }
     }
 
     #[test]
-    fn the_corner_of_a_box_is_found_a_little_inside_it() {
-        let found = Harris::default().detect(&quadrant(20.0, 20.0, 41));
-        assert_eq!(found.len(), 1);
-        let Pixel { u, v } = found[0].at;
-        assert!((u - v).abs() < 1e-4 && u > 20.2 && u < 21.5, "{u}, {v}");
+    fn the_corner_of_a_box_is_found_where_its_edges_meet() {
+        let at = |junction, x: f64, y: f64| {
+            let found = Harris { junction, ..Harris::default() }.detect(&quadrant(x, y, 41));
+            assert_eq!(found.len(), 1);
+            found[0].at
+        };
+        for (x, y) in [(20.0, 20.0), (20.5, 19.5), (20.25, 20.7), (19.9, 20.3)] {
+            let meet = at(2.5, x, y);
+            assert!(meet.distance(&Pixel { u: x, v: y }) < 0.15, "{meet:?} for {x}, {y}");
+        }
+        let peak = at(0.0, 20.0, 20.0);
+        assert!(peak.u > 20.8 && peak.v > 20.8, "the response peaks inside: {peak:?}");
     }
 
     #[test]
@@ -224,7 +241,7 @@ mod tests {
         let turned = (0..90 * 70).map(|i| image.row(i % 70)[89 - i / 70]).collect();
         let turned = Image::new(70, 90, turned).unwrap();
         let (before, after) = (Harris::default().detect(&image), Harris::default().detect(&turned));
-        assert!(before.len() > 40);
+        assert!(before.len() > 25);
         assert_eq!(before.len(), after.len());
         for point in &before {
             let expected = Pixel { u: point.at.v, v: 89.0 - point.at.u };
@@ -245,13 +262,13 @@ mod tests {
         let mut compared = 0;
         for point in &a {
             let shifted = Pixel { u: point.at.u - 5.0, v: point.at.v - 7.0 };
-            let inner = shifted.u > 14.0 && shifted.u < 65.0 && shifted.v > 14.0 && shifted.v < 45.0;
-            if inner {
+            let inner = |at: &Pixel| at.u > 15.0 && at.u < 64.0 && at.v > 15.0 && at.v < 44.0;
+            if inner(&point.at) && inner(&shifted) {
                 assert!(nearest(&b, shifted) < 1e-12, "{point:?}");
                 compared += 1;
             }
         }
-        assert!(compared > 10, "{compared}");
+        assert!(compared > 5, "{compared}");
     }
 
     #[test]

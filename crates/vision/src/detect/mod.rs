@@ -1,6 +1,7 @@
 //! Detectors: where in an image there is something to find again.
 
 mod harris;
+mod junction;
 mod peaks;
 
 pub use harris::Harris;
