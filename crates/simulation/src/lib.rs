@@ -1,1 +1,33 @@
 //! Seeded dives over a virtual production system: rendered images or noisy points, with truth.
+//!
+//! A [`Dive`] is the settings; [`Dive::plan`] draws the site and its survey from a seed; each
+//! [`DiveFrame`] of the [`PlannedDive`] is a view of one object, with a stamp and a rough pose. It
+//! [renders](DiveFrame::render) a stereo pair or gives [points](DiveFrame::points); its
+//! [truth](DiveFrame::truth) is kept apart.
+//!
+//! Everything is a function of the seed, the number of the dive, the number of the frame and the
+//! purpose ([`Stream`]): the same bytes in any order and on any number of threads.
+//!
+//! - World: north, east, down. The cameras look down; right in the image is starboard, its lower
+//!   edge is aft.
+//! - The centre of the first pixel is (0, 0).
+//! - Light is fixed, water is clear: no attenuation, no lamps, no shadows.
+
+mod bed;
+mod blueprint;
+mod dive;
+mod noise;
+mod paint;
+mod points;
+mod raster;
+mod render;
+mod scene;
+mod sensor;
+mod stream;
+mod survey;
+
+pub use blueprint::{Blueprint, BoxPlan, ChequerPlan, ObjectPlan, PanelPlan, PipePlan, PointPlan};
+pub use dive::{BadDive, Dive, DiveFrame, FrameTruth, PlannedDive, RoughPose, VirtualRig, VisiblePoint};
+pub use points::PointNoise;
+pub use sensor::Sensor;
+pub use stream::{Purpose, Stream};

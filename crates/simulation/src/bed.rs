@@ -1,0 +1,188 @@
+//! The relief of the sea bed: gentle waves, on a grid of triangles.
+
+use nalgebra::Vector3;
+
+use crate::stream::{Purpose, Stream};
+
+/// Side of a cell of the grid (m); each is split along its rising diagonal into two triangles.
+const CELL: f64 = 0.25;
+
+/// One wave of the relief: amplitude (m), wave vector (rad/m), phase.
+#[derive(Debug, Clone, Copy)]
+struct Wave {
+    amplitude: f64,
+    north: f64,
+    east: f64,
+    phase: f64,
+}
+
+/// The sea bed. The surface *is* the triangles: rays and pixels see the same one.
+#[derive(Debug, Clone)]
+pub(crate) struct Bed {
+    depth: f64,
+    waves: Vec<Wave>,
+}
+
+/// A rectangle of the bed's grid, for one image.
+#[derive(Debug, Clone)]
+pub(crate) struct Patch {
+    first: [i64; 2],
+    count: [usize; 2],
+    down: Vec<f64>,
+    normals: Vec<Vector3<f64>>,
+}
+
+impl Bed {
+    /// The bed at this mean depth (m).
+    pub(crate) fn new(depth: f64, seed: u64) -> Self {
+        let mut stream = Stream::new(seed, 0, 0, Purpose::Relief);
+        let waves = [9.0, 6.1, 4.3, 3.1].map(|length| {
+            let (sine, cosine) = libm::sincos(stream.between(0.0, std::f64::consts::TAU));
+            let k = std::f64::consts::TAU / length;
+            Wave {
+                amplitude: 0.003 * length,
+                north: k * cosine,
+                east: k * sine,
+                phase: stream.between(0.0, std::f64::consts::TAU),
+            }
+        });
+        Self { depth, waves: waves.to_vec() }
+    }
+
+    /// The mean depth (m).
+    pub(crate) fn depth(&self) -> f64 {
+        self.depth
+    }
+
+    /// How far the bed rises above its mean depth at most (m).
+    pub(crate) fn crest(&self) -> f64 {
+        self.waves.iter().map(|w| w.amplitude).sum()
+    }
+
+    /// Depth of a vertex of the grid, and its slopes.
+    fn vertex(&self, i: i64, j: i64) -> (f64, [f64; 2]) {
+        let (north, east) = (i as f64 * CELL, j as f64 * CELL);
+        let (mut down, mut slope) = (self.depth, [0.0; 2]);
+        for w in &self.waves {
+            let (sine, cosine) = libm::sincos(w.north * north + w.east * east + w.phase);
+            down += w.amplitude * sine;
+            slope[0] += w.amplitude * w.north * cosine;
+            slope[1] += w.amplitude * w.east * cosine;
+        }
+        (down, slope)
+    }
+
+    /// Depth of the surface at a place (m).
+    pub(crate) fn down(&self, north: f64, east: f64) -> f64 {
+        let (x, y) = (north / CELL, east / CELL);
+        let (i, j) = (x.floor(), y.floor());
+        let (fx, fy) = (x - i, y - j);
+        let (i, j) = (i as i64, j as i64);
+        let origin = self.vertex(i, j).0;
+        let far = self.vertex(i + 1, j + 1).0;
+        if fx >= fy {
+            let side = self.vertex(i + 1, j).0;
+            origin + fx * (side - origin) + fy * (far - side)
+        } else {
+            let side = self.vertex(i, j + 1).0;
+            origin + fy * (side - origin) + fx * (far - side)
+        }
+    }
+
+    /// The t > 0 at which `from + t·along` meets the bed, coming from above.
+    pub(crate) fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
+        if along.z <= 0.05 * along.norm() {
+            return None; // level or upwards: the slopes stay below 3°, so no bed within sight
+        }
+        let mut t = (self.depth - from.z) / along.z;
+        // The slopes are gentle: each step divides the error by at least 2.
+        for _ in 0..60 {
+            let at = from + along * t;
+            let step = (self.down(at.x, at.y) - at.z) / along.z;
+            t += step;
+            if step.abs() * along.norm() < 1e-13 {
+                break;
+            }
+        }
+        (t > 0.0).then_some(t)
+    }
+
+    /// The grid over the rectangle from `low` to `high` (north, east).
+    pub(crate) fn patch(&self, low: [f64; 2], high: [f64; 2]) -> Patch {
+        let first = low.map(|x| (x / CELL).floor() as i64);
+        let last = high.map(|x| (x / CELL).ceil() as i64);
+        let count = [(last[0] - first[0]).max(1) as usize + 1, (last[1] - first[1]).max(1) as usize + 1];
+        let (mut down, mut normals) = (Vec::new(), Vec::new());
+        for i in 0..count[0] {
+            for j in 0..count[1] {
+                let (z, [north, east]) = self.vertex(first[0] + i as i64, first[1] + j as i64);
+                down.push(z);
+                normals.push(Vector3::new(north, east, -1.0).normalize());
+            }
+        }
+        Patch { first, count, down, normals }
+    }
+}
+
+impl Patch {
+    /// The triangles of the patch.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [Vector3<f64>; 3]> + '_ {
+        let [rows, columns] = self.count;
+        let corner = move |i: usize, j: usize| {
+            Vector3::new(
+                (self.first[0] + i as i64) as f64 * CELL,
+                (self.first[1] + j as i64) as f64 * CELL,
+                self.down[i * columns + j],
+            )
+        };
+        (0..rows - 1).flat_map(move |i| {
+            (0..columns - 1).flat_map(move |j| {
+                let (a, b, c, d) = (corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1));
+                [[a, b, c], [a, c, d]]
+            })
+        })
+    }
+
+    /// The smoothed normal (upwards) at a place.
+    pub(crate) fn normal(&self, north: f64, east: f64) -> Vector3<f64> {
+        let at = |x: f64, first: i64, count: usize| {
+            let x = (x / CELL - first as f64).clamp(0.0, (count - 1) as f64);
+            let cell = (x.floor() as usize).min(count - 2);
+            (cell, x - cell as f64)
+        };
+        let (i, fx) = at(north, self.first[0], self.count[0]);
+        let (j, fy) = at(east, self.first[1], self.count[1]);
+        let n = |i: usize, j: usize| self.normals[i * self.count[1] + j];
+        let near = n(i, j) * (1.0 - fy) + n(i, j + 1) * fy;
+        let far = n(i + 1, j) * (1.0 - fy) + n(i + 1, j + 1) * fy;
+        near * (1.0 - fx) + far * fx
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_ends_on_the_surface() {
+        let bed = Bed::new(40.0, 3);
+        let from = Vector3::new(1.0, -2.0, 36.0);
+        for k in 0..200 {
+            let k = f64::from(k);
+            let along = Vector3::new(0.6 * libm::cos(k), 0.7 * libm::sin(2.3 * k), 1.0);
+            let at = from + along * bed.hit(&from, &along).unwrap();
+            assert!((at.z - bed.down(at.x, at.y)).abs() < 1e-12);
+            assert!((at.z - 40.0).abs() <= bed.crest());
+        }
+        assert_eq!(bed.hit(&from, &Vector3::new(1.0, 0.0, -0.1)), None);
+    }
+
+    #[test]
+    fn the_surface_passes_through_the_triangles_of_a_patch() {
+        let bed = Bed::new(40.0, 3);
+        for [a, b, c] in bed.patch([-1.0, -1.0], [1.0, 1.0]).triangles() {
+            let centre = (a + b + c) / 3.0;
+            assert!((bed.down(centre.x, centre.y) - centre.z).abs() < 1e-12);
+        }
+    }
+}

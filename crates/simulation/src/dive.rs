@@ -1,0 +1,401 @@
+//! A dive over the virtual site: its settings, its plan, its frames.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use seafix_geometry::{
+    BadCamera, BadRig, Camera, MeasuredPoint, Object, Pinhole, StereoPixels, StereoRig, Transform, World, so3,
+};
+use seafix_referencing::Site;
+use seafix_vision::Image;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    blueprint::Blueprint,
+    points::{Eyes, PointNoise},
+    render::Rendering,
+    scene::Scene,
+    sensor::Sensor,
+    stream::{Purpose, Stream},
+    survey::{SurveyErrors, survey},
+};
+
+/// The first stamp: some time in 2023, so that stamps look like those of a real log.
+const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
+/// A view's feature points are wanted this far from the image border (px).
+const VIEW_MARGIN: f64 = 24.0;
+/// How many views are tried before the best one is taken.
+const VIEW_TRIALS: usize = 100;
+/// The cameras stay this far above anything beneath them (m).
+const CLEARANCE: f64 = 0.4;
+
+/// The settings of a dive over the virtual site.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Dive {
+    /// Frames, each a view of the next object of the route.
+    pub frames: usize,
+    /// Distance from the left camera to the mean of the object's feature points (m).
+    pub distance: f64,
+    /// Least and greatest angle of the optical axis to the vertical (degrees).
+    pub tilt_deg: [f64; 2],
+    /// How far the object's centre may lie off the middle of the view (tangent of the angle).
+    pub off_centre: f64,
+    /// Feature points of the object that a view should show in both images, if it can.
+    pub least_visible: usize,
+    /// Frames a second.
+    pub rate: f64,
+    /// Standard deviation of the rough pose's position, each world axis (m).
+    pub prior_position: f64,
+    /// Standard deviation of the rough pose's attitude, each camera axis (degrees).
+    pub prior_attitude_deg: f64,
+    /// Standard deviation of each coordinate of the model's points (m).
+    pub model_sigma: f64,
+    /// Standard deviation of each surveyed world coordinate of base points (m).
+    pub survey_sigma: f64,
+    /// The cameras.
+    pub rig: VirtualRig,
+    /// Lens and sensor of both cameras.
+    pub sensor: Sensor,
+    /// The same dive as points.
+    pub points: PointNoise,
+}
+
+impl Default for Dive {
+    fn default() -> Self {
+        Self {
+            frames: 70,
+            distance: 3.0,
+            tilt_deg: [0.0, 15.0],
+            off_centre: 0.1,
+            least_visible: 6,
+            rate: 10.0,
+            prior_position: 0.1,
+            prior_attitude_deg: 0.5,
+            model_sigma: 0.001,
+            survey_sigma: 0.01,
+            rig: VirtualRig::default(),
+            sensor: Sensor::default(),
+            points: PointNoise::default(),
+        }
+    }
+}
+
+/// Two equal cameras side by side, axes parallel. The defaults are the paper's camera; the paper
+/// gives no baseline.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct VirtualRig {
+    /// Width and height of the images (px).
+    pub size: [u32; 2],
+    /// Focal length (px).
+    pub focal: f64,
+    /// Distance between the cameras (m).
+    pub baseline: f64,
+}
+
+impl Default for VirtualRig {
+    fn default() -> Self {
+        Self { size: [1024, 768], focal: 500.0, baseline: 0.25 }
+    }
+}
+
+impl VirtualRig {
+    /// The rig; its principal points lie in the middle of the images.
+    ///
+    /// # Errors
+    /// [`BadDive`] when the numbers describe no rig.
+    pub fn build(&self) -> Result<StereoRig, BadDive> {
+        let principal = self.size.map(|n| 0.5 * (f64::from(n) - 1.0));
+        let camera = Pinhole::new(self.size, [self.focal; 2], principal, &[])?;
+        let step = Transform::new(UnitQuaternion::identity(), Vector3::new(-self.baseline, 0.0, 0.0));
+        Ok(StereoRig::new(camera, camera, step)?)
+    }
+}
+
+/// Why settings describe no dive.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BadDive {
+    /// A number outside its range.
+    #[error("{name} = {value}; {remedy}")]
+    Value {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        remedy: &'static str,
+    },
+    /// No camera.
+    #[error("rig: {0}")]
+    Camera(#[from] BadCamera),
+    /// No rig.
+    #[error("rig: {0}")]
+    Rig(#[from] BadRig),
+}
+
+/// The rough pose that a method may use.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RoughPose {
+    /// The left camera in the world, with its error.
+    pub world_from_camera: Transform<World, Camera>,
+    /// Standard deviation of the position, each world axis (m).
+    pub position_sigma: f64,
+    /// Standard deviation of the attitude, each camera axis (rad).
+    pub attitude_sigma: f64,
+}
+
+/// A feature point that both cameras see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VisiblePoint {
+    /// Index of its object in the site.
+    pub object: usize,
+    /// Index of the point in its object.
+    pub point: usize,
+    /// Its true pixels.
+    pub pixels: StereoPixels,
+}
+
+/// What no method may see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameTruth {
+    /// Index of the object that the view was chosen for.
+    pub object: usize,
+    /// The left camera in the world.
+    pub world_from_camera: Transform<World, Camera>,
+    /// The feature points, of any object, that lie in both images with nothing before them.
+    pub visible: Vec<VisiblePoint>,
+}
+
+impl Dive {
+    /// The dive number `dive` of the experiment with this seed.
+    ///
+    /// The site, its survey and the bed are functions of the seed alone, so that the dives of one
+    /// experiment visit one place; views, rough poses and noise also differ between dives.
+    ///
+    /// # Errors
+    /// [`BadDive`] names the setting that is wrong.
+    pub fn plan(&self, seed: u64, dive: u64) -> Result<PlannedDive, BadDive> {
+        self.check()?;
+        let rig = self.rig.build()?;
+        let blueprint = Blueprint::drill_centre();
+        let scene = Scene::new(&blueprint, seed);
+        let errors = SurveyErrors { model: self.model_sigma, survey: self.survey_sigma };
+        let (site, world_from_object) = survey(&blueprint, &scene, errors, seed);
+        Ok(PlannedDive { settings: self.clone(), seed, dive, rig, scene, site, world_from_object })
+    }
+
+    fn check(&self) -> Result<(), BadDive> {
+        let fail = |name, value, remedy| Err(BadDive::Value { name, value, remedy });
+        let within = |name, value: f64, low: f64, high: f64, remedy| {
+            if value >= low && value <= high { Ok(()) } else { fail(name, value, remedy) }
+        };
+        within("distance", self.distance, 1.0, 30.0, "views are taken from 1 m to 30 m")?;
+        let [low, high] = self.tilt_deg;
+        within("tilt-deg[0]", low, 0.0, 40.0, "angles from the vertical go from 0 to 40 degrees")?;
+        within("tilt-deg[1]", high, low, 40.0, "the greatest angle is at least the least, and at most 40 degrees")?;
+        within("off-centre", self.off_centre, 0.0, 1.0, "give a tangent from 0 to 1")?;
+        within("rate", self.rate, 1e-3, 1e4, "give frames a second, from 0.001 to 10000")?;
+        within("prior-position", self.prior_position, 0.0, 100.0, "give metres, from 0 to 100")?;
+        within("prior-attitude-deg", self.prior_attitude_deg, 0.0, 45.0, "give degrees, from 0 to 45")?;
+        within("model-sigma", self.model_sigma, 0.0, 0.1, "give metres, from 0 to 0.1")?;
+        within("survey-sigma", self.survey_sigma, 0.0, 0.2, "give metres, from 0 to 0.2")?;
+        within("rig.baseline", self.rig.baseline, 1e-3, 5.0, "give metres, from 0.001 to 5")?;
+        for n in self.rig.size {
+            within("rig.size", f64::from(n), 16.0, 8192.0, "an image has 16 to 8192 pixels a side")?;
+        }
+        within("sensor.blur", self.sensor.blur, 0.0, 20.0, "give pixels, from 0 to 20")?;
+        within("sensor.noise", self.sensor.noise, 0.0, 255.0, "give grey levels, from 0 to 255")?;
+        within("sensor.white", self.sensor.white, 0.0, 1e6, "give a grey level, zero or more")?;
+        within("points.sigma-px", self.points.sigma_px, 0.0, 20.0, "give pixels, from 0 to 20")?;
+        within("points.found", self.points.found, 0.0, 1.0, "give a share, from 0 to 1")
+    }
+}
+
+/// A dive whose site and bed are drawn; frames are made when asked for, in any order.
+#[derive(Debug, Clone)]
+pub struct PlannedDive {
+    settings: Dive,
+    seed: u64,
+    dive: u64,
+    rig: StereoRig,
+    scene: Scene,
+    site: Site,
+    world_from_object: Vec<Transform<World, Object>>,
+}
+
+impl PlannedDive {
+    /// The site as a method knows it.
+    pub fn site(&self) -> &Site {
+        &self.site
+    }
+
+    /// The site as a method knows it, in `seafix-site/1`.
+    pub fn site_toml(&self) -> String {
+        self.site.to_toml()
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &StereoRig {
+        &self.rig
+    }
+
+    /// The settings it was planned with.
+    pub fn settings(&self) -> &Dive {
+        &self.settings
+    }
+
+    /// Truth: where each object is, as the best fit of its model's points to their true places.
+    pub fn world_from_object(&self) -> &[Transform<World, Object>] {
+        &self.world_from_object
+    }
+
+    /// How many frames it has.
+    pub fn len(&self) -> usize {
+        self.settings.frames
+    }
+
+    /// Whether it has no frame.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Frame number `index`, a function of seed, dive and index alone.
+    pub fn frame(&self, index: usize) -> DiveFrame<'_> {
+        let object = index % self.scene.bodies.len();
+        let eyes = self.view(object, &mut self.stream(index, Purpose::View));
+        let world_from_camera = eyes.world_from_camera;
+        let truth = FrameTruth { object, world_from_camera, visible: self.visible(&eyes) };
+        let interval = 1e9 / self.settings.rate;
+        DiveFrame {
+            dive: self,
+            index,
+            stamp_ns: EPOCH_NS + (index as f64 * interval).round() as u64,
+            prior: self.rough(&world_from_camera, &mut self.stream(index, Purpose::Prior)),
+            truth,
+        }
+    }
+
+    /// All frames, in order.
+    pub fn frames(&self) -> impl Iterator<Item = DiveFrame<'_>> {
+        (0..self.len()).map(|index| self.frame(index))
+    }
+
+    fn stream(&self, frame: usize, purpose: Purpose) -> Stream {
+        Stream::new(self.seed, self.dive, frame as u64, purpose)
+    }
+
+    /// A view of an object: the first of many random ones that shows enough of it, or the best.
+    fn view(&self, object: usize, stream: &mut Stream) -> Eyes<'_> {
+        let body = &self.scene.bodies[object];
+        let wanted = self.settings.least_visible.min(body.points.len());
+        let mut best: Option<(usize, Eyes<'_>)> = None;
+        for _ in 0..VIEW_TRIALS {
+            let eyes = Eyes { rig: &self.rig, world_from_camera: self.look_at(&body.centroid(), stream) };
+            if !eyes.places().iter().all(|at| at.z < self.scene.summit(at, 1.0) - CLEARANCE) {
+                continue;
+            }
+            let shown = body.points.iter().filter(|p| eyes.see(&self.scene, p, VIEW_MARGIN).is_some()).count();
+            if best.is_none_or(|(most, _)| shown > most) {
+                best = Some((shown, eyes));
+            }
+            if shown >= wanted {
+                break;
+            }
+        }
+        best.map_or_else(
+            // Only distances below a metre or so leave no room above an object: look from straight above.
+            || Eyes { rig: &self.rig, world_from_camera: self.aim(&body.centroid(), [0.0; 2], 0.0, 0.0, 0.0) },
+            |(_, eyes)| eyes,
+        )
+    }
+
+    /// A random view of a place.
+    fn look_at(&self, place: &Vector3<f64>, stream: &mut Stream) -> Transform<World, Camera> {
+        let turn = std::f64::consts::TAU;
+        let [low, high] = self.settings.tilt_deg.map(f64::to_radians);
+        let (heading, about, tilt) = (stream.between(0.0, turn), stream.between(0.0, turn), stream.between(low, high));
+        let off = [(); 2].map(|()| self.settings.off_centre * stream.between(-1.0, 1.0));
+        self.aim(place, off, heading, about, tilt)
+    }
+
+    /// The view with this heading, tilted by `tilt` about the direction `about` of the image plane,
+    /// that shows `place` at `off` (tangents) from the middle of what both cameras see.
+    fn aim(&self, place: &Vector3<f64>, off: [f64; 2], heading: f64, about: f64, tilt: f64) -> Transform<World, Camera> {
+        // Straight down, heading north: the image's right is east, its lower edge is aft.
+        let down = so3::exp(&(Vector3::z() * (heading + std::f64::consts::FRAC_PI_2)));
+        let (sine, cosine) = libm::sincos(about);
+        let rotation = down * so3::exp(&Vector3::new(tilt * cosine, tilt * sine, 0.0));
+        let distance = self.settings.distance;
+        let middle = 0.5 * self.rig.baseline() / distance;
+        let seen = Vector3::new(off[0] + middle, off[1], 1.0).normalize() * distance;
+        Transform::new(rotation, place - rotation * seen)
+    }
+
+    fn visible(&self, eyes: &Eyes<'_>) -> Vec<VisiblePoint> {
+        let mut all = Vec::new();
+        for (object, body) in self.scene.bodies.iter().enumerate() {
+            for (point, corner) in body.points.iter().enumerate() {
+                all.extend(eyes.see(&self.scene, corner, 0.0).map(|pixels| VisiblePoint { object, point, pixels }));
+            }
+        }
+        all
+    }
+
+    /// The rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the
+    /// position's along the world's.
+    fn rough(&self, truth: &Transform<World, Camera>, stream: &mut Stream) -> RoughPose {
+        let (position_sigma, attitude_sigma) =
+            (self.settings.prior_position, self.settings.prior_attitude_deg.to_radians());
+        let turn = so3::exp(&-stream.normal3(attitude_sigma));
+        let step = stream.normal3(position_sigma);
+        let world_from_camera = Transform::new(truth.rotation() * turn, truth.translation() - step);
+        RoughPose { world_from_camera, position_sigma, attitude_sigma }
+    }
+}
+
+/// One frame of a dive: what a method may see, and apart from it the truth.
+#[derive(Debug, Clone)]
+pub struct DiveFrame<'a> {
+    dive: &'a PlannedDive,
+    /// Its number in the dive.
+    pub index: usize,
+    /// When it was taken (ns since 1970).
+    pub stamp_ns: u64,
+    /// The rough pose.
+    pub prior: RoughPose,
+    truth: FrameTruth,
+}
+
+impl DiveFrame<'_> {
+    /// The left and the right image: a plain function of the frame.
+    pub fn render(&self) -> (Image, Image) {
+        let eyes = self.eyes();
+        let world_from_right = eyes.world_from_camera * eyes.rig.right_from_left().inverse();
+        let scene = &self.dive.scene;
+        let left = Rendering::new(scene, eyes.rig.left(), eyes.world_from_camera).radiance();
+        let right = Rendering::new(scene, eyes.rig.right(), world_from_right).radiance();
+        let expose = |radiance, camera: &Pinhole, purpose| {
+            let [width, height] = camera.size().map(|n| n as usize);
+            let pixels = self.dive.settings.sensor.expose(radiance, width, self.dive.stream(self.index, purpose));
+            Image::new(width, height, pixels).expect("the rasteriser fills every pixel")
+        };
+        (expose(left, eyes.rig.left(), Purpose::LeftImage), expose(right, eyes.rig.right(), Purpose::RightImage))
+    }
+
+    /// The same view as measured points: visible corners, feature points among them, and clutter.
+    pub fn points(&self) -> Vec<MeasuredPoint> {
+        let mut stream = self.dive.stream(self.index, Purpose::Points);
+        self.eyes().measure(&self.dive.scene, &self.dive.settings.points, &mut stream)
+    }
+
+    /// What no method may see.
+    pub fn truth(&self) -> &FrameTruth {
+        &self.truth
+    }
+
+    fn eyes(&self) -> Eyes<'_> {
+        Eyes { rig: &self.dive.rig, world_from_camera: self.truth.world_from_camera }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,122 @@
+//! What colour a place of a surface has: closed-form textures and a fixed light.
+
+use nalgebra::Vector3;
+
+use crate::{
+    noise::{gradient, hash, shown},
+    scene::Finish,
+};
+
+/// Share of the light that comes from everywhere.
+const AMBIENT: f32 = 0.38;
+/// Share of the light that comes from the lamp.
+const LAMP: f32 = 0.72;
+
+/// The unit vector towards the light (world): high, from the north-east.
+fn towards_light() -> Vector3<f64> {
+    Vector3::new(0.45, 0.38, -0.81).normalize()
+}
+
+/// How brightly a surface with this normal is lit. (Lambert.)
+pub(crate) fn light(normal: &Vector3<f64>) -> f32 {
+    let cosine = normal.dot(&towards_light()) / normal.norm();
+    AMBIENT + LAMP * cosine.max(0.0) as f32
+}
+
+/// The sum of noise octaves: pairs of feature size (m) and amplitude.
+fn octaves(x: f64, y: f64, footprint: f64, seed: u32, layers: &[(f64, f32)]) -> f32 {
+    let mut sum = 0.0;
+    for (k, &(size, amplitude)) in layers.iter().enumerate() {
+        let weight = shown(size * 1.5, footprint) * amplitude;
+        if weight > 0.0 {
+            // Each octave is turned and shifted, so that their grids do not align.
+            let (s, c) = [(0.0, 1.0), (0.6, 0.8), (0.8, -0.6), (-0.28, 0.96)][k % 4];
+            let (u, v) = ((c * x - s * y) / size, (s * x + c * y) / size);
+            sum += weight * gradient(u + 17.3, v - 5.1, seed.wrapping_add(k as u32 * 0x51ED));
+        }
+    }
+    sum
+}
+
+/// Pebbles: in each cell of a grid at most one, lit from one side.
+fn pebbles(x: f64, y: f64, footprint: f64, seed: u32, cell: f64) -> f32 {
+    let weight = shown(cell * 0.5, footprint);
+    if weight == 0.0 {
+        return 0.0;
+    }
+    let (u, v) = (x / cell, y / cell);
+    let (cu, cv) = (u.floor(), v.floor());
+    let h = hash(cu as i32, cv as i32, seed);
+    if h & 7 > 4 {
+        return 0.0;
+    }
+    let share = |shift: u32| ((h >> shift) & 0xFF) as f32 / 255.0;
+    let radius = 0.16 + 0.26 * share(3) * share(3);
+    let room = 1.0 - 2.0 * radius;
+    let (du, dv) = ((u - cu) as f32 - radius - room * share(8), (v - cv) as f32 - radius - room * share(16));
+    let stretch = 1.0 + 0.5 * share(20);
+    let (along, across) = if h & 0x800_0000 == 0 { (du, dv * stretch) } else { (du * stretch, dv) };
+    let distance = (along * along + across * across).sqrt();
+    let soft = (footprint / cell) as f32 + 0.15 * radius;
+    let inside = ((radius - distance) / soft + 0.5).clamp(0.0, 1.0);
+    let tone = 0.5 * share(24) - 0.2 + 0.35 * (du * 0.76 + dv * 0.65) / radius;
+    weight * inside * tone
+}
+
+/// Share of the light that the bed returns at a place (north, east), seen by pixels of this
+/// footprint (m).
+pub(crate) fn bed(north: f64, east: f64, footprint: f64, seed: u32) -> f32 {
+    let sand = octaves(
+        north,
+        east,
+        footprint,
+        seed,
+        &[(2.3, 0.10), (0.9, 0.09), (0.34, 0.08), (0.13, 0.09), (0.05, 0.09), (0.019, 0.08)],
+    );
+    let (tu, tv) = (0.8 * north - 0.6 * east, 0.6 * north + 0.8 * east);
+    let stones = pebbles(north, east, footprint, seed ^ 0xA5A5, 0.21) + 0.8 * pebbles(tu, tv, footprint, seed ^ 0x5A5A, 0.085);
+    0.27 * (1.0 + sand + 0.8 * stones).max(0.1)
+}
+
+/// By what a surface's albedo is multiplied at (x, y) of its plane (m).
+pub(crate) fn finish(finish: Finish, x: f64, y: f64, footprint: f64, seed: u32) -> f32 {
+    match finish {
+        // Stains and growth: large blotches, and small ones where they are thick.
+        Finish::Plate => {
+            let large = octaves(x, y, footprint, seed, &[(0.42, 0.16), (0.17, 0.12)]);
+            let small = octaves(x, y, footprint, seed ^ 0x77, &[(0.071, 0.10), (0.03, 0.07), (0.013, 0.05)]);
+            1.0 + large + small
+        }
+        Finish::Paint => 1.0 + octaves(x, y, footprint, seed, &[(0.11, 0.16), (0.04, 0.12), (0.015, 0.08)]),
+        Finish::Rock => 1.0 + octaves(x, y, footprint, seed, &[(0.09, 0.25), (0.035, 0.2), (0.014, 0.15)]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_follows_the_cosine_and_never_fails() {
+        let l = towards_light();
+        assert!((light(&l) - AMBIENT - LAMP).abs() < 1e-6);
+        assert_eq!(light(&-l), AMBIENT);
+        let tilted = Vector3::new(l.z, 0.0, -l.x).normalize();
+        assert!((light(&(l + tilted)) - AMBIENT - LAMP * libm::sqrtf(0.5)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_bed_is_never_white_nor_black() {
+        for k in 0..20_000 {
+            let (n, e) = (f64::from(k) * 0.0371, f64::from(k % 317) * 0.0113);
+            let a = bed(n, e, 0.004, 9);
+            assert!((0.02..0.6).contains(&a), "{a}");
+        }
+    }
+
+    #[test]
+    fn far_away_a_texture_is_its_mean() {
+        assert!((bed(0.3, 0.4, 100.0, 9) - 0.27).abs() < 1e-6);
+        assert_eq!(finish(Finish::Plate, 0.1, 0.2, 100.0, 9), 1.0);
+    }
+}

@@ -1,0 +1,93 @@
+//! One view as noisy points: what a detector would have measured, without the image.
+
+use seafix_geometry::{Camera, MeasuredPoint, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPoint, World};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    scene::{Corner, Scene},
+    stream::Stream,
+};
+
+/// How points are measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct PointNoise {
+    /// Standard deviation of each pixel coordinate, in each image (px).
+    pub sigma_px: f64,
+    /// Share of the visible corners that are measured.
+    pub found: f64,
+    /// Other measured points a view, anywhere on bed and objects.
+    pub clutter: usize,
+}
+
+impl Default for PointNoise {
+    fn default() -> Self {
+        Self { sigma_px: 0.2, found: 0.9, clutter: 150 }
+    }
+}
+
+/// The rig in the world.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Eyes<'a> {
+    pub(crate) rig: &'a StereoRig,
+    pub(crate) world_from_camera: Transform<World, Camera>,
+}
+
+impl Eyes<'_> {
+    /// Where the left and the right camera are.
+    pub(crate) fn places(&self) -> [nalgebra::Vector3<f64>; 2] {
+        let right = self.world_from_camera * self.rig.right_from_left().inverse();
+        [self.world_from_camera.translation(), right.translation()]
+    }
+
+    /// The pixels of a corner that both cameras see, at least `margin` (px) from the border.
+    pub(crate) fn see(&self, scene: &Scene, corner: &Corner, margin: f64) -> Option<StereoPixels> {
+        let at = self.world_from_camera.inverse() * Point::from(corner.at);
+        let pixels = self.rig.sees(&at, margin)?;
+        self.places().iter().all(|from| scene.sees(from, corner)).then_some(pixels)
+    }
+
+    /// The pixels of a place that lies where the left camera looks along `pixel`, if the right one
+    /// sees it too.
+    fn look(&self, scene: &Scene, pixel: &Pixel) -> Option<StereoPixels> {
+        let [left, right] = self.places();
+        let direction = self.rig.left().normalize(pixel)?.push(1.0);
+        let place = scene.seen(&left, &(self.world_from_camera.rotation() * direction))?;
+        let pixels = self.rig.sees(&(self.world_from_camera.inverse() * place), 0.0)?;
+        scene.clear(&right, &place.coords).then_some(pixels)
+    }
+
+    /// The view as points, in an order that tells nothing.
+    pub(crate) fn measure(&self, scene: &Scene, noise: &PointNoise, stream: &mut Stream) -> Vec<MeasuredPoint> {
+        let mut pixels = Vec::new();
+        for corner in scene.bodies.iter().flat_map(|b| b.points.iter().chain(&b.distractors)) {
+            if let Some(seen) = self.see(scene, corner, 0.0)
+                && stream.unit() < noise.found
+            {
+                pixels.push(seen);
+            }
+        }
+        let [width, height] = self.rig.left().size().map(|n| f64::from(n - 1));
+        for _ in 0..noise.clutter {
+            let pixel = Pixel { u: stream.between(0.0, width), v: stream.between(0.0, height) };
+            pixels.extend(self.look(scene, &pixel));
+        }
+        for k in (1..pixels.len()).rev() {
+            pixels.swap(k, stream.below(k + 1));
+        }
+        pixels
+            .iter()
+            .filter_map(|exact| {
+                let mut disturbed = |p: &Pixel| Pixel {
+                    u: p.u + noise.sigma_px * stream.normal(),
+                    v: p.v + noise.sigma_px * stream.normal(),
+                };
+                let seen = StereoPixels { left: disturbed(&exact.left), right: disturbed(&exact.right) };
+                // A covariance of zero would claim what no camera can know.
+                let found = self.rig.triangulate(&seen, noise.sigma_px.max(1e-3)).ok()?;
+                let position = UncertainPoint { at: found.point, covariance: found.covariance };
+                Some(MeasuredPoint { position, pixels: Some(seen) })
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,113 @@
+//! What lens and sensor do to an image: blur, noise, 8 bits.
+
+use serde::{Deserialize, Serialize};
+
+use crate::stream::Stream;
+
+/// Lens and sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Sensor {
+    /// Standard deviation of the lens's blur (px).
+    pub blur: f64,
+    /// Standard deviation of the noise of a pixel (grey levels of 255).
+    pub noise: f64,
+    /// Grey level of a white surface that faces the light.
+    pub white: f64,
+}
+
+impl Default for Sensor {
+    fn default() -> Self {
+        Self { blur: 0.7, noise: 1.0, white: 255.0 }
+    }
+}
+
+impl Sensor {
+    /// The image of this radiance (1: white facing the light), rounded to 8 bits.
+    pub(crate) fn expose(&self, radiance: Vec<f32>, width: usize, mut noise: Stream) -> Vec<f32> {
+        let mut image = blurred(radiance, width, self.blur);
+        for value in &mut image {
+            let grey = f64::from(*value) * self.white;
+            let noisy = if self.noise > 0.0 { grey + self.noise * noise.normal() } else { grey };
+            *value = noisy.round().clamp(0.0, 255.0) as f32;
+        }
+        image
+    }
+}
+
+/// The image convolved with a Gaussian; at the border the nearest pixel continues.
+fn blurred(image: Vec<f32>, width: usize, sigma: f64) -> Vec<f32> {
+    if !(sigma > 0.0) {
+        return image;
+    }
+    let radius = (4.0 * sigma).ceil() as usize;
+    let weights: Vec<f64> = (0..=2 * radius)
+        .map(|k| {
+            let x = (k as f64 - radius as f64) / sigma;
+            libm::exp(-0.5 * x * x)
+        })
+        .collect();
+    let sum: f64 = weights.iter().sum();
+    let weights: Vec<f32> = weights.iter().map(|w| (w / sum) as f32).collect();
+    let height = image.len() / width;
+
+    let mut across = vec![0.0; image.len()];
+    let mut padded = vec![0.0; width + 2 * radius];
+    for (row, out) in image.chunks_exact(width).zip(across.chunks_exact_mut(width)) {
+        padded[..radius].fill(row[0]);
+        padded[radius..radius + width].copy_from_slice(row);
+        padded[radius + width..].fill(row[width - 1]);
+        for (k, w) in weights.iter().enumerate() {
+            for (o, p) in out.iter_mut().zip(&padded[k..]) {
+                *o += w * p;
+            }
+        }
+    }
+    let mut down = image;
+    down.fill(0.0);
+    for (y, out) in down.chunks_exact_mut(width).enumerate() {
+        for (k, w) in weights.iter().enumerate() {
+            let from = (y + k).saturating_sub(radius).min(height - 1);
+            for (o, p) in out.iter_mut().zip(&across[from * width..(from + 1) * width]) {
+                *o += w * p;
+            }
+        }
+    }
+    down
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::Purpose;
+
+    #[test]
+    fn blur_keeps_the_sum_and_the_centre() {
+        let (width, height) = (31, 21);
+        let mut image = vec![0.0; width * height];
+        image[10 * width + 15] = 100.0;
+        let image = blurred(image, width, 0.7);
+        let sum: f32 = image.iter().sum();
+        assert!((sum - 100.0).abs() < 1e-3);
+        let moment: f32 = image.iter().enumerate().map(|(k, v)| v * (k % width) as f32).sum::<f32>() / sum;
+        assert!((moment - 15.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn noise_has_the_stated_deviation_and_only_whole_levels() {
+        let sensor = Sensor { noise: 2.0, ..Sensor::default() };
+        let grey = sensor.expose(vec![0.5; 40_000], 200, Stream::new(1, 0, 0, Purpose::LeftImage));
+        let mean = grey.iter().sum::<f32>() / 40_000.0;
+        let variance = grey.iter().map(|g| (g - mean).powi(2)).sum::<f32>() / 40_000.0;
+        assert!((mean - 127.5).abs() < 0.05);
+        assert!((variance - 4.0 - 1.0 / 12.0).abs() < 0.15, "{variance}");
+        assert!(grey.iter().all(|g| g.fract() == 0.0));
+    }
+
+    #[test]
+    fn without_noise_the_sensor_only_rounds() {
+        let sensor = Sensor { noise: 0.0, blur: 0.0, ..Sensor::default() };
+        let grey = sensor.expose(vec![0.1, 2.0, -1.0], 3, Stream::new(1, 0, 0, Purpose::LeftImage));
+        assert_eq!(grey, [26.0, 255.0, 0.0]);
+    }
+}

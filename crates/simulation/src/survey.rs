@@ -1,0 +1,191 @@
+//! The virtual site as a method knows it, with the errors of its survey, and as it is.
+
+use nalgebra::{Matrix3, Vector3};
+use seafix_geometry::{Object, Point, Transform, World, triad};
+use seafix_referencing::{ModelPoint, Site, SiteObject};
+
+use crate::{
+    blueprint::{Blueprint, ObjectPlan},
+    scene::{Body, Scene},
+    stream::{Purpose, Stream},
+};
+
+/// Errors of distances between surveyed points are kept below this many standard deviations, so
+/// that every drawn survey passes the site file's own check at four.
+const SURVEY_LIMIT: f64 = 3.5;
+
+/// The errors that the site's description has.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SurveyErrors {
+    /// Standard deviation of each coordinate of a model point (m).
+    pub(crate) model: f64,
+    /// Standard deviation of each surveyed world coordinate (m).
+    pub(crate) survey: f64,
+}
+
+/// The site as described, and where its objects truly are.
+pub(crate) fn survey(
+    blueprint: &Blueprint,
+    scene: &Scene,
+    errors: SurveyErrors,
+    seed: u64,
+) -> (Site, Vec<Transform<World, Object>>) {
+    let drawn = blueprint.objects.iter().zip(&scene.bodies).enumerate().map(|(index, (plan, body))| {
+        survey_object(plan, body, errors, &mut Stream::new(seed, 0, index as u64, Purpose::Survey))
+    });
+    let (objects, truth): (Vec<_>, Vec<_>) = drawn.unzip();
+    let frame = blueprint.objects.iter().position(|o| o.id == blueprint.site_frame).unwrap_or(0);
+    (Site { name: blueprint.name.clone(), frame, objects, warnings: Vec::new() }, truth)
+}
+
+fn survey_object(
+    plan: &ObjectPlan,
+    body: &Body,
+    errors: SurveyErrors,
+    stream: &mut Stream,
+) -> (SiteObject, Transform<World, Object>) {
+    let base = plan.base.each_ref().map(|id| {
+        plan.points.iter().position(|p| p.id == *id).expect("the built-in base names points; a test reads all")
+    });
+    let truth: Vec<Vector3<f64>> = body.points.iter().map(|p| p.at).collect();
+    // The model is measured on the object itself: each point with its own small error.
+    let measured: Vec<Point<World>> = truth.iter().map(|p| Point::from(p + stream.normal3(errors.model))).collect();
+    let [p1, p2, p3] = base.map(|k| measured[k]);
+    let object_from_world = triad::<World, Object>(&p1, &p2, &p3).expect("the base spans a plane; a test says so").inverse();
+    let points: Vec<ModelPoint> = plan
+        .points
+        .iter()
+        .zip(&measured)
+        .zip(&body.points)
+        .map(|((plan, at), corner)| ModelPoint {
+            id: plan.id.clone(),
+            at: Point::from((object_from_world * *at).coords.map(micrometres)),
+            sigma: errors.model,
+            normal: Some((object_from_world.rotation() * corner.normal).map(micrometres).normalize()),
+        })
+        .collect();
+    let base_in_world = surveyed_base(base.map(|k| truth[k]), base.map(|k| points[k].at), errors, stream);
+    let [s1, s2, s3] = &base_in_world;
+    let object = SiteObject {
+        id: plan.id.clone(),
+        base,
+        base_in_world: Some(base_in_world),
+        survey_sigma: errors.survey,
+        world_from_object: triad(s1, s2, s3).ok(),
+        points,
+        interest: Vec::new(),
+    };
+    let start = object_from_world.inverse();
+    let world_from_object = best_fit(start, object.points.iter().map(|p| p.at).zip(truth));
+    (object, world_from_object)
+}
+
+/// The world coordinates of the base with the survey's errors.
+fn surveyed_base(
+    truth: [Vector3<f64>; 3],
+    model: [Point<Object>; 3],
+    errors: SurveyErrors,
+    stream: &mut Stream,
+) -> [Point<World>; 3] {
+    let limit = SURVEY_LIMIT * (2.0 * (errors.survey.powi(2) + errors.model.powi(2))).sqrt() + 5e-6;
+    let mut drawn = truth;
+    // Almost every draw passes; where a thousand do not, the last stands and the site file's check tells.
+    for _ in 0..1000 {
+        drawn = truth.map(|p| (p + stream.normal3(errors.survey)).map(micrometres));
+        let fits = |i: usize, k: usize| ((drawn[i] - drawn[k]).norm() - model[i].distance(&model[k])).abs() <= limit;
+        if fits(0, 1) && fits(0, 2) && fits(1, 2) {
+            break;
+        }
+    }
+    drawn.map(Point::from)
+}
+
+/// Rounded to a micrometre: the site file stays readable.
+fn micrometres(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6 + 0.0
+}
+
+/// The motion that carries the model's points onto their true places with the least squared error,
+/// from a start that is nearly there.
+///
+/// Centroids first, then small rotations: at a fit of millimetres three steps reach rounding error.
+fn best_fit(
+    start: Transform<World, Object>,
+    pairs: impl Iterator<Item = (Point<Object>, Vector3<f64>)> + Clone,
+) -> Transform<World, Object> {
+    let n = pairs.clone().count() as f64;
+    let (mut from, mut to) = (Vector3::zeros(), Vector3::zeros());
+    for (p, w) in pairs.clone() {
+        from += p.coords / n;
+        to += w / n;
+    }
+    let mut rotation = start.rotation();
+    for _ in 0..10 {
+        let (mut normal, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        for (p, w) in pairs.clone() {
+            let (a, b) = (rotation * (p.coords - from), w - to);
+            let skew = seafix_geometry::so3::skew(&a);
+            normal -= skew * skew;
+            gradient += a.cross(&(b - a));
+        }
+        let Some(inverse) = normal.try_inverse() else { break };
+        rotation = seafix_geometry::so3::exp(&(inverse * gradient)) * rotation;
+    }
+    Transform::new(rotation, to - rotation * from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(errors: SurveyErrors, seed: u64) -> (Site, Vec<Transform<World, Object>>, Scene) {
+        let blueprint = Blueprint::drill_centre();
+        let scene = Scene::new(&blueprint, seed);
+        let (site, truth) = survey(&blueprint, &scene, errors, seed);
+        (site, truth, scene)
+    }
+
+    #[test]
+    fn an_exact_survey_is_exact() {
+        let (site, truth, scene) = drawn(SurveyErrors { model: 0.0, survey: 0.0 }, 3);
+        for ((object, world_from_object), body) in site.objects.iter().zip(&truth).zip(&scene.bodies) {
+            for (point, corner) in object.points.iter().zip(&body.points) {
+                assert!((*world_from_object * point.at).distance(&Point::from(corner.at)) < 3e-6);
+                assert!((object.world_from_object.unwrap() * point.at).distance(&Point::from(corner.at)) < 2e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn the_model_is_good_to_a_millimetre_and_the_survey_to_a_centimetre() {
+        let (mut model, mut survey, mut n, mut m) = (0.0, 0.0, 0.0, 0.0);
+        for seed in 0..20 {
+            let (site, truth, scene) = drawn(SurveyErrors { model: 0.001, survey: 0.01 }, seed);
+            for ((object, world_from_object), body) in site.objects.iter().zip(&truth).zip(&scene.bodies) {
+                for (point, corner) in object.points.iter().zip(&body.points) {
+                    model += ((*world_from_object * point.at).coords - corner.at).norm_squared();
+                    n += 3.0;
+                }
+                n -= 6.0; // the fit takes six
+                for (surveyed, &k) in object.base_in_world.unwrap().iter().zip(&object.base) {
+                    survey += (surveyed.coords - body.points[k].at).norm_squared();
+                    m += 3.0;
+                }
+            }
+        }
+        let [model, survey]: [f64; 2] = [(model / n as f64).sqrt(), (survey / m as f64).sqrt()];
+        assert!((model / 0.001 - 1.0).abs() < 0.05, "{model}");
+        assert!((survey / 0.01 - 1.0).abs() < 0.06, "{survey}");
+    }
+
+    #[test]
+    fn the_site_file_says_the_same_and_passes_its_own_check() {
+        for seed in 0..50 {
+            let (site, _, _) = drawn(SurveyErrors { model: 0.001, survey: 0.01 }, seed);
+            let text = site.to_toml();
+            let read = Site::parse(&text, std::path::Path::new("site.toml")).unwrap();
+            assert_eq!(read.warnings, []);
+            assert_eq!(read, site);
+        }
+    }
+}
