@@ -8,6 +8,7 @@
 //! believes it. This crate knows no image and no truth.
 
 mod candidates;
+mod chance;
 mod observations;
 mod problem;
 pub mod problem_file;
@@ -19,7 +20,7 @@ mod solve;
 pub use candidates::{Candidates, Gate, candidates};
 pub use observations::{Observation, Observations};
 pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
-pub use reference::{Acceptance, Alternative, Outcome, Refusal, Reference, reference};
-pub use search::{Identification, SEARCHES, Search, Unidentified};
-pub use site::{BadSite, ModelPoint, Shell, Site, SiteObject, Target};
-pub use solve::{Degenerate, SOLVERS, Solver};
+pub use reference::{Acceptance, Alternative, Attempt, Outcome, Reference, Refusal, judge, reference, rms_apart};
+pub use search::{Identification, MaximumClique, SEARCHES, Samples, Search, StructuralCoherence, Unidentified};
+pub use site::{Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};
+pub use solve::{Choose, Degenerate, Kabsch, SOLVERS, Solver, Triad};

@@ -1,6 +1,9 @@
 //! What a solver is given.
 
-use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, UncertainPoint};
+use nalgebra::{Matrix3, Vector3};
+use seafix_geometry::{Camera, MeasuredPoint, Object, Point, StereoPixels, StereoRig, Transform, UncertainPoint};
+
+use crate::{Correspondence, ModelPoint};
 
 /// One identified point: where it was measured and where the model has it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +18,23 @@ pub struct Observation {
     pub model_sigma: f64,
 }
 
+impl Observation {
+    /// C·H − P: the residual (m, object frame) that `object_from_camera` leaves.
+    pub fn residual(&self, object_from_camera: &Transform<Object, Camera>) -> Vector3<f64> {
+        *object_from_camera * self.measured.at - self.model
+    }
+
+    /// The covariance (m²) of the residual's noise, camera axes: Σ_measured + σ_model² I.
+    pub fn noise(&self) -> Matrix3<f64> {
+        self.measured.covariance + Matrix3::identity() * (self.model_sigma * self.model_sigma)
+    }
+
+    /// Whether every number in it is finite.
+    pub fn is_finite(&self) -> bool {
+        self.measured.at.is_finite() && self.model.is_finite()
+    }
+}
+
 /// All identified points of one target, and the rig that saw them if there is one.
 #[derive(Debug, Clone)]
 pub struct Observations<'a> {
@@ -22,4 +42,29 @@ pub struct Observations<'a> {
     pub points: Vec<Observation>,
     /// The rig.
     pub rig: Option<&'a StereoRig>,
+}
+
+impl<'a> Observations<'a> {
+    /// What the identified pairs say.
+    ///
+    /// # Panics
+    /// When a pair's index is out of range.
+    pub fn of(
+        pairs: &[Correspondence],
+        model: &[ModelPoint],
+        cloud: &[MeasuredPoint],
+        rig: Option<&'a StereoRig>,
+    ) -> Self {
+        let points = pairs.iter().map(|pair| {
+            let (known, seen) = (&model[pair.model], &cloud[pair.cloud]);
+            Observation { measured: seen.position, pixels: seen.pixels, model: known.at, model_sigma: known.sigma }
+        });
+        Self { points: points.collect(), rig }
+    }
+
+    /// Root mean square of the residuals C·H − P over all points (m): the paper's measure.
+    pub fn residual_rms(&self, object_from_camera: &Transform<Object, Camera>) -> f64 {
+        let sum: f64 = self.points.iter().map(|point| point.residual(object_from_camera).norm_squared()).sum();
+        (sum / self.points.len().max(1) as f64).sqrt()
+    }
 }

@@ -1,9 +1,19 @@
 //! Searches: which cloud points are which model points.
 
 use rand::Rng;
-use seafix_component::Registry;
+use seafix_component::{Registry, entry};
 
 use crate::{Correspondence, Problem};
+
+pub(crate) mod association;
+mod bitset;
+mod clique;
+mod maximum_clique;
+mod orientation;
+mod structural_coherence;
+
+pub use maximum_clique::MaximumClique;
+pub use structural_coherence::{Samples, StructuralCoherence};
 
 /// Decides which cloud points are which model points.
 ///
@@ -24,6 +34,8 @@ pub struct Identification {
     pub pairs: Vec<Correspondence>,
     /// Other sets of the same size, as far as the search looks for them.
     pub rivals: Vec<Vec<Correspondence>>,
+    /// Whether `rivals` holds every other set of the same size.
+    pub rivals_complete: bool,
     /// Whether it is proved that no admissible set is larger.
     pub optimal: bool,
     /// No admissible set has more pairs than this.
@@ -69,5 +81,21 @@ pub enum Unidentified {
     },
 }
 
+impl Unidentified {
+    /// The reason as logs and tables have it, in kebab-case.
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Self::TooFew { .. } => "too-few",
+            Self::NoConsensus { .. } => "no-consensus",
+            Self::Budget { .. } => "budget",
+            Self::Mirrored { .. } => "mirrored",
+        }
+    }
+}
+
 /// All searches.
-pub static SEARCHES: Registry<dyn Search> = Registry::new("search", &[]);
+pub static SEARCHES: Registry<dyn Search> =
+    Registry::new("search", &[entry!(MaximumClique), entry!(StructuralCoherence)]);
+
+/// The default budget of a search: pair tests beyond those that build its graph.
+pub(crate) const BUDGET: u64 = 10_000_000;

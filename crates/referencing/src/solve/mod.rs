@@ -1,11 +1,19 @@
 //! Solvers: the rigid motion that carries the measured points onto the model.
 
-use seafix_component::Registry;
+use seafix_component::{Registry, entry};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::Observations;
 
+mod kabsch;
+pub(crate) mod likelihood;
 mod numerical;
+mod spread;
+mod triad;
+
+pub use kabsch::Kabsch;
+pub(crate) use kabsch::fit as least_squares;
+pub use triad::{Choose, Triad};
 
 /// Geometry that determines no pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -19,7 +27,9 @@ pub enum Degenerate {
         needed: usize,
     },
     /// The points lie (nearly) on a line: the rotation about it is unknown.
-    #[error("the points are nearly collinear: their second extent is {ratio:.2e} of the first, at least {least:.2e} is needed")]
+    #[error(
+        "the points are nearly collinear: their second extent is {ratio:.2e} of the first, at least {least:.2e} is needed"
+    )]
     Collinear {
         /// Second singular value over the first.
         ratio: f64,
@@ -44,6 +54,12 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// [`Degenerate`]: the geometry determines no pose, with the number that failed.
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>;
 
+    /// Which of the points the pose rests on, as ascending indices: all of them, unless the solver
+    /// says otherwise. Empty where `solve` would refuse.
+    fn used(&self, data: &Observations<'_>) -> Vec<usize> {
+        (0..data.points.len()).collect()
+    }
+
     /// First-order covariance of [`solve`](Self::solve) at its answer: Σ = Σ_i J_i Σ_i J_iᵀ over all
     /// measured and model points, J by central differences through the solver itself. Honest for
     /// any solver, whatever its weights.
@@ -60,4 +76,4 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
 }
 
 /// All solvers.
-pub static SOLVERS: Registry<dyn Solver> = Registry::new("solver", &[]);
+pub static SOLVERS: Registry<dyn Solver> = Registry::new("solver", &[entry!(Kabsch), entry!(Triad)]);

@@ -1,0 +1,163 @@
+//! Stage 1: which cloud points the prior allows for each model point.
+
+use nalgebra::{Matrix3, Vector3};
+use seafix_geometry::{Camera, MeasuredPoint, Point};
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::{ModelPoint, Prior, PriorBound};
+
+/// How the shell about the predicted place of a model point is drawn when the prior is Gaussian.
+///
+/// In TOML `gate = { chi-square = 0.99 }` or `gate = { box = 0.25 }`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gate {
+    /// The paper's shell: a box of this half-size (m) along the camera's axes, the same for every
+    /// point ("by the known navigation error", Sec. 2.2); its faces belong to it.
+    Box(f64),
+    /// The ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ²₃(confidence) with S = J Σ_nav Jᵀ + Σ_triangulation +
+    /// (σ_model² + σ_survey²) I, J the derivative of the predicted place by the pose: the true
+    /// cloud point lies in it with this confidence (Bar-Shalom and Fortmann, *Tracking and Data
+    /// Association*, 1988, Sec. 5.2).
+    ChiSquare(f64),
+}
+
+impl Default for Gate {
+    fn default() -> Self {
+        Self::ChiSquare(0.99)
+    }
+}
+
+impl Gate {
+    /// What is wrong with the setting, if something is.
+    ///
+    /// # Errors
+    /// A half-size that is not positive and finite, or a confidence outside (0, 1).
+    pub fn check(&self) -> Result<(), String> {
+        match *self {
+            Self::Box(half) if !(half > 0.0 && half.is_finite()) => {
+                Err(format!("gate: box = {half}; give a positive half-size in metres"))
+            }
+            Self::ChiSquare(confidence) if !(confidence > 0.0 && confidence < 1.0) => {
+                Err(format!("gate: chi-square = {confidence}; give a confidence between 0 and 1"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// For each model point, the cloud points that may be it: indices, ascending, without repetition.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Candidates {
+    /// One list a model point; empty where nothing may be it.
+    pub lists: Vec<Vec<usize>>,
+}
+
+impl Candidates {
+    /// Every cloud point for every model point: the search without shells.
+    pub fn all(model: usize, cloud: usize) -> Self {
+        Self { lists: vec![(0..cloud).collect(); model] }
+    }
+
+    /// The lists of these pairs (model, cloud), in any order.
+    ///
+    /// # Panics
+    /// When a model index is not below `model`.
+    pub fn from_pairs(model: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Self {
+        let mut lists = vec![Vec::new(); model];
+        for (i, j) in pairs {
+            lists[i].push(j);
+        }
+        for list in &mut lists {
+            list.sort_unstable();
+            list.dedup();
+        }
+        Self { lists }
+    }
+
+    /// How many pairs there are.
+    pub fn pairs(&self) -> usize {
+        self.lists.iter().map(Vec::len).sum()
+    }
+
+    /// How many model points have a candidate.
+    pub fn with_candidates(&self) -> usize {
+        self.lists.iter().filter(|list| !list.is_empty()).count()
+    }
+}
+
+/// Stage 1: the candidates of each model point.
+///
+/// A cloud point c is a candidate of the model point whose predicted place in the camera is p when
+/// |c − p| ≤ s along each camera axis ([`PriorBound::Box`], closed), or when `gate` lets it through
+/// ([`PriorBound::Gaussian`]). Without a prior every cloud point is. `survey_sigma` (m) is how well
+/// the target's own place is known where the prior came by way of the world; points that `in_view`
+/// denies get no candidates.
+pub fn candidates(
+    model: &[ModelPoint],
+    cloud: &[MeasuredPoint],
+    prior: Option<&Prior>,
+    gate: &Gate,
+    survey_sigma: f64,
+    in_view: Option<&[bool]>,
+) -> Candidates {
+    let seen = |index: usize| in_view.is_none_or(|mask| mask.get(index).copied().unwrap_or(false));
+    let lists = model.iter().enumerate().map(|(index, point)| {
+        if !seen(index) {
+            return Vec::new();
+        }
+        let Some(prior) = prior else {
+            return (0..cloud.len()).collect();
+        };
+        let shell = shell(point, prior, gate, survey_sigma);
+        (0..cloud.len()).filter(|&j| shell.admits(&cloud[j])).collect()
+    });
+    Candidates { lists: lists.collect() }
+}
+
+/// The region about one predicted place in which cloud points are candidates.
+enum PointShell {
+    Box { centre: Point<Camera>, half: f64 },
+    Ellipsoid { centre: Point<Camera>, covariance: Matrix3<f64>, limit: f64 },
+}
+
+fn shell(point: &ModelPoint, prior: &Prior, gate: &Gate, survey_sigma: f64) -> PointShell {
+    let centre = prior.object_from_camera.inverse() * point.at;
+    match (&prior.bound, gate) {
+        (PriorBound::Box(half), _) | (PriorBound::Gaussian(_), Gate::Box(half)) => {
+            PointShell::Box { centre, half: *half }
+        }
+        (PriorBound::Gaussian(covariance), Gate::ChiSquare(confidence)) => {
+            let own = point.sigma * point.sigma + survey_sigma * survey_sigma;
+            PointShell::Ellipsoid {
+                centre,
+                covariance: covariance.of_point(&centre) + Matrix3::identity() * own,
+                limit: chi_square(3, *confidence),
+            }
+        }
+    }
+}
+
+impl PointShell {
+    fn admits(&self, measured: &MeasuredPoint) -> bool {
+        match self {
+            Self::Box { centre, half } => {
+                let step: Vector3<f64> = measured.position.at - *centre;
+                step.amax() <= *half
+            }
+            Self::Ellipsoid { centre, covariance, limit } => {
+                let step = measured.position.at - *centre;
+                // A direction known exactly (S singular) still admits what lies exactly there.
+                let s = covariance + measured.position.covariance;
+                let floor = Matrix3::identity() * (1e-18 + 1e-12 * s.trace());
+                (s + floor).cholesky().is_some_and(|s| step.dot(&s.solve(&step)) <= *limit)
+            }
+        }
+    }
+}
+
+/// The quantile of χ² with these degrees of freedom.
+pub(crate) fn chi_square(freedom: usize, confidence: f64) -> f64 {
+    ChiSquared::new(freedom as f64).expect("the degrees of freedom are positive").inverse_cdf(confidence)
+}

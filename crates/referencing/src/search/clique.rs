@@ -1,0 +1,362 @@
+//! Exact cliques of the association graph, largest first, within a budget.
+
+use std::collections::{HashMap, HashSet};
+
+use super::{
+    association::Association,
+    bitset::{BitMatrix, BitSet},
+    orientation::mirrored,
+};
+use crate::Problem;
+
+/// Sets of more points are tested for orientation against their first so many only, and the
+/// answer is then proved by a complete test at the end.
+pub(super) const MOST_ORIENTED: usize = 40;
+
+/// What a search over cliques is after.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Goal {
+    /// The first of the largest size.
+    Largest,
+    /// All of the least size asked for, up to so many.
+    All {
+        /// No more than this many are kept.
+        cap: usize,
+    },
+}
+
+/// The cliques found and what is proved about the others.
+#[derive(Debug)]
+pub(super) struct Cliques {
+    /// Vertices of each clique, ascending.
+    pub(super) found: Vec<Vec<usize>>,
+    /// No admissible clique is larger; equal to the size found when the search was complete.
+    pub(super) bound: usize,
+    /// Whether the search ended by itself.
+    pub(super) complete: bool,
+}
+
+/// Branch and bound over the cliques that `admits` allows.
+///
+/// Each vertex in turn, from the densest part of a degeneracy order, with its later neighbours as
+/// one small graph; there greedy colouring bounds the size (Tomita and Seki, 2003; San Segundo et al.,
+/// *An exact bit-parallel algorithm for the maximum clique problem*, 2011), and before it the n-partite
+/// bound: no more members than there are different model points, nor than different cloud points.
+/// Orientation removes vertices while the clique grows; both bounds hold without it, so the answer
+/// stays exact.
+pub(super) struct Search<'a> {
+    problem: &'a Problem<'a>,
+    graph: &'a Association,
+    /// Whether mirror images are refused.
+    orientation: bool,
+    /// Tests left: a vertex coloured, or four points tested for orientation.
+    left: u64,
+    order: Vec<usize>,
+    core: Vec<usize>,
+    goal: Goal,
+    /// Least size that is still of interest.
+    least: usize,
+    found: Vec<Vec<usize>>,
+}
+
+/// The end of a search before its time: the budget, or as many cliques as were wanted.
+struct Stop;
+
+impl<'a> Search<'a> {
+    pub(super) fn new(problem: &'a Problem<'a>, graph: &'a Association, orientation: bool, budget: u64) -> Self {
+        let (order, core) = degeneracy(graph.vertices.len(), &graph.adjacency);
+        Self {
+            problem,
+            graph,
+            orientation,
+            left: budget,
+            order,
+            core,
+            goal: Goal::Largest,
+            least: 1,
+            found: Vec::new(),
+        }
+    }
+
+    /// Tests not yet spent.
+    pub(super) fn left(&self) -> u64 {
+        self.left
+    }
+
+    /// With or without the refusal of mirror images from here on.
+    pub(super) fn set_orientation(&mut self, orientation: bool) {
+        self.orientation = orientation;
+    }
+
+    /// The cliques of at least `least` members.
+    pub(super) fn run(&mut self, goal: Goal, least: usize) -> Cliques {
+        (self.goal, self.least, self.found) = (goal, least.max(1), Vec::new());
+        if goal == Goal::Largest {
+            self.greedy();
+        }
+        let mut later = BitSet::empty(self.graph.vertices.len());
+        let mut complete = true;
+        let mut bound = 0;
+        for position in (0..self.order.len()).rev() {
+            let vertex = self.order[position];
+            // Cores do not grow towards the front of the order: nothing large is left.
+            if self.core[vertex] + 1 < self.least {
+                break;
+            }
+            let mut neighbours = later.clone();
+            neighbours.intersect(self.graph.adjacency.row(vertex));
+            later.insert(vertex);
+            if self.within(vertex, neighbours).is_err() {
+                complete = false;
+                bound = self.core[vertex] + 1;
+                break;
+            }
+        }
+        let best = self.found.iter().map(Vec::len).max().unwrap_or(0);
+        Cliques { found: std::mem::take(&mut self.found), bound: bound.min(self.partite()).max(best), complete }
+    }
+
+    /// The n-partite bound of the whole graph.
+    fn partite(&self) -> usize {
+        distinct(self.graph.vertices.iter().map(|pair| pair.model))
+            .min(distinct(self.graph.vertices.iter().map(|pair| pair.cloud)))
+    }
+
+    /// A large clique at once, so that the bounds cut from the start: from some of the densest
+    /// vertices, always the neighbour with most neighbours among those that remain.
+    fn greedy(&mut self) {
+        const STARTS: usize = 24;
+        let mut starts: Vec<usize> = self.order.clone();
+        starts.sort_by_key(|&vertex| std::cmp::Reverse((self.core[vertex], self.graph.adjacency.degree(vertex))));
+        for &start in starts.iter().take(STARTS) {
+            let mut neighbours = BitSet::full(self.graph.vertices.len());
+            neighbours.intersect(self.graph.adjacency.row(start));
+            let local = Local::of(self.graph, neighbours, self.least);
+            let mut clique = vec![start];
+            let mut candidates = BitSet::full(local.vertices.len());
+            while let Some(next) = candidates
+                .iter()
+                .max_by_key(|&v| (candidates.common(local.adjacency.row(v)), std::cmp::Reverse(local.vertices[v])))
+            {
+                candidates.intersect(local.adjacency.row(next));
+                if self.orient(&local, &clique, local.vertices[next], &mut candidates).is_err() {
+                    self.left = 0; // the branches will say so
+                    return;
+                }
+                clique.push(local.vertices[next]);
+            }
+            if clique.len() >= self.least {
+                self.keep(&clique);
+            }
+        }
+    }
+
+    fn keep(&mut self, clique: &[usize]) {
+        let mut clique = clique.to_vec();
+        clique.sort_unstable();
+        match self.goal {
+            Goal::Largest => {
+                self.least = clique.len() + 1;
+                self.found = vec![clique];
+            }
+            Goal::All { .. } => self.found.push(clique),
+        }
+    }
+
+    /// The cliques of `vertex` and some of `neighbours`.
+    fn within(&mut self, vertex: usize, neighbours: BitSet) -> Result<(), Stop> {
+        if self.least <= 1 {
+            self.grown(&[vertex])?;
+        }
+        let local = Local::of(self.graph, neighbours, self.least);
+        if local.vertices.len() + 1 < self.least {
+            return Ok(());
+        }
+        let all = BitSet::full(local.vertices.len());
+        self.expand(&local, &mut vec![vertex], all)
+    }
+
+    /// A clique of interest was reached.
+    fn grown(&mut self, clique: &[usize]) -> Result<(), Stop> {
+        if clique.len() >= self.least {
+            self.keep(clique);
+            if matches!(self.goal, Goal::All { cap } if self.found.len() >= cap) {
+                return Err(Stop);
+            }
+        }
+        Ok(())
+    }
+
+    fn expand(&mut self, local: &Local, clique: &mut Vec<usize>, mut candidates: BitSet) -> Result<(), Stop> {
+        let needed = |search: &Self| search.least.saturating_sub(clique.len());
+        if local.partite(&candidates) < needed(self) {
+            return Ok(());
+        }
+        let coloured = local.colour(&candidates, needed(self).max(1));
+        self.spend(candidates.len() as u64)?;
+        for (vertex, colour) in coloured.into_iter().rev() {
+            if colour < self.least.saturating_sub(clique.len()) {
+                return Ok(());
+            }
+            let mut next = candidates.clone();
+            next.intersect(local.adjacency.row(vertex));
+            candidates.remove(vertex);
+            self.orient(local, clique, local.vertices[vertex], &mut next)?;
+            clique.push(local.vertices[vertex]);
+            self.grown(clique)?;
+            let full = matches!(self.goal, Goal::All { .. }) && clique.len() >= self.least;
+            let result = if next.is_empty() || full { Ok(()) } else { self.expand(local, clique, next) };
+            clique.pop();
+            result?;
+        }
+        Ok(())
+    }
+
+    /// Removes the candidates that would be mirrored with `added` and two members of the clique.
+    fn orient(&mut self, local: &Local, clique: &[usize], added: usize, candidates: &mut BitSet) -> Result<(), Stop> {
+        if !self.orientation || clique.len() < 2 {
+            return Ok(());
+        }
+        let vertices = &self.graph.vertices;
+        let members = &clique[..clique.len().min(MOST_ORIENTED)];
+        for candidate in candidates.iter().collect::<Vec<_>>() {
+            let (c, d) = (vertices[added], vertices[local.vertices[candidate]]);
+            let mut tests = 0;
+            let refused = members.iter().enumerate().any(|(i, &a)| {
+                members[..i].iter().any(|&b| {
+                    tests += 1;
+                    mirrored(self.problem, [vertices[a], vertices[b], c, d])
+                })
+            });
+            if refused {
+                candidates.remove(candidate);
+            }
+            self.spend(tests)?;
+        }
+        Ok(())
+    }
+
+    fn spend(&mut self, tests: u64) -> Result<(), Stop> {
+        self.left = self.left.saturating_sub(tests);
+        if self.left == 0 { Err(Stop) } else { Ok(()) }
+    }
+}
+
+/// The neighbours of one vertex as a graph of their own.
+struct Local {
+    /// Their numbers in the whole graph.
+    vertices: Vec<usize>,
+    adjacency: BitMatrix,
+    /// Their model points and cloud points, numbered from 0.
+    models: Vec<usize>,
+    clouds: Vec<usize>,
+}
+
+impl Local {
+    /// The neighbours that can be in a clique of `least` members with their centre: each needs
+    /// `least − 2` of the others as neighbours. Ordered by degree, so that colouring begins with the
+    /// well-connected.
+    fn of(graph: &Association, mut members: BitSet, least: usize) -> Self {
+        let mut vertices: Vec<(usize, usize)> = Vec::new();
+        loop {
+            vertices.clear();
+            vertices.extend(members.iter().map(|v| (members.common(graph.adjacency.row(v)), v)));
+            let poor = vertices.iter().filter(|(degree, _)| degree + 2 < least);
+            let poor: Vec<usize> = poor.map(|&(_, v)| v).collect();
+            poor.iter().for_each(|&v| members.remove(v));
+            if poor.is_empty() {
+                break;
+            }
+        }
+        vertices.sort_by_key(|&(degree, v)| (std::cmp::Reverse(degree), v));
+        let vertices: Vec<usize> = vertices.into_iter().map(|(_, v)| v).collect();
+        let place: HashMap<usize, usize> = vertices.iter().enumerate().map(|(i, &v)| (v, i)).collect();
+        let mut adjacency = BitMatrix::zeros(vertices.len());
+        for (i, &v) in vertices.iter().enumerate() {
+            let mut neighbours = members.clone();
+            neighbours.intersect(graph.adjacency.row(v));
+            neighbours.iter().filter_map(|w| place.get(&w)).for_each(|&k| adjacency.connect(i, k));
+        }
+        let models = numbered(vertices.iter().map(|&v| graph.vertices[v].model));
+        let clouds = numbered(vertices.iter().map(|&v| graph.vertices[v].cloud));
+        Self { vertices, adjacency, models, clouds }
+    }
+
+    /// The n-partite bound: different model points and different cloud points among the candidates.
+    fn partite(&self, candidates: &BitSet) -> usize {
+        let count = self.vertices.len();
+        let (mut models, mut clouds) = (BitSet::empty(count), BitSet::empty(count));
+        for v in candidates.iter() {
+            models.insert(self.models[v]);
+            clouds.insert(self.clouds[v]);
+        }
+        models.len().min(clouds.len())
+    }
+
+    /// Greedy colouring: vertices with their colours from `least` on, in ascending order of colour.
+    /// A clique among the vertices up to one of them has at most its colour's number of members.
+    fn colour(&self, candidates: &BitSet, least: usize) -> Vec<(usize, usize)> {
+        let mut coloured = Vec::new();
+        let mut rest = candidates.clone();
+        let mut colour = 0;
+        while !rest.is_empty() {
+            colour += 1;
+            let mut free = rest.clone();
+            let mut from = 0;
+            while let Some(vertex) = free.next(from) {
+                free.subtract(self.adjacency.row(vertex), vertex);
+                rest.remove(vertex);
+                from = vertex + 1;
+                if colour >= least {
+                    coloured.push((vertex, colour));
+                }
+            }
+        }
+        coloured
+    }
+}
+
+/// Numbers from 0 in the place of arbitrary ones.
+fn numbered(values: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut names = HashMap::new();
+    values
+        .map(|value| {
+            let next = names.len();
+            *names.entry(value).or_insert(next)
+        })
+        .collect()
+}
+
+fn distinct(values: impl Iterator<Item = usize>) -> usize {
+    values.collect::<HashSet<_>>().len()
+}
+
+/// A degeneracy order (always the vertex of least remaining degree next; of equals the first) and
+/// the core number of each vertex. (Matula and Beck, *Smallest-last ordering*, 1983.)
+fn degeneracy(count: usize, adjacency: &BitMatrix) -> (Vec<usize>, Vec<usize>) {
+    let mut degree: Vec<usize> = (0..count).map(|v| adjacency.degree(v)).collect();
+    // Vertices sorted by degree, where each stands, and where each degree begins (Batagelj and Zaveršnik, 2003).
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by_key(|&v| degree[v]);
+    let mut place = vec![0; count];
+    order.iter().enumerate().for_each(|(i, &v)| place[v] = i);
+    let most = degree.iter().copied().max().unwrap_or(0);
+    let mut start: Vec<usize> = (0..=most + 1).map(|d| order.partition_point(|&v| degree[v] < d)).collect();
+    for i in 0..count {
+        let vertex = order[i];
+        for neighbour in adjacency.ones(vertex) {
+            let d = degree[neighbour];
+            if d > degree[vertex] {
+                // To the front of its degree's range, which then begins one later.
+                let front = start[d].max(i + 1);
+                let other = order[front];
+                order.swap(front, place[neighbour]);
+                place[other] = place[neighbour];
+                place[neighbour] = front;
+                start[d] = front + 1;
+                degree[neighbour] -= 1;
+            }
+        }
+    }
+    (order, degree)
+}

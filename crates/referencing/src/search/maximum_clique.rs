@@ -1,0 +1,148 @@
+//! Maximum clique: the largest admissible set, proved.
+
+use rand::Rng;
+use seafix_component::Component;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, Search, Unidentified,
+    association::Association,
+    clique::{self, Goal, MOST_ORIENTED},
+    orientation::{fours, mirrored, wholly_mirrored},
+};
+use crate::{Correspondence, Observations, Problem, solve::least_squares};
+
+/// The largest admissible set of correspondences: every two coherent, one-to-one, no four of them a
+/// mirror image of the model. Exact within the budget; among sets of one size the least residual
+/// of a rigid fit decides, then the indices.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct MaximumClique {
+    /// Whether mirror images are refused; `false` is the paper's distances alone.
+    pub orientation: bool,
+    /// Pair tests beyond those that build the graph.
+    pub budget: u64,
+    /// How many other sets of the same size are reported, those that share least with the best first.
+    pub rivals: usize,
+    /// More candidate pairs than this are not searched: their graph would not fit into memory
+    /// (40 000 take 200 MB).
+    pub most_pairs: usize,
+}
+
+impl Default for MaximumClique {
+    fn default() -> Self {
+        Self { orientation: true, budget: BUDGET, rivals: 64, most_pairs: 40_000 }
+    }
+}
+
+impl Component for MaximumClique {
+    const NAME: &'static str = "maximum-clique";
+    const SUMMARY: &'static str = "the largest coherent, one-to-one, unmirrored set, by branch and bound";
+    const SOURCE: &'static str = "San Segundo, Rodríguez-Losada, Jiménez, An exact bit-parallel algorithm for the \
+                                  maximum clique problem, 2011; the graph: Bailey et al., 2000";
+}
+
+/// Sets of the largest size that are looked at before the best of them is chosen.
+const MOST_TIES: usize = 4096;
+/// The least set that a pose can come from.
+const NEEDED: usize = 3;
+
+impl Search for MaximumClique {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        let with_candidates = problem.candidates.with_candidates();
+        if with_candidates < NEEDED {
+            return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
+        }
+        if problem.candidates.pairs() > self.most_pairs {
+            return Err(Unidentified::Budget { budget: self.budget, best: 0, bound: with_candidates });
+        }
+        let graph = Association::of(problem);
+        let mut cliques = clique::Search::new(problem, &graph, self.orientation, self.budget);
+        let largest = cliques.run(Goal::Largest, 1);
+        let size = largest.found.first().map_or(0, Vec::len);
+        if size < NEEDED {
+            return Err(match largest.complete {
+                true => Unidentified::NoConsensus { best: size, needed: NEEDED },
+                false => Unidentified::Budget { budget: self.budget, best: size, bound: largest.bound },
+            });
+        }
+        if self.orientation && largest.complete && size == NEEDED {
+            self.refuse_mirrored(problem, &graph, &mut cliques)?;
+        }
+        let mut optimal = largest.complete;
+        let (mut ties, mut rivals_complete) = (largest.found, false);
+        if optimal {
+            let all = cliques.run(Goal::All { cap: MOST_TIES }, size);
+            rivals_complete = all.complete;
+            // The first found stays in, should the budget have ended before it was met again.
+            ties.extend(all.found);
+        }
+        let mut ties: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs(&graph, clique)).collect();
+        ties.sort();
+        ties.dedup();
+        let best = (0..ties.len())
+            .map(|index| (residual(problem, &ties[index]), index))
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+            .expect("a set was found")
+            .1;
+        let pairs = ties.swap_remove(best);
+        if self.orientation && size > MOST_ORIENTED {
+            optimal = optimal && !fours(&pairs).any(|four| mirrored(problem, four));
+        }
+        let (rivals, dropped) = self.least_alike(&pairs, ties);
+        Ok(Identification {
+            pairs,
+            rivals,
+            rivals_complete: rivals_complete && !dropped,
+            optimal,
+            size_bound: largest.bound,
+            tests: graph.tests + (self.budget - cliques.left()),
+        })
+    }
+}
+
+impl MaximumClique {
+    /// Three points have no orientation: where distances alone find more, and all of it is a
+    /// mirror image, the three are what is left of that image.
+    fn refuse_mirrored(
+        &self,
+        problem: &Problem<'_>,
+        graph: &Association,
+        cliques: &mut clique::Search<'_>,
+    ) -> Result<(), Unidentified> {
+        cliques.set_orientation(false);
+        let coherent = cliques.run(Goal::Largest, NEEDED + 1);
+        cliques.set_orientation(true);
+        match coherent.found.first().map(|clique| pairs(graph, clique)) {
+            Some(set) if wholly_mirrored(problem, &set) => Err(Unidentified::Mirrored { best: set.len() }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The rivals that share the fewest pairs with the best set, and whether some were left out.
+    fn least_alike(
+        &self,
+        best: &[Correspondence],
+        mut rivals: Vec<Vec<Correspondence>>,
+    ) -> (Vec<Vec<Correspondence>>, bool) {
+        rivals.sort_by_cached_key(|rival| {
+            (rival.iter().filter(|pair| best.binary_search(pair).is_ok()).count(), rival.clone())
+        });
+        let dropped = rivals.len() > self.rivals;
+        rivals.truncate(self.rivals);
+        (rivals, dropped)
+    }
+}
+
+/// The pairs of a clique, in the order of the model points.
+fn pairs(graph: &Association, clique: &[usize]) -> Vec<Correspondence> {
+    let mut pairs: Vec<Correspondence> = clique.iter().map(|&vertex| graph.vertices[vertex]).collect();
+    pairs.sort_unstable();
+    pairs
+}
+
+/// The residual by which sets of one size are ranked (m).
+fn residual(problem: &Problem<'_>, pairs: &[Correspondence]) -> f64 {
+    let data = Observations::of(pairs, problem.model, problem.cloud, None);
+    data.residual_rms(&least_squares(&data))
+}

@@ -1,0 +1,215 @@
+//! Structural coherence: the paper's search, in the paper's order.
+
+use rand::Rng;
+use seafix_component::Component;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, Search, Unidentified,
+    orientation::{fours, mirrored},
+};
+use crate::{Correspondence, Problem};
+
+/// Which samples of q model points are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Samples {
+    /// The paper's ordered samples A_n^q: each set of points q! times.
+    #[default]
+    Permutations,
+    /// Each set of points once.
+    Combinations,
+}
+
+/// The paper's Stage 2: for q from n down to 3, for each sample of q model points in lexicographic
+/// order, for each choice of one candidate a point, all q(q − 1)/2 distances are compared; the
+/// first sample that agrees in all is the answer.
+///
+/// What the answer says is exact, what it costs is not bearable beyond some ten points: the budget
+/// ends it, and the refusal tells how far it came.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct StructuralCoherence {
+    /// Which samples are tried.
+    pub samples: Samples,
+    /// Whether mirror images are refused; `false` is the paper's distances alone.
+    pub orientation: bool,
+    /// Pair tests before it gives up.
+    pub budget: u64,
+}
+
+impl Default for StructuralCoherence {
+    fn default() -> Self {
+        Self { samples: Samples::default(), orientation: true, budget: BUDGET }
+    }
+}
+
+impl Component for StructuralCoherence {
+    const NAME: &'static str = "structural-coherence";
+    const SUMMARY: &'static str = "the paper's enumeration of ordered samples, longest first";
+    const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
+                                  autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 2.2";
+}
+
+/// The shortest sample that a pose can come from.
+const NEEDED: usize = 3;
+
+impl Search for StructuralCoherence {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        // A model point without candidates is in no sample's product: leaving it out changes no answer.
+        let with: Vec<usize> = (0..problem.model.len()).filter(|&i| !problem.candidates.lists[i].is_empty()).collect();
+        if with.len() < NEEDED {
+            return Err(Unidentified::TooFew { with_candidates: with.len(), needed: NEEDED });
+        }
+        let mut run = Run { problem, settings: self, tests: 0, best: 0 };
+        for q in (NEEDED..=with.len()).rev() {
+            match run.samples_of(&with, q) {
+                Ok(Some(mut pairs)) => {
+                    pairs.sort_unstable();
+                    return Ok(Identification {
+                        pairs,
+                        rivals: Vec::new(),
+                        rivals_complete: false,
+                        optimal: true,
+                        size_bound: q,
+                        tests: run.tests,
+                    });
+                }
+                Ok(None) => {}
+                Err(Spent) => return Err(Unidentified::Budget { budget: self.budget, best: run.best, bound: q }),
+            }
+        }
+        Err(Unidentified::NoConsensus { best: run.best, needed: NEEDED })
+    }
+}
+
+/// The budget is spent.
+struct Spent;
+
+struct Run<'a> {
+    problem: &'a Problem<'a>,
+    settings: &'a StructuralCoherence,
+    tests: u64,
+    /// Size of the largest coherent set met so far, as the beginning of a longer sample.
+    best: usize,
+}
+
+impl Run<'_> {
+    /// The first coherent choice of candidates among the samples of length `q`.
+    fn samples_of(&mut self, with: &[usize], q: usize) -> Result<Option<Vec<Correspondence>>, Spent> {
+        let mut sample: Vec<usize> = (0..q).collect();
+        loop {
+            let points: Vec<usize> = sample.iter().map(|&place| with[place]).collect();
+            if let Some(found) = self.product_of(&points)? {
+                return Ok(Some(found));
+            }
+            let more = match self.settings.samples {
+                Samples::Combinations => next_combination(&mut sample, with.len()),
+                Samples::Permutations => next_arrangement(&mut sample, with.len()),
+            };
+            if !more {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// The first coherent choice of one candidate for each of these model points.
+    fn product_of(&mut self, points: &[usize]) -> Result<Option<Vec<Correspondence>>, Spent> {
+        let lists: Vec<&[usize]> = points.iter().map(|&i| self.problem.candidates.lists[i].as_slice()).collect();
+        let mut choice = vec![0; points.len()];
+        loop {
+            let pairs: Vec<Correspondence> = (0..points.len())
+                .map(|place| Correspondence { model: points[place], cloud: lists[place][choice[place]] })
+                .collect();
+            if self.agrees(&pairs)? {
+                return Ok(Some(pairs));
+            }
+            // The last point's candidate changes fastest.
+            let Some(place) = (0..points.len()).rev().find(|&place| choice[place] + 1 < lists[place].len()) else {
+                return Ok(None);
+            };
+            choice[place] += 1;
+            choice[place + 1..].fill(0);
+        }
+    }
+
+    /// Whether all distances agree; the tests end at the first that does not.
+    fn agrees(&mut self, pairs: &[Correspondence]) -> Result<bool, Spent> {
+        for (place, &a) in pairs.iter().enumerate() {
+            for &b in &pairs[..place] {
+                if self.tests >= self.settings.budget {
+                    return Err(Spent);
+                }
+                self.tests += 1;
+                if !self.problem.coherent(a, b) {
+                    return Ok(false);
+                }
+            }
+            self.best = self.best.max(place + 1);
+        }
+        if self.settings.orientation {
+            for four in fours(pairs) {
+                if self.tests >= self.settings.budget {
+                    return Err(Spent);
+                }
+                self.tests += 1;
+                if mirrored(self.problem, four) {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// The next subset of `0..n` in lexicographic order; false after the last.
+fn next_combination(sample: &mut [usize], n: usize) -> bool {
+    let q = sample.len();
+    let Some(place) = (0..q).rev().find(|&place| sample[place] < n - q + place) else { return false };
+    sample[place] += 1;
+    for later in place + 1..q {
+        sample[later] = sample[later - 1] + 1;
+    }
+    true
+}
+
+/// The next ordered sample of `0..n` without repetition, in lexicographic order; false after the last.
+fn next_arrangement(sample: &mut [usize], n: usize) -> bool {
+    for place in (0..sample.len()).rev() {
+        let next = (sample[place] + 1..n).find(|value| !sample[..place].contains(value));
+        if let Some(value) = next {
+            sample[place] = value;
+            for later in place + 1..sample.len() {
+                let least = (0..n).find(|value| !sample[..later].contains(value));
+                sample[later] = least.expect("a sample is not longer than what it is drawn from");
+            }
+            return true;
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ordered_samples_come_in_lexicographic_order() {
+        let mut sample = vec![0, 1];
+        let mut all = vec![sample.clone()];
+        while next_arrangement(&mut sample, 3) {
+            all.push(sample.clone());
+        }
+        assert_eq!(all, [[0, 1], [0, 2], [1, 0], [1, 2], [2, 0], [2, 1]]);
+    }
+
+    #[test]
+    fn subsets_come_in_lexicographic_order() {
+        let mut sample = vec![0, 1, 2];
+        let mut all = vec![sample.clone()];
+        while next_combination(&mut sample, 4) {
+            all.push(sample.clone());
+        }
+        assert_eq!(all, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]);
+    }
+}

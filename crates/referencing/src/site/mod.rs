@@ -1,0 +1,141 @@
+//! The site: known objects, their feature points, and where they stand.
+//!
+//! Two levels, as in the paper: a production system (site) of objects; every object has its own
+//! frame by the Fig. 2 rule, and the site's frame is that of one chosen object.
+
+mod check;
+mod file;
+mod shell;
+mod target;
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+use seafix_component::Fault;
+use seafix_geometry::{Object, Point, Transform, World};
+
+pub use shell::Shell;
+pub use target::{NoWorld, Target, TargetKind};
+
+/// A feature point of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelPoint {
+    /// Its name, unique in its object.
+    pub id: String,
+    /// Where it is, object frame.
+    pub at: Point<Object>,
+    /// Standard deviation of each of its coordinates (m).
+    pub sigma: f64,
+    /// Unit vector of the side from which it is seen, object frame; `None` if it is seen from everywhere.
+    pub normal: Option<Vector3<f64>>,
+}
+
+impl ModelPoint {
+    /// A point that is known exactly and seen from everywhere.
+    pub fn exact(id: impl Into<String>, at: Point<Object>) -> Self {
+        Self { id: id.into(), at, sigma: 0.0, normal: None }
+    }
+}
+
+/// A place worth inspecting: no feature point, but something that the vehicle goes to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interest {
+    /// Its name.
+    pub id: String,
+    /// Where it is, object frame.
+    pub at: Point<Object>,
+}
+
+/// One known object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SiteObject {
+    /// Its name, unique in the site.
+    pub id: String,
+    /// Indices into `points` of P1, P2, P3 of the Fig. 2 rule.
+    pub base: [usize; 3],
+    /// The surveyed world coordinates of P1, P2, P3.
+    pub base_in_world: Option<[Point<World>; 3]>,
+    /// Standard deviation of each surveyed coordinate (m).
+    pub survey_sigma: f64,
+    /// Eq. (1): where the object stands, from the surveyed base; `None` where no world is known.
+    pub world_from_object: Option<Transform<World, Object>>,
+    /// The feature points, at least three.
+    pub points: Vec<ModelPoint>,
+    /// Points to inspect.
+    pub interest: Vec<Interest>,
+}
+
+impl SiteObject {
+    /// The min–max shell of the feature points in the object's own frame.
+    pub fn shell(&self) -> Shell<Object> {
+        Shell::around(self.points.iter().map(|point| point.at)).expect("an object has at least three points")
+    }
+
+    /// The min–max shell of the feature points in the world; `None` where no world is known.
+    pub fn shell_in_world(&self) -> Option<Shell<World>> {
+        let world_from_object = self.world_from_object?;
+        Shell::around(self.points.iter().map(|point| world_from_object * point.at))
+    }
+
+    /// The distance (m) between feature points `i` and `k`.
+    ///
+    /// # Panics
+    /// When an index is out of range.
+    pub fn distance(&self, i: usize, k: usize) -> f64 {
+        self.points[i].at.distance(&self.points[k].at)
+    }
+}
+
+/// All known objects of one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Site {
+    /// Its name.
+    pub name: String,
+    /// Index of the object whose frame is the site's.
+    pub frame: usize,
+    /// The objects.
+    pub objects: Vec<SiteObject>,
+    /// What is suspicious in the file it came from, but no reason to refuse it.
+    pub warnings: Vec<Fault>,
+}
+
+impl Site {
+    /// The site that `text`, the content of `file`, describes in `seafix-site/1`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once: a fault a line of the file.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, Vec<Fault>> {
+        check::site(&file::read(text, file).map_err(|fault| vec![fault])?, text, file)
+    }
+
+    /// The same site in `seafix-site/1`.
+    pub fn to_toml(&self) -> String {
+        file::write(self)
+    }
+
+    /// The object whose frame is the site's.
+    pub fn frame_object(&self) -> &SiteObject {
+        &self.objects[self.frame]
+    }
+
+    /// The object of this name.
+    pub fn object(&self, id: &str) -> Option<&SiteObject> {
+        self.objects.iter().find(|object| object.id == id)
+    }
+
+    /// The min–max shell of the whole site in the world; `None` unless every object's place is known.
+    pub fn shell_in_world(&self) -> Option<Shell<World>> {
+        self.objects.iter().map(SiteObject::shell_in_world).reduce(|a, b| Some(a?.union(&b?)))?
+    }
+
+    /// What is searched for: each object by itself, or the whole site as one.
+    ///
+    /// # Errors
+    /// [`NoWorld`] when the whole site is asked for and an object's place in the world is unknown.
+    pub fn targets(&self, kind: TargetKind) -> Result<Vec<Target>, NoWorld> {
+        target::targets(self, kind)
+    }
+}
+
+#[cfg(test)]
+mod tests;
