@@ -3,6 +3,7 @@
 mod epipolar;
 mod mutual_ratio;
 mod nearest;
+mod support;
 
 pub use mutual_ratio::MutualRatio;
 use seafix_component::{Registry, entry};

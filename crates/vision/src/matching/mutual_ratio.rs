@@ -4,7 +4,12 @@ use seafix_component::Component;
 use seafix_geometry::StereoRig;
 use serde::{Deserialize, Serialize};
 
-use super::{Match, Matcher, View, epipolar::Band, nearest::Nearest};
+use super::{
+    Match, Matcher, View,
+    epipolar::Band,
+    nearest::{Nearest, squared},
+    support::Candidates,
+};
 
 /// Pairs of key points that are each other's nearest by descriptor, clearly nearer than the second.
 ///
@@ -30,11 +35,14 @@ pub struct MutualRatio {
     pub min_depth: f64,
     /// Greatest depth in the left camera (m).
     pub max_depth: f64,
+    /// How many neighbours of a left key point support its pairs; 0: descriptors alone decide. Needs
+    /// the epipolar band.
+    pub neighbours: usize,
 }
 
 impl Default for MutualRatio {
     fn default() -> Self {
-        Self { ratio: 0.85, max_distance: 0.7, epipolar_px: 2.0, min_depth: 0.1, max_depth: 50.0 }
+        Self { ratio: 0.85, max_distance: 0.7, epipolar_px: 1.0, min_depth: 0.1, max_depth: 50.0, neighbours: 30 }
     }
 }
 
@@ -47,19 +55,43 @@ impl Component for MutualRatio {
 impl Matcher for MutualRatio {
     fn matches(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Vec<Match> {
         let nearest = if self.epipolar_px > 0.0 {
-            let band =
-                Band::new(left.keypoints, right.keypoints, rig, self.epipolar_px, self.min_depth, self.max_depth);
-            Nearest::among(left.descriptors, right.descriptors, |i, j| band.allows(i, j))
+            self.along_the_band(left, right, rig)
         } else {
             Nearest::of_all(left.descriptors, right.descriptors)
         };
         let ratio = (self.ratio * self.ratio) as f32;
-        let greatest = (self.max_distance * self.max_distance) as f32;
+        let greatest = self.max_distance as f32;
         nearest
             .mutual()
-            .filter(|pair| pair.squared <= greatest && pair.squared <= ratio * pair.second)
-            .map(|pair| Match { left: pair.left, right: pair.right, distance: pair.squared.sqrt() })
+            .filter(|pair| pair.squared <= ratio * pair.second)
+            .map(|pair| {
+                let distance = squared(left.descriptors.get(pair.left), right.descriptors.get(pair.right)).sqrt();
+                Match { left: pair.left, right: pair.right, distance }
+            })
+            .filter(|pair| pair.distance <= greatest)
             .collect()
+    }
+}
+
+impl MutualRatio {
+    /// The nearest among the pairs that the rig allows, where distance is that of the descriptors or,
+    /// with neighbours, the inverse of its supported weight.
+    fn along_the_band(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Nearest {
+        let band = Band::new(left.keypoints, right.keypoints, rig, self.epipolar_px, self.min_depth, self.max_depth);
+        let (n, m) = (left.keypoints.len(), right.keypoints.len());
+        let pairs = (0..n).flat_map(|i| (0..m).map(move |j| (i, j))).filter(|&(i, j)| band.allows(i, j));
+        let pairs = pairs.map(|(i, j)| (i, j, squared(left.descriptors.get(i), right.descriptors.get(j))));
+        let mut nearest = Nearest::none(n, m);
+        if self.neighbours == 0 {
+            pairs.for_each(|(i, j, squared)| nearest.offer(i, j, squared));
+            return nearest;
+        }
+        let mut candidates = Candidates::new(n, pairs);
+        candidates.support(left.keypoints, right.keypoints, self.neighbours);
+        for i in 0..n {
+            candidates.of(i).iter().for_each(|c| nearest.offer(i, c.right, 1.0 / c.weight));
+        }
+        nearest
     }
 }
 

@@ -46,33 +46,21 @@ const ROWS: usize = 2;
 const COLUMNS: usize = 8;
 
 impl Nearest {
-    fn none(left: &Descriptors, right: &Descriptors) -> Self {
-        Self { left: vec![Two::NONE; left.len()], right: vec![Two::NONE; right.len()] }
+    /// Of so many left and right descriptors, none compared yet.
+    pub(super) fn none(left: usize, right: usize) -> Self {
+        Self { left: vec![Two::NONE; left], right: vec![Two::NONE; right] }
     }
 
-    fn offer(&mut self, i: usize, j: usize, squared: f32) {
+    /// Left descriptor `i` and right descriptor `j` are this far apart.
+    pub(super) fn offer(&mut self, i: usize, j: usize, squared: f32) {
         self.left[i].offer(j, squared);
         self.right[j].offer(i, squared);
     }
 
-    /// Among the pairs (left, right) that are allowed.
-    pub(super) fn among(left: &Descriptors, right: &Descriptors, allowed: impl Fn(usize, usize) -> bool) -> Self {
-        let mut nearest = Self::none(left, right);
-        for i in 0..left.len() {
-            for j in 0..right.len() {
-                if allowed(i, j) {
-                    let differences = left.get(i).iter().zip(right.get(j)).map(|(a, b)| a - b);
-                    nearest.offer(i, j, differences.fold(0.0, |sum, d| sum + d * d));
-                }
-            }
-        }
-        nearest
-    }
-
     /// Among all pairs: blocks of a few left and eight right descriptors stay in registers. Every sum
-    /// runs in the descriptor's order, so the result is that of [`among`](Self::among) to the last bit.
+    /// runs in the descriptor's order, so the distances are those of [`squared`] to the last bit.
     pub(super) fn of_all(left: &Descriptors, right: &Descriptors) -> Self {
-        let mut nearest = Self::none(left, right);
+        let mut nearest = Self::none(left.len(), right.len());
         if left.is_empty() || right.is_empty() {
             return nearest;
         }
@@ -107,6 +95,11 @@ impl Nearest {
             (back.index == left).then_some(mutual)
         })
     }
+}
+
+/// The squared Euclidean distance.
+pub(super) fn squared(a: &[f32], b: &[f32]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a - b).fold(0.0, |sum, d| sum + d * d)
 }
 
 /// Squared distances between the rows and the columns of a panel.
@@ -150,7 +143,11 @@ mod tests {
             let bits = |nearest: Nearest| -> Vec<_> {
                 nearest.mutual().map(|m| (m.left, m.right, m.squared.to_bits(), m.second.to_bits())).collect()
             };
-            assert_eq!(bits(Nearest::of_all(&left, &right)), bits(Nearest::among(&left, &right, |_, _| true)));
+            let mut one_by_one = Nearest::none(n, m);
+            for (i, j) in (0..n).flat_map(|i| (0..m).map(move |j| (i, j))) {
+                one_by_one.offer(i, j, super::squared(left.get(i), right.get(j)));
+            }
+            assert_eq!(bits(Nearest::of_all(&left, &right)), bits(one_by_one));
         }
     }
 }
