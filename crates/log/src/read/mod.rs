@@ -38,8 +38,26 @@ pub struct Reader {
     source: Source,
     header: TrialHeader,
     pending: Pending,
-    images: bool,
+    images: Images,
     ended: bool,
+}
+
+/// Of which frames the images are decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Images {
+    All,
+    None,
+    At(u64),
+}
+
+impl Images {
+    fn wanted(self, stamp_ns: u64) -> bool {
+        match self {
+            Self::All => true,
+            Self::None => false,
+            Self::At(stamp) => stamp == stamp_ns,
+        }
+    }
 }
 
 impl Reader {
@@ -55,7 +73,7 @@ impl Reader {
                 let header = message.decode(path, "TrialHeader").and_then(|header| {
                     convert::header_record(header).map_err(|error| foreign(path, &message, &error.0))
                 })?;
-                return Ok(Self { source, header, pending: Pending::default(), images: true, ended: false });
+                return Ok(Self { source, header, pending: Pending::default(), images: Images::All, ended: false });
             }
         }
         Err(LogError::Foreign { path: path.to_owned(), what: format!("it has no message on {}", topic::HEADER) })
@@ -64,7 +82,14 @@ impl Reader {
     /// The same, without decoding images: frames come with `images: None`.
     #[must_use]
     pub fn without_images(mut self) -> Self {
-        self.images = false;
+        self.images = Images::None;
+        self
+    }
+
+    /// The same, decoding only the images of frames with this stamp.
+    #[must_use]
+    pub fn images_at(mut self, stamp_ns: u64) -> Self {
+        self.images = Images::At(stamp_ns);
         self
     }
 
@@ -76,7 +101,7 @@ impl Reader {
     fn next_frame(&mut self) -> Result<Option<FrameRecord>, LogError> {
         let path: PathBuf = self.source.path().to_owned();
         while let Some(message) = self.source.next_message()? {
-            if let Some(frame) = self.pending.take(&path, &message, self.images)? {
+            if let Some(frame) = self.pending.take(&path, &message, self.images.wanted(message.log_time))? {
                 return Ok(Some(frame));
             }
         }

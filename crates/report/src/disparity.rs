@@ -1,0 +1,52 @@
+//! The noise of the disparity σ_d, measured where truth tells what it should have been.
+
+use nalgebra::{Matrix4, Point3};
+use seafix_geometry::{Camera, Pinhole, Point, RightCamera, StereoRig, Transform};
+use seafix_log::{CameraRecord, FrameRecord, RigRecord, TrialHeader};
+
+/// A pair whose pixels are further than this from the true projections (px) is not the point it is
+/// taken for.
+const CORRECT: f64 = 2.0;
+
+/// Measured minus true disparity (px) of every correctly identified point of `frame`; nothing where the
+/// images are not rectified or truth is unknown.
+pub(crate) fn errors(header: &TrialHeader, frame: &FrameRecord) -> Vec<f64> {
+    let (Some(truth), true) = (&frame.truth, header.rig.rectified) else { return Vec::new() };
+    let Some(rig) = rig(&header.rig) else { return Vec::new() };
+    let Some(camera_from_world) = matrix(&truth.world_from_camera).try_inverse() else { return Vec::new() };
+    let mut errors = Vec::new();
+    for target in &frame.targets {
+        let Some(model) = header.targets.iter().find(|model| model.id == target.object) else { continue };
+        let Some((_, place)) = truth.world_from_object.iter().find(|(id, _)| *id == target.object) else { continue };
+        let camera_from_object = camera_from_world * matrix(place);
+        for pair in &target.pairs {
+            let [x, y, z] = model.points[pair.model as usize].at;
+            let at = camera_from_object.transform_point(&Point3::new(x, y, z));
+            let (Some(seen), Some(expected)) =
+                (frame.cloud[pair.cloud as usize].pixels, rig.project(&Point::new(at.x, at.y, at.z)))
+            else {
+                continue;
+            };
+            let expected = [[expected.left.u, expected.left.v], [expected.right.u, expected.right.v]];
+            let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+            if apart(seen.left, expected[0]) <= CORRECT && apart(seen.right, expected[1]) <= CORRECT {
+                errors.push((seen.left[0] - seen.right[0]) - (expected[0][0] - expected[1][0]));
+            }
+        }
+    }
+    errors
+}
+
+fn matrix(rows: &[[f64; 4]; 4]) -> Matrix4<f64> {
+    Matrix4::from_fn(|row, column| rows[row][column])
+}
+
+fn rig(record: &RigRecord) -> Option<StereoRig> {
+    let right_from_left = Transform::<RightCamera, Camera>::from_matrix(&matrix(&record.right_from_left)).ok()?;
+    StereoRig::new(camera(&record.left)?, camera(&record.right)?, right_from_left).ok()
+}
+
+fn camera(record: &CameraRecord) -> Option<Pinhole> {
+    let k = record.matrix;
+    Pinhole::new(record.size, [k[0][0], k[1][1]], [k[0][2], k[1][2]], &record.distortion).ok()
+}

@@ -1,0 +1,55 @@
+//! The ten worst frames, with the place in the log where to look.
+
+use maud::{Markup, html};
+use seafix_log::{Outcome, TargetRecord};
+
+use crate::{
+    format::number,
+    run::{Frame, Run, Trial},
+};
+
+/// How many are listed.
+const LISTED: usize = 10;
+
+pub(super) fn section(run: &Run) -> Markup {
+    let mut fixes: Vec<(&Trial, &Frame, &TargetRecord)> = run
+        .trials
+        .iter()
+        .flat_map(|trial| trial.attempts().map(move |(frame, target)| (trial, frame, target)))
+        .filter(|(.., target)| target.outcome == Outcome::Referenced)
+        .collect();
+    let error =
+        |fix: &TargetRecord| fix.evaluation.m2_rms.or(fix.evaluation.m1_rms).or(fix.residual_rms).unwrap_or(0.0);
+    let wrong = |fix: &TargetRecord| fix.evaluation.wrong == Some(true);
+    fixes.sort_by(|(.., a), (.., b)| wrong(b).cmp(&wrong(a)).then(error(b).total_cmp(&error(a))));
+    fixes.truncate(LISTED);
+    html! {
+        h2 { "Worst fixes" }
+        @if fixes.is_empty() {
+            p { "There is no fix." }
+        } @else {
+            figure.table {
+                figcaption { "The fixes with the largest m2, wrong ones first; the stamp leads to the frame in its log." }
+                table {
+                    thead { tr {
+                        th { "Log" } th.n { "frame" } th.n { "stamp (ns)" } th { "target" } th { "judged" } th.n { "points" }
+                        th.n { "m1 (mm)" } th.n { "m2 (mm)" } th.n { "m3 (mm)" } th.n { "m3 (°)" } th.n { "NEES" }
+                    } }
+                    tbody {
+                        @for (trial, frame, fix) in fixes {
+                            @let it = &fix.evaluation;
+                            tr {
+                                td.nowrap { code { (trial.file()) } } td.n { (frame.number) } td.n { (frame.stamp_ns) } td { (fix.object) }
+                                td { (match it.wrong { Some(true) => "wrong", Some(false) => "found", None => "–" }) }
+                                td.n { (fix.pairs.len()) }
+                                td.n { (number(it.m1_rms.map(|m| m * 1e3), 1)) } td.n { (number(it.m2_rms.map(|m| m * 1e3), 1)) }
+                                td.n { (number(it.m3_position.map(|m| m * 1e3), 1)) }
+                                td.n { (number(it.m3_attitude.map(f64::to_degrees), 2)) } td.n { (number(it.nees, 1)) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

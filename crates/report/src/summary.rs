@@ -1,0 +1,252 @@
+//! The results, a row a trial.
+
+use std::collections::BTreeMap;
+
+use seafix_evaluation::quantile;
+use seafix_log::{Axis, Evaluation, Outcome};
+
+use crate::run::{Run, Trial};
+
+/// The results of a run.
+///
+/// `{}` prints them as a table for a terminal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// The run's name.
+    pub run: String,
+    /// The question it asks.
+    pub question: String,
+    /// One row a trial, in the order of their names.
+    pub rows: Vec<Row>,
+}
+
+/// The results of one trial. Found, refused and wrong add up to attempted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The trial's name.
+    pub trial: String,
+    /// Its values on the axes of the experiment.
+    pub axes: Vec<Axis>,
+    /// Name of the search.
+    pub search: String,
+    /// Name of the solver.
+    pub solver: String,
+    /// Frames of the trial.
+    pub frames: usize,
+    /// Frames with a fix of at least one target.
+    pub referenced_frames: usize,
+    /// Frames with a wrong fix of at least one target.
+    pub wrong_frames: usize,
+    /// Attempts: one a frame and target that the prior puts in view.
+    pub attempted: usize,
+    /// Fixes that are not known to be wrong.
+    pub found: usize,
+    /// Attempts that gave no fix.
+    pub refused: usize,
+    /// Fixes beyond the alert limit.
+    pub wrong: usize,
+    /// Fixes that no truth could judge; they count as found.
+    pub unjudged: usize,
+    /// Why attempts were refused, and how often.
+    pub reasons: BTreeMap<String, usize>,
+    /// m1 of the fixes found: RMS of C·H − P over the identified points (m).
+    pub m1: Option<Spread>,
+    /// m1 over the identified points that the solver did not use (m).
+    pub m1_unused: Option<Spread>,
+    /// m2 of the fixes found: RMS error of the transferred model points (m).
+    pub m2: Option<Spread>,
+    /// Median of m2 over all attempts, refused and wrong ones as infinitely far off (m).
+    pub m2_of_all: Option<f64>,
+    /// m3 of the fixes found, position of the left camera (m).
+    pub m3_position: Option<Spread>,
+    /// m3 of the fixes found, attitude (rad).
+    pub m3_attitude: Option<Spread>,
+    /// Mean of the normalised error squared of the fixes found; 6 for an honest covariance.
+    pub nees_mean: Option<f64>,
+    /// How many fixes that mean is over.
+    pub nees_count: usize,
+    /// Identified points of the fixes found.
+    pub identified: Option<Spread>,
+    /// Measured standard deviation of the disparity of correctly identified points (px).
+    pub disparity_sigma: Option<f64>,
+    /// Median times of the stages.
+    pub times: StageTimes,
+}
+
+/// How a quantity spreads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// How many values there are.
+    pub count: usize,
+    /// The 5 % quantile.
+    pub p5: f64,
+    /// The median.
+    pub median: f64,
+    /// The 95 % quantile.
+    pub p95: f64,
+}
+
+impl Spread {
+    /// The spread of `values`; `None` without any.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let mut values: Vec<f64> = values.into_iter().collect();
+        if values.is_empty() {
+            return None;
+        }
+        let count = values.len();
+        let [p5, median, p95] = [0.05, 0.5, 0.95].map(|p| quantile(&mut values, p));
+        Some(Self { count, p5, median, p95 })
+    }
+}
+
+/// Median times (ms): of the first four a frame, of the others an attempt; `None` where a stage did not run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StageTimes {
+    /// Detection, both images.
+    pub detect_ms: Option<f64>,
+    /// Description, both images.
+    pub describe_ms: Option<f64>,
+    /// Matching.
+    pub match_ms: Option<f64>,
+    /// Triangulation.
+    pub triangulate_ms: Option<f64>,
+    /// Choosing candidates.
+    pub candidates_ms: Option<f64>,
+    /// Search.
+    pub search_ms: Option<f64>,
+    /// Solve.
+    pub solve_ms: Option<f64>,
+    /// From the images to the answer.
+    pub total_ms: Option<f64>,
+}
+
+impl StageTimes {
+    /// The stages and their times, in the order of the method.
+    pub fn stages(&self) -> [(&'static str, Option<f64>); 8] {
+        [
+            ("detect", self.detect_ms),
+            ("describe", self.describe_ms),
+            ("match", self.match_ms),
+            ("triangulate", self.triangulate_ms),
+            ("candidates", self.candidates_ms),
+            ("search", self.search_ms),
+            ("solve", self.solve_ms),
+            ("total", self.total_ms),
+        ]
+    }
+}
+
+impl Summary {
+    /// The results of `run`.
+    pub(crate) fn of(run: &Run) -> Self {
+        let header = run.header();
+        Self {
+            run: header.run.clone(),
+            question: header.question.clone(),
+            rows: run.trials.iter().map(Row::of).collect(),
+        }
+    }
+}
+
+impl Row {
+    fn of(trial: &Trial) -> Self {
+        let [search, solver] = trial.method();
+        let mut row = Self {
+            trial: trial.header.trial.clone(),
+            axes: trial.header.axes.clone(),
+            search,
+            solver,
+            frames: trial.frames.len(),
+            referenced_frames: 0,
+            wrong_frames: 0,
+            attempted: 0,
+            found: 0,
+            refused: 0,
+            wrong: 0,
+            unjudged: 0,
+            reasons: BTreeMap::new(),
+            m1: None,
+            m1_unused: None,
+            m2: None,
+            m2_of_all: None,
+            m3_position: None,
+            m3_attitude: None,
+            nees_mean: None,
+            nees_count: 0,
+            identified: None,
+            disparity_sigma: root_mean_square(&trial.disparity_errors),
+            times: times(trial),
+        };
+        for frame in &trial.frames {
+            let fixes = || frame.targets.iter().filter(|target| target.outcome == Outcome::Referenced);
+            row.referenced_frames += usize::from(fixes().next().is_some());
+            row.wrong_frames += usize::from(fixes().any(|fix| fix.evaluation.wrong == Some(true)));
+        }
+        let (mut found, mut all_m2): (Vec<Evaluation>, Vec<f64>) = (Vec::new(), Vec::new());
+        for (_, target) in trial.attempts() {
+            row.attempted += 1;
+            if target.outcome != Outcome::Referenced {
+                row.refused += 1;
+                let reason = if target.reason.is_empty() { target.outcome.name() } else { &target.reason };
+                *row.reasons.entry(reason.to_owned()).or_default() += 1;
+            } else if target.evaluation.wrong == Some(true) {
+                row.wrong += 1;
+            } else {
+                row.found += 1;
+                row.unjudged += usize::from(target.evaluation.wrong.is_none());
+                all_m2.extend(target.evaluation.m2_rms);
+                found.push(target.evaluation);
+            }
+        }
+        let spread = |value: fn(&Evaluation) -> Option<f64>| Spread::of(found.iter().filter_map(value));
+        row.m1 = spread(|fix| fix.m1_rms);
+        row.m1_unused = spread(|fix| fix.m1_unused_rms);
+        row.m2 = spread(|fix| fix.m2_rms);
+        row.m3_position = spread(|fix| fix.m3_position);
+        row.m3_attitude = spread(|fix| fix.m3_attitude);
+        row.identified = spread(|fix| fix.identified.map(f64::from));
+        let nees: Vec<f64> = found.iter().filter_map(|fix| fix.nees).collect();
+        row.nees_count = nees.len();
+        row.nees_mean = (!nees.is_empty()).then(|| nees.iter().sum::<f64>() / nees.len() as f64);
+        if row.m2.is_some() && row.unjudged == 0 {
+            // The lower middle order statistic: between a number and infinity there is no mean.
+            all_m2.resize(row.attempted, f64::INFINITY);
+            all_m2.sort_by(f64::total_cmp);
+            row.m2_of_all = all_m2.get((row.attempted - 1) / 2).copied();
+        }
+        row
+    }
+
+    /// Search and solver, as tables name the method.
+    pub fn method(&self) -> String {
+        format!("{} + {}", self.search, self.solver)
+    }
+
+    /// The axes that the method does not say already.
+    pub(crate) fn conditions(&self) -> impl Iterator<Item = &Axis> {
+        self.axes.iter().filter(|axis| !matches!(crate::format::short(&axis.key), "search" | "solver"))
+    }
+}
+
+fn times(trial: &Trial) -> StageTimes {
+    let median = |values: Vec<f64>| Spread::of(values).map(|spread| spread.median);
+    let frames = |time: fn(&crate::run::Frame) -> Option<f64>| median(trial.frames.iter().filter_map(time).collect());
+    let attempts = |time: fn(&seafix_log::TargetTimes) -> Option<f64>| {
+        median(trial.attempts().filter_map(|(_, target)| time(&target.times)).collect())
+    };
+    StageTimes {
+        detect_ms: frames(|frame| frame.times.detect_ms),
+        describe_ms: frames(|frame| frame.times.describe_ms),
+        match_ms: frames(|frame| frame.times.match_ms),
+        triangulate_ms: frames(|frame| frame.times.triangulate_ms),
+        candidates_ms: attempts(|times| times.candidates_ms),
+        search_ms: attempts(|times| times.search_ms),
+        solve_ms: attempts(|times| times.solve_ms),
+        total_ms: attempts(|times| times.total_ms),
+    }
+}
+
+fn root_mean_square(values: &[f64]) -> Option<f64> {
+    let mean = values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64;
+    (!values.is_empty()).then(|| mean.sqrt())
+}
