@@ -80,21 +80,21 @@ impl Picture {
         };
         let matched: Vec<[f64; 2]> = (0..frame.cloud.len() as u32).flat_map(places).collect();
         for at in frame.key_points.iter().copied().chain(matched.into_iter().filter(|at| at[0] >= offset - 1.0)) {
-            plus(&mut canvas, at, 6.0 * scale, 4.0 * scale, BLACK);
-            plus(&mut canvas, at, 5.0 * scale, 2.0 * scale, WHITE);
+            plus(&mut canvas, at, 7.0 * scale, 4.5 * scale, BLACK);
+            plus(&mut canvas, at, 6.0 * scale, 2.5 * scale, WHITE);
         }
         let fixes: Vec<_> = frame.targets.iter().filter(|target| target.outcome == Outcome::Referenced).collect();
         let candidates: BTreeSet<u32> = frame.targets.iter().flat_map(|target| target.candidates.concat()).collect();
         for at in candidates.iter().flat_map(|&cloud| places(cloud)) {
-            ring(&mut canvas, at, 9.0 * scale, 2.5 * scale, BLUE);
+            ring(&mut canvas, at, 10.5 * scale, 3.0 * scale, BLUE);
         }
         for fix in &fixes {
             for (place, pair) in (0_u32..).zip(&fix.pairs) {
                 for at in places(pair.cloud) {
-                    disc(&mut canvas, at, 10.0 * scale, ORANGE);
-                    disc(&mut canvas, at, 6.5 * scale, BLACK);
+                    disc(&mut canvas, at, 12.0 * scale, ORANGE);
+                    disc(&mut canvas, at, 8.0 * scale, BLACK);
                     if fix.used.contains(&place) {
-                        ring(&mut canvas, at, 14.0 * scale, 3.0 * scale, VERMILION);
+                        ring(&mut canvas, at, 17.0 * scale, 4.0 * scale, VERMILION);
                     }
                 }
             }

@@ -83,7 +83,7 @@ pub(crate) fn plot(plot: &Plot) -> Option<Markup> {
                 @let (column, row) = (index % 2, index / 2);
                 g transform={ "translate(" (c(LEFT + column as f64 * width / 2.0)) " " (c(HEIGHT + 12.0 + 18.0 * row as f64)) ")" } {
                     @if plot.lines {
-                        line x1="0" y1="0" x2="30" y2="0" stroke=(colour(index)) stroke-width="1.6" stroke-dasharray=(DASHES[index % DASHES.len()]);
+                        line x1="0" y1="0" x2="30" y2="0" stroke=(colour(index)) stroke-width="1.6" stroke-dasharray=(DASHES[index % DASHES.len()]) {}
                     }
                     (mark(index, 15.0, 0.0))
                     text x="38" y="4" { (name) }
@@ -135,18 +135,18 @@ fn draw(plot: &Plot, panel: &Panel, scale: &Scale, names: &[&str]) -> Markup {
     let dodge = |index: usize| 5.0 * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
     html! {
         @if let Some(([low, high], name)) = panel.band {
-            rect x=(c(LEFT)) y=(c(scale.y(high))) width=(c(right - LEFT)) height=(c(scale.y(low) - scale.y(high))) fill="#e9e4d4";
-            text class="note" x=(c(right - 6.0)) y=(c(scale.y(high) + 13.0)) text-anchor="end" { (name) }
+            rect x=(c(LEFT)) y=(c(scale.y(high))) width=(c(right - LEFT)) height=(c(scale.y(low) - scale.y(high))) fill="#e9e4d4" {}
+            text class="note" x=(c(LEFT + 6.0)) y=(c(scale.y(high) + 13.0)) { (name) }
         }
         @for tick in scale.y_ticks() {
-            line class="grid" x1=(c(LEFT)) x2=(c(right)) y1=(c(scale.y(tick))) y2=(c(scale.y(tick)));
+            line class="grid" x1=(c(LEFT)) x2=(c(right)) y1=(c(scale.y(tick))) y2=(c(scale.y(tick))) {}
             text x=(c(LEFT - 7.0)) y=(c(scale.y(tick) + 4.0)) text-anchor="end" { (tick_text(tick)) }
         }
         @for &tick in &plot.x_ticks {
-            line class="grid" x1=(c(scale.x(tick))) x2=(c(scale.x(tick))) y1=(c(TOP)) y2=(c(bottom));
+            line class="grid" x1=(c(scale.x(tick))) x2=(c(scale.x(tick))) y1=(c(TOP)) y2=(c(bottom)) {}
             text x=(c(scale.x(tick))) y=(c(bottom + 16.0)) text-anchor="middle" { (tick_text(tick)) }
         }
-        path class="axes" d={ "M" (c(LEFT)) " " (c(TOP)) "V" (c(bottom)) "H" (c(right)) };
+        path class="axes" d={ "M" (c(LEFT)) " " (c(TOP)) "V" (c(bottom)) "H" (c(right)) } {}
         text x=(c((LEFT + right) / 2.0)) y=(c(bottom + 34.0)) text-anchor="middle" { (plot.x_label) }
         text transform={ "translate(14 " (c((TOP + bottom) / 2.0)) ") rotate(-90)" } text-anchor="middle" { (panel.y_label) }
         @for series in &panel.series {
@@ -157,12 +157,12 @@ fn draw(plot: &Plot, panel: &Panel, scale: &Scale, names: &[&str]) -> Markup {
                     d=(series.values.iter().enumerate().map(|(i, value)| {
                         let (x, y) = place(value);
                         format!("{}{} {}", if i == 0 { 'M' } else { 'L' }, c(x), c(y))
-                    }).collect::<String>());
+                    }).collect::<String>()) {}
             }
             @for value in &series.values {
                 @let (x, y) = place(value);
                 @if value.high > value.low {
-                    line x1=(c(x)) x2=(c(x)) y1=(c(scale.y(value.low))) y2=(c(scale.y(value.high))) stroke=(colour(index)) stroke-width="1";
+                    line x1=(c(x)) x2=(c(x)) y1=(c(scale.y(value.low))) y2=(c(scale.y(value.high))) stroke=(colour(index)) stroke-width="1" {}
                 }
                 (mark(index, x, y))
             }
@@ -179,10 +179,10 @@ fn mark(index: usize, x: f64, y: f64) -> Markup {
     let fill = colour(index);
     html! {
         @match index % 4 {
-            0 => { circle cx=(c(x)) cy=(c(y)) r="3.6" fill=(fill); }
-            1 => { rect x=(c(x - 3.2)) y=(c(y - 3.2)) width="6.4" height="6.4" fill=(fill); }
-            2 => { path d={ "M" (c(x)) " " (c(y - 4.4)) "l4.2 7.4h-8.4z" } fill=(fill); }
-            _ => { path d={ "M" (c(x)) " " (c(y - 4.6)) "l4.2 4.6l-4.2 4.6l-4.2 -4.6z" } fill=(fill); }
+            0 => { circle cx=(c(x)) cy=(c(y)) r="3.6" fill=(fill) {} }
+            1 => { rect x=(c(x - 3.2)) y=(c(y - 3.2)) width="6.4" height="6.4" fill=(fill) {} }
+            2 => { path d={ "M" (c(x)) " " (c(y - 4.4)) "l4.2 7.4h-8.4z" } fill=(fill) {} }
+            _ => { path d={ "M" (c(x)) " " (c(y - 4.6)) "l4.2 4.6l-4.2 4.6l-4.2 -4.6z" } fill=(fill) {} }
         }
     }
 }

@@ -28,7 +28,7 @@ pub(super) fn section(run: &Run) -> Markup {
         @if fixes.is_empty() {
             p { "There is no fix." }
         } @else {
-            figure.table {
+            figure.table.wide {
                 figcaption { "The fixes with the largest m2, wrong ones first; the stamp leads to the frame in its log." }
                 table {
                     thead { tr {
