@@ -29,7 +29,7 @@ pub(crate) struct Patch {
     first: [i64; 2],
     count: [usize; 2],
     down: Vec<f64>,
-    normals: Vec<Vector3<f64>>,
+    brightness: Vec<f32>,
 }
 
 impl Bed {
@@ -107,20 +107,23 @@ impl Bed {
         (t > 0.0).then_some(t)
     }
 
-    /// The grid over the rectangle from `low` to `high` (north, east).
-    pub(crate) fn patch(&self, low: [f64; 2], high: [f64; 2]) -> Patch {
+    /// The grid over the rectangle from `low` to `high` (north, east); its brightness is a function
+    /// of the place and the normal.
+    pub(crate) fn patch(&self, low: [f64; 2], high: [f64; 2], tone: impl Fn([f64; 2], &Vector3<f64>) -> f32) -> Patch {
         let first = low.map(|x| (x / CELL).floor() as i64);
         let last = high.map(|x| (x / CELL).ceil() as i64);
         let count = [(last[0] - first[0]).max(1) as usize + 1, (last[1] - first[1]).max(1) as usize + 1];
-        let (mut down, mut normals) = (Vec::new(), Vec::new());
+        let (mut down, mut brightness) = (Vec::new(), Vec::new());
         for i in 0..count[0] {
             for j in 0..count[1] {
-                let (z, [north, east]) = self.vertex(first[0] + i as i64, first[1] + j as i64);
+                let vertex = [first[0] + i as i64, first[1] + j as i64];
+                let (z, [north, east]) = self.vertex(vertex[0], vertex[1]);
                 down.push(z);
-                normals.push(Vector3::new(north, east, -1.0).normalize());
+                let normal = Vector3::new(north, east, -1.0).normalize();
+                brightness.push(tone(vertex.map(|n| n as f64 * CELL), &normal));
             }
         }
-        Patch { first, count, down, normals }
+        Patch { first, count, down, brightness }
     }
 }
 
@@ -143,19 +146,20 @@ impl Patch {
         })
     }
 
-    /// The smoothed normal (upwards) at a place.
-    pub(crate) fn normal(&self, north: f64, east: f64) -> Vector3<f64> {
+    /// The brightness at a place: smooth over the triangles.
+    pub(crate) fn brightness(&self, north: f64, east: f64) -> f32 {
         let at = |x: f64, first: i64, count: usize| {
             let x = (x / CELL - first as f64).clamp(0.0, (count - 1) as f64);
-            let cell = (x.floor() as usize).min(count - 2);
-            (cell, x - cell as f64)
+            let cell = (x as usize).min(count - 2);
+            (cell, (x - cell as f64) as f32)
         };
         let (i, fx) = at(north, self.first[0], self.count[0]);
         let (j, fy) = at(east, self.first[1], self.count[1]);
-        let n = |i: usize, j: usize| self.normals[i * self.count[1] + j];
-        let near = n(i, j) * (1.0 - fy) + n(i, j + 1) * fy;
-        let far = n(i + 1, j) * (1.0 - fy) + n(i + 1, j + 1) * fy;
-        near * (1.0 - fx) + far * fx
+        let row = |i: usize| {
+            let start = i * self.count[1] + j;
+            self.brightness[start] + fy * (self.brightness[start + 1] - self.brightness[start])
+        };
+        row(i) + fx * (row(i + 1) - row(i))
     }
 }
 
@@ -180,7 +184,7 @@ mod tests {
     #[test]
     fn the_surface_passes_through_the_triangles_of_a_patch() {
         let bed = Bed::new(40.0, 3);
-        for [a, b, c] in bed.patch([-1.0, -1.0], [1.0, 1.0]).triangles() {
+        for [a, b, c] in bed.patch([-1.0, -1.0], [1.0, 1.0], |_, _| 1.0).triangles() {
             let centre = (a + b + c) / 3.0;
             assert!((bed.down(centre.x, centre.y) - centre.z).abs() < 1e-12);
         }

@@ -174,7 +174,9 @@ impl ObjectPlan {
                 let carrier = &self.boxes[carrier];
                 carrier.on_top(carrier.corners()[point.corner])
             }
-            (None, None) => unreachable!("the built-in geometry names a panel or a box for each point; a test reads all"),
+            (None, None) => {
+                unreachable!("the built-in geometry names a panel or a box for each point; a test reads all")
+            }
         }
     }
 }
@@ -186,8 +188,9 @@ mod tests {
     /// All distances within an object, sorted.
     fn distances(object: &ObjectPlan) -> Vec<f64> {
         let places: Vec<_> = object.points.iter().map(|p| nalgebra::Vector3::from(object.place(p))).collect();
-        let mut all: Vec<f64> =
-            (0..places.len()).flat_map(|i| (0..i).map(|j| (places[i] - places[j]).norm()).collect::<Vec<_>>()).collect();
+        let mut all: Vec<f64> = (0..places.len())
+            .flat_map(|i| (0..i).map(|j| (places[i] - places[j]).norm()).collect::<Vec<_>>())
+            .collect();
         all.sort_by(f64::total_cmp);
         all
     }
@@ -230,9 +233,10 @@ mod tests {
     #[test]
     fn base_points_span_a_metre_and_no_line() {
         for object in &Blueprint::drill_centre().objects {
-            let [p1, p2, p3] = object.base.clone().map(|id| {
-                nalgebra::Vector3::from(object.place(object.points.iter().find(|p| p.id == id).unwrap()))
-            });
+            let [p1, p2, p3] = object
+                .base
+                .clone()
+                .map(|id| nalgebra::Vector3::from(object.place(object.points.iter().find(|p| p.id == id).unwrap())));
             let (a, b) = (p2 - p1, p3 - p1);
             assert!(a.norm() >= 1.0 && b.norm() >= 1.0);
             assert!(a.cross(&b).norm() / (a.norm() * b.norm()) > 0.5);

@@ -319,7 +319,14 @@ impl PlannedDive {
 
     /// The view with this heading, tilted by `tilt` about the direction `about` of the image plane,
     /// that shows `place` at `off` (tangents) from the middle of what both cameras see.
-    fn aim(&self, place: &Vector3<f64>, off: [f64; 2], heading: f64, about: f64, tilt: f64) -> Transform<World, Camera> {
+    fn aim(
+        &self,
+        place: &Vector3<f64>,
+        off: [f64; 2],
+        heading: f64,
+        about: f64,
+        tilt: f64,
+    ) -> Transform<World, Camera> {
         // Straight down, heading north: the image's right is east, its lower edge is aft.
         let down = so3::exp(&(Vector3::z() * (heading + std::f64::consts::FRAC_PI_2)));
         let (sine, cosine) = libm::sincos(about);
@@ -371,8 +378,8 @@ impl DiveFrame<'_> {
         let eyes = self.eyes();
         let world_from_right = eyes.world_from_camera * eyes.rig.right_from_left().inverse();
         let scene = &self.dive.scene;
-        let left = Rendering::new(scene, eyes.rig.left(), eyes.world_from_camera).radiance();
-        let right = Rendering::new(scene, eyes.rig.right(), world_from_right).radiance();
+        let left = Rendering::new(scene, eyes.rig.left(), &eyes.world_from_camera).radiance();
+        let right = Rendering::new(scene, eyes.rig.right(), &world_from_right).radiance();
         let expose = |radiance, camera: &Pinhole, purpose| {
             let [width, height] = camera.size().map(|n| n as usize);
             let pixels = self.dive.settings.sensor.expose(radiance, width, self.dive.stream(self.index, purpose));

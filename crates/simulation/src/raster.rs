@@ -370,7 +370,8 @@ mod tests {
             .map(|c| Vector3::new(cosine * c.x - sine * c.y, sine * c.x + cosine * c.y, c.z))
             .collect();
         let seen = Visibility::new(&[Facet { corners: turned, ..square }], &camera());
-        let area: f64 = (0..48).flat_map(|row| (0..64).map(move |column| (column, row))).map(|(c, r)| share(&seen, c, r, 3)).sum();
+        let area: f64 =
+            (0..48).flat_map(|row| (0..64).map(move |column| (column, row))).map(|(c, r)| share(&seen, c, r, 3)).sum();
         assert!((area - 13.5 * 20.5).abs() < 0.05, "{area}");
     }
 

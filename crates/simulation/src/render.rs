@@ -1,6 +1,6 @@
 //! From the scene and a camera to an image.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Frame, Pinhole, Transform, World};
 
 use crate::{
@@ -30,23 +30,31 @@ struct Seen {
 }
 
 /// A scene before one camera.
-pub(crate) struct Rendering<'a, F> {
+pub(crate) struct Rendering<'a> {
     scene: &'a Scene,
     camera: &'a Pinhole,
-    world_from_camera: Transform<World, F>,
+    /// The camera's axes and place in the world.
+    turn: Matrix3<f64>,
+    from: Vector3<f64>,
     patch: Patch,
     surfaces: Vec<Seen>,
     visibility: Visibility,
 }
 
-impl<'a, F: Frame> Rendering<'a, F> {
+impl<'a> Rendering<'a> {
     /// What `camera`, placed by `world_from_camera`, sees of the scene.
-    pub(crate) fn new(scene: &'a Scene, camera: &'a Pinhole, world_from_camera: Transform<World, F>) -> Self {
+    pub(crate) fn new<F: Frame>(
+        scene: &'a Scene,
+        camera: &'a Pinhole,
+        world_from_camera: &Transform<World, F>,
+    ) -> Self {
         let camera_from_world = world_from_camera.inverse();
-        let turn = camera_from_world.rotation_matrix();
-        let place = |p: &Vector3<f64>| turn * p + camera_from_world.translation();
-        let (low, high) = footprint(scene, camera, &world_from_camera);
-        let patch = scene.bed.patch(low, high);
+        let into = camera_from_world.rotation_matrix();
+        let place = |p: &Vector3<f64>| into * p + camera_from_world.translation();
+        let (low, high) = footprint(scene, camera, world_from_camera);
+        let patch = scene.bed.patch(low, high, |[north, east], normal| {
+            paint::light(normal) * paint::patches(north, east, scene.texture)
+        });
         let mut facets: Vec<Facet> = patch
             .triangles()
             .map(|corners| Facet { corners: corners.iter().map(place).collect(), id: BED, layer: 0, seamless: true })
@@ -55,7 +63,7 @@ impl<'a, F: Frame> Rendering<'a, F> {
         for (number, surface) in scene.bodies.iter().flat_map(|b| &b.surfaces).enumerate() {
             let corners: Vec<_> = surface.corners.iter().map(place).collect();
             let x = (corners[1] - corners[0]).normalize();
-            let normal = turn * surface.normal;
+            let normal = into * surface.normal;
             surfaces.push(Seen {
                 origin: corners[0],
                 x,
@@ -68,7 +76,8 @@ impl<'a, F: Frame> Rendering<'a, F> {
             facets.push(Facet { corners, id: number as u32 + 1, layer: surface.layer, seamless: false });
         }
         let visibility = Visibility::new(&facets, camera);
-        Self { scene, camera, world_from_camera, patch, surfaces, visibility }
+        let (turn, from) = (world_from_camera.rotation_matrix(), world_from_camera.translation());
+        Self { scene, camera, turn, from, patch, surfaces, visibility }
     }
 
     /// The radiance of every pixel, row by row: 1 is white facing the light.
@@ -104,11 +113,10 @@ impl<'a, F: Frame> Rendering<'a, F> {
         let pixel = 1.0 / (part.inverse_depth * fx);
         let footprint = |slope: f64| pixel / (slope.abs() / ray.norm()).max(0.25);
         if part.id == BED {
-            let at = self.world_from_camera * seafix_geometry::Point::<F>::from(at);
-            let normal = self.patch.normal(at.coords.x, at.coords.y);
-            let down = self.world_from_camera.rotation() * ray;
-            let albedo = paint::bed(at.coords.x, at.coords.y, footprint(down.z), self.scene.texture);
-            return albedo * paint::light(&normal);
+            let along = self.turn * ray;
+            let place = self.from + along / part.inverse_depth;
+            let albedo = paint::bed(place.x, place.y, footprint(along.z), self.scene.texture);
+            return albedo * self.patch.brightness(place.x, place.y);
         }
         let surface = &self.surfaces[part.id as usize - 1];
         let from = at - surface.origin;
@@ -118,7 +126,11 @@ impl<'a, F: Frame> Rendering<'a, F> {
 }
 
 /// The rectangle (north, east) of the bed that the camera can see.
-fn footprint<F: Frame>(scene: &Scene, camera: &Pinhole, world_from_camera: &Transform<World, F>) -> ([f64; 2], [f64; 2]) {
+fn footprint<F: Frame>(
+    scene: &Scene,
+    camera: &Pinhole,
+    world_from_camera: &Transform<World, F>,
+) -> ([f64; 2], [f64; 2]) {
     let from = world_from_camera.translation();
     let ([fx, fy], [cx, cy]) = (camera.focal(), camera.principal());
     let [width, height] = camera.size().map(f64::from);

@@ -5,7 +5,7 @@ use seafix_geometry::{Point, World};
 
 use crate::{
     bed::Bed,
-    blueprint::{BoxPlan, Blueprint, ObjectPlan, PipePlan},
+    blueprint::{Blueprint, BoxPlan, ObjectPlan, PipePlan},
     stream::{Purpose, Stream},
 };
 
