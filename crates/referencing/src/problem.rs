@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Transform};
+use serde::{Deserialize, Serialize};
 
 use crate::{Candidates, ModelPoint};
 
@@ -25,7 +26,10 @@ pub enum PriorBound {
 }
 
 /// When two pairs (model point, cloud point) are coherent: their distances in model and cloud agree.
-#[derive(Debug, Clone, Copy, PartialEq)]
+///
+/// In TOML `tolerance = { sigmas = 3.0 }` or `tolerance = { fixed = 0.05 }`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Tolerance {
     /// The paper's Δ (m), one for all pairs.
     Fixed(f64),

@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn a_set_of_numbers_across_words() {
         let mut set = BitSet::empty(130);
-        [0, 63, 64, 129].map(|number| set.insert(number));
+        [0, 63, 64, 129].into_iter().for_each(|number| set.insert(number));
         assert_eq!(set.iter().collect::<Vec<_>>(), [0, 63, 64, 129]);
         assert_eq!((set.next(1), set.next(65), set.len()), (Some(63), Some(129), 4));
         set.remove(129);

@@ -9,9 +9,11 @@ use super::{
 };
 use crate::Problem;
 
-/// Sets of more points are tested for orientation against their first so many only, and the
-/// answer is then proved by a complete test at the end.
+/// Up to this many points every four are tested for orientation while the set grows.
 pub(super) const MOST_ORIENTED: usize = 40;
+/// Further points are tested against the first so many only (four of 500 points are 2.6 · 10⁹), and
+/// the answer is proved by a complete test at the end, or not called optimal.
+const FEW_ORIENTED: usize = 16;
 
 /// What a search over cliques is after.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,27 +130,51 @@ impl<'a> Search<'a> {
         const STARTS: usize = 24;
         let mut starts: Vec<usize> = self.order.clone();
         starts.sort_by_key(|&vertex| std::cmp::Reverse((self.core[vertex], self.graph.adjacency.degree(vertex))));
+        // A quarter of the budget at most: the proof needs the rest.
+        let reserve = self.left - self.left / 4;
         for &start in starts.iter().take(STARTS) {
+            if self.core[start] + 1 < self.least {
+                return;
+            }
             let mut neighbours = BitSet::full(self.graph.vertices.len());
             neighbours.intersect(self.graph.adjacency.row(start));
             let local = Local::of(self.graph, neighbours, self.least);
             let mut clique = vec![start];
             let mut candidates = BitSet::full(local.vertices.len());
-            while let Some(next) = candidates
-                .iter()
-                .max_by_key(|&v| (candidates.common(local.adjacency.row(v)), std::cmp::Reverse(local.vertices[v])))
-            {
-                candidates.intersect(local.adjacency.row(next));
-                if self.orient(&local, &clique, local.vertices[next], &mut candidates).is_err() {
-                    self.left = 0; // the branches will say so
-                    return;
+            while let Some(next) = local.best_connected(&candidates) {
+                candidates.remove(next);
+                if self.left > reserve && !self.mirrors(&clique, local.vertices[next]) {
+                    candidates.intersect(local.adjacency.row(next));
+                    clique.push(local.vertices[next]);
                 }
-                clique.push(local.vertices[next]);
             }
             if clique.len() >= self.least {
                 self.keep(&clique);
             }
+            if self.left <= reserve {
+                return;
+            }
         }
+    }
+
+    /// Whether a vertex is mirrored with some three members of the clique.
+    fn mirrors(&mut self, clique: &[usize], vertex: usize) -> bool {
+        if !self.orientation {
+            return false;
+        }
+        let members = decisive_members(clique);
+        let vertices = &self.graph.vertices;
+        let mut tests = 0;
+        let mirrors = members.iter().enumerate().any(|(i, &a)| {
+            members[..i].iter().enumerate().any(|(k, &b)| {
+                members[..k].iter().any(|&c| {
+                    tests += 1;
+                    mirrored(self.problem, [vertices[a], vertices[b], vertices[c], vertices[vertex]])
+                })
+            })
+        });
+        self.left = self.left.saturating_sub(tests);
+        mirrors
     }
 
     fn keep(&mut self, clique: &[usize]) {
@@ -218,7 +244,7 @@ impl<'a> Search<'a> {
             return Ok(());
         }
         let vertices = &self.graph.vertices;
-        let members = &clique[..clique.len().min(MOST_ORIENTED)];
+        let members = decisive_members(clique);
         for candidate in candidates.iter().collect::<Vec<_>>() {
             let (c, d) = (vertices[added], vertices[local.vertices[candidate]]);
             let mut tests = 0;
@@ -282,6 +308,12 @@ impl Local {
         Self { vertices, adjacency, models, clouds }
     }
 
+    /// The candidate with most neighbours among the candidates; of equals the first of the whole graph.
+    fn best_connected(&self, candidates: &BitSet) -> Option<usize> {
+        let worth = |v: usize| (candidates.common(self.adjacency.row(v)), std::cmp::Reverse(self.vertices[v]));
+        candidates.iter().max_by_key(|&v| worth(v))
+    }
+
     /// The n-partite bound: different model points and different cloud points among the candidates.
     fn partite(&self, candidates: &BitSet) -> usize {
         let count = self.vertices.len();
@@ -314,6 +346,11 @@ impl Local {
         }
         coloured
     }
+}
+
+/// The members that a further point is tested against.
+fn decisive_members(clique: &[usize]) -> &[usize] {
+    if clique.len() < MOST_ORIENTED { clique } else { &clique[..FEW_ORIENTED] }
 }
 
 /// Numbers from 0 in the place of arbitrary ones.

@@ -14,7 +14,7 @@ use crate::{Correspondence, Observations, Problem, solve::least_squares};
 
 /// The largest admissible set of correspondences: every two coherent, one-to-one, no four of them a
 /// mirror image of the model. Exact within the budget; among sets of one size the least residual
-/// of a rigid fit decides, then the indices.
+/// of a rigid fit decides, then the coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MaximumClique {
@@ -77,17 +77,13 @@ impl Search for MaximumClique {
             // The first found stays in, should the budget have ended before it was met again.
             ties.extend(all.found);
         }
-        let mut ties: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs(&graph, clique)).collect();
         ties.sort();
         ties.dedup();
-        let best = (0..ties.len())
-            .map(|index| (residual(problem, &ties[index]), index))
-            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-            .expect("a set was found")
-            .1;
-        let pairs = ties.swap_remove(best);
+        let best = least_residual(problem, &graph, &ties);
+        let pairs = pairs_of(&graph, &ties.swap_remove(best));
+        let ties: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
         if self.orientation && size > MOST_ORIENTED {
-            optimal = optimal && !fours(&pairs).any(|four| mirrored(problem, four));
+            optimal = optimal && count_fours(size) <= self.budget && !fours(&pairs).any(|four| mirrored(problem, four));
         }
         let (rivals, dropped) = self.least_alike(&pairs, ties);
         Ok(Identification {
@@ -113,7 +109,7 @@ impl MaximumClique {
         cliques.set_orientation(false);
         let coherent = cliques.run(Goal::Largest, NEEDED + 1);
         cliques.set_orientation(true);
-        match coherent.found.first().map(|clique| pairs(graph, clique)) {
+        match coherent.found.first().map(|clique| pairs_of(graph, clique)) {
             Some(set) if wholly_mirrored(problem, &set) => Err(Unidentified::Mirrored { best: set.len() }),
             _ => Ok(()),
         }
@@ -134,15 +130,29 @@ impl MaximumClique {
     }
 }
 
+/// C(n, 4).
+fn count_fours(n: usize) -> u64 {
+    let n = n as u64;
+    n * (n - 1) * (n - 2) * (n - 3) / 24
+}
+
 /// The pairs of a clique, in the order of the model points.
-fn pairs(graph: &Association, clique: &[usize]) -> Vec<Correspondence> {
+fn pairs_of(graph: &Association, clique: &[usize]) -> Vec<Correspondence> {
     let mut pairs: Vec<Correspondence> = clique.iter().map(|&vertex| graph.vertices[vertex]).collect();
     pairs.sort_unstable();
     pairs
 }
 
-/// The residual by which sets of one size are ranked (m).
-fn residual(problem: &Problem<'_>, pairs: &[Correspondence]) -> f64 {
-    let data = Observations::of(pairs, problem.model, problem.cloud, None);
-    data.residual_rms(&least_squares(&data))
+/// The place of the set with the least residual of a rigid fit. Residuals that differ by rounding
+/// only are equal, and then the coordinates decide, in whose order the vertices stand: the answer does
+/// not depend on the order of the cloud.
+fn least_residual(problem: &Problem<'_>, graph: &Association, cliques: &[Vec<usize>]) -> usize {
+    let quantum = 1e-9 * problem.model.iter().map(|point| point.at.coords.amax()).fold(f64::MIN_POSITIVE, f64::max);
+    let rank = |clique: &[usize]| {
+        let data = Observations::of(&pairs_of(graph, clique), problem.model, problem.cloud, None);
+        (data.residual_rms(&least_squares(&data)) / quantum).round()
+    };
+    let ranks: Vec<f64> = cliques.iter().map(|clique| rank(clique)).collect();
+    // `min_by` keeps the first of equals, and the cliques are sorted.
+    (0..cliques.len()).min_by(|&a, &b| ranks[a].total_cmp(&ranks[b])).expect("a set was found")
 }

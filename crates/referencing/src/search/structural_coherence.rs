@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     BUDGET, Identification, Search, Unidentified,
-    orientation::{fours, mirrored},
+    orientation::{fours, mirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Problem};
 
@@ -61,9 +61,13 @@ impl Search for StructuralCoherence {
         if with.len() < NEEDED {
             return Err(Unidentified::TooFew { with_candidates: with.len(), needed: NEEDED });
         }
-        let mut run = Run { problem, settings: self, tests: 0, best: 0 };
+        let mut run = Run { problem, settings: self, tests: 0, best: 0, mirrored: None };
         for q in (NEEDED..=with.len()).rev() {
             match run.samples_of(&with, q) {
+                // Three points have no orientation: these are what is left of a mirror image.
+                Ok(Some(_)) if q == NEEDED && run.mirrored.is_some() => {
+                    return Err(Unidentified::Mirrored { best: run.mirrored.unwrap_or(q) });
+                }
                 Ok(Some(mut pairs)) => {
                     pairs.sort_unstable();
                     return Ok(Identification {
@@ -92,6 +96,8 @@ struct Run<'a> {
     tests: u64,
     /// Size of the largest coherent set met so far, as the beginning of a longer sample.
     best: usize,
+    /// Size of the first, hence largest, coherent sample that was wholly a mirror image.
+    mirrored: Option<usize>,
 }
 
 impl Run<'_> {
@@ -154,6 +160,9 @@ impl Run<'_> {
                 }
                 self.tests += 1;
                 if mirrored(self.problem, four) {
+                    if self.mirrored.is_none() && wholly_mirrored(self.problem, pairs) {
+                        self.mirrored = Some(pairs.len());
+                    }
                     return Ok(false);
                 }
             }
