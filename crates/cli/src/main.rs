@@ -1,2 +1,32 @@
 //! The `seafix` command.
-fn main() {}
+
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+mod catalogue;
+mod commands;
+mod exit;
+mod terminal;
+
+/// Positions of an underwater vehicle relative to a known structure, from stereo images.
+#[derive(Debug, Parser)]
+#[command(name = "seafix", version, propagate_version = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: commands::Command,
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().command.execute() {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => {
+            for line in &failure.lines {
+                eprintln!("error: {line}");
+            }
+            ExitCode::from(failure.code)
+        }
+    }
+}

@@ -1,1 +1,25 @@
-//! Experiment files, trials, the runner and its results.
+//! Experiments: from a question in TOML to logs, results and a manifest.
+//!
+//! An [`Experiment`] asks one English question and says what varies. A [`Plan`] resolves it into
+//! trials; [`run`] opens the [`Source`](source::Source)s, leads every frame through each trial's
+//! [`Pipeline`], compares with truth where there is truth, and logs it all. Methods and truth meet
+//! in one file, `judge.rs`, after the method has answered.
+
+pub mod dataset;
+mod experiment;
+mod judge;
+mod manifest;
+mod pipeline;
+mod record;
+mod results;
+mod run;
+pub mod source;
+mod text;
+mod vary;
+
+pub use experiment::{Experiment, Plan, Trial};
+pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
+pub use results::COLUMNS;
+pub use run::{Finished, Observer, RunError, Silent, run};
+pub use text::read_text;
+pub use vary::Axis;

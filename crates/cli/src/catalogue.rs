@@ -1,0 +1,67 @@
+//! All registries: what `list` and `show` print, and the README's tables.
+
+use seafix_component::{Listing, Registry};
+use seafix_experiment::source::SOURCES;
+use seafix_referencing::{SEARCHES, SOLVERS};
+use seafix_vision::{DESCRIPTORS, DETECTORS, MATCHERS};
+
+/// One kind of component: its plural and its components.
+pub(crate) struct Kind {
+    pub(crate) singular: &'static str,
+    pub(crate) plural: &'static str,
+    pub(crate) listings: Vec<Listing>,
+}
+
+/// All kinds, in the order in which a frame meets them.
+pub(crate) fn kinds() -> Vec<Kind> {
+    vec![
+        kind("sources", &SOURCES),
+        kind("detectors", &DETECTORS),
+        kind("descriptors", &DESCRIPTORS),
+        kind("matchers", &MATCHERS),
+        kind("searches", &SEARCHES),
+        kind("solvers", &SOLVERS),
+    ]
+}
+
+fn kind<T: ?Sized>(plural: &'static str, registry: &Registry<T>) -> Kind {
+    Kind { singular: registry.kind(), plural, listings: registry.listings() }
+}
+
+/// The README's tables, between its markers.
+pub(crate) fn markdown() -> String {
+    let mut text = String::new();
+    for kind in kinds() {
+        text += &format!("| {} | what it does | source |\n|---|---|---|\n", kind.singular);
+        for listing in kind.listings {
+            text += &format!("| `{}` | {} | {} |\n", listing.name, listing.summary, listing.source);
+        }
+        text += "\n";
+    }
+    text.trim_end().to_owned() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_readme_tells_what_the_registries_hold() {
+        let readme = concat!(env!("CARGO_MANIFEST_DIR"), "/../../README.md");
+        let text = std::fs::read_to_string(readme).unwrap();
+        let (begin, end) = ("<!-- components: `seafix list --markdown` -->\n", "<!-- end of components -->");
+        let from = text.find(begin).expect("the README has the begin marker") + begin.len();
+        let to = text.find(end).expect("the README has the end marker");
+        let fresh = super::markdown();
+        if std::env::var_os("SEAFIX_UPDATE").is_some() {
+            std::fs::write(readme, format!("{}{fresh}{}", &text[..from], &text[to..])).unwrap();
+        } else {
+            assert_eq!(&text[from..to], fresh, "run the tests once with SEAFIX_UPDATE=1");
+        }
+    }
+
+    #[test]
+    fn lists_are_in_alphabetical_order() {
+        for kind in super::kinds() {
+            assert!(kind.listings.is_sorted_by_key(|listing| listing.name), "{}", kind.plural);
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! The subcommands, one a file.
+
+use std::path::PathBuf;
+
+use clap::Subcommand;
+
+use crate::exit::Ended;
+
+mod check;
+mod export;
+mod list;
+mod report;
+mod run;
+mod show;
+mod solve;
+
+/// What `seafix` can do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run an experiment, or the default pipeline on a data set: logs, results and a report.
+    Run(run::Run),
+    /// Solve coherence problems (coherence-problem/1), one result each.
+    Solve(solve::Solve),
+    /// Say everything that is wrong with a data set, site, experiment, problem or log.
+    Check {
+        /// The files and folders.
+        #[arg(required = true)]
+        paths: Vec<PathBuf>,
+    },
+    /// List the components that experiment files can name.
+    List(list::List),
+    /// Show a component: what it does, its source, its settings and their defaults.
+    Show {
+        /// The component's name.
+        name: String,
+    },
+    /// Make the report of a run again, from its logs alone.
+    Report {
+        /// The folder of the run.
+        run: PathBuf,
+    },
+    /// Write the frames of an experiment's source as a data set.
+    Export(export::Export),
+}
+
+impl Command {
+    pub(crate) fn execute(&self) -> Ended {
+        match self {
+            Self::Run(command) => command.execute(),
+            Self::Solve(command) => command.execute(),
+            Self::Check { paths } => check::execute(paths),
+            Self::List(command) => command.execute(),
+            Self::Show { name } => show::execute(name),
+            Self::Report { run } => report::execute(run),
+            Self::Export(command) => command.execute(),
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! `seafix show`.
+
+use seafix_component::unknown;
+
+use crate::{
+    catalogue::kinds,
+    exit::{DONE, Ended, Failure, USAGE},
+    terminal::print,
+};
+
+pub(crate) fn execute(name: &str) -> Ended {
+    let kinds = kinds();
+    // One name may stand in several kinds: a detector and its descriptor are both called `surf`.
+    let found: Vec<String> = kinds
+        .iter()
+        .flat_map(|kind| &kind.listings)
+        .filter(|listing| listing.name == name)
+        .map(|listing| {
+            let settings = if listing.defaults.is_empty() {
+                "# no settings\n".to_owned()
+            } else {
+                toml::to_string(&listing.defaults).expect("defaults are plain values")
+            };
+            format!(
+                "# {} `{}`: {}\n# source: {}\nname = \"{}\"\n{settings}",
+                listing.kind, listing.name, listing.summary, listing.source, listing.name
+            )
+        })
+        .collect();
+    if found.is_empty() {
+        let names: Vec<&str> = kinds.iter().flat_map(|kind| &kind.listings).map(|listing| listing.name).collect();
+        return Err(Failure::new(USAGE, format!("no component is called `{name}`{}", unknown(name, &names))));
+    }
+    print(&found.join("\n"))?;
+    Ok(DONE)
+}

@@ -1,0 +1,95 @@
+//! `seafix solve`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use rayon::prelude::*;
+use seafix_component::Choice;
+use seafix_referencing::{
+    Acceptance, SEARCHES, SOLVERS,
+    problem_file::{Answer, Line, Method, solve_file},
+};
+use seafix_simulation::{Purpose, Stream};
+
+use crate::{
+    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
+    terminal::print,
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Solve {
+    /// Problems in the format coherence-problem/1.
+    #[arg(required = true)]
+    problems: Vec<PathBuf>,
+    /// The search.
+    #[arg(long, default_value = "maximum-clique")]
+    search: String,
+    /// The solver.
+    #[arg(long, default_value = "kabsch")]
+    solver: String,
+    /// How many problems are worked on at a time.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// One JSON object a line, for programs.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Solve {
+    pub(crate) fn execute(&self) -> Ended {
+        let usage = |error| Failure::new(USAGE, error);
+        let search = SEARCHES.build(&Choice::named(&self.search)).map_err(usage)?;
+        let solver = SOLVERS.build(&Choice::named(&self.solver)).map_err(usage)?;
+        let acceptance = Acceptance::default();
+        let method = Method {
+            search: (&self.search, &*search),
+            solver: (&self.solver, &*solver),
+            acceptance: &acceptance,
+        };
+        let solve = |path: &PathBuf| {
+            // Every problem has the same stream: its answer depends on no other.
+            solve_file(path, &method, Stream::new(0, 0, 0, Purpose::Search).rng())
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(self.threads))
+            .build()
+            .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
+        let mut failed = false;
+        // In groups, so that answers appear while the rest is worked on, in the order of the arguments.
+        for group in self.problems.chunks(usize::from(self.threads)) {
+            let lines: Vec<Line> = pool.install(|| group.par_iter().map(solve).collect());
+            for line in &lines {
+                failed |= matches!(line, Line::Failed { .. });
+                print(&self.text(line))?;
+            }
+        }
+        Ok(if failed { INPUT } else { DONE })
+    }
+
+    fn text(&self, line: &Line) -> String {
+        if self.json {
+            return serde_json::to_string(line).expect("an answer is plain data") + "\n";
+        }
+        match line {
+            Line::Failed { error, .. } => format!("error: {error}\n"),
+            Line::Answer(answer) => people(answer),
+        }
+    }
+}
+
+/// An answer for people: what came of it, then the pose.
+fn people(answer: &Answer) -> String {
+    let mut text = format!("{}: {}", answer.file, answer.outcome);
+    if let Some(pairs) = &answer.pairs {
+        let proved = if answer.optimal { ", proved largest" } else { "" };
+        text += &format!(", {} points{proved}", pairs.len());
+    }
+    if let Some(why) = &answer.explanation {
+        text += &format!(": {why}");
+    }
+    text += &format!(" ({:.1} ms)\n", answer.time_ms);
+    for row in answer.t_cam_obj.iter().flatten().take(3) {
+        text += &format!("  {:10.6} {:10.6} {:10.6} {:10.4}\n", row[0], row[1], row[2], row[3]);
+    }
+    text
+}

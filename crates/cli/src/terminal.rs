@@ -1,0 +1,62 @@
+//! Writing for people: standard output that may be cut off, progress where somebody watches.
+
+use std::{
+    io::{ErrorKind, IsTerminal, Write, stderr, stdout},
+    path::Path,
+};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use seafix_experiment::Observer;
+
+use crate::exit::{Failure, OUTPUT};
+
+/// Prints `text` to standard output. A reader that went away (`| head`) ends the program quietly.
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    let mut out = stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
+        Err(error) => Err(Failure::new(OUTPUT, format!("cannot write to standard output ({error})"))),
+        Ok(()) => Ok(()),
+    }
+}
+
+/// Shows the progress of a run on standard error: a bar where it is a terminal, else a line now and then.
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    watched: bool,
+}
+
+impl Progress {
+    pub(crate) fn new() -> Self {
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left  {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        Self { bar: ProgressBar::hidden().with_style(style), watched: stderr().is_terminal() }
+    }
+
+    pub(crate) fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Observer for Progress {
+    fn begins(&self, frames: usize, bytes: u64, folder: &Path) {
+        eprintln!("{frames} frames, about {} MB of log, into {}", bytes.div_ceil(1_000_000), folder.display());
+        self.bar.set_length(frames as u64);
+        if self.watched {
+            self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+        }
+    }
+
+    fn frame(&self, trial: &str) {
+        self.bar.inc(1);
+        if self.watched {
+            self.bar.set_message(trial.to_owned());
+        } else {
+            // A log file gets a line at every tenth of the way.
+            let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(1).max(1));
+            if done * 10 / all != (done - 1) * 10 / all {
+                eprintln!("{done}/{all} frames");
+            }
+        }
+    }
+}

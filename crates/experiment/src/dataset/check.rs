@@ -1,0 +1,86 @@
+//! Everything that is wrong with a data set, images included.
+
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
+
+use seafix_component::Fault;
+use sha2::{Digest, Sha256};
+
+use super::{Dataset, folder::inside, read_image};
+
+/// Reads the data set in `folder` and every file it names: decodes the images, compares their sizes
+/// with the calibration and, where hashes are given, every file with its hash.
+///
+/// Returns the faults and the warnings.
+pub fn check(folder: &Path) -> (Vec<Fault>, Vec<Fault>) {
+    let dataset = match Dataset::open(folder) {
+        Ok(dataset) => dataset,
+        Err(faults) => return (faults, Vec::new()),
+    };
+    let mut faults = Vec::new();
+    let mut seen = HashSet::new();
+    for frame in &dataset.frames {
+        for (path, camera) in [(&frame.left, dataset.rig.left()), (&frame.right, dataset.rig.right())] {
+            if seen.insert(path.clone()) {
+                faults.extend(read_image(path, Some(camera.size())).err());
+            }
+        }
+    }
+    faults.extend(hash_faults(&dataset));
+    (faults, dataset.warnings)
+}
+
+fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
+    let file = dataset.folder.join("dataset.toml");
+    let mut faults = Vec::new();
+    for (name, expected) in &dataset.hashes {
+        match inside(&dataset.folder, name, &file).and_then(|path| sha256(&path)) {
+            Err(fault) => faults.push(fault),
+            Ok(found) if !found.eq_ignore_ascii_case(expected) => faults.push(
+                Fault::new("a file that is not the one described", &dataset.folder.join(name))
+                    .value(format!("sha256 {found}"))
+                    .remedy(format!("[hashes] has {expected}: restore the file or correct the hash")),
+            ),
+            Ok(_) => {}
+        }
+    }
+    faults
+}
+
+/// The SHA-256 of a file in hexadecimal.
+pub(crate) fn sha256(path: &Path) -> Result<String, Fault> {
+    let bytes = std::fs::read(path).map_err(|error| Fault::new(format!("cannot read ({error})"), path))?;
+    Ok(hex(&Sha256::digest(bytes)))
+}
+
+/// Bytes in hexadecimal.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// All files of a data set's folder and their SHA-256, in order of name, paths with `/` relative to it.
+pub(crate) fn input_hashes(folder: &Path) -> Result<Vec<(String, String)>, Fault> {
+    let mut files = Vec::new();
+    gather(folder, PathBuf::new(), &mut files)?;
+    files.sort();
+    files.into_iter().map(|name| sha256(&folder.join(&name)).map(|hash| (name, hash))).collect()
+}
+
+fn gather(folder: &Path, below: PathBuf, files: &mut Vec<String>) -> Result<(), Fault> {
+    let here = folder.join(&below);
+    let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), &here);
+    for entry in std::fs::read_dir(&here).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        let path = below.join(entry.file_name());
+        // Links are not followed: they may lead out of the folder or back into it.
+        let kind = entry.file_type().map_err(unreadable)?;
+        if kind.is_dir() {
+            gather(folder, path, files)?;
+        } else if kind.is_file() {
+            files.push(path.to_string_lossy().replace('\\', "/"));
+        }
+    }
+    Ok(())
+}

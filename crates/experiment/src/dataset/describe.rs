@@ -1,0 +1,117 @@
+//! `dataset.toml`, key by key.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Matrix4;
+use seafix_geometry::{Frame, NotRigid, Pinhole, StereoRig, Transform};
+use serde::{Deserialize, Serialize};
+
+/// The versions of the format that are read; the last is written.
+pub(super) const FORMATS: [&str; 2] = ["seafix-dataset/1", "seafix-dataset/1.1"];
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Description {
+    pub(super) format: String,
+    pub(super) name: String,
+    pub(super) licence: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) origin: Option<String>,
+    pub(super) frames: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) site: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) truth: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) prior: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) prior_sigma: Option<PriorSigma>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) prior_covariance: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) visibility: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) objects: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) body_from_camera: Option<[[f64; 4]; 4]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) bits: Option<u8>,
+    pub(super) rig: Rig,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) hashes: BTreeMap<String, String>,
+}
+
+/// Standard deviations of the prior: position per world axis (m), attitude per camera axis (degrees).
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PriorSigma {
+    pub(super) position: f64,
+    pub(super) attitude_deg: f64,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Rig {
+    pub(super) right_from_left: [[f64; 4]; 4],
+    #[serde(default)]
+    pub(super) rectified: bool,
+    pub(super) left: CameraNumbers,
+    pub(super) right: CameraNumbers,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraNumbers {
+    pub(super) size: [u32; 2],
+    pub(super) fx: f64,
+    pub(super) fy: f64,
+    pub(super) cx: f64,
+    pub(super) cy: f64,
+    #[serde(default)]
+    pub(super) distortion: Vec<f64>,
+    /// A dome or flat port; read so that such a set is refused by name instead of by an unknown key.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) port: Option<toml::Table>,
+}
+
+impl CameraNumbers {
+    pub(super) fn of(camera: &Pinhole) -> Self {
+        let ([fx, fy], [cx, cy]) = (camera.focal(), camera.principal());
+        Self { size: camera.size(), fx, fy, cx, cy, distortion: camera.distortion().shortest().to_vec(), port: None }
+    }
+}
+
+impl Rig {
+    pub(super) fn of(rig: &StereoRig) -> Self {
+        Self {
+            right_from_left: rows(&rig.right_from_left().matrix()),
+            rectified: rig.is_rectified(),
+            left: CameraNumbers::of(rig.left()),
+            right: CameraNumbers::of(rig.right()),
+        }
+    }
+
+    /// The rig, or the path of the key at fault below `rig` and what is wrong with it.
+    pub(super) fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
+        let camera = |side: &'static str, c: &CameraNumbers| {
+            if c.port.is_some() {
+                return Err((vec![side, "port"], "views through a dome or flat port are not read yet".to_owned()));
+            }
+            Pinhole::new(c.size, [c.fx, c.fy], [c.cx, c.cy], &c.distortion)
+                .map_err(|error| (vec![side], format!("{side} camera: {error}")))
+        };
+        let (left, right) = (camera("left", &self.left)?, camera("right", &self.right)?);
+        let right_from_left = rigid(&self.right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))?;
+        StereoRig::new(left, right, right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))
+    }
+}
+
+/// A 4×4 matrix of nested rows as a rigid motion.
+pub(super) fn rigid<A: Frame, B: Frame>(rows: &[[f64; 4]; 4]) -> Result<Transform<A, B>, NotRigid> {
+    Transform::from_matrix(&Matrix4::from_fn(|r, c| rows[r][c]))
+}
+
+/// A 4×4 matrix as nested rows.
+pub(super) fn rows(m: &Matrix4<f64>) -> [[f64; 4]; 4] {
+    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
+}

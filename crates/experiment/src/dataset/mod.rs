@@ -1,0 +1,17 @@
+//! `seafix-dataset/1`: a folder with stereo pairs, their rig, and what is known about them.
+
+mod check;
+mod describe;
+mod folder;
+mod open;
+mod picture;
+mod tables;
+pub mod tum;
+mod write;
+
+pub use check::check;
+pub(crate) use check::{input_hashes, sha256};
+pub use open::{Dataset, DatasetFrame};
+pub(crate) use picture::image_size;
+pub use picture::{read_image, write_png};
+pub use write::write;

@@ -1,0 +1,238 @@
+//! A data set, read and checked.
+
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
+
+use seafix_component::{Fault, line_of, nearest};
+use seafix_geometry::{Body, Camera, Covariance6, Object, StereoRig, Transform, World};
+use seafix_referencing::Site;
+
+use super::{
+    describe::{Description, FORMATS, rigid},
+    folder::inside,
+    tables, tum,
+};
+use crate::read_text;
+
+/// A `seafix-dataset/1` folder whose description, tables and paths are in order. Its images are
+/// read frame by frame.
+#[derive(Debug)]
+pub struct Dataset {
+    /// Its name.
+    pub name: String,
+    /// The folder.
+    pub folder: PathBuf,
+    /// The rig that took it.
+    pub rig: StereoRig,
+    /// What there is to see, where that is known.
+    pub site: Option<Site>,
+    /// Where the left camera sits in the vehicle; the identity where the set does not say.
+    pub body_from_camera: Transform<Body, Camera>,
+    /// The stereo pairs, in order of time.
+    pub frames: Vec<DatasetFrame>,
+    /// True poses of displaced objects, by id; the others are where the survey says.
+    pub objects: Vec<(String, Transform<World, Object>)>,
+    /// Whether the set says which feature points are visible.
+    pub has_visibility: bool,
+    pub(super) hashes: Vec<(String, String)>,
+    /// What is odd but not wrong.
+    pub warnings: Vec<Fault>,
+}
+
+/// One stereo pair of a data set and what is known about it.
+#[derive(Debug, Clone)]
+pub struct DatasetFrame {
+    /// When it was taken (ns).
+    pub stamp_ns: u64,
+    /// The left image's file.
+    pub left: PathBuf,
+    /// The right image's file.
+    pub right: PathBuf,
+    /// The true pose of the left camera.
+    pub truth: Option<Transform<World, Camera>>,
+    /// The rough pose a method may use, and its covariance.
+    pub prior: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
+    /// Feature points that both cameras see: (object, point).
+    pub visible: Vec<(String, String)>,
+}
+
+impl Dataset {
+    /// Reads the data set in `folder`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once.
+    pub fn open(folder: &Path) -> Result<Self, Vec<Fault>> {
+        let file = folder.join("dataset.toml");
+        if !folder.is_dir() {
+            return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
+        }
+        let source = read_text(&file).map_err(|fault| vec![fault])?;
+        let described: Description =
+            toml::from_str(&source).map_err(|error| vec![Fault::in_toml(&file, &source, &error)])?;
+        Reader { folder, file: &file, source: &source, described: &described, faults: Vec::new() }.read()
+    }
+}
+
+/// Reads one description and gathers its faults.
+struct Reader<'a> {
+    folder: &'a Path,
+    file: &'a Path,
+    source: &'a str,
+    described: &'a Description,
+    faults: Vec<Fault>,
+}
+
+impl Reader<'_> {
+    fn read(mut self) -> Result<Dataset, Vec<Fault>> {
+        let d = self.described;
+        if !FORMATS.contains(&d.format.as_str()) {
+            let remedy = format!("this program reads {}", FORMATS.join(" and "));
+            self.fault(&["format"], "an unknown format", &d.format, &remedy);
+        }
+        if d.bits.is_some_and(|bits| ![8, 12, 16].contains(&bits)) {
+            self.fault(&["bits"], "an unknown depth of pixels", "", "8, 12 and 16 bits are read");
+        }
+        let rig = d.rig.build().map_err(|(path, what)| {
+            let path: Vec<&str> = std::iter::once("rig").chain(path).collect();
+            self.fault(&path, &what, "", "");
+        });
+        let body_from_camera = match d.body_from_camera.as_ref().map(rigid) {
+            None => Transform::identity(),
+            Some(Ok(pose)) => pose,
+            Some(Err(error)) => {
+                self.fault(&["body_from_camera"], &error.to_string(), "", "");
+                Transform::identity()
+            }
+        };
+        let frame_lines = self.table(&d.frames, tables::frames).unwrap_or_default();
+        let site = d.site.as_deref().and_then(|name| self.site(name));
+        let truth = d.truth.as_deref().and_then(|name| self.table(name, tum::parse)).unwrap_or_default();
+        let prior = d.prior.as_deref().and_then(|name| self.table(name, tum::parse)).unwrap_or_default();
+        let covariances = d.prior_covariance.as_deref().and_then(|name| self.table(name, tables::covariances));
+        let visibility = d.visibility.as_deref().and_then(|name| self.table(name, tables::visibility));
+        let objects = d.objects.as_deref().and_then(|name| self.table(name, tables::objects)).unwrap_or_default();
+        let sigma = self.prior_sigma();
+        if d.prior.is_some() && sigma.is_none() && covariances.is_none() {
+            self.fault(&["prior"], "a prior without its uncertainty", "", "add prior_sigma or prior_covariance");
+        }
+        self.names(site.as_ref(), visibility.as_deref().unwrap_or_default(), &objects);
+
+        let mut frames = Vec::with_capacity(frame_lines.len());
+        for line in &frame_lines {
+            let (Some(left), Some(right)) = (self.image(line, &line.left), self.image(line, &line.right)) else { continue };
+            let covariance = covariances
+                .as_ref()
+                .and_then(|all| all.iter().find(|(stamp, _)| *stamp == line.stamp_ns).map(|(_, c)| *c))
+                .or(sigma);
+            frames.push(DatasetFrame {
+                stamp_ns: line.stamp_ns,
+                left,
+                right,
+                truth: tum::at(&truth, line.stamp_ns),
+                prior: tum::at(&prior, line.stamp_ns).zip(covariance),
+                visible: visibility
+                    .iter()
+                    .flatten()
+                    .filter(|v| v.stamp_ns == line.stamp_ns)
+                    .map(|v| (v.object.clone(), v.point.clone()))
+                    .collect(),
+            });
+        }
+        let mut warnings = Vec::new();
+        for (name, given, found) in [
+            ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count()),
+            ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count()),
+        ] {
+            if given && found < frames.len() {
+                warnings.push(
+                    Fault::new(format!("stereo pairs without a {name}"), self.file)
+                        .on_line(line_of(self.source, &[name]))
+                        .value(format!("{} of {}", frames.len() - found, frames.len()))
+                        .remedy("a pose belongs to a pair when its stamp is within 1 ms"),
+                );
+            }
+        }
+        match rig {
+            Ok(rig) if self.faults.is_empty() => Ok(Dataset {
+                name: d.name.clone(),
+                folder: self.folder.to_owned(),
+                rig,
+                site,
+                body_from_camera,
+                frames,
+                objects,
+                has_visibility: visibility.is_some(),
+                hashes: d.hashes.clone().into_iter().collect(),
+                warnings,
+            }),
+            _ => Err(self.faults),
+        }
+    }
+
+    fn fault(&mut self, key: &[&str], what: &str, value: &str, remedy: &str) {
+        self.faults.push(Fault::new(what, self.file).on_line(line_of(self.source, key)).value(value).remedy(remedy));
+    }
+
+    /// The content of a file the description names, or a fault.
+    fn content(&mut self, name: &str) -> Option<(PathBuf, String)> {
+        let read = inside(self.folder, name, self.file).and_then(|path| read_text(&path).map(|content| (path, content)));
+        read.map_err(|fault| {
+            let line = self.source.lines().position(|line| line.contains(name)).map(|index| index + 1);
+            self.faults.push(if fault.file == self.file { fault.on_line(line) } else { fault });
+        })
+        .ok()
+    }
+
+    fn table<T>(&mut self, name: &str, parse: impl FnOnce(&str, &Path) -> Result<T, Fault>) -> Option<T> {
+        let (path, content) = self.content(name)?;
+        parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()
+    }
+
+    fn site(&mut self, name: &str) -> Option<Site> {
+        let (path, content) = self.content(name)?;
+        Site::parse(&content, &path).map_err(|faults| self.faults.extend(faults)).ok()
+    }
+
+    fn image(&mut self, line: &tables::FrameLine, name: &str) -> Option<PathBuf> {
+        let table = self.folder.join(&self.described.frames);
+        inside(self.folder, name, &table).map_err(|fault| self.faults.push(fault.on_line(line.line))).ok()
+    }
+
+    fn prior_sigma(&mut self) -> Option<Covariance6<World, Camera>> {
+        let sigma = self.described.prior_sigma?;
+        for (name, value) in [("position", sigma.position), ("attitude_deg", sigma.attitude_deg)] {
+            if !(value.is_finite() && value > 0.0) {
+                self.fault(
+                    &["prior_sigma", name],
+                    "a standard deviation that is not positive",
+                    &format!("{name} = {value}"),
+                    "give metres and degrees above zero",
+                );
+                return None;
+            }
+        }
+        Some(Covariance6::isotropic(sigma.attitude_deg.to_radians(), sigma.position))
+    }
+
+    /// Objects and points that the tables name exist in the site.
+    fn names(
+        &mut self,
+        site: Option<&Site>,
+        visibility: &[tables::VisibleLine],
+        objects: &[(String, Transform<World, Object>)],
+    ) {
+        let Some(site) = site else { return };
+        let ids: Vec<&str> = site.objects.iter().map(|object| object.id.as_str()).collect();
+        let named: HashSet<&str> =
+            visibility.iter().map(|v| v.object.as_str()).chain(objects.iter().map(|(id, _)| id.as_str())).collect();
+        let mut unknown: Vec<&str> = named.into_iter().filter(|id| !ids.contains(id)).collect();
+        unknown.sort_unstable();
+        for id in unknown {
+            let remedy = nearest(id, ids.iter().copied())
+                .map_or_else(|| format!("there are {}", ids.join(", ")), |near| format!("did you mean `{near}`?"));
+            self.fault(&["site"], "an object that the site does not have", id, &remedy);
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The small CSV tables of a data set: a header line, then values without quotes.
+
+use std::path::Path;
+
+use nalgebra::{Matrix4, Matrix6};
+use seafix_component::Fault;
+use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
+
+/// One line of `frames.csv`: the stamp and the two image files of a stereo pair.
+pub(super) struct FrameLine {
+    pub(super) line: usize,
+    pub(super) stamp_ns: u64,
+    pub(super) left: String,
+    pub(super) right: String,
+}
+
+/// One line of the visibility table: a feature point that both cameras see.
+pub(super) struct VisibleLine {
+    pub(super) stamp_ns: u64,
+    pub(super) object: String,
+    pub(super) point: String,
+}
+
+/// `stamp_ns,left,right`, in order of time.
+pub(super) fn frames(text: &str, file: &Path) -> Result<Vec<FrameLine>, Fault> {
+    let mut frames: Vec<FrameLine> = Vec::new();
+    for (line, [stamp, left, right]) in rows(text, file, ["stamp_ns", "left", "right"])? {
+        let stamp_ns = number(stamp, line, file)?;
+        if frames.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
+            return Err(Fault::new("a stamp that is not after the one before", file)
+                .on_line(line)
+                .value(stamp)
+                .remedy("sort the lines by time, one a stereo pair"));
+        }
+        frames.push(FrameLine { line, stamp_ns, left: left.to_owned(), right: right.to_owned() });
+    }
+    if frames.is_empty() {
+        return Err(Fault::new("no stereo pair", file).remedy("give one line a pair: stamp_ns,left,right"));
+    }
+    Ok(frames)
+}
+
+/// `stamp_ns,object,point`.
+pub(super) fn visibility(text: &str, file: &Path) -> Result<Vec<VisibleLine>, Fault> {
+    rows(text, file, ["stamp_ns", "object", "point"])?
+        .into_iter()
+        .map(|(line, [stamp, object, point])| {
+            let stamp_ns = number(stamp, line, file)?;
+            Ok(VisibleLine { stamp_ns, object: object.to_owned(), point: point.to_owned() })
+        })
+        .collect()
+}
+
+/// `object,m00,…,m33`: the true `world_from_object`, row by row.
+pub(super) fn objects(text: &str, file: &Path) -> Result<Vec<(String, Transform<World, Object>)>, Fault> {
+    wide_rows(text, file, 16)?
+        .into_iter()
+        .map(|(line, id, numbers)| {
+            Transform::from_matrix(&Matrix4::from_row_slice(&numbers))
+                .map(|pose| (id.to_owned(), pose))
+                .map_err(|error| Fault::new(error.to_string(), file).on_line(line).value(id))
+        })
+        .collect()
+}
+
+/// `stamp_ns,c00,…,c55`: the covariance of the prior (rotation first, camera frame), row by row.
+pub(super) fn covariances(text: &str, file: &Path) -> Result<Vec<(u64, Covariance6<World, Camera>)>, Fault> {
+    wide_rows(text, file, 36)?
+        .into_iter()
+        .map(|(line, stamp, numbers)| {
+            let matrix = Matrix6::from_row_slice(&numbers);
+            if matrix.cholesky().is_none() {
+                return Err(Fault::new("a covariance that is not positive definite", file)
+                    .on_line(line)
+                    .value(stamp)
+                    .remedy("give the full symmetric 6×6 matrix, rotation first"));
+            }
+            Ok((number(stamp, line, file)?, Covariance6::new(matrix)))
+        })
+        .collect()
+}
+
+/// Data lines with exactly the columns of `header`, and their line numbers.
+fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Result<Vec<(usize, [&'a str; N])>, Fault> {
+    let expected = header.join(",");
+    let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+    match lines.next() {
+        Some((_, line)) if line.split(',').map(str::trim).eq(header) => {}
+        other => {
+            return Err(Fault::new("a wrong header", file)
+                .on_line(1)
+                .value(other.map_or("", |(_, line)| line))
+                .remedy(format!("the first line is `{expected}`")));
+        }
+    }
+    lines
+        .filter(|(_, line)| !line.is_empty())
+        .map(|(number, line)| {
+            let words: Vec<&str> = line.split(',').map(str::trim).collect();
+            let columns = words.len();
+            words.try_into().map(|words| (number, words)).map_err(|_| {
+                Fault::new(format!("{columns} columns"), file).on_line(number).value(line).remedy(format!("a line is `{expected}`"))
+            })
+        })
+        .collect()
+}
+
+/// Data lines of a key and `count` numbers, below any header line.
+fn wide_rows<'a>(text: &'a str, file: &Path, count: usize) -> Result<Vec<(usize, &'a str, Vec<f64>)>, Fault> {
+    text.lines()
+        .enumerate()
+        .skip(1)
+        .map(|(index, line)| (index + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty())
+        .map(|(line, content)| {
+            let mut words = content.split(',').map(str::trim);
+            let key = words.next().unwrap_or_default();
+            let numbers: Vec<f64> = words.map(|word| number(word, line, file)).collect::<Result<_, _>>()?;
+            if numbers.len() != count || numbers.iter().any(|x| !x.is_finite()) {
+                return Err(Fault::new(format!("{} finite numbers after the key", numbers.len()), file)
+                    .on_line(line)
+                    .remedy(format!("{count} are needed")));
+            }
+            Ok((line, key, numbers))
+        })
+        .collect()
+}
+
+fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<T, Fault> {
+    word.parse().map_err(|_| Fault::new("not a number", file).on_line(line).value(word).remedy("give a plain decimal number"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_name_the_line_at_fault() {
+        let file = Path::new("frames.csv");
+        let message = |text: &str| frames(text, file).map(|_| ()).unwrap_err().to_string();
+        assert!(message("time,left,right\n").contains("the first line is `stamp_ns,left,right`"));
+        assert!(message("stamp_ns,left,right\n1,a.png\n").starts_with("2 columns in frames.csv:2"));
+        assert!(message("stamp_ns,left,right\nx,a.png,b.png\n").starts_with("not a number in frames.csv:2: x"));
+        assert!(message("stamp_ns,left,right\n2,a,b\n1,c,d\n").contains("frames.csv:3"));
+        assert!(message("stamp_ns,left,right\n").starts_with("no stereo pair"));
+        assert_eq!(frames("stamp_ns,left,right\n1,a.png,b.png\n\n", file).unwrap()[0].left, "a.png");
+    }
+}

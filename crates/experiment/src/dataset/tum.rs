@@ -1,0 +1,124 @@
+//! Trajectories as TUM lines: `seconds tx ty tz qx qy qz qw`.
+
+use std::path::Path;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use seafix_component::Fault;
+use seafix_geometry::{Frame, Transform};
+
+/// A stamp in nanoseconds and the pose at it.
+pub type Stamped<A, B> = (u64, Transform<A, B>);
+
+/// Reads the poses of a TUM text; `file` is named in faults. Lines that begin with `#` are comments.
+///
+/// # Errors
+/// The first line that is not eight numbers, has a quaternion off unit length by more than 1e-3, or
+/// a stamp not after the one before.
+pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<A, B>>, Fault> {
+    let mut poses: Vec<Stamped<A, B>> = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let fault = |what: &str, value: &str, remedy: &str| Fault::new(what, file).on_line(index + 1).value(value).remedy(remedy);
+        let words: Vec<&str> = line.split_whitespace().collect();
+        if words.len() != 8 {
+            let remedy = if line.contains(',') { "separate by blanks, not commas" } else { "a TUM line is `seconds tx ty tz qx qy qz qw`" };
+            return Err(fault(&format!("{} columns", words.len()), line, remedy));
+        }
+        let stamp = nanoseconds(words[0])
+            .ok_or_else(|| fault("a stamp that is no time", words[0], "give seconds, not negative, as a decimal number"))?;
+        let mut numbers = [0.0; 7];
+        for (number, word) in numbers.iter_mut().zip(&words[1..]) {
+            *number = word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| fault("not a finite number", word, "give a number"))?;
+        }
+        let [tx, ty, tz, qx, qy, qz, qw] = numbers;
+        let quaternion = Quaternion::new(qw, qx, qy, qz);
+        if (quaternion.norm() - 1.0).abs() > 1e-3 {
+            return Err(fault("a quaternion that is not of unit length", &format!("{:.6}", quaternion.norm()), "the order is qx qy qz qw"));
+        }
+        if poses.last().is_some_and(|(last, _)| *last >= stamp) {
+            return Err(fault("a stamp that is not after the one before", words[0], "sort the lines by time"));
+        }
+        poses.push((stamp, Transform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(tx, ty, tz))));
+    }
+    Ok(poses)
+}
+
+/// The TUM text of these poses; reading it back gives the same poses to the last bit but rounding.
+pub fn print<A: Frame, B: Frame>(poses: &[Stamped<A, B>]) -> String {
+    poses
+        .iter()
+        .map(|(stamp, pose)| {
+            let (t, q) = (pose.translation(), pose.rotation());
+            format!(
+                "{}.{:09} {} {} {} {} {} {} {}\n",
+                stamp / 1_000_000_000, stamp % 1_000_000_000, t.x, t.y, t.z, q.i, q.j, q.k, q.w
+            )
+        })
+        .collect()
+}
+
+/// The pose nearest in time to `stamp`, if one is within a millisecond.
+pub fn at<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64) -> Option<Transform<A, B>> {
+    const TOLERANCE_NS: u64 = 1_000_000;
+    let after = poses.partition_point(|(time, _)| *time < stamp);
+    poses[after.saturating_sub(1)..poses.len().min(after + 1)]
+        .iter()
+        .min_by_key(|(time, _)| time.abs_diff(stamp))
+        .filter(|(time, _)| time.abs_diff(stamp) <= TOLERANCE_NS)
+        .map(|(_, pose)| *pose)
+}
+
+/// Decimal seconds as nanoseconds, digit by digit: a float would lose them from 2004 on.
+fn nanoseconds(word: &str) -> Option<u64> {
+    if word.contains(['e', 'E']) {
+        let seconds: f64 = word.parse().ok()?;
+        return (seconds.is_finite() && (0.0..1.8e10).contains(&seconds)).then(|| (seconds * 1e9).round() as u64);
+    }
+    let (whole, part) = word.split_once('.').unwrap_or((word, ""));
+    if !part.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let nanos: u64 = format!("{:0<9.9}", part).parse().ok()?;
+    whole.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_geometry::{Camera, World};
+
+    fn read(text: &str) -> Result<Vec<Stamped<World, Camera>>, Fault> {
+        parse(text, Path::new("truth.tum"))
+    }
+
+    #[test]
+    fn stamps_keep_their_nanoseconds() {
+        let poses = read("# comment\n1700000000.123456789 1 2 3 0 0 0 1\n").unwrap();
+        assert_eq!(poses[0].0, 1_700_000_000_123_456_789);
+        assert_eq!(read(&print(&poses)).unwrap(), poses);
+        assert_eq!(nanoseconds("1.5e0"), Some(1_500_000_000));
+        assert_eq!(nanoseconds("-1"), None);
+    }
+
+    #[test]
+    fn bad_lines_are_refused_by_number() {
+        let message = |text: &str| read(text).unwrap_err().to_string();
+        assert!(message("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0\n").starts_with("7 columns in truth.tum:2"));
+        assert!(message("1,0,0,0,0,0,0,1\n").contains("not commas"));
+        assert!(message("1 0 0 0 0 0 0 2\n").contains("unit length"));
+        assert!(message("1 0 0 0 0 0 0 0\n").contains("unit length"));
+        assert!(message("1 NaN 0 0 0 0 0 1\n").contains("not a finite number"));
+        assert!(message("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").contains("sort the lines"));
+    }
+
+    #[test]
+    fn the_nearest_pose_in_time_is_found() {
+        let poses = read("1 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n").unwrap();
+        assert_eq!(at(&poses, 2_000_000_300).unwrap().translation().x, 2.0);
+        assert_eq!(at(&poses, 1_500_000_000), None);
+        assert_eq!(at::<World, Camera>(&[], 0), None);
+    }
+}

@@ -1,0 +1,115 @@
+//! A passage as a data set folder.
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use seafix_component::Fault;
+use seafix_geometry::{Camera, Transform, World};
+
+use super::{
+    check::input_hashes,
+    describe::{Description, FORMATS, PriorSigma, Rig, rows},
+    picture::write_png,
+    tum,
+};
+use crate::source::{Eyes, Passage};
+
+/// Writes every frame of `passage` as a data set in `folder`, which must not exist: images, frames,
+/// site, and truth, prior and visibility where they are known, with the hash of every file. The folder
+/// has its name only when it is complete.
+///
+/// # Errors
+/// A passage without images, a folder that exists, or a file that cannot be written.
+pub fn write(passage: &dyn Passage, folder: &Path, licence: &str) -> Result<(), Fault> {
+    if !passage.images() {
+        return Err(Fault::new("a source without images", folder).remedy("choose one that renders or reads stereo pairs"));
+    }
+    if folder.exists() {
+        return Err(Fault::new("the folder exists", folder).remedy("choose a new one with --out"));
+    }
+    let partial = folder.with_extension("partial");
+    if partial.exists() {
+        fs::remove_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
+    }
+    fs::create_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
+    let name = folder.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned());
+    fill(passage, &partial, &name, licence)?;
+    fs::rename(&partial, folder).map_err(|error| failed(folder, &error))
+}
+
+fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Result<(), Fault> {
+    let put = |name: &str, text: &str| fs::write(folder.join(name), text).map_err(|error| failed(&folder.join(name), &error));
+    let mut frames = "stamp_ns,left,right\n".to_owned();
+    let mut visibility = "stamp_ns,object,point\n".to_owned();
+    let mut objects = None;
+    let mut truths: Vec<tum::Stamped<World, Camera>> = Vec::new();
+    let mut priors: Vec<tum::Stamped<World, Camera>> = Vec::new();
+    for index in 0..passage.frames() {
+        let sight = passage.sight(index)?;
+        if let Eyes::Pair(left, right) = &sight.eyes {
+            let (left_name, right_name) = (format!("left{index:03}.png"), format!("right{index:03}.png"));
+            write_png(&folder.join(&left_name), left)?;
+            write_png(&folder.join(&right_name), right)?;
+            frames += &format!("{},{left_name},{right_name}\n", sight.stamp_ns);
+        }
+        priors.extend(sight.prior.map(|prior| (sight.stamp_ns, prior.world_from_camera)));
+        let Some(truth) = passage.truth(index) else { continue };
+        truths.push((sight.stamp_ns, truth.world_from_camera));
+        for (o, p) in truth.visible.iter().flatten() {
+            let object = &passage.site().objects[*o];
+            visibility += &format!("{},{},{}\n", sight.stamp_ns, object.id, object.points[*p].id);
+        }
+        objects.get_or_insert(truth.world_from_object);
+    }
+    put("frames.csv", &frames)?;
+    put("site.toml", &passage.site().to_toml())?;
+    if !truths.is_empty() {
+        put("truth.tum", &tum::print(&truths))?;
+        put("visibility.csv", &visibility)?;
+    }
+    if !priors.is_empty() {
+        put("prior.tum", &tum::print(&priors))?;
+    }
+    let objects = objects.map(|objects| table_of_objects(passage, &objects));
+    if let Some(table) = &objects {
+        put("objects.csv", table)?;
+    }
+    let known = |file: &str, is: bool| is.then(|| file.to_owned());
+    let description = Description {
+        format: FORMATS[1].to_owned(),
+        name: name.to_owned(),
+        licence: licence.to_owned(),
+        origin: Some(passage.name().to_owned()),
+        frames: "frames.csv".to_owned(),
+        site: known("site.toml", true),
+        truth: known("truth.tum", !truths.is_empty()),
+        prior: known("prior.tum", !priors.is_empty()),
+        prior_sigma: passage
+            .prior_sigma()
+            .map(|(position, attitude)| PriorSigma { position, attitude_deg: attitude.to_degrees() }),
+        prior_covariance: None,
+        visibility: known("visibility.csv", !truths.is_empty()),
+        objects: known("objects.csv", objects.is_some()),
+        body_from_camera: Some(rows(&passage.body_from_camera().matrix())),
+        bits: None,
+        rig: Rig::of(passage.rig()),
+        hashes: input_hashes(folder)?.into_iter().collect::<BTreeMap<_, _>>(),
+    };
+    put("dataset.toml", &toml::to_string(&description).expect("a description is plain values"))
+}
+
+/// `object,m00,…`: where each object truly is.
+fn table_of_objects(passage: &dyn Passage, places: &[Option<Transform<World, seafix_geometry::Object>>]) -> String {
+    let columns: Vec<String> = (0..16).map(|i| format!("m{}{}", i / 4, i % 4)).collect();
+    let mut text = format!("object,{}\n", columns.join(","));
+    for (object, place) in passage.site().objects.iter().zip(places) {
+        if let Some(place) = place {
+            let numbers: Vec<String> = rows(&place.matrix()).iter().flatten().map(f64::to_string).collect();
+            text += &format!("{},{}\n", object.id, numbers.join(","));
+        }
+    }
+    text
+}
+
+fn failed(path: &Path, error: &std::io::Error) -> Fault {
+    Fault::new(format!("cannot write ({error})"), path).remedy("check space and permissions")
+}

@@ -1,0 +1,269 @@
+//! The experiment file, and its resolution into trials.
+
+use std::path::{Path, PathBuf};
+
+use seafix_component::{BuildError, Choice, Fault, line_of};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Axis, Pipeline, Stages, read_text,
+    pipeline::PipelineError,
+    source::{SOURCES, Source},
+    vary,
+};
+
+/// An experiment as its file says it: one question, a source, a pipeline, what varies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// The question, in one English sentence.
+    pub question: String,
+    /// The seed that every random number of the experiment comes from.
+    #[serde(default)]
+    pub seed: u64,
+    /// Where the frames come from.
+    pub source: Choice,
+    /// The way from a frame to a fix.
+    #[serde(default)]
+    pub pipeline: Pipeline,
+    /// What varies; the grid of all its values gives the trials.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vary: Vec<Axis>,
+}
+
+impl Experiment {
+    /// The experiment that a data set alone is: exactly one pipeline, the default.
+    pub fn of_dataset(folder: &Path) -> Self {
+        let name = folder.file_name().map_or("data set".into(), |name| name.to_string_lossy());
+        Self {
+            question: format!("How well does the default pipeline reference {name}?"),
+            seed: 0,
+            source: Choice::named("dataset").with("path", folder.to_string_lossy().into_owned()),
+            pipeline: Pipeline::default(),
+            vary: Vec::new(),
+        }
+    }
+
+    /// The same experiment with every default written out.
+    fn resolved(&self) -> Result<Self, Unfit> {
+        let source = SOURCES.resolve(&self.source).map_err(|error| Unfit::new(&["source"], error))?;
+        let pipeline = self.pipeline.resolved().map_err(Unfit::pipeline)?;
+        Ok(Self { source, pipeline, ..self.clone() })
+    }
+}
+
+/// A resolved experiment: its trials, built and ready to run.
+#[derive(Debug)]
+pub struct Plan {
+    /// A short name: that of the file or folder.
+    pub name: String,
+    /// The folder that relative paths start from.
+    pub folder: PathBuf,
+    /// The command that runs it.
+    pub command: String,
+    /// What the experiment asks, and its axes.
+    pub experiment: Experiment,
+    /// One trial for each point of the grid.
+    pub trials: Vec<Trial>,
+}
+
+/// One resolved configuration.
+#[derive(Debug)]
+pub struct Trial {
+    /// Its name: a number and what distinguishes it.
+    pub name: String,
+    /// Its value on each axis.
+    pub cell: Vec<(String, toml::Value)>,
+    /// The resolved experiment of this trial alone, nothing varying: running it gives this trial again.
+    pub resolved: Experiment,
+    /// Where its frames come from.
+    pub source: Box<dyn Source>,
+    /// Its pipeline.
+    pub stages: Stages,
+}
+
+/// A setting that no component can be built from, and its path in the file.
+struct Unfit {
+    path: Vec<String>,
+    message: String,
+}
+
+impl Unfit {
+    fn new(path: &[&str], error: BuildError) -> Self {
+        let mut path: Vec<String> = path.iter().map(|&step| step.to_owned()).collect();
+        path.extend(error.key().filter(|&key| key != "name").map(str::to_owned));
+        Self { path, message: error.to_string() }
+    }
+
+    fn pipeline(error: PipelineError) -> Self {
+        Self { path: vec!["pipeline".into(), error.setting.into()], message: error.message }
+    }
+}
+
+impl Plan {
+    /// Reads an experiment file, or takes a data set's folder for an experiment of its own; then
+    /// gives each of `settings`, `key=value` with a dotted key and a TOML value, the last word.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the file, with its lines, or with the settings.
+    pub fn read(path: &Path, settings: &[String]) -> Result<Self, Vec<Fault>> {
+        let name = path.file_stem().map_or_else(|| "run".to_owned(), |stem| stem.to_string_lossy().into_owned());
+        if path.is_dir() {
+            let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+            let name = real.file_name().map_or(name, |name| name.to_string_lossy().into_owned());
+            let experiment = changed(Experiment::of_dataset(&real), settings)?;
+            return Self::resolve(experiment, &name, Path::new(""), path, "", settings);
+        }
+        let text = read_text(path).map_err(|fault| vec![fault])?;
+        let experiment: Experiment =
+            toml::from_str(&text).map_err(|error| vec![Fault::in_toml(path, &text, &error)])?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::resolve(changed(experiment, settings)?, &name, folder, path, &text, settings)
+    }
+
+    fn resolve(
+        experiment: Experiment,
+        name: &str,
+        folder: &Path,
+        file: &Path,
+        text: &str,
+        settings: &[String],
+    ) -> Result<Self, Vec<Fault>> {
+        let fault = |path: &[&str], what: &str| Fault::new(what, file).on_line(line_of(text, path));
+        let unfit = |unfit: Unfit| {
+            let path: Vec<&str> = unfit.path.iter().map(String::as_str).collect();
+            vec![fault(&path, &unfit.message)]
+        };
+        let mut faults = vary::check(&experiment.vary, &fault);
+        if experiment.question.trim().is_empty() {
+            faults.push(fault(&["question"], "no question").remedy("say in one sentence what the experiment asks"));
+        }
+        if experiment.seed > i64::MAX as u64 {
+            faults.push(fault(&["seed"], "a seed too large").remedy("TOML holds integers up to 2^63 - 1"));
+        }
+        if !faults.is_empty() {
+            return Err(faults);
+        }
+        let base = Experiment { vary: Vec::new(), ..experiment.resolved().map_err(unfit)? };
+        let base = toml::Table::try_from(&base).expect("an experiment is a table of plain values");
+
+        let mut trials = Vec::new();
+        for (index, cell) in vary::grid(&experiment.vary).into_iter().enumerate() {
+            // A fault in one point of the grid belongs to the line of the axis whose key it is in.
+            let in_cell = |message: String, path: &[String]| {
+                let at = path.join(".");
+                let axis = experiment.vary.iter().position(|axis| axis.key == at || axis.key.starts_with(&at) || at.starts_with(&axis.key));
+                let place = axis.map(|axis| axis.to_string());
+                let mut path: Vec<&str> = vec!["vary"];
+                path.extend(place.as_deref());
+                vec![fault(&path, &message)]
+            };
+            let mut table = base.clone();
+            for (key, value) in &cell {
+                vary::set(&mut table, key, value.clone())
+                    .map_err(|message| in_cell(message, &[key.clone()]))?;
+            }
+            let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
+                let fault = Fault::in_toml(file, "", &error);
+                let last: Vec<String> = cell.last().map(|(key, _)| key.clone()).into_iter().collect();
+                in_cell([fault.what, fault.value, fault.remedy].join(" ").trim().to_owned(), &last)
+            })?;
+            let trial = trial.resolved().map_err(|unfit| in_cell(unfit.message, &unfit.path))?;
+            let source = SOURCES.build(&trial.source).map_err(|error| in_cell(error.to_string(), &["source".to_owned()]))?;
+            let stages = trial
+                .pipeline
+                .build()
+                .map_err(|error| in_cell(error.message, &["pipeline".to_owned(), error.setting.to_owned()]))?;
+            trials.push(Trial { name: vary::name(index + 1, &cell), cell, resolved: trial, source, stages });
+        }
+        let settings: String = settings.iter().map(|setting| format!(" --set '{setting}'")).collect();
+        let command = format!("cargo run --release -- run {}{settings}", file.display());
+        Ok(Self { name: name.to_owned(), folder: folder.to_owned(), command, experiment, trials })
+    }
+}
+
+/// The experiment with some of its settings changed from the command line.
+fn changed(experiment: Experiment, settings: &[String]) -> Result<Experiment, Vec<Fault>> {
+    if settings.is_empty() {
+        return Ok(experiment);
+    }
+    let fault = |what: String, setting: &str| {
+        vec![Fault::new(what, Path::new("--set")).value(setting).remedy("write key=value, for instance pipeline.solver=triad")]
+    };
+    // Components are written out first, so that a setting of a default component can be changed.
+    let resolved = experiment.resolved().unwrap_or(experiment);
+    let mut table = toml::Table::try_from(&resolved).expect("an experiment is a table of plain values");
+    for setting in settings {
+        let (key, value) = setting.split_once('=').ok_or_else(|| fault("no `=`".to_owned(), setting))?;
+        let value = toml::from_str::<toml::Table>(&format!("value = {value}"))
+            .ok()
+            .and_then(|mut table| table.remove("value"))
+            .unwrap_or_else(|| value.trim().into());
+        vary::set(&mut table, key.trim(), value).map_err(|message| fault(message, setting))?;
+    }
+    table.try_into().map_err(|error: toml::de::Error| vec![Fault::in_toml(Path::new("--set"), "", &error)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(text: &str) -> Result<Plan, String> {
+        let experiment: Experiment = toml::from_str(text)
+            .map_err(|error| Fault::in_toml(Path::new("e.toml"), text, &error).to_string())?;
+        Plan::resolve(experiment, "e", Path::new(""), Path::new("e.toml"), text, &[])
+            .map_err(|faults| faults.iter().map(|fault| fault.to_string() + "\n").collect())
+    }
+
+    #[test]
+    fn a_grid_of_trials_is_resolved() {
+        let plan = plan(
+            "question = 'why'\nsource = 'virtual-points'\n[[vary]]\nkey = 'source.distance'\nvalues = [2.0, 3.0]\n\
+             [[vary]]\nkey = 'pipeline.solver'\nvalues = ['triad', 'kabsch']\n",
+        )
+        .unwrap();
+        let names: Vec<&str> = plan.trials.iter().map(|trial| trial.name.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "001-distance-2.0-solver-triad",
+                "002-distance-2.0-solver-kabsch",
+                "003-distance-3.0-solver-triad",
+                "004-distance-3.0-solver-kabsch"
+            ]
+        );
+        assert_eq!(plan.trials[1].resolved.pipeline.solver.name, "kabsch");
+        assert!(plan.trials[1].resolved.vary.is_empty());
+    }
+
+    #[test]
+    fn a_resolved_trial_is_an_experiment_of_its_own() {
+        let first = plan("question = 'why'\nsource = 'virtual-points'\n").unwrap();
+        let text = toml::to_string(&first.trials[0].resolved).unwrap();
+        let again = plan(&text).unwrap();
+        assert_eq!(again.trials[0].resolved, first.trials[0].resolved);
+    }
+
+    #[test]
+    fn the_command_line_has_the_last_word() {
+        let experiment: Experiment = toml::from_str("question = 'why'\nsource = 'virtual-points'").unwrap();
+        let settings = ["source.frames=2".to_owned(), "pipeline.solver=triad".to_owned()];
+        let changed = changed(experiment.clone(), &settings).unwrap();
+        assert_eq!(changed.source.settings["frames"].as_integer(), Some(2));
+        assert_eq!(changed.pipeline.solver.name, "triad");
+        assert!(super::changed(experiment, &["source".to_owned()]).is_err());
+    }
+
+    #[test]
+    fn faults_name_their_line() {
+        let message = |text: &str| plan(text).unwrap_err();
+        assert_eq!(
+            message("question = 'why'\nsource = 'virtual-points'\n\n[pipeline]\nsolver = 'kabsh'\n").trim(),
+            "no solver is called `kabsh`, did you mean `kabsch`? There are kabsch, triad in e.toml:5"
+        );
+        assert!(message("question = 'why'\nsorce = 'virtual-points'\n").starts_with("unknown key in e.toml:2: `sorce`; did you mean `source`?"));
+        assert!(message("question = 'why'\nsource = 'virtual-points'\n[[vary]]\nkey = 'pipeline.solvr'\nvalues = ['triad']\n").contains("e.toml:3"));
+        assert!(message("question = ''\nsource = 'virtual-points'\n").contains("no question in e.toml:1"));
+        assert!(message("question = 'why'\nsource = { name = 'virtual-points', distanc = 2 }\n").contains("did you mean `distance`"));
+    }
+}

@@ -1,0 +1,144 @@
+//! Where an answer meets the truth: after the method is done, and nowhere else.
+
+use nalgebra::Vector3;
+use seafix_evaluation::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
+use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform, World};
+use seafix_log::{Evaluation, FrameRecord, TruthRecord, VisiblePoint};
+use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
+
+use crate::{Sighting, record::rows4, source::Truth};
+
+/// A pair is correct when its cloud point shows within this distance (px) of the true projections.
+const CORRECT_PX: f64 = 2.0;
+
+/// A target with the truth about it at one instant.
+struct TrueTarget<'a> {
+    target: &'a Target,
+    /// The true place of the target's frame.
+    world_from_object: Transform<World, Object>,
+    /// The true place of each of its points, camera frame; an object of its own may be displaced.
+    points: Vec<Point<Camera>>,
+    /// Which of them both cameras see; `None` where nobody knows.
+    visible: Option<Vec<bool>>,
+}
+
+/// Fills in what only truth can tell: the truth itself and the evaluation of every attempt.
+pub(crate) fn judge(
+    record: &mut FrameRecord,
+    sighting: &Sighting,
+    truth: &Truth,
+    site: &Site,
+    targets: &[Target],
+    kind: TargetKind,
+    rig: &StereoRig,
+) {
+    let known: Vec<Option<TrueTarget<'_>>> = targets
+        .iter()
+        .enumerate()
+        .map(|(index, target)| {
+            let objects = match kind {
+                TargetKind::Object => vec![index],
+                TargetKind::Site => (0..site.objects.len()).collect(),
+            };
+            true_target(target, &objects, site, truth, kind)
+        })
+        .collect();
+    record.truth = Some(TruthRecord {
+        world_from_camera: rows4(&truth.world_from_camera.matrix()),
+        world_from_object: known
+            .iter()
+            .flatten()
+            .map(|known| (known.target.name.clone(), rows4(&known.world_from_object.matrix())))
+            .collect(),
+        visible: known.iter().flatten().flat_map(visible_points).collect(),
+    });
+    for (attempt, row) in sighting.attempts.iter().zip(record.targets.iter_mut()) {
+        let Some(known) = &known[attempt.target] else { continue };
+        let identified = row.evaluation.identified;
+        let visible = count_visible(known, rig);
+        row.evaluation = Evaluation { identified, visible, wrong: Some(false), ..Evaluation::default() };
+        if let Outcome::Referenced(fix) = &attempt.answer.outcome {
+            evaluate(&mut row.evaluation, fix, known, sighting, truth, rig);
+        }
+    }
+}
+
+fn true_target<'a>(
+    target: &'a Target,
+    objects: &[usize],
+    site: &Site,
+    truth: &Truth,
+    kind: TargetKind,
+) -> Option<TrueTarget<'a>> {
+    let frame = match kind {
+        TargetKind::Object => objects[0],
+        TargetKind::Site => site.frame,
+    };
+    let camera_from_world = truth.world_from_camera.inverse();
+    let mut points = Vec::with_capacity(target.points.len());
+    let mut visible = truth.visible.as_ref().map(|_| Vec::with_capacity(target.points.len()));
+    for &o in objects {
+        let camera_from_object = camera_from_world * truth.world_from_object[o]?;
+        for (p, point) in site.objects[o].points.iter().enumerate() {
+            points.push(camera_from_object * point.at);
+            if let (Some(mask), Some(seen)) = (&mut visible, &truth.visible) {
+                mask.push(seen.contains(&(o, p)));
+            }
+        }
+    }
+    Some(TrueTarget { target, world_from_object: truth.world_from_object[frame]?, points, visible })
+}
+
+fn visible_points(known: &TrueTarget<'_>) -> Vec<VisiblePoint> {
+    let mask = known.visible.as_deref().unwrap_or_default();
+    let seen = mask.iter().enumerate().filter(|(_, seen)| **seen);
+    seen.map(|(point, _)| VisiblePoint { object: known.target.name.clone(), point: point as u32 }).collect()
+}
+
+/// How many of the target's points both cameras see: as the data set says, else those in both images.
+fn count_visible(known: &TrueTarget<'_>, rig: &StereoRig) -> Option<u32> {
+    let count = match &known.visible {
+        Some(mask) => mask.iter().filter(|seen| **seen).count(),
+        None => known.points.iter().filter(|point| rig.sees(point, 0.0).is_some()).count(),
+    };
+    Some(count as u32)
+}
+
+fn evaluate(
+    row: &mut Evaluation,
+    fix: &Reference,
+    known: &TrueTarget<'_>,
+    sighting: &Sighting,
+    truth: &Truth,
+    rig: &StereoRig,
+) {
+    let estimate = &fix.object_from_camera;
+    let true_pose = known.world_from_object.inverse() * truth.world_from_camera;
+    let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
+    let is_correct: Vec<bool> = fix.pairs.iter().map(|pair| correct(pair, known, sighting, rig)).collect();
+    let of = |keep: &dyn Fn(usize) -> bool| -> Vec<(Point<Camera>, Point<Object>)> {
+        let kept = fix.pairs.iter().enumerate().filter(|(index, _)| is_correct[*index] && keep(*index));
+        kept.map(|(_, pair)| (sighting.cloud[pair.cloud].position.at, model[pair.model])).collect()
+    };
+    let used: Vec<Vector3<f64>> =
+        fix.used.iter().map(|&index| sighting.cloud[fix.pairs[index].cloud].position.at.coords).collect();
+    let centroid = Point::from(used.iter().sum::<Vector3<f64>>() / used.len().max(1) as f64);
+
+    row.correct_pairs = Some(is_correct.iter().filter(|correct| **correct).count() as u32);
+    row.wrong_pairs = Some(fix.used.iter().any(|&index| !is_correct[index]));
+    row.m1_rms = residual_rms(estimate, &of(&|_| true));
+    row.m1_unused_rms = residual_rms(estimate, &of(&|index| !fix.used.contains(&index)));
+    row.m2_rms = transfer_rms(estimate, &true_pose, &model);
+    row.m3_position = Some(position_error(estimate, &true_pose));
+    row.m3_attitude = Some(attitude_error(estimate, &true_pose));
+    row.nees = nees(estimate, &true_pose, &fix.covariance, &centroid);
+    row.wrong = row.m2_rms.map(|m2| !(m2 <= alert_limit(known.target.diameter())));
+}
+
+/// Whether the cloud point of `pair` shows where its model point truly is, in both images.
+fn correct(pair: &Correspondence, known: &TrueTarget<'_>, sighting: &Sighting, rig: &StereoRig) -> bool {
+    let measured = &sighting.cloud[pair.cloud];
+    let shown: Option<StereoPixels> = measured.pixels.or_else(|| rig.project(&measured.position.at));
+    let (Some(shown), Some(expected)) = (shown, rig.project(&known.points[pair.model])) else { return false };
+    shown.left.distance(&expected.left) <= CORRECT_PX && shown.right.distance(&expected.right) <= CORRECT_PX
+}

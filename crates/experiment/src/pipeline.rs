@@ -1,0 +1,287 @@
+//! From a sight to fixes: the method, one line a stage, in the paper's order.
+
+use std::time::Instant;
+
+use rand::Rng;
+use seafix_component::{BuildError, Choice, Registry};
+use seafix_geometry::{Covariance6, MeasuredPoint, StereoRig};
+use seafix_log::{FrameTimes, TargetTimes};
+use seafix_referencing::{
+    Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind, Tolerance, candidates, judge,
+};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, Descriptor, Detector, Keypoint, MATCHERS, Matcher, Refine, Triangulator, View,
+    stereo_pixels, triangulate,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::source::{Eyes, Sight, WorldPrior};
+
+/// The settings of the way from a frame to a fix.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Pipeline {
+    /// What is searched for: each object in view, or the whole site at once.
+    pub target: TargetKind,
+    /// Finds corners in each image.
+    pub detector: Choice,
+    /// Describes their surroundings.
+    pub descriptor: Choice,
+    /// Pairs left with right.
+    pub matcher: Choice,
+    /// Aligns each pair between the views.
+    pub refine: Refine,
+    /// Turns pairs into points.
+    pub triangulation: Triangulator,
+    /// Stage 1: the shells.
+    pub gate: Gate,
+    /// When two distances agree.
+    pub tolerance: Tolerance,
+    /// Stage 2: the search.
+    pub search: Choice,
+    /// The solver.
+    pub solver: Choice,
+    /// When an answer is believed.
+    pub acceptance: Acceptance,
+}
+
+impl Default for Pipeline {
+    fn default() -> Self {
+        Self {
+            target: TargetKind::Object,
+            detector: Choice::named("harris"),
+            descriptor: Choice::named("surf"),
+            matcher: Choice::named("mutual-ratio"),
+            refine: Refine::default(),
+            triangulation: Triangulator::default(),
+            gate: Gate::default(),
+            tolerance: Tolerance::Sigmas(3.0),
+            search: Choice::named("maximum-clique"),
+            solver: Choice::named("kabsch"),
+            acceptance: Acceptance::default(),
+        }
+    }
+}
+
+/// A setting of the pipeline that cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{message}")]
+pub struct PipelineError {
+    /// The key below `pipeline`.
+    pub setting: &'static str,
+    /// What is wrong, and the nearest right thing.
+    pub message: String,
+}
+
+impl Pipeline {
+    /// The same pipeline with every setting of its components written out.
+    ///
+    /// # Errors
+    /// [`PipelineError`] names the setting.
+    pub fn resolved(&self) -> Result<Self, PipelineError> {
+        Ok(Self {
+            detector: resolve(&DETECTORS, &self.detector)?,
+            descriptor: resolve(&DESCRIPTORS, &self.descriptor)?,
+            matcher: resolve(&MATCHERS, &self.matcher)?,
+            search: resolve(&SEARCHES, &self.search)?,
+            solver: resolve(&SOLVERS, &self.solver)?,
+            ..self.clone()
+        })
+    }
+
+    /// The pipeline, ready to work.
+    ///
+    /// # Errors
+    /// [`PipelineError`] names the setting.
+    pub fn build(&self) -> Result<Stages, PipelineError> {
+        Ok(Stages {
+            detector: build(&DETECTORS, &self.detector)?,
+            descriptor: build(&DESCRIPTORS, &self.descriptor)?,
+            matcher: build(&MATCHERS, &self.matcher)?,
+            search: build(&SEARCHES, &self.search)?,
+            solver: build(&SOLVERS, &self.solver)?,
+            settings: self.clone(),
+        })
+    }
+}
+
+fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice, PipelineError> {
+    registry.resolve(choice).map_err(|error| in_pipeline(registry, &error))
+}
+
+fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Box<T>, PipelineError> {
+    registry.build(choice).map_err(|error| in_pipeline(registry, &error))
+}
+
+fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {
+    PipelineError { setting: registry.kind(), message: error.to_string() }
+}
+
+/// A pipeline, built.
+#[derive(Debug)]
+pub struct Stages {
+    detector: Box<dyn Detector>,
+    descriptor: Box<dyn Descriptor>,
+    matcher: Box<dyn Matcher>,
+    search: Box<dyn Search>,
+    solver: Box<dyn Solver>,
+    settings: Pipeline,
+}
+
+/// Everything the pipeline made of one sight.
+#[derive(Debug)]
+pub struct Sighting {
+    /// Key points of the left image.
+    pub keypoints: Vec<Keypoint>,
+    /// The cloud.
+    pub cloud: Vec<MeasuredPoint>,
+    /// One attempt for each target in view.
+    pub attempts: Vec<Attempt>,
+    /// Times of the common stages.
+    pub times: FrameTimes,
+}
+
+/// What came of one target.
+#[derive(Debug)]
+pub struct Attempt {
+    /// Index among the site's targets.
+    pub target: usize,
+    /// The shells' content.
+    pub candidates: Candidates,
+    /// The answer.
+    pub answer: seafix_referencing::Attempt,
+    /// Times of this target's stages.
+    pub times: TargetTimes,
+    started: Instant,
+}
+
+impl Stages {
+    /// The settings it was built from.
+    pub fn settings(&self) -> &Pipeline {
+        &self.settings
+    }
+
+    /// The way from one sight to fixes, in the paper's order: key points, matches, cloud; then for
+    /// each target in view candidates (Stage 1), the search (Stage 2) and the solution.
+    pub fn reference(&self, sight: &Sight, targets: &[Target], rig: &StereoRig, rng: &mut dyn Rng) -> Sighting {
+        let start = Instant::now();
+        let (keypoints, cloud, times) = self.cloud(&sight.eyes, rig);
+        let common = milliseconds(start);
+        let attempts = targets
+            .iter()
+            .enumerate()
+            .filter_map(|(index, target)| {
+                let prior = prior(target, sight.prior.as_ref());
+                let in_view = in_view(target, prior.as_ref(), rig)?;
+                let mut attempt = self.attempt(index, target, &cloud, prior.as_ref(), &in_view, rig, rng);
+                attempt.times.total_ms = Some(common + milliseconds(attempt.started));
+                Some(attempt)
+            })
+            .collect();
+        Sighting { keypoints, cloud, attempts, times }
+    }
+
+    fn cloud(&self, eyes: &Eyes, rig: &StereoRig) -> (Vec<Keypoint>, Vec<MeasuredPoint>, FrameTimes) {
+        let (left, right) = match eyes {
+            Eyes::Points(cloud) => return (Vec::new(), cloud.clone(), FrameTimes::default()),
+            Eyes::Pair(left, right) => (left, right),
+        };
+        let (keypoints, detect) = timed(|| [self.detector.detect(left), self.detector.detect(right)]);
+        let (descriptors, describe) = timed(|| {
+            [self.descriptor.describe(left, &keypoints[0]), self.descriptor.describe(right, &keypoints[1])]
+        });
+        let left = View { image: left, keypoints: &keypoints[0], descriptors: &descriptors[0] };
+        let right = View { image: right, keypoints: &keypoints[1], descriptors: &descriptors[1] };
+        let (pairs, matching) = timed(|| {
+            let matches = self.matcher.matches(&left, &right, rig);
+            stereo_pixels(&matches, &left, &right, &self.settings.refine)
+        });
+        let (cloud, triangulation) = timed(|| triangulate(&pairs, rig, &self.settings.triangulation));
+        let times = FrameTimes {
+            detect_ms: Some(detect),
+            describe_ms: Some(describe),
+            match_ms: Some(matching),
+            triangulate_ms: Some(triangulation),
+        };
+        let [keypoints, _] = keypoints;
+        (keypoints, cloud, times)
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one call site; each is a different thing")]
+    fn attempt(
+        &self,
+        index: usize,
+        target: &Target,
+        cloud: &[MeasuredPoint],
+        prior: Option<&Prior>,
+        in_view: &[bool],
+        rig: &StereoRig,
+        rng: &mut dyn Rng,
+    ) -> Attempt {
+        let started = Instant::now();
+        let settings = &self.settings;
+        let (candidates, stage1) =
+            timed(|| candidates(&target.points, cloud, prior, &settings.gate, target.survey_sigma, Some(in_view)));
+        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: settings.tolerance };
+        let (found, stage2) = timed(|| self.search.search(&problem, rng));
+        let (answer, solution) =
+            timed(|| judge(&problem, prior, found, &*self.solver, &settings.acceptance, Some(rig)));
+        let times = TargetTimes {
+            candidates_ms: Some(stage1),
+            search_ms: Some(stage2),
+            solve_ms: Some(solution),
+            total_ms: None,
+        };
+        Attempt { target: index, candidates, answer, times, started }
+    }
+}
+
+/// The rough pose relative to `target`; `None` where no world connects them. The perturbation lives
+/// in the camera frame, so that its covariance is the same in the world and in the object.
+fn prior(target: &Target, world: Option<&WorldPrior>) -> Option<Prior> {
+    let (world, world_from_object) = (world?, target.world_from_object?);
+    Some(Prior {
+        object_from_camera: world_from_object.inverse() * world.world_from_camera,
+        bound: PriorBound::Gaussian(Covariance6::new(world.covariance.matrix)),
+    })
+}
+
+/// Which points of `target` may be in view: predicted in both images, or out of them by no more than
+/// three standard deviations of the prediction, and not from behind. `None` when fewer than three are
+/// predicted inside, so that no fix is attempted. Without a prior everything may be in view.
+fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Vec<bool>> {
+    /// Cosine of the angle between a point's normal and the line of sight below which it shows its back.
+    const BACK: f64 = -0.2;
+    let Some(prior) = prior else { return Some(vec![true; target.points.len()]) };
+    let camera_from_object = prior.object_from_camera.inverse();
+    let focal = rig.left().focal()[0];
+    let mut inside = 0;
+    let mask = target
+        .points
+        .iter()
+        .map(|point| {
+            let at = camera_from_object * point.at;
+            let faces = point.normal.is_none_or(|normal| {
+                let sight = prior.object_from_camera.translation() - point.at.coords;
+                normal.normalize().dot(&sight.normalize()) > BACK
+            });
+            let spread = match &prior.bound {
+                PriorBound::Gaussian(covariance) => covariance.of_point(&at).trace().sqrt(),
+                PriorBound::Box(half) => *half,
+            };
+            inside += usize::from(faces && rig.sees(&at, 0.0).is_some());
+            faces && rig.sees(&at, -3.0 * focal * spread / at.coords.z).is_some()
+        })
+        .collect();
+    (inside >= 3).then_some(mask)
+}
+
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = Instant::now();
+    let result = work();
+    (result, milliseconds(start))
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,208 @@
+//! From what happened to what is logged.
+
+use std::path::Path;
+
+use nalgebra::{Matrix3, Matrix4, Matrix6};
+use seafix_component::Registry;
+use seafix_evaluation::alert_limit;
+use seafix_geometry::{Pinhole, Pixel, StereoPixels, StereoRig};
+use seafix_log::{
+    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, GreyImage, ModelPoint, Outcome as Logged,
+    Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
+};
+use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target};
+use seafix_vision::{DESCRIPTORS, DETECTORS, Image, MATCHERS};
+
+use crate::{
+    Attempt, Plan, Sighting, Trial,
+    source::{Eyes, Passage, Sight},
+};
+
+/// What is the same for every frame of `trial`.
+pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets: &[Target], run: &Path) -> TrialHeader {
+    let site = passage.site();
+    let world_from_site = site.frame_object().world_from_object;
+    let pipeline = trial.stages.settings();
+    let prior = passage.prior_sigma();
+    TrialHeader {
+        run: run.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+        trial: trial.name.clone(),
+        title: plan.name.replace(['-', '_'], " "),
+        question: plan.experiment.question.clone(),
+        command: plan.command.clone(),
+        axes: trial
+            .cell
+            .iter()
+            .map(|(key, value)| Axis {
+                key: key.clone(),
+                value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
+            })
+            .collect(),
+        components: vec![
+            component(&DETECTORS, &pipeline.detector),
+            component(&DESCRIPTORS, &pipeline.descriptor),
+            component(&MATCHERS, &pipeline.matcher),
+            component(&SEARCHES, &pipeline.search),
+            component(&SOLVERS, &pipeline.solver),
+        ],
+        configuration: toml::to_string(&trial.resolved).expect("a resolved experiment is plain values"),
+        site: site.to_toml(),
+        source: passage.name().to_owned(),
+        rig: rig(passage.rig()),
+        body_from_camera: rows4(&passage.body_from_camera().matrix()),
+        world_from_site: world_from_site.map(|pose| rows4(&pose.matrix())),
+        targets: targets
+            .iter()
+            .map(|target| TargetModel {
+                id: target.name.clone(),
+                site_from_object: match (world_from_site, target.world_from_object) {
+                    (Some(site), Some(object)) => rows4(&(site.inverse() * object).matrix()),
+                    _ => rows4(&Matrix4::identity()),
+                },
+                points: target
+                    .points
+                    .iter()
+                    .map(|point| ModelPoint { id: point.id.clone(), at: point.at.coords.into(), sigma: point.sigma })
+                    .collect(),
+                alert_limit: alert_limit(target.diameter()),
+            })
+            .collect(),
+        prior_position_sigma: prior.map(|(position, _)| position),
+        prior_attitude_sigma: prior.map(|(_, attitude)| attitude),
+        pixel_sigma: Some(pipeline.triangulation.sigma_px),
+        disparity_sigma: None,
+        seeds: vec![("experiment".to_owned(), trial.resolved.seed)],
+        versions: vec![("seafix".to_owned(), env!("CARGO_PKG_VERSION").to_owned())],
+    }
+}
+
+/// What one frame gave, without truth.
+pub(crate) fn frame(index: usize, sight: &Sight, sighting: &Sighting, trial: &Trial, targets: &[Target]) -> FrameRecord {
+    let pipeline = trial.stages.settings();
+    let (search, solver) = (&pipeline.search.name, &pipeline.solver.name);
+    let mut attempts: Vec<TargetRecord> =
+        sighting.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
+    if attempts.is_empty() {
+        let reason = if sighting.cloud.is_empty() { "no-data" } else { "nothing-in-view" };
+        attempts.push(TargetRecord::not_attempted(search, solver, reason));
+    }
+    FrameRecord {
+        frame: index as u64,
+        stamp_ns: sight.stamp_ns,
+        images: match &sight.eyes {
+            Eyes::Pair(left, right) => Some([grey(left), grey(right)]),
+            Eyes::Points(_) => None,
+        },
+        key_points: sighting.keypoints.iter().map(|keypoint| uv(&keypoint.at)).collect(),
+        cloud: sighting
+            .cloud
+            .iter()
+            .map(|point| CloudPoint {
+                at: point.position.at.coords.into(),
+                covariance: rows3(&point.position.covariance),
+                pixels: point.pixels.as_ref().map(pixel_pair),
+            })
+            .collect(),
+        prior: sight.prior.map(|prior| PriorRecord { world_from_camera: rows4(&prior.world_from_camera.matrix()) }),
+        truth: None,
+        targets: attempts,
+        times: sighting.times,
+    }
+}
+
+/// What came of one target.
+fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> TargetRecord {
+    let answer = &attempt.answer;
+    let mut record = TargetRecord::refused(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
+    record.detail = answer.outcome.explanation().unwrap_or_default();
+    record.candidates =
+        attempt.candidates.lists.iter().map(|list| list.iter().map(|&j| j as u32).collect()).collect();
+    record.times = attempt.times;
+    record.optimal = Some(answer.optimal);
+    record.size_bound = answer.size_bound.map(|n| n as u64);
+    record.expected_chance_sets = answer.expected_chance_sets;
+    record.tests = answer.tests;
+    record.pairs = pairs(&answer.identified);
+    record.evaluation.identified = Some(answer.identified.len() as u32);
+    match &answer.outcome {
+        Outcome::Referenced(fix) => {
+            record.outcome = Logged::Referenced;
+            record.object_from_camera = Some(rows4(&fix.object_from_camera.matrix()));
+            record.covariance = Some(rows6(&fix.covariance.matrix));
+            record.pairs = pairs(&fix.pairs);
+            record.used = fix.used.iter().map(|&index| index as u32).collect();
+            record.residual_rms = Some(fix.residual_rms);
+        }
+        Outcome::Ambiguous(alternatives) => {
+            record.outcome = Logged::Ambiguous;
+            record.alternatives = alternatives
+                .iter()
+                .map(|other| Alternative {
+                    object_from_camera: rows4(&other.object_from_camera.matrix()),
+                    pairs: pairs(&other.pairs),
+                    score: other.score,
+                })
+                .collect();
+        }
+        Outcome::Unidentified(_) => record.outcome = Logged::Unidentified,
+        Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
+    }
+    record
+}
+
+fn component<T: ?Sized>(registry: &Registry<T>, choice: &seafix_component::Choice) -> Component {
+    let listing = registry.listings().into_iter().find(|listing| listing.name == choice.name);
+    Component {
+        stage: registry.kind().to_owned(),
+        name: choice.name.clone(),
+        summary: listing.as_ref().map_or_else(String::new, |listing| listing.summary.to_owned()),
+        source: listing.as_ref().map_or_else(String::new, |listing| listing.source.to_owned()),
+        settings: choice.settings.iter().map(|(key, value)| (key.clone(), value.to_string())).collect(),
+    }
+}
+
+fn rig(rig: &StereoRig) -> RigRecord {
+    RigRecord {
+        left: camera(rig.left()),
+        right: camera(rig.right()),
+        right_from_left: rows4(&rig.right_from_left().matrix()),
+        rectified: rig.is_rectified(),
+    }
+}
+
+fn camera(camera: &Pinhole) -> CameraRecord {
+    let ([fx, fy], [cx, cy]) = (camera.focal(), camera.principal());
+    CameraRecord {
+        size: camera.size(),
+        matrix: [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]],
+        distortion: camera.distortion().shortest().to_vec(),
+    }
+}
+
+fn grey(image: &Image) -> GreyImage {
+    GreyImage { width: image.width() as u32, height: image.height() as u32, pixels: image.to_u8() }
+}
+
+fn pairs(pairs: &[Correspondence]) -> Vec<Pair> {
+    pairs.iter().map(|pair| Pair { model: pair.model as u32, cloud: pair.cloud as u32 }).collect()
+}
+
+pub(crate) fn pixel_pair(pixels: &StereoPixels) -> PixelPair {
+    PixelPair { left: uv(&pixels.left), right: uv(&pixels.right) }
+}
+
+fn uv(pixel: &Pixel) -> [f64; 2] {
+    [pixel.u, pixel.v]
+}
+
+fn rows3(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
+}
+
+pub(crate) fn rows4(m: &Matrix4<f64>) -> [[f64; 4]; 4] {
+    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
+}
+
+fn rows6(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
+    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
+}

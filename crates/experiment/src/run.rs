@@ -1,0 +1,295 @@
+//! The runner: every frame of every source through every trial's pipeline, into logs and tables.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use rayon::prelude::*;
+use seafix_component::Fault;
+use seafix_log::{FrameRecord, LogError, Writer};
+use seafix_referencing::Target;
+use seafix_simulation::{Purpose, Stream};
+
+use crate::{
+    Plan, Trial,
+    dataset::sha256,
+    judge::judge,
+    manifest::{Git, Input, Machine, Manifest, TrialEntry},
+    record,
+    results::{Row, csv, write_parquet},
+    source::Passage,
+};
+
+/// Watches a run. The runner itself prints nothing.
+pub trait Observer: Sync {
+    /// The run begins: so many frames over all trials, about so many bytes of log, in this folder.
+    fn begins(&self, _frames: usize, _bytes: u64, _folder: &Path) {}
+    /// One more frame of `trial` is logged.
+    fn frame(&self, _trial: &str) {}
+}
+
+/// Watches nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Silent;
+impl Observer for Silent {}
+
+/// Why a run could not be finished.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The inputs are wrong; nothing was written.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Input(Vec<Fault>),
+    /// The output cannot be written.
+    #[error("{0}")]
+    Output(Fault),
+}
+
+impl From<LogError> for RunError {
+    fn from(error: LogError) -> Self {
+        Self::Output(Fault::new(error.to_string(), Path::new("")))
+    }
+}
+
+/// A run that is complete.
+#[derive(Debug)]
+pub struct Finished {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Attempts over all trials and frames.
+    pub rows: usize,
+}
+
+/// The trials that see the same passage: they share its frames, so that they are compared on the
+/// same noise.
+struct Group<'a> {
+    passage: Box<dyn Passage>,
+    trials: Vec<&'a Trial>,
+    /// What each trial searches for.
+    targets: Vec<Vec<Target>>,
+}
+
+/// Runs `plan` into the folder `out`, or into the next free folder below `runs`.
+///
+/// The answer depends on the plan alone: not on the number of threads, not on earlier runs. Logs and
+/// tables carry `.partial` until they are complete.
+///
+/// # Errors
+/// [`RunError`]: everything that is wrong with the inputs, before anything is written; or the output
+/// that could not be written.
+pub fn run(plan: &Plan, out: Option<&Path>, threads: usize, observer: &dyn Observer) -> Result<Finished, RunError> {
+    let groups = open(plan)?;
+    let folder = make_folder(out, &plan.name).map_err(RunError::Output)?;
+    let frames = groups.iter().map(|group| group.passage.frames() * group.trials.len()).sum();
+    observer.begins(frames, groups.iter().map(expected_bytes).sum(), &folder);
+
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| RunError::Output(Fault::new(format!("no threads ({error})"), Path::new("the machine"))))?;
+    let mut rows = Vec::new();
+    for group in &groups {
+        run_group(plan, group, &folder, &pool, observer, &mut rows)?;
+    }
+    // Groups finish in the order of their sources; the table is in the order of the trials.
+    rows.sort_by(|a, b| a.order().cmp(&b.order()));
+    write_tables(&folder, &rows)?;
+    write_manifest(plan, &groups, &folder, threads)?;
+    Ok(Finished { folder, rows: rows.len() })
+}
+
+/// Opens every source once and checks what it needs.
+fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
+    let mut groups: Vec<Group<'_>> = Vec::new();
+    let mut faults = Vec::new();
+    for trial in &plan.trials {
+        let same = |other: &Trial| {
+            other.resolved.source == trial.resolved.source && other.resolved.seed == trial.resolved.seed
+        };
+        if let Some(group) = groups.iter_mut().find(|group| same(group.trials[0])) {
+            group.trials.push(trial);
+            continue;
+        }
+        match trial.source.open(trial.resolved.seed, &plan.folder) {
+            Ok(passage) => groups.push(Group { passage, trials: vec![trial], targets: Vec::new() }),
+            Err(more) => faults.extend(more),
+        }
+    }
+    for group in &mut groups {
+        for trial in &group.trials {
+            match group.passage.site().targets(trial.stages.settings().target) {
+                Ok(targets) => group.targets.push(targets),
+                Err(error) => faults.push(Fault::new(error.to_string(), Path::new(group.passage.name()))),
+            }
+        }
+    }
+    faults.dedup();
+    if faults.is_empty() { Ok(groups) } else { Err(RunError::Input(faults)) }
+}
+
+fn run_group(
+    plan: &Plan,
+    group: &Group<'_>,
+    folder: &Path,
+    pool: &rayon::ThreadPool,
+    observer: &dyn Observer,
+    rows: &mut Vec<Row>,
+) -> Result<(), RunError> {
+    let passage = &*group.passage;
+    let mut writers = Vec::new();
+    for (trial, targets) in group.trials.iter().zip(&group.targets) {
+        let header = record::header(plan, trial, passage, targets, folder);
+        writers.push(Writer::create(&folder.join(format!("{}.mcap", trial.name)), &header)?);
+    }
+    // A few frames a thread at a time: enough to keep all busy, few enough to keep in memory.
+    let batch = 2 * pool.current_num_threads();
+    for first in (0..passage.frames()).step_by(batch) {
+        let last = passage.frames().min(first + batch);
+        let done: Vec<Result<Vec<FrameRecord>, Fault>> =
+            pool.install(|| (first..last).into_par_iter().map(|index| frame(group, index)).collect());
+        for records in done {
+            let records = records.map_err(|fault| RunError::Input(vec![fault]))?;
+            for ((record, writer), trial) in records.iter().zip(&mut writers).zip(&group.trials) {
+                writer.frame(record)?;
+                rows.extend(Row::of(&trial.name, record));
+                observer.frame(&trial.name);
+            }
+        }
+    }
+    writers.into_iter().try_for_each(Writer::finish)?;
+    Ok(())
+}
+
+/// One frame through every trial of its group. The sight is made once; every trial does all of its
+/// own work on it, so that times are its own.
+fn frame(group: &Group<'_>, index: usize) -> Result<Vec<FrameRecord>, Fault> {
+    let passage = &*group.passage;
+    let sight = passage.sight(index)?;
+    let truth = passage.truth(index);
+    Ok(group
+        .trials
+        .iter()
+        .zip(&group.targets)
+        .map(|(trial, targets)| {
+            let mut stream = Stream::new(trial.resolved.seed, 0, index as u64, Purpose::Search);
+            let sighting = trial.stages.reference(&sight, targets, passage.rig(), stream.rng());
+            let mut record = record::frame(index, &sight, &sighting, trial, targets);
+            if let Some(truth) = &truth {
+                let kind = trial.stages.settings().target;
+                judge(&mut record, &sighting, truth, passage.site(), targets, kind, passage.rig());
+            }
+            record
+        })
+        .collect())
+}
+
+/// About how much log a group writes: images, losslessly compressed to some 0.7 of their size, are
+/// nearly all of it.
+fn expected_bytes(group: &Group<'_>) -> u64 {
+    const CLOUD_BYTES: f64 = 150e3;
+    let images = if group.passage.images() {
+        [group.passage.rig().left(), group.passage.rig().right()]
+            .iter()
+            .map(|camera| 0.7 * f64::from(camera.size()[0]) * f64::from(camera.size()[1]))
+            .sum()
+    } else {
+        0.0
+    };
+    ((images + CLOUD_BYTES) * (group.passage.frames() * group.trials.len()) as f64) as u64
+}
+
+/// The folder of the run: new, or empty.
+fn make_folder(out: Option<&Path>, name: &str) -> Result<PathBuf, Fault> {
+    let failed = |path: &Path, error: std::io::Error| {
+        Fault::new(format!("cannot make the output folder ({error})"), path)
+            .remedy("choose another with --out, or make room and rights for it")
+    };
+    if let Some(out) = out {
+        if out.exists() {
+            let mut entries = fs::read_dir(out).map_err(|error| failed(out, error))?;
+            if entries.next().is_some() {
+                return Err(Fault::new("the output folder is not empty", out).remedy("choose a new one with --out"));
+            }
+        }
+        fs::create_dir_all(out).map_err(|error| failed(out, error))?;
+        return Ok(out.to_owned());
+    }
+    let runs = Path::new("runs");
+    fs::create_dir_all(runs).map_err(|error| failed(runs, error))?;
+    for number in 1.. {
+        let folder = runs.join(if number == 1 { name.to_owned() } else { format!("{name}-{number}") });
+        match fs::create_dir(&folder) {
+            Ok(()) => return Ok(folder),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(failed(&folder, error)),
+        }
+    }
+    unreachable!("some number is free")
+}
+
+/// Writes a file under a `.partial` name and renames it when it is on the disk.
+fn complete(path: &Path, write: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), RunError> {
+    let partial = PathBuf::from(format!("{}.partial", path.display()));
+    write(&partial).and_then(|()| fs::rename(&partial, path).map_err(|error| error.to_string())).map_err(|error| {
+        RunError::Output(Fault::new(format!("cannot write ({error})"), path).remedy("make room on the disk"))
+    })
+}
+
+fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+    complete(path, |partial| {
+        use std::io::Write;
+        let mut file = fs::File::create(partial).map_err(|error| error.to_string())?;
+        file.write_all(bytes).and_then(|()| file.sync_all()).map_err(|error| error.to_string())
+    })
+}
+
+fn write_tables(folder: &Path, rows: &[Row]) -> Result<(), RunError> {
+    write_bytes(&folder.join("results.csv"), csv(rows).as_bytes())?;
+    complete(&folder.join("results.parquet"), |partial| write_parquet(partial, rows).map_err(|error| error.to_string()))
+}
+
+fn write_manifest(plan: &Plan, groups: &[Group<'_>], folder: &Path, threads: usize) -> Result<(), RunError> {
+    let input = |fault: Fault| RunError::Input(vec![fault]);
+    let mut inputs = Vec::new();
+    for group in groups {
+        let files: BTreeMap<String, String> = group.passage.inputs().map_err(input)?.into_iter().collect();
+        inputs.push(Input { source: group.passage.name().to_owned(), files });
+    }
+    let frames = |trial: &Trial| {
+        let group = groups.iter().find(|group| group.trials.iter().any(|other| other.name == trial.name));
+        group.map_or(0, |group| group.passage.frames())
+    };
+    let resolved = |experiment: &crate::Experiment| {
+        toml::to_string(experiment).expect("a resolved experiment is a table of plain values")
+    };
+    let mut outputs = BTreeMap::new();
+    for name in plan.trials.iter().map(|trial| format!("{}.mcap", trial.name)).chain(["results.csv".into(), "results.parquet".into()]) {
+        outputs.insert(name.clone(), sha256(&folder.join(&name)).map_err(RunError::Output)?);
+    }
+    let manifest = Manifest {
+        format: "seafix-manifest/1",
+        state: "finished",
+        question: plan.experiment.question.clone(),
+        seafix: env!("CARGO_PKG_VERSION"),
+        git: Git::here(),
+        machine: Machine::here(),
+        threads,
+        seeds: BTreeMap::from([("experiment".to_owned(), plan.experiment.seed)]),
+        experiment: resolved(&plan.experiment),
+        trials: plan
+            .trials
+            .iter()
+            .map(|trial| TrialEntry {
+                name: trial.name.clone(),
+                log: format!("{}.mcap", trial.name),
+                frames: frames(trial),
+                configuration: resolved(&trial.resolved),
+            })
+            .collect(),
+        inputs,
+        outputs,
+    };
+    let text = serde_json::to_string_pretty(&manifest).expect("a manifest is plain data") + "\n";
+    write_bytes(&folder.join("manifest.json"), text.as_bytes())
+}

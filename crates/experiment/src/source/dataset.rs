@@ -1,0 +1,117 @@
+//! A recorded data set.
+
+use std::path::Path;
+
+use seafix_component::{Component, Fault};
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
+use seafix_referencing::Site;
+use serde::{Deserialize, Serialize};
+
+use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
+use crate::dataset::{Dataset, image_size, input_hashes, read_image};
+
+/// Reads a `seafix-dataset/1` folder.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct DatasetSource {
+    /// The folder; relative to the experiment file.
+    pub path: String,
+}
+
+impl Component for DatasetSource {
+    const NAME: &'static str = "dataset";
+    const SUMMARY: &'static str = "stereo pairs from a seafix-dataset/1 folder";
+    const SOURCE: &'static str = "FORMATS, section 2";
+}
+
+impl Source for DatasetSource {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        let path = folder.join(&self.path);
+        let dataset = Dataset::open(&path)?;
+        let Some(site) = dataset.site.clone() else {
+            return Err(vec![
+                Fault::new("no site", &path.join("dataset.toml"))
+                    .remedy("a fix needs a known object: add `site = \"site.toml\"`"),
+            ]);
+        };
+        let faults: Vec<Fault> = dataset
+            .frames
+            .iter()
+            .flat_map(|f| [(&f.left, dataset.rig.left()), (&f.right, dataset.rig.right())])
+            .filter_map(|(file, camera)| image_size(file, Some(camera.size())).err())
+            .collect();
+        if faults.is_empty() { Ok(Box::new(Recorded { dataset, site })) } else { Err(faults) }
+    }
+}
+
+/// A data set with a site.
+struct Recorded {
+    dataset: Dataset,
+    site: Site,
+}
+
+impl Passage for Recorded {
+    fn name(&self) -> &str {
+        &self.dataset.name
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+
+    fn rig(&self) -> &StereoRig {
+        &self.dataset.rig
+    }
+
+    fn body_from_camera(&self) -> Transform<Body, Camera> {
+        self.dataset.body_from_camera
+    }
+
+    fn images(&self) -> bool {
+        true
+    }
+
+    fn frames(&self) -> usize {
+        self.dataset.frames.len()
+    }
+
+    fn prior_sigma(&self) -> Option<(f64, f64)> {
+        let (_, covariance) = self.dataset.frames.iter().find_map(|frame| frame.prior)?;
+        Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
+    }
+
+    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+        let frame = &self.dataset.frames[index];
+        let left = read_image(&frame.left, Some(self.dataset.rig.left().size()))?;
+        let right = read_image(&frame.right, Some(self.dataset.rig.right().size()))?;
+        let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes: Eyes::Pair(left, right), prior })
+    }
+
+    fn truth(&self, index: usize) -> Option<Truth> {
+        let frame = &self.dataset.frames[index];
+        let world_from_object = self
+            .site
+            .objects
+            .iter()
+            .map(|object| {
+                let moved = self.dataset.objects.iter().find(|(id, _)| *id == object.id).map(|(_, pose)| *pose);
+                moved.or(object.world_from_object)
+            })
+            .collect();
+        let index_of = |(object, point): &(String, String)| {
+            let o = self.site.objects.iter().position(|candidate| candidate.id == *object)?;
+            let p = self.site.objects[o].points.iter().position(|candidate| candidate.id == *point)?;
+            Some((o, p))
+        };
+        Some(Truth {
+            world_from_camera: frame.truth?,
+            world_from_object,
+            visible: self.dataset.has_visibility.then(|| frame.visible.iter().filter_map(index_of).collect()),
+        })
+    }
+
+    fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
+        input_hashes(&self.dataset.folder)
+    }
+}

@@ -1,0 +1,102 @@
+//! Sources: where stereo pairs, or clouds, come from.
+
+use std::path::Path;
+
+use seafix_component::{Fault, Registry, entry};
+use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
+use seafix_referencing::Site;
+use seafix_vision::Image;
+
+mod dataset;
+mod virtual_dive;
+mod virtual_images;
+mod virtual_points;
+
+pub use dataset::DatasetSource;
+pub use virtual_images::VirtualImages;
+pub use virtual_points::VirtualPoints;
+
+/// What a method may see of one instant.
+#[derive(Debug, Clone)]
+pub struct Sight {
+    /// When (ns).
+    pub stamp_ns: u64,
+    /// What the cameras gave.
+    pub eyes: Eyes,
+    /// The rough pose, if one is known.
+    pub prior: Option<WorldPrior>,
+}
+
+/// What the cameras gave.
+#[derive(Debug, Clone)]
+pub enum Eyes {
+    /// A stereo pair.
+    Pair(Image, Image),
+    /// A cloud that came without images.
+    Points(Vec<MeasuredPoint>),
+}
+
+/// The rough pose of the left camera in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorldPrior {
+    /// The pose.
+    pub world_from_camera: Transform<World, Camera>,
+    /// Its covariance.
+    pub covariance: Covariance6<World, Camera>,
+}
+
+/// What is true at one instant. The runner compares with it; no method is given it.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// The left camera.
+    pub world_from_camera: Transform<World, Camera>,
+    /// Each object of the site, in its order; `None` where no world is known.
+    pub world_from_object: Vec<Option<Transform<World, Object>>>,
+    /// The feature points both cameras see, as (object, point) indices; `None` where nobody knows.
+    pub visible: Option<Vec<(usize, usize)>>,
+}
+
+/// A sequence of instants, simulated or recorded, opened and checked.
+pub trait Passage: Send + Sync {
+    /// Its name, for people.
+    fn name(&self) -> &str;
+    /// What there is to see.
+    fn site(&self) -> &Site;
+    /// The rig the method is told.
+    fn rig(&self) -> &StereoRig;
+    /// Where the left camera sits in the vehicle.
+    fn body_from_camera(&self) -> Transform<Body, Camera>;
+    /// Whether it gives images rather than clouds.
+    fn images(&self) -> bool;
+    /// How many instants there are.
+    fn frames(&self) -> usize;
+    /// Standard deviations of the prior, typical for the passage: position per world axis (m) and
+    /// attitude per camera axis (rad).
+    fn prior_sigma(&self) -> Option<(f64, f64)>;
+    /// What a method may see at instant `index`.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    fn sight(&self, index: usize) -> Result<Sight, Fault>;
+    /// What is true at instant `index`, where it is known.
+    fn truth(&self, index: usize) -> Option<Truth>;
+    /// Files it was made from, with their SHA-256.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    fn inputs(&self) -> Result<Vec<(String, String)>, Fault>;
+}
+
+/// Where stereo pairs or clouds come from.
+pub trait Source: Send + Sync + std::fmt::Debug {
+    /// Opens the passage that `seed` selects; relative paths start from `folder`. Everything that
+    /// can be checked without decoding images is checked here.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once.
+    fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>>;
+}
+
+/// All sources.
+pub static SOURCES: Registry<dyn Source> =
+    Registry::new("source", &[entry!(DatasetSource), entry!(VirtualImages), entry!(VirtualPoints)]);

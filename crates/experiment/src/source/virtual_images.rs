@@ -1,0 +1,26 @@
+//! The virtual dive, rendered.
+
+use std::path::Path;
+
+use seafix_component::{Component, Fault};
+use seafix_simulation::Dive;
+use serde::{Deserialize, Serialize};
+
+use super::{Passage, Source, virtual_dive::open};
+
+/// A seeded dive over the virtual production system, as rendered stereo pairs.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct VirtualImages(pub Dive);
+
+impl Component for VirtualImages {
+    const NAME: &'static str = "virtual-images";
+    const SUMMARY: &'static str = "a seeded dive over the virtual site, rendered as stereo pairs";
+    const SOURCE: &'static str = "scene of Bobkov, Kudryashov, Inzartsev 2021, Sec. 3.1";
+}
+
+impl Source for VirtualImages {
+    fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        open(&self.0, seed, true)
+    }
+}

@@ -1,0 +1,26 @@
+//! The virtual dive as points.
+
+use std::path::Path;
+
+use seafix_component::{Component, Fault};
+use seafix_simulation::Dive;
+use serde::{Deserialize, Serialize};
+
+use super::{Passage, Source, virtual_dive::open};
+
+/// The same dive as `virtual-images`, as clouds of noisy points: no image is made, none is looked at.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct VirtualPoints(pub Dive);
+
+impl Component for VirtualPoints {
+    const NAME: &'static str = "virtual-points";
+    const SUMMARY: &'static str = "the same dive as noisy points and clutter, without images";
+    const SOURCE: &'static str = "scene of Bobkov, Kudryashov, Inzartsev 2021, Sec. 3.1";
+}
+
+impl Source for VirtualPoints {
+    fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        open(&self.0, seed, false)
+    }
+}

@@ -1,0 +1,24 @@
+//! Text files as people write them.
+
+use std::path::Path;
+
+use seafix_component::Fault;
+
+/// The text of a file: UTF-8, a byte order mark and CRLF accepted, at most 64 MiB.
+///
+/// # Errors
+/// A file that is missing, too large, or not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, Fault> {
+    const LIMIT: u64 = 64 << 20;
+    let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions");
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > LIMIT {
+        return Err(Fault::new("text file too large", path).value(format!("{size} bytes")).remedy(format!("at most {LIMIT} bytes are read")));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy("save the file as UTF-8")
+    })?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(&text).replace("\r\n", "\n"))
+}

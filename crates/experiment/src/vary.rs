@@ -1,0 +1,119 @@
+//! What varies: from one experiment to its trials.
+
+use seafix_component::Fault;
+use serde::{Deserialize, Serialize};
+
+/// One thing that varies over an experiment, written `[[vary]]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// The setting, as a dotted path: `source.distance`, `pipeline.solver`.
+    pub key: String,
+    /// Its values.
+    pub values: Vec<toml::Value>,
+}
+
+/// One point of the grid: a value for each axis, in the order of the axes.
+pub(crate) type Cell = Vec<(String, toml::Value)>;
+
+/// All points of the grid, the last axis fastest; without axes one empty point.
+pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
+    axes.iter().fold(vec![Vec::new()], |cells, axis| {
+        cells
+            .iter()
+            .flat_map(|cell| {
+                axis.values.iter().map(move |value| {
+                    let mut longer = cell.clone();
+                    longer.push((axis.key.clone(), value.clone()));
+                    longer
+                })
+            })
+            .collect()
+    })
+}
+
+/// Puts `value` at the dotted path `key`. A component chosen by its bare name becomes a table
+/// first, so that one of its settings can vary.
+///
+/// # Errors
+/// A part of the path that is neither a table nor a component's name.
+pub(crate) fn set(table: &mut toml::Table, key: &str, value: toml::Value) -> Result<(), String> {
+    let (path, last) = key.rsplit_once('.').unwrap_or(("", key));
+    let mut here = table;
+    for step in path.split('.').filter(|step| !step.is_empty()) {
+        let entry = here.entry(step.to_owned()).or_insert_with(|| toml::Table::new().into());
+        if let toml::Value::String(name) = entry {
+            let mut component = toml::Table::new();
+            component.insert("name".to_owned(), name.clone().into());
+            *entry = component.into();
+        }
+        here = entry.as_table_mut().ok_or_else(|| format!("`{step}` in `{key}` is no table"))?;
+    }
+    here.insert(last.to_owned(), value);
+    Ok(())
+}
+
+/// The name of a trial: its number and what distinguishes it, fit for a file.
+pub(crate) fn name(number: usize, cell: &Cell) -> String {
+    let mut name = format!("{number:03}");
+    for (key, value) in cell {
+        let key = key.rsplit('.').next().unwrap_or(key);
+        let value = match value {
+            toml::Value::String(text) => text.clone(),
+            toml::Value::Table(table) => table.get("name").and_then(|n| n.as_str()).unwrap_or("table").to_owned(),
+            other => other.to_string(),
+        };
+        name += &format!("-{key}-{value}");
+    }
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || ".-_".contains(c) { c } else { '_' }).take(120).collect()
+}
+
+/// Axes that vary nothing are mistakes.
+pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], &str) -> Fault) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (index, axis) in axes.iter().enumerate() {
+        let place = index.to_string();
+        if axis.values.is_empty() {
+            faults.push(fault(&["vary", &place, "values"], "an axis without values").remedy("list at least one value"));
+        }
+        if axes[..index].iter().any(|other| other.key == axis.key) {
+            faults.push(fault(&["vary", &place, "key"], "an axis that is there twice").value(&axis.key).remedy("join their values"));
+        }
+    }
+    faults
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(key: &str, values: &[i64]) -> Axis {
+        Axis { key: key.to_owned(), values: values.iter().map(|&v| v.into()).collect() }
+    }
+
+    #[test]
+    fn the_grid_has_the_last_axis_fastest() {
+        let cells = grid(&[axis("a", &[1, 2]), axis("b", &[3, 4])]);
+        let values: Vec<Vec<i64>> =
+            cells.iter().map(|cell| cell.iter().map(|(_, v)| v.as_integer().unwrap()).collect()).collect();
+        assert_eq!(values, [[1, 3], [1, 4], [2, 3], [2, 4]]);
+        assert_eq!(grid(&[]), [Vec::new()]);
+    }
+
+    #[test]
+    fn a_bare_name_opens_for_its_settings() {
+        let mut table: toml::Table = toml::from_str("source = 'virtual-images'").unwrap();
+        set(&mut table, "source.distance", 3.0.into()).unwrap();
+        assert_eq!(table["source"]["name"].as_str(), Some("virtual-images"));
+        assert_eq!(table["source"]["distance"].as_float(), Some(3.0));
+        set(&mut table, "pipeline.solver", "triad".into()).unwrap();
+        assert_eq!(table["pipeline"]["solver"].as_str(), Some("triad"));
+        assert!(set(&mut table, "source.distance.deeper", 1.into()).is_err());
+    }
+
+    #[test]
+    fn names_are_fit_for_files() {
+        let cell = vec![("source.distance".to_owned(), 2.5.into()), ("pipeline.solver".to_owned(), "../triad".into())];
+        assert_eq!(name(3, &cell), "003-distance-2.5-solver-.._triad");
+    }
+}
