@@ -5,6 +5,39 @@
 //! record stands twice: exactly, in this project's own messages (`seafix.v1.*`, `proto/seafix`), and
 //! drawn, in the well-known messages that Foxglove and Rerun display.
 //!
+//! ```
+//! # fn record(path: &std::path::Path, header: &seafix_log::TrialHeader, frames: &[seafix_log::FrameRecord])
+//! # -> Result<(), seafix_log::LogError> {
+//! let mut writer = seafix_log::Writer::create(path, header)?;
+//! for frame in frames {
+//!     writer.frame(frame)?;
+//! }
+//! writer.finish()?; // a writer dropped before leaves `NAME.mcap.partial`
+//! assert_eq!(seafix_log::read(path)?.frames, frames);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Topics
+//!
+//! | topic | message | |
+//! |---|---|---|
+//! | `/run/header` | `seafix.v1.TrialHeader` | once, before all else |
+//! | `/referencing/candidates` | `seafix.v1.Candidates` | one an attempted target and frame |
+//! | `/referencing/result` | `seafix.v1.ReferencingResult` | likewise |
+//! | `/metrics/evaluation` | `seafix.v1.Evaluation` | likewise: comparison with truth |
+//! | `/metrics/timing` | `seafix.v1.Timing` | one a frame |
+//! | `/referencing/frame` | `seafix.v1.Frame` | one a frame, its last: cloud, key points, prior, truth |
+//! | `/camera/left/image`, `right` | `foxglove.CompressedImage` | PNG, lossless; the only copy of the images |
+//! | `/camera/left/calibration`, `right` | `foxglove.CameraCalibration` | once |
+//! | `/camera/left/annotations`, `right` | `foxglove.ImageAnnotations` | key points, candidates, identified points |
+//! | `/tf` | `foxglove.FrameTransforms` | the tree of frames |
+//! | `/cloud`, `/cloud/candidates`, `/cloud/identified` | `foxglove.PointCloud` | coloured by target |
+//! | `/model`, `/scene/model` | `foxglove.PointCloud`, `foxglove.SceneUpdate` | once: the feature points |
+//! | `/pose/estimate`, `/pose/truth`, `/pose/prior` | `foxglove.PoseInFrame` | the vehicle |
+//!
+//! Attachments `configuration.toml` and `site.toml`; metadata record `run`.
+//!
 //! # Conventions
 //!
 //! - Records are in the conventions of the house: metres, radians, column vectors (`p_a = a_from_b · p_b`),
