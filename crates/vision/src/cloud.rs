@@ -17,7 +17,7 @@ pub struct Triangulator {
 
 impl Default for Triangulator {
     fn default() -> Self {
-        Self { sigma_px: 0.25, epipolar_px: 1.5, max_depth: 20.0 }
+        Self { sigma_px: 0.15, epipolar_px: 1.5, max_depth: 20.0 }
     }
 }
 

@@ -24,9 +24,10 @@ use crate::{Image, Match, View};
 pub struct Refine {
     /// Whether to align at all.
     pub refine: bool,
-    /// Side of the window (px), odd.
+    /// Side of the window (px), odd, at most 201.
     pub window: usize,
-    /// Whether the window may also be sheared and scaled, as a slanted surface asks for.
+    /// Whether the window may also be sheared and scaled, as a strongly slanted surface asks for. At the
+    /// corners of boxes, with another surface behind, six parameters are noisier than two.
     pub affine: bool,
     /// How far the alignment may move the right place (px).
     pub reach: f64,
@@ -38,7 +39,7 @@ pub struct Refine {
 
 impl Default for Refine {
     fn default() -> Self {
-        Self { refine: true, window: 13, affine: true, reach: 1.5, least_correlation: 0.8, iterations: 20 }
+        Self { refine: true, window: 11, affine: false, reach: 1.5, least_correlation: 0.8, iterations: 20 }
     }
 }
 
@@ -70,7 +71,7 @@ struct Aligner<'a> {
 
 impl<'a> Aligner<'a> {
     fn new(settings: &'a Refine) -> Self {
-        let half = (settings.window / 2) as isize;
+        let half = (settings.window / 2).min(100) as isize;
         let sigma = (half as f64 + 0.5) / 1.5;
         let side = 2 * half + 1;
         let weight = |x: isize| libm::exp(-0.5 * ((x - half) * (x - half)) as f64 / (sigma * sigma));
@@ -225,4 +226,58 @@ fn keys(t: f64) -> ([f64; 4], [f64; 4]) {
     ];
     let slopes = [-0.5 + t * (2.0 - 1.5 * t), t * (-5.0 + 4.5 * t), 0.5 + t * (4.0 - 4.5 * t), t * (-1.0 + 1.5 * t)];
     (weights, slopes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Descriptors, Keypoint};
+
+    /// Waves, seen `shift` px further to the right and half of that down, with other light and contrast.
+    fn waves(shift: f64, contrast: f64, light: f64) -> Image {
+        let value = |i: usize| {
+            let (x, y) = ((i % 60) as f64 - shift, (i / 60) as f64 - 0.5 * shift);
+            light + contrast * (libm::sin(0.5 * x + 0.2 * y) + libm::cos(0.6 * y - 0.3 * x) + libm::sin(0.9 * x))
+        };
+        Image::new(60, 60, (0..3600).map(|i| value(i) as f32).collect()).unwrap()
+    }
+
+    fn aligned(right: &Image, at: Pixel, start: Pixel, refine: &Refine) -> StereoPixels {
+        let left = waves(0.0, 30.0, 120.0);
+        let none = Descriptors::default();
+        let [l, r] = [at, start].map(|at| [Keypoint { at, response: 1.0, scale: 1.0 }]);
+        let view = |image, keypoints| View { image, keypoints, descriptors: &none };
+        let found = [Match { left: 0, right: 0, distance: 0.0 }];
+        let (left, right) = (View { image: &left, keypoints: &l, descriptors: &none }, view(right, &r));
+        stereo_pixels(&found, &left, &right, refine)[0]
+    }
+
+    #[test]
+    fn a_shift_is_found_under_other_light() {
+        let right = waves(0.62, 20.0, 80.0);
+        for affine in [false, true] {
+            let refine = Refine { affine, ..Refine::default() };
+            let at = Pixel { u: 30.3, v: 28.8 };
+            let pair = aligned(&right, at, Pixel { u: 30.0, v: 29.5 }, &refine);
+            assert_eq!(pair.left, at);
+            assert!(pair.right.distance(&Pixel { u: 30.92, v: 29.11 }) < 0.03, "{affine}: {pair:?}");
+        }
+    }
+
+    #[test]
+    fn where_it_cannot_align_the_places_stay() {
+        let at = Pixel { u: 30.0, v: 30.0 };
+        let start = Pixel { u: 30.4, v: 30.1 };
+        let right = waves(0.62, 20.0, 80.0);
+        let off = Refine { refine: false, ..Refine::default() };
+        assert_eq!(aligned(&right, at, start, &off).right, start);
+        let flat = Image::new(60, 60, vec![90.0; 3600]).unwrap();
+        assert_eq!(aligned(&flat, at, start, &Refine::default()).right, start, "nothing to align to");
+        let tiny = Image::new(1, 1, vec![90.0]).unwrap();
+        assert_eq!(aligned(&tiny, at, start, &Refine::default()).right, start, "an image too small");
+        let border = Pixel { u: 2.0, v: 30.0 };
+        assert_eq!(aligned(&right, border, start, &Refine::default()).right, start, "a window cut off");
+        let far = Pixel { u: 34.0, v: 30.0 };
+        assert_eq!(aligned(&right, at, far, &Refine::default()).right, far, "too far to reach");
+    }
 }

@@ -82,6 +82,10 @@ impl Harris {
     /// R at every pixel; zero nearer to the border than the operator reaches.
     fn response(&self, image: &Image) -> Vec<f32> {
         let (width, height) = (image.width(), image.height());
+        // Checked before the kernel is built: its size is the user's.
+        if !(6.0 * self.sigma < width.min(height) as f64) {
+            return vec![0.0; width * height];
+        }
         let kernel = half_kernel(self.sigma);
         let reach = kernel.len() - 1;
         let margin = reach + 1;
@@ -226,6 +230,9 @@ mod tests {
 
     #[test]
     fn images_without_structure_have_no_corner() {
+        let vast =
+            Harris { sigma: 1e300, junction: 1e300, radius: usize::MAX, balance: usize::MAX, ..Harris::default() };
+        assert!(vast.detect(&texture(60, 50)).is_empty());
         for (width, height) in [(1, 1), (2, 2), (1, 50), (64, 48), (300, 3)] {
             let flat = Image::new(width, height, vec![128.0; width * height]).unwrap();
             assert_eq!(Harris::default().detect(&flat), []);

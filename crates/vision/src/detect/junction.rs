@@ -32,6 +32,7 @@ const SLACK: usize = 4;
 impl Junction {
     /// With windows of standard deviation `sigma` (px).
     pub(super) fn new(sigma: f64) -> Self {
+        let sigma = sigma.min(1000.0); // wider than that fits no image
         let outer = -0.5 / (sigma * sigma);
         Self { exponents: [outer, outer / (0.6 * 0.6) + outer], half: libm::ceil(2.5 * sigma) as usize }
     }

@@ -39,6 +39,7 @@ pub(super) fn maxima(response: &[f32], width: usize, least: f32, radius: usize) 
 fn is_greatest(response: &[f32], width: usize, x: usize, y: usize, radius: usize) -> bool {
     let height = response.len() / width;
     let r = response[y * width + x];
+    let radius = radius.min(width.max(height));
     let squared = radius * radius;
     (y.saturating_sub(radius)..=(y + radius).min(height - 1)).all(|other_y| {
         let dy = other_y.abs_diff(y);
@@ -62,7 +63,8 @@ pub(super) fn strongest(peaks: &mut Vec<Peak>, [width, height]: [usize; 2], budg
     }
     if balance > 0 {
         let longer = width.max(height);
-        let cell = |x: usize| x.saturating_mul(balance) / longer;
+        let balance = balance.min(longer);
+        let cell = |x: usize| x * balance / longer;
         let columns = cell(width - 1) + 1;
         let mut taken = vec![0_usize; columns * (cell(height - 1) + 1)];
         let mut ranked: Vec<(usize, Peak)> = peaks
