@@ -174,7 +174,7 @@ mod tests {
                 }
             }
         }
-        let [model, survey]: [f64; 2] = [(model / n as f64).sqrt(), (survey / m as f64).sqrt()];
+        let [model, survey]: [f64; 2] = [f64::sqrt(model / n), f64::sqrt(survey / m)];
         assert!((model / 0.001 - 1.0).abs() < 0.05, "{model}");
         assert!((survey / 0.01 - 1.0).abs() < 0.06, "{survey}");
     }
