@@ -80,8 +80,8 @@ impl Picture {
         };
         let matched: Vec<[f64; 2]> = (0..frame.cloud.len() as u32).flat_map(places).collect();
         for at in frame.key_points.iter().copied().chain(matched.into_iter().filter(|at| at[0] >= offset - 1.0)) {
-            plus(&mut canvas, at, 7.0 * scale, 4.5 * scale, BLACK);
-            plus(&mut canvas, at, 6.0 * scale, 2.5 * scale, WHITE);
+            plus(&mut canvas, at, 5.5 * scale, 4.0 * scale, BLACK);
+            plus(&mut canvas, at, 4.5 * scale, 2.0 * scale, WHITE);
         }
         let fixes: Vec<_> = frame.targets.iter().filter(|target| target.outcome == Outcome::Referenced).collect();
         let candidates: BTreeSet<u32> = frame.targets.iter().flat_map(|target| target.candidates.concat()).collect();

@@ -143,7 +143,7 @@ fn over_frames(run: &Run, summary: &Summary) -> Markup {
             figure.plot {
                 (drawn)
                 figcaption {
-                    "Error of every fix over the frames; a frame without a mark was refused. The shaded band is the m1 that the paper reports for its virtual scene at 2–5 m. "
+                    "Error of every fix over the frames; a frame without a mark gave none. The shaded band is the m1 that the paper reports for its virtual scene at 2–5 m, another scene and camera. "
                     (conditions(run, None))
                 }
             }

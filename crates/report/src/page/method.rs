@@ -30,22 +30,21 @@ pub(super) fn section(run: &Run) -> Markup {
         figure.table {
             figcaption { "The pipeline. Several lines of one stage are the alternatives compared." }
             table {
-                thead { tr { th { "Stage" } th { "Component" } th { "What it does" } th { "Settings" } } }
+                thead { tr { th { "Stage" } th { "Component" } th { "What it does, and its settings" } } }
                 tbody {
                     @for (first, component) in rows {
                         tr.break[first] {
                             td { @if first { (component.stage) } }
-                            td { (component.name) }
+                            td.nowrap { (component.name) }
                             td.text {
                                 (component.summary)
                                 @if !component.source.is_empty() { " " span.minor { "(" (component.source) ")" } }
-                            }
-                            td { code {
+                                @if !component.settings.is_empty() { br; }
                                 @for (index, (key, value)) in component.settings.iter().enumerate() {
-                                    @if index > 0 { br; }
-                                    (key) " = " (value)
+                                    @if index > 0 { ", " }
+                                    code.nowrap { (key) " = " (value) }
                                 }
-                            } }
+                            }
                         }
                     }
                 }

@@ -1,15 +1,18 @@
 //! The ten worst frames, with the place in the log where to look.
 
 use maud::{Markup, html};
-use seafix_log::{Outcome, TargetRecord};
+use seafix_log::{Evaluation, Outcome, TargetRecord};
 
 use crate::{
-    format::number,
+    format::{decimals, number},
     run::{Frame, Run, Trial},
 };
 
 /// How many are listed.
 const LISTED: usize = 10;
+
+/// The head of a column and what stands in it.
+type Column = (&'static str, fn(&Evaluation) -> Option<f64>);
 
 pub(super) fn section(run: &Run) -> Markup {
     let mut fixes: Vec<(&Trial, &Frame, &TargetRecord)> = run
@@ -23,6 +26,14 @@ pub(super) fn section(run: &Run) -> Markup {
     let wrong = |fix: &TargetRecord| fix.evaluation.wrong == Some(true);
     fixes.sort_by(|(.., a), (.., b)| wrong(b).cmp(&wrong(a)).then(error(b).total_cmp(&error(a))));
     fixes.truncate(LISTED);
+    let columns: [Column; 5] = [
+        ("m1 (mm)", |fix| fix.m1_rms.map(|m| m * 1e3)),
+        ("m2 (mm)", |fix| fix.m2_rms.map(|m| m * 1e3)),
+        ("m3 (mm)", |fix| fix.m3_position.map(|m| m * 1e3)),
+        ("m3 (°)", |fix| fix.m3_attitude.map(f64::to_degrees)),
+        ("NEES", |fix| fix.nees),
+    ];
+    let digits = columns.map(|(_, value)| decimals(fixes.iter().filter_map(|(.., fix)| value(&fix.evaluation))));
     html! {
         h2 { "Worst fixes" }
         @if fixes.is_empty() {
@@ -33,7 +44,7 @@ pub(super) fn section(run: &Run) -> Markup {
                 table {
                     thead { tr {
                         th { "Log" } th.n { "frame" } th.n { "stamp (ns)" } th { "target" } th { "judged" } th.n { "points" }
-                        th.n { "m1 (mm)" } th.n { "m2 (mm)" } th.n { "m3 (mm)" } th.n { "m3 (°)" } th.n { "NEES" }
+                        @for (name, _) in columns { th.n { (name) } }
                     } }
                     tbody {
                         @for (trial, frame, fix) in fixes {
@@ -42,9 +53,7 @@ pub(super) fn section(run: &Run) -> Markup {
                                 td.nowrap { code { (trial.file()) } } td.n { (frame.number) } td.n { (frame.stamp_ns) } td { (fix.object) }
                                 td { (match it.wrong { Some(true) => "wrong", Some(false) => "found", None => "–" }) }
                                 td.n { (fix.pairs.len()) }
-                                td.n { (number(it.m1_rms.map(|m| m * 1e3), 1)) } td.n { (number(it.m2_rms.map(|m| m * 1e3), 1)) }
-                                td.n { (number(it.m3_position.map(|m| m * 1e3), 1)) }
-                                td.n { (number(it.m3_attitude.map(f64::to_degrees), 2)) } td.n { (number(it.nees, 1)) }
+                                @for ((_, value), digits) in columns.into_iter().zip(digits) { td.n { (number(value(it), digits)) } }
                             }
                         }
                     }
