@@ -72,33 +72,40 @@ impl Bed {
         (down, slope)
     }
 
-    /// Depth of the surface at a place (m).
-    pub(crate) fn down(&self, north: f64, east: f64) -> f64 {
+    /// Depth of the surface at a place (m), and the slopes of the triangle there.
+    fn surface(&self, north: f64, east: f64) -> (f64, [f64; 2]) {
         let (x, y) = (north / CELL, east / CELL);
         let (i, j) = (x.floor(), y.floor());
         let (fx, fy) = (x - i, y - j);
         let (i, j) = (i as i64, j as i64);
-        let origin = self.vertex(i, j).0;
-        let far = self.vertex(i + 1, j + 1).0;
-        if fx >= fy {
+        let (origin, far) = (self.vertex(i, j).0, self.vertex(i + 1, j + 1).0);
+        let [rise_x, rise_y] = if fx >= fy {
             let side = self.vertex(i + 1, j).0;
-            origin + fx * (side - origin) + fy * (far - side)
+            [side - origin, far - side]
         } else {
             let side = self.vertex(i, j + 1).0;
-            origin + fy * (side - origin) + fx * (far - side)
-        }
+            [far - side, side - origin]
+        };
+        (origin + fx * rise_x + fy * rise_y, [rise_x / CELL, rise_y / CELL])
+    }
+
+    /// Depth of the surface at a place (m).
+    pub(crate) fn down(&self, north: f64, east: f64) -> f64 {
+        self.surface(north, east).0
     }
 
     /// The t > 0 at which `from + t·along` meets the bed, coming from above.
     pub(crate) fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
-        if along.z <= 0.05 * along.norm() {
-            return None; // level or upwards: the slopes stay below 3°, so no bed within sight
+        if along.z <= 0.15 * along.norm() {
+            return None; // nearly level or upwards: the waves' slopes stay below 0.08, so no bed within sight
         }
         let mut t = (self.depth - from.z) / along.z;
-        // The slopes are gentle: each step divides the error by at least 2.
-        for _ in 0..60 {
+        // Newton's steps on the triangles: exact once the right triangle is reached, and the slopes
+        // are so gentle that it is reached at once.
+        for _ in 0..20 {
             let at = from + along * t;
-            let step = (self.down(at.x, at.y) - at.z) / along.z;
+            let (down, [north, east]) = self.surface(at.x, at.y);
+            let step = (down - at.z) / (along.z - north * along.x - east * along.y);
             t += step;
             if step.abs() * along.norm() < 1e-13 {
                 break;

@@ -11,7 +11,24 @@
 //! - World: north, east, down. The cameras look down; right in the image is starboard, its lower
 //!   edge is aft.
 //! - The centre of the first pixel is (0, 0).
+//! - Surfaces are flat and drawn exactly: one sample for a pixel that no edge crosses, 34 for the
+//!   others; textures are closed forms that fade out below two pixels.
 //! - Light is fixed, water is clear: no attenuation, no lamps, no shadows.
+//!
+//! # How well the images can be measured
+//!
+//! Default settings (1 grey level of noise, 0.7 px of blur), 21 views at each of 2, 3, 4 and 5 m;
+//! Harris corners, SURF, mutual nearest neighbours, no alignment; true pixels are exact:
+//!
+//! | feature points | found in both images within 2 px | σ of the disparity | mean offset in an image |
+//! |---|---|---|---|
+//! | X marks (two dark squares touch) | 98–100 % | 0.024–0.027 px | 0.07–0.10 px |
+//! | corners of panels | 95–100 % | 0.03–0.05 px | 0.17–0.18 px |
+//! | corners of boxes (the bed behind them moves) | 65–89 % | 0.3–0.6 px | 0.44–0.57 px |
+//! | all | 95–97 % | 0.10–0.20 px, robust (1.48 MAD) 0.03 px | |
+//!
+//! That is better than what the paper's figures imply (0.2–0.35 px, with real textures): the water is
+//! clear and the paint is sharp. [`PointNoise`] is set to the paper's range instead (σ_d = √2·0.2 px).
 
 mod bed;
 mod blueprint;

@@ -8,7 +8,8 @@ use crate::{
     stream::Stream,
 };
 
-/// How points are measured.
+/// How points are measured. The default noise is what the paper's figures imply, not what the
+/// rendered images allow: σ_d = √2·σ_px = 0.28 px.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointNoise {

@@ -33,6 +33,8 @@ pub(crate) struct Surface {
     pub(crate) finish: Finish,
     /// 1 for paint, which lies in the plane of the plate that carries it; 0 otherwise.
     pub(crate) layer: u8,
+    /// A ball around it.
+    ball: Ball,
 }
 
 /// A place that a detector may find: a feature point or another corner.
@@ -52,8 +54,7 @@ pub(crate) struct Body {
     pub(crate) points: Vec<Corner>,
     /// Corners that are no feature points.
     pub(crate) distractors: Vec<Corner>,
-    centre: Vector3<f64>,
-    radius: f64,
+    ball: Ball,
 }
 
 /// Everything that can be seen.
@@ -67,17 +68,39 @@ pub(crate) struct Scene {
 /// Sides of a pipe's cross-section.
 const PIPE_SIDES: usize = 16;
 
+/// A ball that encloses something.
+#[derive(Debug, Clone, Copy)]
+struct Ball {
+    centre: Vector3<f64>,
+    radius: f64,
+}
+
+impl Ball {
+    /// The ball around a centre that holds all places.
+    fn around<'a>(centre: Vector3<f64>, places: impl Iterator<Item = &'a Vector3<f64>>) -> Self {
+        Self { centre, radius: places.map(|p| (p - centre).norm()).fold(0.0, f64::max) + 1e-6 }
+    }
+
+    /// Whether the line through `from` along `along` passes through it.
+    fn meets(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> bool {
+        let miss = (self.centre - from).cross(along).norm_squared();
+        miss <= self.radius * self.radius * along.norm_squared()
+    }
+}
+
 impl Surface {
     fn new(corners: Vec<Vector3<f64>>, outside: &Vector3<f64>, albedo: f64, finish: Finish) -> Self {
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
         let normal = if normal.dot(outside) < 0.0 { -normal } else { normal };
-        Self { corners, normal, albedo: albedo as f32, finish, layer: u8::from(finish == Finish::Paint) }
+        let centre = corners.iter().sum::<Vector3<f64>>() / corners.len() as f64;
+        let ball = Ball::around(centre, corners.iter());
+        Self { corners, normal, albedo: albedo as f32, finish, layer: u8::from(finish == Finish::Paint), ball }
     }
 
     /// The t at which `from + t·along` passes through the surface.
     fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
         let slope = self.normal.dot(along);
-        if slope.abs() < 1e-12 {
+        if slope.abs() < 1e-12 || !self.ball.meets(from, along) {
             return None;
         }
         let t = self.normal.dot(&(self.corners[0] - from)) / slope;
@@ -93,7 +116,7 @@ impl Surface {
 }
 
 impl Body {
-    fn new(plan: &ObjectPlan, index: usize, depth: f64, bed: &Bed, rocks: &mut Stream, count: usize) -> Self {
+    fn new(plan: &ObjectPlan, depth: f64, bed: &Bed, rocks: &mut Stream, count: usize) -> Self {
         let [roll, pitch] = plan.tilt_deg.map(f64::to_radians);
         let about = |axis: Vector3<f64>, angle: f64| seafix_geometry::so3::exp(&(axis * angle));
         let turn: UnitQuaternion<f64> =
@@ -139,21 +162,13 @@ impl Body {
 
         let points: Vec<_> = plan.points.iter().map(|p| Corner { at: world(plan.place(p)), normal: up }).collect();
         distractors.retain(|d| points.iter().all(|p| (p.at - d.at).norm() > 1e-6));
-        let radius = surfaces.iter().flat_map(|s| &s.corners).map(|c| (c - origin).norm()).fold(0.0, f64::max);
-        debug_assert!(!points.is_empty(), "object {index} has no points");
-        Self { surfaces, points, distractors, centre: origin, radius }
+        let ball = Ball::around(origin, surfaces.iter().flat_map(|s| &s.corners));
+        Self { surfaces, points, distractors, ball }
     }
 
     /// The mean of the feature points.
     pub(crate) fn centroid(&self) -> Vector3<f64> {
         self.points.iter().map(|p| p.at).sum::<Vector3<f64>>() / self.points.len() as f64
-    }
-
-    /// Whether the line through `from` along `along` passes near enough to meet it.
-    fn near(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> bool {
-        let to = self.centre - from;
-        let miss = to.cross(along).norm_squared();
-        miss <= self.radius * self.radius * along.norm_squared()
     }
 }
 
@@ -251,7 +266,7 @@ impl Scene {
             .enumerate()
             .map(|(index, plan)| {
                 let mut rocks = Stream::new(seed, 0, index as u64, Purpose::Rocks);
-                Body::new(plan, index, blueprint.depth, &bed, &mut rocks, blueprint.rocks)
+                Body::new(plan, blueprint.depth, &bed, &mut rocks, blueprint.rocks)
             })
             .collect();
         let texture = Stream::new(seed, 0, 0, Purpose::Texture).bits() as u32;
@@ -260,7 +275,7 @@ impl Scene {
 
     /// The first t > 0 at which `from + t·along` meets a body or the bed.
     pub(crate) fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
-        let bodies = self.bodies.iter().filter(|b| b.near(from, along));
+        let bodies = self.bodies.iter().filter(|b| b.ball.meets(from, along));
         let solid = bodies.flat_map(|b| &b.surfaces).filter_map(|s| s.hit(from, along));
         solid.chain(self.bed.hit(from, along)).min_by(f64::total_cmp)
     }
@@ -268,7 +283,10 @@ impl Scene {
     /// Whether nothing lies between `from` and the place `to`, up to a millimetre before it.
     pub(crate) fn clear(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         let along = to - from;
-        self.hit(from, &along).is_none_or(|t| t * along.norm() >= along.norm() - 1e-3)
+        let before = 1.0 - 1e-3 / along.norm();
+        let solid = self.bodies.iter().filter(|b| b.ball.meets(from, &along)).flat_map(|b| &b.surfaces);
+        let mut hits = solid.filter_map(|s| s.hit(from, &along)).chain(self.bed.hit(from, &along));
+        !hits.any(|t| t < before)
     }
 
     /// Whether a corner is turned towards `from` and nothing hides it.
