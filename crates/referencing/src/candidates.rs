@@ -161,3 +161,87 @@ impl PointShell {
 pub(crate) fn chi_square(freedom: usize, confidence: f64) -> f64 {
     ChiSquared::new(freedom as f64).expect("the degrees of freedom are positive").inverse_cdf(confidence)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_geometry::{Covariance6, Transform, UncertainPoint};
+
+    fn cloud(places: &[[f64; 3]], sigma: f64) -> Vec<MeasuredPoint> {
+        places
+            .iter()
+            .map(|at| MeasuredPoint { position: UncertainPoint::isotropic(Point::from(*at), sigma), pixels: None })
+            .collect()
+    }
+
+    fn one_point(at: [f64; 3]) -> Vec<ModelPoint> {
+        vec![ModelPoint::exact("P", Point::from(at))]
+    }
+
+    fn boxed(half: f64) -> Prior {
+        Prior { object_from_camera: Transform::identity(), bound: PriorBound::Box(half) }
+    }
+
+    #[test]
+    fn the_faces_of_the_box_belong_to_it() {
+        let model = one_point([0.0, 0.0, 2.0]);
+        let cloud = cloud(&[[0.25, -0.25, 2.25], [0.25 + 1e-9, 0.0, 2.0], [0.0, 0.0, 2.0]], 0.0);
+        let found = candidates(&model, &cloud, Some(&boxed(0.25)), &Gate::default(), 0.0, None);
+        assert_eq!(found.lists, [vec![0, 2]]);
+        assert_eq!((found.pairs(), found.with_candidates()), (2, 1));
+    }
+
+    #[test]
+    fn the_lists_grow_with_the_box() {
+        let model = one_point([0.0, 0.0, 2.0]);
+        let cloud = cloud(&[[0.1, 0.0, 2.0], [0.0, 0.3, 2.0], [0.0, 0.0, 2.7]], 0.0);
+        for (half, expected) in [(0.05, 0), (0.1, 1), (0.3, 2), (0.8, 3)] {
+            let found = candidates(&model, &cloud, Some(&boxed(half)), &Gate::default(), 0.0, None);
+            assert_eq!(found.pairs(), expected, "half-size {half}");
+        }
+    }
+
+    #[test]
+    fn a_gaussian_prior_gates_by_its_covariance() {
+        // 0.01 rad about y at 2 m depth moves the point 0.02 m along x; position 0.03 m, cloud 0.04 m, model 0.12 m.
+        let model = vec![ModelPoint { sigma: 0.12, ..one_point([0.0, 0.0, 2.0])[0].clone() }];
+        let bound = PriorBound::Gaussian(Covariance6::isotropic(0.01, 0.03));
+        let prior = Prior { object_from_camera: Transform::identity(), bound };
+        let along = |axis: usize, variance: f64, limit: f64| {
+            let edge = (variance * limit).sqrt();
+            let mut places = [[0.0, 0.0, 2.0]; 2];
+            places[0][axis] += edge * (1.0 - 1e-6);
+            places[1][axis] += edge * (1.0 + 1e-6);
+            candidates(&model, &cloud(&places, 0.04), Some(&prior), &Gate::ChiSquare(0.99), 0.0, None).lists
+        };
+        let base = 0.03f64.powi(2) + 0.04f64.powi(2) + 0.12f64.powi(2);
+        let limit = chi_square(3, 0.99);
+        assert!((limit - 11.345).abs() < 1e-3);
+        assert_eq!(along(0, base + 0.02f64.powi(2), limit), [vec![0]]);
+        assert_eq!(along(2, base, limit), [vec![0]], "depth does not feel the attitude");
+        let faithful = candidates(&model, &cloud(&[[0.2, 0.0, 2.0]], 0.04), Some(&prior), &Gate::Box(0.2), 0.0, None);
+        assert_eq!(faithful.lists, [vec![0]]);
+    }
+
+    #[test]
+    fn without_a_prior_every_point_is_a_candidate_of_what_is_in_view() {
+        let model = [one_point([0.0, 0.0, 2.0]), one_point([1.0, 0.0, 2.0])].concat();
+        let cloud = cloud(&[[0.0; 3]; 2], 0.01);
+        let found = candidates(&model, &cloud, None, &Gate::default(), 0.0, Some(&[false, true]));
+        assert_eq!(found.lists, [vec![], vec![0, 1]]);
+        assert_eq!(candidates(&model, &cloud, None, &Gate::default(), 0.0, None), Candidates::all(2, 2));
+    }
+
+    #[test]
+    fn a_gate_is_written_in_toml() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct Stage {
+            gate: Gate,
+        }
+        let read: Stage = toml::from_str("gate = { chi-square = 0.95 }").unwrap();
+        assert_eq!(read.gate, Gate::ChiSquare(0.95));
+        let text = toml::to_string(&Stage { gate: Gate::Box(0.25) }).unwrap();
+        assert_eq!(toml::from_str::<Stage>(&text).unwrap().gate, Gate::Box(0.25));
+        assert!(Gate::Box(-1.0).check().is_err() && Gate::ChiSquare(1.0).check().is_err() && read.gate.check().is_ok());
+    }
+}

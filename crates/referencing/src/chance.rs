@@ -90,3 +90,83 @@ fn agreement(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
     }
     agreeing / looked_at
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Candidates, ModelPoint, Tolerance};
+    use nalgebra::Vector3;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
+
+    /// Points on a line: model and cloud; distances decide who agrees.
+    fn model(at: &[f64]) -> Vec<ModelPoint> {
+        at.iter().map(|&x| ModelPoint::exact("", Point::new(x, 0.0, 0.0))).collect()
+    }
+
+    fn cloud(at: &[f64]) -> Vec<MeasuredPoint> {
+        at.iter()
+            .map(|&x| MeasuredPoint { position: UncertainPoint::isotropic(Point::new(x, 0.0, 0.0), 0.0), pixels: None })
+            .collect()
+    }
+
+    #[test]
+    fn three_lists_of_two() {
+        // No pair agrees: cloud distances are far from the model's. Pairs of different model and cloud
+        // points: 3 · 4 = 12, so q = (0 + 1) / (12 + 2) and E_3 = 2³ q³.
+        let (model, cloud) = (model(&[0.0, 1.0, 3.0]), cloud(&[0.0, 100.0, 1000.0, 5000.0, 20000.0, 90000.0]));
+        let candidates = Candidates { lists: vec![vec![0, 1], vec![2, 3], vec![4, 5]] };
+        let problem =
+            Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.1) };
+        let nothing = [Correspondence { model: 9, cloud: 0 }; 3];
+        assert!((expected_sets(&problem, &nothing) / (8.0 / 14f64.powi(3)) - 1.0).abs() < 1e-12);
+        assert_eq!(expected_sets(&problem, &nothing[..2]), f64::INFINITY);
+    }
+
+    #[test]
+    fn subsets_are_weighed_by_their_lists() {
+        // e_3 of (1, 2, 3, 4) = 6 + 8 + 12 + 24.
+        let (model, cloud) = (model(&[0.0, 1.0, 3.0, 7.0]), cloud(&[0.0; 4]));
+        let candidates = Candidates { lists: (1..=4).map(|length| (0..length).collect()).collect() };
+        let problem =
+            Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.1) };
+        assert!((ln_products(&problem, 3).exp() - 50.0).abs() < 1e-9);
+        assert_eq!(ln_products(&problem, 5), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn the_expectation_is_what_clutter_shows() {
+        // No object: five independent points in a box about each of six predictions; the sets of four
+        // that are coherent and unmirrored, counted one by one.
+        let places =
+            [[0.0, 0.0, 0.0], [1.3, 0.0, 0.0], [0.3, -0.9, 0.0], [0.8, 0.6, 0.5], [-0.4, 0.7, 0.9], [0.1, -0.3, 1.2]];
+        let model: Vec<ModelPoint> = places.iter().map(|at| ModelPoint::exact("", Point::from(*at))).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let (mut expected, mut counted) = (0.0, 0.0);
+        for _ in 0..150 {
+            let cloud: Vec<MeasuredPoint> = (0..30)
+                .map(|j| Vector3::from(places[j / 5]) + Vector3::from_fn(|_, _| rng.random_range(-0.25..0.25)))
+                .map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at.into(), 0.01), pixels: None })
+                .collect();
+            let candidates = Candidates { lists: (0..6).map(|i| (5 * i..5 * i + 5).collect()).collect() };
+            let tolerance = Tolerance::Fixed(0.03);
+            let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance };
+            expected += expected_sets(&problem, &[Correspondence { model: 9, cloud: 99 }; 4]);
+            let pairs: Vec<Correspondence> = (0..30).map(|cloud| Correspondence { model: cloud / 5, cloud }).collect();
+            let agree = |a: usize, b: usize| problem.coherent(pairs[a], pairs[b]);
+            for a in 0..30 {
+                for b in (a + 1..30).filter(|&b| agree(a, b)) {
+                    for c in (b + 1..30).filter(|&c| agree(a, c) && agree(b, c)) {
+                        for d in (c + 1..30).filter(|&d| agree(a, d) && agree(b, d) && agree(c, d)) {
+                            let four = [a, b, c, d].map(|i| pairs[i]);
+                            counted += f64::from(u8::from(!crate::search::mirrored(&problem, four)));
+                        }
+                    }
+                }
+            }
+        }
+        let ratio = counted / expected;
+        assert!((0.5..2.0).contains(&ratio), "{counted} counted, {expected} expected");
+    }
+}

@@ -1,5 +1,6 @@
 //! The association graph: candidate pairs as vertices, structural coherence as edges.
 
+use nalgebra::Vector3;
 use seafix_geometry::Point;
 
 use super::bitset::BitMatrix;
@@ -21,37 +22,29 @@ pub(crate) struct Association {
     pub(crate) tests: u64,
 }
 
-/// Cloud distances are tabulated up to this many points (2 MiB).
-const MOST_TABULATED: usize = 512;
-
 impl Association {
     /// The graph of a problem.
     pub(crate) fn of(problem: &Problem<'_>) -> Self {
         let vertices = vertices(problem);
         let mut adjacency = BitMatrix::zeros(vertices.len());
         let mut tests = 0;
-        let quick = Quick::of(problem);
-        // Ranges of vertices of one model point.
-        let mut groups: Vec<std::ops::Range<usize>> = Vec::new();
-        for (index, vertex) in vertices.iter().enumerate() {
-            match groups.last_mut().filter(|group| vertices[group.start].model == vertex.model) {
-                Some(group) => group.end = index + 1,
-                None => groups.push(index..index + 1),
-            }
-        }
-        for (g, first) in groups.iter().enumerate() {
-            for second in &groups[g + 1..] {
-                let known = problem.model[vertices[first.start].model]
-                    .at
-                    .distance(&problem.model[vertices[second.start].model].at);
-                tests += (first.len() * second.len()) as u64;
-                for a in first.clone() {
-                    for b in second.clone() {
-                        let (v, w) = (vertices[a], vertices[b]);
-                        if quick.may_agree(problem, known, v, w) && problem.coherent(v, w) {
-                            adjacency.connect(a, b);
-                        }
-                    }
+        // A cheap necessary condition first, on arrays that lie side by side; the exact test decides.
+        let model: Vec<Vector3<f64>> = vertices.iter().map(|pair| problem.model[pair.model].at.coords).collect();
+        let cloud: Vec<Vector3<f64>> =
+            vertices.iter().map(|pair| problem.cloud[pair.cloud].position.at.coords).collect();
+        let reach: Vec<f64> = vertices.iter().map(|&pair| reach(problem, pair)).collect();
+        let mut near: Vec<bool> = Vec::new();
+        for a in 0..vertices.len() {
+            near.clear();
+            near.extend((a + 1..vertices.len()).map(|b| {
+                let (known, measured) = ((model[b] - model[a]).norm(), (cloud[b] - cloud[a]).norm());
+                (known - measured).abs() <= reach[a] + reach[b]
+            }));
+            tests += near.len() as u64;
+            for (step, _) in near.iter().enumerate().filter(|(_, near)| **near) {
+                let b = a + 1 + step;
+                if problem.coherent(vertices[a], vertices[b]) {
+                    adjacency.connect(a, b);
                 }
             }
         }
@@ -59,52 +52,16 @@ impl Association {
     }
 }
 
-/// A cheap necessary condition of coherence; the exact test decides.
-struct Quick {
-    /// Distances of the cloud, row by row, where they fit.
-    table: Vec<f64>,
-    /// An upper bound of each cloud point's standard deviation in any direction; empty for a fixed Δ.
-    sigma: Vec<f64>,
-    fixed: f64,
-}
-
-impl Quick {
-    fn of(problem: &Problem<'_>) -> Self {
-        let at = |j: usize| problem.cloud[j].position.at;
-        let count = problem.cloud.len();
-        let table = if count <= MOST_TABULATED {
-            (0..count).flat_map(|j| (0..count).map(move |l| at(j).distance(&at(l)))).collect()
-        } else {
-            Vec::new()
-        };
-        let (sigma, fixed) = match problem.tolerance {
-            Tolerance::Fixed(delta) => (Vec::new(), delta),
-            Tolerance::Sigmas(k) => {
-                let bound =
-                    |point: &seafix_geometry::MeasuredPoint| k * point.position.covariance.trace().max(0.0).sqrt();
-                (problem.cloud.iter().map(bound).collect(), 0.0)
-            }
-        };
-        Self { table, sigma, fixed }
-    }
-
-    fn may_agree(&self, problem: &Problem<'_>, known: f64, v: Correspondence, w: Correspondence) -> bool {
-        let measured = if self.table.is_empty() {
-            problem.cloud[v.cloud].position.at.distance(&problem.cloud[w.cloud].position.at)
-        } else {
-            self.table[v.cloud * problem.cloud.len() + w.cloud]
-        };
-        let reach = match problem.tolerance {
-            Tolerance::Fixed(_) => self.fixed,
-            Tolerance::Sigmas(k) => {
-                // √(a² + b²) ≤ a + b, so this is at least Δ.
-                self.sigma[v.cloud]
-                    + self.sigma[w.cloud]
-                    + k * (problem.model[v.model].sigma + problem.model[w.model].sigma)
-            }
-        };
-        (known - measured).abs() <= reach * (1.0 + 1e-9) + 1e-12
-    }
+/// A share of a bound of Δ: that of two pairs is at most the sum of theirs, by √(x² + y²) ≤ x + y.
+fn reach(problem: &Problem<'_>, pair: Correspondence) -> f64 {
+    let bound = match problem.tolerance {
+        Tolerance::Fixed(delta) => 0.5 * delta,
+        Tolerance::Sigmas(k) => {
+            let measured = problem.cloud[pair.cloud].position.covariance.trace().max(0.0).sqrt();
+            k * (measured + problem.model[pair.model].sigma)
+        }
+    };
+    bound * (1.0 + 1e-9) + 1e-12
 }
 
 /// The candidate pairs in the order of their coordinates, model first.

@@ -15,23 +15,13 @@ pub(super) const MOST_ORIENTED: usize = 40;
 /// the answer is proved by a complete test at the end, or not called optimal.
 const FEW_ORIENTED: usize = 16;
 
-/// What a search over cliques is after.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Goal {
-    /// The first of the largest size.
-    Largest,
-    /// All of the least size asked for, up to so many.
-    All {
-        /// No more than this many are kept.
-        cap: usize,
-    },
-}
-
 /// The cliques found and what is proved about the others.
 #[derive(Debug)]
 pub(super) struct Cliques {
-    /// Vertices of each clique, ascending.
+    /// The largest cliques met, up to the cap; vertices ascending.
     pub(super) found: Vec<Vec<usize>>,
+    /// Whether these are all of their size.
+    pub(super) all: bool,
     /// No admissible clique is larger; equal to the size found when the search was complete.
     pub(super) bound: usize,
     /// Whether the search ended by itself.
@@ -55,29 +45,21 @@ pub(super) struct Search<'a> {
     left: u64,
     order: Vec<usize>,
     core: Vec<usize>,
-    goal: Goal,
     /// Least size that is still of interest.
     least: usize,
+    /// The largest cliques so far.
     found: Vec<Vec<usize>>,
+    /// With 1 the first of the largest is kept, with more all of the size of interest.
+    cap: usize,
 }
 
-/// The end of a search before its time: the budget, or as many cliques as were wanted.
+/// The end of a search before its time.
 struct Stop;
 
 impl<'a> Search<'a> {
     pub(super) fn new(problem: &'a Problem<'a>, graph: &'a Association, orientation: bool, budget: u64) -> Self {
         let (order, core) = degeneracy(graph.vertices.len(), &graph.adjacency);
-        Self {
-            problem,
-            graph,
-            orientation,
-            left: budget,
-            order,
-            core,
-            goal: Goal::Largest,
-            least: 1,
-            found: Vec::new(),
-        }
+        Self { problem, graph, orientation, left: budget, order, core, least: 1, found: Vec::new(), cap: 1 }
     }
 
     /// Tests not yet spent.
@@ -90,32 +72,72 @@ impl<'a> Search<'a> {
         self.orientation = orientation;
     }
 
-    /// The cliques of at least `least` members.
-    pub(super) fn run(&mut self, goal: Goal, least: usize) -> Cliques {
-        (self.goal, self.least, self.found) = (goal, least.max(1), Vec::new());
-        if goal == Goal::Largest {
-            self.greedy();
-        }
+    /// The largest cliques of at least `least` members; of those that tie, no more than `cap`.
+    ///
+    /// First one of the largest and the proof that none is larger, then what ties with it, with the
+    /// budget that is left.
+    pub(super) fn run(&mut self, least: usize, cap: usize) -> Cliques {
+        (self.least, self.cap, self.found) = (least.max(1), 1, Vec::new());
+        self.greedy();
         let mut later = BitSet::empty(self.graph.vertices.len());
-        let mut complete = true;
-        let mut bound = 0;
+        let mut open = Vec::new();
+        let (mut complete, mut bound) = (true, 0);
         for position in (0..self.order.len()).rev() {
             let vertex = self.order[position];
+            let tie = self.tie();
             // Cores do not grow towards the front of the order: nothing large is left.
-            if self.core[vertex] + 1 < self.least {
+            if self.core[vertex] + 1 < tie {
                 break;
             }
             let mut neighbours = later.clone();
             neighbours.intersect(self.graph.adjacency.row(vertex));
             later.insert(vertex);
-            if self.within(vertex, neighbours).is_err() {
-                complete = false;
-                bound = self.core[vertex] + 1;
+            let local = Local::of(self.graph, neighbours, tie);
+            if local.vertices.len() + 1 >= tie {
+                open.push(position);
+            }
+            if self.within(vertex, &local).is_err() {
+                (complete, bound) = (false, self.core[vertex] + 1);
                 break;
             }
         }
-        let best = self.found.iter().map(Vec::len).max().unwrap_or(0);
-        Cliques { found: std::mem::take(&mut self.found), bound: bound.min(self.partite()).max(best), complete }
+        let all = complete && self.ties(&open, cap);
+        let mut found = std::mem::take(&mut self.found);
+        found.sort();
+        let best = found.first().map_or(0, Vec::len);
+        Cliques { found, all, bound: bound.min(self.partite()).max(best), complete }
+    }
+
+    /// The size of the largest so far, or the least that is of interest.
+    fn tie(&self) -> usize {
+        self.found.first().map_or(self.least, Vec::len)
+    }
+
+    /// Adds all cliques as large as the largest, from the vertices at these places of the order;
+    /// whether all were met.
+    fn ties(&mut self, open: &[usize], cap: usize) -> bool {
+        if cap <= 1 || self.found.is_empty() {
+            return false;
+        }
+        (self.least, self.cap) = (self.tie(), cap);
+        let first = self.found.pop().expect("there is one");
+        let mut place = vec![0; self.order.len()];
+        self.order.iter().enumerate().for_each(|(position, &vertex)| place[vertex] = position);
+        let mut all = true;
+        for &position in open {
+            let vertex = self.order[position];
+            let mut neighbours = BitSet::empty(place.len());
+            self.graph.adjacency.ones(vertex).filter(|&w| place[w] > position).for_each(|w| neighbours.insert(w));
+            let local = Local::of(self.graph, neighbours, self.least);
+            if self.within(vertex, &local).is_err() {
+                all = false;
+                break;
+            }
+        }
+        if !self.found.contains(&first) {
+            self.found.push(first);
+        }
+        all
     }
 
     /// The n-partite bound of the whole graph.
@@ -180,37 +202,22 @@ impl<'a> Search<'a> {
     fn keep(&mut self, clique: &[usize]) {
         let mut clique = clique.to_vec();
         clique.sort_unstable();
-        match self.goal {
-            Goal::Largest => {
-                self.least = clique.len() + 1;
-                self.found = vec![clique];
-            }
-            Goal::All { .. } => self.found.push(clique),
+        if self.cap == 1 {
+            self.least = clique.len() + 1;
+            self.found.clear();
         }
+        self.found.push(clique);
     }
 
-    /// The cliques of `vertex` and some of `neighbours`.
-    fn within(&mut self, vertex: usize, neighbours: BitSet) -> Result<(), Stop> {
+    /// The cliques of `vertex` and some of its later neighbours.
+    fn within(&mut self, vertex: usize, local: &Local) -> Result<(), Stop> {
         if self.least <= 1 {
-            self.grown(&[vertex])?;
+            self.keep(&[vertex]);
         }
-        let local = Local::of(self.graph, neighbours, self.least);
         if local.vertices.len() + 1 < self.least {
             return Ok(());
         }
-        let all = BitSet::full(local.vertices.len());
-        self.expand(&local, &mut vec![vertex], all)
-    }
-
-    /// A clique of interest was reached.
-    fn grown(&mut self, clique: &[usize]) -> Result<(), Stop> {
-        if clique.len() >= self.least {
-            self.keep(clique);
-            if matches!(self.goal, Goal::All { cap } if self.found.len() >= cap) {
-                return Err(Stop);
-            }
-        }
-        Ok(())
+        self.expand(local, &mut vec![vertex], BitSet::full(local.vertices.len()))
     }
 
     fn expand(&mut self, local: &Local, clique: &mut Vec<usize>, mut candidates: BitSet) -> Result<(), Stop> {
@@ -229,9 +236,13 @@ impl<'a> Search<'a> {
             candidates.remove(vertex);
             self.orient(local, clique, local.vertices[vertex], &mut next)?;
             clique.push(local.vertices[vertex]);
-            self.grown(clique)?;
-            let full = matches!(self.goal, Goal::All { .. }) && clique.len() >= self.least;
-            let result = if next.is_empty() || full { Ok(()) } else { self.expand(local, clique, next) };
+            if clique.len() >= self.least {
+                self.keep(clique);
+                if self.cap > 1 && self.found.len() >= self.cap {
+                    return Err(Stop);
+                }
+            }
+            let result = if next.is_empty() { Ok(()) } else { self.expand(local, clique, next) };
             clique.pop();
             result?;
         }
@@ -299,9 +310,7 @@ impl Local {
         let place: HashMap<usize, usize> = vertices.iter().enumerate().map(|(i, &v)| (v, i)).collect();
         let mut adjacency = BitMatrix::zeros(vertices.len());
         for (i, &v) in vertices.iter().enumerate() {
-            let mut neighbours = members.clone();
-            neighbours.intersect(graph.adjacency.row(v));
-            neighbours.iter().filter_map(|w| place.get(&w)).for_each(|&k| adjacency.connect(i, k));
+            members.shared(graph.adjacency.row(v)).filter_map(|w| place.get(&w)).for_each(|&k| adjacency.connect(i, k));
         }
         let models = numbered(vertices.iter().map(|&v| graph.vertices[v].model));
         let clouds = numbered(vertices.iter().map(|&v| graph.vertices[v].cloud));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     BUDGET, Identification, Search, Unidentified,
     association::Association,
-    clique::{self, Goal, MOST_ORIENTED},
+    clique::{self, MOST_ORIENTED},
     orientation::{fours, mirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Observations, Problem, solve::least_squares};
@@ -58,7 +58,7 @@ impl Search for MaximumClique {
         }
         let graph = Association::of(problem);
         let mut cliques = clique::Search::new(problem, &graph, self.orientation, self.budget);
-        let largest = cliques.run(Goal::Largest, 1);
+        let largest = cliques.run(1, MOST_TIES);
         let size = largest.found.first().map_or(0, Vec::len);
         if size < NEEDED {
             return Err(match largest.complete {
@@ -70,15 +70,7 @@ impl Search for MaximumClique {
             self.refuse_mirrored(problem, &graph, &mut cliques)?;
         }
         let mut optimal = largest.complete;
-        let (mut ties, mut rivals_complete) = (largest.found, false);
-        if optimal {
-            let all = cliques.run(Goal::All { cap: MOST_TIES }, size);
-            rivals_complete = all.complete;
-            // The first found stays in, should the budget have ended before it was met again.
-            ties.extend(all.found);
-        }
-        ties.sort();
-        ties.dedup();
+        let mut ties = largest.found;
         let best = least_residual(problem, &graph, &ties);
         let pairs = pairs_of(&graph, &ties.swap_remove(best));
         let ties: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
@@ -89,7 +81,7 @@ impl Search for MaximumClique {
         Ok(Identification {
             pairs,
             rivals,
-            rivals_complete: rivals_complete && !dropped,
+            rivals_complete: largest.all && !dropped,
             optimal,
             size_bound: largest.bound,
             tests: graph.tests + (self.budget - cliques.left()),
@@ -107,7 +99,7 @@ impl MaximumClique {
         cliques: &mut clique::Search<'_>,
     ) -> Result<(), Unidentified> {
         cliques.set_orientation(false);
-        let coherent = cliques.run(Goal::Largest, NEEDED + 1);
+        let coherent = cliques.run(NEEDED + 1, 1);
         cliques.set_orientation(true);
         match coherent.found.first().map(|clique| pairs_of(graph, clique)) {
             Some(set) if wholly_mirrored(problem, &set) => Err(Unidentified::Mirrored { best: set.len() }),

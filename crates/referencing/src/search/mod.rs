@@ -5,7 +5,7 @@ use seafix_component::{Registry, entry};
 
 use crate::{Correspondence, Problem};
 
-pub(crate) mod association;
+mod association;
 mod bitset;
 mod clique;
 mod maximum_clique;
@@ -13,6 +13,8 @@ mod orientation;
 mod structural_coherence;
 
 pub use maximum_clique::MaximumClique;
+#[cfg(test)]
+pub(crate) use orientation::mirrored;
 pub use structural_coherence::{Samples, StructuralCoherence};
 
 /// Decides which cloud points are which model points.

@@ -1,1 +1,217 @@
-//! Hand-worked sites.
+//! Hand-worked sites: one good, and every way to break it.
+
+use std::path::Path;
+
+use seafix_geometry::Point;
+
+use super::*;
+
+/// Two objects: a plate at (10, 20, 30) with the world's axes, and a frame 5 m north of it.
+const GOOD: &str = r#"
+format = "seafix-site/1"
+name = "yard"
+axes = "p1p3-x/p1p2xp1p3-z/zx-y"
+site_frame = "plate"
+[[object]]
+id = "plate"
+base = ["A", "B", "C"]
+base_in_world = [[10.0, 20.0, 30.0], [10.0, 19.0, 30.0], [12.0, 20.0, 30.0]]
+survey_sigma = 0.01
+[[object.point]]
+id = "A"
+at = [0.0, 0.0, 0.0]
+sigma = 0.001
+normal = [0.0, 0.0, 2.0]
+[[object.point]]
+id = "B"
+at = [0.0, -1.0, 0.0]
+[[object.point]]
+id = "C"
+at = [2.0, 0.0, 0.0]
+[[object.interest]]
+id = "valve"
+at = [1.0, 0.5, 0.25]
+[[object]]
+id = "frame"
+base = ["A", "B", "C"]
+base_in_world = [[15.0, 20.0, 30.0], [15.0, 19.0, 30.0], [16.0, 20.0, 30.0]]
+survey_sigma = 0.02
+[[object.point]]
+id = "A"
+at = [0.0, 0.0, 0.0]
+[[object.point]]
+id = "B"
+at = [0.0, -1.0, 0.0]
+[[object.point]]
+id = "C"
+at = [1.0, 0.0, 0.0]
+[[object.point]]
+id = "D"
+at = [0.5, 0.5, -1.0]
+"#;
+
+fn parse(text: &str) -> Result<Site, Vec<Fault>> {
+    Site::parse(text, Path::new("site.toml"))
+}
+
+/// The faults of the good site after one replacement, as they are printed.
+fn faults(from: &str, to: &str) -> Vec<String> {
+    assert!(GOOD.contains(from), "the good site has no `{from}`");
+    parse(&GOOD.replacen(from, to, 1)).expect_err("the site is broken").iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn a_good_site_stands_where_it_was_surveyed() {
+    let site = parse(GOOD).unwrap();
+    assert!(site.warnings.is_empty(), "{:?}", site.warnings);
+    let plate = site.frame_object();
+    assert_eq!((plate.id.as_str(), plate.base, plate.distance(1, 2)), ("plate", [0, 1, 2], 5f64.sqrt()));
+    let at = plate.world_from_object.unwrap() * Point::new(1.0, 1.0, 1.0);
+    assert!(at.distance(&Point::new(11.0, 21.0, 31.0)) < 1e-12, "{at:?}");
+    assert_eq!(plate.points[0].normal, Some(Vector3::z()), "normals become unit vectors");
+    let shell = site.shell_in_world().unwrap();
+    assert!(shell.min.distance(&Point::new(10.0, 19.0, 29.0)) < 1e-12, "{shell:?}");
+    assert!(shell.max.distance(&Point::new(16.0, 20.5, 30.0)) < 1e-12, "{shell:?}");
+}
+
+#[test]
+fn a_site_written_and_read_is_the_same() {
+    let site = parse(GOOD).unwrap();
+    assert_eq!(parse(&site.to_toml()).unwrap(), site);
+}
+
+#[test]
+fn the_whole_site_is_one_target_in_its_frame() {
+    let site = parse(GOOD).unwrap();
+    let [target] = &site.targets(TargetKind::Site).unwrap()[..] else { panic!("one target") };
+    let ids: Vec<&str> = target.points.iter().map(|point| point.id.as_str()).collect();
+    assert_eq!(ids, ["plate/A", "plate/B", "plate/C", "frame/A", "frame/B", "frame/C", "frame/D"]);
+    assert_eq!(target.points[2].at, Point::new(2.0, 0.0, 0.0), "the frame object's own points are not touched");
+    assert!(target.points[6].at.distance(&Point::new(5.5, 0.5, -1.0)) < 1e-12);
+    assert_eq!(target.points[0].sigma, 0.001);
+    assert!((target.points[6].sigma - 0.01f64.hypot(0.02)).abs() < 1e-15, "the survey is between the objects");
+    assert!((target.diameter() - (6f64 * 6.0 + 1.0).sqrt()).abs() < 1e-12, "plate/B to frame/C");
+    let targets = site.targets(TargetKind::Object).unwrap();
+    assert_eq!(targets.iter().map(|target| target.points.len()).collect::<Vec<_>>(), [3, 4]);
+}
+
+#[test]
+fn a_site_without_a_world_has_objects_only() {
+    let text = GOOD.replace("base_in_world = [[15.0, 20.0, 30.0], [15.0, 19.0, 30.0], [16.0, 20.0, 30.0]]\n", "");
+    let site = parse(&text).unwrap();
+    assert_eq!(site.targets(TargetKind::Site), Err(NoWorld { object: "frame".to_owned() }));
+    assert_eq!(site.targets(TargetKind::Object).unwrap().len(), 2);
+    assert_eq!(site.shell_in_world(), None);
+}
+
+#[test]
+fn not_a_number_names_its_point() {
+    let found = faults("at = [0.0, -1.0, 0.0]", "at = [0.0, nan, 0.0]");
+    let expected = "object `plate`, point `B`: `at` is not finite in site.toml:18: [0.0, NaN, 0.0]; \
+                    give finite numbers, in metres";
+    assert_eq!(found, [expected]);
+}
+
+#[test]
+fn two_points_are_too_few() {
+    let found = faults("[[object.point]]\nid = \"C\"\nat = [2.0, 0.0, 0.0]\n", "");
+    assert!(found[0].starts_with("object `plate` has too few points in site.toml:6: 2 points"), "{found:?}");
+    assert!(found[1].contains("base names no point in site.toml:8: `C`"), "{found:?}");
+}
+
+#[test]
+fn a_collinear_base_is_refused_with_its_sine() {
+    let found = faults("at = [0.0, -1.0, 0.0]", "at = [1.0, -0.0005, 0.0]");
+    assert!(
+        found[0].starts_with("object `plate`: the base is collinear in site.toml:8: sine 5.00e-4 at P1"),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_nearly_collinear_base_is_a_warning() {
+    let text = GOOD.replacen("at = [0.0, -1.0, 0.0]", "at = [1.0, -0.05, 0.0]", 1);
+    let site = parse(&text.replacen("[10.0, 19.0, 30.0]", "[11.0, 19.95, 30.0]", 1)).unwrap();
+    assert!(site.warnings[0].to_string().contains("the base is nearly collinear"), "{:?}", site.warnings);
+}
+
+#[test]
+fn points_in_one_place_are_refused_by_both_names() {
+    let found = faults("at = [0.5, 0.5, -1.0]", "at = [1.0, 0.0, 1e-7]");
+    assert_eq!(found, ["object `frame`: two points in one place in site.toml:39: `C` and `D`; remove one"]);
+}
+
+#[test]
+fn an_id_used_twice_names_both_lines() {
+    let found = faults("id = \"D\"", "id = \"B\"");
+    let expected =
+        "object `frame`: point id is used twice in site.toml:40: `B`; it is already used on line 34; give each its own";
+    assert_eq!(found, [expected]);
+    let found = faults("id = \"frame\"", "id = \"plate\"");
+    assert!(
+        found[0].starts_with("object id is used twice in site.toml:24: `plate`; it is already used on line 7"),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn an_unknown_name_is_answered_with_the_nearest() {
+    assert!(
+        faults("site_frame = \"plate\"", "site_frame = \"plat\"")[0].ends_with(":5: `plat`; did you mean `plate`?")
+    );
+    let found = faults("site_frame", "site_farme");
+    assert_eq!(found, ["unknown key in site.toml:5: `site_farme`; did you mean `site_frame`?"]);
+    assert!(faults("seafix-site/1", "seafix-site/2")[0].contains("unknown format in site.toml:2: `seafix-site/2`"));
+}
+
+#[test]
+fn millimetres_are_suspected() {
+    let text = r#"
+format = "seafix-site/1"
+name = "mm"
+axes = "p1p3-x/p1p2xp1p3-z/zx-y"
+site_frame = "o"
+[[object]]
+id = "o"
+base = ["A", "B", "C"]
+point = [{ id = "A", at = [0, 0, 0] }, { id = "B", at = [0, -1500.0, 0] }, { id = "C", at = [2000.0, 0, 0] }]
+"#;
+    let text = text
+        .replace("[0, 0, 0]", "[0.0, 0.0, 0.0]")
+        .replace("-1500.0, 0]", "-1500.0, 0.0]")
+        .replace("[0, -", "[0.0, -");
+    let text = text.replace("[2000.0, 0, 0]", "[2000.0, 0.0, 0.0]");
+    let site = parse(&text).unwrap();
+    assert!(site.warnings[0].to_string().starts_with("object `o`: units? in site.toml:6"), "{:?}", site.warnings);
+    let far = text.replace("2000.0", "2000000.0");
+    assert!(parse(&far).unwrap_err()[0].to_string().starts_with("object `o`: units?"));
+}
+
+#[test]
+fn the_base_obeys_the_rule_of_axes() {
+    // P2 on the other side: the sign that does not cancel in Eq. (1).
+    let found = faults("at = [0.0, -1.0, 0.0]", "at = [0.0, 1.0, 0.0]");
+    assert!(found[0].starts_with("object `plate`: the base breaks the rule of axes in site.toml:8"), "{found:?}");
+    assert!(found[0].contains("P2 = [0, -1, 0], P3 = [2, 0, 0]"), "{found:?}");
+}
+
+#[test]
+fn survey_and_model_must_agree() {
+    let found = faults("[12.0, 20.0, 30.0]", "[12.2, 20.0, 30.0]");
+    assert_eq!(found.len(), 2, "P1 P3 and P2 P3: {found:?}");
+    assert!(
+        found[0].contains("disagree on P1 P3 in site.toml:9: 2.2000 m surveyed, 2.0000 m in the model"),
+        "{found:?}"
+    );
+    // Within four standard deviations of a distance it is a survey.
+    assert!(parse(&GOOD.replacen("[12.0, 20.0, 30.0]", "[12.03, 20.0, 30.0]", 1)).is_ok());
+}
+
+#[test]
+fn all_faults_come_at_once() {
+    let text = GOOD
+        .replace("survey_sigma = 0.02", "survey_sigma = -1.0")
+        .replace("at = [2.0, 0.0, 0.0]", "at = [inf, 0.0, 0.0]");
+    let found = parse(&text.replace("site_frame = \"plate\"", "site_frame = \"x\"")).unwrap_err();
+    assert_eq!(found.len(), 3, "{found:?}");
+}

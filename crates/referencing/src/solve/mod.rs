@@ -9,6 +9,8 @@ mod kabsch;
 pub(crate) mod likelihood;
 mod numerical;
 mod spread;
+#[cfg(test)]
+mod tests;
 mod triad;
 
 pub use kabsch::Kabsch;

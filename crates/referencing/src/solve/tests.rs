@@ -1,0 +1,137 @@
+//! What both solvers owe, and what each does in its own way.
+
+use nalgebra::{Matrix3, Vector3, Vector6};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{Camera, Object, Point, Transform, UncertainPoint};
+
+use super::*;
+use crate::Observation;
+
+fn motion() -> Transform<Object, Camera> {
+    Transform::exp(&Vector6::new(0.4, -1.1, 0.7, 1.5, -2.0, 3.0))
+}
+
+/// Exact observations of these model points.
+fn seen(model: &[[f64; 3]], sigma: f64) -> Observations<'static> {
+    let points = model.iter().map(|at| {
+        let model = Point::from(*at);
+        let measured = UncertainPoint::isotropic(motion().inverse() * model, sigma);
+        Observation { measured, pixels: None, model, model_sigma: 0.0 }
+    });
+    Observations { points: points.collect(), rig: None }
+}
+
+const SPREAD: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.4, 0.3, 0.9], [-0.7, 0.5, 0.4]];
+
+fn solvers() -> Vec<Box<dyn Solver>> {
+    SOLVERS.names().map(|name| SOLVERS.build(&seafix_component::Choice::named(name)).unwrap()).collect()
+}
+
+#[test]
+fn exact_data_give_the_exact_pose() {
+    for solver in solvers() {
+        let found = solver.solve(&seen(&SPREAD, 0.01)).unwrap();
+        assert!(motion().error_to(&found).amax() < 1e-12, "{solver:?}: {}", motion().error_to(&found));
+    }
+}
+
+#[test]
+fn flat_and_slender_sets_lose_no_digits() {
+    let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+    let slender = [[0.0, 0.0, 0.0], [1.0, 0.01, 0.0], [2.0, 0.0, 0.01], [3.0, -0.01, 0.0]];
+    for (points, limit) in [(flat, 1e-13), (slender, 1e-11)] {
+        let found = Kabsch::default().solve(&seen(&points, 0.01)).unwrap();
+        assert!(motion().error_to(&found).amax() < limit, "{}", motion().error_to(&found));
+    }
+}
+
+#[test]
+fn a_reflection_is_never_the_answer() {
+    let mut data = seen(&SPREAD, 0.01);
+    for point in &mut data.points {
+        point.measured.at.coords.z *= -1.0;
+    }
+    let found = Kabsch::default().solve(&data).unwrap();
+    assert!((found.rotation_matrix().determinant() - 1.0).abs() < 1e-12);
+    assert!(data.residual_rms(&found) > 0.1, "a mirror image fits no rigid motion");
+}
+
+#[test]
+fn kabsch_has_the_least_residual_of_all_poses() {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut data = seen(&SPREAD, 0.02);
+    for point in &mut data.points {
+        point.measured.at = point.measured.at + Vector3::from_fn(|_, _| rng.random_range(-0.03..0.03));
+    }
+    let best = Kabsch::default().solve(&data).unwrap();
+    let triad = Triad::default().solve(&data).unwrap();
+    assert!(data.residual_rms(&best) <= data.residual_rms(&triad));
+    for _ in 0..1000 {
+        let xi = Vector6::from_fn(|_, _| rng.random_range(-0.01..0.01));
+        assert!(data.residual_rms(&best) <= data.residual_rms(&best.perturbed(&xi)));
+    }
+}
+
+#[test]
+fn what_determines_no_pose_is_refused_with_its_number() {
+    let line = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1e-5, 0.0]];
+    for solver in solvers() {
+        assert_eq!(solver.solve(&seen(&SPREAD[..2], 0.01)), Err(Degenerate::TooFew { found: 2, needed: 3 }));
+        assert!(matches!(solver.solve(&seen(&line, 0.01)), Err(Degenerate::Collinear { .. })), "{solver:?}");
+        let mut data = seen(&SPREAD, 0.01);
+        data.points[1].measured.at.coords.y = f64::NAN;
+        assert_eq!(solver.solve(&data), Err(Degenerate::NotFinite));
+        assert!(matches!(solver.solve(&seen(&[[1.0, 2.0, 3.0]; 3], 0.01)), Err(Degenerate::Collinear { .. })));
+    }
+}
+
+#[test]
+fn the_triad_says_which_three_it_took() {
+    let data = seen(&[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [3.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.01);
+    let used = |choose| Triad { choose, ..Triad::default() }.used(&data);
+    assert_eq!(used(Choose::First), [0, 1, 2]);
+    assert_eq!(used(Choose::LargestArea), [1, 3, 4].map(|i| if i == 1 { 0 } else { i }));
+    assert_eq!(used(Choose::SmallestCovariance).len(), 3);
+    assert_eq!(Kabsch::default().used(&data), [0, 1, 2, 3, 4]);
+    assert!(Triad::default().used(&seen(&SPREAD[..2], 0.01)).is_empty());
+}
+
+#[test]
+fn the_covariance_of_kabsch_is_that_of_least_squares() {
+    // With equal weights: σ² (Σ JᵀJ)⁻¹, J = [ [p]×, −I ].
+    let data = seen(&SPREAD, 0.02);
+    let covariance = Kabsch::default().covariance(&data, &motion()).unwrap();
+    let mut normal = nalgebra::Matrix6::zeros();
+    for point in &data.points {
+        let mut j = nalgebra::Matrix3x6::zeros();
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&seafix_geometry::so3::skew(&point.measured.at.coords));
+        j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-Matrix3::identity());
+        normal += j.transpose() * j;
+    }
+    let expected = normal.try_inverse().unwrap() * 0.02 * 0.02;
+    assert!((covariance.matrix - expected).amax() < 1e-6 * expected.amax());
+}
+
+#[test]
+fn the_covariance_is_what_many_draws_show() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let clean = seen(&SPREAD, 0.003);
+    for solver in solvers() {
+        let covariance = solver.covariance(&clean, &motion()).unwrap().matrix;
+        let weight = covariance.cholesky().unwrap();
+        let draws = 1500;
+        let mut nees = 0.0;
+        for _ in 0..draws {
+            let mut data = clean.clone();
+            for point in &mut data.points {
+                // The sum of twelve uniform numbers: variance 1.
+                let normal = Vector3::from_fn(|_, _| (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>());
+                point.measured.at = point.measured.at + normal * 0.003;
+            }
+            let xi = solver.solve(&data).unwrap().error_to(&motion());
+            nees += xi.dot(&weight.solve(&xi)) / f64::from(draws);
+        }
+        assert!((5.6..6.4).contains(&nees), "{solver:?}: NEES {nees}");
+    }
+}

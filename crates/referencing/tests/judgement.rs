@@ -1,0 +1,224 @@
+//! When a pose is believed, and what is said when it is not.
+
+use nalgebra::{Vector3, Vector6};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint};
+use seafix_referencing::{
+    Acceptance, Attempt, Candidates, Correspondence, Kabsch, MaximumClique, ModelPoint, Outcome, Prior, PriorBound,
+    Problem, Refusal, StructuralCoherence, Tolerance, Unidentified, reference,
+};
+
+const SIGMA: f64 = 0.005;
+
+/// Seven points without symmetry.
+const MODEL: [[f64; 3]; 7] = [
+    [0.0, 0.0, 0.0],
+    [1.3, 0.0, 0.0],
+    [0.3, -0.9, 0.0],
+    [0.8, 0.6, 0.5],
+    [-0.4, 0.7, 0.9],
+    [0.1, -0.3, 1.2],
+    [1.1, -0.5, 0.8],
+];
+
+fn motion() -> Transform<Object, Camera> {
+    Transform::exp(&Vector6::new(0.3, -0.2, 0.5, 0.1, 0.2, -3.0))
+}
+
+fn model_of(places: &[[f64; 3]]) -> Vec<ModelPoint> {
+    places.iter().enumerate().map(|(i, at)| ModelPoint::exact(i.to_string(), Point::from(*at))).collect()
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>())
+}
+
+/// The model seen from the pose with noise; point i of the cloud is point i of the model.
+fn cloud_of(model: &[ModelPoint], rng: &mut ChaCha8Rng) -> Vec<MeasuredPoint> {
+    let seen = model.iter().map(|point| motion().inverse() * point.at + normal(rng) * SIGMA);
+    seen.map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None }).collect()
+}
+
+fn attempt(model: &[ModelPoint], cloud: &[MeasuredPoint], candidates: &Candidates, prior: Option<&Prior>) -> Attempt {
+    let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Sigmas(4.0) };
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let (search, solver) = (MaximumClique::default(), Kabsch::default());
+    reference(&problem, prior, &search, &solver, &Acceptance::default(), None, &mut rng)
+}
+
+#[test]
+fn a_model_in_view_is_referenced() {
+    let (model, mut rng) = (model_of(&MODEL), ChaCha8Rng::seed_from_u64(1));
+    let mut cloud = cloud_of(&model, &mut rng);
+    for _ in 0..20 {
+        let at = Point::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(2.0..4.0));
+        cloud.push(MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None });
+    }
+    let found = attempt(&model, &cloud, &Candidates::all(7, 27), None);
+    let Outcome::Referenced(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
+    assert_eq!(fix.pairs, (0..7).map(|i| Correspondence { model: i, cloud: i }).collect::<Vec<_>>());
+    assert_eq!((found.optimal, found.size_bound, &found.identified), (true, Some(7), &fix.pairs));
+    assert!(found.expected_chance_sets.unwrap() < 1e-6);
+    let xi = fix.object_from_camera.error_to(&motion());
+    assert!(xi.dot(&fix.covariance.matrix.cholesky().unwrap().solve(&xi)) < 22.5, "within its covariance");
+    assert_eq!(found.outcome.reason(), None);
+}
+
+#[test]
+fn true_sets_pass_the_residual_gate_at_the_stated_confidence() {
+    // 0.999: of 2000 true sets 2 fail on average; 10 or more would be a chance of 5e-5.
+    let model = model_of(&MODEL);
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
+    let prior = Prior { object_from_camera: motion(), bound: PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05)) };
+    let mut gated = 0;
+    for _ in 0..2000 {
+        let cloud = cloud_of(&model, &mut rng);
+        let of_prior = Prior {
+            object_from_camera: motion().perturbed(&{
+                let (phi, rho) = (normal(&mut rng) * 0.02, normal(&mut rng) * 0.05);
+                Vector6::new(phi.x, phi.y, phi.z, rho.x, rho.y, rho.z)
+            }),
+            ..prior.clone()
+        };
+        let found = attempt(&model, &cloud, &candidates, Some(&of_prior));
+        gated += usize::from(found.outcome.reason() == Some("gate"));
+    }
+    assert!(gated < 14, "{gated} of 2000 true sets fell at two gates of 0.999");
+}
+
+#[test]
+fn a_set_that_fits_no_rigid_motion_falls_at_the_residuals() {
+    // One Δ of 20 σ lets a displaced point agree with all others; the residual does not.
+    let model = model_of(&MODEL);
+    let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(3));
+    cloud[4].position.at = cloud[4].position.at + Vector3::new(0.0, 0.0, 12.0 * SIGMA);
+    let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
+    let problem =
+        Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(20.0 * SIGMA) };
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let (search, solver) = (MaximumClique::default(), Kabsch::default());
+    let found = reference(&problem, None, &search, &solver, &Acceptance::default(), None, &mut rng);
+    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
+    assert_eq!((found.outcome.name(), found.outcome.reason()), ("unidentified", Some("gate")));
+}
+
+#[test]
+fn a_pose_against_the_prior_falls() {
+    let model = model_of(&MODEL);
+    let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(4));
+    let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
+    let elsewhere = motion().perturbed(&Vector6::new(0.0, 0.0, 0.0, 0.5, 0.0, 0.0));
+    for (bound, passes) in [
+        (PriorBound::Box(0.4), false),
+        (PriorBound::Box(0.6), true),
+        (PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05)), false),
+        (PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.2)), true),
+    ] {
+        let prior = Prior { object_from_camera: elsewhere, bound };
+        let found = attempt(&model, &cloud, &candidates, Some(&prior));
+        assert_eq!(matches!(found.outcome, Outcome::Referenced(_)), passes, "{:?}: {:?}", prior.bound, found.outcome);
+        assert!(passes || matches!(found.outcome, Outcome::Unidentified(Refusal::Prior { off }) if off > 1.0));
+    }
+}
+
+/// A square pyramid's base and tip: turned by a quarter it is itself.
+const PYRAMID: [[f64; 3]; 8] = [
+    [1.0, 1.0, 0.0],
+    [-1.0, 1.0, 0.0],
+    [-1.0, -1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [0.5, 0.5, 0.7],
+    [-0.5, 0.5, 0.7],
+    [-0.5, -0.5, 0.7],
+    [0.5, -0.5, 0.7],
+];
+
+#[test]
+fn a_symmetric_object_is_ambiguous_until_the_prior_decides() {
+    let model = model_of(&PYRAMID);
+    let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(5));
+    let found = attempt(&model, &cloud, &Candidates::all(8, 8), None);
+    let Outcome::Ambiguous(rivals) = &found.outcome else { panic!("{:?}", found.outcome) };
+    assert_eq!(rivals.len(), 4, "four quarter turns");
+    assert!(rivals.windows(2).all(|two| two[0].score >= two[1].score), "the likeliest first");
+    assert_eq!((found.outcome.reason(), found.margin().unwrap() >= 0.0), (Some("rivals"), true));
+    let bound = PriorBound::Gaussian(Covariance6::isotropic(0.1, 0.1));
+    let found = attempt(&model, &cloud, &Candidates::all(8, 8), Some(&Prior { object_from_camera: motion(), bound }));
+    let Outcome::Referenced(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
+    assert!(fix.object_from_camera.error_to(&motion()).amax() < 0.02);
+    let runner_up = found.runner_up.as_ref().expect("the other turns were looked at");
+    assert!(runner_up.score < fix.score && found.margin().unwrap() > 10.0);
+}
+
+#[test]
+fn a_mirror_image_is_refused_by_name() {
+    let model = model_of(&MODEL);
+    let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(6));
+    for point in &mut cloud {
+        point.position.at.coords.x *= -1.0;
+    }
+    let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
+    let found = attempt(&model, &cloud, &candidates, None);
+    let expected = Refusal::Search(Unidentified::Mirrored { best: 7 });
+    assert_eq!(found.outcome, Outcome::Unidentified(expected));
+    assert_eq!(found.outcome.reason(), Some("mirrored"));
+    // The paper's distances alone accept it; no rigid motion then fits.
+    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Sigmas(4.0) };
+    let search = StructuralCoherence { orientation: false, ..StructuralCoherence::default() };
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let found = reference(&problem, None, &search, &Kabsch::default(), &Acceptance::default(), None, &mut rng);
+    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
+}
+
+#[test]
+fn clutter_alone_is_chance_or_less() {
+    let model = model_of(&MODEL);
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    for round in 0..200 {
+        let place = |rng: &mut ChaCha8Rng| {
+            Point::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(2.0..4.0))
+        };
+        let cloud: Vec<MeasuredPoint> = (0..30)
+            .map(|_| MeasuredPoint { position: UncertainPoint::isotropic(place(&mut rng), SIGMA), pixels: None })
+            .collect();
+        let found = attempt(&model, &cloud, &Candidates::all(7, 30), None);
+        assert!(!matches!(found.outcome, Outcome::Referenced(_)), "round {round}: {:?}", found.outcome);
+    }
+}
+
+#[test]
+fn too_few_are_too_few() {
+    let model = model_of(&MODEL);
+    let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(10));
+    for cloud in [&cloud[..0], &cloud[..2]] {
+        let candidates = Candidates::from_pairs(7, (0..cloud.len()).map(|i| (i, i)));
+        let found = attempt(&model, cloud, &candidates, None);
+        assert_eq!((found.outcome.name(), found.outcome.reason()), ("unidentified", Some("too-few")));
+    }
+}
+
+#[test]
+fn a_blow_up_stops_at_the_budget_with_an_honest_bound() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let places: Vec<[f64; 3]> = (0..50).map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0))).collect();
+    let model = model_of(&places);
+    let cloud: Vec<MeasuredPoint> = (0..100)
+        .map(|_| Point::from(std::array::from_fn::<f64, 3, _>(|_| rng.random_range(-1.0..1.0))))
+        .map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None })
+        .collect();
+    let candidates = Candidates::all(50, 100);
+    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.05) };
+    let search = StructuralCoherence { budget: 100_000, ..StructuralCoherence::default() };
+    let solver = Kabsch::default();
+    let found = reference(&problem, None, &search, &solver, &Acceptance::default(), None, &mut rng);
+    let Outcome::Unidentified(Refusal::Search(Unidentified::Budget { best, bound, .. })) = found.outcome else {
+        panic!("{:?}", found.outcome)
+    };
+    assert!(best >= 1 && bound == 50 && !found.optimal, "{best} {bound}");
+    let search = MaximumClique { budget: 10_000, ..MaximumClique::default() };
+    let found = reference(&problem, None, &search, &solver, &Acceptance::default(), None, &mut rng);
+    assert!(!found.optimal && found.size_bound.unwrap() <= 50, "{found:?}");
+    assert!(!matches!(found.outcome, Outcome::Referenced(_)));
+}
