@@ -43,14 +43,24 @@ fn conditions(run: &Run, trial: Option<&Trial>) -> Markup {
     let rig = &header.rig;
     let t = rig.right_from_left.map(|row| row[3]);
     let baseline = t[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
+    let sources = match trial {
+        Some(trial) => vec![trial.header.source.clone()],
+        None => distinct(run.trials.iter().map(|trial| trial.header.source.clone())),
+    };
     html! {
-        "Source: " (header.source) "; " (rig.left.size[0]) " × " (rig.left.size[1]) " px, f = "
+        "Source: " (sources.join("; ")) "; " (rig.left.size[0]) " × " (rig.left.size[1]) " px, f = "
         (format!("{:.0}", rig.left.matrix[0][0])) " px, baseline " (format!("{baseline:.2}")) " m"
+        @if trial.is_none() { "; " (frames(run)) " a trial" }
         @if let Some(trial) = trial {
             @for axis in &trial.header.axes { "; " (short(&axis.key)) " " (axis.value) }
         }
         "."
     }
+}
+
+/// How many frames a trial has.
+fn frames(run: &Run) -> String {
+    distinct(run.trials.iter().map(|trial| counted(trial.frames.len(), "frame", "frames"))).join(" or ")
 }
 
 /// m1 and m2 over the conditions, or over the frames where nothing but the method varies.
