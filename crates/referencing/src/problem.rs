@@ -17,6 +17,7 @@ pub struct Prior {
 
 /// How far a prior may be off.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "there is one prior a search, and it is passed by reference")]
 pub enum PriorBound {
     /// Gaussian: the covariance of ξ in `T_true = T_prior · Exp(ξ)`.
     Gaussian(Covariance6<Object, Camera>),

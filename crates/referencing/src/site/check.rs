@@ -224,9 +224,9 @@ fn spread(check: &mut Checker<'_>, points: &[ModelPoint], of: &str, number: &str
         .at(format!("{of}: units?"), &["object", number])
         .value(format!("its points lie within {extent} m of each other"))
         .remedy("coordinates are in metres");
-    if extent < IMPOSSIBLE[0] || extent > IMPOSSIBLE[1] {
+    if !(IMPOSSIBLE[0]..=IMPOSSIBLE[1]).contains(&extent) {
         check.fault(fault);
-    } else if extent < SUSPICIOUS[0] || extent > SUSPICIOUS[1] {
+    } else if !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
         check.warnings.push(fault);
     }
 }

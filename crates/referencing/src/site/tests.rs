@@ -149,7 +149,7 @@ fn an_id_used_twice_names_both_lines() {
     assert_eq!(found, [expected]);
     let found = faults("id = \"frame\"", "id = \"plate\"");
     assert!(
-        found[0].starts_with("object id is used twice in site.toml:24: `plate`; it is already used on line 7"),
+        found[0].starts_with("object id is used twice in site.toml:26: `plate`; it is already used on line 7"),
         "{found:?}"
     );
 }
