@@ -1,7 +1,5 @@
 //! The `seafix` command.
 
-#![allow(clippy::print_stdout, clippy::print_stderr)]
-
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -24,7 +22,7 @@ fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
             for line in &failure.lines {
-                eprintln!("error: {line}");
+                terminal::tell(&format!("error: {line}"));
             }
             ExitCode::from(failure.code)
         }

@@ -20,6 +20,11 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// Tells the person on standard error; a run does not stop because nobody listens.
+pub(crate) fn tell(line: &str) {
+    let _ = writeln!(stderr(), "{line}");
+}
+
 /// Shows the progress of a run on standard error: a bar where it is a terminal, else a line now and then.
 pub(crate) struct Progress {
     bar: ProgressBar,
@@ -40,7 +45,7 @@ impl Progress {
 
 impl Observer for Progress {
     fn begins(&self, frames: usize, bytes: u64, folder: &Path) {
-        eprintln!("{frames} frames, about {} MB of log, into {}", bytes.div_ceil(1_000_000), folder.display());
+        tell(&format!("{frames} frames, about {} MB of log, into {}", bytes.div_ceil(1_000_000), folder.display()));
         self.bar.set_length(frames as u64);
         if self.watched {
             self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
@@ -55,7 +60,7 @@ impl Observer for Progress {
             // A log file gets a line at every tenth of the way.
             let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(1).max(1));
             if done * 10 / all != (done - 1) * 10 / all {
-                eprintln!("{done}/{all} frames");
+                tell(&format!("{done}/{all} frames"));
             }
         }
     }

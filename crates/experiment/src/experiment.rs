@@ -6,8 +6,9 @@ use seafix_component::{BuildError, Choice, Fault, line_of};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Axis, Pipeline, Stages, read_text,
+    Axis, Pipeline, Stages,
     pipeline::PipelineError,
+    read_text,
     source::{SOURCES, Source},
     vary,
 };
@@ -96,7 +97,8 @@ impl Unfit {
     }
 
     fn pipeline(error: PipelineError) -> Self {
-        Self { path: vec!["pipeline".into(), error.setting.into()], message: error.message }
+        let path = ["pipeline".to_owned(), error.setting.to_owned()].into_iter().chain(error.key).collect();
+        Self { path, message: error.message }
     }
 }
 
@@ -152,7 +154,10 @@ impl Plan {
             // A fault in one point of the grid belongs to the line of the axis whose key it is in.
             let in_cell = |message: String, path: &[String]| {
                 let at = path.join(".");
-                let axis = experiment.vary.iter().position(|axis| axis.key == at || axis.key.starts_with(&at) || at.starts_with(&axis.key));
+                let axis = experiment
+                    .vary
+                    .iter()
+                    .position(|axis| axis.key == at || axis.key.starts_with(&at) || at.starts_with(&axis.key));
                 let place = axis.map(|axis| axis.to_string());
                 let mut path: Vec<&str> = vec!["vary"];
                 path.extend(place.as_deref());
@@ -160,8 +165,7 @@ impl Plan {
             };
             let mut table = base.clone();
             for (key, value) in &cell {
-                vary::set(&mut table, key, value.clone())
-                    .map_err(|message| in_cell(message, &[key.clone()]))?;
+                vary::set(&mut table, key, value.clone()).map_err(|message| in_cell(message, &[key.clone()]))?;
             }
             let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
                 let fault = Fault::in_toml(file, "", &error);
@@ -169,7 +173,8 @@ impl Plan {
                 in_cell([fault.what, fault.value, fault.remedy].join(" ").trim().to_owned(), &last)
             })?;
             let trial = trial.resolved().map_err(|unfit| in_cell(unfit.message, &unfit.path))?;
-            let source = SOURCES.build(&trial.source).map_err(|error| in_cell(error.to_string(), &["source".to_owned()]))?;
+            let source =
+                SOURCES.build(&trial.source).map_err(|error| in_cell(error.to_string(), &["source".to_owned()]))?;
             let stages = trial
                 .pipeline
                 .build()
@@ -188,7 +193,11 @@ fn changed(experiment: Experiment, settings: &[String]) -> Result<Experiment, Ve
         return Ok(experiment);
     }
     let fault = |what: String, setting: &str| {
-        vec![Fault::new(what, Path::new("--set")).value(setting).remedy("write key=value, for instance pipeline.solver=triad")]
+        vec![
+            Fault::new(what, Path::new("--set"))
+                .value(setting)
+                .remedy("write key=value, for instance pipeline.solver=triad"),
+        ]
     };
     // Components are written out first, so that a setting of a default component can be changed.
     let resolved = experiment.resolved().unwrap_or(experiment);
@@ -209,8 +218,8 @@ mod tests {
     use super::*;
 
     fn plan(text: &str) -> Result<Plan, String> {
-        let experiment: Experiment = toml::from_str(text)
-            .map_err(|error| Fault::in_toml(Path::new("e.toml"), text, &error).to_string())?;
+        let experiment: Experiment =
+            toml::from_str(text).map_err(|error| Fault::in_toml(Path::new("e.toml"), text, &error).to_string())?;
         Plan::resolve(experiment, "e", Path::new(""), Path::new("e.toml"), text, &[])
             .map_err(|faults| faults.iter().map(|fault| fault.to_string() + "\n").collect())
     }
@@ -261,9 +270,20 @@ mod tests {
             message("question = 'why'\nsource = 'virtual-points'\n\n[pipeline]\nsolver = 'kabsh'\n").trim(),
             "no solver is called `kabsh`, did you mean `kabsch`? There are kabsch, triad in e.toml:5"
         );
-        assert!(message("question = 'why'\nsorce = 'virtual-points'\n").starts_with("unknown key in e.toml:2: `sorce`; did you mean `source`?"));
-        assert!(message("question = 'why'\nsource = 'virtual-points'\n[[vary]]\nkey = 'pipeline.solvr'\nvalues = ['triad']\n").contains("e.toml:3"));
+        assert!(
+            message("question = 'why'\nsorce = 'virtual-points'\n")
+                .starts_with("unknown key in e.toml:2: `sorce`; did you mean `source`?")
+        );
+        assert!(
+            message(
+                "question = 'why'\nsource = 'virtual-points'\n[[vary]]\nkey = 'pipeline.solvr'\nvalues = ['triad']\n"
+            )
+            .contains("e.toml:3")
+        );
         assert!(message("question = ''\nsource = 'virtual-points'\n").contains("no question in e.toml:1"));
-        assert!(message("question = 'why'\nsource = { name = 'virtual-points', distanc = 2 }\n").contains("did you mean `distance`"));
+        assert!(
+            message("question = 'why'\nsource = { name = 'virtual-points', distanc = 2 }\n")
+                .contains("did you mean `distance`")
+        );
     }
 }

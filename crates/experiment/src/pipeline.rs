@@ -7,7 +7,8 @@ use seafix_component::{BuildError, Choice, Registry};
 use seafix_geometry::{Covariance6, MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
-    Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind, Tolerance, candidates, judge,
+    Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind,
+    Tolerance, candidates, judge,
 };
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, Descriptor, Detector, Keypoint, MATCHERS, Matcher, Refine, Triangulator, View,
@@ -69,6 +70,8 @@ impl Default for Pipeline {
 pub struct PipelineError {
     /// The key below `pipeline`.
     pub setting: &'static str,
+    /// The key below that, where the component's setting is known.
+    pub key: Option<String>,
     /// What is wrong, and the nearest right thing.
     pub message: String,
 }
@@ -114,7 +117,8 @@ fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Box<T>, P
 }
 
 fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {
-    PipelineError { setting: registry.kind(), message: error.to_string() }
+    let key = error.key().filter(|&key| key != "name").map(str::to_owned);
+    PipelineError { setting: registry.kind(), key, message: error.to_string() }
 }
 
 /// A pipeline, built.
@@ -187,9 +191,8 @@ impl Stages {
             Eyes::Pair(left, right) => (left, right),
         };
         let (keypoints, detect) = timed(|| [self.detector.detect(left), self.detector.detect(right)]);
-        let (descriptors, describe) = timed(|| {
-            [self.descriptor.describe(left, &keypoints[0]), self.descriptor.describe(right, &keypoints[1])]
-        });
+        let (descriptors, describe) =
+            timed(|| [self.descriptor.describe(left, &keypoints[0]), self.descriptor.describe(right, &keypoints[1])]);
         let left = View { image: left, keypoints: &keypoints[0], descriptors: &descriptors[0] };
         let right = View { image: right, keypoints: &keypoints[1], descriptors: &descriptors[1] };
         let (pairs, matching) = timed(|| {

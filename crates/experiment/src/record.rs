@@ -77,7 +77,13 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
 }
 
 /// What one frame gave, without truth.
-pub(crate) fn frame(index: usize, sight: &Sight, sighting: &Sighting, trial: &Trial, targets: &[Target]) -> FrameRecord {
+pub(crate) fn frame(
+    index: usize,
+    sight: &Sight,
+    sighting: &Sighting,
+    trial: &Trial,
+    targets: &[Target],
+) -> FrameRecord {
     let pipeline = trial.stages.settings();
     let (search, solver) = (&pipeline.search.name, &pipeline.solver.name);
     let mut attempts: Vec<TargetRecord> =
@@ -115,8 +121,7 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
     let answer = &attempt.answer;
     let mut record = TargetRecord::refused(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
     record.detail = answer.outcome.explanation().unwrap_or_default();
-    record.candidates =
-        attempt.candidates.lists.iter().map(|list| list.iter().map(|&j| j as u32).collect()).collect();
+    record.candidates = attempt.candidates.lists.iter().map(|list| list.iter().map(|&j| j as u32).collect()).collect();
     record.times = attempt.times;
     record.optimal = Some(answer.optimal);
     record.size_bound = answer.size_bound.map(|n| n as u64);

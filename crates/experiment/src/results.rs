@@ -150,8 +150,9 @@ pub(crate) fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), ParquetErro
         let cells = rows.iter().map(|row| (column.fill)(row));
         match column.kind {
             "Text" => {
-                let words: Vec<ByteArray> =
-                    cells.map(|cell| if let Cell::Text(word) = cell { word.as_str().into() } else { "".into() }).collect();
+                let words: Vec<ByteArray> = cells
+                    .map(|cell| if let Cell::Text(word) = cell { word.as_str().into() } else { "".into() })
+                    .collect();
                 writer.typed::<ByteArrayType>().write_batch(&words, None, None)?;
             }
             "Whole" => {
@@ -170,7 +171,7 @@ pub(crate) fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), ParquetErro
         writer.close()?;
     }
     group.close()?;
-    file.finish()?;
+    // Writes the footer and gives the file back.
     file.into_inner()?.sync_all()?;
     Ok(())
 }
@@ -203,14 +204,22 @@ mod tests {
     fn a_row_is_a_line_and_unknown_is_empty() {
         let text = csv(&[row("a,b"), row("=1+1")]);
         let mut lines = text.lines();
-        assert!(lines.next().unwrap().starts_with("trial,frame,stamp_ns,object,search,solver,outcome,reason,wrong,wrong_pairs,visible"));
+        assert!(
+            lines
+                .next()
+                .unwrap()
+                .starts_with("trial,frame,stamp_ns,object,search,solver,outcome,reason,wrong,wrong_pairs,visible")
+        );
         assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,unidentified,chance,,,4,,"));
         assert!(lines.next().unwrap().contains("\"'=1+1\""));
     }
 
     #[test]
     fn the_same_table_is_read_back_from_parquet() {
-        use parquet::{file::reader::{FileReader, SerializedFileReader}, record::Field};
+        use parquet::{
+            file::reader::{FileReader, SerializedFileReader},
+            record::Field,
+        };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("results.parquet");
         write_parquet(&path, &[row("manifold"), row("")]).unwrap();

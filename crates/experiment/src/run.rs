@@ -264,7 +264,12 @@ fn write_manifest(plan: &Plan, groups: &[Group<'_>], folder: &Path, threads: usi
         toml::to_string(experiment).expect("a resolved experiment is a table of plain values")
     };
     let mut outputs = BTreeMap::new();
-    for name in plan.trials.iter().map(|trial| format!("{}.mcap", trial.name)).chain(["results.csv".into(), "results.parquet".into()]) {
+    for name in plan
+        .trials
+        .iter()
+        .map(|trial| format!("{}.mcap", trial.name))
+        .chain(["results.csv".into(), "results.parquet".into()])
+    {
         outputs.insert(name.clone(), sha256(&folder.join(&name)).map_err(RunError::Output)?);
     }
     let manifest = Manifest {

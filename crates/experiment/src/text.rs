@@ -10,10 +10,14 @@ use seafix_component::Fault;
 /// A file that is missing, too large, or not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, Fault> {
     const LIMIT: u64 = 64 << 20;
-    let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions");
+    let unreadable = |error: std::io::Error| {
+        Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
+    };
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     if size > LIMIT {
-        return Err(Fault::new("text file too large", path).value(format!("{size} bytes")).remedy(format!("at most {LIMIT} bytes are read")));
+        return Err(Fault::new("text file too large", path)
+            .value(format!("{size} bytes"))
+            .remedy(format!("at most {LIMIT} bytes are read")));
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     let text = String::from_utf8(bytes).map_err(|error| {

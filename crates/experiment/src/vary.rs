@@ -77,7 +77,11 @@ pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], &str) -> Fault) -> Ve
             faults.push(fault(&["vary", &place, "values"], "an axis without values").remedy("list at least one value"));
         }
         if axes[..index].iter().any(|other| other.key == axis.key) {
-            faults.push(fault(&["vary", &place, "key"], "an axis that is there twice").value(&axis.key).remedy("join their values"));
+            faults.push(
+                fault(&["vary", &place, "key"], "an axis that is there twice")
+                    .value(&axis.key)
+                    .remedy("join their values"),
+            );
         }
     }
     faults

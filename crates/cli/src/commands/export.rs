@@ -29,10 +29,8 @@ impl Export {
     pub(crate) fn execute(&self) -> Ended {
         let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
         let trial = plan.trials.first().ok_or_else(|| Failure::new(USAGE, "the experiment has no trial"))?;
-        let passage = trial
-            .source
-            .open(trial.resolved.seed, &plan.folder)
-            .map_err(|faults| Failure::faults(INPUT, &faults))?;
+        let passage =
+            trial.source.open(trial.resolved.seed, &plan.folder).map_err(|faults| Failure::faults(INPUT, &faults))?;
         dataset::write(&*passage, &self.out, &self.licence).map_err(|fault| Failure::new(OUTPUT, fault))?;
         print(&format!("{} stereo pairs in {}\n", passage.frames(), self.out.display()))?;
         Ok(DONE)

@@ -41,11 +41,8 @@ impl Solve {
         let search = SEARCHES.build(&Choice::named(&self.search)).map_err(usage)?;
         let solver = SOLVERS.build(&Choice::named(&self.solver)).map_err(usage)?;
         let acceptance = Acceptance::default();
-        let method = Method {
-            search: (&self.search, &*search),
-            solver: (&self.solver, &*solver),
-            acceptance: &acceptance,
-        };
+        let method =
+            Method { search: (&self.search, &*search), solver: (&self.solver, &*solver), acceptance: &acceptance };
         let solve = |path: &PathBuf| {
             // Every problem has the same stream: its answer depends on no other.
             solve_file(path, &method, Stream::new(0, 0, 0, Purpose::Search).rng())

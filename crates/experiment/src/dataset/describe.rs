@@ -101,7 +101,8 @@ impl Rig {
                 .map_err(|error| (vec![side], format!("{side} camera: {error}")))
         };
         let (left, right) = (camera("left", &self.left)?, camera("right", &self.right)?);
-        let right_from_left = rigid(&self.right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))?;
+        let right_from_left =
+            rigid(&self.right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))?;
         StereoRig::new(left, right, right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))
     }
 }

@@ -8,14 +8,20 @@ use seafix_component::Fault;
 pub(super) fn inside(folder: &Path, name: &str, mentioned_in: &Path) -> Result<PathBuf, Fault> {
     let fault = |what: &str, remedy: &str| Fault::new(what, mentioned_in).value(format!("`{name}`")).remedy(remedy);
     if name.is_empty() || name.contains(['\\', '\0']) {
-        return Err(fault("a path that names no file", "give a path relative to the data set's folder, parts joined by /"));
+        return Err(fault(
+            "a path that names no file",
+            "give a path relative to the data set's folder, parts joined by /",
+        ));
     }
     if !Path::new(name).components().all(|part| matches!(part, Part::Normal(_) | Part::CurDir)) {
         return Err(fault("a path that leads out of the data set", "give a path relative to its folder, without `..`"));
     }
     let path = folder.join(name);
     let (Ok(real), Ok(home)) = (path.canonicalize(), folder.canonicalize()) else {
-        return Err(fault("a file that does not exist", &format!("put it into {} or correct the name", folder.display())));
+        return Err(fault(
+            "a file that does not exist",
+            &format!("put it into {} or correct the name", folder.display()),
+        ));
     };
     if !real.starts_with(&home) {
         return Err(fault("a link that leads out of the data set", "copy the file into the folder"));

@@ -121,7 +121,9 @@ impl Reader<'_> {
 
         let mut frames = Vec::with_capacity(frame_lines.len());
         for line in &frame_lines {
-            let (Some(left), Some(right)) = (self.image(line, &line.left), self.image(line, &line.right)) else { continue };
+            let (Some(left), Some(right)) = (self.image(line, &line.left), self.image(line, &line.right)) else {
+                continue;
+            };
             let covariance = covariances
                 .as_ref()
                 .and_then(|all| all.iter().find(|(stamp, _)| *stamp == line.stamp_ns).map(|(_, c)| *c))
@@ -177,7 +179,8 @@ impl Reader<'_> {
 
     /// The content of a file the description names, or a fault.
     fn content(&mut self, name: &str) -> Option<(PathBuf, String)> {
-        let read = inside(self.folder, name, self.file).and_then(|path| read_text(&path).map(|content| (path, content)));
+        let read =
+            inside(self.folder, name, self.file).and_then(|path| read_text(&path).map(|content| (path, content)));
         read.map_err(|fault| {
             let line = self.source.lines().position(|line| line.contains(name)).map(|index| index + 1);
             self.faults.push(if fault.file == self.file { fault.on_line(line) } else { fault });

@@ -56,9 +56,9 @@ pub(crate) fn image_size(path: &Path, expected: Option<[u32; 2]>) -> Result<(u32
 }
 
 fn open(path: &Path) -> Result<ImageReader<BufReader<File>>, Fault> {
-    ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|error| Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions"))
+    ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|error| {
+        Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
+    })
 }
 
 fn damaged(path: &Path, error: &image::ImageError) -> Fault {
@@ -76,7 +76,6 @@ pub fn write_png(path: &Path, image: &Image) -> Result<(), Fault> {
     let grey = image::GrayImage::from_raw(image.width() as u32, image.height() as u32, image.to_u8())
         .expect("an image has width × height pixels");
     DynamicImage::from(grey).write_to(&mut bytes, image::ImageFormat::Png).expect("memory takes every PNG");
-    std::fs::write(path, bytes.into_inner()).map_err(|error| {
-        Fault::new(format!("cannot write ({error})"), path).remedy("check space and permissions")
-    })
+    std::fs::write(path, bytes.into_inner())
+        .map_err(|error| Fault::new(format!("cannot write ({error})"), path).remedy("check space and permissions"))
 }

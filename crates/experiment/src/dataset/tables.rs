@@ -81,7 +81,11 @@ pub(super) fn covariances(text: &str, file: &Path) -> Result<Vec<(u64, Covarianc
 }
 
 /// Data lines with exactly the columns of `header`, and their line numbers.
-fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Result<Vec<(usize, [&'a str; N])>, Fault> {
+fn rows<'a, const N: usize>(
+    text: &'a str,
+    file: &Path,
+    header: [&str; N],
+) -> Result<Vec<(usize, [&'a str; N])>, Fault> {
     let expected = header.join(",");
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     match lines.next() {
@@ -99,7 +103,10 @@ fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Re
             let words: Vec<&str> = line.split(',').map(str::trim).collect();
             let columns = words.len();
             words.try_into().map(|words| (number, words)).map_err(|_| {
-                Fault::new(format!("{columns} columns"), file).on_line(number).value(line).remedy(format!("a line is `{expected}`"))
+                Fault::new(format!("{columns} columns"), file)
+                    .on_line(number)
+                    .value(line)
+                    .remedy(format!("a line is `{expected}`"))
             })
         })
         .collect()
@@ -127,7 +134,8 @@ fn wide_rows<'a>(text: &'a str, file: &Path, count: usize) -> Result<Vec<(usize,
 }
 
 fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<T, Fault> {
-    word.parse().map_err(|_| Fault::new("not a number", file).on_line(line).value(word).remedy("give a plain decimal number"))
+    word.parse()
+        .map_err(|_| Fault::new("not a number", file).on_line(line).value(word).remedy("give a plain decimal number"))
 }
 
 #[cfg(test)]

@@ -21,22 +21,37 @@ pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
-        let fault = |what: &str, value: &str, remedy: &str| Fault::new(what, file).on_line(index + 1).value(value).remedy(remedy);
+        let fault = |what: &str, value: &str, remedy: &str| {
+            Fault::new(what, file).on_line(index + 1).value(value).remedy(remedy)
+        };
         let words: Vec<&str> = line.split_whitespace().collect();
         if words.len() != 8 {
-            let remedy = if line.contains(',') { "separate by blanks, not commas" } else { "a TUM line is `seconds tx ty tz qx qy qz qw`" };
+            let remedy = if line.contains(',') {
+                "separate by blanks, not commas"
+            } else {
+                "a TUM line is `seconds tx ty tz qx qy qz qw`"
+            };
             return Err(fault(&format!("{} columns", words.len()), line, remedy));
         }
-        let stamp = nanoseconds(words[0])
-            .ok_or_else(|| fault("a stamp that is no time", words[0], "give seconds, not negative, as a decimal number"))?;
+        let stamp = nanoseconds(words[0]).ok_or_else(|| {
+            fault("a stamp that is no time", words[0], "give seconds, not negative, as a decimal number")
+        })?;
         let mut numbers = [0.0; 7];
         for (number, word) in numbers.iter_mut().zip(&words[1..]) {
-            *number = word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| fault("not a finite number", word, "give a number"))?;
+            *number = word
+                .parse()
+                .ok()
+                .filter(|x: &f64| x.is_finite())
+                .ok_or_else(|| fault("not a finite number", word, "give a number"))?;
         }
         let [tx, ty, tz, qx, qy, qz, qw] = numbers;
         let quaternion = Quaternion::new(qw, qx, qy, qz);
         if (quaternion.norm() - 1.0).abs() > 1e-3 {
-            return Err(fault("a quaternion that is not of unit length", &format!("{:.6}", quaternion.norm()), "the order is qx qy qz qw"));
+            return Err(fault(
+                "a quaternion that is not of unit length",
+                &format!("{:.6}", quaternion.norm()),
+                "the order is qx qy qz qw",
+            ));
         }
         if poses.last().is_some_and(|(last, _)| *last >= stamp) {
             return Err(fault("a stamp that is not after the one before", words[0], "sort the lines by time"));
@@ -54,7 +69,15 @@ pub fn print<A: Frame, B: Frame>(poses: &[Stamped<A, B>]) -> String {
             let (t, q) = (pose.translation(), pose.rotation());
             format!(
                 "{}.{:09} {} {} {} {} {} {} {}\n",
-                stamp / 1_000_000_000, stamp % 1_000_000_000, t.x, t.y, t.z, q.i, q.j, q.k, q.w
+                stamp / 1_000_000_000,
+                stamp % 1_000_000_000,
+                t.x,
+                t.y,
+                t.z,
+                q.i,
+                q.j,
+                q.k,
+                q.w
             )
         })
         .collect()

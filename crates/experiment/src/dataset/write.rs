@@ -21,7 +21,9 @@ use crate::source::{Eyes, Passage};
 /// A passage without images, a folder that exists, or a file that cannot be written.
 pub fn write(passage: &dyn Passage, folder: &Path, licence: &str) -> Result<(), Fault> {
     if !passage.images() {
-        return Err(Fault::new("a source without images", folder).remedy("choose one that renders or reads stereo pairs"));
+        return Err(
+            Fault::new("a source without images", folder).remedy("choose one that renders or reads stereo pairs")
+        );
     }
     if folder.exists() {
         return Err(Fault::new("the folder exists", folder).remedy("choose a new one with --out"));
@@ -37,7 +39,8 @@ pub fn write(passage: &dyn Passage, folder: &Path, licence: &str) -> Result<(), 
 }
 
 fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Result<(), Fault> {
-    let put = |name: &str, text: &str| fs::write(folder.join(name), text).map_err(|error| failed(&folder.join(name), &error));
+    let put =
+        |name: &str, text: &str| fs::write(folder.join(name), text).map_err(|error| failed(&folder.join(name), &error));
     let mut frames = "stamp_ns,left,right\n".to_owned();
     let mut visibility = "stamp_ns,object,point\n".to_owned();
     let mut objects = None;

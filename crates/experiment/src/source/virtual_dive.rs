@@ -11,7 +11,8 @@ use seafix_simulation::{Dive, PlannedDive};
 use super::{Eyes, Passage, Sight, Truth, WorldPrior};
 
 pub(super) fn open(dive: &Dive, seed: u64, images: bool) -> Result<Box<dyn Passage>, Vec<Fault>> {
-    let dive = dive.plan(seed, 0).map_err(|error| vec![Fault::new(error.to_string(), Path::new("the source's settings"))])?;
+    let dive =
+        dive.plan(seed, 0).map_err(|error| vec![Fault::new(error.to_string(), Path::new("the source's settings"))])?;
     let name = format!(
         "virtual site, seed {seed}, {} m, {}",
         dive.settings().distance,

@@ -1,0 +1,294 @@
+//! Bad input gets one line with file, place and remedy, the right exit code, and nothing half-written.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+/// A small sound data set: two images of noise, a rig, a site of three points.
+struct Sample {
+    folder: TempDir,
+}
+
+const SITE: &str = r#"format = "seafix-site/1"
+name = "three"
+axes = "p1p3-x/p1p2xp1p3-z/zx-y"
+site_frame = "box"
+
+[[object]]
+id = "box"
+base = ["A", "B", "C"]
+base_in_world = [[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [2.0, 0.0, 0.0]]
+survey_sigma = 0.01
+
+[[object.point]]
+id = "A"
+at = [0.0, 0.0, 0.0]
+
+[[object.point]]
+id = "B"
+at = [0.0, -1.0, 0.0]
+
+[[object.point]]
+id = "C"
+at = [2.0, 0.0, 0.0]
+"#;
+
+const DATASET: &str = r#"format = "seafix-dataset/1"
+name = "sample"
+licence = "CC0-1.0"
+frames = "frames.csv"
+site = "site.toml"
+prior = "prior.tum"
+prior_sigma = { position = 0.1, attitude_deg = 0.5 }
+
+[rig]
+right_from_left = [[1.0, 0.0, 0.0, -0.25], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+
+[rig.left]
+size = [64, 48]
+fx = 50.0
+fy = 50.0
+cx = 31.5
+cy = 23.5
+
+[rig.right]
+size = [64, 48]
+fx = 50.0
+fy = 50.0
+cx = 31.5
+cy = 23.5
+"#;
+
+impl Sample {
+    fn new() -> Self {
+        let sample = Self { folder: TempDir::new().unwrap() };
+        sample.put("dataset.toml", DATASET);
+        sample.put("site.toml", SITE);
+        sample.put("frames.csv", "stamp_ns,left,right\n1000000000,a.pgm,a.pgm\n");
+        sample.put("prior.tum", "1.0 0 0 -3 0 0 0 1\n");
+        sample.put("a.pgm", &pgm(64, 48));
+        sample
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn put(&self, name: &str, text: &str) -> &Self {
+        fs::write(self.path(name), text).unwrap();
+        self
+    }
+
+    /// Replaces `from` by `to` in the file `name`.
+    fn change(&self, name: &str, from: &str, to: &str) -> &Self {
+        let text = fs::read_to_string(self.path(name)).unwrap();
+        assert!(text.contains(from), "{name} has no {from}");
+        self.put(name, &text.replace(from, to))
+    }
+
+    /// Runs the data set; it must fail with `code`, say every one of `parts`, and write nothing.
+    fn refused(&self, code: i32, parts: &[&str]) {
+        let out = self.path("out");
+        refused(&["run", self.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()], code, parts);
+        assert!(!out.exists(), "something was written");
+    }
+}
+
+/// A plain image in the text form of PGM.
+fn pgm(width: usize, height: usize) -> String {
+    let pixels: Vec<String> = (0..width * height).map(|i| ((i * 7919) % 251).to_string()).collect();
+    format!("P2\n{width} {height}\n255\n{}\n", pixels.join("\n"))
+}
+
+/// The command must fail with `code` and one line for each fault; together they say every one of `parts`.
+fn refused(arguments: &[&str], code: i32, parts: &[&str]) {
+    let output = Command::cargo_bin("seafix").unwrap().args(arguments).output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{message}");
+    assert!(message.lines().all(|line| line.starts_with("error: ")), "{message}");
+    for part in parts {
+        assert!(message.contains(part), "no `{part}` in {message}");
+    }
+}
+
+#[test]
+fn the_sound_sample_runs() {
+    let sample = Sample::new();
+    let out = sample.path("out");
+    let run = ["run", sample.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()];
+    Command::cargo_bin("seafix").unwrap().args(run).assert().success();
+    for file in ["001.mcap", "results.csv", "results.parquet", "manifest.json", "report/report.html"] {
+        assert!(out.join(file).exists(), "{file}");
+    }
+    assert!(fs::read_dir(&out).unwrap().all(|entry| !entry.unwrap().path().to_string_lossy().ends_with(".partial")));
+}
+
+#[test]
+fn a_model_with_two_points() {
+    let sample = Sample::new();
+    let two = SITE.split("[[object.point]]\nid = \"C\"").next().unwrap();
+    sample.put("site.toml", two).change("site.toml", "base = [\"A\", \"B\", \"C\"]", "base = [\"A\", \"B\", \"B\"]");
+    let folder = sample.folder.path().to_str().unwrap();
+    let output = Command::cargo_bin("seafix").unwrap().args(["run", folder]).output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{message}");
+    assert!(message.lines().any(|line| line.contains("site.toml:") && line.contains("2 ")), "{message}");
+}
+
+#[test]
+fn a_collinear_base() {
+    Sample::new()
+        .change("site.toml", "at = [0.0, -1.0, 0.0]", "at = [1.0, 0.0, 0.0]")
+        .change("site.toml", "[0.0, -1.0, 0.0]", "[1.0, 0.0, 0.0]")
+        .refused(3, &["site.toml:8", "collinear"]);
+}
+
+#[test]
+fn a_coordinate_that_is_no_number() {
+    Sample::new()
+        .change("site.toml", "at = [2.0, 0.0, 0.0]", "at = [2.0, nan, 0.0]")
+        .refused(3, &["site.toml:", "C", "NaN"]);
+}
+
+#[test]
+fn images_of_another_size() {
+    Sample::new()
+        .put("a.pgm", &pgm(32, 48))
+        .change("frames.csv", "a.pgm,a.pgm", "a.pgm,b.pgm")
+        .put("b.pgm", &pgm(64, 48))
+        .refused(3, &["a.pgm", "32×48, calibrated 64×48"]);
+}
+
+#[test]
+fn a_truncated_image() {
+    let sample = Sample::new();
+    fs::write(sample.path("a.pgm"), b"\x89PNG\r\n\x1a\n\0\0").unwrap();
+    sample.change("frames.csv", "a.pgm,a.pgm", "a.pgm,b.pgm").put("b.pgm", &pgm(64, 48));
+    sample.refused(3, &["a.pgm", "PNG, JPEG and PNM"]);
+}
+
+#[test]
+fn an_unknown_key_of_a_data_set() {
+    Sample::new()
+        .change("dataset.toml", "licence =", "license =")
+        .refused(3, &["dataset.toml:3", "`license`", "`licence`"]);
+}
+
+#[test]
+fn a_missing_file() {
+    Sample::new()
+        .change("dataset.toml", "site.toml", "sight.toml")
+        .refused(3, &["dataset.toml:5", "sight.toml", "does not exist"]);
+}
+
+#[test]
+fn a_path_that_leads_out() {
+    Sample::new().change("frames.csv", "a.pgm,a.pgm", "../a.pgm,a.pgm").refused(3, &["frames.csv:2", "leads out"]);
+}
+
+#[test]
+fn cameras_in_one_place() {
+    Sample::new().change("dataset.toml", "-0.25", "0.0").refused(3, &["dataset.toml:", "baseline"]);
+}
+
+#[test]
+fn a_rig_that_is_no_rotation() {
+    Sample::new()
+        .change("dataset.toml", "[[1.0, 0.0, 0.0, -0.25]", "[[1.1, 0.0, 0.0, -0.25]")
+        .refused(3, &["dataset.toml:", "orthonormal"]);
+}
+
+fn experiment(text: &str) -> (TempDir, String) {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("e.toml");
+    fs::write(&file, text).unwrap();
+    let file = file.to_str().unwrap().to_owned();
+    (folder, file)
+}
+
+#[test]
+fn an_unknown_key_of_an_experiment() {
+    let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n[pipeline]\nsolvr = 'triad'\n");
+    refused(&["run", &file], 2, &["e.toml:4", "`solvr`", "`solver`"]);
+}
+
+#[test]
+fn an_unknown_component() {
+    let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n[pipeline]\nsolver = 'kabsh'\n");
+    refused(&["run", &file], 2, &["e.toml:4", "no solver is called `kabsh`, did you mean `kabsch`?"]);
+}
+
+#[test]
+fn an_unknown_setting() {
+    let (_folder, file) =
+        experiment("question = 'why'\nsource = 'virtual-points'\n[pipeline.solver]\nname = 'triad'\nchose = 'first'\n");
+    refused(&["run", &file], 2, &["e.toml:5", "did you mean `choose`?"]);
+}
+
+#[test]
+fn a_value_out_of_range() {
+    let (_folder, file) = experiment("question = 'why'\n[source]\nname = 'virtual-points'\ndistance = -1.0\n");
+    let run = Path::new(&file).with_file_name("out");
+    refused(&["run", &file, "--out", run.to_str().unwrap()], 3, &["distance = -1"]);
+    assert!(!run.exists());
+}
+
+#[test]
+fn an_experiment_that_is_not_there() {
+    refused(&["run", "nowhere.toml"], 2, &["nowhere.toml"]);
+}
+
+#[test]
+fn an_output_folder_that_is_not_empty() {
+    let sample = Sample::new();
+    let folder = sample.folder.path().to_str().unwrap();
+    refused(&["run", folder, "--out", folder], 4, &["not empty", "--out"]);
+}
+
+#[test]
+fn a_bad_problem_among_good_ones() {
+    let folder = TempDir::new().unwrap();
+    let put = |name: &str, text: &str| {
+        fs::write(folder.path().join(name), text).unwrap();
+        folder.path().join(name).to_str().unwrap().to_owned()
+    };
+    let good = r#"{"format":"coherence-problem/1","id":"t","model":[[0,0,0],[1,0,0],[0,2,0],[0,0,3]],
+        "cloud":[[0,0,5],[1,0,5],[0,2,5],[0,0,8]],"sigma":0.001,"delta":0.01,"prior":null,"putative":null}"#;
+    let good = put("good.json", good);
+    let bad = put("bad.json", "{\"format\": \"coherence-problem/1\"}");
+    let output = Command::cargo_bin("seafix").unwrap().args(["solve", "--json", &bad, &good]).output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let lines: Vec<serde_json::Value> =
+        String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(lines[0]["error"].as_str().unwrap().contains("bad.json"));
+    assert_eq!(lines[1]["outcome"], "referenced", "{}", lines[1]);
+}
+
+#[test]
+fn an_unknown_search_of_solve() {
+    refused(&["solve", "--search", "maximum-click", "x.json"], 2, &["did you mean `maximum-clique`?"]);
+}
+
+#[test]
+fn check_lists_everything_at_once() {
+    let sample = Sample::new();
+    sample
+        .change(
+            "dataset.toml",
+            "fx = 50.0\nfy = 50.0\ncx = 31.5\ncy = 23.5\n\n[rig.right]",
+            "fx = -1.0\nfy = 50.0\ncx = 31.5\ncy = 23.5\n\n[rig.right]",
+        )
+        .change("prior.tum", "0 0 0 1", "0 0 0 2")
+        .change("frames.csv", "a.pgm,a.pgm", "b.pgm,a.pgm");
+    let output =
+        Command::cargo_bin("seafix").unwrap().args(["check", sample.folder.path().to_str().unwrap()]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    for part in ["fx = -1", "prior.tum:1", "b.pgm"] {
+        assert!(text.contains(part), "no `{part}` in {text}");
+    }
+}
