@@ -16,9 +16,14 @@
 //! share of it. Seeds are fixed, so every run draws the same cases; what failed once is kept in
 //! `proptest-regressions/` and tried first ever after.
 
+pub mod admissible;
 mod law;
+pub mod least_squares;
 pub mod points;
 pub mod poses;
+pub mod problems;
 pub mod rigs;
+pub mod scenes;
+pub mod variants;
 
-pub use law::{law, within};
+pub use law::{law, not_idle, within};

@@ -1,12 +1,14 @@
-//! The frame that three points define.
+//! The frame that three points define, of an object and of a site.
 
-use seafix_geometry::{Camera, Object, Point, World, triad};
+use proptest::prelude::*;
+use seafix_geometry::{Camera, Object, Point, Transform, World, triad};
 use seafix_proptests::{
     law,
-    points::{sine_of_smallest_angle, triangle},
+    points::{point, sine_of_smallest_angle, triangle},
     poses::pose,
     within,
 };
+use seafix_referencing::{ModelPoint, Site, SiteObject, TargetKind};
 
 /// P7. The triad frame: unit vectors to 1e-14, mutually orthogonal to 1e-13, right-handed (det = +1),
 /// origin = P1 exactly, e1 along P1→P3 and e3 normal to P1P2 and P1P3, P2 with y < 0.
@@ -53,5 +55,58 @@ fn a_frame_moves_with_its_points() {
         let longest = motion.translation().norm().max(expected.translation().norm());
         let limit = 1e-12 * (1.0 + longest) / sine_of_smallest_angle(&corners);
         within("moved triad − triad of moved", (moved.matrix() - expected.matrix()).amax(), limit)
+    });
+}
+
+/// Any object: a base of its own frame's rule, further points, and a surveyed place in the world.
+fn object() -> impl Strategy<Value = SiteObject> {
+    (triangle::<World>(), prop::collection::vec((point::<Object>(3.0), 0.0..0.01), 0..6)).prop_map(|(base, more)| {
+        let [p1, p2, p3] = base;
+        let world_from_object = triad::<World, Object>(&p1, &p2, &p3).expect("the triangle is no line");
+        let own = base.map(|corner| (world_from_object.inverse() * corner, 0.0));
+        let points = own.into_iter().chain(more).enumerate();
+        SiteObject {
+            id: String::new(),
+            base: [0, 1, 2],
+            base_in_world: Some(base),
+            survey_sigma: 0.01,
+            world_from_object: Some(world_from_object),
+            points: points
+                .map(|(i, (at, sigma))| ModelPoint { sigma, ..ModelPoint::exact(format!("P{i}"), at) })
+                .collect(),
+            interest: Vec::new(),
+        }
+    })
+}
+
+/// P13. The site's frame is the frame of the chosen object: H from that object to the site is I exactly,
+/// so that its points keep their coordinates bit for bit; every other object's points stand where the
+/// survey has them: ≤ 1e-12 (1 + L).
+///
+/// Seen to fail when the chosen object is carried through the world and back like the others.
+#[test]
+fn the_chosen_object_is_the_frame_of_the_site() {
+    law(256, (prop::collection::vec(object(), 1..5), any::<prop::sample::Index>()), |(mut objects, chosen)| {
+        let frame = chosen.index(objects.len());
+        for (i, object) in objects.iter_mut().enumerate() {
+            object.id = format!("object {i}");
+        }
+        let site = Site { name: "site".to_owned(), frame, objects, warnings: Vec::new() };
+        let whole = &site.targets(TargetKind::Site).expect("every object's place is known")[0];
+        prop_assert_eq!(whole.world_from_object, site.objects[frame].world_from_object);
+        let mut points = whole.points.iter();
+        for (i, object) in site.objects.iter().enumerate() {
+            for (own, carried) in object.points.iter().zip(&mut points) {
+                if i == frame {
+                    prop_assert_eq!((own.at, own.sigma), (carried.at, carried.sigma));
+                }
+                let place = |target: &Option<Transform<World, Object>>, p| target.expect("a place is known") * p;
+                let (surveyed, site) =
+                    (place(&object.world_from_object, own.at), place(&whole.world_from_object, carried.at));
+                within("in the world", surveyed.distance(&site), 1e-12 * (1.0 + surveyed.coords.norm()))?;
+            }
+        }
+        prop_assert!(points.next().is_none());
+        Ok(())
     });
 }

@@ -1,0 +1,197 @@
+//! Coherence problems with a planted answer.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use proptest::{prelude::*, sample::Index};
+use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
+use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, Tolerance};
+
+use crate::poses::{rotation, vector};
+
+/// A problem and what was planted in it.
+#[derive(Debug, Clone)]
+pub struct Planted {
+    /// The model's points.
+    pub model: Vec<ModelPoint>,
+    /// The cloud: first the images of the visible points, then decoys, then clutter.
+    pub cloud: Vec<MeasuredPoint>,
+    /// The true image of every visible point, and others.
+    pub candidates: Candidates,
+    /// When distances agree.
+    pub tolerance: Tolerance,
+    /// The true pairs, of the visible points.
+    pub truth: Vec<Correspondence>,
+}
+
+impl Planted {
+    /// The problem as a search takes it.
+    pub fn problem(&self) -> Problem<'_> {
+        Problem { model: &self.model, cloud: &self.cloud, candidates: &self.candidates, tolerance: self.tolerance }
+    }
+}
+
+/// How the points of a model lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// Anywhere in a box of 2 × 1.5 × 1 m.
+    Scattered,
+    /// On a lattice of 0.25 m, 3 × 3 × 3: many equal distances, many mirror images of parts.
+    Lattice,
+    /// In one plane, 2 × 1.5 m.
+    Flat,
+    /// Within a few tolerances of each other, the images being each other's candidates: two model points
+    /// may both suit one cloud point.
+    Crowded,
+}
+
+/// The most points a problem may have, and the most candidates a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Size {
+    /// Model points.
+    pub points: usize,
+    /// Candidates a point.
+    pub list: usize,
+    /// Points of the cloud that are neither images nor decoys.
+    pub clutter: usize,
+}
+
+/// What brute force can enumerate: 7 points, 4 candidates each.
+pub const SMALL: Size = Size { points: 7, list: 4, clutter: 6 };
+/// What it cannot: more vertices than a machine word has bits.
+pub const LARGE: Size = Size { points: 24, list: 6, clutter: 60 };
+
+/// One model point's draws.
+#[derive(Debug, Clone)]
+struct Drawn {
+    place: Vector3<f64>,
+    cell: [u8; 3],
+    /// Of its image, and of its decoy (shares of the problem's noise).
+    noise: [Vector3<f64>; 2],
+    visible: bool,
+    /// Whether the cloud also holds the image of its reflection.
+    decoy: bool,
+    others: Vec<Index>,
+    sigma: f64,
+}
+
+fn drawn(list: usize) -> impl Strategy<Value = Drawn> {
+    let noise = || vector(1.0);
+    (
+        vector(1.0),
+        prop::array::uniform3(0u8..3),
+        (noise(), noise()),
+        prop::bool::weighted(0.85),
+        prop::bool::weighted(0.4),
+        prop::collection::vec(any::<Index>(), 0..=list),
+        0.0..=1.0,
+    )
+        .prop_map(|(place, cell, (a, b), visible, decoy, others, sigma)| Drawn {
+            place,
+            cell,
+            noise: [a, b],
+            visible,
+            decoy,
+            others,
+            sigma,
+        })
+}
+
+/// What all points of a problem share.
+#[derive(Debug, Clone)]
+struct Shared {
+    layout: Layout,
+    camera_from_object: Transform<Camera, Object>,
+    /// Whether the cloud is the model's mirror image.
+    mirrored: bool,
+    tolerance: Tolerance,
+    /// Greatest noise of a coordinate (m).
+    noise: f64,
+    /// Standard deviations (m) of measured points along the camera's axes, of model points.
+    sigma: [f64; 4],
+}
+
+fn shared() -> impl Strategy<Value = Shared> {
+    let layout =
+        prop::sample::select(vec![Layout::Scattered, Layout::Lattice, Layout::Lattice, Layout::Flat, Layout::Crowded]);
+    let motion = (rotation(), vector(1.0))
+        .prop_map(|(r, t): (UnitQuaternion<f64>, Vector3<f64>)| Transform::new(r, t + Vector3::new(0.0, 0.0, 4.0)));
+    let sigmas = (0.0..=0.01, 1.0..10.0, prop_oneof![Just(0.0), 1e-3..5e-3]);
+    let fixed = (2e-3..0.06).prop_map(Tolerance::Fixed);
+    let tolerance = prop_oneof![2 => fixed, 1 => (2.0..4.0).prop_map(Tolerance::Sigmas)];
+    let exact = prop_oneof![1 => Just(0.0), 2 => 0.0..=1.0, 1 => Just(1.0)];
+    (layout, motion, prop::bool::weighted(0.2), tolerance, exact, prop_oneof![1 => Just(0.0), 3 => Just(1.0)], sigmas)
+        .prop_map(|(layout, camera_from_object, mirrored, tolerance, noise, exactly, (across, depth, model))| {
+            let (noise, across) = match tolerance {
+                Tolerance::Fixed(delta) => (noise * delta * 0.4, across * exactly),
+                // A tolerance of no width finds nothing: measured points are uncertain here.
+                Tolerance::Sigmas(_) => (noise * (across + 1e-3), across + 1e-3),
+            };
+            Shared {
+                layout,
+                camera_from_object,
+                mirrored,
+                tolerance,
+                noise,
+                sigma: [across, across, across * depth, model],
+            }
+        })
+}
+
+/// Problems up to this size.
+pub fn planted(size: Size) -> impl Strategy<Value = Planted> {
+    let points = prop::collection::vec(drawn(size.list), 1..=size.points);
+    let clutter = prop::collection::vec(vector(1.0), 0..=size.clutter);
+    (shared(), points, clutter).prop_map(|(shared, points, clutter)| plant(&shared, &points, &clutter))
+}
+
+fn plant(shared: &Shared, points: &[Drawn], clutter: &[Vector3<f64>]) -> Planted {
+    let extent = Vector3::new(1.0, 0.75, 0.5);
+    let place = |drawn: &Drawn| match shared.layout {
+        Layout::Scattered => drawn.place.component_mul(&extent),
+        Layout::Flat => drawn.place.component_mul(&Vector3::new(1.0, 0.75, 0.0)),
+        Layout::Lattice => (Vector3::from(drawn.cell.map(f64::from)) - Vector3::from_element(1.0)) * 0.25,
+        Layout::Crowded => drawn.place * 0.05,
+    };
+    let reflected = |p: Vector3<f64>| Vector3::new(p.x, p.y, -p.z);
+    let image = |p: Vector3<f64>, noise: Vector3<f64>| {
+        let p = if shared.mirrored { reflected(p) } else { p };
+        shared.camera_from_object * Point::from(p) + noise * shared.noise
+    };
+    let model: Vec<ModelPoint> = points
+        .iter()
+        .enumerate()
+        .map(|(i, drawn)| ModelPoint {
+            sigma: shared.sigma[3] * drawn.sigma,
+            ..ModelPoint::exact(format!("P{i}"), Point::from(place(drawn)))
+        })
+        .collect();
+    let mut places: Vec<Point<Camera>> = Vec::new();
+    let mut lists = vec![Vec::new(); points.len()];
+    let mut truth = Vec::new();
+    for (i, drawn) in points.iter().enumerate().filter(|(_, drawn)| drawn.visible) {
+        truth.push(Correspondence { model: i, cloud: places.len() });
+        lists[i].push(places.len());
+        places.push(image(place(drawn), drawn.noise[0]));
+    }
+    for (i, drawn) in points.iter().enumerate().filter(|(_, drawn)| drawn.decoy) {
+        lists[i].push(places.len());
+        places.push(image(reflected(place(drawn)), drawn.noise[1]));
+    }
+    places.extend(clutter.iter().map(|p| shared.camera_from_object * Point::from(p.component_mul(&extent))));
+    for (list, drawn) in lists.iter_mut().zip(points) {
+        // Images and decoys come first; the list grows to as many as were drawn.
+        let reach = if shared.layout == Layout::Crowded { truth.len() } else { places.len() };
+        let more = drawn.others.len().saturating_sub(list.len());
+        list.extend(drawn.others.iter().filter(|_| reach > 0).take(more).map(|other| other.index(reach)));
+    }
+    let pairs = lists.iter().enumerate().flat_map(|(i, list)| list.iter().map(move |&j| (i, j)));
+    let [x, y, z, _] = shared.sigma;
+    let covariance = Matrix3::from_diagonal(&Vector3::new(x * x, y * y, z * z));
+    let measure = |at| MeasuredPoint { position: UncertainPoint { at, covariance }, pixels: None };
+    Planted {
+        candidates: Candidates::from_pairs(model.len(), pairs),
+        cloud: places.into_iter().map(measure).collect(),
+        model,
+        tolerance: shared.tolerance,
+        truth,
+    }
+}

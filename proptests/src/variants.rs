@@ -1,0 +1,92 @@
+//! Every component of a registry, with its defaults and with every value of every switch.
+
+use seafix_component::{Choice, Listing, Registry};
+use toml::Value;
+
+/// A component built from a choice.
+#[derive(Debug)]
+pub struct Variant<T: ?Sized> {
+    /// The choice with every setting written out.
+    choice: Choice,
+    /// What a failure calls it: name and the settings that were chosen.
+    pub name: String,
+    /// The component.
+    pub component: Box<T>,
+}
+
+impl<T: ?Sized> Variant<T> {
+    /// The value of a switch of this name; `None` where the component has none.
+    pub fn switch(&self, key: &str) -> Option<bool> {
+        self.choice.settings.get(key)?.as_bool()
+    }
+}
+
+/// All components of a registry, each with every combination of its switches (the settings that are
+/// true or false, or one of a few words). `given` settings replace the default wherever a component
+/// has them.
+///
+/// # Panics
+/// When a listed component cannot be built from its own settings.
+pub fn variants<T: ?Sized>(registry: &Registry<T>, given: &[(&str, i64)]) -> Vec<Variant<T>> {
+    let variants_of = |listing: &Listing| {
+        let has = |(key, _): &&(&str, i64)| listing.defaults.contains_key(*key);
+        let first =
+            given.iter().filter(has).fold(Choice::named(listing.name), |choice, (key, value)| choice.with(key, *value));
+        let mut choices = vec![first];
+        for (key, default) in listing.defaults.iter().filter(|(_, default)| default.is_bool() || default.is_str()) {
+            let values = values_of(registry, listing.name, key, default);
+            choices = choices
+                .iter()
+                .flat_map(|choice| values.iter().map(|value| choice.clone().with(key, value.clone())))
+                .collect();
+        }
+        choices
+    };
+    let build = |chosen: Choice| Variant {
+        component: registry.build(&chosen).expect("the registry listed the settings"),
+        name: format!("{} {{ {} }}", chosen.name, chosen.settings.to_string().trim_end().replace('\n', ", ")),
+        choice: registry.resolve(&chosen).expect("the registry listed the settings"),
+    };
+    registry.listings().iter().flat_map(variants_of).map(build).collect()
+}
+
+/// The values of a switch; of any other setting only what it is.
+fn values_of<T: ?Sized>(registry: &Registry<T>, name: &str, key: &str, default: &Value) -> Vec<Value> {
+    match default {
+        Value::Boolean(_) => vec![true.into(), false.into()],
+        // The refusal of a word that is none of them names them all.
+        Value::String(_) => match registry.build(&Choice::named(name).with(key, "\u{1}")) {
+            Ok(_) => vec![default.clone()],
+            Err(refusal) => {
+                let message = refusal.to_string();
+                let quoted = message.split('`').skip(1).step_by(2).map(Value::from);
+                quoted.filter(|word| registry.build(&Choice::named(name).with(key, word.clone())).is_ok()).collect()
+            }
+        },
+        _ => vec![default.clone()],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_referencing::{SEARCHES, SOLVERS};
+
+    #[test]
+    fn every_value_of_every_switch_is_built() {
+        let names: Vec<String> = variants(&SOLVERS, &[]).into_iter().map(|variant| variant.name).collect();
+        for word in ["first", "largest-area", "smallest-covariance"] {
+            assert!(names.contains(&format!("triad {{ choose = \"{word}\" }}")), "{names:?}");
+        }
+        let searches = variants(&SEARCHES, &[("budget", 5)]);
+        let oriented = |value| searches.iter().filter(|variant| variant.switch("orientation") == Some(value)).count();
+        assert_eq!(oriented(true), oriented(false));
+        assert!(
+            searches.iter().all(|variant| variant
+                .choice
+                .settings
+                .get("budget")
+                .is_none_or(|b| b.as_integer() == Some(5)))
+        );
+    }
+}
