@@ -55,6 +55,11 @@ fn a_reflection_is_never_the_answer() {
     let found = Kabsch::default().solve(&data).unwrap();
     assert!((found.rotation_matrix().determinant() - 1.0).abs() < 1e-12);
     assert!(data.residual_rms(&found) > 0.1, "a mirror image fits no rigid motion");
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for _ in 0..1000 {
+        let xi = Vector6::from_fn(|_, _| rng.random_range(-0.5..0.5));
+        assert!(data.residual_rms(&found) <= data.residual_rms(&found.perturbed(&xi)), "the best of the rotations");
+    }
 }
 
 #[test]
