@@ -116,7 +116,7 @@ fn a_fix_is_carried_by_odometry() {
 
 /// P12. (6) composed in one step or in many agrees: ≤ 1e-12 times the number of steps.
 ///
-/// Seen to fail when the chain of steps multiplies right to left.
+/// Seen to fail when products of rows multiply right to left.
 #[test]
 fn many_steps_are_one() {
     let turns = prop::collection::vec(vector(1.0), 31);

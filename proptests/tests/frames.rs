@@ -44,7 +44,7 @@ fn three_points_make_a_frame() {
 
 /// P8. The triad of points moved by T is the triad moved by T: ≤ 1e-12 (1 + L) / sin(smallest angle).
 ///
-/// Seen to fail when an axis is taken from the coordinate frame instead of the points.
+/// Seen to fail when z is taken from the coordinate frame instead of the points.
 #[test]
 fn a_frame_moves_with_its_points() {
     law(1024, (triangle::<World>(), pose::<Camera, World>(100.0)), |(corners, motion)| {

@@ -51,19 +51,20 @@ fn every_set_is_admissible(searches: &[Variant<dyn Search>], planted: &Planted) 
 }
 
 /// P21. Every returned set, rivals included, is coherent: all q (q − 1)/2 differences ≤ Δ, evaluated
-/// anew from the original coordinates, in closed form; up to 24 points and 100 in the cloud.
+/// anew from the original coordinates, in closed form; up to 24 points and 108 in the cloud.
 ///
-/// Seen to fail when the last two pairs of a set are not compared.
+/// Seen to fail when the last two pairs of a set are not compared, when orientation is tested only while
+/// a set has two points, and when coherence does not ask for two different cloud points.
 #[test]
 fn every_returned_set_is_coherent() {
     let searches = searches();
-    law(128, planted(LARGE), |planted| every_set_is_admissible(&searches, &planted));
+    law(256, prop_oneof![planted(LARGE), planted(SMALL)], |planted| every_set_is_admissible(&searches, &planted));
 }
 
 /// P21, P22. The bound is closed: a set with a difference of exactly Δ is found whole, and is not found
 /// when Δ is the next smaller number. Whole numbers times a power of two on one axis: no rounding.
 ///
-/// Seen to fail when the comparison is < instead of ≤.
+/// Seen to fail when the comparison is < instead of ≤, and when the last two pairs are not compared.
 #[test]
 fn a_difference_of_exactly_delta_is_coherent() {
     let searches = searches();
@@ -111,8 +112,8 @@ fn measured(at: Vector3<f64>) -> MeasuredPoint {
 /// needed; where it calls the largest coherent set a mirror image brute force finds no admissible four;
 /// where its budget ends its bounds enclose brute force. And some search settles every problem.
 ///
-/// Seen to fail when the colouring bound is one too small, when orientation is tested only while a
-/// set has four points, and when a model point's last candidate is forgotten.
+/// Seen to fail when the colouring bound or the n-partite bound is one too small, when orientation is
+/// tested only while a set has two points, and when a model point's last candidate is forgotten.
 #[test]
 fn no_admissible_set_is_larger() {
     let searches = searches();
@@ -189,7 +190,8 @@ fn no_admissible_set_is_larger() {
 /// P22 beyond brute force: no answer that is called optimal is smaller than an admissible set that was
 /// planted, and every bound leaves room for it; up to 24 points.
 ///
-/// Seen to fail when the n-partite bound counts one too few.
+/// Seen to fail when a model point's last candidate is forgotten, and when the orientation test
+/// refuses equal signs.
 #[test]
 fn a_planted_set_is_not_missed() {
     let searches = searches();
@@ -325,5 +327,5 @@ fn no_point_serves_twice() {
         }
         Ok(())
     });
-    not_idle("points that would serve twice", contested.get(), cases, 5);
+    not_idle("points that would serve twice", contested.get(), cases, 20);
 }

@@ -34,7 +34,7 @@ fn enough(solver: &Variant<dyn Solver>, scene: &Scene) -> bool {
 #[test]
 fn exact_points_give_the_exact_pose() {
     let solvers = solvers();
-    law(512, bare(100.0, 0.0), |scene| {
+    law(256, bare(100.0, 0.0), |scene| {
         let truth = &scene.object_from_camera;
         let limit = 1e-12 * (1.0 + truth.translation().norm());
         let mut answers = 0;
@@ -53,7 +53,7 @@ fn exact_points_give_the_exact_pose() {
 /// P38 for points that a rig saw: exact pixels, with the rig and the pixels at hand. Triangulated
 /// points are good to 1e-9 m, so the pose is held to that over the points' extent.
 ///
-/// Seen to fail as the law above.
+/// Seen to fail when the measured points' centroid is left out, and as the law above.
 #[test]
 fn exact_pixels_give_the_exact_pose() {
     let solvers = solvers();
@@ -78,7 +78,7 @@ fn exact_pixels_give_the_exact_pose() {
 #[test]
 fn moves_with_the_camera() {
     let solvers = solvers();
-    law(512, (bare(5.0, 5e-3), pose::<Camera, Camera>(5.0)), |(scene, motion)| {
+    law(256, (bare(5.0, 5e-3), pose::<Camera, Camera>(5.0)), |(scene, motion)| {
         let moved = scene.camera_moved(&motion);
         for solver in solvers.iter().filter(|solver| enough(solver, &scene)) {
             match (solve(solver, &scene), solve(solver, &moved)) {
@@ -99,12 +99,13 @@ fn moves_with_the_camera() {
 /// P39. Equivariance, object side. In the paper's rows solve(x, y B) = solve(x, y) B: ≤ 1e-10, for noisy
 /// bare points and for noisy pixels with their rig; a solver that refuses one refuses both.
 ///
-/// Seen to fail when the centroid of the model's points is left out.
+/// Seen to fail when the centroid of the model's points is left out, when points are weighted by their
+/// distance from the object's origin, and when the area of a triangle is measured from there.
 #[test]
 fn moves_with_the_object() {
     let solvers = solvers();
     let scene = prop_oneof![bare(5.0, 5e-3).boxed(), seen(0.5).boxed()];
-    law(512, (scene, pose::<Object, Object>(5.0)), |(scene, motion)| {
+    law(256, (scene, pose::<Object, Object>(5.0)), |(scene, motion)| {
         let moved = scene.object_moved(&motion);
         for solver in solvers.iter().filter(|solver| enough(solver, &scene)) {
             match (solve(solver, &scene), solve(solver, &moved)) {
@@ -134,8 +135,8 @@ fn best_of_all(solvers: &[Variant<dyn Solver>], scene: &Scene) -> Option<(Transf
 /// No solver claims to be that one: the least sum among all of them must be the minimum, computed from
 /// Horn's eigenvalue, and no solver and no perturbation may be below it.
 ///
-/// Seen to fail when the measured points' centroid is left out and when the singular vectors are taken
-/// in the wrong order.
+/// Seen to fail when points are weighted by their distance from the object's origin, when a centroid
+/// is left out, and when the rotation is transposed.
 #[test]
 fn no_motion_has_smaller_squares() {
     let solvers = solvers();
@@ -155,13 +156,13 @@ fn no_motion_has_smaller_squares() {
 /// P41. det R = +1 always, also for coplanar, noisy and mirrored input: RᵀR = I and det R = 1 to 1e-13, no
 /// NaN.
 ///
-/// Seen to fail when a solver returns a scaled rotation.
+/// Seen to fail when a rotation is returned 1e-9 too long.
 #[test]
 fn a_pose_is_never_a_reflection() {
     let solvers = solvers();
     let scene =
         prop_oneof![bare(20.0, 0.0).boxed(), bare(20.0, 0.02).boxed(), bare(20.0, 1.0).boxed(), seen(0.5).boxed()];
-    law(512, (scene, any::<bool>()), |(scene, mirrored)| {
+    law(256, (scene, any::<bool>()), |(scene, mirrored)| {
         let scene = if mirrored { scene.mirrored() } else { scene };
         for solver in &solvers {
             let Ok(found) = solve(solver, &scene) else { continue };
@@ -182,7 +183,7 @@ fn a_pose_is_never_a_reflection() {
 #[test]
 fn mirrored_points_leave_a_large_residual() {
     let solvers = solvers();
-    law(512, bare(10.0, 0.0), |scene| {
+    law(256, bare(10.0, 0.0), |scene| {
         let mirrored = scene.mirrored();
         let places: Vec<Vector3<f64>> = scene.points.iter().map(|point| point.model.coords).collect();
         let [least, second, first] = extents(&places);

@@ -44,7 +44,8 @@ fn triangulation_undoes_projection() {
 /// P48 for general rigs: any displacement across the axis, turned cameras, lens distortion of 4, 5
 /// and 8 coefficients.
 ///
-/// Seen to fail when the radial part's derivative is left out of the iteration that undistorts.
+/// Seen to fail when the slope of the radial distortion is left out of its derivative, and when
+/// undistorting ends after one step.
 #[test]
 fn triangulation_undoes_projection_for_any_rig() {
     let seen = Cell::new(0);

@@ -58,7 +58,7 @@ fn an_inverse_undoes() {
 
 /// P3. The rotation part of everything that makes a motion: |RᵀR − I| ≤ 1e-13 and |det R − 1| ≤ 1e-13.
 ///
-/// Seen to fail when a matrix taken in is not brought back to an exact rotation.
+/// Seen to fail when the quaternion of a matrix taken in is not brought to unit length.
 #[test]
 fn rotations_stay_rotations() {
     let perturbed = prop::array::uniform9(-1e-9..=1e-9f64);
@@ -132,7 +132,7 @@ fn quaternions_and_matrices_agree() {
 
 /// P6. exp(log(R)) = R for angles in \[0, π\]: ≤ 1e-12, and ≤ 1e-7 within 1e-6 of π.
 ///
-/// Seen to fail when the logarithm of −q is taken as it stands.
+/// Seen to fail when the logarithm of −q is taken as it stands: its length passes π.
 #[test]
 fn exp_undoes_log() {
     let angles = prop_oneof![
