@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use rand::Rng;
 use seafix_component::{BuildError, Choice, Registry};
-use seafix_geometry::{Covariance6, MeasuredPoint, StereoRig};
+use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
     Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind,
@@ -16,7 +16,7 @@ use seafix_vision::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::source::{Eyes, Sight, WorldPrior};
+use crate::source::{Eyes, Sight};
 
 /// The settings of the way from a frame to a fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -175,7 +175,8 @@ impl Stages {
             .iter()
             .enumerate()
             .filter_map(|(index, target)| {
-                let prior = prior(target, sight.prior.as_ref());
+                let world = sight.prior.as_ref();
+                let prior = world.and_then(|world| target.prior(&world.world_from_camera, &world.covariance));
                 let in_view = in_view(target, prior.as_ref(), rig)?;
                 let mut attempt = self.attempt(index, target, &cloud, prior.as_ref(), &in_view, rig, rng);
                 attempt.times.total_ms = Some(common + milliseconds(attempt.started));
@@ -223,8 +224,7 @@ impl Stages {
     ) -> Attempt {
         let started = Instant::now();
         let settings = &self.settings;
-        let (candidates, stage1) =
-            timed(|| candidates(&target.points, cloud, prior, &settings.gate, target.survey_sigma, Some(in_view)));
+        let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)));
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: settings.tolerance };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
         let (answer, solution) =
@@ -237,16 +237,6 @@ impl Stages {
         };
         Attempt { target: index, candidates, answer, times, started }
     }
-}
-
-/// The rough pose relative to `target`; `None` where no world connects them. The perturbation lives
-/// in the camera frame, so that its covariance is the same in the world and in the object.
-fn prior(target: &Target, world: Option<&WorldPrior>) -> Option<Prior> {
-    let (world, world_from_object) = (world?, target.world_from_object?);
-    Some(Prior {
-        object_from_camera: world_from_object.inverse() * world.world_from_camera,
-        bound: PriorBound::Gaussian(Covariance6::new(world.covariance.matrix)),
-    })
 }
 
 /// Which points of `target` may be in view: predicted in both images, or out of them by no more than

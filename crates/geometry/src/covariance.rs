@@ -32,11 +32,7 @@ impl<A: Frame, B: Frame> Covariance6<A, B> {
     #[must_use]
     pub fn inverse(&self, a_from_b: &Transform<A, B>) -> Covariance6<B, A> {
         // T = T̂ Exp(ξ) ⇒ T⁻¹ = T̂⁻¹ Exp(−Ad(T̂) ξ).
-        let r = a_from_b.rotation_matrix();
-        let mut ad = Matrix6::zeros();
-        ad.fixed_view_mut::<3, 3>(0, 0).copy_from(&r);
-        ad.fixed_view_mut::<3, 3>(3, 3).copy_from(&r);
-        ad.fixed_view_mut::<3, 3>(3, 0).copy_from(&(skew(&a_from_b.translation()) * r));
+        let ad = a_from_b.adjoint();
         Covariance6::new(ad * self.matrix * ad.transpose())
     }
 

@@ -2,7 +2,7 @@
 
 use std::{fmt, marker::PhantomData, ops::Mul};
 
-use nalgebra::{Isometry3, Matrix3, Matrix4, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::{Frame, Point, so3};
 
@@ -142,6 +142,16 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         xi
     }
 
+    /// Ad(T): the ξ in frame `A` that moves as ξ in frame `B` does, T · Exp(ξ) = Exp(Ad(T) ξ) · T.
+    pub fn adjoint(&self) -> Matrix6<f64> {
+        let r = self.rotation_matrix();
+        let mut adjoint = Matrix6::zeros();
+        adjoint.fixed_view_mut::<3, 3>(0, 0).copy_from(&r);
+        adjoint.fixed_view_mut::<3, 3>(3, 3).copy_from(&r);
+        adjoint.fixed_view_mut::<3, 3>(3, 0).copy_from(&(so3::skew(&self.translation()) * r));
+        adjoint
+    }
+
     /// `self · Exp(ξ)`: this estimate moved by a perturbation in frame `B`.
     #[must_use]
     pub fn perturbed(&self, xi: &Vector6<f64>) -> Self {
@@ -222,6 +232,14 @@ mod tests {
         let p = object_from_camera * Point::new(1.0, 0.0, 0.0);
         assert!(p.distance(&Point::new(1.0, 1.0, 0.0)) < 1e-15);
         assert!((object_from_camera.inverse() * p).distance(&Point::new(1.0, 0.0, 0.0)) < 1e-15);
+    }
+
+    #[test]
+    fn the_adjoint_carries_a_perturbation_across() {
+        let t = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.5, 1.0, 2.0, -1.0].into());
+        let xi = Vector6::from([0.02, 0.01, -0.03, 0.2, -0.1, 0.3]);
+        let left = Transform::<Object, Object>::exp(&(t.adjoint() * xi)) * t;
+        assert!((left.matrix() - t.perturbed(&xi).matrix()).amax() < 1e-14);
     }
 
     #[test]

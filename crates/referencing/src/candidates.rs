@@ -16,8 +16,8 @@ pub enum Gate {
     /// The paper's shell: a box of this half-size (m) along the camera's axes, the same for every
     /// point ("by the known navigation error", Sec. 2.2); its faces belong to it.
     Box(f64),
-    /// The ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ²₃(confidence) with S = J Σ_nav Jᵀ + Σ_triangulation +
-    /// (σ_model² + σ_survey²) I, J the derivative of the predicted place by the pose: the true
+    /// The ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ²₃(confidence) with S = J Σ_prior Jᵀ + Σ_triangulation +
+    /// σ_model² I, J the derivative of the predicted place by the pose: the true
     /// cloud point lies in it with this confidence (Bar-Shalom and Fortmann, *Tracking and Data
     /// Association*, 1988, Sec. 5.2).
     ChiSquare(f64),
@@ -91,15 +91,13 @@ impl Candidates {
 ///
 /// A cloud point c is a candidate of the model point whose predicted place in the camera is p when
 /// |c − p| ≤ s along each camera axis ([`PriorBound::Box`], closed), or when `gate` lets it through
-/// ([`PriorBound::Gaussian`]). Without a prior every cloud point is. `survey_sigma` (m) is how well
-/// the target's own place is known where the prior came by way of the world; points that `in_view`
-/// denies get no candidates.
+/// ([`PriorBound::Gaussian`]). Without a prior every cloud point is. Points that `in_view` denies get
+/// no candidates.
 pub fn candidates(
     model: &[ModelPoint],
     cloud: &[MeasuredPoint],
     prior: Option<&Prior>,
     gate: &Gate,
-    survey_sigma: f64,
     in_view: Option<&[bool]>,
 ) -> Candidates {
     let seen = |index: usize| in_view.is_none_or(|mask| mask.get(index).copied().unwrap_or(false));
@@ -110,7 +108,7 @@ pub fn candidates(
         let Some(prior) = prior else {
             return (0..cloud.len()).collect();
         };
-        let shell = shell(point, prior, gate, survey_sigma);
+        let shell = shell(point, prior, gate);
         (0..cloud.len()).filter(|&j| shell.admits(&cloud[j])).collect()
     });
     Candidates { lists: lists.collect() }
@@ -122,14 +120,14 @@ enum PointShell {
     Ellipsoid { centre: Point<Camera>, covariance: Matrix3<f64>, limit: f64 },
 }
 
-fn shell(point: &ModelPoint, prior: &Prior, gate: &Gate, survey_sigma: f64) -> PointShell {
+fn shell(point: &ModelPoint, prior: &Prior, gate: &Gate) -> PointShell {
     let centre = prior.object_from_camera.inverse() * point.at;
     match (&prior.bound, gate) {
         (PriorBound::Box(half), _) | (PriorBound::Gaussian(_), Gate::Box(half)) => {
             PointShell::Box { centre, half: *half }
         }
         (PriorBound::Gaussian(covariance), Gate::ChiSquare(confidence)) => {
-            let own = point.sigma * point.sigma + survey_sigma * survey_sigma;
+            let own = point.sigma * point.sigma;
             PointShell::Ellipsoid {
                 centre,
                 covariance: covariance.of_point(&centre) + Matrix3::identity() * own,
@@ -186,7 +184,7 @@ mod tests {
     fn the_faces_of_the_box_belong_to_it() {
         let model = one_point([0.0, 0.0, 2.0]);
         let cloud = cloud(&[[0.25, -0.25, 2.25], [0.25 + 1e-9, 0.0, 2.0], [0.0, 0.0, 2.0]], 0.0);
-        let found = candidates(&model, &cloud, Some(&boxed(0.25)), &Gate::default(), 0.0, None);
+        let found = candidates(&model, &cloud, Some(&boxed(0.25)), &Gate::default(), None);
         assert_eq!(found.lists, [vec![0, 2]]);
         assert_eq!((found.pairs(), found.with_candidates()), (2, 1));
     }
@@ -196,7 +194,7 @@ mod tests {
         let model = one_point([0.0, 0.0, 2.0]);
         let cloud = cloud(&[[0.1, 0.0, 2.0], [0.0, 0.3, 2.0], [0.0, 0.0, 2.7]], 0.0);
         for (half, expected) in [(0.05, 0), (0.1, 1), (0.3, 2), (0.8, 3)] {
-            let found = candidates(&model, &cloud, Some(&boxed(half)), &Gate::default(), 0.0, None);
+            let found = candidates(&model, &cloud, Some(&boxed(half)), &Gate::default(), None);
             assert_eq!(found.pairs(), expected, "half-size {half}");
         }
     }
@@ -212,14 +210,14 @@ mod tests {
             let mut places = [[0.0, 0.0, 2.0]; 2];
             places[0][axis] += edge * (1.0 - 1e-6);
             places[1][axis] += edge * (1.0 + 1e-6);
-            candidates(&model, &cloud(&places, 0.04), Some(&prior), &Gate::ChiSquare(0.99), 0.0, None).lists
+            candidates(&model, &cloud(&places, 0.04), Some(&prior), &Gate::ChiSquare(0.99), None).lists
         };
         let base = 0.03f64.powi(2) + 0.04f64.powi(2) + 0.12f64.powi(2);
         let limit = chi_square(3, 0.99);
         assert!((limit - 11.345).abs() < 1e-3);
         assert_eq!(along(0, base + 0.02f64.powi(2), limit), [vec![0]]);
         assert_eq!(along(2, base, limit), [vec![0]], "depth does not feel the attitude");
-        let faithful = candidates(&model, &cloud(&[[0.2, 0.0, 2.0]], 0.04), Some(&prior), &Gate::Box(0.2), 0.0, None);
+        let faithful = candidates(&model, &cloud(&[[0.2, 0.0, 2.0]], 0.04), Some(&prior), &Gate::Box(0.2), None);
         assert_eq!(faithful.lists, [vec![0]]);
     }
 
@@ -227,9 +225,9 @@ mod tests {
     fn without_a_prior_every_point_is_a_candidate_of_what_is_in_view() {
         let model = [one_point([0.0, 0.0, 2.0]), one_point([1.0, 0.0, 2.0])].concat();
         let cloud = cloud(&[[0.0; 3]; 2], 0.01);
-        let found = candidates(&model, &cloud, None, &Gate::default(), 0.0, Some(&[false, true]));
+        let found = candidates(&model, &cloud, None, &Gate::default(), Some(&[false, true]));
         assert_eq!(found.lists, [vec![], vec![0, 1]]);
-        assert_eq!(candidates(&model, &cloud, None, &Gate::default(), 0.0, None), Candidates::all(2, 2));
+        assert_eq!(candidates(&model, &cloud, None, &Gate::default(), None), Candidates::all(2, 2));
     }
 
     #[test]

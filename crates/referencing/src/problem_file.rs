@@ -149,7 +149,7 @@ impl CoherenceProblem {
         match &self.putative {
             Some(pairs) => Some(Candidates::from_pairs(self.model.len(), pairs.iter().copied())),
             None if self.model.len().saturating_mul(self.cloud.len()) > MOST_CANDIDATES && self.prior.is_none() => None,
-            None => Some(candidates(&self.model, &self.cloud, self.prior.as_ref(), &Gate::default(), 0.0, None)),
+            None => Some(candidates(&self.model, &self.cloud, self.prior.as_ref(), &Gate::default(), None)),
         }
     }
 

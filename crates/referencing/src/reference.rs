@@ -9,6 +9,7 @@ use crate::{
     Unidentified,
     candidates::chi_square,
     chance::expected_sets,
+    site::diameter,
     solve::likelihood::{self, Likelihood},
 };
 
@@ -22,7 +23,9 @@ pub struct Acceptance {
     pub chance_budget: f64,
     /// Confidence of the χ² tests of residuals and prior: a true set fails with one minus this.
     pub confidence: f64,
-    /// Poses further apart than this (m, RMS over the model points) are different answers.
+    /// Poses further apart than this (m, RMS over the model points), or than 5 % of the model's
+    /// diameter if that is less, are different answers; a pose that by its own covariance may be off
+    /// by as much is none.
     pub alert_limit: f64,
 }
 
@@ -110,6 +113,16 @@ pub enum Refusal {
         /// The quantile of χ² with 3k − 6 degrees of freedom.
         limit: f64,
     },
+    /// By its own covariance the pose may be further off than the alert limit.
+    #[error(
+        "the model points are known to {rms:.3} m (RMS, one sigma); twice that exceeds the alert limit of {limit:.3} m"
+    )]
+    Imprecise {
+        /// Root mean square over the model points of the predicted error (m).
+        rms: f64,
+        /// The alert limit (m).
+        limit: f64,
+    },
     /// The pose contradicts the prior.
     #[error("the pose is {off:.3} times as far from the prior as the prior allows")]
     Prior {
@@ -126,6 +139,7 @@ impl Refusal {
             Self::TooFew { .. } => "too-few",
             Self::Chance { .. } => "chance",
             Self::Residuals { .. } | Self::Prior { .. } => "gate",
+            Self::Imprecise { .. } => "imprecise",
         }
     }
 }
@@ -235,18 +249,22 @@ pub fn judge(
         Ok(found) => found,
         Err(why) => return Attempt::without(why),
     };
-    let expected = expected_sets(problem, &found.pairs);
-    let judge = Judge { problem, prior, solver, acceptance, rig };
-    let (outcome, runner_up) = match judge.size(&found).and_then(|()| judge.chance(&found, expected)) {
+    let alert_limit = acceptance.alert_limit.min(ALERT_SHARE * diameter(problem.model));
+    let judge = Judge { problem, prior, solver, acceptance, alert_limit, rig };
+    let (outcome, runner_up) = match judge.size(&found.pairs).and_then(|()| judge.chance(&found.pairs)) {
         Ok(()) => judge.poses(&found),
         Err(refusal) => (Outcome::Unidentified(refusal), None),
     };
+    let believed = match &outcome {
+        Outcome::Referenced(reference) => &reference.pairs,
+        _ => &found.pairs,
+    };
     Attempt {
+        expected_chance_sets: Some(expected_sets(problem, believed)),
         outcome,
         runner_up,
         optimal: found.optimal,
         size_bound: Some(found.size_bound),
-        expected_chance_sets: Some(expected),
         tests: Some(found.tests),
         identified: found.pairs,
     }
@@ -271,6 +289,11 @@ impl Attempt {
         }
     }
 }
+
+/// The alert limit is at most this share of the model's diameter.
+const ALERT_SHARE: f64 = 0.05;
+/// One pair in so many may be left out.
+const EXCLUDABLE: usize = 5;
 
 /// A set with its pose.
 struct Hypothesis {
@@ -297,22 +320,23 @@ struct Judge<'a> {
     prior: Option<&'a Prior>,
     solver: &'a dyn Solver,
     acceptance: &'a Acceptance,
+    alert_limit: f64,
     rig: Option<&'a StereoRig>,
 }
 
 impl Judge<'_> {
-    fn size(&self, found: &Identification) -> Result<(), Refusal> {
+    fn size(&self, pairs: &[Correspondence]) -> Result<(), Refusal> {
         let needed = self.acceptance.least_points.max(self.solver.minimum());
-        match found.pairs.len() {
+        match pairs.len() {
             enough if enough >= needed => Ok(()),
             few => Err(Refusal::TooFew { found: few, needed }),
         }
     }
 
-    fn chance(&self, found: &Identification, expected: f64) -> Result<(), Refusal> {
-        let budget = self.acceptance.chance_budget;
+    fn chance(&self, pairs: &[Correspondence]) -> Result<(), Refusal> {
+        let (expected, budget) = (expected_sets(self.problem, pairs), self.acceptance.chance_budget);
         // Written so that a NaN is refused too.
-        if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size: found.pairs.len(), expected, budget }) }
+        if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size: pairs.len(), expected, budget }) }
     }
 
     /// The pose of the set and of its rivals: the only one that passes, several, or none.
@@ -335,6 +359,10 @@ impl Judge<'_> {
                 Err(degenerate) => Fallen::Degenerate(degenerate),
             };
             first_fall.get_or_insert(fall);
+        }
+        if passed.is_empty() {
+            passed =
+                std::iter::once(&found.pairs).chain(&found.rivals).flat_map(|pairs| self.excluding(pairs)).collect();
         }
         let by_score = |a: &Hypothesis, b: &Hypothesis| b.score.total_cmp(&a.score).then_with(|| a.pairs.cmp(&b.pairs));
         passed.sort_by(by_score);
@@ -377,7 +405,35 @@ impl Judge<'_> {
         Ok(Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score: likelihood.log + prior })
     }
 
-    /// Whether the residuals and the prior let the pose pass.
+    /// The set without its worst pairs: as few are left out as make it believable, at most one in five,
+    /// so that at least four points bear witness. A pair may agree with the distances of the others
+    /// and still be badly measured: a corner before a distant ground, say. Every way of leaving out the
+    /// last one that passes is given, so that their poses can contradict each other.
+    fn excluding(&self, pairs: &[Correspondence]) -> Vec<Hypothesis> {
+        let mut kept = pairs.to_vec();
+        for _ in 0..pairs.len() / EXCLUDABLE {
+            let fewer = |out: usize| {
+                let mut fewer = kept.clone();
+                fewer.remove(out);
+                self.hypothesis(&fewer).ok()
+            };
+            let hypotheses: Vec<Hypothesis> = (0..kept.len()).filter_map(fewer).collect();
+            let Some(best) = hypotheses.iter().min_by(|a, b| a.likelihood.cost.total_cmp(&b.likelihood.cost)) else {
+                break;
+            };
+            kept.clone_from(&best.pairs);
+            if self.size(&kept).and_then(|()| self.chance(&kept)).is_err() {
+                break;
+            }
+            let passed: Vec<Hypothesis> = hypotheses.into_iter().filter(|h| self.believable(h).is_ok()).collect();
+            if !passed.is_empty() {
+                return passed;
+            }
+        }
+        Vec::new()
+    }
+
+    /// Whether residuals, precision and prior let the pose pass.
     fn believable(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
         let freedom = 3 * hypothesis.pairs.len() - 6;
         let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(freedom, self.acceptance.confidence));
@@ -385,9 +441,13 @@ impl Judge<'_> {
         if !(chi2 <= limit) {
             return Err(Fallen::Refused(Refusal::Residuals { chi2, limit }));
         }
-        let Some(prior) = self.prior else { return Ok(()) };
         let data = self.observations(&hypothesis.pairs);
         let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
+        let (rms, limit) = (self.predicted_rms(hypothesis, &covariance), self.alert_limit);
+        if !(2.0 * rms <= limit) {
+            return Err(Fallen::Refused(Refusal::Imprecise { rms, limit }));
+        }
+        let Some(prior) = self.prior else { return Ok(()) };
         let off = match &prior.bound {
             PriorBound::Gaussian(of_prior) => {
                 let xi = prior.object_from_camera.error_to(&hypothesis.pose);
@@ -398,6 +458,15 @@ impl Judge<'_> {
             PriorBound::Box(half) => self.off_box(hypothesis, &covariance, &prior.object_from_camera, *half),
         };
         if off <= 1.0 { Ok(()) } else { Err(Fallen::Refused(Refusal::Prior { off })) }
+    }
+
+    /// The predicted error of the model points that the pose transfers: root mean square over all of
+    /// them, one standard deviation (m).
+    fn predicted_rms(&self, hypothesis: &Hypothesis, covariance: &Covariance6<Object, Camera>) -> f64 {
+        let camera_from_object = hypothesis.pose.inverse();
+        let model = self.problem.model;
+        let sum: f64 = model.iter().map(|point| covariance.of_point(&(camera_from_object * point.at)).trace()).sum();
+        (sum / model.len() as f64).sqrt()
     }
 
     /// How far the identified model points, placed by the pose, are from where the prior places them:
@@ -422,7 +491,7 @@ impl Judge<'_> {
 
     /// Whether two poses are different answers.
     fn apart(&self, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> bool {
-        !(rms_apart(self.problem.model, a, b) <= self.acceptance.alert_limit)
+        !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
     }
 
     fn fix(&self, hypothesis: Hypothesis) -> Outcome {

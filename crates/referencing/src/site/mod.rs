@@ -10,11 +10,12 @@ mod target;
 
 use std::path::Path;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3, Vector6};
 use seafix_component::Fault;
-use seafix_geometry::{Object, Point, Transform, World};
+use seafix_geometry::{Covariance6, Object, Point, Transform, World, triad};
 
 pub use shell::Shell;
+pub(crate) use target::diameter;
 pub use target::{NoWorld, Target, TargetKind};
 
 /// A feature point of a model.
@@ -75,6 +76,26 @@ impl SiteObject {
     pub fn shell_in_world(&self) -> Option<Shell<World>> {
         let world_from_object = self.world_from_object?;
         Shell::around(self.points.iter().map(|point| world_from_object * point.at))
+    }
+
+    /// How well the survey knows where the object stands: the covariance of
+    /// [`world_from_object`](Self::world_from_object), from that of the nine surveyed coordinates.
+    ///
+    /// Σ = Σ_c (ξ_c⁺ − ξ_c⁻)(ξ_c⁺ − ξ_c⁻)ᵀ / 4, ξ_c^± the pose's step when coordinate c is moved by ±σ. A
+    /// short base turns millimetres of survey into degrees of attitude.
+    pub fn survey_covariance(&self) -> Option<Covariance6<World, Object>> {
+        let (base, pose) = (self.base_in_world?, self.world_from_object?);
+        let mut sum = Matrix6::zeros();
+        for c in 0..9 {
+            let moved = |step: f64| {
+                let mut base = base;
+                base[c / 3].coords[c % 3] += step;
+                triad(&base[0], &base[1], &base[2]).map_or_else(|_| Vector6::zeros(), |moved| pose.error_to(&moved))
+            };
+            let xi = (moved(self.survey_sigma) - moved(-self.survey_sigma)) * 0.5;
+            sum += xi * xi.transpose();
+        }
+        Some(Covariance6::new(sum))
     }
 
     /// The distance (m) between feature points `i` and `k`.

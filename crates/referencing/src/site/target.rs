@@ -1,9 +1,11 @@
 //! What one search looks for.
 
-use seafix_geometry::{Object, Transform, World};
+use nalgebra::Matrix6;
+use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, World};
 use serde::{Deserialize, Serialize};
 
 use super::{ModelPoint, Shell, Site, SiteObject};
+use crate::{Prior, PriorBound};
 
 /// What is searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -35,14 +37,30 @@ pub struct Target {
     pub points: Vec<ModelPoint>,
     /// Where the target's frame stands; `None` where no world is known.
     pub world_from_object: Option<Transform<World, Object>>,
-    /// Standard deviation of each surveyed coordinate of that place (m).
-    pub survey_sigma: f64,
+    /// How well that place is known; `None` where no world is known.
+    pub survey: Option<Covariance6<World, Object>>,
 }
 
 impl Target {
     /// The greatest distance between two of its points (m).
     pub fn diameter(&self) -> f64 {
         diameter(&self.points)
+    }
+
+    /// The rough pose relative to the target, from the rough pose in the world: what is unsure of
+    /// either is unsure of it. `None` where no world connects them.
+    ///
+    /// With T_wc = T̂_wc Exp(ξ) and T_wo = T̂_wo Exp(η): T_oc = T̂_oc Exp(ξ − Ad(T̂_co) η) to first order.
+    pub fn prior(
+        &self,
+        world_from_camera: &Transform<World, Camera>,
+        covariance: &Covariance6<World, Camera>,
+    ) -> Option<Prior> {
+        let object_from_camera = self.world_from_object?.inverse() * *world_from_camera;
+        let adjoint = object_from_camera.inverse().adjoint();
+        let survey = self.survey.map_or_else(Matrix6::zeros, |survey| survey.matrix);
+        let covariance = Covariance6::new(covariance.matrix + adjoint * survey * adjoint.transpose());
+        Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) })
     }
 
     /// The min–max shell of its points in its own frame.
@@ -55,7 +73,7 @@ impl Target {
             name: object.id.clone(),
             points: object.points.clone(),
             world_from_object: object.world_from_object,
-            survey_sigma: object.survey_sigma,
+            survey: object.survey_covariance(),
         }
     }
 }
@@ -86,19 +104,26 @@ fn whole(site: &Site) -> Result<Target, NoWorld> {
             let place = |o: &SiteObject| o.world_from_object.ok_or_else(|| NoWorld { object: o.id.clone() });
             (place(frame)?.inverse() * place(object)?).relabel()
         };
-        // Within the frame object the survey cancels; to the others it does not.
-        let survey = if own { 0.0 } else { object.survey_sigma.hypot(frame.survey_sigma) };
-        points.extend(object.points.iter().map(|point| ModelPoint {
-            id: format!("{}/{}", object.id, point.id),
-            at: site_from_object * point.at,
-            sigma: if own { point.sigma } else { point.sigma.hypot(survey) },
-            normal: point.normal.map(|normal| site_from_object.rotation() * normal),
+        points.extend(object.points.iter().map(|point| {
+            let at = site_from_object * point.at;
+            // Within the frame object the survey cancels; to the others both surveys count, the more
+            // the farther the point is from the base that was surveyed.
+            let spread = |survey: Option<Covariance6<World, Object>>, at: &Point<Object>| {
+                survey.filter(|_| !own).map_or(0.0, |survey| survey.of_point(at).trace() / 3.0)
+            };
+            let survey = spread(frame.survey_covariance(), &at) + spread(object.survey_covariance(), &point.at);
+            ModelPoint {
+                id: format!("{}/{}", object.id, point.id),
+                at,
+                sigma: (point.sigma * point.sigma + survey).sqrt(),
+                normal: point.normal.map(|normal| site_from_object.rotation() * normal),
+            }
         }));
     }
     Ok(Target {
         name: site.name.clone(),
         points,
         world_from_object: frame.world_from_object,
-        survey_sigma: frame.survey_sigma,
+        survey: frame.survey_covariance(),
     })
 }
