@@ -1,5 +1,7 @@
 //! Bad input gets one line with file, place and remedy, the right exit code, and nothing half-written.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
 use std::{
     fs,
     path::{Path, PathBuf},

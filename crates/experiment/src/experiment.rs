@@ -136,7 +136,7 @@ impl Plan {
             let path: Vec<&str> = unfit.path.iter().map(String::as_str).collect();
             vec![fault(&path, &unfit.message)]
         };
-        let mut faults = vary::check(&experiment.vary, &fault);
+        let mut faults = vary::check(&experiment.vary, fault);
         if experiment.question.trim().is_empty() {
             faults.push(fault(&["question"], "no question").remedy("say in one sentence what the experiment asks"));
         }
@@ -165,7 +165,8 @@ impl Plan {
             };
             let mut table = base.clone();
             for (key, value) in &cell {
-                vary::set(&mut table, key, value.clone()).map_err(|message| in_cell(message, &[key.clone()]))?;
+                vary::set(&mut table, key, value.clone())
+                    .map_err(|message| in_cell(message, std::slice::from_ref(key)))?;
             }
             let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
                 let fault = Fault::in_toml(file, "", &error);

@@ -6,6 +6,9 @@ use nalgebra::{Matrix4, Matrix6};
 use seafix_component::Fault;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 
+/// What a table holds, or the first line that is wrong.
+type Table<T> = Result<Vec<T>, Fault>;
+
 /// One line of `frames.csv`: the stamp and the two image files of a stereo pair.
 pub(super) struct FrameLine {
     pub(super) line: usize,
@@ -22,7 +25,7 @@ pub(super) struct VisibleLine {
 }
 
 /// `stamp_ns,left,right`, in order of time.
-pub(super) fn frames(text: &str, file: &Path) -> Result<Vec<FrameLine>, Fault> {
+pub(super) fn frames(text: &str, file: &Path) -> Table<FrameLine> {
     let mut frames: Vec<FrameLine> = Vec::new();
     for (line, [stamp, left, right]) in rows(text, file, ["stamp_ns", "left", "right"])? {
         let stamp_ns = number(stamp, line, file)?;
@@ -41,7 +44,7 @@ pub(super) fn frames(text: &str, file: &Path) -> Result<Vec<FrameLine>, Fault> {
 }
 
 /// `stamp_ns,object,point`.
-pub(super) fn visibility(text: &str, file: &Path) -> Result<Vec<VisibleLine>, Fault> {
+pub(super) fn visibility(text: &str, file: &Path) -> Table<VisibleLine> {
     rows(text, file, ["stamp_ns", "object", "point"])?
         .into_iter()
         .map(|(line, [stamp, object, point])| {
@@ -52,7 +55,7 @@ pub(super) fn visibility(text: &str, file: &Path) -> Result<Vec<VisibleLine>, Fa
 }
 
 /// `object,m00,…,m33`: the true `world_from_object`, row by row.
-pub(super) fn objects(text: &str, file: &Path) -> Result<Vec<(String, Transform<World, Object>)>, Fault> {
+pub(super) fn objects(text: &str, file: &Path) -> Table<(String, Transform<World, Object>)> {
     wide_rows(text, file, 16)?
         .into_iter()
         .map(|(line, id, numbers)| {
@@ -64,7 +67,7 @@ pub(super) fn objects(text: &str, file: &Path) -> Result<Vec<(String, Transform<
 }
 
 /// `stamp_ns,c00,…,c55`: the covariance of the prior (rotation first, camera frame), row by row.
-pub(super) fn covariances(text: &str, file: &Path) -> Result<Vec<(u64, Covariance6<World, Camera>)>, Fault> {
+pub(super) fn covariances(text: &str, file: &Path) -> Table<(u64, Covariance6<World, Camera>)> {
     wide_rows(text, file, 36)?
         .into_iter()
         .map(|(line, stamp, numbers)| {
@@ -81,11 +84,7 @@ pub(super) fn covariances(text: &str, file: &Path) -> Result<Vec<(u64, Covarianc
 }
 
 /// Data lines with exactly the columns of `header`, and their line numbers.
-fn rows<'a, const N: usize>(
-    text: &'a str,
-    file: &Path,
-    header: [&str; N],
-) -> Result<Vec<(usize, [&'a str; N])>, Fault> {
+fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Table<(usize, [&'a str; N])> {
     let expected = header.join(",");
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     match lines.next() {
@@ -113,7 +112,7 @@ fn rows<'a, const N: usize>(
 }
 
 /// Data lines of a key and `count` numbers, below any header line.
-fn wide_rows<'a>(text: &'a str, file: &Path, count: usize) -> Result<Vec<(usize, &'a str, Vec<f64>)>, Fault> {
+fn wide_rows<'a>(text: &'a str, file: &Path, count: usize) -> Table<(usize, &'a str, Vec<f64>)> {
     text.lines()
         .enumerate()
         .skip(1)
