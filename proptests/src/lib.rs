@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! cargo test -p seafix-proptests                                    # under a minute
-//! PROPTEST_CASES=20000 cargo test --release -p seafix-proptests     # the long proof
+//! PROPTEST_CASES=20000 cargo test --release -p seafix-proptests     # the long proof, many minutes
 //! PROPTEST_RNG_SEED=7 cargo test -p seafix-proptests                # other draws
 //! ```
 //!

@@ -183,8 +183,8 @@ fn no_admissible_set_is_larger() {
         Ok(())
     });
     not_idle("answers that settle a problem", settled.get(), cases, 1);
-    not_idle("no consensus", refused.get(), cases, 10);
-    not_idle("mirror images", mirrored.get(), cases, 20);
+    not_idle("no consensus", refused.get(), cases, 30);
+    not_idle("mirror images", mirrored.get(), cases, 50);
 }
 
 /// P22 beyond brute force: no answer that is called optimal is smaller than an admissible set that was
@@ -327,5 +327,5 @@ fn no_point_serves_twice() {
         }
         Ok(())
     });
-    not_idle("points that would serve twice", contested.get(), cases, 20);
+    not_idle("points that would serve twice", contested.get(), cases, 40);
 }
