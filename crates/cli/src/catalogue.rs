@@ -43,19 +43,33 @@ pub(crate) fn markdown() -> String {
 
 #[cfg(test)]
 mod tests {
-    #[test]
-    fn the_readme_tells_what_the_registries_hold() {
-        let readme = concat!(env!("CARGO_MANIFEST_DIR"), "/../../README.md");
-        let text = std::fs::read_to_string(readme).unwrap();
-        let (begin, end) = ("<!-- components: `seafix list --markdown` -->\n", "<!-- end of components -->");
+    use std::{fs, path::Path};
+
+    /// Holds the part of the README below the line `begin` against `fresh`, or writes it there.
+    fn readme_says(begin: &str, end: &str, fresh: &str) {
+        let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md");
+        let text = fs::read_to_string(&readme).unwrap();
         let from = text.find(begin).expect("the README has the begin marker") + begin.len();
-        let to = text.find(end).expect("the README has the end marker");
-        let fresh = super::markdown();
+        let to = from + text[from..].find(end).expect("the README has the end marker");
         if std::env::var_os("SEAFIX_UPDATE").is_some() {
-            std::fs::write(readme, format!("{}{fresh}{}", &text[..from], &text[to..])).unwrap();
+            fs::write(readme, format!("{}{fresh}{}", &text[..from], &text[to..])).unwrap();
         } else {
             assert_eq!(&text[from..to], fresh, "run the tests once with SEAFIX_UPDATE=1");
         }
+    }
+
+    #[test]
+    fn the_readme_tells_what_the_registries_hold_and_what_was_measured() {
+        let components = super::markdown();
+        readme_says("<!-- components: `seafix list --markdown` -->\n", "<!-- end of components -->", &components);
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/virtual-direct");
+        let summary = fs::read_to_string(folder.join("summary.txt")).unwrap();
+        let results = summary.split("\n\n").next().unwrap();
+        readme_says(
+            "<!-- reports/virtual-direct/summary.txt -->\n",
+            "<!-- end of summary -->",
+            &format!("```\n{results}\n```\n"),
+        );
     }
 
     #[test]

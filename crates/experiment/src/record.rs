@@ -184,7 +184,7 @@ fn camera(camera: &Pinhole) -> CameraRecord {
     }
 }
 
-fn grey(image: &Image) -> GreyImage {
+pub(crate) fn grey(image: &Image) -> GreyImage {
     GreyImage { width: image.width() as u32, height: image.height() as u32, pixels: image.to_u8() }
 }
 

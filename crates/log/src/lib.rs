@@ -61,6 +61,7 @@ mod view;
 mod write;
 
 pub use error::LogError;
+pub use png::encode_png;
 pub use read::{Reader, TrialLog, read};
 pub use record::{
     Alternative, Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, Matrix3,

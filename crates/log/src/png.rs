@@ -12,8 +12,11 @@ use crate::GreyImage;
 /// No image of a log has more pixels than this.
 const LIMIT: u64 = 64 << 20;
 
-/// `image` as PNG.
-pub(crate) fn encode(image: &GreyImage) -> Result<Vec<u8>, String> {
+/// `image` as PNG, losslessly and quickly.
+///
+/// # Errors
+/// An image whose pixels do not fill it.
+pub fn encode_png(image: &GreyImage) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
         .write_image(&image.pixels, image.width, image.height, ExtendedColorType::L8)
@@ -43,7 +46,7 @@ mod tests {
     #[test]
     fn a_grey_image_comes_back() {
         let image = GreyImage { width: 5, height: 3, pixels: (0..15).map(|i| i * 17).collect() };
-        assert_eq!(decode(&encode(&image).unwrap()).unwrap(), image);
+        assert_eq!(decode(&encode_png(&image).unwrap()).unwrap(), image);
     }
 
     #[test]

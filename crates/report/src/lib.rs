@@ -25,6 +25,15 @@ pub use summary::{Row, Spread, StageTimes, Summary};
 
 use run::Run;
 
+/// A report that was written.
+#[derive(Debug)]
+pub struct Report {
+    /// The page.
+    pub page: PathBuf,
+    /// The results in it, as a table for the terminal.
+    pub summary: Summary,
+}
+
 /// Reads the logs in `run_dir` and gives the results, a row a trial.
 ///
 /// # Errors
@@ -33,22 +42,22 @@ pub fn summary(run_dir: &Path) -> Result<Summary, ReportError> {
     Ok(Summary::of(&Run::read(run_dir)?))
 }
 
-/// Reads the logs in `run_dir` and writes `report/report.html` and the pictures in `report/figures`;
-/// gives the path of the page.
+/// Reads the logs in `run_dir` and writes into `folder`: `report.html`, the picture in it as `fix.jpg`,
+/// and the table for the terminal as `summary.txt`.
 ///
 /// # Errors
 /// [`ReportError`] when there is no log, one cannot be read, or the report cannot be written.
-pub fn report(run_dir: &Path) -> Result<PathBuf, ReportError> {
+pub fn report(run_dir: &Path, folder: &Path) -> Result<Report, ReportError> {
     let run = Run::read(run_dir)?;
     let summary = Summary::of(&run);
     let picture = figure::Picture::choose(&run)?;
     let page = page::page(&run, &summary, picture.as_ref()).into_string();
 
-    let folder = run_dir.join("report");
     if let Some(picture) = &picture {
-        write(&folder.join("figures"), "fix.png", &picture.png)?;
+        write(folder, "fix.jpg", &picture.jpeg)?;
     }
-    write(&folder, "report.html", page.as_bytes())
+    write(folder, "summary.txt", summary.to_string().as_bytes())?;
+    Ok(Report { page: write(folder, "report.html", page.as_bytes())?, summary })
 }
 
 /// Writes a file whole or not at all.

@@ -200,20 +200,20 @@ fn write_run(folder: &Path, distances: &[f64]) {
 fn the_report_is_the_same_twice_and_stands_alone() {
     let folder = tempfile::tempdir().unwrap();
     write_run(folder.path(), &[2.0, 3.0, 4.0, 5.0]);
-    let path = report(folder.path()).unwrap();
+    let path = report(folder.path(), &folder.path().join("report")).unwrap().page;
     let first = fs::read(&path).unwrap();
-    assert_eq!(fs::read(report(folder.path()).unwrap()).unwrap(), first);
+    assert_eq!(fs::read(report(folder.path(), &folder.path().join("report")).unwrap().page).unwrap(), first);
     let text = String::from_utf8(first).unwrap();
     assert!(!text.contains("<script") && text.contains("&lt;script&gt;"), "names are escaped");
     for foreign in ["src=\"http", "href=\"http", "url("] {
         assert!(!text.contains(foreign), "{foreign}");
     }
-    let picture = image::open(folder.path().join("report/figures/fix.png")).unwrap();
+    let picture = image::open(folder.path().join("report/fix.jpg")).unwrap();
     assert_eq!([picture.width(), picture.height()], [2 * SIZE[0] + 8, SIZE[1]]);
     if let Some(keep) = std::env::var_os("KEEP_REPORT") {
         fs::create_dir_all(&keep).unwrap();
         fs::write(Path::new(&keep).join("report.html"), text).unwrap();
-        fs::copy(folder.path().join("report/figures/fix.png"), Path::new(&keep).join("fix.png")).unwrap();
+        fs::copy(folder.path().join("report/fix.jpg"), Path::new(&keep).join("fix.jpg")).unwrap();
         fs::write(Path::new(&keep).join("table.txt"), summary(folder.path()).unwrap().to_string()).unwrap();
     }
 }
@@ -227,7 +227,7 @@ fn one_trial_is_drawn_over_its_frames() {
     let mut writer = Writer::create(&folder.path().join("001.mcap"), &header).unwrap();
     (0..12).for_each(|number| writer.frame(&frame(&header, number, 3.0)).unwrap());
     writer.finish().unwrap();
-    let text = fs::read_to_string(report(folder.path()).unwrap()).unwrap();
+    let text = fs::read_to_string(report(folder.path(), &folder.path().join("report")).unwrap().page).unwrap();
     assert!(text.contains("Error of every fix over the frames"));
     if let Some(keep) = std::env::var_os("KEEP_REPORT") {
         fs::create_dir_all(&keep).unwrap();
@@ -264,5 +264,5 @@ fn numbers_are_those_of_the_log() {
 #[test]
 fn a_folder_without_logs_is_no_run() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(report(folder.path()), Err(ReportError::NoLogs(_))));
+    assert!(matches!(report(folder.path(), &folder.path().join("report")), Err(ReportError::NoLogs(_))));
 }

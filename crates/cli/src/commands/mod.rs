@@ -35,10 +35,7 @@ pub(crate) enum Command {
         name: String,
     },
     /// Make the report of a run again, from its logs alone.
-    Report {
-        /// The folder of the run.
-        run: PathBuf,
-    },
+    Report(report::Report),
     /// Write the frames of an experiment's source as a data set.
     Export(export::Export),
 }
@@ -51,7 +48,7 @@ impl Command {
             Self::Check { paths } => check::execute(paths),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),
-            Self::Report { run } => report::execute(run),
+            Self::Report(command) => command.execute(),
             Self::Export(command) => command.execute(),
         }
     }

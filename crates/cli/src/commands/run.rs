@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use seafix_experiment::{Plan, run};
+use seafix_report::report;
 
 use crate::{
-    exit::{DONE, Ended, Failure, OUTPUT, USAGE},
+    exit::{DONE, Ended, Failure, USAGE},
     terminal::{Progress, print},
 };
 
@@ -34,10 +35,8 @@ impl Run {
         let finished = run(&plan, self.out.as_deref(), threads, &progress);
         progress.end();
         let finished = finished?;
-        let failed = |error: seafix_report::ReportError| Failure::new(OUTPUT, error);
-        let report = seafix_report::report(&finished.folder).map_err(failed)?;
-        let summary = seafix_report::summary(&finished.folder).map_err(failed)?;
-        print(&format!("{summary}\nreport: {}\n", report.display()))?;
+        let written = report(&finished.folder, &finished.folder.join("report")).map_err(super::report::failure)?;
+        print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
         Ok(DONE)
     }
 }

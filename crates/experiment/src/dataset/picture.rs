@@ -1,14 +1,13 @@
 //! Image files in and out.
 
-use std::{
-    fs::File,
-    io::{BufReader, Cursor},
-    path::Path,
-};
+use std::{fs::File, io::BufReader, path::Path};
 
-use image::{ColorType, DynamicImage, ImageReader, Limits};
+use image::{ColorType, ImageReader, Limits};
 use seafix_component::Fault;
+use seafix_log::encode_png;
 use seafix_vision::Image;
+
+use crate::record::grey;
 
 /// The most pixels an image may declare.
 const MOST_PIXELS: u64 = 64 << 20;
@@ -72,10 +71,7 @@ fn damaged(path: &Path, error: &image::ImageError) -> Fault {
 /// # Errors
 /// The file cannot be written.
 pub fn write_png(path: &Path, image: &Image) -> Result<(), Fault> {
-    let mut bytes = Cursor::new(Vec::new());
-    let grey = image::GrayImage::from_raw(image.width() as u32, image.height() as u32, image.to_u8())
-        .expect("an image has width × height pixels");
-    DynamicImage::from(grey).write_to(&mut bytes, image::ImageFormat::Png).expect("memory takes every PNG");
-    std::fs::write(path, bytes.into_inner())
+    encode_png(&grey(image))
+        .and_then(|bytes| std::fs::write(path, bytes).map_err(|error| error.to_string()))
         .map_err(|error| Fault::new(format!("cannot write ({error})"), path).remedy("check space and permissions"))
 }

@@ -46,7 +46,9 @@ impl Writer {
         let transforms = view::moving_transforms(&self.places, frame).map_err(record)?;
         let poses = view::body_pose(&self.places, frame).map_err(record)?;
         let pngs = match &frame.images {
-            Some([left, right]) => vec![png::encode(left).map_err(record)?, png::encode(right).map_err(record)?],
+            Some([left, right]) => {
+                vec![png::encode_png(left).map_err(record)?, png::encode_png(right).map_err(record)?]
+            }
             None => Vec::new(),
         };
 

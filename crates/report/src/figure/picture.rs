@@ -1,8 +1,8 @@
 //! Both images of one fix with what was found in them, in the manner of the paper's Figure 7.
 
-use std::{collections::BTreeSet, io::Cursor};
+use std::collections::BTreeSet;
 
-use image::{ImageFormat, Rgb, RgbImage};
+use image::{Rgb, RgbImage, codecs::jpeg::JpegEncoder};
 use seafix_log::{FrameRecord, GreyImage, Outcome, Reader};
 
 use super::marks::{BLACK, BLUE, ORANGE, VERMILION, WHITE, disc, plus, ring};
@@ -11,14 +11,16 @@ use crate::{
     run::{Run, Trial},
 };
 
+/// Of the JPEG: marks stay sharp, the file stays below a megabyte.
+const QUALITY: u8 = 88;
 /// Columns between the two images.
 const GAP: u32 = 8;
 
 /// The picture of one frame, and what its caption says.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    /// The two images side by side, PNG.
-    pub(crate) png: Vec<u8>,
+    /// The two images side by side, JPEG: a page with it can be sent by mail.
+    pub(crate) jpeg: Vec<u8>,
     /// Columns and rows.
     pub(crate) size: [u32; 2],
     /// Index of the trial.
@@ -99,14 +101,12 @@ impl Picture {
                 }
             }
         }
-        let mut png = Cursor::new(Vec::new());
-        canvas.write_to(&mut png, ImageFormat::Png).map_err(|error| ReportError::Picture {
-            path: trial.path.clone(),
-            frame: frame.frame,
-            message: error.to_string(),
+        let mut jpeg = Vec::new();
+        canvas.write_with_encoder(JpegEncoder::new_with_quality(&mut jpeg, QUALITY)).map_err(|error| {
+            ReportError::Picture { path: trial.path.clone(), frame: frame.frame, message: error.to_string() }
         })?;
         Ok(Self {
-            png: png.into_inner(),
+            jpeg,
             size,
             trial: index,
             frame: frame.frame,

@@ -19,7 +19,7 @@ pub(super) fn fix(run: &Run, picture: Option<&Picture>) -> Markup {
     let key = |drawing: &'static str| html! { svg.key viewBox="0 0 32 32" { (PreEscaped(drawing)) } };
     html! {
         figure.image.wide {
-            img src={ "data:image/png;base64," (STANDARD.encode(&picture.png)) } width=(picture.size[0]) height=(picture.size[1])
+            img src={ "data:image/jpeg;base64," (STANDARD.encode(&picture.jpeg)) } width=(picture.size[0]) height=(picture.size[1])
                 alt="Left and right image with key points, candidates and identified points";
             figcaption {
                 "Left and right image of one fix: " (key_points) " key points of the left image and " (cloud) " matched points "
