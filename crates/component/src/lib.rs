@@ -44,8 +44,10 @@ mod choice;
 mod fault;
 mod registry;
 mod suggest;
+mod text;
 
 pub use choice::Choice;
 pub use fault::{Fault, line_at, line_of};
-pub use registry::{BuildError, Component, Entry, Listing, Registry, SettingsError, settings};
+pub use registry::{BuildError, Component, Entry, Listing, Registry, SettingsError, in_range, settings};
 pub use suggest::{nearest, unknown};
+pub use text::read_text;

@@ -15,6 +15,14 @@ pub trait Component: Default + Serialize + DeserializeOwned + 'static {
     const SUMMARY: &'static str;
     /// Where it comes from: author, title, year.
     const SOURCE: &'static str;
+
+    /// Whether its settings can be: a component is built only from settings that pass.
+    ///
+    /// # Errors
+    /// The setting that is out of its range, its value, and the range: `ratio = -1; give a number from 0 to 1`.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
+    }
 }
 
 /// Why a component could not be built.
@@ -110,9 +118,19 @@ pub fn settings<C: Component>(settings: toml::Table) -> Result<C, SettingsError>
             return Err(SettingsError { key: Some(key.clone()), message: error.message().to_owned() });
         }
     }
-    settings
+    let component: C = settings
         .try_into()
-        .map_err(|error: toml::de::Error| SettingsError { key: None, message: error.message().to_owned() })
+        .map_err(|error: toml::de::Error| SettingsError { key: None, message: error.message().to_owned() })?;
+    component.check().map_err(|message| SettingsError { key: None, message })?;
+    Ok(component)
+}
+
+/// The message of a setting that is out of its range, for [`Component::check`]: `Err` unless `holds`.
+///
+/// # Errors
+/// `name = value; give range`.
+pub fn in_range(holds: bool, name: &str, value: impl std::fmt::Display, range: &str) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(format!("{name} = {value}; give {range}")) }
 }
 
 fn defaults<C: Component>() -> toml::Table {
@@ -237,6 +255,10 @@ mod tests {
         const NAME: &'static str = "square";
         const SUMMARY: &'static str = "four equal sides";
         const SOURCE: &'static str = "Euclid, Elements";
+
+        fn check(&self) -> Result<(), String> {
+            in_range(self.side_length > 0.0, "side-length", self.side_length, "a positive length")
+        }
     }
 
     impl Shape for Square {
@@ -263,6 +285,12 @@ mod tests {
             "shape `square` has no setting `side-lenght`, did you mean `side-length`? There are side-length"
         );
         assert_eq!(error.key(), Some("side-lenght"));
+    }
+
+    #[test]
+    fn a_value_out_of_range_is_refused() {
+        let error = SHAPES.build(&Choice::named("square").with("side-length", -1.0)).unwrap_err();
+        assert_eq!(error.to_string(), "shape `square`: side-length = -1; give a positive length");
     }
 
     #[test]

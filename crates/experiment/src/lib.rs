@@ -14,12 +14,11 @@ mod record;
 mod results;
 mod run;
 pub mod source;
-mod text;
 mod vary;
 
 pub use experiment::{Experiment, Plan, Trial};
 pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
 pub use results::COLUMNS;
 pub use run::{Finished, Observer, RunError, Silent, run};
-pub use text::read_text;
+pub use seafix_component::read_text;
 pub use vary::Axis;

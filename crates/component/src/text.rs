@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix_component::Fault;
+use crate::Fault;
 
 /// The text of a file: UTF-8, a byte order mark and CRLF accepted, at most 64 MiB.
 ///
