@@ -37,6 +37,10 @@ impl Component for Kabsch {
 }
 
 impl Solver for Kabsch {
+    fn least_squares(&self) -> bool {
+        true
+    }
+
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         Ok(fit(data))

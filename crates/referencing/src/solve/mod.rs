@@ -50,6 +50,11 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         3
     }
 
+    /// Whether its pose claims the least sum of squared, unweighted residuals of all rigid motions.
+    fn least_squares(&self) -> bool {
+        false
+    }
+
     /// The pose `object_from_camera`.
     ///
     /// # Errors
