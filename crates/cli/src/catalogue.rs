@@ -32,7 +32,7 @@ fn kind<T: ?Sized>(plural: &'static str, registry: &Registry<T>) -> Kind {
 pub(crate) fn markdown() -> String {
     let mut text = String::new();
     for kind in kinds() {
-        text += &format!("| {} | what it does | source |\n|---|---|---|\n", kind.singular);
+        text += &format!("| {} | what it does | literature |\n|---|---|---|\n", kind.singular);
         for listing in kind.listings {
             text += &format!("| `{}` | {} | {} |\n", listing.name, listing.summary, listing.source);
         }

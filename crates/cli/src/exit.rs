@@ -36,6 +36,7 @@ impl From<RunError> for Failure {
         match error {
             RunError::Input(faults) => Self::faults(INPUT, &faults),
             RunError::Output(fault) => Self::new(OUTPUT, fault),
+            RunError::Log(error) => Self::new(OUTPUT, error),
         }
     }
 }

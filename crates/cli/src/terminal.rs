@@ -6,6 +6,7 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
+use seafix_component::Fault;
 use seafix_experiment::Observer;
 
 use crate::exit::{Failure, OUTPUT};
@@ -50,6 +51,10 @@ impl Observer for Progress {
         if self.watched {
             self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
         }
+    }
+
+    fn warns(&self, warning: &Fault) {
+        tell(&format!("warning: {warning}"));
     }
 
     fn frame(&self, trial: &str) {

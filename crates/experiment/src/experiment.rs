@@ -34,8 +34,7 @@ pub struct Experiment {
 
 impl Experiment {
     /// The experiment that a data set alone is: exactly one pipeline, the default.
-    pub fn of_dataset(folder: &Path) -> Self {
-        let name = folder.file_name().map_or("data set".into(), |name| name.to_string_lossy());
+    pub fn of_dataset(folder: &Path, name: &str) -> Self {
         Self {
             question: format!("How well does the default pipeline reference {name}?"),
             seed: 0,
@@ -111,9 +110,10 @@ impl Plan {
     pub fn read(path: &Path, settings: &[String]) -> Result<Self, Vec<Fault>> {
         let name = path.file_stem().map_or_else(|| "run".to_owned(), |stem| stem.to_string_lossy().into_owned());
         if path.is_dir() {
+            // A name even for `.`; the path itself stays as it was given.
             let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
             let name = real.file_name().map_or(name, |name| name.to_string_lossy().into_owned());
-            let experiment = changed(Experiment::of_dataset(&real), settings)?;
+            let experiment = changed(Experiment::of_dataset(path, &name), settings)?;
             return Self::resolve(experiment, &name, Path::new(""), path, "", settings);
         }
         let text = read_text(path).map_err(|fault| vec![fault])?;

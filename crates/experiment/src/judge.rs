@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform,
 use seafix_log::{Evaluation, FrameRecord, TruthRecord, VisiblePoint};
 use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
 
-use crate::{Sighting, record::rows4, source::Truth};
+use crate::{Sighting, source::Truth};
 
 /// A pair is correct when its cloud point shows within this distance (px) of the true projections.
 const CORRECT_PX: f64 = 2.0;
@@ -44,11 +44,11 @@ pub(crate) fn judge(
         })
         .collect();
     record.truth = Some(TruthRecord {
-        world_from_camera: rows4(&truth.world_from_camera.matrix()),
+        world_from_camera: truth.world_from_camera.rows(),
         world_from_object: known
             .iter()
             .flatten()
-            .map(|known| (known.target.name.clone(), rows4(&known.world_from_object.matrix())))
+            .map(|known| (known.target.name.clone(), known.world_from_object.rows()))
             .collect(),
         visible: known.iter().flatten().flat_map(visible_points).collect(),
     });

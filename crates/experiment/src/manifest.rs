@@ -54,15 +54,21 @@ pub(crate) struct Machine {
 }
 
 impl Git {
-    /// The commit this program was built from, as far as git can tell.
+    /// The checkout this program was built in, as it is now; nothing for a program that was carried
+    /// elsewhere.
     pub(crate) fn here() -> Self {
+        let workspace = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let inside = std::env::current_exe().ok().zip(std::fs::canonicalize(workspace).ok());
+        if !inside.is_some_and(|(program, workspace)| program.starts_with(workspace)) {
+            return Self { commit: None, dirty: None };
+        }
         let git = |arguments: &[&str]| {
             let output = Command::new("git").arg("-C").arg(env!("CARGO_MANIFEST_DIR")).args(arguments).output().ok()?;
             output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
         };
         Self {
             commit: git(&["rev-parse", "HEAD"]),
-            dirty: git(&["status", "--porcelain", "--untracked-files=no"]).map(|changes| !changes.is_empty()),
+            dirty: git(&["status", "--porcelain"]).map(|changes| !changes.is_empty()),
         }
     }
 }

@@ -97,6 +97,11 @@ impl Pipeline {
     /// # Errors
     /// [`PipelineError`] names the setting.
     pub fn build(&self) -> Result<Stages, PipelineError> {
+        let fits = |setting, check: Result<(), String>| {
+            check.map_err(|message| PipelineError { setting, key: None, message: format!("{setting}: {message}") })
+        };
+        fits("gate", self.gate.check())?;
+        fits("acceptance", self.acceptance.check())?;
         Ok(Stages {
             detector: build(&DETECTORS, &self.detector)?,
             descriptor: build(&DESCRIPTORS, &self.descriptor)?,

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use nalgebra::{Matrix3, Matrix4, Matrix6};
+use nalgebra::{Matrix3, Matrix6};
 use seafix_component::Registry;
 use seafix_evaluation::alert_limit;
-use seafix_geometry::{Pinhole, Pixel, StereoPixels, StereoRig};
+use seafix_geometry::{Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
     Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, GreyImage, ModelPoint, Outcome as Logged,
     Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
@@ -14,7 +14,8 @@ use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target};
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, MATCHERS};
 
 use crate::{
-    Attempt, Plan, Sighting, Trial,
+    Attempt, Pipeline, Plan, Sighting, Trial,
+    manifest::Git,
     source::{Eyes, Passage, Sight},
 };
 
@@ -38,26 +39,20 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
                 value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
             })
             .collect(),
-        components: vec![
-            component(&DETECTORS, &pipeline.detector),
-            component(&DESCRIPTORS, &pipeline.descriptor),
-            component(&MATCHERS, &pipeline.matcher),
-            component(&SEARCHES, &pipeline.search),
-            component(&SOLVERS, &pipeline.solver),
-        ],
+        components: components(pipeline, passage.images()),
         configuration: toml::to_string(&trial.resolved).expect("a resolved experiment is plain values"),
         site: site.to_toml(),
         source: passage.name().to_owned(),
         rig: rig(passage.rig()),
-        body_from_camera: rows4(&passage.body_from_camera().matrix()),
-        world_from_site: world_from_site.map(|pose| rows4(&pose.matrix())),
+        body_from_camera: passage.body_from_camera().rows(),
+        world_from_site: world_from_site.map(|pose| pose.rows()),
         targets: targets
             .iter()
             .map(|target| TargetModel {
                 id: target.name.clone(),
                 site_from_object: match (world_from_site, target.world_from_object) {
-                    (Some(site), Some(object)) => rows4(&(site.inverse() * object).matrix()),
-                    _ => rows4(&Matrix4::identity()),
+                    (Some(site), Some(object)) => (site.inverse() * object).rows(),
+                    _ => Transform::<Object, Object>::identity().rows(),
                 },
                 points: target
                     .points
@@ -69,10 +64,10 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
             .collect(),
         prior_position_sigma: prior.map(|(position, _)| position),
         prior_attitude_sigma: prior.map(|(_, attitude)| attitude),
-        pixel_sigma: Some(pipeline.triangulation.sigma_px),
+        pixel_sigma: passage.pixel_sigma().or(Some(pipeline.triangulation.sigma_px)),
         disparity_sigma: None,
         seeds: vec![("experiment".to_owned(), trial.resolved.seed)],
-        versions: vec![("seafix".to_owned(), env!("CARGO_PKG_VERSION").to_owned())],
+        versions: versions(),
     }
 }
 
@@ -109,7 +104,7 @@ pub(crate) fn frame(
                 pixels: point.pixels.as_ref().map(pixel_pair),
             })
             .collect(),
-        prior: sight.prior.map(|prior| PriorRecord { world_from_camera: rows4(&prior.world_from_camera.matrix()) }),
+        prior: sight.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() }),
         truth: None,
         targets: attempts,
         times: sighting.times,
@@ -132,9 +127,10 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
     match &answer.outcome {
         Outcome::Referenced(fix) => {
             record.outcome = Logged::Referenced;
-            record.object_from_camera = Some(rows4(&fix.object_from_camera.matrix()));
+            record.object_from_camera = Some(fix.object_from_camera.rows());
             record.covariance = Some(rows6(&fix.covariance.matrix));
             record.pairs = pairs(&fix.pairs);
+            record.evaluation.identified = Some(fix.pairs.len() as u32);
             record.used = fix.used.iter().map(|&index| index as u32).collect();
             record.residual_rms = Some(fix.residual_rms);
         }
@@ -143,7 +139,7 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
             record.alternatives = alternatives
                 .iter()
                 .map(|other| Alternative {
-                    object_from_camera: rows4(&other.object_from_camera.matrix()),
+                    object_from_camera: other.object_from_camera.rows(),
                     pairs: pairs(&other.pairs),
                     score: other.score,
                 })
@@ -153,6 +149,27 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
     record
+}
+
+/// The components that did some work: a cloud that came without images was not looked at.
+fn components(pipeline: &Pipeline, images: bool) -> Vec<Component> {
+    let front = [
+        component(&DETECTORS, &pipeline.detector),
+        component(&DESCRIPTORS, &pipeline.descriptor),
+        component(&MATCHERS, &pipeline.matcher),
+    ];
+    let back = [component(&SEARCHES, &pipeline.search), component(&SOLVERS, &pipeline.solver)];
+    front.into_iter().filter(|_| images).chain(back).collect()
+}
+
+fn versions() -> Vec<(String, String)> {
+    let package = ("seafix".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
+    let git = Git::here();
+    let commit = git.commit.map(|commit| {
+        let state = if git.dirty == Some(true) { " and uncommitted changes" } else { "" };
+        ("commit".to_owned(), format!("{commit}{state}"))
+    });
+    std::iter::once(package).chain(commit).collect()
 }
 
 fn component<T: ?Sized>(registry: &Registry<T>, choice: &seafix_component::Choice) -> Component {
@@ -170,7 +187,7 @@ fn rig(rig: &StereoRig) -> RigRecord {
     RigRecord {
         left: camera(rig.left()),
         right: camera(rig.right()),
-        right_from_left: rows4(&rig.right_from_left().matrix()),
+        right_from_left: rig.right_from_left().rows(),
         rectified: rig.is_rectified(),
     }
 }
@@ -201,10 +218,6 @@ fn uv(pixel: &Pixel) -> [f64; 2] {
 }
 
 fn rows3(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
-}
-
-pub(crate) fn rows4(m: &Matrix4<f64>) -> [[f64; 4]; 4] {
     std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
 }
 

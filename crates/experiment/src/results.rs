@@ -107,7 +107,7 @@ pub(crate) fn csv(rows: &[Row]) -> String {
             .map(|column| match (column.fill)(row) {
                 Cell::Text(word) => quoted(&word),
                 Cell::Whole(number) => number.map(|n| n.to_string()).unwrap_or_default(),
-                Cell::Real(number) => number.map(|x| x.to_string()).unwrap_or_default(),
+                Cell::Real(number) => number.map(real).unwrap_or_default(),
                 Cell::Flag(flag) => flag.map(|f| f.to_string()).unwrap_or_default(),
             })
             .collect();
@@ -115,6 +115,11 @@ pub(crate) fn csv(rows: &[Row]) -> String {
         text += "\n";
     }
     text
+}
+
+/// A number with all its digits; very small ones with an exponent instead of many zeros.
+fn real(x: f64) -> String {
+    if x != 0.0 && x.abs() < 1e-5 { format!("{x:e}") } else { x.to_string() }
 }
 
 /// A word as a CSV field: quoted where it must be; a spreadsheet shall not take it for a formula.

@@ -26,6 +26,8 @@ use crate::{
 pub trait Observer: Sync {
     /// The run begins: so many frames over all trials, about so many bytes of log, in this folder.
     fn begins(&self, _frames: usize, _bytes: u64, _folder: &Path) {}
+    /// Something is odd about an input, but not wrong.
+    fn warns(&self, _warning: &Fault) {}
     /// One more frame of `trial` is logged.
     fn frame(&self, _trial: &str) {}
 }
@@ -44,12 +46,9 @@ pub enum RunError {
     /// The output cannot be written.
     #[error("{0}")]
     Output(Fault),
-}
-
-impl From<LogError> for RunError {
-    fn from(error: LogError) -> Self {
-        Self::Output(Fault::new(error.to_string(), Path::new("")))
-    }
+    /// A log cannot be written.
+    #[error(transparent)]
+    Log(#[from] LogError),
 }
 
 /// A run that is complete.
@@ -80,6 +79,7 @@ struct Group<'a> {
 /// that could not be written.
 pub fn run(plan: &Plan, out: Option<&Path>, threads: usize, observer: &dyn Observer) -> Result<Finished, RunError> {
     let groups = open(plan)?;
+    groups.iter().flat_map(|group| group.passage.warnings()).for_each(|warning| observer.warns(warning));
     let folder = make_folder(out, &plan.name).map_err(RunError::Output)?;
     let frames = groups.iter().map(|group| group.passage.frames() * group.trials.len()).sum();
     observer.begins(frames, groups.iter().map(expected_bytes).sum(), &folder);

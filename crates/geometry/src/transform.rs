@@ -104,6 +104,20 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         self.isometry.to_homogeneous()
     }
 
+    /// The motion of nested rows, as files hold it.
+    ///
+    /// # Errors
+    /// As [`from_matrix`](Self::from_matrix).
+    pub fn from_rows(rows: &[[f64; 4]; 4]) -> Result<Self, NotRigid> {
+        Self::from_matrix(&Matrix4::from_fn(|row, column| rows[row][column]))
+    }
+
+    /// The homogeneous matrix as nested rows, as files hold it.
+    pub fn rows(&self) -> [[f64; 4]; 4] {
+        let matrix = self.matrix();
+        std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+    }
+
     /// The rotation: axes of `B` seen in `A`.
     pub fn rotation(&self) -> UnitQuaternion<f64> {
         self.isometry.rotation

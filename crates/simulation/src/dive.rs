@@ -183,11 +183,16 @@ impl Dive {
         Ok(PlannedDive { settings: self.clone(), seed, dive, rig, scene, site, world_from_object })
     }
 
-    fn check(&self) -> Result<(), BadDive> {
+    /// Whether the settings describe a dive.
+    ///
+    /// # Errors
+    /// The first setting outside its range.
+    pub fn check(&self) -> Result<(), BadDive> {
         let fail = |name, value, remedy| Err(BadDive::Value { name, value, remedy });
         let within = |name, value: f64, low: f64, high: f64, remedy| {
             if value >= low && value <= high { Ok(()) } else { fail(name, value, remedy) }
         };
+        within("frames", self.frames as f64, 1.0, 1e6, "give 1 to 1000000 frames")?;
         within("distance", self.distance, 1.0, 30.0, "views are taken from 1 m to 30 m")?;
         let [low, high] = self.tilt_deg;
         within("tilt-deg[0]", low, 0.0, 40.0, "angles from the vertical go from 0 to 40 degrees")?;

@@ -30,16 +30,27 @@ pub(crate) fn execute(paths: &[PathBuf]) -> Ended {
 }
 
 /// The faults and warnings of one file or folder, by what it is.
-fn examine(path: &Path) -> (Vec<Fault>, Vec<Fault>) {
+fn examine(path: &Path) -> (Vec<String>, Vec<Fault>) {
+    let lines = |faults: Vec<Fault>| faults.iter().map(ToString::to_string).collect();
+    if path.extension().is_some_and(|extension| extension == "mcap") {
+        return (log(path).err().map(|error| error.to_string()).into_iter().collect(), Vec::new());
+    }
+    let (faults, warnings) = read(path);
+    (lines(faults), warnings)
+}
+
+/// Reads a log from end to end, a frame at a time.
+fn log(path: &Path) -> Result<(), seafix_log::LogError> {
+    seafix_log::Reader::open(path)?.try_for_each(|frame| frame.map(|_| ()))
+}
+
+fn read(path: &Path) -> (Vec<Fault>, Vec<Fault>) {
     let faults = |result: Result<(), Vec<Fault>>| (result.err().unwrap_or_default(), Vec::new());
     if path.is_dir() {
         return dataset::check(path);
     }
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("json") => faults(problem_file::read(path).map(|_| ()).map_err(|fault| vec![fault])),
-        Some("mcap") => {
-            faults(seafix_log::read(path).map(|_| ()).map_err(|error| vec![Fault::new(error.to_string(), path)]))
-        }
         _ => match read_text(path) {
             Err(fault) => (vec![fault], Vec::new()),
             Ok(text) => match format(&text).as_deref() {

@@ -1,14 +1,11 @@
 //! Everything that is wrong with a data set, images included.
 
-use std::{
-    collections::HashSet,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use seafix_component::Fault;
 use sha2::{Digest, Sha256};
 
-use super::{Dataset, folder::inside, read_image};
+use super::{Dataset, folder::inside};
 
 /// Reads the data set in `folder` and every file it names: decodes the images, compares their sizes
 /// with the calibration and, where hashes are given, every file with its hash.
@@ -19,15 +16,8 @@ pub fn check(folder: &Path) -> (Vec<Fault>, Vec<Fault>) {
         Ok(dataset) => dataset,
         Err(faults) => return (faults, Vec::new()),
     };
-    let mut faults = Vec::new();
-    let mut seen = HashSet::new();
-    for frame in &dataset.frames {
-        for (path, camera) in [(&frame.left, dataset.rig.left()), (&frame.right, dataset.rig.right())] {
-            if seen.insert(path.clone()) {
-                faults.extend(read_image(path, Some(camera.size())).err());
-            }
-        }
-    }
+    let mut faults: Vec<Fault> = dataset.frames.iter().filter_map(|frame| dataset.pair(frame).err()).collect();
+    faults.dedup();
     faults.extend(hash_faults(&dataset));
     (faults, dataset.warnings)
 }

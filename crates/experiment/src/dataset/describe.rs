@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Matrix4;
-use seafix_geometry::{Frame, NotRigid, Pinhole, StereoRig, Transform};
+use seafix_geometry::{Pinhole, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 /// The versions of the format that are read; the last is written.
@@ -84,7 +83,7 @@ impl CameraNumbers {
 impl Rig {
     pub(super) fn of(rig: &StereoRig) -> Self {
         Self {
-            right_from_left: rows(&rig.right_from_left().matrix()),
+            right_from_left: rig.right_from_left().rows(),
             rectified: rig.is_rectified(),
             left: CameraNumbers::of(rig.left()),
             right: CameraNumbers::of(rig.right()),
@@ -101,18 +100,8 @@ impl Rig {
                 .map_err(|error| (vec![side], format!("{side} camera: {error}")))
         };
         let (left, right) = (camera("left", &self.left)?, camera("right", &self.right)?);
-        let right_from_left =
-            rigid(&self.right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))?;
+        let right_from_left = Transform::from_rows(&self.right_from_left)
+            .map_err(|error| (vec!["right_from_left"], error.to_string()))?;
         StereoRig::new(left, right, right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))
     }
-}
-
-/// A 4×4 matrix of nested rows as a rigid motion.
-pub(super) fn rigid<A: Frame, B: Frame>(rows: &[[f64; 4]; 4]) -> Result<Transform<A, B>, NotRigid> {
-    Transform::from_matrix(&Matrix4::from_fn(|r, c| rows[r][c]))
-}
-
-/// A 4×4 matrix as nested rows.
-pub(super) fn rows(m: &Matrix4<f64>) -> [[f64; 4]; 4] {
-    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
 }

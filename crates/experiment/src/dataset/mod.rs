@@ -12,6 +12,5 @@ mod write;
 pub use check::check;
 pub(crate) use check::{input_hashes, sha256};
 pub use open::{Dataset, DatasetFrame};
-pub(crate) use picture::image_size;
 pub use picture::{read_image, write_png};
 pub use write::write;

@@ -8,10 +8,12 @@ use std::{
 use seafix_component::{Fault, line_of, nearest};
 use seafix_geometry::{Body, Camera, Covariance6, Object, StereoRig, Transform, World};
 use seafix_referencing::Site;
+use seafix_vision::Image;
 
 use super::{
-    describe::{Description, FORMATS, rigid},
+    describe::{Description, FORMATS},
     folder::inside,
+    picture::read_image,
     tables, tum,
 };
 use crate::read_text;
@@ -36,6 +38,8 @@ pub struct Dataset {
     pub objects: Vec<(String, Transform<World, Object>)>,
     /// Whether the set says which feature points are visible.
     pub has_visibility: bool,
+    /// Depth of the pixels in images of 16 bits.
+    pub bits: u8,
     pub(super) hashes: Vec<(String, String)>,
     /// What is odd but not wrong.
     pub warnings: Vec<Fault>,
@@ -75,6 +79,17 @@ impl Dataset {
     }
 }
 
+impl Dataset {
+    /// The two images of `frame`.
+    ///
+    /// # Errors
+    /// As [`read_image`].
+    pub fn pair(&self, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
+        let left = read_image(&frame.left, self.rig.left().size(), self.bits)?;
+        Ok((left, read_image(&frame.right, self.rig.right().size(), self.bits)?))
+    }
+}
+
 /// Reads one description and gathers its faults.
 struct Reader<'a> {
     folder: &'a Path,
@@ -98,7 +113,7 @@ impl Reader<'_> {
             let path: Vec<&str> = std::iter::once("rig").chain(path).collect();
             self.fault(&path, &what, "", "");
         });
-        let body_from_camera = match d.body_from_camera.as_ref().map(rigid) {
+        let body_from_camera = match d.body_from_camera.as_ref().map(Transform::from_rows) {
             None => Transform::identity(),
             Some(Ok(pose)) => pose,
             Some(Err(error)) => {
@@ -142,7 +157,17 @@ impl Reader<'_> {
                     .collect(),
             });
         }
-        let mut warnings = Vec::new();
+        let mut warnings = site.as_ref().map_or_else(Vec::new, |site| site.warnings.clone());
+        if let Ok(rig) = &rig
+            && d.rig.rectified
+            && !rig.is_rectified()
+        {
+            warnings.push(
+                Fault::new("a rig that is called rectified and is not", self.file)
+                    .on_line(line_of(self.source, &["rig", "rectified"]))
+                    .remedy("the numbers of the two cameras decide, not the word"),
+            );
+        }
         for (name, given, found) in [
             ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count()),
             ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count()),
@@ -166,6 +191,7 @@ impl Reader<'_> {
                 frames,
                 objects,
                 has_visibility: visibility.is_some(),
+                bits: d.bits.unwrap_or(16),
                 hashes: d.hashes.clone().into_iter().collect(),
                 warnings,
             }),
@@ -227,6 +253,15 @@ impl Reader<'_> {
         objects: &[(String, Transform<World, Object>)],
     ) {
         let Some(site) = site else { return };
+        let points = |id: &str| site.objects.iter().find(|object| object.id == id).map(|object| &object.points);
+        for line in visibility {
+            if points(&line.object).is_some_and(|points| points.iter().all(|point| point.id != line.point)) {
+                let table = self.folder.join(self.described.visibility.as_deref().unwrap_or_default());
+                let fault = Fault::new("a point that its object does not have", &table).on_line(line.line);
+                self.faults
+                    .push(fault.value(format!("{}/{}", line.object, line.point)).remedy("name a point of the site"));
+            }
+        }
         let ids: Vec<&str> = site.objects.iter().map(|object| object.id.as_str()).collect();
         let named: HashSet<&str> =
             visibility.iter().map(|v| v.object.as_str()).chain(objects.iter().map(|(id, _)| id.as_str())).collect();

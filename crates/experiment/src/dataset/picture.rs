@@ -14,13 +14,13 @@ const MOST_PIXELS: u64 = 64 << 20;
 /// The most memory its decoder may take (bytes).
 const MOST_MEMORY: u64 = 512 << 20;
 
-/// Reads a PNG, JPEG or PNM image as grey, 8 or 16 bits; colour becomes luma (Rec. 709 weights).
-/// `expected` is the size that the calibration has.
+/// Reads a PNG, JPEG or PNM image as grey; colour becomes luma (Rec. 709 weights). `expected` is the
+/// size that the calibration has, `bits` the depth of the pixels in images of 16 bits.
 ///
 /// # Errors
 /// An unreadable, truncated or foreign file, a size other than expected or beyond 64 Mpx
 /// (checked from the header, before anything is decoded).
-pub fn read_image(path: &Path, expected: Option<[u32; 2]>) -> Result<Image, Fault> {
+pub fn read_image(path: &Path, expected: [u32; 2], bits: u8) -> Result<Image, Fault> {
     let (width, height) = image_size(path, expected)?;
     let mut reader = open(path)?;
     let mut limits = Limits::default();
@@ -31,22 +31,24 @@ pub fn read_image(path: &Path, expected: Option<[u32; 2]>) -> Result<Image, Faul
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
             decoded.into_luma8().into_raw().into_iter().map(f32::from).collect()
         }
-        _ => decoded.into_luma16().into_raw().into_iter().map(|p| f32::from(p) / 257.0).collect(),
+        _ => {
+            let white = (1_u32 << bits.min(16)) - 1;
+            decoded.into_luma16().into_raw().into_iter().map(|p| f32::from(p) * (255.0 / white as f32)).collect()
+        }
     };
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
 }
 
 /// Width and height from the header alone; `expected` is the size that the calibration has.
-pub(crate) fn image_size(path: &Path, expected: Option<[u32; 2]>) -> Result<(u32, u32), Fault> {
+fn image_size(path: &Path, expected: [u32; 2]) -> Result<(u32, u32), Fault> {
     let (width, height) = open(path)?.into_dimensions().map_err(|error| damaged(path, &error))?;
     if u64::from(width) * u64::from(height) > MOST_PIXELS {
         return Err(Fault::new("an image too large", path)
             .value(format!("{width}×{height}"))
             .remedy(format!("at most {MOST_PIXELS} pixels are read")));
     }
-    if let Some([w, h]) = expected
-        && (width, height) != (w, h)
-    {
+    let [w, h] = expected;
+    if (width, height) != (w, h) {
         return Err(Fault::new("an image of another size than the calibration", path)
             .value(format!("{width}×{height}, calibrated {w}×{h}"))
             .remedy("give the images the rig was calibrated with, or correct `size`"));

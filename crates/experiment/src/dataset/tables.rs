@@ -19,6 +19,7 @@ pub(super) struct FrameLine {
 
 /// One line of the visibility table: a feature point that both cameras see.
 pub(super) struct VisibleLine {
+    pub(super) line: usize,
     pub(super) stamp_ns: u64,
     pub(super) object: String,
     pub(super) point: String,
@@ -49,7 +50,7 @@ pub(super) fn visibility(text: &str, file: &Path) -> Table<VisibleLine> {
         .into_iter()
         .map(|(line, [stamp, object, point])| {
             let stamp_ns = number(stamp, line, file)?;
-            Ok(VisibleLine { stamp_ns, object: object.to_owned(), point: point.to_owned() })
+            Ok(VisibleLine { line, stamp_ns, object: object.to_owned(), point: point.to_owned() })
         })
         .collect()
 }
@@ -72,8 +73,9 @@ pub(super) fn covariances(text: &str, file: &Path) -> Table<(u64, Covariance6<Wo
         .into_iter()
         .map(|(line, stamp, numbers)| {
             let matrix = Matrix6::from_row_slice(&numbers);
-            if matrix.cholesky().is_none() {
-                return Err(Fault::new("a covariance that is not positive definite", file)
+            let symmetric = (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
+            if !symmetric || matrix.cholesky().is_none() {
+                return Err(Fault::new("a covariance that is not symmetric and positive definite", file)
                     .on_line(line)
                     .value(stamp)
                     .remedy("give the full symmetric 6×6 matrix, rotation first"));

@@ -1,13 +1,17 @@
 //! A passage as a data set folder.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use seafix_component::Fault;
 use seafix_geometry::{Camera, Transform, World};
 
 use super::{
     check::input_hashes,
-    describe::{Description, FORMATS, PriorSigma, Rig, rows},
+    describe::{Description, FORMATS, PriorSigma, Rig},
     picture::write_png,
     tum,
 };
@@ -28,9 +32,11 @@ pub fn write(passage: &dyn Passage, folder: &Path, licence: &str) -> Result<(), 
     if folder.exists() {
         return Err(Fault::new("the folder exists", folder).remedy("choose a new one with --out"));
     }
-    let partial = folder.with_extension("partial");
+    let mut partial = folder.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
     if partial.exists() {
-        fs::remove_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
+        return Err(Fault::new("an interrupted export is in the way", &partial).remedy("delete it"));
     }
     fs::create_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
     let name = folder.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned());
@@ -42,7 +48,7 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
     let put =
         |name: &str, text: &str| fs::write(folder.join(name), text).map_err(|error| failed(&folder.join(name), &error));
     let mut frames = "stamp_ns,left,right\n".to_owned();
-    let mut visibility = "stamp_ns,object,point\n".to_owned();
+    let mut visibility: Option<String> = None;
     let mut objects = None;
     let mut truths: Vec<tum::Stamped<World, Camera>> = Vec::new();
     let mut priors: Vec<tum::Stamped<World, Camera>> = Vec::new();
@@ -59,7 +65,8 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
         truths.push((sight.stamp_ns, truth.world_from_camera));
         for (o, p) in truth.visible.iter().flatten() {
             let object = &passage.site().objects[*o];
-            visibility += &format!("{},{},{}\n", sight.stamp_ns, object.id, object.points[*p].id);
+            let table = visibility.get_or_insert_with(|| "stamp_ns,object,point\n".to_owned());
+            *table += &format!("{},{},{}\n", sight.stamp_ns, object.id, object.points[*p].id);
         }
         objects.get_or_insert(truth.world_from_object);
     }
@@ -67,7 +74,9 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
     put("site.toml", &passage.site().to_toml())?;
     if !truths.is_empty() {
         put("truth.tum", &tum::print(&truths))?;
-        put("visibility.csv", &visibility)?;
+    }
+    if let Some(table) = &visibility {
+        put("visibility.csv", table)?;
     }
     if !priors.is_empty() {
         put("prior.tum", &tum::print(&priors))?;
@@ -90,9 +99,9 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
             .prior_sigma()
             .map(|(position, attitude)| PriorSigma { position, attitude_deg: attitude.to_degrees() }),
         prior_covariance: None,
-        visibility: known("visibility.csv", !truths.is_empty()),
+        visibility: known("visibility.csv", visibility.is_some()),
         objects: known("objects.csv", objects.is_some()),
-        body_from_camera: Some(rows(&passage.body_from_camera().matrix())),
+        body_from_camera: Some(passage.body_from_camera().rows()),
         bits: None,
         rig: Rig::of(passage.rig()),
         hashes: input_hashes(folder)?.into_iter().collect::<BTreeMap<_, _>>(),
@@ -106,7 +115,7 @@ fn table_of_objects(passage: &dyn Passage, places: &[Option<Transform<World, sea
     let mut text = format!("object,{}\n", columns.join(","));
     for (object, place) in passage.site().objects.iter().zip(places) {
         if let Some(place) = place {
-            let numbers: Vec<String> = rows(&place.matrix()).iter().flatten().map(f64::to_string).collect();
+            let numbers: Vec<String> = place.rows().iter().flatten().map(f64::to_string).collect();
             text += &format!("{},{}\n", object.id, numbers.join(","));
         }
     }

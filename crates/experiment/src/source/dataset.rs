@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use seafix_component::{Component, Fault};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
 use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
-use crate::dataset::{Dataset, image_size, input_hashes, read_image};
+use crate::dataset::{Dataset, input_hashes};
 
 /// Reads a `seafix-dataset/1` folder.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -21,7 +22,7 @@ pub struct DatasetSource {
 impl Component for DatasetSource {
     const NAME: &'static str = "dataset";
     const SUMMARY: &'static str = "stereo pairs from a seafix-dataset/1 folder";
-    const SOURCE: &'static str = "FORMATS, section 2";
+    const SOURCE: &'static str = "docs/formats.md";
 }
 
 impl Source for DatasetSource {
@@ -34,12 +35,8 @@ impl Source for DatasetSource {
                     .remedy("a fix needs a known object: add `site = \"site.toml\"`"),
             ]);
         };
-        let faults: Vec<Fault> = dataset
-            .frames
-            .iter()
-            .flat_map(|f| [(&f.left, dataset.rig.left()), (&f.right, dataset.rig.right())])
-            .filter_map(|(file, camera)| image_size(file, Some(camera.size())).err())
-            .collect();
+        // Every image is decoded once before anything is written: a damaged one shall not end a run midway.
+        let faults: Vec<Fault> = dataset.frames.par_iter().flat_map_iter(|frame| dataset.pair(frame).err()).collect();
         if faults.is_empty() { Ok(Box::new(Recorded { dataset, site })) } else { Err(faults) }
     }
 }
@@ -80,10 +77,13 @@ impl Passage for Recorded {
         Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
     }
 
+    fn warnings(&self) -> &[Fault] {
+        &self.dataset.warnings
+    }
+
     fn sight(&self, index: usize) -> Result<Sight, Fault> {
         let frame = &self.dataset.frames[index];
-        let left = read_image(&frame.left, Some(self.dataset.rig.left().size()))?;
-        let right = read_image(&frame.right, Some(self.dataset.rig.right().size()))?;
+        let (left, right) = self.dataset.pair(frame)?;
         let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
         Ok(Sight { stamp_ns: frame.stamp_ns, eyes: Eyes::Pair(left, right), prior })
     }

@@ -73,6 +73,14 @@ pub trait Passage: Send + Sync {
     /// Standard deviations of the prior, typical for the passage: position per world axis (m) and
     /// attitude per camera axis (rad).
     fn prior_sigma(&self) -> Option<(f64, f64)>;
+    /// Standard deviation of a pixel coordinate in clouds that come without images (px), where known.
+    fn pixel_sigma(&self) -> Option<f64> {
+        None
+    }
+    /// What is odd about it but not wrong.
+    fn warnings(&self) -> &[Fault] {
+        &[]
+    }
     /// What a method may see at instant `index`.
     ///
     /// # Errors

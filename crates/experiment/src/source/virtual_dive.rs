@@ -59,6 +59,10 @@ impl Passage for Virtual {
         Some((settings.prior_position, settings.prior_attitude_deg.to_radians()))
     }
 
+    fn pixel_sigma(&self) -> Option<f64> {
+        (!self.images).then_some(self.dive.settings().points.sigma_px)
+    }
+
     fn sight(&self, index: usize) -> Result<Sight, Fault> {
         let frame = self.dive.frame(index);
         let eyes = if self.images {

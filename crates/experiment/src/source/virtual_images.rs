@@ -17,6 +17,10 @@ impl Component for VirtualImages {
     const NAME: &'static str = "virtual-images";
     const SUMMARY: &'static str = "a seeded dive over the virtual site, rendered as stereo pairs";
     const SOURCE: &'static str = "scene of Bobkov, Kudryashov, Inzartsev 2021, Sec. 3.1";
+
+    fn check(&self) -> Result<(), String> {
+        self.0.check().map_err(|error| error.to_string())
+    }
 }
 
 impl Source for VirtualImages {

@@ -17,6 +17,10 @@ impl Component for VirtualPoints {
     const NAME: &'static str = "virtual-points";
     const SUMMARY: &'static str = "the same dive as noisy points and clutter, without images";
     const SOURCE: &'static str = "scene of Bobkov, Kudryashov, Inzartsev 2021, Sec. 3.1";
+
+    fn check(&self) -> Result<(), String> {
+        self.0.check().map_err(|error| error.to_string())
+    }
 }
 
 impl Source for VirtualPoints {
