@@ -235,8 +235,20 @@ fn an_unknown_setting() {
 fn a_value_out_of_range() {
     let (_folder, file) = experiment("question = 'why'\n[source]\nname = 'virtual-points'\ndistance = -1.0\n");
     let run = Path::new(&file).with_file_name("out");
-    refused(&["run", &file, "--out", run.to_str().unwrap()], 3, &["distance = -1"]);
+    refused(&["run", &file, "--out", run.to_str().unwrap()], 2, &["e.toml:2", "distance = -1", "from 1 m to 30 m"]);
     assert!(!run.exists());
+}
+
+#[test]
+fn settings_of_the_pipeline_out_of_range() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("out");
+    for setting in ["acceptance.confidence=2", "acceptance.least-points=0", "gate={chi-square=1.5}", "gate={box=-1}"] {
+        let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n");
+        let set = format!("pipeline.{setting}");
+        refused(&["run", &file, "--set", &set, "--out", out.to_str().unwrap()], 2, &["; give "]);
+        assert!(!out.exists(), "{setting}");
+    }
 }
 
 #[test]
