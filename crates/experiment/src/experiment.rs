@@ -171,7 +171,8 @@ impl Plan {
             let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
                 let fault = Fault::in_toml(file, "", &error);
                 let last: Vec<String> = cell.last().map(|(key, _)| key.clone()).into_iter().collect();
-                in_cell([fault.what, fault.value, fault.remedy].join(" ").trim().to_owned(), &last)
+                let parts = [fault.value, fault.remedy].into_iter().filter(|part| !part.is_empty());
+                in_cell(std::iter::once(fault.what).chain(parts).collect::<Vec<_>>().join(", "), &last)
             })?;
             let trial = trial.resolved().map_err(|unfit| in_cell(unfit.message, &unfit.path))?;
             let source =

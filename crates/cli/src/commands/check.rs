@@ -46,6 +46,10 @@ fn log(path: &Path) -> Result<(), seafix_log::LogError> {
 
 fn read(path: &Path) -> (Vec<Fault>, Vec<Fault>) {
     let faults = |result: Result<(), Vec<Fault>>| (result.err().unwrap_or_default(), Vec::new());
+    if path.is_dir() && !path.join("dataset.toml").exists() {
+        let what = Fault::new("a folder without a dataset.toml", path);
+        return (vec![what.remedy("name a data set, or the files of the folder one by one")], Vec::new());
+    }
     if path.is_dir() {
         return dataset::check(path);
     }

@@ -22,7 +22,8 @@ pub fn check(folder: &Path) -> (Vec<Fault>, Vec<Fault>) {
     (faults, dataset.warnings)
 }
 
-fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
+/// Files that are not those whose hashes the description has.
+pub(crate) fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
     let file = dataset.folder.join("dataset.toml");
     let mut faults = Vec::new();
     for (name, expected) in &dataset.hashes {

@@ -10,7 +10,7 @@ pub mod tum;
 mod write;
 
 pub use check::check;
-pub(crate) use check::{input_hashes, sha256};
+pub(crate) use check::{hash_faults, input_hashes, sha256};
 pub use open::{Dataset, DatasetFrame};
 pub use picture::{read_image, write_png};
 pub use write::write;

@@ -57,7 +57,7 @@ pub(super) fn visibility(text: &str, file: &Path) -> Table<VisibleLine> {
 
 /// `object,m00,…,m33`: the true `world_from_object`, row by row.
 pub(super) fn objects(text: &str, file: &Path) -> Table<(String, Transform<World, Object>)> {
-    wide_rows(text, file, 16)?
+    wide_rows(text, file, "object", 16)?
         .into_iter()
         .map(|(line, id, numbers)| {
             Transform::from_matrix(&Matrix4::from_row_slice(&numbers))
@@ -69,7 +69,7 @@ pub(super) fn objects(text: &str, file: &Path) -> Table<(String, Transform<World
 
 /// `stamp_ns,c00,…,c55`: the covariance of the prior (rotation first, camera frame), row by row.
 pub(super) fn covariances(text: &str, file: &Path) -> Table<(u64, Covariance6<World, Camera>)> {
-    wide_rows(text, file, 36)?
+    wide_rows(text, file, "stamp_ns", 36)?
         .into_iter()
         .map(|(line, stamp, numbers)| {
             let matrix = Matrix6::from_row_slice(&numbers);
@@ -113,8 +113,15 @@ fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Ta
         .collect()
 }
 
-/// Data lines of a key and `count` numbers, below any header line.
-fn wide_rows<'a>(text: &'a str, file: &Path, count: usize) -> Table<(usize, &'a str, Vec<f64>)> {
+/// Data lines of a key and `count` numbers, below a header line that begins with `head`.
+fn wide_rows<'a>(text: &'a str, file: &Path, head: &str, count: usize) -> Table<(usize, &'a str, Vec<f64>)> {
+    let first = text.lines().next().unwrap_or_default();
+    if first.split(',').map(str::trim).next() != Some(head) || first.split(',').count() != count + 1 {
+        return Err(Fault::new("a wrong header", file)
+            .on_line(1)
+            .value(first)
+            .remedy(format!("the first line names `{head}` and {count} columns of numbers")));
+    }
     text.lines()
         .enumerate()
         .skip(1)
@@ -142,6 +149,15 @@ fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_of_places_needs_its_header() {
+        let file = Path::new("objects.csv");
+        assert!(objects("x\n", file).unwrap_err().to_string().contains("names `object` and 16 columns"));
+        let columns: String = (0..16).map(|i| format!(",m{i}")).collect();
+        let identity = "box,1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1";
+        assert_eq!(objects(&format!("object{columns}\n{identity}\n"), file).unwrap()[0].0, "box");
+    }
 
     #[test]
     fn tables_name_the_line_at_fault() {

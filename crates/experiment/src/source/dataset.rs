@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use seafix_component::{Component, Fault};
+use seafix_component::{Component, Fault, in_range};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
 use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
-use crate::dataset::{Dataset, input_hashes};
+use crate::dataset::{Dataset, hash_faults, input_hashes};
 
 /// Reads a `seafix-dataset/1` folder.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -23,6 +23,10 @@ impl Component for DatasetSource {
     const NAME: &'static str = "dataset";
     const SUMMARY: &'static str = "stereo pairs from a seafix-dataset/1 folder";
     const SOURCE: &'static str = "docs/formats.md";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(!self.path.is_empty(), "path", "''", "the folder of a data set, relative to the experiment file")
+    }
 }
 
 impl Source for DatasetSource {
@@ -36,7 +40,10 @@ impl Source for DatasetSource {
             ]);
         };
         // Every image is decoded once before anything is written: a damaged one shall not end a run midway.
-        let faults: Vec<Fault> = dataset.frames.par_iter().flat_map_iter(|frame| dataset.pair(frame).err()).collect();
+        let mut faults: Vec<Fault> =
+            dataset.frames.par_iter().flat_map_iter(|frame| dataset.pair(frame).err()).collect();
+        faults.dedup();
+        faults.extend(hash_faults(&dataset));
         if faults.is_empty() { Ok(Box::new(Recorded { dataset, site })) } else { Err(faults) }
     }
 }
