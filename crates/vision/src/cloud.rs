@@ -1,5 +1,6 @@
 //! From matched pixels to measured points.
 
+use seafix_component::in_range;
 use seafix_geometry::{MeasuredPoint, StereoPixels, StereoRig};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +19,20 @@ pub struct Triangulator {
 impl Default for Triangulator {
     fn default() -> Self {
         Self { sigma_px: 0.15, epipolar_px: 1.5, max_depth: 20.0 }
+    }
+}
+
+impl Triangulator {
+    /// Whether the settings can be.
+    ///
+    /// # Errors
+    /// The setting that is out of its range, its value, and the range.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { sigma_px, epipolar_px, max_depth } = *self;
+        in_range(sigma_px > 0.0 && sigma_px <= 100.0, "sigma-px", sigma_px, "more than 0, at most 100 (px)")?;
+        let band = epipolar_px > 0.0 && epipolar_px <= 1000.0;
+        in_range(band, "epipolar-px", epipolar_px, "more than 0, at most 1000 (px)")?;
+        in_range(max_depth > 0.0 && max_depth.is_finite(), "max-depth", max_depth, "a positive depth (m)")
     }
 }
 

@@ -29,14 +29,6 @@ impl Image {
         Ok(Self { width, height, pixels })
     }
 
-    /// The image of these 8-bit pixels, row by row.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn from_u8(width: usize, height: usize, pixels: &[u8]) -> Result<Self, BadImage> {
-        Self::new(width, height, pixels.iter().map(|&p| f32::from(p)).collect())
-    }
-
     /// Width in pixels.
     pub fn width(&self) -> usize {
         self.width

@@ -1,6 +1,7 @@
 //! Sub-pixel alignment of matched places between the two images.
 
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
+use seafix_component::in_range;
 use seafix_geometry::{Pixel, StereoPixels};
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +25,7 @@ use crate::{Image, Match, View};
 pub struct Refine {
     /// Whether to align at all.
     pub refine: bool,
-    /// Side of the window (px), odd, at most 201.
+    /// Side of the window (px), odd, 3 to 201.
     pub window: usize,
     /// Whether the window may also be sheared and scaled, as a strongly slanted surface asks for. At the
     /// corners of boxes, with another surface behind, six parameters are noisier than two.
@@ -40,6 +41,22 @@ pub struct Refine {
 impl Default for Refine {
     fn default() -> Self {
         Self { refine: true, window: 11, affine: false, reach: 1.5, least_correlation: 0.8, iterations: 20 }
+    }
+}
+
+impl Refine {
+    /// Whether the settings can be.
+    ///
+    /// # Errors
+    /// The setting that is out of its range, its value, and the range.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { refine: _, window, affine: _, reach, least_correlation, iterations } = *self;
+        let odd = window % 2 == 1 && (3..=201).contains(&window);
+        in_range(odd, "window", window, "an odd number of pixels from 3 to 201")?;
+        in_range(reach > 0.0 && reach <= 100.0, "reach", reach, "more than 0, at most 100 (px)")?;
+        let correlated = (-1.0..=1.0).contains(&least_correlation);
+        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
+        in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
     }
 }
 

@@ -1,6 +1,6 @@
 //! The SURF descriptor, upright, at given key points.
 
-use seafix_component::Component;
+use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{Descriptor, Descriptors, integral::Integral};
@@ -35,6 +35,10 @@ impl Component for Surf {
     const NAME: &'static str = "surf";
     const SUMMARY: &'static str = "upright SURF: 64 sums of Haar wavelets around the key point";
     const SOURCE: &'static str = "Bay, Tuytelaars and Van Gool, SURF: speeded up robust features, ECCV 2006";
+
+    fn check(&self) -> Result<(), String> {
+        in_range((0.0..=100.0).contains(&self.scale), "scale", self.scale, "a number from 0 to 100 (px)")
+    }
 }
 
 /// Sub-regions along a side.

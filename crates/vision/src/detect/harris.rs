@@ -1,6 +1,6 @@
 //! Harris' corner detector.
 
-use seafix_component::Component;
+use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{Detector, Keypoint, junction::Junction, peaks};
@@ -52,6 +52,16 @@ impl Component for Harris {
     const SUMMARY: &'static str = "corners by the structure tensor, to a fraction of a pixel, spread over the image";
     const SOURCE: &'static str =
         "Harris and Stephens, A combined corner and edge detector, Alvey Vision Conference, 1988";
+
+    fn check(&self) -> Result<(), String> {
+        let Self { sigma, k, quality, radius: _, junction, features, balance: _ } = *self;
+        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
+        // From k = 1/4 on no response is positive.
+        in_range((0.0..0.25).contains(&k), "k", k, "a number from 0 to below 0.25")?;
+        in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
+        in_range((0.0..=100.0).contains(&junction), "junction", junction, "a number from 0 to 100 (px)")?;
+        in_range(features > 0, "features", features, "at least 1")
+    }
 }
 
 /// Corners nearer to each other than this are one (px).

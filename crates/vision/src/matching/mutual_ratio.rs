@@ -1,6 +1,6 @@
 //! Mutual nearest neighbours with the ratio test.
 
-use seafix_component::Component;
+use seafix_component::{Component, in_range};
 use seafix_geometry::StereoRig;
 use serde::{Deserialize, Serialize};
 
@@ -50,6 +50,17 @@ impl Component for MutualRatio {
     const NAME: &'static str = "mutual-ratio";
     const SUMMARY: &'static str = "mutual nearest neighbours along the epipolar band, with the ratio test";
     const SOURCE: &'static str = "Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004";
+
+    fn check(&self) -> Result<(), String> {
+        let Self { ratio, max_distance, epipolar_px, min_depth, max_depth, neighbours } = *self;
+        in_range(ratio > 0.0 && ratio <= 1.0, "ratio", ratio, "more than 0, at most 1")?;
+        in_range(max_distance > 0.0 && max_distance <= 2.0, "max-distance", max_distance, "more than 0, at most 2")?;
+        in_range((0.0..=1000.0).contains(&epipolar_px), "epipolar-px", epipolar_px, "a number from 0 to 1000 (px)")?;
+        in_range(min_depth >= 0.0 && min_depth.is_finite(), "min-depth", min_depth, "0 or a positive depth (m)")?;
+        let beyond = format!("a depth beyond min-depth = {min_depth} (m)");
+        in_range(max_depth > min_depth && max_depth.is_finite(), "max-depth", max_depth, &beyond)?;
+        in_range(neighbours <= 1000, "neighbours", neighbours, "at most 1000")
+    }
 }
 
 impl Matcher for MutualRatio {
@@ -246,6 +257,28 @@ mod tests {
         assert!(found.iter().map(|m| (m.left, m.right)).eq((0..9).map(|i| (i, i))));
         let without = MutualRatio { epipolar_px: 0.0, ..MutualRatio::default() };
         assert!(matched(&without, (&l, &same), (&r, &same), &rig).len() <= 1);
+    }
+
+    #[test]
+    fn a_lattice_is_matched_by_its_neighbours_alone() {
+        let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
+        let seen: Vec<_> = (0..48)
+            .map(|i| Point::new(f64::from(i % 8) * 0.1 - 0.35, f64::from(i / 8) * 0.1 - 0.25, 2.0))
+            .map(|point| rig.project(&point).unwrap())
+            .collect();
+        let (l, r): (Vec<_>, Vec<_>) = seen.iter().map(|s| (s.left, s.right)).unzip();
+        // One look for all, a little of each point's own, and more noise in each image.
+        let mut next = numbers(11);
+        let look: Vec<f32> = (0..48 * 16).map(|i| (i % 16) as f32 / 16.0 + 0.2 * next()).collect();
+        let mut noisy = || unit(look.iter().map(|x| x + 0.3 * next()).collect(), 16);
+        let (a, b) = (noisy(), noisy());
+        let right = |neighbours| {
+            let found = matched(&MutualRatio { neighbours, ..MutualRatio::default() }, (&l, &a), (&r, &b), &rig);
+            (found.iter().filter(|m| m.left == m.right).count(), found.len())
+        };
+        let (alone, found) = right(0);
+        assert!(alone <= 5 && found < 48, "descriptors alone: {alone} of {found} are right");
+        assert_eq!(right(30), (48, 48));
     }
 
     #[test]

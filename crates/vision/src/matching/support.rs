@@ -143,3 +143,77 @@ fn squared(a: &Pixel, b: &Pixel) -> f64 {
     let (u, v) = (a.u - b.u, a.v - b.v);
     u * u + v * v
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COLUMNS: usize = 8;
+    const ROWS: usize = 6;
+    const COUNT: usize = COLUMNS * ROWS;
+
+    /// A lattice of 25 px seen by both cameras, 60 px further left in the right image, where it is also
+    /// slanted: 2 % narrower.
+    fn lattice() -> [Vec<Keypoint>; 2] {
+        let at = |u: f64, v: f64| Keypoint { at: Pixel { u, v }, response: 1.0, scale: 1.0 };
+        let place = |i: usize| (100.0 + 25.0 * (i % COLUMNS) as f64, 100.0 + 25.0 * (i / COLUMNS) as f64);
+        let left = (0..COUNT).map(|i| at(place(i).0, place(i).1));
+        let right = (0..COUNT).map(|i| at(0.98 * place(i).0 - 60.0, place(i).1));
+        [left.collect(), right.collect()]
+    }
+
+    /// Left point `i` may be every right point of its row, and all look alike: every third is a
+    /// little more like its neighbour than like itself, the others the other way round.
+    fn alike() -> impl Iterator<Item = (usize, usize, f32)> {
+        let pairs = (0..COUNT).flat_map(|i| (0..COLUMNS).map(move |column| (i, i / COLUMNS * COLUMNS + column)));
+        pairs.map(|(i, j)| {
+            let itself = i == j;
+            let misled = i % 3 == 0;
+            (i, j, if itself == misled { 0.05 } else { 0.04 })
+        })
+    }
+
+    /// The right point that each left one believes in most, and whether clearly: the second has less than
+    /// half the belief.
+    fn believed(candidates: &Candidates) -> Vec<(usize, bool)> {
+        let most = |i: usize| {
+            let mut sorted = candidates.of(i).to_vec();
+            sorted.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+            (sorted[0].right, sorted[1].weight < 0.5 * sorted[0].weight)
+        };
+        (0..COUNT).map(most).collect()
+    }
+
+    #[test]
+    fn neighbours_decide_where_all_points_look_alike() {
+        let [left, right] = lattice();
+        let mut candidates = Candidates::new(COUNT, alike());
+        let alone = believed(&candidates);
+        assert_eq!((0..COUNT).filter(|&i| alone[i].0 == i).count(), COUNT - COUNT / 3, "a third is misled");
+        assert!(alone.iter().all(|(_, clearly)| !clearly), "and nothing is clear");
+        candidates.support(&left, &right, 12);
+        let together = believed(&candidates);
+        assert!((0..COUNT).all(|i| together[i] == (i, true)), "{together:?}");
+    }
+
+    #[test]
+    fn where_nothing_agrees_the_descriptors_decide() {
+        let [left, right] = lattice();
+        // The right points lie far from each other: no two displacements are alike.
+        let scattered: Vec<Keypoint> = right
+            .iter()
+            .enumerate()
+            .map(|(i, point)| Keypoint { at: Pixel { u: 1e4 * i as f64, v: point.at.v }, ..*point })
+            .collect();
+        let mut candidates = Candidates::new(COUNT, alike());
+        let ratios = |candidates: &Candidates| -> Vec<f32> {
+            (0..COUNT)
+                .flat_map(|i| candidates.of(i).iter().map(move |c| c.weight / candidates.of(i)[0].weight))
+                .collect()
+        };
+        let before = ratios(&candidates);
+        candidates.support(&left, &scattered, 12);
+        let furthest = before.iter().zip(ratios(&candidates)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(furthest < 1e-5, "{furthest}");
+    }
+}

@@ -1,0 +1,113 @@
+//! Which settings the components of vision refuse, and how they say it.
+
+use seafix_component::{Choice, Registry};
+use seafix_vision::{DESCRIPTORS, DETECTORS, MATCHERS, Refine, Triangulator};
+
+const NO_NUMBERS: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+
+/// What a registry says to a choice; `None`: it is built.
+fn refusal<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Option<String> {
+    registry.build(choice).err().map(|error| error.to_string())
+}
+
+/// The defaults are accepted, and no setting that is a number may be none.
+fn numbers_must_be_numbers<T: ?Sized>(registry: &Registry<T>) {
+    for listing in registry.listings() {
+        registry.build(&Choice::named(listing.name)).expect("the defaults are settings");
+        for (key, _) in listing.defaults.iter().filter(|(_, default)| default.is_float()) {
+            for bad in NO_NUMBERS {
+                let said = refusal(registry, &Choice::named(listing.name).with(key, bad)).unwrap_or_default();
+                assert!(said.contains(&format!("{key} = {bad}; give ")), "{} {key} = {bad}: {said:?}", listing.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn no_number_is_no_setting() {
+    numbers_must_be_numbers(&DETECTORS);
+    numbers_must_be_numbers(&DESCRIPTORS);
+    numbers_must_be_numbers(&MATCHERS);
+}
+
+/// The least and greatest values of a setting are accepted, those beyond are refused by its name.
+fn range<T: ?Sized>(registry: &Registry<T>, name: &str, key: &str, inside: &[f64], beyond: &[f64]) {
+    for &value in inside {
+        assert_eq!(refusal(registry, &Choice::named(name).with(key, value)), None, "{key} = {value}");
+    }
+    for &value in beyond {
+        let said = refusal(registry, &Choice::named(name).with(key, value)).unwrap_or_default();
+        assert!(said.contains(&format!("`{name}`: {key} = {value}; give ")), "{key} = {value}: {said:?}");
+    }
+}
+
+#[test]
+fn harris_refuses_what_finds_nothing() {
+    range(&DETECTORS, "harris", "sigma", &[0.5, 100.0], &[0.0, -1.0, 101.0]);
+    range(&DETECTORS, "harris", "k", &[0.0, 0.24], &[-0.04, 0.25]);
+    range(&DETECTORS, "harris", "quality", &[0.0, 1.0], &[-0.1, 1.1]);
+    range(&DETECTORS, "harris", "junction", &[0.0, 100.0], &[-2.5, 101.0]);
+    assert_eq!(
+        refusal(&DETECTORS, &Choice::named("harris").with("features", 0)).unwrap(),
+        "detector `harris`: features = 0; give at least 1"
+    );
+    assert!(refusal(&DETECTORS, &Choice::named("harris").with("radius", -1)).is_some());
+    assert_eq!(refusal(&DETECTORS, &Choice::named("harris").with("balance", 0)), None);
+}
+
+#[test]
+fn surf_refuses_a_scale_that_is_none() {
+    range(&DESCRIPTORS, "surf", "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
+}
+
+#[test]
+fn mutual_ratio_refuses_what_matches_nothing() {
+    range(&MATCHERS, "mutual-ratio", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
+    range(&MATCHERS, "mutual-ratio", "max-distance", &[0.1, 2.0], &[0.0, -0.7, 2.1]);
+    range(&MATCHERS, "mutual-ratio", "epipolar-px", &[0.0, 1000.0], &[-1.0, 1001.0]);
+    range(&MATCHERS, "mutual-ratio", "min-depth", &[0.0, 49.0], &[-0.1]);
+    range(&MATCHERS, "mutual-ratio", "max-depth", &[0.2], &[0.1, 0.0, -1.0]);
+    assert_eq!(
+        refusal(&MATCHERS, &Choice::named("mutual-ratio").with("min-depth", 60.0)).unwrap(),
+        "matcher `mutual-ratio`: max-depth = 50; give a depth beyond min-depth = 60 (m)"
+    );
+    assert_eq!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("neighbours", 0)), None);
+    assert!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("neighbours", 1001)).is_some());
+}
+
+#[test]
+fn refine_names_the_setting_that_cannot_be() {
+    assert_eq!(Refine::default().check(), Ok(()));
+    let refused = |refine: Refine, start: &str| {
+        let said = refine.check().expect_err(start);
+        assert!(said.starts_with(start), "{said:?}, not {start:?}");
+    };
+    for window in [0, 1, 10, 203] {
+        refused(Refine { window, ..Refine::default() }, &format!("window = {window}; give an odd number"));
+    }
+    for window in [3, 201] {
+        assert_eq!(Refine { window, ..Refine::default() }.check(), Ok(()));
+    }
+    for bad in NO_NUMBERS.into_iter().chain([-2.0, 101.0]) {
+        refused(Refine { reach: bad, ..Refine::default() }, &format!("reach = {bad}; give "));
+        refused(Refine { least_correlation: bad, ..Refine::default() }, &format!("least-correlation = {bad}; give "));
+    }
+    refused(Refine { reach: 0.0, ..Refine::default() }, "reach = 0; give ");
+    refused(Refine { iterations: 0, ..Refine::default() }, "iterations = 0; give ");
+}
+
+#[test]
+fn triangulation_names_the_setting_that_cannot_be() {
+    assert_eq!(Triangulator::default().check(), Ok(()));
+    for bad in NO_NUMBERS.into_iter().chain([0.0, -1.0]) {
+        let settings = Triangulator::default();
+        for (settings, key) in [
+            (Triangulator { sigma_px: bad, ..settings.clone() }, "sigma-px"),
+            (Triangulator { epipolar_px: bad, ..settings.clone() }, "epipolar-px"),
+            (Triangulator { max_depth: bad, ..settings.clone() }, "max-depth"),
+        ] {
+            let said = settings.check().expect_err(key);
+            assert!(said.starts_with(&format!("{key} = {bad}; give ")), "{said:?}");
+        }
+    }
+}
