@@ -1,6 +1,11 @@
 //! The largest admissible sets by plain enumeration: what searches are held against.
 //!
 //! Everything is written anew here, distances, tolerances and volumes included, with no eye to speed.
+//!
+//! The tests of `seafix-referencing` have a brute force of their own, for one search and in many cases.
+//! This one is independent of it on purpose: the definition of an admissible set is what all laws of
+//! searches rest on, and a misreading of it would have to be made twice. It also says what is wrong with
+//! a set that is not admissible, and which cases rounding decides.
 
 use nalgebra::Vector3;
 use seafix_referencing::{Correspondence, Problem, Tolerance};

@@ -1,6 +1,6 @@
 //! What solvers are given: identified points, with the pose they were made from.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use seafix_geometry::{Camera, Object, Pixel, Point, StereoRig, Transform, UncertainPoint};
 use seafix_referencing::{Observation, Observations};
@@ -94,6 +94,22 @@ pub fn extents(points: &[Vector3<f64>]) -> [f64; 3] {
     let mut values: [f64; 3] = scatter.symmetric_eigenvalues().into();
     values.sort_by(f64::total_cmp);
     values
+}
+
+/// The corners of a box of 1 × 0.8 × 0.6 m, 4 m before the camera, bare and without noise: the easiest
+/// scene there is.
+pub fn corners() -> Scene {
+    let truth = Transform::new(UnitQuaternion::identity(), Vector3::new(0.0, 0.0, -4.0));
+    let points = (0..8).map(|i| {
+        let model = Point::new(f64::from(i & 1), 0.8 * f64::from(i >> 1 & 1), 0.6 * f64::from(i >> 2));
+        Observation {
+            measured: UncertainPoint::isotropic(truth.inverse() * model, 1e-3),
+            pixels: None,
+            model,
+            model_sigma: 0.0,
+        }
+    });
+    Scene { points: points.collect(), rig: None, object_from_camera: truth }
 }
 
 /// Bare points from a camera anywhere within ±`reach` (m), each coordinate with up to `noise` (m) of
