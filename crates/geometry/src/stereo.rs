@@ -87,6 +87,18 @@ impl StereoRig {
         self.right_from_left.translation().norm()
     }
 
+    /// E = [t̂]× R of `right_from_left`, t̂ the direction of its translation: x_rᵀ E x_l = 0 for the undistorted
+    /// directions of one point; E x_l is the epipolar line of x_l in the right image.
+    pub fn essential(&self) -> &Matrix3<f64> {
+        &self.essential
+    }
+
+    /// The mean of the four focal lengths (px): what scales distances in the cameras' directions to pixels.
+    pub fn mean_focal(&self) -> f64 {
+        let [l, r] = [self.left.focal(), self.right.focal()];
+        0.25 * (l[0] + l[1] + r[0] + r[1])
+    }
+
     /// Whether rows of the two images correspond: the same camera twice, without distortion, one
     /// beside the other along x.
     pub fn is_rectified(&self) -> bool {
@@ -117,9 +129,7 @@ impl StereoRig {
         let r = self.right.normalize(&seen.right)?.push(1.0);
         let (line_r, line_l) = (self.essential * l, self.essential.transpose() * r);
         let slope = line_r.xy().norm_squared() + line_l.xy().norm_squared();
-        let [fl, fr] = [self.left.focal(), self.right.focal()];
-        let f = 0.25 * (fl[0] + fl[1] + fr[0] + fr[1]);
-        Some(f * r.dot(&line_r).abs() / slope.sqrt())
+        Some(self.mean_focal() * r.dot(&line_r).abs() / slope.sqrt())
     }
 
     /// The point that both pixels see, and how well it is known when each pixel coordinate has

@@ -1,7 +1,7 @@
 //! Which pairs of key points the rig allows.
 
 use nalgebra::{Vector2, Vector3};
-use seafix_geometry::{StereoRig, so3::skew};
+use seafix_geometry::StereoRig;
 
 use crate::Keypoint;
 
@@ -47,9 +47,7 @@ impl Band {
     ) -> Self {
         let motion = rig.right_from_left();
         let (rotation, step) = (motion.rotation_matrix(), motion.translation());
-        let essential = skew(&(step / rig.baseline())) * rotation;
-        let [fl, fr] = [rig.left().focal(), rig.right().focal()];
-        let focal = 0.25 * (fl[0] + fl[1] + fr[0] + fr[1]);
+        let (essential, focal) = (rig.essential(), rig.mean_focal());
         // Where the lens model has no direction the ray is not a number, which no comparison allows.
         let nowhere = Vector2::repeat(f64::NAN);
         let left = left.iter().map(|keypoint| {
