@@ -10,7 +10,7 @@ use seafix_log::{
     Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, GreyImage, ModelPoint, Outcome as Logged,
     Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
 };
-use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target};
+use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, MATCHERS};
 
 use crate::{
@@ -51,8 +51,9 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
             .map(|target| TargetModel {
                 id: target.name.clone(),
                 site_from_object: match (world_from_site, target.world_from_object) {
-                    (Some(site), Some(object)) => (site.inverse() * object).rows(),
-                    _ => Transform::<Object, Object>::identity().rows(),
+                    (Some(site), Some(object)) => Some((site.inverse() * object).rows()),
+                    _ => (pipeline.target == TargetKind::Site || target.name == site.frame_object().id)
+                        .then(|| Transform::<Object, Object>::identity().rows()),
                 },
                 points: target
                     .points
@@ -65,7 +66,6 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
         prior_position_sigma: prior.map(|(position, _)| position),
         prior_attitude_sigma: prior.map(|(_, attitude)| attitude),
         pixel_sigma: passage.pixel_sigma().or(Some(pipeline.triangulation.sigma_px)),
-        disparity_sigma: None,
         seeds: vec![("experiment".to_owned(), trial.resolved.seed)],
         versions: versions(),
     }

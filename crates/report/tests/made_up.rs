@@ -59,7 +59,7 @@ fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
         world_from_site: Some(EYE),
         targets: vec![TargetModel {
             id: format!("manifold {NAME}"),
-            site_from_object: EYE,
+            site_from_object: Some(EYE),
             points: (0..9)
                 .map(|i| ModelPoint {
                     id: format!("M{i}"),
@@ -72,7 +72,6 @@ fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
         prior_position_sigma: Some(0.1),
         prior_attitude_sigma: Some(0.5_f64.to_radians()),
         pixel_sigma: Some(0.25),
-        disparity_sigma: None,
         seeds: vec![("experiment".to_owned(), 1)],
         versions: vec![("seafix".to_owned(), "0.1.0".to_owned())],
     }

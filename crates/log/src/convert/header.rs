@@ -23,7 +23,6 @@ pub(crate) fn header_message(header: &TrialHeader) -> proto::TrialHeader {
         prior_position_sigma,
         prior_attitude_sigma,
         pixel_sigma,
-        disparity_sigma,
         seeds,
         versions,
     } = header.clone();
@@ -50,7 +49,6 @@ pub(crate) fn header_message(header: &TrialHeader) -> proto::TrialHeader {
         prior_position_sigma,
         prior_attitude_sigma,
         pixel_sigma,
-        disparity_sigma,
         seeds: seeds.into_iter().map(|(name, value)| proto::Seed { name, value }).collect(),
         versions: versions.into_iter().map(|(name, value)| proto::Version { name, value }).collect(),
     }
@@ -70,7 +68,7 @@ fn camera_message(camera: CameraRecord) -> proto::Camera {
 fn target_message(target: TargetModel) -> proto::Target {
     let point = |ModelPoint { id, at: [x, y, z], sigma }| proto::ModelPoint { id, x, y, z, sigma };
     proto::Target {
-        site_from_object: flat(&target.site_from_object),
+        site_from_object: target.site_from_object.as_ref().map(flat).unwrap_or_default(),
         points: target.points.into_iter().map(point).collect(),
         id: target.id,
         alert_limit: target.alert_limit,
@@ -103,7 +101,6 @@ pub(crate) fn header_record(message: proto::TrialHeader) -> Result<TrialHeader, 
         prior_position_sigma: message.prior_position_sigma,
         prior_attitude_sigma: message.prior_attitude_sigma,
         pixel_sigma: message.pixel_sigma,
-        disparity_sigma: message.disparity_sigma,
         seeds: message.seeds.into_iter().map(|seed| (seed.name, seed.value)).collect(),
         versions: message.versions.into_iter().map(|version| (version.name, version.value)).collect(),
     })
@@ -126,7 +123,7 @@ fn camera_record(message: proto::Camera) -> Result<CameraRecord, Malformed> {
 fn target_record(message: proto::Target) -> Result<TargetModel, Malformed> {
     let point = |proto::ModelPoint { id, x, y, z, sigma }| ModelPoint { id, at: [x, y, z], sigma };
     Ok(TargetModel {
-        site_from_object: matrix("target.site_from_object", &message.site_from_object)?,
+        site_from_object: matrix_if_any("target.site_from_object", &message.site_from_object)?,
         points: message.points.into_iter().map(point).collect(),
         id: message.id,
         alert_limit: message.alert_limit,

@@ -110,7 +110,7 @@ pub struct TrialHeader {
     pub source: ::prost::alloc::string::String,
     #[prost(message, optional, tag = "11")]
     pub rig: ::core::option::Option<Rig>,
-    /// 4 x 4.
+    /// 4 x 4, the left camera's pose in the vehicle's body: p_body = body_from_camera * p_camera.
     #[prost(double, repeated, tag = "12")]
     pub body_from_camera: ::prost::alloc::vec::Vec<f64>,
     /// 4 x 4; absent where no world is known.
@@ -127,9 +127,6 @@ pub struct TrialHeader {
     /// Assumed standard deviation of a corner, per axis and image (px).
     #[prost(double, optional, tag = "17")]
     pub pixel_sigma: ::core::option::Option<f64>,
-    /// Measured standard deviation of the disparity (px).
-    #[prost(double, optional, tag = "18")]
-    pub disparity_sigma: ::core::option::Option<f64>,
     #[prost(message, repeated, tag = "19")]
     pub seeds: ::prost::alloc::vec::Vec<Seed>,
     #[prost(message, repeated, tag = "20")]
@@ -199,7 +196,7 @@ pub struct Camera {
 pub struct Target {
     #[prost(string, tag = "1")]
     pub id: ::prost::alloc::string::String,
-    /// 4 x 4.
+    /// 4 x 4, its place in the site's frame; empty where no survey tells.
     #[prost(double, repeated, tag = "2")]
     pub site_from_object: ::prost::alloc::vec::Vec<f64>,
     #[prost(message, repeated, tag = "3")]

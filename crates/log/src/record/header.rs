@@ -28,7 +28,7 @@ pub struct TrialHeader {
     pub source: String,
     /// The two cameras.
     pub rig: RigRecord,
-    /// The vehicle's body seen from the left camera: `body_from_camera`.
+    /// The left camera's pose in the vehicle's body: `p_body = body_from_camera · p_camera`.
     pub body_from_camera: Matrix4,
     /// The surveyed place of the site's frame in the world, if a world is known.
     pub world_from_site: Option<Matrix4>,
@@ -40,8 +40,6 @@ pub struct TrialHeader {
     pub prior_attitude_sigma: Option<f64>,
     /// Assumed standard deviation of a detected corner, per axis and image (px).
     pub pixel_sigma: Option<f64>,
-    /// Measured standard deviation σ_d of the disparity (px), where truth allows to measure it.
-    pub disparity_sigma: Option<f64>,
     /// Named seeds.
     pub seeds: Vec<(String, u64)>,
     /// Versions of what made the run: the package, the commit, the compiler.
@@ -51,7 +49,7 @@ pub struct TrialHeader {
 /// The value of this trial on one axis of the experiment.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Axis {
-    /// The key that varies, as the experiment file writes it: `referencing.solver`, `source.distance`.
+    /// The key that varies, as the experiment file writes it: `pipeline.solver`, `source.distance`.
     pub key: String,
     /// Its value here, as the experiment file writes it, without quotes: `kabsch`, `3.5`.
     pub value: String,
@@ -79,7 +77,7 @@ pub struct RigRecord {
     pub left: CameraRecord,
     /// The right camera.
     pub right: CameraRecord,
-    /// The right camera's pose: `p_right = right_from_left · p_left`.
+    /// The left camera's pose in the right one: `p_right = right_from_left · p_left`.
     pub right_from_left: Matrix4,
     /// Whether rows of the two images correspond.
     pub rectified: bool,
@@ -101,8 +99,9 @@ pub struct CameraRecord {
 pub struct TargetModel {
     /// The object's id, `site` for the whole site.
     pub id: String,
-    /// Its place in the site's frame: `site_from_object`.
-    pub site_from_object: Matrix4,
+    /// Its place in the site's frame: `p_site = site_from_object · p_object`; `None` where no survey tells,
+    /// of any object but the one whose frame is the site's.
+    pub site_from_object: Option<Matrix4>,
     /// Its feature points.
     pub points: Vec<ModelPoint>,
     /// A pose with m2 beyond this (m) is wrong.

@@ -79,11 +79,14 @@ pub(crate) fn identified_cloud(header: &TrialHeader, frame: &FrameRecord) -> Poi
     cloud(CAMERAS[0], "model_index", dots, frame.stamp_ns)
 }
 
-/// The model's points in the site's frame, in the colours of their targets.
+/// The model's points in the site's frame, in the colours of their targets; without the targets whose
+/// place there is not known.
 pub(crate) fn model_cloud(header: &TrialHeader, places: &Places, stamp_ns: u64) -> PointCloud {
-    let dots = header.targets.iter().zip(&places.site_from_object).enumerate().flat_map(|(index, (target, place))| {
+    let placed = header.targets.iter().enumerate();
+    let placed = placed.filter_map(|(index, target)| Some((index, target, places.of_target(&target.id)?)));
+    let dots = placed.flat_map(|(index, target, place)| {
         target.points.iter().zip(0..).map(move |(point, number)| Dot {
-            at: (place.1 * seafix_geometry::Point::new(point.at[0], point.at[1], point.at[2])).coords.into(),
+            at: (*place * seafix_geometry::Point::new(point.at[0], point.at[1], point.at[2])).coords.into(),
             number,
             colour: colour(index),
         })

@@ -4,8 +4,10 @@
 //! - frames: `world` (north, east, down; if a world is known) → `sps` (the site) → `object/ID`;
 //!   `sps` → `auv` (estimate: forward, starboard, down) → `camera_left` → `camera_right`;
 //!   `world` → `auv_truth` → `camera_left_truth`, `world` → `auv_prior`. One parent a child. A frame
-//!   of the trial that gave no fix moves neither `auv` nor the cameras. `world_enu` and `auv_flu` are
-//!   the same places with the axes of REP-103.
+//!   of the trial that gave no fix moves neither `auv` nor the cameras. A target whose place in the
+//!   site is not known has a frame of its own, joined to nothing: its points stand in `/scene/model`,
+//!   not in `/model`, and its fixes do not place the vehicle. `world_enu` and `auv_flu` are the same
+//!   places with the axes of REP-103.
 //! - camera frames are optical: x right, y down, z forward, as the house's.
 //! - annotations count pixels from the corner of the first one, so they add 0.5.
 //! - clouds are 32-bit floats.

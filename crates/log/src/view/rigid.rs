@@ -3,7 +3,7 @@
 use foxglove::messages::{Pose, Quaternion, Vector3};
 use seafix_geometry::{Body, Camera, Frame, Object, RightCamera, Site, Transform, World};
 
-use crate::{FrameRecord, Matrix4, TrialHeader};
+use crate::{FrameRecord, Matrix4, TargetModel, TrialHeader};
 
 /// The motion of a matrix, or what is wrong with it.
 fn motion<A: Frame, B: Frame>(name: &str, m: &Matrix4) -> Result<Transform<A, B>, String> {
@@ -15,6 +15,7 @@ fn motion<A: Frame, B: Frame>(name: &str, m: &Matrix4) -> Result<Transform<A, B>
 #[derive(Debug)]
 pub(crate) struct Places {
     pub(super) world_from_site: Option<Transform<World, Site>>,
+    /// Of the targets whose place in the site is known, by their ids.
     pub(super) site_from_object: Vec<(String, Transform<Site, Object>)>,
     pub(super) body_from_camera: Transform<Body, Camera>,
     pub(super) right_from_left: Transform<RightCamera, Camera>,
@@ -23,16 +24,22 @@ pub(crate) struct Places {
 impl Places {
     /// The places of `header`, or what is wrong with them.
     pub(crate) fn of(header: &TrialHeader) -> Result<Self, String> {
-        let target = |target: &crate::TargetModel| {
+        let target = |target: &TargetModel| {
             let name = format!("site_from_object of target `{}`", target.id);
-            Ok((target.id.clone(), motion(&name, &target.site_from_object)?))
+            let place = target.site_from_object.as_ref()?;
+            Some(motion(&name, place).map(|place| (target.id.clone(), place)))
         };
         Ok(Self {
             world_from_site: header.world_from_site.as_ref().map(|m| motion("world_from_site", m)).transpose()?,
-            site_from_object: header.targets.iter().map(target).collect::<Result<_, String>>()?,
+            site_from_object: header.targets.iter().filter_map(target).collect::<Result<_, String>>()?,
             body_from_camera: motion("body_from_camera", &header.body_from_camera)?,
             right_from_left: motion("rig.right_from_left", &header.rig.right_from_left)?,
         })
+    }
+
+    /// Where the target of this id is in the site, if that is known.
+    pub(super) fn of_target(&self, id: &str) -> Option<&Transform<Site, Object>> {
+        self.site_from_object.iter().find(|(known, _)| known == id).map(|(_, place)| place)
     }
 
     /// The poses of `frame`, or what is wrong with them.
@@ -43,9 +50,7 @@ impl Places {
         for target in &frame.targets {
             if let Some(m) = &target.object_from_camera {
                 let object_from_camera = motion::<Object, Camera>("object_from_camera", m)?;
-                if let (None, Some((_, site_from_object))) =
-                    (&estimate, self.site_from_object.iter().find(|(id, _)| *id == target.object))
-                {
+                if let (None, Some(site_from_object)) = (&estimate, self.of_target(&target.object)) {
                     estimate = Some(*site_from_object * object_from_camera * camera_from_body);
                 }
             }
@@ -65,7 +70,7 @@ impl Places {
 }
 
 /// Where the vehicle is in one frame, as far as it is known; the estimate is that of the first
-/// referenced target.
+/// referenced target whose place in the site is known.
 #[derive(Debug)]
 pub(super) struct Poses {
     pub(super) estimate: Option<Transform<Site, Body>>,

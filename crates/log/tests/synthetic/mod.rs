@@ -27,7 +27,7 @@ pub(crate) fn header() -> TrialHeader {
     };
     let target = |id: &str, x: f64| TargetModel {
         id: id.to_owned(),
-        site_from_object: at(x, 0.0, 0.0),
+        site_from_object: (x < 3.0).then(|| at(x, 0.0, 0.0)),
         points: (0..5)
             .map(|i| ModelPoint { id: format!("{id}{i}"), at: [noise(i), noise(i + 9), noise(i + 20)], sigma: 0.001 })
             .collect(),
@@ -53,11 +53,10 @@ pub(crate) fn header() -> TrialHeader {
         rig: RigRecord { left: camera.clone(), right: camera, right_from_left: at(-0.25, 0.0, 0.0), rectified: true },
         body_from_camera: [[0.0, 0.0, 1.0, 0.1], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
         world_from_site: Some(at(10.0, 20.0, 30.0)),
-        targets: vec![target("A", 0.0), target("B", 2.0)],
+        targets: vec![target("A", 0.0), target("B", 2.0), target("nowhere", 4.0)],
         prior_position_sigma: Some(0.1),
         prior_attitude_sigma: None,
         pixel_sigma: Some(0.2),
-        disparity_sigma: Some(0.3),
         seeds: vec![("experiment".to_owned(), u64::MAX)],
         versions: vec![("seafix".to_owned(), "0.1.0".to_owned())],
     }
