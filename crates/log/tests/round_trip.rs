@@ -27,11 +27,14 @@ fn images_can_be_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.mcap");
     synthetic::write(&path, 3);
-    for (number, frame) in Reader::open(&path).unwrap().without_images().enumerate() {
+    let mut reader = Reader::open(&path).unwrap().without_images();
+    assert!(!reader.has_images());
+    for (number, frame) in reader.by_ref().enumerate() {
         let mut expected = synthetic::frame(number as u64);
         expected.images = None;
         assert_eq!(frame.unwrap(), expected);
     }
+    assert!(reader.has_images());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix4, Point3};
 use seafix_geometry::{Camera, Pinhole, Point, RightCamera, StereoRig, Transform};
-use seafix_log::{CameraRecord, FrameRecord, RigRecord, TrialHeader};
+use seafix_log::{CameraRecord, FrameRecord, RigRecord, TargetModel, TrialHeader};
 
 /// A pair whose pixels are further than this from the true projections (px) is not the point it is
 /// taken for.
@@ -10,13 +10,17 @@ const CORRECT: f64 = 2.0;
 
 /// Measured minus true disparity (px) of every correctly identified point of `frame`; nothing where the
 /// images are not rectified or truth is unknown.
+///
+/// The errors are truncated: pairs further than 2 px from truth are left out. So are targets made of several
+/// objects, whose coordinates carry the errors of the survey.
 pub(crate) fn errors(header: &TrialHeader, frame: &FrameRecord) -> Vec<f64> {
     let (Some(truth), true) = (&frame.truth, header.rig.rectified) else { return Vec::new() };
     let Some(rig) = rig(&header.rig) else { return Vec::new() };
     let Some(camera_from_world) = matrix(&truth.world_from_camera).try_inverse() else { return Vec::new() };
     let mut errors = Vec::new();
     for target in &frame.targets {
-        let Some(model) = header.targets.iter().find(|model| model.id == target.object) else { continue };
+        let model = header.targets.iter().find(|model| model.id == target.object);
+        let Some(model) = model.filter(|model| !surveyed(model)) else { continue };
         let Some((_, place)) = truth.world_from_object.iter().find(|(id, _)| *id == target.object) else { continue };
         let camera_from_object = camera_from_world * matrix(place);
         for pair in &target.pairs {
@@ -35,6 +39,13 @@ pub(crate) fn errors(header: &TrialHeader, frame: &FrameRecord) -> Vec<f64> {
         }
     }
     errors
+}
+
+/// Whether the points of `model` belong to several objects, as `OBJECT/POINT`, so that a survey has joined them.
+fn surveyed(model: &TargetModel) -> bool {
+    let mut objects = model.points.iter().map(|point| point.id.rsplit_once('/').map(|(object, _)| object));
+    let first = objects.next();
+    objects.any(|object| Some(object) != first)
 }
 
 fn matrix(rows: &[[f64; 4]; 4]) -> Matrix4<f64> {

@@ -21,6 +21,8 @@ pub(crate) struct Trial {
     pub(crate) path: PathBuf,
     pub(crate) header: TrialHeader,
     pub(crate) frames: Vec<Frame>,
+    /// Whether the log has images, or no frame at all; without images the points came as they are.
+    pub(crate) images: bool,
     /// The errors of the disparities of correctly identified points (px), where truth tells.
     pub(crate) disparity_errors: Vec<f64>,
 }
@@ -73,7 +75,8 @@ impl Trial {
             let FrameRecord { frame: number, stamp_ns, targets, times, .. } = frame;
             frames.push(Frame { number, stamp_ns, targets, times });
         }
-        Ok(Self { path, header: reader.header().clone(), frames, disparity_errors })
+        let images = reader.has_images() || frames.is_empty();
+        Ok(Self { path, header: reader.header().clone(), images, frames, disparity_errors })
     }
 
     /// The name of the log.

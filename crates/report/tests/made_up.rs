@@ -265,3 +265,53 @@ fn a_folder_without_logs_is_no_run() {
     let folder = tempfile::tempdir().unwrap();
     assert!(matches!(report(folder.path(), &folder.path().join("report")), Err(ReportError::NoLogs(_))));
 }
+
+/// Writes the run of one trial that `change` makes of frames at 3 m, and gives its report and summary.
+fn changed(change: impl Fn(&mut TrialHeader, &mut FrameRecord)) -> (String, seafix_report::Summary) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut header = header(1, 3.0, "kabsch");
+    let mut frames: Vec<FrameRecord> = (0..12).map(|number| frame(&header, number, 3.0)).collect();
+    frames.iter_mut().for_each(|frame| change(&mut header, frame));
+    let mut writer = Writer::create(&folder.path().join("001.mcap"), &header).unwrap();
+    frames.iter().for_each(|frame| writer.frame(frame).unwrap());
+    writer.finish().unwrap();
+    let report = report(folder.path(), &folder.path().join("report")).unwrap();
+    (fs::read_to_string(report.page).unwrap(), report.summary)
+}
+
+#[test]
+fn only_single_trials_carry_intervals() {
+    let (text, _) = changed(|_, _| {});
+    assert!(text.contains("%, 95 % interval ["));
+    let folder = tempfile::tempdir().unwrap();
+    write_run(folder.path(), &[3.0]);
+    let text = fs::read_to_string(report(folder.path(), &folder.path().join("report")).unwrap().page).unwrap();
+    assert!(!text.contains("95 % interval [") && text.contains("These counts pool trials"));
+}
+
+#[test]
+fn what_saw_no_images_is_not_said_to_match_them() {
+    let (text, _) = changed(|_, _| {});
+    assert!(text.contains("are described, matched and triangulated") && text.contains("harris"));
+    let (text, _) = changed(|_, frame| {
+        frame.images = None;
+        frame.key_points.clear();
+        frame.times = FrameTimes::default();
+    });
+    let pipeline = &text[text.find("The pipeline.").unwrap()..text.find("Metrics, fixed").unwrap()];
+    assert!(text.contains("The source gives no images") && !text.contains("are described, matched"));
+    assert!(!pipeline.contains("harris") && pipeline.contains("maximum-clique"));
+}
+
+#[test]
+fn a_surveyed_target_measures_no_disparity() {
+    let named = |objects: [&str; 2]| {
+        let (_, summary) = changed(|header, _| {
+            let points = header.targets[0].points.iter_mut().enumerate();
+            points.for_each(|(index, point)| point.id = format!("{}/{index}", objects[index % 2]));
+        });
+        summary.rows[0].disparity_sigma
+    };
+    assert!(named(["box", "box"]).is_some());
+    assert_eq!(named(["box", "drum"]), None);
+}

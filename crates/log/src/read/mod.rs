@@ -39,6 +39,7 @@ pub struct Reader {
     header: TrialHeader,
     pending: Pending,
     images: Images,
+    seen_images: bool,
     ended: bool,
 }
 
@@ -73,7 +74,14 @@ impl Reader {
                 let header = message.decode(path, "TrialHeader").and_then(|header| {
                     convert::header_record(header).map_err(|error| foreign(path, &message, &error.0))
                 })?;
-                return Ok(Self { source, header, pending: Pending::default(), images: Images::All, ended: false });
+                return Ok(Self {
+                    source,
+                    header,
+                    pending: Pending::default(),
+                    images: Images::All,
+                    seen_images: false,
+                    ended: false,
+                });
             }
         }
         Err(LogError::Foreign { path: path.to_owned(), what: format!("it has no message on {}", topic::HEADER) })
@@ -98,9 +106,15 @@ impl Reader {
         &self.header
     }
 
+    /// Whether a frame read so far has images in the log, decoded or not.
+    pub fn has_images(&self) -> bool {
+        self.seen_images
+    }
+
     fn next_frame(&mut self) -> Result<Option<FrameRecord>, LogError> {
         let path: PathBuf = self.source.path().to_owned();
         while let Some(message) = self.source.next_message()? {
+            self.seen_images |= topic::IMAGES.contains(&&message.topic[..]);
             if let Some(frame) = self.pending.take(&path, &message, self.images.wanted(message.log_time))? {
                 return Ok(Some(frame));
             }

@@ -14,7 +14,16 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Markup {
     let total = |count: fn(&Row) -> usize| summary.rows.iter().map(count).sum::<usize>();
     let (attempted, found, refused, wrong) =
         (total(|row| row.attempted), total(|row| row.found), total(|row| row.refused), total(|row| row.wrong));
-    let share = |k: usize| html! { (k) " (" (percent(k, attempted)) " %, 95 % interval " (interval(k, attempted)) ")" };
+    // Trials may share their frames, and then they are no independent draws: the counts of several carry
+    // no interval.
+    let one = run.trials.len() == 1;
+    let share = |k: usize| {
+        html! {
+            (k) " (" (percent(k, attempted)) " %"
+            @if one { ", 95 % interval " (interval(k, attempted)) }
+            ")"
+        }
+    };
     let methods = distinct(summary.rows.iter().map(Row::method));
     html! {
         section.abstract {
@@ -24,6 +33,9 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Markup {
                 (counted(total(|row| row.frames), "frame", "frames")) ", "
                 (counted(attempted, "target", "targets")) " were attempted: "
                 (share(found)) " found, " (share(refused)) " refused, " (share(wrong)) " wrong."
+                @if !one {
+                    " These counts pool trials that may share their frames; intervals stand with each trial below."
+                }
                 @if total(|row| row.unjudged) > 0 {
                     " No truth judges " (total(|row| row.unjudged)) " of the fixes found."
                 }

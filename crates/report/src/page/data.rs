@@ -32,7 +32,7 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Markup {
                     @if measured[1] > 0.0 {
                         @let [low, high] = measured.map(|sigma| number(Some(sigma), 2));
                         (line("Disparity noise measured", &format!(
-                            "σ = {} px, RMS over the correctly identified points, those within 2 px of truth",
+                            "σ = {} px, RMS over the identified points within 2 px of truth, which truncates it; targets of several objects left out",
                             if low == high { low } else { format!("{low}–{high}") }
                         )))
                     }

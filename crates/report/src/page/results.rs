@@ -182,7 +182,7 @@ fn times(summary: &Summary) -> Markup {
         figure.table {
             figcaption {
                 "Time (ms), medians: of the first four stages a frame, of the others an attempted target; "
-                i { "total" } " is from the images to the answer about one target."
+                i { "total" } " is from the images, or the points where there are none, to the answer about one target."
             }
             table {
                 thead { tr {
