@@ -1,6 +1,7 @@
 //! Stage 1: which cloud points the prior allows for each model point.
 
 use nalgebra::{Matrix3, Vector3};
+use seafix_component::in_range;
 use seafix_geometry::{Camera, MeasuredPoint, Point};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -35,15 +36,15 @@ impl Gate {
     /// # Errors
     /// A half-size that is not positive and finite, or a confidence outside (0, 1).
     pub fn check(&self) -> Result<(), String> {
-        match *self {
-            Self::Box(half) if !(half > 0.0 && half.is_finite()) => {
-                Err(format!("gate: box = {half}; give a positive half-size in metres"))
+        // Written so that a NaN is refused too.
+        let checked = match *self {
+            Self::Box(half) => in_range(half > 0.0 && half.is_finite(), "box", half, "a positive half-size in metres"),
+            Self::ChiSquare(confidence) => {
+                let inside = confidence > 0.0 && confidence < 1.0;
+                in_range(inside, "chi-square", confidence, "a confidence between 0 and 1")
             }
-            Self::ChiSquare(confidence) if !(confidence > 0.0 && confidence < 1.0) => {
-                Err(format!("gate: chi-square = {confidence}; give a confidence between 0 and 1"))
-            }
-            _ => Ok(()),
-        }
+        };
+        checked.map_err(|message| format!("gate: {message}"))
     }
 }
 
@@ -241,5 +242,6 @@ mod tests {
         let text = toml::to_string(&Stage { gate: Gate::Box(0.25) }).unwrap();
         assert_eq!(toml::from_str::<Stage>(&text).unwrap().gate, Gate::Box(0.25));
         assert!(Gate::Box(-1.0).check().is_err() && Gate::ChiSquare(1.0).check().is_err() && read.gate.check().is_ok());
+        assert!(Gate::Box(f64::NAN).check().is_err() && Gate::ChiSquare(f64::NAN).check().is_err());
     }
 }

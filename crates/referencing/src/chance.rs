@@ -22,8 +22,8 @@ pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> 
         return f64::INFINITY;
     }
     let q = agreement(problem, found);
-    let ln = ln_products(problem, k) + (3 * k - 6) as f64 * q.ln();
-    ln.exp()
+    let ln = ln_products(problem, k) + (3 * k - 6) as f64 * libm::log(q);
+    libm::exp(ln)
 }
 
 /// ln Σ over k-subsets of Π |list_i|: the elementary symmetric polynomial e_k of the list lengths.
@@ -37,15 +37,15 @@ fn ln_products(problem: &Problem<'_>, k: usize) -> f64 {
     if n * k > MOST_TERMS {
         // Maclaurin's inequality: e_k ≤ C(n, k) · mean^k.
         let mean = lengths.iter().sum::<f64>() / n as f64;
-        let choose: f64 = (0..k).map(|i| ((n - i) as f64 / (i + 1) as f64).ln()).sum();
-        return choose + k as f64 * mean.ln();
+        let choose: f64 = (0..k).map(|i| libm::log((n - i) as f64 / (i + 1) as f64)).sum();
+        return choose + k as f64 * libm::log(mean);
     }
     // e_j of the first i lengths, as logarithms: e_j ← e_j + length · e_{j−1}.
     let mut e = vec![f64::NEG_INFINITY; k + 1];
     e[0] = 0.0;
     for length in lengths {
         for j in (1..=k).rev() {
-            e[j] = ln_sum(e[j], e[j - 1] + length.ln());
+            e[j] = ln_sum(e[j], e[j - 1] + libm::log(length));
         }
     }
     e[k]
@@ -54,7 +54,7 @@ fn ln_products(problem: &Problem<'_>, k: usize) -> f64 {
 /// ln(eᵃ + eᵇ).
 fn ln_sum(a: f64, b: f64) -> f64 {
     let (high, low) = (a.max(b), a.min(b));
-    if high == f64::NEG_INFINITY { high } else { high + (low - high).exp().ln_1p() }
+    if high == f64::NEG_INFINITY { high } else { high + libm::log1p(libm::exp(low - high)) }
 }
 
 /// The share of coherent pairs among candidates of different model points and cloud points, those of

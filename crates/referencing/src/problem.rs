@@ -1,6 +1,7 @@
 //! What a search is given.
 
 use nalgebra::Vector3;
+use seafix_component::in_range;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,22 @@ pub enum Tolerance {
     /// Δ_ij = k·√(nᵀ(Σ_i + Σ_j)n + σ_i² + σ_j²): k standard deviations of this very distance, n its
     /// direction in the cloud, σ the model's own.
     Sigmas(f64),
+}
+
+impl Tolerance {
+    /// What is wrong with the setting, if something is.
+    ///
+    /// # Errors
+    /// A number that is not positive and finite.
+    pub fn check(&self) -> Result<(), String> {
+        let (name, value, range) = match *self {
+            Self::Fixed(delta) => ("fixed", delta, "a positive number of metres"),
+            Self::Sigmas(k) => ("sigmas", k, "a positive number of standard deviations"),
+        };
+        // Written so that a NaN is refused too.
+        let positive = value > 0.0 && value.is_finite();
+        in_range(positive, name, value, range).map_err(|message| format!("tolerance: {message}"))
+    }
 }
 
 /// A model point and the cloud point believed to be it.
@@ -87,5 +104,20 @@ impl Problem<'_> {
         let model = self.model[a.model].at.distance(&self.model[b.model].at);
         let cloud = self.cloud[a.cloud].position.at.distance(&self.cloud[b.cloud].position.at);
         (model - cloud).abs() <= self.delta(a, b)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tolerance_is_positive() {
+        assert!(Tolerance::Fixed(0.05).check().is_ok() && Tolerance::Sigmas(3.0).check().is_ok());
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Tolerance::Fixed(bad).check().is_err() && Tolerance::Sigmas(bad).check().is_err(), "{bad}");
+        }
+        let message = Tolerance::Fixed(-1.0).check().unwrap_err();
+        assert_eq!(message, "tolerance: fixed = -1; give a positive number of metres");
     }
 }

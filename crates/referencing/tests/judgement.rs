@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint};
 use seafix_referencing::{
     Acceptance, Attempt, Candidates, Correspondence, Kabsch, MaximumClique, ModelPoint, Outcome, Prior, PriorBound,
-    Problem, Refusal, StructuralCoherence, Tolerance, Unidentified, reference,
+    Problem, Refusal, Search, StructuralCoherence, Tolerance, Unidentified, judge, reference,
 };
 
 const SIGMA: f64 = 0.005;
@@ -90,10 +90,13 @@ fn true_sets_pass_the_residual_gate_at_the_stated_confidence() {
 
 #[test]
 fn a_set_that_fits_no_rigid_motion_falls_at_the_residuals() {
-    // One Δ of 20 σ lets a displaced point agree with all others; the residual does not.
+    // One Δ of 20 σ lets two displaced points agree with all others; the residuals do not, and of
+    // seven points only one may be left out.
     let model = model_of(&MODEL);
     let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(3));
-    cloud[4].position.at = cloud[4].position.at + Vector3::new(0.0, 0.0, 12.0 * SIGMA);
+    for (i, side) in [(4, 12.0), (1, -12.0)] {
+        cloud[i].position.at = cloud[i].position.at + Vector3::new(0.0, 0.0, side * SIGMA);
+    }
     let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
     let problem =
         Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(20.0 * SIGMA) };
@@ -221,4 +224,110 @@ fn a_blow_up_stops_at_the_budget_with_an_honest_bound() {
     let found = reference(&problem, None, &search, &solver, &Acceptance::default(), None, &mut rng);
     assert!(!found.optimal && found.size_bound.unwrap() <= 50, "{found:?}");
     assert!(!matches!(found.outcome, Outcome::Referenced(_)));
+}
+
+/// The model seen with one Δ of 20 σ, pairs i–i; point 4 is off in depth by 12 σ.
+fn one_badly_measured(places: &[[f64; 3]]) -> (Vec<ModelPoint>, Vec<MeasuredPoint>, Candidates) {
+    let model = model_of(places);
+    let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(3));
+    cloud[4].position.at = cloud[4].position.at + Vector3::new(0.0, 0.0, 12.0 * SIGMA);
+    // Clutter that agrees with nothing, so that chance is known to be small.
+    for i in 0..8 {
+        let at = Point::new(20.0 * f64::from(i), 50.0, 50.0);
+        cloud.push(MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None });
+    }
+    let n = places.len();
+    let clutter = (0..n).flat_map(|i| (n..n + 8).map(move |j| (i, j)));
+    let candidates = Candidates::from_pairs(n, (0..n).map(|i| (i, i)).chain(clutter));
+    (model, cloud, candidates)
+}
+
+fn judged(
+    (model, cloud, candidates): &(Vec<ModelPoint>, Vec<MeasuredPoint>, Candidates),
+    prior: Option<&Prior>,
+    acceptance: &Acceptance,
+    rivals: Vec<Vec<Correspondence>>,
+) -> Attempt {
+    let tolerance = Tolerance::Fixed(20.0 * SIGMA);
+    let problem = Problem { model, cloud, candidates, tolerance };
+    let mut found = MaximumClique::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a set");
+    found.rivals.extend(rivals);
+    judge(&problem, prior, Ok(found), &Kabsch::default(), acceptance, None)
+}
+
+#[test]
+fn a_badly_measured_pair_is_left_out() {
+    let scene = one_badly_measured(&MODEL);
+    let found = judged(&scene, None, &Acceptance::default(), Vec::new());
+    let Outcome::Referenced(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
+    assert_eq!(fix.pairs.iter().map(|pair| pair.model).collect::<Vec<_>>(), [0, 1, 2, 3, 5, 6]);
+    assert_eq!(found.identified.len(), 7);
+    assert!(fix.object_from_camera.error_to(&motion()).amax() < 0.02);
+    assert!(fix.score < -0.5 * 16.0, "the pair left out counts: {}", fix.score);
+}
+
+#[test]
+fn a_rescued_set_against_a_rival_that_passes_is_ambiguous() {
+    // The same object again, well measured, a metre to the side.
+    let (model, mut cloud, mut candidates) = one_badly_measured(&MODEL);
+    let first = cloud.len();
+    let again = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(7));
+    cloud.extend(again.into_iter().map(|mut point| {
+        point.position.at = point.position.at + Vector3::new(1.0, 0.0, 0.0);
+        point
+    }));
+    for i in 0..7 {
+        candidates.lists[i].push(first + i);
+    }
+    let whole: Vec<Correspondence> = (0..7).map(|i| Correspondence { model: i, cloud: first + i }).collect();
+    let bad: Vec<Correspondence> = (0..7).map(|i| Correspondence { model: i, cloud: i }).collect();
+    let found = judged(&(model, cloud, candidates), None, &Acceptance::default(), vec![whole.clone(), bad]);
+    let Outcome::Ambiguous(rivals) = &found.outcome else { panic!("{:?}", found.outcome) };
+    assert_eq!((rivals.len(), rivals[0].pairs == whole, rivals[1].pairs.len()), (2, true, 6));
+    assert!(found.margin().expect("two poses") > 8.0, "the whole set is the likelier");
+}
+
+#[test]
+fn leaving_pairs_out_helps_against_nothing_but_residuals() {
+    // A prior that the true pose contradicts: the set without its bad pair contradicts it as well.
+    let scene = one_badly_measured(&MODEL);
+    let elsewhere = motion().perturbed(&Vector6::new(0.0, 0.0, 0.0, 0.5, 0.0, 0.0));
+    let bound = PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05));
+    let prior = Prior { object_from_camera: elsewhere, bound };
+    let found = judged(&scene, Some(&prior), &Acceptance::default(), Vec::new());
+    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
+    // A set whose residuals pass and whose pose does not is refused as a whole.
+    let model = model_of(&MODEL);
+    let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(4));
+    let scene = (model, cloud, Candidates::from_pairs(7, (0..7).map(|i| (i, i))));
+    let found = judged(&scene, Some(&prior), &Acceptance::default(), Vec::new());
+    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Prior { .. })), "{:?}", found.outcome);
+}
+
+#[test]
+fn a_pose_less_precise_than_the_alert_limit_is_refused() {
+    let model = model_of(&MODEL);
+    let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(4));
+    let scene = (model, cloud, Candidates::from_pairs(7, (0..7).map(|i| (i, i))));
+    let acceptance = Acceptance { alert_limit: 0.002, ..Acceptance::default() };
+    let found = judged(&scene, None, &acceptance, Vec::new());
+    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Imprecise { .. })), "{:?}", found.outcome);
+    assert_eq!(found.outcome.reason(), Some("imprecise"));
+}
+
+#[test]
+fn what_was_not_looked_at_is_not_believed() {
+    let (model, mut rng) = (model_of(&MODEL), ChaCha8Rng::seed_from_u64(1));
+    let cloud = cloud_of(&model, &mut rng);
+    let candidates = Candidates::all(7, 7);
+    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Sigmas(4.0) };
+    let mut found = MaximumClique::default().search(&problem, &mut rng).expect("a set");
+    assert_eq!(found.undecided, None);
+    let why = Unidentified::Budget { budget: 5, best: 7, bound: 7, tests: 9 };
+    found.undecided = Some(why.clone());
+    let refused = judge(&problem, None, Ok(found), &Kabsch::default(), &Acceptance::default(), None);
+    assert_eq!(refused.outcome, Outcome::Unidentified(Refusal::Search(why.clone())));
+    assert_eq!((refused.outcome.reason(), refused.identified.len()), (Some("budget"), 7));
+    let none = judge(&problem, None, Err(why), &Kabsch::default(), &Acceptance::default(), None);
+    assert_eq!((none.tests, none.size_bound, none.optimal), (Some(9), Some(7), false));
 }

@@ -163,7 +163,7 @@ impl CoherenceProblem {
     ) -> Attempt {
         let Some(candidates) = self.candidates() else {
             let bound = self.model.len().min(self.cloud.len());
-            let why = Unidentified::Budget { budget: MOST_CANDIDATES as u64, best: 0, bound };
+            let why = Unidentified::Budget { budget: MOST_CANDIDATES as u64, best: 0, bound, tests: 0 };
             return Attempt::without(why);
         };
         let problem = Problem {

@@ -50,6 +50,18 @@ impl Association {
         }
         Self { vertices, adjacency, tests }
     }
+
+    /// The graph of those vertices alone that are to be kept.
+    pub(super) fn restricted(&self, keep: impl Fn(Correspondence) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.vertices.len()).filter(|&v| keep(self.vertices[v])).collect();
+        let mut place = vec![None; self.vertices.len()];
+        kept.iter().enumerate().for_each(|(i, &v)| place[v] = Some(i));
+        let mut adjacency = BitMatrix::zeros(kept.len());
+        for (i, &v) in kept.iter().enumerate() {
+            self.adjacency.ones(v).filter_map(|w| place[w]).filter(|&k| k > i).for_each(|k| adjacency.connect(i, k));
+        }
+        Self { vertices: kept.iter().map(|&v| self.vertices[v]).collect(), adjacency, tests: 0 }
+    }
 }
 
 /// A share of a bound of Δ: that of two pairs is at most the sum of theirs, by √(x² + y²) ≤ x + y.

@@ -1,14 +1,15 @@
 //! Maximum clique: the largest admissible set, proved.
 
 use rand::Rng;
-use seafix_component::Component;
+use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
     BUDGET, Identification, Search, Unidentified,
+    alike::all_alike,
     association::Association,
     clique::{self, MOST_ORIENTED},
-    orientation::{fours, mirrored, wholly_mirrored},
+    orientation::{unmirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Observations, Problem, solve::least_squares};
 
@@ -22,7 +23,8 @@ pub struct MaximumClique {
     pub orientation: bool,
     /// Pair tests beyond those that build the graph.
     pub budget: u64,
-    /// How many other sets of the same size are reported, those that share least with the best first.
+    /// How many other sets of the same size are reported, those that share least with the best first,
+    /// where it is proved that the others are like the best; where it is not, all that were met are.
     pub rivals: usize,
     /// More candidate pairs than this are not searched: their graph would not fit into memory
     /// (40 000 take 200 MB).
@@ -40,6 +42,11 @@ impl Component for MaximumClique {
     const SUMMARY: &'static str = "the largest coherent, one-to-one, unmirrored set, by branch and bound";
     const SOURCE: &'static str = "San Segundo, Rodríguez-Losada, Jiménez, An exact bit-parallel algorithm for the \
                                   maximum clique problem, 2011; the graph: Bailey et al., 2000";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
 }
 
 /// Sets of the largest size that are looked at before the best of them is chosen.
@@ -53,39 +60,56 @@ impl Search for MaximumClique {
         if with_candidates < NEEDED {
             return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
         }
+        let budget = self.budget;
         if problem.candidates.pairs() > self.most_pairs {
-            return Err(Unidentified::Budget { budget: self.budget, best: 0, bound: with_candidates });
+            return Err(Unidentified::Budget { budget, best: 0, bound: with_candidates, tests: 0 });
         }
         let graph = Association::of(problem);
-        let mut cliques = clique::Search::new(problem, &graph, self.orientation, self.budget);
+        // The rest is for the proof that what ties is alike.
+        let share = budget - budget / 4;
+        let mut cliques = clique::Search::new(problem, &graph, self.orientation, share);
         let largest = cliques.run(1, MOST_TIES);
         let size = largest.found.first().map_or(0, Vec::len);
         if size < NEEDED {
+            let tests = graph.tests + (share - cliques.left());
             return Err(match largest.complete {
                 true => Unidentified::NoConsensus { best: size, needed: NEEDED },
-                false => Unidentified::Budget { budget: self.budget, best: size, bound: largest.bound },
+                false => Unidentified::Budget { budget, best: size, bound: largest.bound, tests },
             });
         }
         if self.orientation && largest.complete && size == NEEDED {
             self.refuse_mirrored(problem, &graph, &mut cliques)?;
         }
-        let mut optimal = largest.complete;
         let mut ties = largest.found;
         let best = least_residual(problem, &graph, &ties);
-        let pairs = pairs_of(&graph, &ties.swap_remove(best));
-        let ties: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
-        if self.orientation && size > MOST_ORIENTED {
-            optimal = optimal && count_fours(size) <= self.budget && !fours(&pairs).any(|four| mirrored(problem, four));
+        let clique = ties.swap_remove(best);
+        let mut pairs = pairs_of(&graph, &clique);
+        let mut rivals: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
+        Self::least_alike_first(&pairs, &mut rivals);
+        let mut tests = graph.tests + (share - cliques.left());
+        let (mut optimal, mut all) = (largest.complete, largest.all);
+        let mut decided = all;
+        if !all || rivals.len() > self.rivals {
+            let (alike, spent) = all_alike(problem, &graph, &pairs, self.orientation, budget - share + cliques.left());
+            tests += spent;
+            if alike {
+                decided = true;
+                all = all && rivals.len() <= self.rivals;
+                rivals.truncate(self.rivals);
+            }
         }
-        let (rivals, dropped) = self.least_alike(&pairs, ties);
-        Ok(Identification {
-            pairs,
-            rivals,
-            rivals_complete: largest.all && !dropped,
-            optimal,
-            size_bound: largest.bound,
-            tests: graph.tests + (self.budget - cliques.left()),
-        })
+        if self.orientation && size > MOST_ORIENTED {
+            // In the order of the graph: whom to drop does not depend on the order of the points.
+            let kept = unmirrored(problem, clique.iter().map(|&vertex| graph.vertices[vertex]).collect(), budget);
+            tests += kept.tests;
+            optimal = optimal && kept.complete && kept.pairs.len() == size;
+            all = all && optimal;
+            pairs = kept.pairs;
+            pairs.sort_unstable();
+        }
+        let undecided =
+            (!decided).then_some(Unidentified::Budget { budget, best: pairs.len(), bound: largest.bound, tests });
+        Ok(Identification { pairs, rivals, rivals_complete: all, optimal, size_bound: largest.bound, tests, undecided })
     }
 }
 
@@ -107,25 +131,12 @@ impl MaximumClique {
         }
     }
 
-    /// The rivals that share the fewest pairs with the best set, and whether some were left out.
-    fn least_alike(
-        &self,
-        best: &[Correspondence],
-        mut rivals: Vec<Vec<Correspondence>>,
-    ) -> (Vec<Vec<Correspondence>>, bool) {
+    /// Puts the rivals that share the fewest pairs with the best set first.
+    fn least_alike_first(best: &[Correspondence], rivals: &mut [Vec<Correspondence>]) {
         rivals.sort_by_cached_key(|rival| {
             (rival.iter().filter(|pair| best.binary_search(pair).is_ok()).count(), rival.clone())
         });
-        let dropped = rivals.len() > self.rivals;
-        rivals.truncate(self.rivals);
-        (rivals, dropped)
     }
-}
-
-/// C(n, 4).
-fn count_fours(n: usize) -> u64 {
-    let n = n as u64;
-    n * (n - 1) * (n - 2) * (n - 3) / 24
 }
 
 /// The pairs of a clique, in the order of the model points.
@@ -147,4 +158,18 @@ fn least_residual(problem: &Problem<'_>, graph: &Association, cliques: &[Vec<usi
     let ranks: Vec<f64> = cliques.iter().map(|clique| rank(clique)).collect();
     // `min_by` keeps the first of equals, and the cliques are sorted.
     (0..cliques.len()).min_by(|&a, &b| ranks[a].total_cmp(&ranks[b])).expect("a set was found")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        let good = MaximumClique::default();
+        assert_eq!(good.check(), Ok(()));
+        let message = MaximumClique { budget: 0, ..good.clone() }.check().unwrap_err();
+        assert_eq!(message, "budget = 0; give 1 or more pair tests");
+        assert!(MaximumClique { most_pairs: 2, ..good }.check().is_err());
+    }
 }

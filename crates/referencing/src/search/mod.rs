@@ -5,6 +5,7 @@ use seafix_component::{Registry, entry};
 
 use crate::{Correspondence, Problem};
 
+mod alike;
 mod association;
 mod bitset;
 mod clique;
@@ -44,6 +45,9 @@ pub struct Identification {
     pub size_bound: usize,
     /// Pair tests spent, those that built the graph included.
     pub tests: u64,
+    /// Why the set is not to be believed by itself: the search ended before it had seen, or ruled
+    /// out, every set as large that is unlike it. `None` also of a search that looks for no rivals.
+    pub undecided: Option<Unidentified>,
 }
 
 /// Why nothing was identified.
@@ -74,6 +78,8 @@ pub enum Unidentified {
         best: usize,
         /// No set is larger than this.
         bound: usize,
+        /// Pair tests spent, those that built the graph included.
+        tests: u64,
     },
     /// Only mirror images of the model were found.
     #[error("the largest coherent set, {best} points, is a mirror image of the model")]

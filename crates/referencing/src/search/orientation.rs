@@ -74,3 +74,132 @@ pub(crate) fn fours(set: &[Correspondence]) -> impl Iterator<Item = [Corresponde
             .flat_map(move |j| (j + 1..n).flat_map(move |k| (k + 1..n).map(move |l| [set[i], set[j], set[k], set[l]])))
     })
 }
+
+/// What is left of a large set when no four tested are mirrored.
+pub(crate) struct Unmirrored {
+    pub(crate) pairs: Vec<Correspondence>,
+    /// Whether every four was tested.
+    pub(crate) complete: bool,
+    /// Fours tested.
+    pub(crate) tests: u64,
+}
+
+/// The set without the members of mirrored fours: the member of most of them is dropped, of equals
+/// the last, until there is none.
+///
+/// Every four is tested where they are no more than `most`. Of a larger set those are that have three members
+/// in a well-spread core: a member whose image is mirrored is so with every triangle it is far from. What
+/// such a set says is then tested as a whole by the residuals of a rigid fit.
+pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, most: u64) -> Unmirrored {
+    let (mut complete, mut tests) = (true, 0);
+    loop {
+        let all = choose(pairs.len(), 4) <= most;
+        complete = complete && all;
+        let core = if all { (0..pairs.len()).collect() } else { core(problem, &pairs, most) };
+        let mut opposed: Vec<[u32; 4]> = Vec::new();
+        'fours: for (place, &d) in core.iter().enumerate() {
+            for (k, &c) in core[..place].iter().enumerate() {
+                for (j, &b) in core[..k].iter().enumerate() {
+                    let others = if all { &core[..j] } else { &[] };
+                    let rest = if all { 0..0 } else { 0..pairs.len() };
+                    for a in others.iter().copied().chain(rest).filter(|a| ![b, c, d].contains(a)) {
+                        tests += 1;
+                        if mirrored(problem, [a, b, c, d].map(|i| pairs[i])) {
+                            opposed.push([a, b, c, d].map(|i| i as u32));
+                            if opposed.len() >= MOST_LISTED {
+                                break 'fours;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        if opposed.is_empty() {
+            return Unmirrored { pairs, complete, tests };
+        }
+        let mut dropped = vec![false; pairs.len()];
+        while !opposed.is_empty() {
+            let mut count = vec![0u32; pairs.len()];
+            opposed.iter().flatten().for_each(|&i| count[i as usize] += 1);
+            let worst = (0..pairs.len()).max_by_key(|&i| count[i]).expect("a four has members");
+            dropped[worst] = true;
+            opposed.retain(|four| !four.contains(&(worst as u32)));
+        }
+        let mut place = 0..dropped.len();
+        pairs.retain(|_| place.next().is_some_and(|i| !dropped[i]));
+    }
+}
+
+/// Mirrored fours that are listed before members are dropped (1.6 MB).
+const MOST_LISTED: usize = 100_000;
+/// Members of the core of a set that is too large to be tested whole.
+const CORE: usize = 40;
+
+/// Members far from each other in the model, at most [`CORE`], so few that all their triangles with all
+/// members are no more than `most`: always the farthest from those taken, from the first on.
+fn core(problem: &Problem<'_>, pairs: &[Correspondence], most: u64) -> Vec<usize> {
+    let at = |i: usize| problem.model[pairs[i].model].at;
+    let mut taken = vec![0];
+    let mut off: Vec<f64> = (0..pairs.len()).map(|i| at(i).distance(&at(0))).collect();
+    while taken.len() < CORE && choose(taken.len() + 1, 3).saturating_mul(pairs.len() as u64) <= most {
+        let next = (0..pairs.len()).max_by(|&i, &j| off[i].total_cmp(&off[j])).unwrap_or(0);
+        if !(off[next] > 0.0) {
+            break;
+        }
+        taken.push(next);
+        off.iter_mut().enumerate().for_each(|(i, off)| *off = off.min(at(i).distance(&at(next))));
+    }
+    taken
+}
+
+/// C(n, k).
+fn choose(n: usize, k: u64) -> u64 {
+    (0..k).fold(1u64, |product, i| product.saturating_mul((n as u64).saturating_sub(i)) / (i + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Candidates, ModelPoint, Tolerance};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
+
+    #[test]
+    fn subsets_are_counted() {
+        assert_eq!((choose(3, 4), choose(4, 4), choose(40, 3), choose(50, 4)), (0, 1, 9880, 230_300));
+    }
+
+    /// What is left of 60 points whose last five stand on the wrong side of the plane z = 0.
+    fn left(most: u64) -> Unmirrored {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let places: Vec<Vector3<f64>> = (0..60)
+            .map(|i| {
+                let z = if i < 55 { rng.random_range(-1.0..1.0) } else { rng.random_range(0.5..1.0) };
+                Vector3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), z)
+            })
+            .collect();
+        let model: Vec<ModelPoint> = places.iter().map(|at| ModelPoint::exact("", Point::from(*at))).collect();
+        let seen = places.iter().enumerate().map(|(i, at)| {
+            let z = if i < 55 { at.z } else { -at.z };
+            Point::new(at.x, at.y, z)
+        });
+        let cloud: Vec<MeasuredPoint> =
+            seen.map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at, 0.001), pixels: None }).collect();
+        let candidates = Candidates::from_pairs(60, (0..60).map(|i| (i, i)));
+        let tolerance = Tolerance::Fixed(0.01);
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance };
+        let pairs: Vec<Correspondence> = (0..60).map(|i| Correspondence { model: i, cloud: i }).collect();
+        unmirrored(&problem, pairs, most)
+    }
+
+    #[test]
+    fn members_that_are_mirrored_are_dropped() {
+        let kept = left(1_000_000);
+        assert!(kept.complete && kept.pairs.len() >= 50 && kept.pairs.iter().all(|pair| pair.model < 55));
+        assert!(kept.tests >= choose(kept.pairs.len(), 4));
+        let kept = left(100_000);
+        assert!(!kept.complete && kept.pairs.len() >= 50, "{}", kept.pairs.len());
+        assert!(kept.pairs.iter().all(|pair| pair.model < 55), "the core tells them too");
+    }
+}

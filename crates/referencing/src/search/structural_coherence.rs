@@ -1,7 +1,7 @@
 //! Structural coherence: the paper's search, in the paper's order.
 
 use rand::Rng;
-use seafix_component::Component;
+use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -49,6 +49,10 @@ impl Component for StructuralCoherence {
     const SUMMARY: &'static str = "the paper's enumeration of ordered samples, longest first";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 2.2";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")
+    }
 }
 
 /// The shortest sample that a pose can come from.
@@ -77,10 +81,14 @@ impl Search for StructuralCoherence {
                         optimal: true,
                         size_bound: q,
                         tests: run.tests,
+                        undecided: None,
                     });
                 }
                 Ok(None) => {}
-                Err(Spent) => return Err(Unidentified::Budget { budget: self.budget, best: run.best, bound: q }),
+                Err(Spent) => {
+                    let (budget, best) = (self.budget, run.best);
+                    return Err(Unidentified::Budget { budget, best, bound: q, tests: run.tests });
+                }
             }
         }
         Err(Unidentified::NoConsensus { best: run.best, needed: NEEDED })
@@ -201,6 +209,13 @@ fn next_arrangement(sample: &mut [usize], n: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_search_without_a_budget_is_refused() {
+        assert_eq!(StructuralCoherence::default().check(), Ok(()));
+        let message = StructuralCoherence { budget: 0, ..StructuralCoherence::default() }.check().unwrap_err();
+        assert_eq!(message, "budget = 0; give 1 or more pair tests");
+    }
 
     #[test]
     fn ordered_samples_come_in_lexicographic_order() {

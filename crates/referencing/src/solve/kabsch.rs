@@ -1,7 +1,7 @@
 //! Kabsch: unweighted least squares over the rigid motions.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::Component;
+use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Object, Transform, so3};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,12 @@ impl Component for Kabsch {
     const SUMMARY: &'static str = "unweighted least squares over rigid motions, by singular values";
     const SOURCE: &'static str = "Kabsch, A solution for the best rotation to relate two sets of vectors, 1976; \
                                   Umeyama, Least-squares estimation of transformation parameters, 1991";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
+        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+    }
 }
 
 impl Solver for Kabsch {
@@ -89,4 +95,17 @@ fn polish(mut rotation: Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
         }
     }
     rotation
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Kabsch::default().check(), Ok(()));
+        for bad in [-0.1, 1.0, f64::NAN] {
+            assert!(Kabsch { least_ratio: bad }.check().is_err(), "{bad}");
+        }
+    }
 }

@@ -12,8 +12,6 @@ pub(crate) struct Likelihood {
     pub(crate) pose: Transform<Object, Camera>,
     /// Σ rᵀ S⁻¹ r there: χ² with 3k − 6 degrees of freedom for true pairs.
     pub(crate) cost: f64,
-    /// The log-likelihood there.
-    pub(crate) log: f64,
 }
 
 /// Coordinates are never better than this (m): exact data would otherwise have infinite weight.
@@ -46,9 +44,7 @@ pub(crate) fn maximum(data: &Observations<'_>, start: &Transform<Object, Camera>
             break;
         }
     }
-    let normalisation: f64 = weights.iter().map(|weight| weight.determinant().ln()).sum();
-    let constant = 3.0 * data.points.len() as f64 * (2.0 * std::f64::consts::PI).ln();
-    Likelihood { pose, cost: best.cost, log: 0.5 * (normalisation - constant - best.cost) }
+    Likelihood { pose, cost: best.cost }
 }
 
 struct Linearized {

@@ -1,6 +1,6 @@
 //! Triad: the paper's pose from three identified points.
 
-use seafix_component::Component;
+use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform, triad};
 use serde::{Deserialize, Serialize};
 
@@ -43,6 +43,12 @@ impl Component for Triad {
     const SUMMARY: &'static str = "auxiliary frames on three identified points, Eq. (3) to (5)";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of autonomous \
          underwater vehicles to man-made objects using stereo images, 2021";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.least_sine >= 0.0 && self.least_sine < 1.0;
+        in_range(share, "least-sine", self.least_sine, "a sine from 0 to below 1")
+    }
 }
 
 /// More points than this are thinned before all triangles are weighed: 40 points have 9880.
@@ -150,4 +156,17 @@ fn predicted_error(points: &[Observation; 3], data: &Observations<'_>) -> Result
     let at = pose(points)?;
     let covariance = covariance_of(points, data, &at)?;
     Ok(data.points.iter().map(|point| covariance.of_point(&point.measured.at).trace()).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Triad::default().check(), Ok(()));
+        for bad in [-0.1, 1.0, f64::NAN] {
+            assert!(Triad { least_sine: bad, ..Triad::default() }.check().is_err(), "{bad}");
+        }
+    }
 }

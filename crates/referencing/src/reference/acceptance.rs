@@ -1,0 +1,65 @@
+//! When a pose is believed.
+
+use seafix_component::in_range;
+use serde::{Deserialize, Serialize};
+
+/// When an identified set is believed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Acceptance {
+    /// Least number of identified points.
+    pub least_points: usize,
+    /// Largest expected number of chance sets of the found size (a-contrario acceptance).
+    pub chance_budget: f64,
+    /// Confidence of the χ² tests of residuals and prior: a true set fails with one minus this.
+    pub confidence: f64,
+    /// Poses further apart than this (m, RMS over the model points), or than 5 % of the model's
+    /// diameter if that is less, are different answers; a pose that by its own covariance may be off
+    /// by as much is none.
+    pub alert_limit: f64,
+}
+
+impl Default for Acceptance {
+    fn default() -> Self {
+        Self { least_points: 3, chance_budget: 0.01, confidence: 0.999, alert_limit: 0.10 }
+    }
+}
+
+impl Acceptance {
+    /// What is wrong with the settings, if something is.
+    ///
+    /// # Errors
+    /// The first setting out of its range, and the range.
+    pub fn check(&self) -> Result<(), String> {
+        let check = || {
+            in_range(self.least_points >= 3, "least-points", self.least_points, "3 or more")?;
+            // Written so that a NaN is refused too.
+            let budget = self.chance_budget > 0.0 && self.chance_budget.is_finite();
+            in_range(budget, "chance-budget", self.chance_budget, "a positive number")?;
+            let confident = self.confidence > 0.0 && self.confidence < 1.0;
+            in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
+            let alert = self.alert_limit > 0.0 && self.alert_limit.is_finite();
+            in_range(alert, "alert-limit", self.alert_limit, "a positive number of metres")
+        };
+        check().map_err(|message| format!("acceptance: {message}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        let good = Acceptance::default();
+        assert_eq!(good.check(), Ok(()));
+        let message = Acceptance { least_points: 2, ..good.clone() }.check().unwrap_err();
+        assert_eq!(message, "acceptance: least-points = 2; give 3 or more");
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Acceptance { chance_budget: bad, ..good.clone() }.check().is_err(), "chance-budget = {bad}");
+            assert!(Acceptance { confidence: bad, ..good.clone() }.check().is_err(), "confidence = {bad}");
+            assert!(Acceptance { alert_limit: bad, ..good.clone() }.check().is_err(), "alert-limit = {bad}");
+        }
+        assert!(Acceptance { confidence: 1.0, ..good }.check().is_err());
+    }
+}

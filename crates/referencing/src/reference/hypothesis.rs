@@ -1,0 +1,34 @@
+//! A set of pairs with the pose it leads to.
+
+use seafix_geometry::{Camera, Object, Transform};
+
+use super::{Alternative, Refusal};
+use crate::{Correspondence, Degenerate, solve::likelihood::Likelihood};
+
+/// A set with its pose.
+pub(super) struct Hypothesis {
+    pub(super) pairs: Vec<Correspondence>,
+    /// What the solver says.
+    pub(super) pose: Transform<Object, Camera>,
+    /// The most likely pose near it, and how well that explains the pairs.
+    pub(super) likelihood: Likelihood,
+    /// As [`Alternative::score`].
+    pub(super) score: f64,
+}
+
+impl Hypothesis {
+    pub(super) fn alternative(self) -> Alternative {
+        Alternative { object_from_camera: self.pose, pairs: self.pairs, score: self.score }
+    }
+}
+
+/// The likeliest first; of equals the first in the order of the pairs.
+pub(super) fn by_score(a: &Hypothesis, b: &Hypothesis) -> std::cmp::Ordering {
+    b.score.total_cmp(&a.score).then_with(|| a.pairs.cmp(&b.pairs))
+}
+
+/// Why a hypothesis falls.
+pub(super) enum Fallen {
+    Refused(Refusal),
+    Degenerate(Degenerate),
+}

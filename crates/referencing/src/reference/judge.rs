@@ -1,0 +1,225 @@
+//! The tests that a set and its rivals must pass.
+
+use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+
+use super::{
+    Acceptance, Alternative, Outcome, Reference, Refusal,
+    hypothesis::{Fallen, Hypothesis, by_score},
+    rms_apart,
+};
+use crate::{
+    Correspondence, Degenerate, Identification, Observations, Prior, PriorBound, Problem, Solver,
+    candidates::chi_square, chance::expected_sets, solve::likelihood,
+};
+
+/// What a set is judged by.
+pub(super) struct Judge<'a> {
+    pub(super) problem: &'a Problem<'a>,
+    pub(super) prior: Option<&'a Prior>,
+    pub(super) solver: &'a dyn Solver,
+    pub(super) acceptance: &'a Acceptance,
+    /// Poses further apart (m) are different answers.
+    pub(super) alert_limit: f64,
+    /// Pairs of the largest set that is judged.
+    pub(super) largest: usize,
+    pub(super) rig: Option<&'a StereoRig>,
+}
+
+impl Judge<'_> {
+    pub(super) fn size(&self, pairs: &[Correspondence]) -> Result<(), Refusal> {
+        let needed = self.acceptance.least_points.max(self.solver.minimum());
+        match pairs.len() {
+            enough if enough >= needed => Ok(()),
+            few => Err(Refusal::TooFew { found: few, needed }),
+        }
+    }
+
+    pub(super) fn chance(&self, pairs: &[Correspondence]) -> Result<(), Refusal> {
+        let (expected, budget) = (expected_sets(self.problem, pairs), self.acceptance.chance_budget);
+        // Written so that a NaN is refused too.
+        if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size: pairs.len(), expected, budget }) }
+    }
+
+    /// The pose of the set and of its rivals: the only one that passes, several, or none.
+    pub(super) fn poses(&self, found: &Identification) -> (Outcome, Option<Alternative>) {
+        let mut stand = Stand::default();
+        // Of what fell, the set that the search prefers gives the reason.
+        let mut first_fall: Option<(usize, Fallen)> = None;
+        let mut fell = |place: usize, fall: Fallen| {
+            if first_fall.as_ref().is_none_or(|(first, _)| place < *first) {
+                first_fall = Some((place, fall));
+            }
+        };
+        let mut whole: Vec<(usize, Hypothesis)> = Vec::new();
+        for (place, pairs) in std::iter::once(&found.pairs).chain(&found.rivals).enumerate() {
+            match self.hypothesis(pairs) {
+                Ok(hypothesis) => whole.push((place, hypothesis)),
+                Err(degenerate) => fell(place, Fallen::Degenerate(degenerate)),
+            }
+        }
+        whole.sort_by(|(_, a), (_, b)| by_score(a, b));
+        let mut unfit = Vec::new();
+        for (place, hypothesis) in whole {
+            match self.residuals(&hypothesis) {
+                Ok(()) => {
+                    if let Some(fall) = self.admit(hypothesis, &mut stand) {
+                        fell(place, fall);
+                    }
+                }
+                Err(refusal) => {
+                    fell(place, Fallen::Refused(refusal));
+                    unfit.push(hypothesis);
+                }
+            }
+        }
+        for hypothesis in self.thinned(&unfit) {
+            self.admit(hypothesis, &mut stand);
+        }
+        stand.passed.sort_by(by_score);
+        stand.refused.append(&mut unfit);
+        stand.refused.sort_by(by_score);
+        let mut different: Vec<Hypothesis> = Vec::new();
+        for hypothesis in stand.passed {
+            if different.iter().all(|known| self.apart(&known.pose, &hypothesis.pose)) {
+                different.push(hypothesis);
+            }
+        }
+        if different.len() > 1 {
+            return (Outcome::Ambiguous(different.into_iter().map(Hypothesis::alternative).collect()), None);
+        }
+        match (different.pop(), first_fall) {
+            (Some(best), _) => {
+                let runner_up = stand.refused.into_iter().find(|other| self.apart(&best.pose, &other.pose));
+                (self.fix(best), runner_up.map(Hypothesis::alternative))
+            }
+            (None, Some((_, Fallen::Degenerate(why)))) => (Outcome::Degenerate(why), None),
+            (None, Some((_, Fallen::Refused(why)))) => (Outcome::Unidentified(why), None),
+            (None, None) => unreachable!("every set either passed or fell"),
+        }
+    }
+
+    /// Puts a hypothesis whose residuals pass to those that stand or to those refused, and then says why.
+    /// One that only repeats a likelier pose is not looked at: it could change nothing.
+    fn admit(&self, hypothesis: Hypothesis, stand: &mut Stand) -> Option<Fallen> {
+        let repeats =
+            |known: &Hypothesis| known.score >= hypothesis.score && !self.apart(&known.pose, &hypothesis.pose);
+        if stand.passed.iter().any(repeats) {
+            return None;
+        }
+        match self.precise_and_near(&hypothesis) {
+            Ok(()) => {
+                stand.passed.push(hypothesis);
+                None
+            }
+            Err(fall) => {
+                stand.refused.push(hypothesis);
+                Some(fall)
+            }
+        }
+    }
+
+    fn observations(&self, pairs: &[Correspondence]) -> Observations<'_> {
+        Observations::of(pairs, self.problem.model, self.problem.cloud, self.rig)
+    }
+
+    pub(super) fn hypothesis(&self, pairs: &[Correspondence]) -> Result<Hypothesis, Degenerate> {
+        let data = self.observations(pairs);
+        let pose = self.solver.solve(&data)?;
+        let likelihood = likelihood::maximum(&data, &pose);
+        let prior = match self.prior {
+            Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) }) => {
+                let xi = object_from_camera.error_to(&likelihood.pose);
+                covariance.matrix.cholesky().map_or(0.0, |c| xi.dot(&c.solve(&xi)))
+            }
+            _ => 0.0,
+        };
+        let fewer = self.largest.saturating_sub(pairs.len()) as f64 * chi_square(3, self.acceptance.confidence);
+        Ok(Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score: -0.5 * (likelihood.cost + fewer + prior) })
+    }
+
+    /// Whether a rigid motion explains the set within its noise.
+    pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), Refusal> {
+        let freedom = 3 * hypothesis.pairs.len() - 6;
+        let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(freedom, self.acceptance.confidence));
+        // Written so that a NaN is refused too.
+        if chi2 <= limit { Ok(()) } else { Err(Refusal::Residuals { chi2, limit }) }
+    }
+
+    /// Whether precision and prior let the pose pass.
+    fn precise_and_near(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
+        let data = self.observations(&hypothesis.pairs);
+        let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
+        let (rms, limit) = (self.predicted_rms(hypothesis, &covariance), self.alert_limit);
+        // Written so that a NaN is refused too.
+        if !(2.0 * rms <= limit) {
+            return Err(Fallen::Refused(Refusal::Imprecise { rms, limit }));
+        }
+        let Some(prior) = self.prior else { return Ok(()) };
+        let off = match &prior.bound {
+            PriorBound::Gaussian(of_prior) => {
+                let xi = prior.object_from_camera.error_to(&hypothesis.pose);
+                let sum = (of_prior.matrix + covariance.matrix).cholesky();
+                let chi2 = sum.map_or(f64::INFINITY, |c| xi.dot(&c.solve(&xi)));
+                (chi2 / chi_square(6, self.acceptance.confidence)).sqrt()
+            }
+            PriorBound::Box(half) => self.off_box(hypothesis, &covariance, &prior.object_from_camera, *half),
+        };
+        if off <= 1.0 { Ok(()) } else { Err(Fallen::Refused(Refusal::Prior { off })) }
+    }
+
+    /// The predicted error of the model points that the pose transfers: root mean square over all of
+    /// them, one standard deviation (m).
+    fn predicted_rms(&self, hypothesis: &Hypothesis, covariance: &Covariance6<Object, Camera>) -> f64 {
+        let camera_from_object = hypothesis.pose.inverse();
+        let model = self.problem.model;
+        let sum: f64 = model.iter().map(|point| covariance.of_point(&(camera_from_object * point.at)).trace()).sum();
+        (sum / model.len() as f64).sqrt()
+    }
+
+    /// How far the identified model points, placed by the pose, are from where the prior places them:
+    /// the largest step along a camera axis over the half-size and the noise allowed with it.
+    fn off_box(
+        &self,
+        hypothesis: &Hypothesis,
+        covariance: &Covariance6<Object, Camera>,
+        prior: &Transform<Object, Camera>,
+        half: f64,
+    ) -> f64 {
+        let sigmas = chi_square(1, self.acceptance.confidence).sqrt();
+        let (by_pose, by_prior) = (hypothesis.pose.inverse(), prior.inverse());
+        let offs = hypothesis.pairs.iter().flat_map(|pair| {
+            let at = self.problem.model[pair.model].at;
+            let placed = by_pose * at;
+            let (step, noise) = (placed - by_prior * at, covariance.of_point(&placed));
+            (0..3).map(move |axis| step[axis].abs() / (half + sigmas * noise[(axis, axis)].max(0.0).sqrt()))
+        });
+        offs.fold(0.0, f64::max)
+    }
+
+    /// Whether two poses are different answers.
+    fn apart(&self, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> bool {
+        !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
+    }
+
+    fn fix(&self, hypothesis: Hypothesis) -> Outcome {
+        let data = self.observations(&hypothesis.pairs);
+        match self.solver.covariance(&data, &hypothesis.pose) {
+            Ok(covariance) => Outcome::Referenced(Box::new(Reference {
+                object_from_camera: hypothesis.pose,
+                covariance,
+                used: self.solver.used(&data),
+                residual_rms: data.residual_rms(&hypothesis.pose),
+                score: hypothesis.score,
+                pairs: hypothesis.pairs,
+            })),
+            Err(why) => Outcome::Degenerate(why),
+        }
+    }
+}
+
+/// The hypotheses that passed every test, and those that did not.
+#[derive(Default)]
+struct Stand {
+    passed: Vec<Hypothesis>,
+    refused: Vec<Hypothesis>,
+}

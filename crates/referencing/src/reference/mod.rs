@@ -1,0 +1,97 @@
+//! From a search's answer to a pose that is believed, or a refusal.
+
+use rand::Rng;
+use seafix_geometry::{Camera, Object, StereoRig, Transform};
+
+use crate::{
+    Identification, ModelPoint, Prior, Problem, Search, Solver, Unidentified, chance::expected_sets, site::diameter,
+};
+
+mod acceptance;
+mod exclusion;
+mod hypothesis;
+mod judge;
+mod outcome;
+mod refusal;
+
+pub use acceptance::Acceptance;
+pub use outcome::{Alternative, Attempt, Outcome, Reference};
+pub use refusal::Refusal;
+
+use judge::Judge;
+
+/// The alert limit is at most this share of the model's diameter.
+const ALERT_SHARE: f64 = 0.05;
+
+/// One attempt at a fix, after Stage 1: Stage 2 (which cloud points are which model points), the
+/// rigid motion, and the tests that it must pass before it is believed.
+pub fn reference(
+    problem: &Problem<'_>,
+    prior: Option<&Prior>,
+    search: &dyn Search,
+    solver: &dyn Solver,
+    acceptance: &Acceptance,
+    rig: Option<&StereoRig>,
+    rng: &mut dyn Rng,
+) -> Attempt {
+    let found = search.search(problem, rng);
+    judge(problem, prior, found, solver, acceptance, rig)
+}
+
+/// The second half of [`reference()`], for callers that time the search by itself: from what a
+/// search said to a pose that is believed, or a refusal.
+pub fn judge(
+    problem: &Problem<'_>,
+    prior: Option<&Prior>,
+    found: Result<Identification, Unidentified>,
+    solver: &dyn Solver,
+    acceptance: &Acceptance,
+    rig: Option<&StereoRig>,
+) -> Attempt {
+    let found = match found {
+        Ok(found) => found,
+        Err(why) => return Attempt::without(why),
+    };
+    let alert_limit = acceptance.alert_limit.min(ALERT_SHARE * diameter(problem.model));
+    let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
+    let judge = Judge { problem, prior, solver, acceptance, alert_limit, largest, rig };
+    let (outcome, runner_up) = match judge.size(&found.pairs).and_then(|()| judge.chance(&found.pairs)) {
+        Ok(()) => judge.poses(&found),
+        Err(refusal) => (Outcome::Unidentified(refusal), None),
+    };
+    let outcome = match &found.undecided {
+        Some(why) if !settled(&outcome, found.optimal) => Outcome::Unidentified(why.clone().into()),
+        _ => outcome,
+    };
+    let believed = match &outcome {
+        Outcome::Referenced(reference) => &reference.pairs,
+        _ => &found.pairs,
+    };
+    Attempt {
+        expected_chance_sets: Some(expected_sets(problem, believed)),
+        outcome,
+        runner_up,
+        optimal: found.optimal,
+        size_bound: Some(found.size_bound),
+        tests: Some(found.tests),
+        identified: found.pairs,
+    }
+}
+
+/// Whether the outcome stands whatever sets the search did not look at. These may contradict a fix, and
+/// stand where what was looked at fell; but poses that contradict each other stay ambiguous, and
+/// where no set is larger all are too small.
+fn settled(outcome: &Outcome, optimal: bool) -> bool {
+    match outcome {
+        Outcome::Ambiguous(_) => true,
+        Outcome::Unidentified(Refusal::TooFew { .. } | Refusal::Chance { .. }) => optimal,
+        _ => false,
+    }
+}
+
+/// How far two poses place the model points apart: root mean square over all of them (m).
+pub fn rms_apart(model: &[ModelPoint], a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> f64 {
+    let (a, b) = (a.inverse(), b.inverse());
+    let sum: f64 = model.iter().map(|point| (a * point.at - b * point.at).norm_squared()).sum();
+    (sum / model.len().max(1) as f64).sqrt()
+}

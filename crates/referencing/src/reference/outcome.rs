@@ -1,0 +1,138 @@
+//! What comes of an attempt: a fix, rivals, or a refusal.
+
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
+
+use super::Refusal;
+use crate::{Correspondence, Degenerate, Unidentified};
+
+/// A fix: the pose relative to the target and everything that supports it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reference {
+    /// The pose.
+    pub object_from_camera: Transform<Object, Camera>,
+    /// Its covariance.
+    pub covariance: Covariance6<Object, Camera>,
+    /// The identified points.
+    pub pairs: Vec<Correspondence>,
+    /// The indices into `pairs` of the points the pose rests on (all of them, or the triad's three).
+    pub used: Vec<usize>,
+    /// Root mean square of the residuals C·H − P over the pairs (m).
+    pub residual_rms: f64,
+    /// How well it explains the data: minus half of the χ² of its residuals and of the prior, and
+    /// χ²₃(confidence) for each pair fewer than the largest set has (a truncated χ²: sets of
+    /// different size compare); larger is better.
+    pub score: f64,
+}
+
+/// Another pose that explains the data as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alternative {
+    /// The pose.
+    pub object_from_camera: Transform<Object, Camera>,
+    /// Its pairs.
+    pub pairs: Vec<Correspondence>,
+    /// How well it explains the data: minus half of the χ² of its residuals and of the prior, and
+    /// χ²₃(confidence) for each pair fewer than the largest set has (a truncated χ²: sets of
+    /// different size compare); larger is better.
+    pub score: f64,
+}
+
+/// What came of one attempt at a fix.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// A pose that passed every test.
+    Referenced(Box<Reference>),
+    /// Several poses explain the data equally well; the likeliest first.
+    Ambiguous(Vec<Alternative>),
+    /// No set of points was identified, or the set was not believed.
+    Unidentified(Refusal),
+    /// The identified points determine no pose.
+    Degenerate(Degenerate),
+}
+
+impl Outcome {
+    /// Its name in logs and tables.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Referenced(_) => "referenced",
+            Self::Ambiguous(_) => "ambiguous",
+            Self::Unidentified(_) => "unidentified",
+            Self::Degenerate(_) => "degenerate",
+        }
+    }
+
+    /// Why there is no pose, in kebab-case; `None` where there is one.
+    pub fn reason(&self) -> Option<&'static str> {
+        match self {
+            Self::Referenced(_) => None,
+            Self::Ambiguous(_) => Some("rivals"),
+            Self::Unidentified(refusal) => Some(refusal.reason()),
+            Self::Degenerate(_) => Some("degenerate"),
+        }
+    }
+
+    /// The same in a sentence with its numbers; `None` where there is a pose.
+    pub fn explanation(&self) -> Option<String> {
+        match self {
+            Self::Referenced(_) => None,
+            Self::Ambiguous(rivals) => Some(format!("{} different poses explain the data", rivals.len())),
+            Self::Unidentified(refusal) => Some(refusal.to_string()),
+            Self::Degenerate(degenerate) => Some(degenerate.to_string()),
+        }
+    }
+}
+
+/// An outcome and what led to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attempt {
+    /// What came of it.
+    pub outcome: Outcome,
+    /// The set that the search found, believed or not; empty where it found none.
+    pub identified: Vec<Correspondence>,
+    /// The best pose that differs from the answer by more than the alert limit, though it was not
+    /// believed; for comparison only.
+    pub runner_up: Option<Alternative>,
+    /// Whether it is proved that no admissible set is larger.
+    pub optimal: bool,
+    /// No admissible set has more pairs than this, where the search says so.
+    pub size_bound: Option<usize>,
+    /// Expected number of chance sets as large as the one found.
+    pub expected_chance_sets: Option<f64>,
+    /// Pair tests spent by the search, where it says so.
+    pub tests: Option<u64>,
+}
+
+impl Attempt {
+    /// How much better than the runner-up the answer explains the data: the difference of their scores.
+    pub fn margin(&self) -> Option<f64> {
+        match (&self.outcome, &self.runner_up) {
+            (Outcome::Referenced(reference), Some(other)) => Some(reference.score - other.score),
+            (Outcome::Ambiguous(rivals), _) => Some(rivals.first()?.score - rivals.get(1)?.score),
+            _ => None,
+        }
+    }
+}
+
+impl Attempt {
+    /// The attempt that a search refused.
+    pub(crate) fn without(why: Unidentified) -> Self {
+        let tests = match why {
+            Unidentified::Budget { tests, .. } => Some(tests),
+            _ => None,
+        };
+        let size_bound = match why {
+            Unidentified::Budget { bound, .. } => Some(bound),
+            Unidentified::NoConsensus { best, .. } | Unidentified::Mirrored { best } => Some(best),
+            Unidentified::TooFew { with_candidates, .. } => Some(with_candidates),
+        };
+        Self {
+            optimal: !matches!(why, Unidentified::Budget { .. }),
+            outcome: Outcome::Unidentified(why.into()),
+            identified: Vec::new(),
+            runner_up: None,
+            size_bound,
+            expected_chance_sets: None,
+            tests,
+        }
+    }
+}

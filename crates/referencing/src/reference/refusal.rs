@@ -1,0 +1,66 @@
+//! Why an answer is not believed.
+
+use crate::Unidentified;
+
+/// Why an answer is not believed, or why there is none.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// The search found nothing.
+    #[error(transparent)]
+    Search(#[from] Unidentified),
+    /// The set is smaller than asked for.
+    #[error("{found} points were identified; {needed} are needed")]
+    TooFew {
+        /// Its size.
+        found: usize,
+        /// [`Acceptance::least_points`](crate::Acceptance::least_points), or what the solver needs.
+        needed: usize,
+    },
+    /// Chance alone would give sets as large.
+    #[error("chance gives {expected:.2e} sets of {size} points; at most {budget:.1e} are accepted")]
+    Chance {
+        /// Size of the set.
+        size: usize,
+        /// Expected number of chance sets of this size.
+        expected: f64,
+        /// [`Acceptance::chance_budget`](crate::Acceptance::chance_budget).
+        budget: f64,
+    },
+    /// No rigid motion explains the set within its noise.
+    #[error("the residuals have χ² = {chi2:.1}; at most {limit:.1} is likely of a true set")]
+    Residuals {
+        /// Σ rᵀ S⁻¹ r of the most likely rigid motion.
+        chi2: f64,
+        /// The quantile of χ² with 3k − 6 degrees of freedom.
+        limit: f64,
+    },
+    /// By its own covariance the pose may be further off than the alert limit.
+    #[error(
+        "the model points are known to {rms:.3} m (RMS, one sigma); twice that exceeds the alert limit of {limit:.3} m"
+    )]
+    Imprecise {
+        /// Root mean square over the model points of the predicted error (m).
+        rms: f64,
+        /// The alert limit (m).
+        limit: f64,
+    },
+    /// The pose contradicts the prior.
+    #[error("the pose is {off:.3} times as far from the prior as the prior allows")]
+    Prior {
+        /// Distance from the prior over the largest allowed.
+        off: f64,
+    },
+}
+
+impl Refusal {
+    /// The reason as logs and tables have it, in kebab-case.
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Self::Search(why) => why.reason(),
+            Self::TooFew { .. } => "too-few",
+            Self::Chance { .. } => "chance",
+            Self::Residuals { .. } | Self::Prior { .. } => "gate",
+            Self::Imprecise { .. } => "imprecise",
+        }
+    }
+}
