@@ -16,7 +16,7 @@ impl fmt::Display for Summary {
             ["method"]
                 .into_iter()
                 .chain(conditions.iter().map(String::as_str))
-                .chain(["n", "found", "refused", "wrong", "m1 mm", "m2 mm", "m3 mm", "m3 deg", "ms"]),
+                .chain(["frames", "n", "found", "refused", "wrong", "m1 mm", "m2 mm", "m3 mm", "m3 deg", "ms"]),
         );
         let column = |value: fn(&Row) -> Option<Spread>, scale: f64| {
             let medians: Vec<Option<f64>> =
@@ -31,7 +31,11 @@ impl fmt::Display for Summary {
             column(|row| row.m3_attitude, 1f64.to_degrees()),
         ];
         for (index, row) in self.rows.iter().enumerate() {
-            let counts = [row.attempted, row.found, row.refused, row.wrong].map(|count| count.to_string());
+            // A frame that attempted nothing stays in the count of frames; without truth nobody knows what is wrong.
+            let frames = format!("{}/{}", row.referenced_frames, row.frames);
+            let wrong =
+                if row.found > 0 && row.unjudged == row.found { "–".to_owned() } else { row.wrong.to_string() };
+            let counts = [frames, row.attempted.to_string(), row.found.to_string(), row.refused.to_string(), wrong];
             let errors = columns.iter().map(|column| column[index].clone());
             let total = format::number(row.times.total_ms, 1);
             results.row(leading(row).chain(counts).chain(errors).chain([total]));
@@ -39,12 +43,12 @@ impl fmt::Display for Summary {
         let paper = format!("{:.0}–{:.0}", PAPER_M1[0] * 1e3, PAPER_M1[1] * 1e3);
         let blank = |n| std::iter::repeat_n(String::new(), n);
         results.row(
-            ["the paper".to_owned()].into_iter().chain(blank(conditions.len() + 4)).chain([paper]).chain(blank(4)),
+            ["the paper".to_owned()].into_iter().chain(blank(conditions.len() + 5)).chain([paper]).chain(blank(4)),
         );
         results.write(f)?;
         writeln!(
             f,
-            "m1 residual C·H − P, m2 transferred model points, m3 camera position and attitude; medians of the fixes found."
+            "frames fixed of all, targets attempted (n); m1 residual C·H − P, m2 transferred model points, m3 camera position and attitude; medians of the fixes found."
         )?;
 
         let stages = self.rows.first().map(|row| row.times.stages().map(|(stage, _)| stage));
