@@ -1,0 +1,164 @@
+//! The answer to a problem, as it is printed.
+
+use std::{path::Path, time::Instant};
+
+use rand::Rng;
+use seafix_geometry::{Camera, Object, Transform};
+use serde::Serialize;
+
+use super::{CoherenceProblem, read};
+use crate::{Acceptance, Alternative, Correspondence, Outcome, Search, Solver};
+
+/// The method that answers: what is used, and under which name it is reported.
+#[derive(Debug, Clone, Copy)]
+pub struct Method<'a> {
+    /// The search and its registered name.
+    pub search: (&'a str, &'a dyn Search),
+    /// The solver and its registered name.
+    pub solver: (&'a str, &'a dyn Solver),
+    /// When an answer is believed.
+    pub acceptance: &'a Acceptance,
+}
+
+/// A pose that was not the answer, as it is printed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OtherPose {
+    /// camera_from_object.
+    #[serde(rename = "T_cam_obj")]
+    pub t_cam_obj: [[f64; 4]; 4],
+    /// Its pairs (model, cloud).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<[usize; 2]>,
+    /// How well it explains the data.
+    pub score: f64,
+}
+
+/// The answer to one problem, with the keys of FORMATS.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Answer {
+    /// The file.
+    pub file: String,
+    /// The problem's name.
+    pub id: String,
+    /// `referenced`, `ambiguous`, `unidentified` or `degenerate`.
+    pub outcome: &'static str,
+    /// Why there is no pose.
+    pub reason: Option<&'static str>,
+    /// The same in a sentence.
+    pub explanation: Option<String>,
+    /// camera_from_object, if referenced.
+    #[serde(rename = "T_cam_obj")]
+    pub t_cam_obj: Option<[[f64; 4]; 4]>,
+    /// Covariance of object_from_camera, if referenced.
+    pub covariance: Option<[[f64; 6]; 6]>,
+    /// The identified pairs (model, cloud), if referenced.
+    pub pairs: Option<Vec<[usize; 2]>>,
+    /// The poses among which the data do not decide.
+    pub alternatives: Vec<OtherPose>,
+    /// The best pose that was not believed.
+    pub runner_up: Option<OtherPose>,
+    /// Difference of the scores of the best and the next.
+    pub margin: Option<f64>,
+    /// Whether it is proved that no admissible set is larger.
+    pub optimal: bool,
+    /// No admissible set has more pairs.
+    pub size_bound: Option<usize>,
+    /// Expected number of chance sets as large as the one found.
+    pub expected_chance_sets: Option<f64>,
+    /// Pair tests of the search.
+    pub tests: Option<u64>,
+    /// Everything derived from the file (ms); reading and parsing not counted.
+    pub time_ms: f64,
+    /// The search's name.
+    pub search: String,
+    /// The solver's name.
+    pub solver: String,
+}
+
+/// One line of output: an answer, or what is wrong with the file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Line {
+    /// The answer.
+    Answer(Box<Answer>),
+    /// The file could not be used.
+    Failed {
+        /// The file.
+        file: String,
+        /// What is wrong with it, in one line.
+        error: String,
+    },
+}
+
+/// The answer to a problem that came from `file`.
+pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng: &mut dyn Rng) -> Answer {
+    let start = Instant::now();
+    let attempt = problem.attempt(method.search.1, method.solver.1, method.acceptance, rng);
+    let time_ms = start.elapsed().as_secs_f64() * 1e3;
+    let reference = match &attempt.outcome {
+        Outcome::Referenced(reference) => Some(reference),
+        _ => None,
+    };
+    Answer {
+        file: file.display().to_string(),
+        id: problem.id.clone(),
+        outcome: attempt.outcome.name(),
+        reason: attempt.outcome.reason(),
+        explanation: attempt.outcome.explanation(),
+        t_cam_obj: reference.map(|reference| rows(&reference.object_from_camera)),
+        covariance: reference.map(|reference| {
+            std::array::from_fn(|row| std::array::from_fn(|column| reference.covariance.matrix[(row, column)]))
+        }),
+        pairs: reference.map(|reference| indices(&reference.pairs)),
+        alternatives: match &attempt.outcome {
+            Outcome::Ambiguous(all) => all.iter().map(OtherPose::from).collect(),
+            _ => Vec::new(),
+        },
+        runner_up: match (&attempt.outcome, &attempt.runner_up) {
+            (Outcome::Ambiguous(all), _) => all.get(1).map(OtherPose::without_pairs),
+            (_, other) => other.as_ref().map(OtherPose::without_pairs),
+        },
+        margin: attempt.margin(),
+        optimal: attempt.optimal,
+        size_bound: attempt.size_bound,
+        expected_chance_sets: attempt.expected_chance_sets.filter(|expected| expected.is_finite()),
+        tests: attempt.tests,
+        time_ms,
+        search: method.search.0.to_owned(),
+        solver: method.solver.0.to_owned(),
+    }
+}
+
+/// Reads, checks and answers one file.
+pub fn solve_file(file: &Path, method: &Method<'_>, rng: &mut dyn Rng) -> Line {
+    match read(file) {
+        Ok(problem) => Line::Answer(Box::new(answer(&problem, file, method, rng))),
+        Err(fault) => Line::Failed { file: file.display().to_string(), error: fault.to_string() },
+    }
+}
+
+impl From<&Alternative> for OtherPose {
+    fn from(alternative: &Alternative) -> Self {
+        Self {
+            t_cam_obj: rows(&alternative.object_from_camera),
+            pairs: indices(&alternative.pairs),
+            score: alternative.score,
+        }
+    }
+}
+
+impl OtherPose {
+    fn without_pairs(alternative: &Alternative) -> Self {
+        Self { pairs: Vec::new(), ..Self::from(alternative) }
+    }
+}
+
+/// camera_from_object, row by row.
+fn rows(object_from_camera: &Transform<Object, Camera>) -> [[f64; 4]; 4] {
+    let matrix = object_from_camera.inverse().matrix();
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
+
+fn indices(pairs: &[Correspondence]) -> Vec<[usize; 2]> {
+    pairs.iter().map(|pair| [pair.model, pair.cloud]).collect()
+}

@@ -1,0 +1,221 @@
+//! The problem as a file has it.
+
+use std::path::Path;
+
+use nalgebra::{Matrix3, Matrix4};
+use rand::Rng;
+use seafix_component::{Fault, nearest, read_text};
+use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
+use serde::Deserialize;
+
+use crate::{
+    Acceptance, Attempt, Candidates, Gate, ModelPoint, Prior, PriorBound, Problem, Search, Shell, Solver, Tolerance,
+    Unidentified, candidates, reference, site::diameter,
+};
+
+/// The format this reader understands.
+pub const FORMAT: &str = "coherence-problem/1";
+/// More candidate pairs than this are not listed: no search could use them.
+const MOST_CANDIDATES: usize = 4_000_000;
+
+/// An identification problem, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoherenceProblem {
+    /// Its name.
+    pub id: String,
+    /// The feature points, object frame.
+    pub model: Vec<ModelPoint>,
+    /// The measured points, camera frame.
+    pub cloud: Vec<MeasuredPoint>,
+    /// The distance tolerance Δ (m).
+    pub delta: f64,
+    /// The rough pose, if one is known.
+    pub prior: Option<Prior>,
+    /// The only pairs (model, cloud) to consider, if they are given.
+    pub putative: Option<Vec<(usize, usize)>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    format: String,
+    #[serde(default)]
+    id: Option<String>,
+    #[serde(default, rename = "family")]
+    _family: serde::de::IgnoredAny,
+    #[serde(default, rename = "seed_set")]
+    _seed_set: serde::de::IgnoredAny,
+    #[serde(default, rename = "seed")]
+    _seed: serde::de::IgnoredAny,
+    model: Vec<[f64; 3]>,
+    cloud: Vec<[f64; 3]>,
+    sigma: f64,
+    #[serde(default)]
+    sigma_xyz: Option<Vec<[f64; 3]>>,
+    delta: f64,
+    #[serde(default)]
+    prior: Option<RawPrior>,
+    #[serde(default)]
+    putative: Option<Vec<[usize; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPrior {
+    #[serde(rename = "T_cam_obj")]
+    t_cam_obj: [[f64; 4]; 4],
+    shell_half_m: f64,
+}
+
+impl CoherenceProblem {
+    /// The problem in `text`, the content of `file`.
+    ///
+    /// # Errors
+    /// The first fault: not JSON, an unknown key or format, a number that is not finite or out of
+    /// its range, an index that points nowhere, a prior that is no rigid motion.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
+        let raw: Raw = serde_json::from_str(text).map_err(|error| json(file, &error))?;
+        let fault = |what: &str| Fault::new(what, file);
+        if raw.format != FORMAT {
+            let remedy = format!("this reader knows `{FORMAT}`");
+            return Err(fault("unknown format").value(format!("`{}`", raw.format)).remedy(remedy));
+        }
+        for (name, rows) in [("model", &raw.model), ("cloud", &raw.cloud)] {
+            if let Some(index) = rows.iter().position(|row| !row.iter().all(|x| x.is_finite())) {
+                let what = format!("{name} point {index} is not finite");
+                return Err(fault(&what).value(format!("{:?}", rows[index])).remedy("give finite numbers, in metres"));
+            }
+        }
+        let is_sigma = |sigma: f64| sigma >= 0.0 && sigma.is_finite();
+        if !is_sigma(raw.sigma) {
+            return Err(fault("`sigma` is out of range").value(raw.sigma).remedy("give metres, zero or more"));
+        }
+        if let Some(rows) = &raw.sigma_xyz {
+            if rows.len() != raw.cloud.len() {
+                let value = format!("{} rows for {} cloud points", rows.len(), raw.cloud.len());
+                return Err(fault("`sigma_xyz` has the wrong length")
+                    .value(value)
+                    .remedy("give one row a cloud point"));
+            }
+            if let Some(index) = rows.iter().position(|row| !row.iter().all(|&sigma| is_sigma(sigma))) {
+                let what = format!("row {index} of `sigma_xyz` is out of range");
+                return Err(fault(&what).value(format!("{:?}", rows[index])).remedy("give metres, zero or more"));
+            }
+        }
+        let model: Vec<ModelPoint> = raw
+            .model
+            .iter()
+            .enumerate()
+            .map(|(index, at)| ModelPoint::exact(index.to_string(), Point::from(*at)))
+            .collect();
+        // Two points or fewer are answered "too few", whatever Δ says of them. The diameter is at least
+        // the diagonal of the shell over √3: it is computed only where that does not settle it.
+        let shell = Shell::around(model.iter().map(|point| point.at));
+        let settled = shell.map_or(0.0, |shell| shell.max.distance(&shell.min)) / 12f64.sqrt();
+        let large = model.len() > 2 && raw.delta > settled && raw.delta > diameter(&model) / 2.0;
+        if !(raw.delta > 0.0 && raw.delta.is_finite()) || large {
+            let greatest = diameter(&model) / 2.0;
+            let remedy = format!("allowed: above 0, at most half the model's diameter, {greatest:.4} m");
+            return Err(fault("`delta` is out of range").value(raw.delta).remedy(remedy));
+        }
+        let putative = match raw.putative {
+            None => None,
+            Some(pairs) => {
+                let out = pairs.iter().position(|[i, j]| *i >= raw.model.len() || *j >= raw.cloud.len());
+                if let Some(index) = out {
+                    let what = format!("putative pair {index} points nowhere");
+                    let remedy =
+                        format!("there are {} model and {} cloud points, from 0", raw.model.len(), raw.cloud.len());
+                    return Err(fault(&what).value(format!("{:?}", pairs[index])).remedy(remedy));
+                }
+                Some(pairs.into_iter().map(|[i, j]| (i, j)).collect())
+            }
+        };
+        let cloud = raw.cloud.iter().enumerate().map(|(index, at)| {
+            let sigma = raw.sigma_xyz.as_ref().map_or([raw.sigma; 3], |rows| rows[index]);
+            let covariance = Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
+            MeasuredPoint { position: UncertainPoint { at: Point::from(*at), covariance }, pixels: None }
+        });
+        Ok(Self {
+            id: raw.id.unwrap_or_default(),
+            model,
+            cloud: cloud.collect(),
+            delta: raw.delta,
+            prior: raw.prior.map(|prior| prior.checked(file)).transpose()?,
+            putative,
+        })
+    }
+
+    /// Stage 1: which cloud points may be which model points; `None` when there are too many to list.
+    pub fn candidates(&self) -> Option<Candidates> {
+        match &self.putative {
+            Some(pairs) => Some(Candidates::from_pairs(self.model.len(), pairs.iter().copied())),
+            None if self.model.len().saturating_mul(self.cloud.len()) > MOST_CANDIDATES && self.prior.is_none() => None,
+            None => Some(candidates(&self.model, &self.cloud, self.prior.as_ref(), &Gate::default(), None)),
+        }
+    }
+
+    /// One attempt at the pose.
+    pub fn attempt(
+        &self,
+        search: &dyn Search,
+        solver: &dyn Solver,
+        acceptance: &Acceptance,
+        rng: &mut dyn Rng,
+    ) -> Attempt {
+        let Some(candidates) = self.candidates() else {
+            let bound = self.model.len().min(self.cloud.len());
+            let why = Unidentified::Budget { budget: MOST_CANDIDATES as u64, best: 0, bound, tests: 0 };
+            return Attempt::without(why);
+        };
+        let problem = Problem {
+            model: &self.model,
+            cloud: &self.cloud,
+            candidates: &candidates,
+            tolerance: Tolerance::Fixed(self.delta),
+        };
+        reference(&problem, self.prior.as_ref(), search, solver, acceptance, None, rng)
+    }
+}
+
+impl RawPrior {
+    fn checked(&self, file: &Path) -> Result<Prior, Fault> {
+        let matrix = Matrix4::from_fn(|row, column| self.t_cam_obj[row][column]);
+        let camera_from_object = Transform::<Camera, Object>::from_matrix(&matrix)
+            .map_err(|error| Fault::new(format!("`prior.T_cam_obj` is no rigid motion: {error}"), file))?;
+        if !(self.shell_half_m > 0.0 && self.shell_half_m.is_finite()) {
+            let fault = Fault::new("`prior.shell_half_m` is out of range", file).value(self.shell_half_m);
+            return Err(fault.remedy("give a positive half-size in metres"));
+        }
+        Ok(Prior { object_from_camera: camera_from_object.inverse(), bound: PriorBound::Box(self.shell_half_m) })
+    }
+}
+
+/// What the JSON reader found wrong, with the nearest key to an unknown one.
+fn json(file: &Path, error: &serde_json::Error) -> Fault {
+    let full = error.to_string();
+    let message = full.split(" at line ").next().unwrap_or_default();
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let line = (error.line() > 0).then(|| error.line());
+    match quoted.split_first() {
+        Some((key, known)) if message.starts_with("unknown field") => {
+            let remedy = match nearest(key, known.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("there are {}", known.join(", ")),
+            };
+            Fault::new("unknown key", file).on_line(line).value(format!("`{key}`")).remedy(remedy)
+        }
+        _ => Fault::new(message, file)
+            .on_line(line)
+            .value(format!("column {}", error.column()))
+            .remedy(format!("give `{FORMAT}` as JSON")),
+    }
+}
+
+/// The problem in a file.
+///
+/// # Errors
+/// As [`read_text`], or [`CoherenceProblem::parse`] refuses it.
+pub fn read(file: &Path) -> Result<CoherenceProblem, Fault> {
+    CoherenceProblem::parse(&read_text(file)?, file)
+}

@@ -1,0 +1,114 @@
+//! Problems as files and their answers.
+
+use std::path::Path;
+
+use super::*;
+use crate::{Acceptance, Kabsch, MaximumClique};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use seafix_component::Fault;
+
+/// Five points seen from the origin of a camera 3 m in front of them, as exact numbers.
+const GOOD: &str = r#"{"format": "coherence-problem/1", "id": "x", "family": "t", "seed_set": "own", "seed": 1,
+"model": [[0,0,0],[1,0,0],[0.25,-0.75,0],[0.5,0.5,1],[-0.5,0.25,0.5]],
+"cloud": [[0,0,3],[1,0,3],[0.25,-0.75,3],[0.5,0.5,4],[-0.5,0.25,3.5]],
+"sigma": 0.01, "delta": 0.04,
+"prior": {"T_cam_obj": [[1,0,0,0.05],[0,1,0,0],[0,0,1,3],[0,0,0,1]], "shell_half_m": 0.1},
+"putative": null}"#;
+
+fn parse(text: &str) -> Result<CoherenceProblem, Fault> {
+    CoherenceProblem::parse(text, Path::new("p.json"))
+}
+
+fn fault(from: &str, to: &str) -> String {
+    assert!(GOOD.contains(from), "the good problem has no `{from}`");
+    parse(&GOOD.replacen(from, to, 1)).expect_err("the problem is broken").to_string()
+}
+
+fn solved(text: &str) -> serde_json::Value {
+    let method = Method {
+        search: ("maximum-clique", &MaximumClique::default()),
+        solver: ("kabsch", &Kabsch::default()),
+        acceptance: &Acceptance::default(),
+    };
+    let answer = answer(&parse(text).unwrap(), Path::new("p.json"), &method, &mut ChaCha8Rng::seed_from_u64(0));
+    serde_json::to_value(Line::Answer(Box::new(answer))).unwrap()
+}
+
+#[test]
+fn a_good_problem_is_answered_with_the_keys_of_the_format() {
+    let answer = solved(GOOD);
+    let keys = [
+        "file",
+        "id",
+        "outcome",
+        "reason",
+        "T_cam_obj",
+        "covariance",
+        "pairs",
+        "alternatives",
+        "runner_up",
+        "margin",
+        "optimal",
+        "size_bound",
+        "expected_chance_sets",
+        "time_ms",
+    ];
+    assert!(keys.iter().all(|key| answer.get(key).is_some()), "{answer}");
+    assert_eq!((answer["outcome"].as_str(), answer["reason"].is_null()), (Some("referenced"), true), "{answer}");
+    assert_eq!(answer["pairs"], serde_json::json!([[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]));
+    assert!((answer["T_cam_obj"][2][3].as_f64().unwrap() - 3.0).abs() < 1e-12, "camera from object");
+    assert_eq!(answer["covariance"].as_array().unwrap().len(), 6);
+}
+
+#[test]
+fn a_refusal_has_no_pose() {
+    let text = GOOD.replace("\"putative\": null", "\"putative\": [[0,0],[1,1]]");
+    let answer = solved(&text);
+    assert_eq!((answer["outcome"].as_str(), answer["reason"].as_str()), (Some("unidentified"), Some("too-few")));
+    assert!(["T_cam_obj", "covariance", "pairs"].iter().all(|key| answer[key].is_null()), "{answer}");
+}
+
+#[test]
+fn candidates_come_from_pairs_shells_or_everything() {
+    let problem = parse(GOOD).unwrap();
+    assert_eq!(problem.candidates().unwrap().lists, [[0], [1], [2], [3], [4]].map(Vec::from));
+    let all = CoherenceProblem { prior: None, ..problem.clone() };
+    assert_eq!(all.candidates().unwrap().pairs(), 25);
+    let pairs = CoherenceProblem { putative: Some(vec![(2, 4), (2, 1), (2, 4)]), ..problem };
+    assert_eq!(pairs.candidates().unwrap().lists[2], [1, 4]);
+}
+
+#[test]
+fn every_fault_names_its_place() {
+    assert_eq!(fault("\"delta\"", "\"delat\""), "unknown key in p.json:4: `delat`; did you mean `delta`?");
+    assert!(fault("problem/1", "problem/2").starts_with("unknown format in p.json: `coherence-problem/2`"));
+    assert!(fault("0.04", "-1").starts_with("`delta` is out of range in p.json: -1; allowed: above 0, at most"));
+    assert!(fault("0.04", "2.0").starts_with("`delta` is out of range in p.json: 2; allowed"));
+    // The third and the fourth point are 1.6202 m apart, the shell's diagonal is 2.19 m.
+    assert!(fault("0.04", "0.82").ends_with("at most half the model's diameter, 0.8101 m"));
+    assert!(parse(&GOOD.replacen("0.04", "0.81", 1)).is_ok());
+    assert!(fault("0.01", "-0.01").starts_with("`sigma` is out of range"));
+    assert!(fault("[0.5,0.5,1]", "[0.5,1e999,1]").contains("p.json:2"), "no finite number");
+    assert!(fault("[0.5,0.5,1]", "[0.5,NaN,1]").contains("p.json:2"), "no JSON");
+    assert!(fault("[0.5,0.5,1]", "[0.5,1]").contains("p.json:2"), "two coordinates");
+    assert!(fault("null}", "[[0,5]]}").starts_with("putative pair 0 points nowhere in p.json: [0, 5]"));
+    assert!(fault("[[1,0,0,0.05]", "[[1.1,0,0,0.05]").starts_with("`prior.T_cam_obj` is no rigid motion"));
+    assert!(fault("0.1}", "0}").starts_with("`prior.shell_half_m` is out of range"));
+    assert!(
+        fault("\"sigma\": 0.01", "\"sigma\": 0.01, \"sigma_xyz\": [[1,1,1]]").starts_with("`sigma_xyz` has the wrong")
+    );
+    assert!(fault("{\"format\"", "[{\"format\"").contains("in p.json:1"));
+}
+
+#[test]
+fn a_file_that_is_not_there_is_a_line() {
+    let method = Method {
+        search: ("maximum-clique", &MaximumClique::default()),
+        solver: ("kabsch", &Kabsch::default()),
+        acceptance: &Acceptance::default(),
+    };
+    let line = solve_file(Path::new("no/such/file.json"), &method, &mut ChaCha8Rng::seed_from_u64(0));
+    assert!(matches!(&line, Line::Failed { error, .. } if error.starts_with("cannot read (")), "{line:?}");
+    assert!(serde_json::to_value(&line).unwrap().get("error").is_some());
+}
