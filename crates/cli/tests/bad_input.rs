@@ -243,7 +243,22 @@ fn a_value_out_of_range() {
 fn settings_of_the_pipeline_out_of_range() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("out");
-    for setting in ["acceptance.confidence=2", "acceptance.least-points=0", "gate={chi-square=1.5}", "gate={box=-1}"] {
+    for setting in [
+        "acceptance.confidence=2",
+        "acceptance.confidence=nan",
+        "acceptance.least-points=0",
+        "gate={chi-square=1.5}",
+        "gate={box=-1}",
+        "tolerance={sigmas=-1}",
+        "tolerance={fixed=nan}",
+        "refine.window=10000",
+        "triangulation.sigma-px=-1",
+        "detector.sigma=nan",
+        "descriptor.scale=-1",
+        "matcher.ratio=-1",
+        "search.budget=0",
+        "solver.least-ratio=nan",
+    ] {
         let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n");
         let set = format!("pipeline.{setting}");
         refused(&["run", &file, "--set", &set, "--out", out.to_str().unwrap()], 2, &["; give "]);

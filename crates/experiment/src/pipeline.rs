@@ -100,7 +100,10 @@ impl Pipeline {
         let fits = |setting, check: Result<(), String>| {
             check.map_err(|message| PipelineError { setting, key: None, message: format!("{setting}: {message}") })
         };
+        fits("refine", self.refine.check())?;
+        fits("triangulation", self.triangulation.check())?;
         fits("gate", self.gate.check())?;
+        fits("tolerance", self.tolerance.check())?;
         fits("acceptance", self.acceptance.check())?;
         Ok(Stages {
             detector: build(&DETECTORS, &self.detector)?,

@@ -156,6 +156,21 @@ fn a_symmetric_object_is_ambiguous_until_the_prior_decides() {
 }
 
 #[test]
+fn what_a_flat_part_of_a_mirror_image_leaves_is_refused() {
+    // Any model of enough points has nearly flat parts, which are coherent with their own image.
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    for draw in 0..200 {
+        let n = [7, 8, 12][draw % 3];
+        let places: Vec<[f64; 3]> = (0..n).map(|_| [(); 3].map(|()| rng.random_range(-1.0..1.0))).collect();
+        let model = model_of(&places);
+        let mut seen = cloud_of(&model, &mut rng);
+        seen.iter_mut().for_each(|point| point.position.at.coords.x *= -1.0);
+        let found = attempt(&model, &seen, &Candidates::all(n, n), None);
+        assert!(!matches!(found.outcome, Outcome::Referenced(_)), "draw {draw}: {:?}", found.outcome);
+    }
+}
+
+#[test]
 fn a_mirror_image_is_refused_by_name() {
     let model = model_of(&MODEL);
     let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(6));

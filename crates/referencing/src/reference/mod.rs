@@ -60,6 +60,7 @@ pub fn judge(
         Err(refusal) => (Outcome::Unidentified(refusal), None),
     };
     let outcome = match &found.undecided {
+        Some(why @ Unidentified::Mirrored { .. }) => Outcome::Unidentified(why.clone().into()),
         Some(why) if !settled(&outcome, found.optimal) => Outcome::Unidentified(why.clone().into()),
         _ => outcome,
     };

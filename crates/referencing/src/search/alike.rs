@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{association::Association, clique};
+use super::{association::Association, clique, orientation::Sense};
 use crate::{Correspondence, Observations, Problem, Tolerance, solve::least_squares};
 
 /// Points nearer to a line than this share of the model's extent fix no rotation about it.
@@ -22,7 +22,7 @@ pub(super) fn all_alike(
     problem: &Problem<'_>,
     graph: &Association,
     best: &[Correspondence],
-    orientation: bool,
+    sense: Sense,
     budget: u64,
 ) -> (bool, u64) {
     let motion = least_squares(&Observations::of(best, problem.model, problem.cloud, None)).inverse();
@@ -40,7 +40,7 @@ pub(super) fn all_alike(
         return (false, 0);
     }
     let rest = graph.restricted(|pair| !fits(pair));
-    let mut cliques = clique::Search::new(problem, &rest, orientation, budget);
+    let mut cliques = clique::Search::new(problem, &rest, sense, budget);
     let largest = cliques.run(least, 1);
     (largest.complete && largest.found.is_empty(), budget - cliques.left())
 }
@@ -101,7 +101,7 @@ mod tests {
         let problem =
             Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.02) };
         let best: Vec<Correspondence> = (0..12).map(|i| Correspondence { model: i, cloud: i }).collect();
-        all_alike(&problem, &Association::of(&problem), &best, true, 100_000).0
+        all_alike(&problem, &Association::of(&problem), &best, Sense::Proper, 100_000).0
     }
 
     #[test]

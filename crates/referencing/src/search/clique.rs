@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::{
     association::Association,
     bitset::{BitMatrix, BitSet},
-    orientation::mirrored,
+    orientation::Sense,
 };
 use crate::Problem;
 
@@ -39,8 +39,8 @@ pub(super) struct Cliques {
 pub(super) struct Search<'a> {
     problem: &'a Problem<'a>,
     graph: &'a Association,
-    /// Whether mirror images are refused.
-    orientation: bool,
+    /// What fours are refused.
+    sense: Sense,
     /// Tests left: a vertex coloured, or four points tested for orientation.
     left: u64,
     order: Vec<usize>,
@@ -57,9 +57,9 @@ pub(super) struct Search<'a> {
 struct Stop;
 
 impl<'a> Search<'a> {
-    pub(super) fn new(problem: &'a Problem<'a>, graph: &'a Association, orientation: bool, budget: u64) -> Self {
+    pub(super) fn new(problem: &'a Problem<'a>, graph: &'a Association, sense: Sense, budget: u64) -> Self {
         let (order, core) = degeneracy(graph.vertices.len(), &graph.adjacency);
-        Self { problem, graph, orientation, left: budget, order, core, least: 1, found: Vec::new(), cap: 1 }
+        Self { problem, graph, sense, left: budget, order, core, least: 1, found: Vec::new(), cap: 1 }
     }
 
     /// Tests not yet spent.
@@ -67,9 +67,9 @@ impl<'a> Search<'a> {
         self.left
     }
 
-    /// With or without the refusal of mirror images from here on.
-    pub(super) fn set_orientation(&mut self, orientation: bool) {
-        self.orientation = orientation;
+    /// Refuses other fours from here on.
+    pub(super) fn set_sense(&mut self, sense: Sense) {
+        self.sense = sense;
     }
 
     /// The largest cliques of at least `least` members; of those that tie, no more than `cap`.
@@ -165,7 +165,7 @@ impl<'a> Search<'a> {
             let mut candidates = BitSet::full(local.vertices.len());
             while let Some(next) = local.best_connected(&candidates) {
                 candidates.remove(next);
-                if self.left > reserve && !self.mirrors(&clique, local.vertices[next]) {
+                if self.left > reserve && !self.refuses(&clique, local.vertices[next]) {
                     candidates.intersect(local.adjacency.row(next));
                     clique.push(local.vertices[next]);
                 }
@@ -179,24 +179,24 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether a vertex is mirrored with some three members of the clique.
-    fn mirrors(&mut self, clique: &[usize], vertex: usize) -> bool {
-        if !self.orientation {
+    /// Whether a vertex makes a refused four with some three members of the clique.
+    fn refuses(&mut self, clique: &[usize], vertex: usize) -> bool {
+        if self.sense == Sense::Any {
             return false;
         }
         let members = decisive_members(clique);
         let vertices = &self.graph.vertices;
         let mut tests = 0;
-        let mirrors = members.iter().enumerate().any(|(i, &a)| {
+        let refused = members.iter().enumerate().any(|(i, &a)| {
             members[..i].iter().enumerate().any(|(k, &b)| {
                 members[..k].iter().any(|&c| {
                     tests += 1;
-                    mirrored(self.problem, [vertices[a], vertices[b], vertices[c], vertices[vertex]])
+                    self.sense.refuses(self.problem, [vertices[a], vertices[b], vertices[c], vertices[vertex]])
                 })
             })
         });
         self.left = self.left.saturating_sub(tests);
-        mirrors
+        refused
     }
 
     fn keep(&mut self, clique: &[usize]) {
@@ -249,9 +249,9 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Removes the candidates that would be mirrored with `added` and two members of the clique.
+    /// Removes the candidates that would make a refused four with `added` and two members of the clique.
     fn orient(&mut self, local: &Local, clique: &[usize], added: usize, candidates: &mut BitSet) -> Result<(), Stop> {
-        if !self.orientation || clique.len() < 2 {
+        if self.sense == Sense::Any || clique.len() < 2 {
             return Ok(());
         }
         let vertices = &self.graph.vertices;
@@ -262,7 +262,7 @@ impl<'a> Search<'a> {
             let refused = members.iter().enumerate().any(|(i, &a)| {
                 members[..i].iter().any(|&b| {
                     tests += 1;
-                    mirrored(self.problem, [vertices[a], vertices[b], c, d])
+                    self.sense.refuses(self.problem, [vertices[a], vertices[b], c, d])
                 })
             });
             if refused {

@@ -9,7 +9,7 @@ use super::{
     alike::all_alike,
     association::Association,
     clique::{self, MOST_ORIENTED},
-    orientation::{unmirrored, wholly_mirrored},
+    orientation::{Sense, unmirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Observations, Problem, solve::least_squares};
 
@@ -67,7 +67,8 @@ impl Search for MaximumClique {
         let graph = Association::of(problem);
         // The rest is for the proof that what ties is alike.
         let share = budget - budget / 4;
-        let mut cliques = clique::Search::new(problem, &graph, self.orientation, share);
+        let sense = if self.orientation { Sense::Proper } else { Sense::Any };
+        let mut cliques = clique::Search::new(problem, &graph, sense, share);
         let largest = cliques.run(1, MOST_TIES);
         let size = largest.found.first().map_or(0, Vec::len);
         if size < NEEDED {
@@ -80,6 +81,7 @@ impl Search for MaximumClique {
         if self.orientation && largest.complete && size == NEEDED {
             self.refuse_mirrored(problem, &graph, &mut cliques)?;
         }
+        let larger_image = self.larger_image(size, &mut cliques);
         let mut ties = largest.found;
         let best = least_residual(problem, &graph, &ties);
         let clique = ties.swap_remove(best);
@@ -90,7 +92,7 @@ impl Search for MaximumClique {
         let (mut optimal, mut all) = (largest.complete, largest.all);
         let mut decided = all;
         if !all || rivals.len() > self.rivals {
-            let (alike, spent) = all_alike(problem, &graph, &pairs, self.orientation, budget - share + cliques.left());
+            let (alike, spent) = all_alike(problem, &graph, &pairs, sense, budget - share + cliques.left());
             tests += spent;
             if alike {
                 decided = true;
@@ -107,8 +109,9 @@ impl Search for MaximumClique {
             pairs = kept.pairs;
             pairs.sort_unstable();
         }
-        let undecided =
-            (!decided).then_some(Unidentified::Budget { budget, best: pairs.len(), bound: largest.bound, tests });
+        let undecided = larger_image.or_else(|| {
+            (!decided).then_some(Unidentified::Budget { budget, best: pairs.len(), bound: largest.bound, tests })
+        });
         Ok(Identification { pairs, rivals, rivals_complete: all, optimal, size_bound: largest.bound, tests, undecided })
     }
 }
@@ -122,13 +125,25 @@ impl MaximumClique {
         graph: &Association,
         cliques: &mut clique::Search<'_>,
     ) -> Result<(), Unidentified> {
-        cliques.set_orientation(false);
+        cliques.set_sense(Sense::Any);
         let coherent = cliques.run(NEEDED + 1, 1);
-        cliques.set_orientation(true);
+        cliques.set_sense(Sense::Proper);
         match coherent.found.first().map(|clique| pairs_of(graph, clique)) {
             Some(set) if wholly_mirrored(problem, &set) => Err(Unidentified::Mirrored { best: set.len() }),
             _ => Ok(()),
         }
+    }
+
+    /// A mirror image of the model with more points than the set found: then the set is what a flat part
+    /// of that image leaves, and no fix.
+    fn larger_image(&self, size: usize, cliques: &mut clique::Search<'_>) -> Option<Unidentified> {
+        if !self.orientation {
+            return None;
+        }
+        cliques.set_sense(Sense::Mirrored);
+        let images = cliques.run(size + 1, 1);
+        cliques.set_sense(Sense::Proper);
+        images.found.first().map(|image| Unidentified::Mirrored { best: image.len() })
     }
 
     /// Puts the rivals that share the fewest pairs with the best set first.

@@ -45,8 +45,9 @@ pub struct Identification {
     pub size_bound: usize,
     /// Pair tests spent, those that built the graph included.
     pub tests: u64,
-    /// Why the set is not to be believed by itself: the search ended before it had seen, or ruled
-    /// out, every set as large that is unlike it. `None` also of a search that looks for no rivals.
+    /// Why the set is not to be believed by itself: a larger set is a mirror image, or the search ended
+    /// before it had seen, or ruled out, every set as large that is unlike it. `None` also of a search
+    /// that looks for no rivals.
     pub undecided: Option<Unidentified>,
 }
 

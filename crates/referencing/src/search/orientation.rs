@@ -25,6 +25,36 @@ pub(crate) fn mirrored(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool
     decisive(problem, &four, &model, &cloud, known)
 }
 
+/// What a set's fours must be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sense {
+    /// Anything: distances alone decide, as in the paper.
+    Any,
+    /// Not mirrored.
+    Proper,
+    /// Not upright: every four that can tell is a mirror image.
+    Mirrored,
+}
+
+impl Sense {
+    /// Whether four pairs contradict it.
+    pub(crate) fn refuses(self, problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
+        match self {
+            Self::Any => false,
+            Self::Proper => mirrored(problem, four),
+            Self::Mirrored => upright(problem, four),
+        }
+    }
+}
+
+/// Whether four pairs are decisively no mirror image.
+fn upright(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
+    let model = four.map(|pair| problem.model[pair.model].at.coords);
+    let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
+    let known = volume(&model);
+    known * volume(&cloud) > 0.0 && decisive(problem, &four, &model, &cloud, known)
+}
+
 /// Whether the model's volume is large enough to tell an image from its reflection.
 fn decisive(
     problem: &Problem<'_>,

@@ -81,7 +81,8 @@ impl Search for StructuralCoherence {
                         optimal: true,
                         size_bound: q,
                         tests: run.tests,
-                        undecided: None,
+                        // A longer sample was a mirror image: what is left of it is no fix.
+                        undecided: run.mirrored.map(|best| Unidentified::Mirrored { best }),
                     });
                 }
                 Ok(None) => {}
