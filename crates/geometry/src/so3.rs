@@ -30,7 +30,7 @@ pub fn angle(rotation: &UnitQuaternion<f64>) -> f64 {
 
 /// The left Jacobian V(φ): Exp(φ, ρ) translates by V(φ) ρ.
 ///
-/// V = I + (1 − cos θ)/θ² [φ]× + (θ − sin θ)/θ³ [φ]×², θ = |φ|.
+/// V = I + (1 − cos θ)/θ² \[φ\]× + (θ − sin θ)/θ³ \[φ\]×², θ = |φ|.
 pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let theta = phi.norm();
     let t2 = theta * theta;
