@@ -233,11 +233,6 @@ impl PlannedDive {
         &self.site
     }
 
-    /// The site as a method knows it, in `seafix-site/1`.
-    pub fn site_toml(&self) -> String {
-        self.site.to_toml()
-    }
-
     /// The rig.
     pub fn rig(&self) -> &StereoRig {
         &self.rig

@@ -11,7 +11,7 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// Of the JPEG: marks stay sharp, the file stays below a megabyte.
+/// Of the JPEG: marks stay sharp, the page stays small.
 const QUALITY: u8 = 88;
 /// Columns between the two images.
 const GAP: u32 = 8;
