@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use seafix_geometry::{Camera, Object, Pixel, Point, StereoRig, Transform, UncertainPoint};
+use seafix_geometry::{Camera, Object, Pixel, Point, StereoRig, Transform, UncertainPixels, UncertainPoint};
 use seafix_referencing::{Observation, Observations};
 
 use crate::{
@@ -146,7 +146,8 @@ pub fn seen(noise: f64) -> impl Strategy<Value = Scene> {
                 let Some(mut pixels) = rig.sees(&(camera_from_object * Point::from(*p)), 0.0) else { continue };
                 let off = |pixel: Pixel, u: f64, v: f64| Pixel { u: pixel.u + u * noise, v: pixel.v + v * noise };
                 (pixels.left, pixels.right) = (off(pixels.left, e[0], e[1]), off(pixels.right, e[2], e[3]));
-                let found = rig.triangulate(&pixels, noise.max(0.05)).ok()?;
+                let pixels = UncertainPixels::independent(pixels, noise.max(0.05));
+                let found = rig.triangulate(&pixels).ok()?;
                 points.push(Observation {
                     measured: UncertainPoint { at: found.point, covariance: found.covariance },
                     pixels: Some(pixels),

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use proptest::{prelude::*, test_runner::TestCaseResult};
-use seafix_geometry::StereoRig;
+use seafix_geometry::{StereoRig, UncertainPixels};
 use seafix_proptests::{
     law, not_idle,
     rigs::{general, point_at, rectified, seen_by_left},
@@ -17,12 +17,13 @@ const EXACT: f64 = 1e-9;
 fn returns_to_the_point(rig: &StereoRig, places: &[(f64, f64, f64)], seen: &Cell<u32>) -> TestCaseResult {
     for point in places.iter().filter_map(|&place| point_at(rig, place)) {
         let Some(pixels) = rig.sees(&point, 0.0) else { continue };
-        let found = rig.triangulate(&pixels, EXACT).map_err(|error| TestCaseError::fail(error.to_string()))?;
+        let exact = UncertainPixels::independent(pixels, EXACT);
+        let found = rig.triangulate(&exact).map_err(|error| TestCaseError::fail(error.to_string()))?;
         within("distance (m)", found.point.distance(&point), 1e-9)?;
         let again = rig.project(&found.point).ok_or_else(|| TestCaseError::fail("not seen again"))?;
         within("left (px)", again.left.distance(&pixels.left), 1e-9)?;
         within("right (px)", again.right.distance(&pixels.right), 1e-9)?;
-        within("residual (px)", found.residual, 1e-9)?;
+        within("residual (px)", found.disagreement.sqrt() * EXACT, 1e-9)?;
         seen.set(seen.get() + 1);
     }
     Ok(())

@@ -138,7 +138,8 @@ fn evaluate(
 /// Whether the cloud point of `pair` shows where its model point truly is, in both images.
 fn correct(pair: &Correspondence, known: &TrueTarget<'_>, sighting: &Sighting, rig: &StereoRig) -> bool {
     let measured = &sighting.cloud[pair.cloud];
-    let shown: Option<StereoPixels> = measured.pixels.or_else(|| rig.project(&measured.position.at));
+    let shown: Option<StereoPixels> =
+        measured.pixels.map(|pixels| pixels.at).or_else(|| rig.project(&measured.position.at));
     let (Some(shown), Some(expected)) = (shown, rig.project(&known.points[pair.model])) else { return false };
     shown.left.distance(&expected.left) <= CORRECT_PX && shown.right.distance(&expected.right) <= CORRECT_PX
 }

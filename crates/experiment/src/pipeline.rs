@@ -10,10 +10,7 @@ use seafix_referencing::{
     Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind,
     Tolerance, candidates, judge,
 };
-use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptor, Detector, Keypoint, MATCHERS, Matcher, Refine, Triangulator, View,
-    stereo_pixels, triangulate,
-};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FrontEnd, Keypoint, Look, MATCHERS, Refine, Triangulator};
 use serde::{Deserialize, Serialize};
 
 use crate::source::{Eyes, Sight};
@@ -106,9 +103,13 @@ impl Pipeline {
         fits("tolerance", self.tolerance.check())?;
         fits("acceptance", self.acceptance.check())?;
         Ok(Stages {
-            detector: build(&DETECTORS, &self.detector)?,
-            descriptor: build(&DESCRIPTORS, &self.descriptor)?,
-            matcher: build(&MATCHERS, &self.matcher)?,
+            front_end: FrontEnd {
+                detector: build(&DETECTORS, &self.detector)?,
+                descriptor: build(&DESCRIPTORS, &self.descriptor)?,
+                matcher: build(&MATCHERS, &self.matcher)?,
+                refine: self.refine.clone(),
+                triangulator: self.triangulation.clone(),
+            },
             search: build(&SEARCHES, &self.search)?,
             solver: build(&SOLVERS, &self.solver)?,
             settings: self.clone(),
@@ -132,9 +133,7 @@ fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> Pipelin
 /// A pipeline, built.
 #[derive(Debug)]
 pub struct Stages {
-    detector: Box<dyn Detector>,
-    descriptor: Box<dyn Descriptor>,
-    matcher: Box<dyn Matcher>,
+    front_end: FrontEnd,
     search: Box<dyn Search>,
     solver: Box<dyn Solver>,
     settings: Pipeline,
@@ -199,24 +198,16 @@ impl Stages {
             Eyes::Points(cloud) => return (Vec::new(), cloud.clone(), FrameTimes::default()),
             Eyes::Pair(left, right) => (left, right),
         };
-        let (keypoints, detect) = timed(|| [self.detector.detect(left), self.detector.detect(right)]);
-        let (descriptors, describe) =
-            timed(|| [self.descriptor.describe(left, &keypoints[0]), self.descriptor.describe(right, &keypoints[1])]);
-        let left = View { image: left, keypoints: &keypoints[0], descriptors: &descriptors[0] };
-        let right = View { image: right, keypoints: &keypoints[1], descriptors: &descriptors[1] };
-        let (pairs, matching) = timed(|| {
-            let matches = self.matcher.matches(&left, &right, rig);
-            stereo_pixels(&matches, &left, &right, &self.settings.refine)
-        });
-        let (cloud, triangulation) = timed(|| triangulate(&pairs, rig, &self.settings.triangulation));
+        // Frames are worked on side by side: within one, a single thread keeps the times honest.
+        let mut look = Look::default();
+        self.front_end.look(left, right, rig, &mut look);
         let times = FrameTimes {
-            detect_ms: Some(detect),
-            describe_ms: Some(describe),
-            match_ms: Some(matching),
-            triangulate_ms: Some(triangulation),
+            detect_ms: Some(look.times.detect_ms),
+            describe_ms: Some(look.times.describe_ms),
+            match_ms: Some(look.times.match_ms + look.times.refine_ms),
+            triangulate_ms: Some(look.times.triangulate_ms),
         };
-        let [keypoints, _] = keypoints;
-        (keypoints, cloud, times)
+        (look.keypoints()[0].to_vec(), look.cloud, times)
     }
 
     #[expect(clippy::too_many_arguments, reason = "one call site; each is a different thing")]

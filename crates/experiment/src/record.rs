@@ -101,7 +101,7 @@ pub(crate) fn frame(
             .map(|point| CloudPoint {
                 at: point.position.at.coords.into(),
                 covariance: rows3(&point.position.covariance),
-                pixels: point.pixels.as_ref().map(pixel_pair),
+                pixels: point.pixels.map(|pixels| pixel_pair(&pixels.at)),
             })
             .collect(),
         prior: sight.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() }),

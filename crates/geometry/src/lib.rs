@@ -30,7 +30,7 @@ mod triad;
 
 pub use covariance::{Covariance6, UncertainPoint};
 pub use frame::{Body, Camera, Frame, Object, Point, RightCamera, Site, World};
-pub use measured::MeasuredPoint;
+pub use measured::{MeasuredPoint, UncertainPixels};
 pub use pinhole::{BadCamera, Distortion, Pinhole, Pixel};
 pub use stereo::{BadRig, StereoPixels, StereoRig, Triangulation, Untriangulable};
 pub use transform::{NotRigid, Transform};

@@ -1,8 +1,8 @@
 //! Two cameras side by side (or one above the other, or any way), and the point both see.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
 
-use crate::{Camera, Pinhole, Pixel, Point, RightCamera, Transform, so3::skew};
+use crate::{Camera, Pinhole, Pixel, Point, RightCamera, Transform, UncertainPixels, so3::skew};
 
 /// Where the two cameras of a rig see one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +39,9 @@ pub enum Untriangulable {
     /// The rays are so nearly parallel that the depth is unknown.
     #[error("the rays are parallel to within their noise")]
     Parallel,
+    /// The covariance of the pixels has no inverse.
+    #[error("the covariance of the pixels is singular")]
+    Singular,
 }
 
 /// A triangulated point.
@@ -48,9 +51,9 @@ pub struct Triangulation {
     pub point: Point<Camera>,
     /// Its covariance (m²), from the pixel noise alone.
     pub covariance: Matrix3<f64>,
-    /// What the four pixel coordinates disagree by: √Σ residual² (px). One degree of freedom, the
-    /// distance across the epipolar line shared between the images.
-    pub residual: f64,
+    /// What the four pixel coordinates disagree by, rᵀ Σ⁻¹ r: where their covariance Σ is right, χ² of one
+    /// degree of freedom, the distance across the epipolar line.
+    pub disagreement: f64,
 }
 
 impl StereoRig {
@@ -132,45 +135,54 @@ impl StereoRig {
         Some(self.mean_focal() * r.dot(&line_r).abs() / slope.sqrt())
     }
 
-    /// The point that both pixels see, and how well it is known when each pixel coordinate has
-    /// the standard deviation `sigma` (px).
+    /// The point that both pixels see, and how well it is known when their coordinates err as
+    /// their covariance Σ says.
     ///
     /// Maximum likelihood: from the midpoint of the rays' closest approach, Gauss–Newton on the four
-    /// pixel residuals; covariance σ² (JᵀJ)⁻¹ at the solution. (Hartley and Sturm, *Triangulation*, 1997.)
+    /// pixel residuals r weighted by Σ⁻¹; covariance (Jᵀ Σ⁻¹ J)⁻¹ at the solution. (Hartley and Sturm,
+    /// *Triangulation*, 1997.)
     ///
     /// # Errors
-    /// [`Untriangulable`] when the rays are parallel or meet behind a camera.
-    pub fn triangulate(&self, seen: &StereoPixels, sigma: f64) -> Result<Triangulation, Untriangulable> {
-        let mut point = self.midpoint(seen)?;
+    /// [`Untriangulable`] when the rays are parallel or meet behind a camera, or when Σ has no inverse.
+    pub fn triangulate(&self, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable> {
+        let information = seen.covariance.cholesky().ok_or(Untriangulable::Singular)?.inverse();
+        let mut point = self.midpoint(&seen.at)?;
         // The measured pixels hardly disagree, so three steps reach rounding error; the rest is reserve.
         for _ in 0..10 {
-            let (normal, gradient, _) = self.linearize(&point, seen).ok_or(Untriangulable::Behind(point.coords.z))?;
+            let (normal, gradient, _) =
+                self.linearize(&point, &seen.at, &information).ok_or(Untriangulable::Behind(point.coords.z))?;
             let step = normal.try_inverse().ok_or(Untriangulable::Parallel)? * gradient;
             point = point + step;
             if step.norm() <= 1e-14 * point.coords.norm() {
                 break;
             }
         }
-        let (normal, _, cost) = self.linearize(&point, seen).ok_or(Untriangulable::Behind(point.coords.z))?;
-        let covariance = normal.try_inverse().ok_or(Untriangulable::Parallel)? * (sigma * sigma);
+        let (normal, _, disagreement) =
+            self.linearize(&point, &seen.at, &information).ok_or(Untriangulable::Behind(point.coords.z))?;
+        let covariance = normal.try_inverse().ok_or(Untriangulable::Parallel)?;
         if !covariance.iter().all(|x| x.is_finite()) || covariance.trace() > point.coords.norm_squared() {
             return Err(Untriangulable::Parallel);
         }
-        Ok(Triangulation { point, covariance, residual: cost.sqrt() })
+        Ok(Triangulation { point, covariance, disagreement })
     }
 
-    /// JᵀJ, Jᵀr and rᵀr of the four pixel residuals at `point`.
-    fn linearize(&self, point: &Point<Camera>, seen: &StereoPixels) -> Option<(Matrix3<f64>, Vector3<f64>, f64)> {
+    /// JᵀWJ, JᵀWr and rᵀWr of the four pixel residuals r at `point`.
+    fn linearize(
+        &self,
+        point: &Point<Camera>,
+        seen: &StereoPixels,
+        weight: &Matrix4<f64>,
+    ) -> Option<(Matrix3<f64>, Vector3<f64>, f64)> {
         let (left, jl) = self.left.project_with_jacobian(point)?;
         let (right, jr) = self.right.project_with_jacobian(&(self.right_from_left * *point))?;
         let jr = jr * self.right_from_left.rotation_matrix();
-        let rl = Vector2::new(seen.left.u - left.u, seen.left.v - left.v);
-        let rr = Vector2::new(seen.right.u - right.u, seen.right.v - right.v);
-        Some((
-            jl.transpose() * jl + jr.transpose() * jr,
-            jl.transpose() * rl + jr.transpose() * rr,
-            rl.norm_squared() + rr.norm_squared(),
-        ))
+        let mut j = Matrix4x3::zeros();
+        j.fixed_rows_mut::<2>(0).copy_from(&jl);
+        j.fixed_rows_mut::<2>(2).copy_from(&jr);
+        let r =
+            Vector4::new(seen.left.u - left.u, seen.left.v - left.v, seen.right.u - right.u, seen.right.v - right.v);
+        let weighted = weight * j;
+        Some((j.transpose() * weighted, weighted.transpose() * r, r.dot(&(weight * r))))
     }
 
     /// The midpoint of the closest approach of the two rays.
@@ -205,6 +217,11 @@ mod tests {
         StereoRig::new(camera, camera, Transform::new(nalgebra::UnitQuaternion::identity(), -step)).unwrap()
     }
 
+    /// The pixels of `point`, each coordinate to 0.2 px.
+    fn seen(rig: &StereoRig, point: &Point<Camera>) -> UncertainPixels {
+        UncertainPixels::independent(rig.project(point).unwrap(), 0.2)
+    }
+
     #[test]
     fn disparity_is_f_b_over_z() {
         let seen = rig(Vector3::new(0.25, 0.0, 0.0)).project(&Point::new(0.3, -0.2, 2.0)).unwrap();
@@ -216,25 +233,55 @@ mod tests {
     fn depth_noise_is_z_squared_sigma_d_over_f_b() {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0));
         let point = Point::new(0.125, 0.0, 4.0);
-        let found = rig.triangulate(&rig.project(&point).unwrap(), 0.2).unwrap();
+        let found = rig.triangulate(&seen(&rig, &point)).unwrap();
         assert!(found.point.distance(&point) < 1e-12);
         let expected = 16.0 * (0.2 * 2f64.sqrt()) / (500.0 * 0.25);
         assert!((found.covariance[(2, 2)].sqrt() / expected - 1.0).abs() < 1e-3);
     }
 
     #[test]
+    fn an_error_common_to_both_images_leaves_the_depth_alone() {
+        let rig = rig(Vector3::new(0.25, 0.0, 0.0));
+        let point = Point::new(0.125, 0.0, 4.0);
+        let (place, alignment) = (0.3 * 0.3, 0.02 * 0.02);
+        let mut pixels = seen(&rig, &point);
+        pixels.covariance = Matrix4::identity() * place;
+        for i in 0..2 {
+            pixels.covariance[(i, i + 2)] = place;
+            pixels.covariance[(i + 2, i)] = place;
+            pixels.covariance[(i + 2, i + 2)] = place + alignment;
+        }
+        let found = rig.triangulate(&pixels).unwrap();
+        let expected = 16.0 * 0.02 / (500.0 * 0.25);
+        assert!((found.covariance[(2, 2)].sqrt() / expected - 1.0).abs() < 1e-6, "{}", found.covariance);
+        assert!((found.covariance[(1, 1)].sqrt() / (4.0 * 0.3 / 500.0) - 1.0).abs() < 1e-2);
+    }
+
+    #[test]
+    fn disagreement_is_the_distance_across_the_epipolar_line() {
+        let rig = rig(Vector3::new(0.25, 0.0, 0.0));
+        let mut pixels = seen(&rig, &Point::new(0.7, -0.3, 3.0));
+        assert!(rig.triangulate(&pixels).unwrap().disagreement < 1e-20);
+        // 0.4 px between the rows, of standard deviation 0.2 √2: χ² = 2.
+        pixels.at.right.v += 0.4;
+        assert!((rig.triangulate(&pixels).unwrap().disagreement - 2.0).abs() < 1e-3);
+        pixels.covariance = Matrix4::zeros();
+        assert_eq!(rig.triangulate(&pixels), Err(Untriangulable::Singular));
+    }
+
+    #[test]
     fn a_vertical_baseline_works_the_same() {
         let rig = rig(Vector3::new(0.0, 0.3, 0.0));
         let point = Point::new(-0.5, 0.4, 3.0);
-        assert!(rig.triangulate(&rig.project(&point).unwrap(), 0.2).unwrap().point.distance(&point) < 1e-12);
+        assert!(rig.triangulate(&seen(&rig, &point)).unwrap().point.distance(&point) < 1e-12);
     }
 
     #[test]
     fn swapped_images_lie_behind_the_cameras() {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0));
-        let seen = rig.project(&Point::new(0.0, 0.0, 3.0)).unwrap();
-        let swapped = StereoPixels { left: seen.right, right: seen.left };
-        assert!(matches!(rig.triangulate(&swapped, 0.2), Err(Untriangulable::Behind(_))));
+        let mut seen = seen(&rig, &Point::new(0.0, 0.0, 3.0));
+        seen.at = StereoPixels { left: seen.at.right, right: seen.at.left };
+        assert!(matches!(rig.triangulate(&seen), Err(Untriangulable::Behind(_))));
     }
 
     #[test]

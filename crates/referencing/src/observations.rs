@@ -1,7 +1,7 @@
 //! What a solver is given.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_geometry::{Camera, MeasuredPoint, Object, Point, StereoPixels, StereoRig, Transform, UncertainPoint};
+use seafix_geometry::{Camera, MeasuredPoint, Object, Point, StereoRig, Transform, UncertainPixels, UncertainPoint};
 
 use crate::{Correspondence, ModelPoint};
 
@@ -11,7 +11,7 @@ pub struct Observation {
     /// Measured, camera frame.
     pub measured: UncertainPoint<Camera>,
     /// Where the two images show it, if it came from images.
-    pub pixels: Option<StereoPixels>,
+    pub pixels: Option<UncertainPixels>,
     /// The model's place.
     pub model: Point<Object>,
     /// Standard deviation of each coordinate of the model's place (m).

@@ -1,6 +1,8 @@
 //! One view as noisy points: what a detector would have measured, without the image.
 
-use seafix_geometry::{Camera, MeasuredPoint, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPoint, World};
+use seafix_geometry::{
+    Camera, MeasuredPoint, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint, World,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -85,9 +87,10 @@ impl Eyes<'_> {
                 };
                 let seen = StereoPixels { left: disturbed(&exact.left), right: disturbed(&exact.right) };
                 // A covariance of zero would claim what no camera can know.
-                let found = self.rig.triangulate(&seen, noise.sigma_px.max(1e-3)).ok()?;
+                let pixels = UncertainPixels::independent(seen, noise.sigma_px.max(1e-3));
+                let found = self.rig.triangulate(&pixels).ok()?;
                 let position = UncertainPoint { at: found.point, covariance: found.covariance };
-                Some(MeasuredPoint { position, pixels: Some(seen) })
+                Some(MeasuredPoint { position, pixels: Some(pixels) })
             })
             .collect()
     }

@@ -1,7 +1,7 @@
 //! From matched pixels to measured points.
 
 use seafix_component::in_range;
-use seafix_geometry::{MeasuredPoint, StereoPixels, StereoRig};
+use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels, UncertainPoint};
 use serde::{Deserialize, Serialize};
 
 /// What the triangulation is told.
@@ -36,19 +36,21 @@ impl Triangulator {
     }
 }
 
-/// The points whose two pixels pass the epipolar test and meet in front of the cameras, in the
-/// order of `pairs`.
-pub fn triangulate(pairs: &[StereoPixels], rig: &StereoRig, settings: &Triangulator) -> Vec<MeasuredPoint> {
-    pairs
-        .iter()
-        .filter(|pair| rig.epipolar_distance(pair).is_some_and(|distance| distance <= settings.epipolar_px))
-        .filter_map(|pair| {
-            let found = rig.triangulate(pair, settings.sigma_px).ok()?;
-            let near = found.point.coords.z <= settings.max_depth;
+impl Triangulator {
+    /// Replaces `cloud` by the points whose two pixels pass the epipolar test and meet in front of the
+    /// cameras, in the order of `pairs`.
+    pub fn triangulate_into(&self, pairs: &[UncertainPixels], rig: &StereoRig, cloud: &mut Vec<MeasuredPoint>) {
+        cloud.clear();
+        let near = pairs
+            .iter()
+            .filter(|pair| rig.epipolar_distance(&pair.at).is_some_and(|distance| distance <= self.epipolar_px));
+        cloud.extend(near.filter_map(|pair| {
+            let found = rig.triangulate(pair).ok()?;
+            let near = found.point.coords.z <= self.max_depth;
             near.then_some(MeasuredPoint {
-                position: seafix_geometry::UncertainPoint { at: found.point, covariance: found.covariance },
+                position: UncertainPoint { at: found.point, covariance: found.covariance },
                 pixels: Some(*pair),
             })
-        })
-        .collect()
+        }));
+    }
 }

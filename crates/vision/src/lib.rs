@@ -1,8 +1,8 @@
 //! From two images to a cloud of measured points.
 //!
 //! A [`Detector`] finds corners in each image, a [`Descriptor`] describes their surroundings, a
-//! [`Matcher`] pairs left with right, and [`triangulate`] turns the pairs that pass
-//! the epipolar test into [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
+//! [`Matcher`] pairs left with right, and a [`Triangulator`] turns the pairs
+//! that pass the epipolar test into [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
 //!
 //! The centre of the first pixel is (0, 0); brightness is linear in the stored values, 0 is black
 //! and 255 the white of an 8-bit image.
@@ -10,14 +10,18 @@
 mod cloud;
 mod describe;
 mod detect;
+mod front_end;
 mod gaussian;
 mod image;
 mod matching;
 mod refine;
+mod workspace;
 
-pub use cloud::{Triangulator, triangulate};
-pub use describe::{DESCRIPTORS, Descriptor, Descriptors, Surf};
+pub use cloud::Triangulator;
+pub use describe::{DESCRIPTORS, Descriptor, Descriptors, Surf, Table};
 pub use detect::{DETECTORS, Detector, Harris, Keypoint};
+pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
 pub use matching::{MATCHERS, Match, Matcher, MutualRatio, View};
-pub use refine::{Refine, stereo_pixels};
+pub use refine::Refine;
+pub use workspace::{Threads, Workspace};

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
 use seafix_component::in_range;
-use seafix_geometry::{Pixel, StereoPixels};
+use seafix_geometry::{Pixel, StereoPixels, UncertainPixels};
 use serde::{Deserialize, Serialize};
 
-use crate::{Image, Match, View};
+use crate::{Image, Match, View, Workspace};
 
 /// How the right place of a match is aligned to the left one.
 ///
@@ -60,19 +60,33 @@ impl Refine {
     }
 }
 
-/// The places of the matched key points, in the order of `matches`, aligned as `refine` says.
-pub fn stereo_pixels(matches: &[Match], left: &View<'_>, right: &View<'_>, refine: &Refine) -> Vec<StereoPixels> {
-    let mut aligner = Aligner::new(refine);
-    matches
-        .iter()
-        .map(|found| {
-            let pair = StereoPixels { left: left.keypoints[found.left].at, right: right.keypoints[found.right].at };
-            if !refine.refine {
-                return pair;
-            }
-            aligner.align(left.image, right.image, &pair).map_or(pair, |right| StereoPixels { right, ..pair })
-        })
-        .collect()
+impl Refine {
+    /// Replaces `pixels` by the places of the matched key points, in the order of `matches`, aligned as
+    /// these settings say; `sigma` is the error of a place that a detector found (px, each coordinate).
+    pub fn align_into(
+        &self,
+        matches: &[Match],
+        left: &View<'_>,
+        right: &View<'_>,
+        sigma: f64,
+        _: &mut Workspace,
+        pixels: &mut Vec<UncertainPixels>,
+    ) {
+        let mut aligner = Aligner::new(self);
+        pixels.clear();
+        pixels.extend(matches.iter().map(|found| {
+            let pair = StereoPixels { left: left.keypoints[found.left].at, right: found.right };
+            let aligned = if self.refine { aligner.align(left.image, right.image, &pair) } else { None };
+            UncertainPixels::independent(StereoPixels { right: aligned.unwrap_or(pair.right), ..pair }, sigma)
+        }));
+    }
+
+    /// The places of the matched key points, aligned, in the order of `matches`.
+    pub fn align(&self, matches: &[Match], left: &View<'_>, right: &View<'_>, sigma: f64) -> Vec<UncertainPixels> {
+        let mut pixels = Vec::new();
+        self.align_into(matches, left, right, sigma, &mut Workspace::default(), &mut pixels);
+        pixels
+    }
 }
 
 /// A window's working space, used again for every match.
@@ -264,9 +278,9 @@ mod tests {
         let none = Descriptors::default();
         let [l, r] = [at, start].map(|at| [Keypoint { at, response: 1.0, scale: 1.0 }]);
         let view = |image, keypoints| View { image, keypoints, descriptors: &none };
-        let found = [Match { left: 0, right: 0, distance: 0.0 }];
+        let found = [Match { left: 0, right: start, distance: 0.0 }];
         let (left, right) = (View { image: &left, keypoints: &l, descriptors: &none }, view(right, &r));
-        stereo_pixels(&found, &left, &right, refine)[0]
+        refine.align(&found, &left, &right, 0.15)[0].at
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The covariance of any solver's answer, by central differences through the solver.
 
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
-use seafix_geometry::{Camera, Covariance6, Object, Pixel, Point, StereoPixels, StereoRig, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels};
 
 use super::Degenerate;
 use crate::Observations;
@@ -28,7 +28,10 @@ pub(super) fn covariance(
             let j = jacobian(at, |step| {
                 moved.points[i].measured.at = original.measured.at + step;
                 moved.points[i].pixels = data.rig.map_or(original.pixels, |rig| {
-                    original.pixels.map(|pixels| shifted(rig, pixels, &original.measured.at, &step))
+                    original.pixels.map(|seen| {
+                        let at = shifted(rig, seen.at, &original.measured.at, &step);
+                        UncertainPixels { at, ..seen }
+                    })
                 });
                 let answer = solve(&moved);
                 moved.points[i] = original;

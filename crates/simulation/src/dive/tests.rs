@@ -230,7 +230,7 @@ fn points_are_the_truth_with_pixel_noise() {
         for seen in &frame.truth().visible {
             let nearest = points
                 .iter()
-                .filter_map(|p| p.pixels)
+                .filter_map(|p| Some(p.pixels?.at))
                 .min_by(|a, b| a.left.distance(&seen.pixels.left).total_cmp(&b.left.distance(&seen.pixels.left)))
                 .unwrap();
             let e = (nearest.left.u - nearest.right.u) - (seen.pixels.left.u - seen.pixels.right.u);

@@ -4,7 +4,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{Descriptor, Descriptors, integral::Integral};
-use crate::{Image, Keypoint};
+use crate::{Image, Keypoint, Workspace};
 
 /// SURF's 64 numbers, upright: sums of Haar wavelet responses around the key point.
 ///
@@ -53,19 +53,18 @@ const EDGES: usize = SIDE + 2;
 const LENGTH: usize = REGIONS * REGIONS * 4;
 
 impl Descriptor for Surf {
-    fn describe(&self, image: &Image, keypoints: &[Keypoint]) -> Descriptors {
+    fn describe_into(&self, image: &Image, keypoints: &[Keypoint], _: &mut Workspace, described: &mut Descriptors) {
         let integral = Integral::of(image);
         // The Gaussian in steps of s is the same for all key points.
         let weights: [f64; SIDE] = std::array::from_fn(|i| {
             let step = i as f64 - 0.5 * (SIDE - 1) as f64;
             libm::exp(-0.5 * step * step / (3.3 * 3.3))
         });
-        let mut values = Vec::with_capacity(keypoints.len() * LENGTH);
-        for keypoint in keypoints {
+        let rows = described.numbers_mut(keypoints.len(), LENGTH).chunks_exact_mut(LENGTH);
+        for (row, keypoint) in rows.zip(keypoints) {
             let step = if self.scale > 0.0 { self.scale } else { f64::from(keypoint.scale) };
-            values.extend(describe(&integral, keypoint, step, &weights));
+            row.copy_from_slice(&describe(&integral, keypoint, step, &weights));
         }
-        Descriptors::new(LENGTH, values)
     }
 }
 
@@ -123,12 +122,12 @@ mod tests {
     #[test]
     fn a_ramp_has_only_its_own_derivative() {
         let described = Surf { scale: 1.0 }.describe(&image(|x, _| x), &[at(40.0, 30.0)]);
-        for region in described.get(0).chunks_exact(4) {
+        for region in described.numbers().unwrap().row(0).chunks_exact(4) {
             assert!(region[0] > 0.0 && region[0] == region[2], "{region:?}");
             assert!(region[1].abs() < 1e-6 && region[3] < 1e-6, "{region:?}");
         }
         // The middle regions weigh more than the outer ones, and left equals right.
-        let region = |i: usize| described.get(0)[4 * i];
+        let region = |i: usize| described.numbers().unwrap().row(0)[4 * i];
         assert!(region(5) > region(4) && region(4) > region(0));
         assert!((region(4) - region(7)).abs() < 1e-6);
     }
@@ -139,11 +138,11 @@ mod tests {
         let described = Surf::default().describe(&image(waves), &points);
         assert_eq!(described.len(), points.len());
         for i in 0..points.len() {
-            let norm = described.get(i).iter().map(|x| x * x).sum::<f32>();
+            let norm = described.numbers().unwrap().row(i).iter().map(|x| x * x).sum::<f32>();
             assert!((norm - 1.0).abs() < 1e-5, "{i}: {norm}");
         }
         let flat = Surf::default().describe(&image(|_, _| 137.0), &points);
-        assert!((0..points.len()).all(|i| flat.get(i).iter().all(|x| *x == 0.0)));
+        assert!((0..points.len()).all(|i| flat.numbers().unwrap().row(i).iter().all(|x| *x == 0.0)));
     }
 
     #[test]
@@ -152,7 +151,14 @@ mod tests {
         let a = Surf::default().describe(&image(waves), &points);
         let b = Surf::default().describe(&image(|x, y| 0.5 * waves(x, y) + 64.0), &points);
         for i in 0..points.len() {
-            let furthest = a.get(i).iter().zip(b.get(i)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let furthest = a
+                .numbers()
+                .unwrap()
+                .row(i)
+                .iter()
+                .zip(b.numbers().unwrap().row(i))
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f32::max);
             assert!(furthest < 1e-6, "{i}: {furthest}");
         }
     }

@@ -4,7 +4,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{Detector, Keypoint, junction::Junction, peaks};
-use crate::{Image, gaussian::half_kernel};
+use crate::{Image, Workspace, gaussian::half_kernel};
 
 /// Harris' corners: places whose surroundings change in every direction.
 ///
@@ -68,14 +68,14 @@ impl Component for Harris {
 const SAME: f64 = 1.0;
 
 impl Detector for Harris {
-    fn detect(&self, image: &Image) -> Vec<Keypoint> {
+    fn detect_into(&self, image: &Image, _: &mut Workspace, corners: &mut Vec<Keypoint>) {
         let response = self.response(image);
         let strongest = response.iter().copied().fold(0.0_f32, f32::max);
         let least = (f64::from(strongest) * self.quality) as f32;
         let mut found = peaks::maxima(&response, image.width(), least, self.radius);
         peaks::strongest(&mut found, [image.width(), image.height()], self.features, self.balance);
         let junction = (self.junction > 0.0).then(|| Junction::new(self.junction));
-        let mut corners: Vec<Keypoint> = Vec::with_capacity(found.len());
+        corners.clear();
         for peak in found {
             let vertex = peaks::vertex(&response, image.width(), &peak);
             let at = junction.as_ref().and_then(|junction| junction.near(image, &vertex)).unwrap_or(vertex);
@@ -84,7 +84,6 @@ impl Detector for Harris {
                 corners.push(Keypoint { at, response: peak.response, scale: self.sigma as f32 });
             }
         }
-        corners
     }
 }
 

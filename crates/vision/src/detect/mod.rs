@@ -8,7 +8,7 @@ pub use harris::Harris;
 use seafix_component::{Registry, entry};
 use seafix_geometry::Pixel;
 
-use crate::Image;
+use crate::{Image, Workspace};
 
 /// A place in an image that can be found again.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,8 +23,15 @@ pub struct Keypoint {
 
 /// Finds the key points of an image.
 pub trait Detector: Send + Sync + std::fmt::Debug {
-    /// The key points, strongest first.
-    fn detect(&self, image: &Image) -> Vec<Keypoint>;
+    /// Replaces `found` by the image's key points, strongest first.
+    fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>);
+
+    /// The key points of one image, strongest first.
+    fn detect(&self, image: &Image) -> Vec<Keypoint> {
+        let mut found = Vec::new();
+        self.detect_into(image, &mut Workspace::default(), &mut found);
+        found
+    }
 }
 
 /// All detectors.

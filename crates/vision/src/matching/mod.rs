@@ -7,9 +7,9 @@ mod support;
 
 pub use mutual_ratio::MutualRatio;
 use seafix_component::{Registry, entry};
-use seafix_geometry::StereoRig;
+use seafix_geometry::{Pixel, StereoRig};
 
-use crate::{Descriptors, Image, Keypoint};
+use crate::{Descriptors, Image, Keypoint, Workspace};
 
 /// One image and what was found in it.
 #[derive(Debug, Clone, Copy)]
@@ -22,21 +22,35 @@ pub struct View<'a> {
     pub descriptors: &'a Descriptors,
 }
 
-/// Two key points that look like the same thing.
+/// A key point of the left image and the place in the right image that looks the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Match {
     /// Index among the left key points.
     pub left: usize,
-    /// Index among the right key points.
-    pub right: usize,
+    /// The place in the right image: a key point's, or wherever the matcher found it.
+    pub right: Pixel,
     /// How unlike they are, in the matcher's own measure; smaller is more alike.
     pub distance: f32,
 }
 
-/// Pairs the key points of two views; no key point is in two pairs.
+/// Finds the key points of the left view again in the right one; no key point and no place is in two pairs.
 pub trait Matcher: Send + Sync + std::fmt::Debug {
-    /// The pairs, in the order of the left key points.
-    fn matches(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Vec<Match>;
+    /// Replaces `found` by the pairs, in the order of the left key points.
+    fn match_into(
+        &self,
+        left: &View<'_>,
+        right: &View<'_>,
+        rig: &StereoRig,
+        work: &mut Workspace,
+        found: &mut Vec<Match>,
+    );
+
+    /// The pairs of two views, in the order of the left key points.
+    fn matches(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Vec<Match> {
+        let mut found = Vec::new();
+        self.match_into(left, right, rig, &mut Workspace::default(), &mut found);
+        found
+    }
 }
 
 /// All matchers.

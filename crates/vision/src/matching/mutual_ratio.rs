@@ -10,6 +10,7 @@ use super::{
     nearest::{Nearest, squared},
     support::Candidates,
 };
+use crate::{Table, Workspace};
 
 /// Pairs of key points that are each other's nearest by descriptor, clearly nearer than the second.
 ///
@@ -64,34 +65,36 @@ impl Component for MutualRatio {
 }
 
 impl Matcher for MutualRatio {
-    fn matches(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Vec<Match> {
-        let nearest = if self.epipolar_px > 0.0 {
-            self.along_the_band(left, right, rig)
-        } else {
-            Nearest::of_all(left.descriptors, right.descriptors)
-        };
+    fn match_into(
+        &self,
+        left: &View<'_>,
+        right: &View<'_>,
+        rig: &StereoRig,
+        _: &mut Workspace,
+        found: &mut Vec<Match>,
+    ) {
+        found.clear();
+        let (Some(a), Some(b)) = (left.descriptors.numbers(), right.descriptors.numbers()) else { return };
+        let nearest =
+            if self.epipolar_px > 0.0 { self.along_the_band(left, right, [a, b], rig) } else { Nearest::of_all(a, b) };
         let ratio = (self.ratio * self.ratio) as f32;
         let greatest = self.max_distance as f32;
-        nearest
-            .mutual()
-            .filter(|pair| pair.squared <= ratio * pair.second)
-            .map(|pair| {
-                let distance = squared(left.descriptors.get(pair.left), right.descriptors.get(pair.right)).sqrt();
-                Match { left: pair.left, right: pair.right, distance }
-            })
-            .filter(|pair| pair.distance <= greatest)
-            .collect()
+        let pairs = nearest.mutual().filter(|pair| pair.squared <= ratio * pair.second).map(|pair| {
+            let distance = squared(a.row(pair.left), b.row(pair.right)).sqrt();
+            Match { left: pair.left, right: right.keypoints[pair.right].at, distance }
+        });
+        found.extend(pairs.filter(|pair| pair.distance <= greatest));
     }
 }
 
 impl MutualRatio {
     /// The nearest among the pairs that the rig allows, where distance is that of the descriptors or,
     /// with neighbours, the inverse of its supported weight.
-    fn along_the_band(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Nearest {
+    fn along_the_band(&self, left: &View<'_>, right: &View<'_>, [a, b]: [&Table<f32>; 2], rig: &StereoRig) -> Nearest {
         let band = Band::new(left.keypoints, right.keypoints, rig, self.epipolar_px, self.min_depth, self.max_depth);
         let (n, m) = (left.keypoints.len(), right.keypoints.len());
         let pairs = (0..n).flat_map(|i| (0..m).map(move |j| (i, j))).filter(|&(i, j)| band.allows(i, j));
-        let pairs = pairs.map(|(i, j)| (i, j, squared(left.descriptors.get(i), right.descriptors.get(j))));
+        let pairs = pairs.map(|(i, j)| (i, j, squared(a.row(i), b.row(j))));
         let mut nearest = Nearest::none(n, m);
         if self.neighbours == 0 {
             pairs.for_each(|(i, j, squared)| nearest.offer(i, j, squared));
@@ -109,7 +112,7 @@ impl MutualRatio {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Descriptors, Image, Keypoint};
+    use crate::{Descriptors, Image, Keypoint, Table};
     use nalgebra::{UnitQuaternion, Vector3};
     use seafix_geometry::{Pinhole, Pixel, Point, Transform};
 
@@ -137,7 +140,7 @@ mod tests {
             let norm = v.iter().map(|x| x * x).sum::<f32>().sqrt();
             v.iter().map(move |x| x / norm)
         });
-        Descriptors::new(length, unit.collect())
+        Descriptors::Numbers(Table::new(length, unit.collect()))
     }
 
     fn matched(
@@ -153,6 +156,11 @@ mod tests {
             &View { image: &image, keypoints: &r, descriptors: right.1 },
             rig,
         )
+    }
+
+    /// Which right pixel a match means.
+    fn index(right: &[Pixel], found: &Match) -> usize {
+        right.iter().position(|at| *at == found.right).unwrap()
     }
 
     /// Points at random depths, their pixels in both images and random descriptors, noisy on the right,
@@ -185,11 +193,19 @@ mod tests {
             m.epipolar_px == 0.0
                 || rig.epipolar_distance(&seen).is_some_and(|d| d <= m.epipolar_px)
                     && rig
-                        .triangulate(&seen, 0.1)
+                        .triangulate(&seafix_geometry::UncertainPixels::independent(seen, 0.1))
                         .is_ok_and(|t| (m.min_depth..=m.max_depth).contains(&t.point.coords.z))
         };
         let distance = |i: usize, j: usize| -> f32 {
-            left.1.get(i).iter().zip(right.1.get(j)).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
+            left.1
+                .numbers()
+                .unwrap()
+                .row(i)
+                .iter()
+                .zip(right.1.numbers().unwrap().row(j))
+                .map(|(a, b)| (a - b) * (a - b))
+                .sum::<f32>()
+                .sqrt()
         };
         let mut pairs = Vec::new();
         for i in 0..left.0.len() {
@@ -223,12 +239,12 @@ mod tests {
                 MutualRatio { min_depth: 2.0, max_depth: 3.0, ..MutualRatio::default() },
             ] {
                 let found = matched(&matcher, (&l, &a), (&r, &b), &rig);
-                let pairs: Vec<_> = found.iter().map(|m| (m.left, m.right)).collect();
+                let pairs: Vec<_> = found.iter().map(|m| (m.left, index(&r, m))).collect();
                 assert_eq!(pairs, brute_force(&matcher, (&l, &a), (&r, &b), &rig), "{matcher:?}");
                 // Left to right and back: the same pairs when the images change places (P54).
                 if matcher.epipolar_px == 0.0 {
                     let mut back: Vec<_> =
-                        matched(&matcher, (&r, &b), (&l, &a), &rig).iter().map(|m| (m.right, m.left)).collect();
+                        matched(&matcher, (&r, &b), (&l, &a), &rig).iter().map(|m| (index(&l, m), m.left)).collect();
                     back.sort_unstable();
                     assert_eq!(pairs, back);
                 }
@@ -242,7 +258,7 @@ mod tests {
         let (l, r, a, b) = scene(100, &rig);
         let found = matched(&MutualRatio::default(), (&l, &a), (&r, &b), &rig);
         assert!(found.len() >= 98, "{}", found.len());
-        assert!(found.iter().all(|m| m.right == 99 - m.left));
+        assert!(found.iter().all(|m| index(&r, m) == 99 - m.left));
     }
 
     #[test]
@@ -252,9 +268,9 @@ mod tests {
         let seen: Vec<_> =
             (0..9).map(|i| rig.project(&Point::new(0.0, f64::from(i) * 0.2 - 0.8, 2.0)).unwrap()).collect();
         let (l, r): (Vec<_>, Vec<_>) = seen.iter().map(|s| (s.left, s.right)).unzip();
-        let same = Descriptors::new(2, [0.6, 0.8].repeat(9));
+        let same = Descriptors::Numbers(Table::new(2, [0.6, 0.8].repeat(9)));
         let found = matched(&MutualRatio::default(), (&l, &same), (&r, &same), &rig);
-        assert!(found.iter().map(|m| (m.left, m.right)).eq((0..9).map(|i| (i, i))));
+        assert!(found.iter().map(|m| (m.left, index(&r, m))).eq((0..9).map(|i| (i, i))));
         let without = MutualRatio { epipolar_px: 0.0, ..MutualRatio::default() };
         assert!(matched(&without, (&l, &same), (&r, &same), &rig).len() <= 1);
     }
@@ -274,7 +290,7 @@ mod tests {
         let (a, b) = (noisy(), noisy());
         let right = |neighbours| {
             let found = matched(&MutualRatio { neighbours, ..MutualRatio::default() }, (&l, &a), (&r, &b), &rig);
-            (found.iter().filter(|m| m.left == m.right).count(), found.len())
+            (found.iter().filter(|m| m.left == index(&r, m)).count(), found.len())
         };
         let (alone, found) = right(0);
         assert!(alone <= 5 && found < 48, "descriptors alone: {alone} of {found} are right");
@@ -285,7 +301,7 @@ mod tests {
     fn nothing_matches_nothing() {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
         let (l, _, a, _) = scene(3, &rig);
-        let none = Descriptors::new(16, Vec::new());
+        let none = Descriptors::Numbers(Table::new(16, Vec::new()));
         for matcher in [MutualRatio::default(), MutualRatio { epipolar_px: 0.0, ..MutualRatio::default() }] {
             assert!(matched(&matcher, (&l, &a), (&[], &none), &rig).is_empty());
             assert!(matched(&matcher, (&[], &none), (&l, &a), &rig).is_empty());

@@ -1,6 +1,6 @@
 //! Exact nearest and second nearest neighbours between two sets of descriptors.
 
-use crate::Descriptors;
+use crate::Table;
 
 /// For every descriptor of either side, the nearest on the other side and the distance of the second.
 #[derive(Debug)]
@@ -59,22 +59,22 @@ impl Nearest {
 
     /// Among all pairs: blocks of a few left and eight right descriptors stay in registers. Every sum
     /// runs in the descriptor's order, so the distances are those of [`squared`] to the last bit.
-    pub(super) fn of_all(left: &Descriptors, right: &Descriptors) -> Self {
+    pub(super) fn of_all(left: &Table<f32>, right: &Table<f32>) -> Self {
         let mut nearest = Self::none(left.len(), right.len());
         if left.is_empty() || right.is_empty() {
             return nearest;
         }
-        let length = right.get(0).len();
+        let length = right.length();
         // Panels of eight right descriptors, number by number; the last one is filled up with zeros.
         let panels: Vec<Vec<[f32; COLUMNS]>> = (0..right.len())
             .step_by(COLUMNS)
             .map(|first| {
-                let value = |k: usize, j: usize| if j < right.len() { right.get(j)[k] } else { 0.0 };
+                let value = |k: usize, j: usize| if j < right.len() { right.row(j)[k] } else { 0.0 };
                 (0..length).map(|k| std::array::from_fn(|c| value(k, first + c))).collect()
             })
             .collect();
         for first in (0..left.len()).step_by(ROWS) {
-            let rows: [&[f32]; ROWS] = std::array::from_fn(|r| left.get((first + r).min(left.len() - 1)));
+            let rows: [&[f32]; ROWS] = std::array::from_fn(|r| left.row((first + r).min(left.len() - 1)));
             for (panel, values) in panels.iter().enumerate() {
                 let squared = block(rows, values);
                 for (i, squared) in (first..left.len()).zip(squared) {
@@ -125,8 +125,8 @@ mod tests {
 
     #[test]
     fn nearest_and_second_by_hand() {
-        let left = Descriptors::new(1, vec![0.0, 5.0, 5.5]);
-        let right = Descriptors::new(1, vec![5.1, 0.5, 9.0]);
+        let left = Table::new(1, vec![0.0, 5.0, 5.5]);
+        let right = Table::new(1, vec![5.1, 0.5, 9.0]);
         let pairs: Vec<_> = Nearest::of_all(&left, &right).mutual().map(|m| (m.left, m.right, m.second)).collect();
         assert_eq!(pairs.len(), 2);
         assert_eq!((pairs[0].0, pairs[0].1), (0, 1));
@@ -139,13 +139,13 @@ mod tests {
     fn blocks_give_the_same_bits() {
         for (n, m) in [(1, 1), (2, 8), (13, 21), (40, 7)] {
             let values = |n: usize, seed: usize| (0..n * 5).map(|i| ((i * 37 + seed) % 101) as f32 * 0.013).collect();
-            let (left, right) = (Descriptors::new(5, values(n, 3)), Descriptors::new(5, values(m, 50)));
+            let (left, right) = (Table::new(5, values(n, 3)), Table::new(5, values(m, 50)));
             let bits = |nearest: Nearest| -> Vec<_> {
                 nearest.mutual().map(|m| (m.left, m.right, m.squared.to_bits(), m.second.to_bits())).collect()
             };
             let mut one_by_one = Nearest::none(n, m);
             for (i, j) in (0..n).flat_map(|i| (0..m).map(move |j| (i, j))) {
-                one_by_one.offer(i, j, super::squared(left.get(i), right.get(j)));
+                one_by_one.offer(i, j, super::squared(left.row(i), right.row(j)));
             }
             assert_eq!(bits(Nearest::of_all(&left, &right)), bits(one_by_one));
         }

@@ -1,0 +1,108 @@
+//! From two images to a cloud, one line a stage.
+
+use std::time::Instant;
+
+use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels};
+
+use crate::{
+    Descriptor, Descriptors, Detector, Image, Keypoint, Match, Matcher, Refine, Threads, Triangulator, View, Workspace,
+};
+
+/// The stages between two images and a cloud.
+#[derive(Debug)]
+pub struct FrontEnd {
+    /// Finds key points in each image.
+    pub detector: Box<dyn Detector>,
+    /// Describes their surroundings.
+    pub descriptor: Box<dyn Descriptor>,
+    /// Pairs left with right.
+    pub matcher: Box<dyn Matcher>,
+    /// Aligns each pair between the views.
+    pub refine: Refine,
+    /// Turns pairs into points.
+    pub triangulator: Triangulator,
+}
+
+/// What the front end made of one pair of images, and the memory it made it in.
+///
+/// Used again for the next pair it allocates nothing that an earlier pair did not need.
+#[derive(Debug, Default)]
+pub struct Look {
+    /// Left and right.
+    eyes: [Eye; 2],
+    work: Workspace,
+    /// Left key points and where the right image shows them.
+    pub matches: Vec<Match>,
+    /// The same, aligned, with their covariance.
+    pub pixels: Vec<UncertainPixels>,
+    /// The cloud.
+    pub cloud: Vec<MeasuredPoint>,
+    /// How long each stage took.
+    pub times: StageTimes,
+}
+
+/// One image's part.
+#[derive(Debug, Default)]
+struct Eye {
+    work: Workspace,
+    keypoints: Vec<Keypoint>,
+    descriptors: Descriptors,
+}
+
+/// Milliseconds that each stage took, both images together.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StageTimes {
+    /// Key points.
+    pub detect_ms: f64,
+    /// Descriptors.
+    pub describe_ms: f64,
+    /// Matches.
+    pub match_ms: f64,
+    /// Alignment between the views.
+    pub refine_ms: f64,
+    /// Triangulation.
+    pub triangulate_ms: f64,
+}
+
+impl Look {
+    /// An empty one; `threads` says who works.
+    pub fn new(threads: Threads) -> Self {
+        let eye = || Eye { work: Workspace::new(threads), ..Eye::default() };
+        Self { eyes: [eye(), eye()], work: Workspace::new(threads), ..Self::default() }
+    }
+
+    /// The key points of the left and of the right image.
+    pub fn keypoints(&self) -> [&[Keypoint]; 2] {
+        [&self.eyes[0].keypoints, &self.eyes[1].keypoints]
+    }
+}
+
+impl FrontEnd {
+    /// Replaces what is in `look` by what these two images show.
+    pub fn look(&self, left: &Image, right: &Image, rig: &StereoRig, look: &mut Look) {
+        let Look { eyes: [l, r], work, matches, pixels, cloud, times } = look;
+        let threads = work.threads();
+        times.detect_ms = timed(|| {
+            let detect = |image, eye: &mut Eye| self.detector.detect_into(image, &mut eye.work, &mut eye.keypoints);
+            threads.join(|| detect(left, l), || detect(right, r));
+        });
+        times.describe_ms = timed(|| {
+            let describe = |image, eye: &mut Eye| {
+                self.descriptor.describe_into(image, &eye.keypoints, &mut eye.work, &mut eye.descriptors);
+            };
+            threads.join(|| describe(left, l), || describe(right, r));
+        });
+        let left = View { image: left, keypoints: &l.keypoints, descriptors: &l.descriptors };
+        let right = View { image: right, keypoints: &r.keypoints, descriptors: &r.descriptors };
+        times.match_ms = timed(|| self.matcher.match_into(&left, &right, rig, work, matches));
+        let sigma = self.triangulator.sigma_px;
+        times.refine_ms = timed(|| self.refine.align_into(matches, &left, &right, sigma, work, pixels));
+        times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
+    }
+}
+
+fn timed(work: impl FnOnce()) -> f64 {
+    let start = Instant::now();
+    work();
+    start.elapsed().as_secs_f64() * 1e3
+}
