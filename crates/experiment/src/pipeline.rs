@@ -89,32 +89,41 @@ impl Pipeline {
         })
     }
 
+    /// The part of it between two images and a cloud, ready to work.
+    ///
+    /// # Errors
+    /// [`PipelineError`] names the setting.
+    pub fn front_end(&self) -> Result<FrontEnd, PipelineError> {
+        fits("refine", self.refine.check())?;
+        fits("triangulation", self.triangulation.check())?;
+        Ok(FrontEnd {
+            detector: build(&DETECTORS, &self.detector)?,
+            descriptor: build(&DESCRIPTORS, &self.descriptor)?,
+            matcher: build(&MATCHERS, &self.matcher)?,
+            refine: self.refine.clone(),
+            triangulator: self.triangulation.clone(),
+        })
+    }
+
     /// The pipeline, ready to work.
     ///
     /// # Errors
     /// [`PipelineError`] names the setting.
     pub fn build(&self) -> Result<Stages, PipelineError> {
-        let fits = |setting, check: Result<(), String>| {
-            check.map_err(|message| PipelineError { setting, key: None, message: format!("{setting}: {message}") })
-        };
-        fits("refine", self.refine.check())?;
-        fits("triangulation", self.triangulation.check())?;
         fits("gate", self.gate.check())?;
         fits("tolerance", self.tolerance.check())?;
         fits("acceptance", self.acceptance.check())?;
         Ok(Stages {
-            front_end: FrontEnd {
-                detector: build(&DETECTORS, &self.detector)?,
-                descriptor: build(&DESCRIPTORS, &self.descriptor)?,
-                matcher: build(&MATCHERS, &self.matcher)?,
-                refine: self.refine.clone(),
-                triangulator: self.triangulation.clone(),
-            },
+            front_end: self.front_end()?,
             search: build(&SEARCHES, &self.search)?,
             solver: build(&SOLVERS, &self.solver)?,
             settings: self.clone(),
         })
     }
+}
+
+fn fits(setting: &'static str, check: Result<(), String>) -> Result<(), PipelineError> {
+    check.map_err(|message| PipelineError { setting, key: None, message: format!("{setting}: {message}") })
 }
 
 fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice, PipelineError> {
