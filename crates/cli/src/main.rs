@@ -7,6 +7,7 @@ use clap::Parser;
 mod catalogue;
 mod commands;
 mod exit;
+mod ply;
 mod terminal;
 
 /// Positions of an underwater vehicle relative to a known structure, from stereo images.

@@ -194,25 +194,8 @@ fn changed(experiment: Experiment, settings: &[String]) -> Result<Experiment, Ve
     if settings.is_empty() {
         return Ok(experiment);
     }
-    let fault = |what: String, setting: &str| {
-        vec![
-            Fault::new(what, Path::new("--set"))
-                .value(setting)
-                .remedy("write key=value, for instance pipeline.solver=triad"),
-        ]
-    };
     // Components are written out first, so that a setting of a default component can be changed.
-    let resolved = experiment.resolved().unwrap_or(experiment);
-    let mut table = toml::Table::try_from(&resolved).expect("an experiment is a table of plain values");
-    for setting in settings {
-        let (key, value) = setting.split_once('=').ok_or_else(|| fault("no `=`".to_owned(), setting))?;
-        let value = toml::from_str::<toml::Table>(&format!("value = {value}"))
-            .ok()
-            .and_then(|mut table| table.remove("value"))
-            .unwrap_or_else(|| value.trim().into());
-        vary::set(&mut table, key.trim(), value).map_err(|message| fault(message, setting))?;
-    }
-    table.try_into().map_err(|error: toml::de::Error| vec![Fault::in_toml(Path::new("--set"), "", &error)])
+    vary::changed(&experiment.resolved().unwrap_or(experiment), settings, "pipeline.solver=triad")
 }
 
 #[cfg(test)]

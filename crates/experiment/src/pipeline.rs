@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use rand::Rng;
-use seafix_component::{BuildError, Choice, Registry};
+use seafix_component::{BuildError, Choice, Fault, Registry};
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
@@ -13,7 +13,10 @@ use seafix_referencing::{
 use seafix_vision::{DESCRIPTORS, DETECTORS, FrontEnd, Keypoint, Look, MATCHERS, Refine, Triangulator};
 use serde::{Deserialize, Serialize};
 
-use crate::source::{Eyes, Sight};
+use crate::{
+    source::{Eyes, Sight},
+    vary,
+};
 
 /// The settings of the way from a frame to a fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -87,6 +90,15 @@ impl Pipeline {
             solver: resolve(&SOLVERS, &self.solver)?,
             ..self.clone()
         })
+    }
+
+    /// The same pipeline with each of `settings`, `key=value` with a dotted key and a TOML value, given
+    /// the last word.
+    ///
+    /// # Errors
+    /// The setting that cannot be.
+    pub fn changed(&self, settings: &[String]) -> Result<Self, Vec<Fault>> {
+        vary::changed(&self.resolved().unwrap_or_else(|_| self.clone()), settings, "detector.sigma=1.5")
     }
 
     /// The part of it between two images and a cloud, ready to work.

@@ -1,7 +1,9 @@
 //! What varies: from one experiment to its trials.
 
+use std::path::Path;
+
 use seafix_component::Fault;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// One thing that varies over an experiment, written `[[vary]]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,6 +32,31 @@ pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
             })
             .collect()
     })
+}
+
+/// `whole` with each of `settings`, `key=value` with a dotted key and a TOML value, given the last word.
+///
+/// # Errors
+/// The setting that cannot be, with `example` as one that could.
+pub(crate) fn changed<T: Serialize + DeserializeOwned>(
+    whole: &T,
+    settings: &[String],
+    example: &str,
+) -> Result<T, Vec<Fault>> {
+    let fault = |what: String, setting: &str| {
+        let fault = Fault::new(what, Path::new("--set")).value(setting);
+        vec![fault.remedy(format!("write key=value, for instance {example}"))]
+    };
+    let mut table = toml::Table::try_from(whole).expect("settings are a table of plain values");
+    for setting in settings {
+        let (key, value) = setting.split_once('=').ok_or_else(|| fault("no `=`".to_owned(), setting))?;
+        let value = toml::from_str::<toml::Table>(&format!("value = {value}"))
+            .ok()
+            .and_then(|mut table| table.remove("value"))
+            .unwrap_or_else(|| value.trim().into());
+        set(&mut table, key.trim(), value).map_err(|message| fault(message, setting))?;
+    }
+    table.try_into().map_err(|error: toml::de::Error| vec![Fault::in_toml(Path::new("--set"), "", &error)])
 }
 
 /// Puts `value` at the dotted path `key`. A component chosen by its bare name becomes a table

@@ -64,6 +64,20 @@ pub struct StageTimes {
     pub triangulate_ms: f64,
 }
 
+impl StageTimes {
+    /// Each stage by its name, in the order of the work.
+    pub fn stages(&self) -> Vec<(&'static str, f64)> {
+        let Self { detect_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *self;
+        vec![
+            ("detect", detect_ms),
+            ("describe", describe_ms),
+            ("match", match_ms),
+            ("refine", refine_ms),
+            ("triangulate", triangulate_ms),
+        ]
+    }
+}
+
 impl Look {
     /// An empty one; `threads` says who works.
     pub fn new(threads: Threads) -> Self {

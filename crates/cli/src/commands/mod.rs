@@ -7,6 +7,7 @@ use clap::Subcommand;
 use crate::exit::Ended;
 
 mod check;
+mod cloud;
 mod export;
 mod list;
 mod report;
@@ -21,6 +22,8 @@ pub(crate) enum Command {
     Run(run::Run),
     /// Solve coherence problems (coherence-problem/1), one result each.
     Solve(solve::Solve),
+    /// Make the cloud of measured points of one stereo pair.
+    Cloud(cloud::Cloud),
     /// Say everything that is wrong with a data set, site, experiment, problem or log.
     Check {
         /// The files and folders.
@@ -45,6 +48,7 @@ impl Command {
         match self {
             Self::Run(command) => command.execute(),
             Self::Solve(command) => command.execute(),
+            Self::Cloud(command) => command.execute(),
             Self::Check { paths } => check::execute(paths),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),

@@ -1,7 +1,8 @@
 //! `dataset.toml`, key by key.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
+use seafix_component::{Fault, line_of};
 use seafix_geometry::{Pinhole, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +74,27 @@ pub(super) struct CameraNumbers {
     pub(super) port: Option<toml::Table>,
 }
 
+impl Description {
+    /// The rig, or what is wrong with it in `file`, whose text is `source`.
+    pub(super) fn build_rig(&self, file: &Path, source: &str) -> Result<StereoRig, Fault> {
+        self.rig.build().map_err(|(path, what)| {
+            let path: Vec<&str> = std::iter::once("rig").chain(path).collect();
+            Fault::new(what, file).on_line(line_of(source, &path))
+        })
+    }
+
+    /// Depth of the pixels in images of 16 bits, or what is wrong with it.
+    pub(super) fn depth(&self, file: &Path, source: &str) -> Result<u8, Fault> {
+        match self.bits.unwrap_or(16) {
+            bits @ (8 | 12 | 16) => Ok(bits),
+            other => Err(Fault::new("an unknown depth of pixels", file)
+                .on_line(line_of(source, &["bits"]))
+                .value(other)
+                .remedy("8, 12 and 16 bits are read")),
+        }
+    }
+}
+
 impl CameraNumbers {
     pub(super) fn of(camera: &Pinhole) -> Self {
         let ([fx, fy], [cx, cy]) = (camera.focal(), camera.principal());
@@ -91,7 +113,7 @@ impl Rig {
     }
 
     /// The rig, or the path of the key at fault below `rig` and what is wrong with it.
-    pub(super) fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
+    fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
         let camera = |side: &'static str, c: &CameraNumbers| {
             if c.port.is_some() {
                 return Err((vec![side, "port"], "views through a dome or flat port are not read yet".to_owned()));

@@ -11,6 +11,6 @@ mod write;
 
 pub use check::check;
 pub(crate) use check::{hash_faults, input_hashes, sha256};
-pub use open::{Dataset, DatasetFrame};
+pub use open::{Dataset, DatasetFrame, read_rig};
 pub use picture::{read_image, write_png};
 pub use write::write;

@@ -79,6 +79,18 @@ impl Dataset {
     }
 }
 
+/// The rig that a data set's description, the file or its folder, has, and the depth of its images of
+/// 16 bits; nothing else the description names is looked at.
+///
+/// # Errors
+/// No such file, or what is wrong with it.
+pub fn read_rig(path: &Path) -> Result<(StereoRig, u8), Fault> {
+    let file = if path.is_dir() { path.join("dataset.toml") } else { path.to_owned() };
+    let source = read_text(&file)?;
+    let described: Description = toml::from_str(&source).map_err(|error| Fault::in_toml(&file, &source, &error))?;
+    Ok((described.build_rig(&file, &source)?, described.depth(&file, &source)?))
+}
+
 impl Dataset {
     /// The two images of `frame`.
     ///
@@ -106,13 +118,8 @@ impl Reader<'_> {
             let remedy = format!("this program reads {}", FORMATS.join(" and "));
             self.fault(&["format"], "an unknown format", &d.format, &remedy);
         }
-        if d.bits.is_some_and(|bits| ![8, 12, 16].contains(&bits)) {
-            self.fault(&["bits"], "an unknown depth of pixels", "", "8, 12 and 16 bits are read");
-        }
-        let rig = d.rig.build().map_err(|(path, what)| {
-            let path: Vec<&str> = std::iter::once("rig").chain(path).collect();
-            self.fault(&path, &what, "", "");
-        });
+        let bits = d.depth(self.file, self.source).map_err(|fault| self.faults.push(fault));
+        let rig = d.build_rig(self.file, self.source).map_err(|fault| self.faults.push(fault));
         let body_from_camera = match d.body_from_camera.as_ref().map(Transform::from_rows) {
             None => Transform::identity(),
             Some(Ok(pose)) => pose,
@@ -181,8 +188,8 @@ impl Reader<'_> {
                 );
             }
         }
-        match rig {
-            Ok(rig) if self.faults.is_empty() => Ok(Dataset {
+        match (rig, bits) {
+            (Ok(rig), Ok(bits)) if self.faults.is_empty() => Ok(Dataset {
                 name: d.name.clone(),
                 folder: self.folder.to_owned(),
                 rig,
@@ -191,7 +198,7 @@ impl Reader<'_> {
                 frames,
                 objects,
                 has_visibility: visibility.is_some(),
-                bits: d.bits.unwrap_or(16),
+                bits,
                 hashes: d.hashes.clone().into_iter().collect(),
                 warnings,
             }),

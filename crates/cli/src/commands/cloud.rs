@@ -1,0 +1,196 @@
+//! `seafix cloud`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use rayon::ThreadPoolBuilder;
+use seafix_component::{Choice, Fault};
+use seafix_experiment::{
+    Pipeline,
+    dataset::{read_image, read_rig},
+};
+use seafix_geometry::StereoRig;
+use seafix_vision::{FrontEnd, Image, Look, StageTimes, Threads};
+use serde_json::{Value, json};
+
+use crate::{
+    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
+    ply,
+    terminal::print,
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Cloud {
+    /// The left image.
+    left: PathBuf,
+    /// The right image.
+    right: PathBuf,
+    /// The rig that took them: a dataset.toml, of which only the rig and `bits` are read.
+    #[arg(long, value_name = "DATASET.toml")]
+    rig: PathBuf,
+    /// The detector [default: the pipeline's].
+    #[arg(long)]
+    detector: Option<String>,
+    /// The descriptor [default: the pipeline's].
+    #[arg(long)]
+    descriptor: Option<String>,
+    /// The matcher [default: the pipeline's].
+    #[arg(long)]
+    matcher: Option<String>,
+    /// At most so many key points an image [default: the detector's].
+    #[arg(long)]
+    features: Option<u32>,
+    /// Change a setting of the pipeline: a dotted key and a TOML value, `detector.sigma=1.5`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// How many times the cloud is made, for its times.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    repeat: u32,
+    /// How many threads work; the cloud does not depend on it.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// One JSON object, for programs: every point, and the times of the stages.
+    #[arg(long)]
+    json: bool,
+    /// Write the cloud here, as PLY.
+    #[arg(long, value_name = "CLOUD.ply")]
+    out: Option<PathBuf>,
+}
+
+impl Cloud {
+    pub(crate) fn execute(&self) -> Ended {
+        let pipeline = self.pipeline()?;
+        let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
+        let input = |fault: Fault| Failure::new(INPUT, fault);
+        let (rig, bits) = read_rig(&self.rig).map_err(input)?;
+        let left = read_image(&self.left, rig.left().size(), bits).map_err(input)?;
+        let right = read_image(&self.right, rig.right().size(), bits).map_err(input)?;
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(usize::from(self.threads))
+            .build()
+            .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
+        let (look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
+        if let Some(path) = &self.out {
+            ply::write(path, &look.cloud, &left).map_err(|fault| Failure::new(OUTPUT, fault))?;
+        }
+        let pipeline = pipeline.resolved().map_err(|error| Failure::new(USAGE, error))?;
+        print(&if self.json { self.machines(&look, &times, &pipeline) } else { self.people(&look, &times) })?;
+        Ok(DONE)
+    }
+
+    /// The default pipeline with what the command line changes.
+    fn pipeline(&self) -> Result<Pipeline, Failure> {
+        let mut pipeline = Pipeline::default();
+        let choose = |choice: &mut Choice, name: &Option<String>| {
+            if let Some(name) = name {
+                *choice = Choice::named(name);
+            }
+        };
+        choose(&mut pipeline.detector, &self.detector);
+        choose(&mut pipeline.descriptor, &self.descriptor);
+        choose(&mut pipeline.matcher, &self.matcher);
+        if let Some(features) = self.features {
+            pipeline.detector = pipeline.detector.with("features", i64::from(features));
+        }
+        // A wrong name is told before `--set` is blamed for it.
+        pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
+        pipeline.changed(&self.set).map_err(|faults| Failure::faults(USAGE, &faults))
+    }
+
+    fn make(&self, front_end: &FrontEnd, left: &Image, right: &Image, rig: &StereoRig) -> (Look, Vec<StageTimes>) {
+        let mut look = Look::new(if self.threads > 1 { Threads::Pool } else { Threads::One });
+        let times = (0..self.repeat).map(|_| {
+            front_end.look(left, right, rig, &mut look);
+            look.times
+        });
+        let times = times.collect();
+        (look, times)
+    }
+
+    /// For people: how much was found, and how long each stage took.
+    fn people(&self, look: &Look, times: &[StageTimes]) -> String {
+        let [left, right] = look.keypoints().map(<[_]>::len);
+        let depths = look.cloud.iter().map(|point| point.position.at.coords.z);
+        let (near, far) = depths.fold((f64::INFINITY, 0.0_f64), |(near, far), z| (near.min(z), far.max(z)));
+        let depth = if look.cloud.is_empty() { String::new() } else { format!(", {near:.2} to {far:.2} m deep") };
+        let (matches, points) = (look.matches.len(), look.cloud.len());
+        let mut text = format!("{left} and {right} key points, {matches} matches, {points} points{depth}\n");
+        text += &format!("{:12}{:>10}{:>12}\n", "stage", "least ms", "median ms");
+        for (stage, [least, median]) in summary(times) {
+            text += &format!("{stage:12}{least:10.2}{median:12.2}\n");
+        }
+        text + &format!(
+            "{} {}, {} {}\n",
+            self.repeat,
+            plural(self.repeat, "repeat"),
+            self.threads,
+            plural(self.threads, "thread")
+        )
+    }
+
+    /// For programs: everything.
+    fn machines(&self, look: &Look, times: &[StageTimes], pipeline: &Pipeline) -> String {
+        let points: Vec<Value> = look.cloud.iter().map(point).collect();
+        let times: serde_json::Map<String, Value> = summary(times)
+            .into_iter()
+            .map(|(stage, [least, median])| (stage.to_owned(), json!({ "least": least, "median": median })))
+            .collect();
+        let value = json!({
+            "left": name(&self.left),
+            "right": name(&self.right),
+            "keypoints": look.keypoints().map(<[_]>::len),
+            "matches": look.matches.len(),
+            "points": points,
+            "times_ms": times,
+            "repeats": self.repeat,
+            "threads": self.threads,
+            "pipeline": {
+                "detector": pipeline.detector,
+                "descriptor": pipeline.descriptor,
+                "matcher": pipeline.matcher,
+                "refine": pipeline.refine,
+                "triangulation": pipeline.triangulation,
+            },
+        });
+        value.to_string() + "\n"
+    }
+}
+
+/// The least and the median time of every stage and of the whole, `total` (ms).
+fn summary(times: &[StageTimes]) -> Vec<(&'static str, [f64; 2])> {
+    let stages: Vec<Vec<(&'static str, f64)>> = times.iter().map(StageTimes::stages).collect();
+    let of = |mut all: Vec<f64>| {
+        all.sort_by(f64::total_cmp);
+        let middle = all.len() / 2;
+        [all[0], if all.len().is_multiple_of(2) { 0.5 * (all[middle - 1] + all[middle]) } else { all[middle] }]
+    };
+    let whole = |stages: &Vec<(&str, f64)>| stages.iter().map(|(_, ms)| ms).sum();
+    let names = stages[0].iter().enumerate();
+    let each = names.map(|(index, (name, _))| (*name, of(stages.iter().map(|all| all[index].1).collect())));
+    each.chain([("total", of(stages.iter().map(whole).collect()))]).collect()
+}
+
+fn point(point: &seafix_geometry::MeasuredPoint) -> Value {
+    let covariance: Vec<Vec<f64>> =
+        point.position.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+    let pixels = point.pixels.map(|pixels| {
+        let rows: Vec<Vec<f64>> = pixels.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+        (pixels.at, rows)
+    });
+    let (at, pixel_covariance) = pixels.unzip();
+    json!({
+        "left": at.map(|at| [at.left.u, at.left.v]),
+        "right": at.map(|at| [at.right.u, at.right.v]),
+        "position": <[f64; 3]>::from(point.position.at.coords),
+        "covariance": covariance,
+        "pixel_covariance": pixel_covariance,
+    })
+}
+
+fn name(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+fn plural(count: impl Into<u32>, word: &str) -> String {
+    if count.into() == 1 { word.to_owned() } else { format!("{word}s") }
+}

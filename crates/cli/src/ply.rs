@@ -1,0 +1,40 @@
+//! Point clouds as PLY, the format that MeshLab, CloudCompare and Open3D read.
+
+use std::path::Path;
+
+use seafix_component::Fault;
+use seafix_geometry::MeasuredPoint;
+use seafix_vision::Image;
+
+/// Writes `cloud` as binary PLY: position (m, left camera's axes), the grey of the left image there,
+/// and the standard deviation of the position (m, √ of the covariance's trace).
+///
+/// # Errors
+/// The file cannot be written; what had its name before stays.
+pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Result<(), Fault> {
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment left camera: x right, y down, z forward; metres\n\
+         element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float sigma\nend_header\n",
+        cloud.len()
+    )
+    .into_bytes();
+    for point in cloud {
+        let at = point.position.at.coords;
+        at.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+        let grey = point.pixels.map_or(255, |pixels| grey(left, pixels.at.left.u, pixels.at.left.v));
+        bytes.extend([grey; 3]);
+        bytes.extend((point.position.covariance.trace().sqrt() as f32).to_le_bytes());
+    }
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|error| {
+        Fault::new(format!("cannot write ({error})"), path).remedy("check the folder and its permissions")
+    })
+}
+
+/// The grey value of the pixel nearest to (u, v).
+fn grey(image: &Image, u: f64, v: f64) -> u8 {
+    let nearest = |x: f64, size: usize| (x.round().max(0.0) as usize).min(size - 1);
+    image.row(nearest(v, image.height()))[nearest(u, image.width())].round().clamp(0.0, 255.0) as u8
+}

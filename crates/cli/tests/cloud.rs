@@ -1,0 +1,106 @@
+//! Two images to a cloud, as a person and as a program asks for it.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample").join(name)
+}
+
+/// The first stereo pair of the sample, and more arguments.
+fn cloud(more: &[&str]) -> assert_cmd::assert::Assert {
+    let table = fs::read_to_string(sample("frames.csv")).unwrap();
+    let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
+    let mut command = Command::cargo_bin("seafix").unwrap();
+    command.arg("cloud").args(pair.iter().map(|name| sample(name)));
+    command.arg("--rig").arg(sample("dataset.toml")).args(more).assert()
+}
+
+fn json(more: &[&str]) -> Value {
+    serde_json::from_slice(&cloud(&[&["--json"], more].concat()).success().get_output().stdout).unwrap()
+}
+
+/// The error of a command that ends with this code and prints nothing.
+fn refusal(more: &[&str], code: i32) -> String {
+    let ended = cloud(more).code(code);
+    assert!(ended.get_output().stdout.is_empty());
+    let text = String::from_utf8(ended.get_output().stderr.clone()).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    text
+}
+
+#[test]
+fn a_program_gets_every_point_and_the_times() {
+    let all = json(&["--repeat", "2"]);
+    let points = all["points"].as_array().unwrap();
+    assert!(points.len() > 100);
+    for point in points {
+        let (position, covariance) = (&point["position"], &point["covariance"]);
+        assert!(position[2].as_f64().unwrap() > 0.0);
+        assert!((0..3).all(|i| covariance[i][i].as_f64().unwrap() > 0.0));
+        // The rig of the sample is rectified: the two rows agree but for noise.
+        let row = |side: &str| point[side][1].as_f64().unwrap();
+        assert!((row("left") - row("right")).abs() < 3.0, "{point}");
+    }
+    for stage in ["detect", "describe", "match", "refine", "triangulate", "total"] {
+        let times = &all["times_ms"][stage];
+        let (least, median) = (times["least"].as_f64().unwrap(), times["median"].as_f64().unwrap());
+        assert!(0.0 <= least && least <= median, "{stage}: {times}");
+    }
+}
+
+#[test]
+fn threads_and_repeats_change_no_point() {
+    let points = |more: &[&str]| json(more)["points"].clone();
+    assert_eq!(points(&["--threads", "3", "--repeat", "3"]), points(&[]));
+}
+
+#[test]
+fn the_budget_is_kept() {
+    let all = json(&["--features", "50"]);
+    assert_eq!(all["keypoints"], serde_json::json!([50, 50]));
+    assert_eq!(all["pipeline"]["detector"]["features"], 50);
+}
+
+#[test]
+fn the_cloud_is_written_whole() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("cloud.ply");
+    let said = cloud(&["--out", file.to_str().unwrap()]).success();
+    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    let bytes = fs::read(&file).unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let header = String::from_utf8(bytes[..end].to_vec()).unwrap();
+    let count: usize = header.split("element vertex ").nth(1).unwrap().lines().next().unwrap().parse().unwrap();
+    assert_eq!(bytes.len() - end, count * (3 * 8 + 3 + 4));
+    assert!(said.contains(&format!("{count} points")), "{said}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing half-written stays");
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_one_line() {
+    assert!(refusal(&["--detector", "haris"], 2).contains("did you mean `harris`?"));
+    assert!(refusal(&["--features", "0"], 2).contains("features"));
+    assert!(refusal(&["--set", "detector.sigmma=2"], 2).contains("did you mean `sigma`?"));
+    assert!(refusal(&["--out", "/nowhere/cloud.ply"], 4).contains("/nowhere/cloud.ply"));
+    let folder = TempDir::new().unwrap();
+    let rig = folder.path().join("dataset.toml");
+    let text = fs::read_to_string(sample("dataset.toml")).unwrap();
+    let refused = |text: &str| {
+        fs::write(&rig, text).unwrap();
+        let mut command = Command::cargo_bin("seafix").unwrap();
+        let image = sample("frames.csv");
+        command.arg("cloud").args([&image, &image]).arg("--rig").arg(&rig);
+        String::from_utf8(command.assert().code(3).get_output().stderr.clone()).unwrap()
+    };
+    assert!(refused(&text).contains("no image that can be decoded"));
+    assert!(refused(&text.replace("fx = ", "fx = -")).contains("dataset.toml:"));
+}
