@@ -46,7 +46,6 @@ fn harris_refuses_what_finds_nothing() {
     range(&DETECTORS, "harris", "sigma", &[0.5, 100.0], &[0.0, -1.0, 101.0]);
     range(&DETECTORS, "harris", "k", &[0.0, 0.24], &[-0.04, 0.25]);
     range(&DETECTORS, "harris", "quality", &[0.0, 1.0], &[-0.1, 1.1]);
-    range(&DETECTORS, "harris", "junction", &[0.0, 100.0], &[-2.5, 101.0]);
     assert_eq!(
         refusal(&DETECTORS, &Choice::named("harris").with("features", 0)).unwrap(),
         "detector `harris`: features = 0; give at least 1"

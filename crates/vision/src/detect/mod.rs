@@ -1,7 +1,6 @@
 //! Detectors: where in an image there is something to find again.
 
 mod harris;
-mod junction;
 mod peaks;
 
 pub use harris::Harris;
