@@ -49,7 +49,6 @@ impl Threads {
     /// `work(index, piece)` for every piece of `size` of `items`, with one scratch for each piece.
     ///
     /// What a piece holds does not depend on the threads, so neither does the result.
-    #[allow(dead_code, reason = "the stages that share work follow")]
     pub(crate) fn pieces<T: Send, S: Send + Default>(
         self,
         items: &mut [T],
@@ -68,6 +67,15 @@ impl Threads {
                 let pieces = items.par_chunks_mut(size).zip(scratch).enumerate();
                 pieces.for_each(|(index, (piece, scratch))| work(index, piece, scratch));
             }
+        }
+    }
+
+    /// How many of `rows` rows make a band, where each row's result depends on its surroundings alone:
+    /// few bands, for every band repeats work at its edges, yet enough to keep all threads busy.
+    pub(crate) fn rows_a_band(self, rows: usize) -> usize {
+        match self {
+            Self::One => rows.max(1),
+            Self::Pool => rows.div_ceil(4 * rayon::current_num_threads()).max(16),
         }
     }
 

@@ -3,26 +3,32 @@
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{Detector, Keypoint, peaks};
-use crate::{Image, Workspace, gaussian::half_kernel};
+use super::{
+    Detector, Keypoint, Selection, Window,
+    corners::Corners,
+    select::Budget,
+    tensor::{Measure, Tensor},
+};
+use crate::{Image, Workspace};
 
 /// Harris' corners: places whose surroundings change in every direction.
 ///
-/// The gradient g (grey levels/px, Sobel's operator) gives the structure tensor
-/// A = G_σ ∗ g gᵀ, integrated with a Gaussian; the response is R = det A − k (tr A)²
-/// (grey levels⁴/px⁴): positive at corners, negative along edges, zero where nothing changes.
-/// A corner is a maximum of R, placed to a fraction of a pixel by the quadratic through its nine
-/// responses. That is a place to find again, not yet where edges meet: the response peaks 1 to 2 px
-/// inside a convex corner.
+/// The gradient g (grey levels/px, Sobel's operator) gives the structure tensor A = w ∗ g gᵀ, integrated
+/// with a window w; the response is R = det A − k (tr A)² (grey levels⁴/px⁴): positive at corners,
+/// negative along edges, zero where nothing changes. A corner is a maximum of R, placed to a fraction of
+/// a pixel by the quadratic through its nine responses. That is a place to find again, not yet where
+/// edges meet: the response peaks 1 to 2 px inside a convex corner.
 ///
-/// Nothing is found nearer to the border than the operator reaches, 3σ + 2 px; an image too small
-/// for that has no corner.
+/// Nothing is found nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; an image
+/// too small for that has no corner.
 ///
 /// Source: Harris and Stephens, *A combined corner and edge detector*, Alvey Vision Conference, 1988.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Harris {
-    /// Standard deviation of the Gaussian that integrates the structure tensor (px).
+    /// The weights that integrate the structure tensor.
+    pub window: Window,
+    /// Standard deviation of the window (px).
     pub sigma: f64,
     /// Harris' constant k: how strongly a straight edge is rejected; 0.04 to 0.06 is common.
     pub k: f64,
@@ -33,14 +39,24 @@ pub struct Harris {
     pub radius: usize,
     /// At most so many corners.
     pub features: usize,
-    /// Cells along the longer side of the image over which the budget is spread; in each round every
-    /// cell contributes its strongest corner left. 0: the strongest of the whole image.
-    pub balance: usize,
+    /// Which, when there are more.
+    pub selection: Selection,
+    /// Cells along the longer side of the image over which a balanced selection spreads the corners.
+    pub cells: usize,
 }
 
 impl Default for Harris {
     fn default() -> Self {
-        Self { sigma: 2.0, k: 0.04, quality: 1e-4, radius: 4, features: 1000, balance: 8 }
+        Self {
+            window: Window::Gaussian,
+            sigma: 2.0,
+            k: 0.04,
+            quality: 1e-4,
+            radius: 4,
+            features: 1000,
+            selection: Selection::Balanced,
+            cells: 8,
+        }
     }
 }
 
@@ -51,113 +67,26 @@ impl Component for Harris {
         "Harris and Stephens, A combined corner and edge detector, Alvey Vision Conference, 1988";
 
     fn check(&self) -> Result<(), String> {
-        let Self { sigma, k, quality, radius: _, features, balance: _ } = *self;
+        let Self { window: _, sigma, k, quality, radius: _, features, selection: _, cells } = *self;
         in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
         // From k = 1/4 on no response is positive.
         in_range((0.0..0.25).contains(&k), "k", k, "a number from 0 to below 0.25")?;
         in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
-        in_range(features > 0, "features", features, "at least 1")
+        in_range(features > 0, "features", features, "at least 1")?;
+        in_range(cells > 0, "cells", cells, "at least 1")
     }
 }
 
 impl Detector for Harris {
-    fn detect_into(&self, image: &Image, _: &mut Workspace, corners: &mut Vec<Keypoint>) {
-        let response = self.response(image);
-        let strongest = response.iter().copied().fold(0.0_f32, f32::max);
-        let least = (f64::from(strongest) * self.quality) as f32;
-        let mut found = peaks::maxima(&response, image.width(), least, self.radius);
-        peaks::strongest(&mut found, [image.width(), image.height()], self.features, self.balance);
-        corners.clear();
-        corners.extend(found.iter().map(|peak| Keypoint {
-            at: peaks::vertex(&response, image.width(), peak),
-            response: peak.response,
-            scale: self.sigma as f32,
-        }));
-    }
-}
-
-impl Harris {
-    /// R at every pixel; zero nearer to the border than the operator reaches.
-    fn response(&self, image: &Image) -> Vec<f32> {
-        let (width, height) = (image.width(), image.height());
-        // Checked before the kernel is built: its size is the user's.
-        if !(6.0 * self.sigma < width.min(height) as f64) {
-            return vec![0.0; width * height];
-        }
-        let kernel = half_kernel(self.sigma);
-        let reach = kernel.len() - 1;
-        let margin = reach + 1;
-        let mut response = vec![0.0; width * height];
-        if width <= 2 * margin || height <= 2 * margin {
-            return response;
-        }
-        // The tensor's rows, smoothed along x, of the last 2·reach + 1 rows; then smoothed along y.
-        // Indices of columns count from the first column that has a gradient, column 1.
-        let gradients = width - 2;
-        let inner = gradients - 2 * reach;
-        let rows = 2 * reach + 1;
-        let mut ring = vec![0.0; rows * 3 * inner];
-        let mut products = vec![0.0; 3 * gradients];
-        let mut tensor = vec![0.0; 3 * inner];
-        let k = self.k as f32;
-        for y in 1..height - 1 {
-            let (xx, rest) = products.split_at_mut(gradients);
-            let (xy, yy) = rest.split_at_mut(gradients);
-            tensor_row(image, y, xx, xy, yy);
-            let slot = &mut ring[(y % rows) * 3 * inner..][..3 * inner];
-            for (smooth, product) in slot.chunks_exact_mut(inner).zip(products.chunks_exact(gradients)) {
-                weigh(smooth, &product[reach..], kernel[0]);
-                for (step, &weight) in kernel.iter().enumerate().skip(1) {
-                    add_pair(smooth, &product[reach - step..], &product[reach + step..], weight);
-                }
-            }
-            let Some(centre) = y.checked_sub(reach).filter(|&centre| centre > reach) else { continue };
-            let row = |y: usize| &ring[(y % rows) * 3 * inner..][..3 * inner];
-            weigh(&mut tensor, row(centre), kernel[0]);
-            for (step, &weight) in kernel.iter().enumerate().skip(1) {
-                add_pair(&mut tensor, row(centre - step), row(centre + step), weight);
-            }
-            let (xx, rest) = tensor.split_at(inner);
-            let (xy, yy) = rest.split_at(inner);
-            let out = &mut response[centre * width + margin..][..inner];
-            for (((out, &xx), &xy), &yy) in out.iter_mut().zip(xx).zip(xy).zip(yy) {
-                let trace = xx + yy;
-                *out = (xx * yy - xy * xy) - k * (trace * trace);
-            }
-        }
-        response
-    }
-}
-
-/// The products gx gx, gx gy, gy gy of row `y`, without its first and last column.
-fn tensor_row(image: &Image, y: usize, xx: &mut [f32], xy: &mut [f32], yy: &mut [f32]) {
-    let n = xx.len();
-    let (above, here, below) = (image.row(y - 1), image.row(y), image.row(y + 1));
-    // Sobel's operator sums eight differences of one pixel.
-    const EIGHTH: f32 = 0.125;
-    let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..]];
-    let [h0, h2] = [&here[..n], &here[2..]];
-    let [b0, b1, b2] = [&below[..n], &below[1..=n], &below[2..]];
-    for x in 0..n {
-        let gx = (((a2[x] - a0[x]) + (b2[x] - b0[x])) + 2.0 * (h2[x] - h0[x])) * EIGHTH;
-        let gy = (((b0[x] - a0[x]) + (b2[x] - a2[x])) + 2.0 * (b1[x] - a1[x])) * EIGHTH;
-        xx[x] = gx * gx;
-        xy[x] = gx * gy;
-        yy[x] = gy * gy;
-    }
-}
-
-/// out = weight · a.
-fn weigh(out: &mut [f32], a: &[f32], weight: f32) {
-    for (out, &a) in out.iter_mut().zip(a) {
-        *out = weight * a;
-    }
-}
-
-/// out += weight · (a + b): both sides of a symmetric kernel at once.
-fn add_pair(out: &mut [f32], a: &[f32], b: &[f32], weight: f32) {
-    for ((out, &a), &b) in out.iter_mut().zip(a).zip(b) {
-        *out += weight * (a + b);
+    fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {
+        let measure = Measure::Harris { k: self.k as f32 };
+        let corners = Corners {
+            tensor: Tensor { window: self.window, sigma: self.sigma, measure },
+            quality: self.quality,
+            radius: self.radius,
+            budget: Budget { features: self.features, selection: self.selection, cells: self.cells },
+        };
+        corners.find(image, work, found);
     }
 }
 
@@ -221,7 +150,7 @@ mod tests {
 
     #[test]
     fn images_without_structure_have_no_corner() {
-        let vast = Harris { sigma: 1e300, radius: usize::MAX, balance: usize::MAX, ..Harris::default() };
+        let vast = Harris { sigma: 1e300, radius: usize::MAX, cells: usize::MAX, ..Harris::default() };
         assert!(vast.detect(&texture(60, 50)).is_empty());
         for (width, height) in [(1, 1), (2, 2), (1, 50), (64, 48), (300, 3)] {
             let flat = Image::new(width, height, vec![128.0; width * height]).unwrap();
@@ -254,7 +183,7 @@ mod tests {
             Image::new(80, 60, pixels).unwrap()
         };
         // No relative threshold: the strongest corner of one crop may be outside the other.
-        let harris = Harris { quality: 0.0, balance: 0, ..Harris::default() };
+        let harris = Harris { quality: 0.0, selection: Selection::Strongest, ..Harris::default() };
         let (a, b) = (harris.detect(&crop(10, 10)), harris.detect(&crop(15, 17)));
         let mut compared = 0;
         for point in &a {
@@ -281,7 +210,7 @@ mod tests {
         let all = Harris { features: usize::MAX, ..Harris::default() }.detect(&image);
         assert!(all.len() > 100);
         assert!(all.windows(2).all(|w| w[0].response >= w[1].response));
-        let some = Harris { features: 30, balance: 0, ..Harris::default() }.detect(&image);
+        let some = Harris { features: 30, selection: Selection::Strongest, ..Harris::default() }.detect(&image);
         assert_eq!(some, all[..30]);
         assert!(Harris { features: 0, ..Harris::default() }.detect(&image).is_empty());
     }

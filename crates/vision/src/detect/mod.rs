@@ -1,11 +1,18 @@
 //! Detectors: where in an image there is something to find again.
 
+mod corners;
 mod harris;
 mod peaks;
+mod select;
+mod shi_tomasi;
+mod tensor;
 
 pub use harris::Harris;
 use seafix_component::{Registry, entry};
 use seafix_geometry::Pixel;
+pub use select::Selection;
+pub use shi_tomasi::ShiTomasi;
+pub use tensor::Window;
 
 use crate::{Image, Workspace};
 
@@ -34,4 +41,4 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
 }
 
 /// All detectors.
-pub static DETECTORS: Registry<dyn Detector> = Registry::new("detector", &[entry!(Harris)]);
+pub static DETECTORS: Registry<dyn Detector> = Registry::new("detector", &[entry!(Harris), entry!(ShiTomasi)]);

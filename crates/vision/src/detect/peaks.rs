@@ -1,119 +1,187 @@
-//! Maxima of a response over an image: which, how many, and where to a fraction of a pixel.
+//! Maxima of a response over an image: which, and where to a fraction of a pixel.
 
+use multiversion::multiversion;
 use seafix_geometry::Pixel;
 
-/// A pixel whose response is the greatest around.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Peak {
-    pub(super) x: usize,
-    pub(super) y: usize,
-    pub(super) response: f32,
+use super::Keypoint;
+use crate::Threads;
+
+/// Which maxima count.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Peaks {
+    /// The least response.
+    pub(super) least: f32,
+    /// No other within this distance is greater (px).
+    pub(super) radius: usize,
 }
 
-/// The pixels with a positive response of at least `least` that none within `radius` px exceeds,
-/// row by row; of equal ones within the radius the first counts. Never at the border of the image.
-pub(super) fn maxima(response: &[f32], width: usize, least: f32, radius: usize) -> Vec<Peak> {
-    let height = response.len() / width;
-    let mut found = Vec::new();
-    for y in 1..height.saturating_sub(1) {
-        let row = |y: usize| &response[y * width..][..width];
-        let (above, here, below) = (row(y - 1), row(y), row(y + 1));
-        for x in 1..width.saturating_sub(1) {
-            let r = here[x];
-            if r >= least
-                && r > 0.0
-                && r > here[x - 1]
-                && r >= here[x + 1]
-                && r > above[x - 1].max(above[x]).max(above[x + 1])
-                && r >= below[x - 1].max(below[x]).max(below[x + 1])
-                && is_greatest(response, width, x, y, radius)
-            {
-                found.push(Peak { x, y, response: r });
+/// What the search for maxima keeps in mind while it works.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    bands: Vec<Band>,
+    /// How far the disc reaches sideways in its middle row, the next, and so on (px).
+    chords: Vec<usize>,
+}
+
+#[derive(Debug, Default)]
+struct Band {
+    marks: Vec<u8>,
+    found: Vec<Keypoint>,
+}
+
+impl Peaks {
+    /// Replaces `found` by the pixels with a positive response of at least `least` that none within the
+    /// radius exceeds, row by row; of equal ones within the radius the first counts. Never at the border
+    /// of the image.
+    pub(super) fn find(
+        &self,
+        response: &[f32],
+        width: usize,
+        threads: Threads,
+        scratch: &mut Scratch,
+        found: &mut Vec<Keypoint>,
+    ) {
+        let height = response.len() / width;
+        found.clear();
+        if width < 3 || height < 3 {
+            return;
+        }
+        let Scratch { bands, chords } = scratch;
+        let radius = self.radius.min(width.max(height));
+        chords.clear();
+        chords.extend((0..=radius).map(|dy| (radius * radius - dy * dy).isqrt()));
+        let least = self.least.max(f32::from_bits(1));
+        let rows = threads.rows_a_band(height - 2);
+        let count = (height - 2).div_ceil(rows);
+        bands.resize_with(count.max(bands.len()), Band::default);
+        threads.pieces(&mut bands[..count], 1, &mut Vec::<()>::new(), |index, band, ()| {
+            let Band { marks, found } = &mut band[0];
+            marks.resize(width, 0);
+            found.clear();
+            for y in 1 + index * rows..(1 + (index + 1) * rows).min(height - 1) {
+                let row = |y: usize| &response[y * width..][..width];
+                mark(row(y - 1), row(y), row(y + 1), least, &mut marks[1..width - 1]);
+                each(marks, |x| {
+                    if is_greatest(response, width, [x, y], chords) {
+                        let at = Pixel { u: x as f64, v: y as f64 };
+                        found.push(Keypoint { at, response: response[y * width + x], scale: 0.0 });
+                    }
+                });
             }
+        });
+        bands[..count].iter().for_each(|band| found.extend_from_slice(&band.found));
+    }
+}
+
+/// Marks by 1 the inner pixels of a row that are at least `least` and greatest of their nine; of equals
+/// the first.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn mark(above: &[f32], here: &[f32], below: &[f32], least: f32, marks: &mut [u8]) {
+    mark_in_any_lanes(above, here, below, least, marks);
+}
+
+#[inline(always)]
+fn mark_in_any_lanes(above: &[f32], here: &[f32], below: &[f32], least: f32, marks: &mut [u8]) {
+    let n = marks.len();
+    let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..n + 2]];
+    let [h0, h1, h2] = [&here[..n], &here[1..=n], &here[2..n + 2]];
+    let [b0, b1, b2] = [&below[..n], &below[1..=n], &below[2..n + 2]];
+    // Not f32::max: this one is a single instruction.
+    let max = |a: f32, b: f32| if a > b { a } else { b };
+    for x in 0..n {
+        let r = h1[x];
+        let before = max(max(a0[x], a1[x]), max(a2[x], h0[x]));
+        let after = max(max(b0[x], b1[x]), max(b2[x], h2[x]));
+        marks[x] = u8::from((r >= least) & (r > before) & (r >= after));
+    }
+}
+
+/// Calls `visit` with the index of every byte that is 1; the others are 0.
+fn each(marks: &[u8], mut visit: impl FnMut(usize)) {
+    let (words, rest) = marks.as_chunks::<8>();
+    for (index, word) in words.iter().enumerate() {
+        let mut bits = u64::from_le_bytes(*word);
+        while bits != 0 {
+            visit(8 * index + bits.trailing_zeros() as usize / 8);
+            bits &= bits - 1;
         }
     }
-    found
+    let done = 8 * words.len();
+    rest.iter().enumerate().filter(|(_, mark)| **mark != 0).for_each(|(index, _)| visit(done + index));
 }
 
 /// Whether no pixel of the disc around (x, y) exceeds it, and no earlier one equals it.
-fn is_greatest(response: &[f32], width: usize, x: usize, y: usize, radius: usize) -> bool {
+fn is_greatest(response: &[f32], width: usize, [x, y]: [usize; 2], chords: &[usize]) -> bool {
     let height = response.len() / width;
     let r = response[y * width + x];
-    let radius = radius.min(width.max(height));
-    let squared = radius * radius;
-    (y.saturating_sub(radius)..=(y + radius).min(height - 1)).all(|other_y| {
-        let dy = other_y.abs_diff(y);
-        (x.saturating_sub(radius)..=(x + radius).min(width - 1)).all(|other_x| {
-            let dx = other_x.abs_diff(x);
-            let other = response[other_y * width + other_x];
-            let earlier = (other_y, other_x) < (y, x);
-            dx * dx + dy * dy > squared || if earlier { other < r } else { other <= r }
-        })
+    let row = |y: usize, chord: usize| {
+        let row = &response[y * width..][..width];
+        (&row[x.saturating_sub(chord)..x], &row[x..(x + chord + 1).min(width)])
+    };
+    let below = |others: &[f32]| others.iter().all(|&other| other < r);
+    let at_most = |others: &[f32]| others.iter().all(|&other| other <= r);
+    // The nearest rows first: they are the likeliest to hold a greater one.
+    chords.iter().enumerate().all(|(dy, &chord)| {
+        if dy == 0 {
+            let (left, right) = row(y, chord);
+            return below(left) && at_most(right);
+        }
+        let up = y.checked_sub(dy).map(|y| row(y, chord));
+        let down = Some(y + dy).filter(|&y| y < height).map(|y| row(y, chord));
+        up.is_none_or(|(left, right)| below(left) && below(right))
+            && down.is_none_or(|(left, right)| at_most(left) && at_most(right))
     })
 }
 
-/// Keeps at most `budget` peaks and puts the strongest first. With `balance` > 0 the image is cut into
-/// square cells, `balance` along its longer side, and every cell gives its strongest before any gives
-/// its second.
-pub(super) fn strongest(peaks: &mut Vec<Peak>, [width, height]: [usize; 2], budget: usize, balance: usize) {
-    let stronger = |a: &Peak, b: &Peak| b.response.total_cmp(&a.response).then((a.y, a.x).cmp(&(b.y, b.x)));
-    peaks.sort_unstable_by(stronger);
-    if peaks.len() <= budget {
-        return;
-    }
-    if balance > 0 {
-        let longer = width.max(height);
-        let balance = balance.min(longer);
-        let cell = |x: usize| x * balance / longer;
-        let columns = cell(width - 1) + 1;
-        let mut taken = vec![0_usize; columns * (cell(height - 1) + 1)];
-        let mut ranked: Vec<(usize, Peak)> = peaks
-            .iter()
-            .map(|peak| {
-                let rank = &mut taken[cell(peak.y) * columns + cell(peak.x)];
-                *rank += 1;
-                (*rank, *peak)
-            })
-            .collect();
-        ranked.sort_by_key(|(rank, _)| *rank); // stable: within a rank the strongest stay first
-        peaks.clear();
-        peaks.extend(ranked.into_iter().take(budget).map(|(_, peak)| peak));
-        peaks.sort_unstable_by(stronger);
-    }
-    peaks.truncate(budget);
-}
-
-/// The vertex of the quadratic through the peak and its eight neighbours (px), never more than a pixel
-/// from the peak; the peak itself where the nine describe no maximum.
+/// The vertex of the quadratic through the nine values around a pixel (px from that pixel), row by row,
+/// never more than a pixel away; the pixel itself where the nine describe no maximum.
 ///
 /// Newton's step −H⁻¹ g with the derivatives by central differences.
-pub(super) fn vertex(response: &[f32], width: usize, peak: &Peak) -> Pixel {
-    let at = |dx: isize, dy: isize| {
-        let x = peak.x.wrapping_add_signed(dx);
-        let y = peak.y.wrapping_add_signed(dy);
-        f64::from(response[y * width + x])
-    };
-    let centre = at(0, 0);
-    let gx = 0.5 * (at(1, 0) - at(-1, 0));
-    let gy = 0.5 * (at(0, 1) - at(0, -1));
-    let xx = at(1, 0) + at(-1, 0) - 2.0 * centre;
-    let yy = at(0, 1) + at(0, -1) - 2.0 * centre;
-    let xy = 0.25 * ((at(1, 1) + at(-1, -1)) - (at(1, -1) + at(-1, 1)));
+pub(super) fn vertex(nine: [[f32; 3]; 3]) -> [f64; 2] {
+    let [[nw, n, ne], [w, centre, e], [sw, s, se]] = nine.map(|row| row.map(f64::from));
+    let gx = 0.5 * (e - w);
+    let gy = 0.5 * (s - n);
+    let xx = e + w - 2.0 * centre;
+    let yy = s + n - 2.0 * centre;
+    let xy = 0.25 * ((se + nw) - (ne + sw));
     let determinant = xx * yy - xy * xy;
-    let (mut dx, mut dy) = (0.0, 0.0);
     if determinant > 0.0 && xx < 0.0 {
-        dx = (xy * gy - yy * gx) / determinant;
-        dy = (xy * gx - xx * gy) / determinant;
-        if !(dx.abs() <= 1.0 && dy.abs() <= 1.0) {
-            (dx, dy) = (0.0, 0.0);
+        let dx = (xy * gy - yy * gx) / determinant;
+        let dy = (xy * gx - xx * gy) / determinant;
+        if dx.abs() <= 1.0 && dy.abs() <= 1.0 {
+            return [dx, dy];
         }
     }
-    Pixel { u: peak.x as f64 + dx, v: peak.y as f64 + dy }
+    [0.0, 0.0]
+}
+
+/// Moves a point at an inner pixel to the vertex around it.
+pub(super) fn to_vertex(point: &mut Keypoint, response: &[f32], width: usize) {
+    let (x, y) = (point.at.u as usize, point.at.v as usize);
+    let row = |y: usize| std::array::from_fn(|i| response[y * width + x - 1 + i]);
+    let [dx, dy] = vertex([row(y - 1), row(y), row(y + 1)]);
+    point.at.u += dx;
+    point.at.v += dy;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn maxima(response: &[f32], width: usize, least: f32, radius: usize, threads: Threads) -> Vec<Keypoint> {
+        let mut found = Vec::new();
+        Peaks { least, radius }.find(response, width, threads, &mut Scratch::default(), &mut found);
+        found
+    }
+
+    /// Plateaus and noise, reproducible.
+    fn rough(n: usize, levels: u32) -> Vec<f32> {
+        let hash = |i: usize| {
+            let h = (i as u32).wrapping_mul(0x9E37_79B1);
+            (h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 8
+        };
+        (0..n).map(|i| (hash(i) % levels) as f32 - 3.0).collect()
+    }
 
     #[test]
     fn a_quadratic_has_its_vertex_where_it_is() {
@@ -123,32 +191,58 @@ mod tests {
             10.0 - 2.0 * x * x - y * y - x * y
         };
         let response: Vec<f32> = (0..20).map(value).collect();
-        let found = maxima(&response, 5, 0.0, 2);
+        let mut found = maxima(&response, 5, 0.0, 2, Threads::One);
         assert_eq!(found.len(), 1);
-        let vertex = vertex(&response, 5, &found[0]);
-        assert!(vertex.distance(&Pixel { u: 2.3, v: 1.8 }) < 1e-5, "{vertex:?}");
+        to_vertex(&mut found[0], &response, 5);
+        assert!(found[0].at.distance(&Pixel { u: 2.3, v: 1.8 }) < 1e-5, "{found:?}");
     }
 
     #[test]
-    fn of_equal_neighbours_the_first_counts_and_the_vertex_is_between() {
+    fn of_equal_neighbours_the_first_counts() {
         let mut response = vec![0.0; 36];
         for i in [14, 15, 20, 21] {
             response[i] = 4.0;
         }
-        let found = maxima(&response, 6, 0.0, 3);
-        assert_eq!(found, [Peak { x: 2, y: 2, response: 4.0 }]);
+        let found = maxima(&response, 6, 0.0, 3, Threads::One);
+        assert_eq!(found, [Keypoint { at: Pixel { u: 2.0, v: 2.0 }, response: 4.0, scale: 0.0 }]);
     }
 
     #[test]
-    fn balance_spreads_the_budget() {
-        let peak = |x, response| Peak { x, y: 0, response };
-        let all = vec![peak(1, 9.0), peak(3, 8.0), peak(5, 7.0), peak(60, 1.0)];
-        let kept = |balance| {
-            let mut peaks = all.clone();
-            strongest(&mut peaks, [100, 10], 3, balance);
-            peaks.iter().map(|peak| peak.x).collect::<Vec<_>>()
-        };
-        assert_eq!(kept(0), [1, 3, 5]);
-        assert_eq!(kept(2), [1, 3, 60]);
+    fn they_are_those_that_the_definition_names() {
+        for (width, height, radius, levels) in
+            [(67, 41, 4, 1000), (50, 33, 1, 9), (40, 40, 7, 30), (3, 3, 2, 50), (90, 5, 0, 5)]
+        {
+            let response = rough(width * height, levels);
+            let greatest = |x: usize, y: usize| {
+                let r = response[y * width + x];
+                let mut others = (0..width * height).map(|i| (i % width, i / width));
+                others.all(|(ox, oy)| {
+                    let (dx, dy) = (ox.abs_diff(x), oy.abs_diff(y));
+                    let near = dx * dx + dy * dy <= radius * radius || dx.max(dy) <= 1;
+                    let other = response[oy * width + ox];
+                    !near || if (oy, ox) < (y, x) { other < r } else { other <= r }
+                })
+            };
+            let inner = (0..width * height).map(|i| (i % width, i / width));
+            let expected: Vec<_> = inner
+                .filter(|&(x, y)| x > 0 && y > 0 && x < width - 1 && y < height - 1)
+                .filter(|&(x, y)| response[y * width + x] >= 2.0 && greatest(x, y))
+                .map(|(x, y)| Pixel { u: x as f64, v: y as f64 })
+                .collect();
+            for threads in [Threads::One, Threads::Pool] {
+                let found = maxima(&response, width, 2.0, radius, threads);
+                assert_eq!(found.iter().map(|point| point.at).collect::<Vec<_>>(), expected);
+            }
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_marks_the_same() {
+        let rows = rough(3 * 133, 20);
+        let (mut any, mut plain) = (vec![0; 131], vec![0; 131]);
+        let [above, here, below] = [0, 1, 2].map(|y| &rows[133 * y..][..133]);
+        mark(above, here, below, 1.0, &mut any);
+        mark_in_any_lanes(above, here, below, 1.0, &mut plain);
+        assert_eq!(any, plain);
     }
 }

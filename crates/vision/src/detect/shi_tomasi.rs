@@ -1,0 +1,109 @@
+//! Shi and Tomasi's corner detector.
+
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Detector, Keypoint, Selection, Window,
+    corners::Corners,
+    select::Budget,
+    tensor::{Measure, Tensor},
+};
+use crate::{Image, Workspace};
+
+/// Good features to track: places whose displacement is well determined in every direction.
+///
+/// The response is the smaller eigenvalue of the structure tensor A = w ∗ g gᵀ (grey levels²/px²) of
+/// [`Harris`](super::Harris), the information that the window holds on the worse determined direction.
+/// It has no constant to choose.
+///
+/// Nothing is found nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; an image
+/// too small for that has no corner.
+///
+/// Source: Shi and Tomasi, *Good features to track*, CVPR 1994.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ShiTomasi {
+    /// The weights that integrate the structure tensor.
+    pub window: Window,
+    /// Standard deviation of the window (px).
+    pub sigma: f64,
+    /// The weakest response worth keeping, relative to the strongest of the image. The response goes
+    /// with the square of contrast: 0.01 keeps a tenth of the strongest contrast.
+    pub quality: f64,
+    /// No corner has a stronger one within this distance (px).
+    pub radius: usize,
+    /// At most so many corners.
+    pub features: usize,
+    /// Which, when there are more.
+    pub selection: Selection,
+    /// Cells along the longer side of the image over which a balanced selection spreads the corners.
+    pub cells: usize,
+}
+
+impl Default for ShiTomasi {
+    fn default() -> Self {
+        Self {
+            window: Window::Gaussian,
+            sigma: 2.0,
+            quality: 0.01,
+            radius: 4,
+            features: 1000,
+            selection: Selection::Balanced,
+            cells: 8,
+        }
+    }
+}
+
+impl Component for ShiTomasi {
+    const NAME: &'static str = "shi-tomasi";
+    const SUMMARY: &'static str = "corners by the smaller eigenvalue of the structure tensor, spread over the image";
+    const SOURCE: &'static str = "Shi and Tomasi, Good features to track, CVPR 1994";
+
+    fn check(&self) -> Result<(), String> {
+        let Self { window: _, sigma, quality, radius: _, features, selection: _, cells } = *self;
+        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
+        in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
+        in_range(features > 0, "features", features, "at least 1")?;
+        in_range(cells > 0, "cells", cells, "at least 1")
+    }
+}
+
+impl Detector for ShiTomasi {
+    fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {
+        let corners = Corners {
+            tensor: Tensor { window: self.window, sigma: self.sigma, measure: Measure::LeastEigenvalue },
+            quality: self.quality,
+            radius: self.radius,
+            budget: Budget { features: self.features, selection: self.selection, cells: self.cells },
+        };
+        corners.find(image, work, found);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `contrast` grey levels between the quarters of a chessboard's crossing at (20, 20).
+    fn crossing(contrast: f32) -> Image {
+        let side = |i: usize| (i as f32 - 20.0).clamp(-0.5, 0.5);
+        let pixel = |i: usize| 128.0 + 2.0 * contrast * side(i % 41) * side(i / 41);
+        Image::new(41, 41, (0..41 * 41).map(pixel).collect()).unwrap()
+    }
+
+    #[test]
+    fn the_response_goes_with_the_square_of_contrast() {
+        let of = |contrast| ShiTomasi::default().detect(&crossing(contrast));
+        let (one, two) = (of(32.0), of(64.0));
+        assert_eq!((one.len(), two.len()), (1, 1));
+        assert_eq!(two[0].response, 4.0 * one[0].response);
+        assert!((one[0].at.u - 20.0).abs() < 1e-6 && (one[0].at.v - 20.0).abs() < 1e-6, "{one:?}");
+    }
+
+    #[test]
+    fn an_edge_is_no_corner() {
+        let edge = Image::new(40, 40, (0..1600).map(|i| if i % 40 < 20 { 20.0 } else { 220.0 }).collect()).unwrap();
+        assert_eq!(ShiTomasi::default().detect(&edge), []);
+    }
+}

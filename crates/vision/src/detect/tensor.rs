@@ -1,0 +1,366 @@
+//! The structure tensor, streamed: from an image to a response at every pixel.
+
+use multiversion::multiversion;
+use serde::{Deserialize, Serialize};
+
+use crate::{Image, Threads, gaussian::half_kernel};
+
+/// The weights that integrate the structure tensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Window {
+    /// A Gaussian, cut off at 3σ: the same in every direction.
+    #[default]
+    Gaussian,
+    /// A square of equal weights and the same variance, σ² = (n² − 1)/12 for n pixels. Of whole grey
+    /// levels the sums are exact, and a quarter turn of the image turns the response to the last bit.
+    Box,
+}
+
+/// What a structure tensor A says of its pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Measure {
+    /// det A − k (tr A)², Harris and Stephens (grey levels⁴/px⁴).
+    Harris { k: f32 },
+    /// The smaller eigenvalue, Shi and Tomasi (grey levels²/px²).
+    LeastEigenvalue,
+}
+
+/// A = w ∗ g gᵀ, the gradient g by Sobel's operator (grey levels/px).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tensor {
+    pub(super) window: Window,
+    /// Standard deviation of the window (px).
+    pub(super) sigma: f64,
+    pub(super) measure: Measure,
+}
+
+/// What the response keeps between frames.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    weights: Option<Weights>,
+    bands: Vec<Band>,
+}
+
+/// The weights of a window along one axis.
+#[derive(Debug)]
+struct Weights {
+    of: (Window, f64),
+    /// Of the centre, and of each step away from it.
+    half: Vec<f32>,
+    /// What both axes together have to be scaled by.
+    scale: f32,
+}
+
+/// The memory of one band of rows, and the strongest response in it.
+#[derive(Debug, Default)]
+struct Band {
+    /// gx gx, gx gy, gy gy of one row of a strip, with what the window needs on either side.
+    products: [Vec<f32>; 3],
+    /// The three, smoothed along x, of as many rows as the window is high.
+    ring: Vec<Planes>,
+    strongest: f32,
+}
+
+/// Columns of a strip: what a window needs of one stays in the first-level cache.
+const STRIP: usize = 128;
+/// xx, xy, yy of the columns of a strip.
+type Planes = [f32; 3 * STRIP];
+
+impl Weights {
+    fn new(window: Window, sigma: f64) -> Self {
+        let of = (window, sigma);
+        match window {
+            Window::Gaussian => Self { of, half: half_kernel(sigma), scale: 1.0 },
+            Window::Box => {
+                let reach = libm::round(((12.0 * sigma * sigma + 1.0).sqrt() - 1.0) / 2.0) as usize;
+                let n = 2 * reach + 1;
+                Self { of, half: vec![1.0; reach + 1], scale: 1.0 / (n * n) as f32 }
+            }
+        }
+    }
+
+    fn reach(&self) -> usize {
+        self.half.len() - 1
+    }
+}
+
+impl Tensor {
+    /// Fills `response` for every pixel, zero nearer to the border than the operator reaches, and
+    /// returns the greatest. An image too small for the operator has no response.
+    pub(super) fn response_into(
+        &self,
+        image: &Image,
+        threads: Threads,
+        scratch: &mut Scratch,
+        response: &mut Vec<f32>,
+    ) -> f32 {
+        let (width, height) = (image.width(), image.height());
+        response.resize(width * height, 0.0);
+        // Checked before the weights are made: their number is the user's.
+        if !(2.0 * self.sigma < width.min(height) as f64) {
+            response.fill(0.0);
+            return 0.0;
+        }
+        let Scratch { weights, bands } = scratch;
+        let weights = match weights {
+            Some(weights) if weights.of == (self.window, self.sigma) => weights,
+            other => other.insert(Weights::new(self.window, self.sigma)),
+        };
+        let margin = weights.reach() + 1;
+        if width.min(height) <= 2 * margin {
+            response.fill(0.0);
+            return 0.0;
+        }
+        let rows = threads.rows_a_band(height);
+        threads.pieces(response, rows * width, bands, |index, out, band: &mut Band| {
+            self.fill(image, index * rows, out, weights, band);
+        });
+        bands[..height.div_ceil(rows)].iter().map(|band| band.strongest).fold(0.0, f32::max)
+    }
+
+    /// Fills a band of whole rows, the first of which is row `first` of the image.
+    fn fill(&self, image: &Image, first: usize, out: &mut [f32], weights: &Weights, band: &mut Band) {
+        let (width, height) = (image.width(), image.height());
+        let margin = weights.reach() + 1;
+        let end = first + out.len() / width;
+        for (y, row) in (first..).zip(out.chunks_exact_mut(width)) {
+            if y < margin || y >= height - margin {
+                row.fill(0.0);
+            } else {
+                row[..margin].fill(0.0);
+                row[width - margin..].fill(0.0);
+            }
+        }
+        band.products.iter_mut().for_each(|plane| plane.resize(STRIP + 2 * weights.reach(), 0.0));
+        band.ring.resize(2 * weights.reach() + 1, [0.0; 3 * STRIP]);
+        band.strongest = 0.0;
+        let rows = first.max(margin)..end.min(height - margin);
+        let whole = Part { image, weights, measure: self.measure, first, rows, columns: 0..0 };
+        for left in (margin..width - margin).step_by(STRIP) {
+            let columns = left..(left + STRIP).min(width - margin);
+            strip(&Part { columns, ..whole.clone() }, out, band);
+        }
+    }
+}
+
+/// A rectangle of the image, at most a strip wide, that the operator does not leave.
+#[derive(Clone)]
+struct Part<'a> {
+    image: &'a Image,
+    weights: &'a Weights,
+    measure: Measure,
+    /// The image's row that is the first of the band.
+    first: usize,
+    rows: std::ops::Range<usize>,
+    columns: std::ops::Range<usize>,
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn strip(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
+    strip_in_any_lanes(part, out, band);
+}
+
+/// The response of one part, row by row: products of gradients, smoothed along x into the ring; when the
+/// ring holds all rows of a window they are smoothed along y.
+///
+/// Smoothing works on whole strips; what lies beyond a narrower part is computed and never read.
+#[inline(always)]
+fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
+    let Part { image, weights, measure, first, rows, columns } = part;
+    let (reach, half) = (weights.reach(), weights.half.as_slice());
+    let Band { products, ring, strongest } = band;
+    let size = ring.len();
+    let count = columns.len();
+    let mut tensor: Planes = [0.0; 3 * STRIP];
+    let mut greatest = [0.0_f32; STRIP];
+    for y in rows.start.saturating_sub(reach)..rows.end + reach {
+        let row = |y: usize| &image.row(y)[columns.start - reach - 1..columns.end + reach + 1];
+        gradient_products([row(y - 1), row(y), row(y + 1)], products);
+        for (smooth, product) in ring[y % size].as_chunks_mut::<STRIP>().0.iter_mut().zip(products.iter()) {
+            let at = |i: usize| product[i..].first_chunk::<STRIP>().expect("as long as a strip and its window");
+            smooth_symmetric(smooth, half, at(reach), |step| [at(reach - step), at(reach + step)]);
+        }
+        if y < rows.start + reach {
+            continue;
+        }
+        let centre = y - reach;
+        let at = |y: usize| &ring[y % size];
+        smooth_symmetric(&mut tensor, half, at(centre), |step| [at(centre - step), at(centre + step)]);
+        let out = &mut out[(centre - first) * image.width() + columns.start..][..count];
+        let [xx, xy, yy] = [0, 1, 2].map(|plane| &tensor[plane * STRIP..][..count]);
+        let greatest = &mut greatest[..count];
+        for x in 0..count {
+            let [xx, xy, yy] = [xx[x], xy[x], yy[x]].map(|sum| sum * weights.scale);
+            let r = match *measure {
+                Measure::Harris { k } => {
+                    let trace = xx + yy;
+                    (xx * yy - xy * xy) - k * (trace * trace)
+                }
+                Measure::LeastEigenvalue => {
+                    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+                    mean - (half * half + xy * xy).sqrt()
+                }
+            };
+            out[x] = r;
+            greatest[x] = if r > greatest[x] { r } else { greatest[x] };
+        }
+    }
+    *strongest = greatest.iter().copied().fold(*strongest, f32::max);
+}
+
+/// gx gx, gx gy, gy gy of a row, without its first and last column.
+#[inline(always)]
+fn gradient_products([above, here, below]: [&[f32]; 3], [xx, xy, yy]: &mut [Vec<f32>; 3]) {
+    let n = here.len() - 2;
+    // Sobel's operator sums eight differences of one pixel.
+    const EIGHTH: f32 = 0.125;
+    let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..n + 2]];
+    let [h0, h2] = [&here[..n], &here[2..n + 2]];
+    let [b0, b1, b2] = [&below[..n], &below[1..=n], &below[2..n + 2]];
+    let (xx, xy, yy) = (&mut xx[..n], &mut xy[..n], &mut yy[..n]);
+    for x in 0..n {
+        let gx = (((a2[x] - a0[x]) + (b2[x] - b0[x])) + 2.0 * (h2[x] - h0[x])) * EIGHTH;
+        let gy = (((b0[x] - a0[x]) + (b2[x] - a2[x])) + 2.0 * (b1[x] - a1[x])) * EIGHTH;
+        xx[x] = gx * gx;
+        xy[x] = gx * gy;
+        yy[x] = gy * gy;
+    }
+}
+
+/// out = half[0] · centre + Σ half[step] · (a + b), with the pair a, b at each step from the centre:
+/// both sides of a symmetric kernel at once. The sum runs in the order of the steps.
+#[inline(always)]
+fn smooth_symmetric<'a, const N: usize>(
+    out: &mut [f32; N],
+    half: &[f32],
+    centre: &[f32; N],
+    pair: impl Fn(usize) -> [&'a [f32; N]; 2],
+) {
+    // Several steps at a time: fewer passes over `out`.
+    let (groups, rest) = half[1..].as_chunks::<3>();
+    if groups.is_empty() {
+        for i in 0..N {
+            out[i] = half[0] * centre[i];
+        }
+    }
+    for (index, &[u, v, w]) in groups.iter().enumerate() {
+        let step = 1 + 3 * index;
+        let [[a, b], [c, d], [e, f]] = [pair(step), pair(step + 1), pair(step + 2)];
+        if index == 0 {
+            for i in 0..N {
+                out[i] = ((half[0] * centre[i] + u * (a[i] + b[i])) + v * (c[i] + d[i])) + w * (e[i] + f[i]);
+            }
+        } else {
+            for i in 0..N {
+                out[i] = ((out[i] + u * (a[i] + b[i])) + v * (c[i] + d[i])) + w * (e[i] + f[i]);
+            }
+        }
+    }
+    for (index, &u) in rest.iter().enumerate() {
+        let [a, b] = pair(1 + 3 * groups.len() + index);
+        for i in 0..N {
+            out[i] += u * (a[i] + b[i]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rough(width: usize, height: usize) -> Image {
+        let value = |i: usize| {
+            let h = (i as u32).wrapping_mul(0x9E37_79B1);
+            ((h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 24) as f32
+        };
+        Image::new(width, height, (0..width * height).map(value).collect()).unwrap()
+    }
+
+    fn response(tensor: &Tensor, image: &Image, threads: Threads) -> (Vec<f32>, f32) {
+        let mut response = vec![7.0; 3];
+        let strongest = tensor.response_into(image, threads, &mut Scratch::default(), &mut response);
+        (response, strongest)
+    }
+
+    /// The response at a pixel as the definition has it, in f64.
+    fn by_definition(tensor: &Tensor, image: &Image, x: usize, y: usize) -> f64 {
+        let weights = Weights::new(tensor.window, tensor.sigma);
+        let reach = weights.reach() as isize;
+        let pixel = |x: isize, y: isize| f64::from(image.row(y as usize)[x as usize]);
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
+            let (x, y) = (x as isize + dx, y as isize + dy);
+            let side = |dx: isize| pixel(x + dx, y - 1) + 2.0 * pixel(x + dx, y) + pixel(x + dx, y + 1);
+            let end = |dy: isize| pixel(x - 1, y + dy) + 2.0 * pixel(x, y + dy) + pixel(x + 1, y + dy);
+            let (gx, gy) = ((side(1) - side(-1)) / 8.0, (end(1) - end(-1)) / 8.0);
+            let weight = |d: isize| f64::from(weights.half[d.unsigned_abs()]);
+            let weight = weight(dx) * weight(dy) * f64::from(weights.scale);
+            xx += weight * gx * gx;
+            xy += weight * gx * gy;
+            yy += weight * gy * gy;
+        }
+        match tensor.measure {
+            Measure::Harris { k } => (xx * yy - xy * xy) - f64::from(k) * (xx + yy) * (xx + yy),
+            Measure::LeastEigenvalue => 0.5 * (xx + yy) - (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt(),
+        }
+    }
+
+    const MEASURES: [Measure; 2] = [Measure::Harris { k: 0.04 }, Measure::LeastEigenvalue];
+
+    #[test]
+    fn it_is_the_definition_at_every_pixel_on_any_threads() {
+        for (window, sigma, reach) in [
+            (Window::Gaussian, 0.3, 1),
+            (Window::Gaussian, 1.0, 3),
+            (Window::Gaussian, 2.0, 6),
+            (Window::Box, 0.3, 0),
+            (Window::Box, 2.0, 3),
+        ] {
+            for (measure, (width, height)) in MEASURES.into_iter().zip([(163, 33), (31, 60)]) {
+                let (tensor, image) = (Tensor { window, sigma, measure }, rough(width, height));
+                let (found, strongest) = response(&tensor, &image, Threads::One);
+                let margin = reach + 1;
+                let inner = |at: usize, n: usize| at >= margin && at + margin < n;
+                for (i, &r) in found.iter().enumerate() {
+                    let (x, y) = (i % width, i / width);
+                    if inner(x, width) && inner(y, height) {
+                        let expected = by_definition(&tensor, &image, x, y);
+                        let size = if measure == Measure::LeastEigenvalue { 5e3 } else { 2.5e7 };
+                        assert!((f64::from(r) - expected).abs() < 2e-6 * size, "{tensor:?} {x} {y}: {r} {expected}");
+                    } else {
+                        assert_eq!(r, 0.0);
+                    }
+                }
+                assert_eq!(strongest, found.iter().copied().fold(0.0, f32::max));
+                assert_eq!((found, strongest), response(&tensor, &image, Threads::Pool));
+            }
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let image = rough(150, 40);
+        for (measure, window) in MEASURES.into_iter().zip([Window::Gaussian, Window::Box]) {
+            let weights = Weights::new(window, 1.5);
+            let run = |strip: fn(&Part<'_>, &mut [f32], &mut Band)| {
+                let mut out = vec![0.0; 150 * 40];
+                let products = [0; 3].map(|_| vec![0.0; STRIP + 2 * weights.reach()]);
+                let ring = vec![[0.0; 3 * STRIP]; 2 * weights.reach() + 1];
+                let mut band = Band { products, ring, strongest: 0.0 };
+                let part = Part { image: &image, weights: &weights, measure, first: 0, rows: 9..31, columns: 11..130 };
+                strip(&part, &mut out, &mut band);
+                out.iter().map(|r| r.to_bits()).collect::<Vec<_>>()
+            };
+            assert_eq!(run(strip), run(strip_in_any_lanes));
+        }
+    }
+
+    #[test]
+    fn the_box_has_the_variance_asked_for() {
+        for n in [1_usize, 3, 5, 7, 21] {
+            let sigma = ((n * n - 1) as f64 / 12.0).sqrt();
+            assert_eq!(Weights::new(Window::Box, sigma).reach(), n / 2);
+        }
+    }
+}
