@@ -1,0 +1,262 @@
+//! The stages, and what each asks of its peer.
+
+use seafix_component::{Choice, Registry};
+use seafix_geometry::{Pixel, StereoRig};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, Descriptors, FrontEnd, Image, Keypoint, Look, MATCHERS, Match, Matcher, Refine, Table,
+    Threads, Triangulator, View, Workspace,
+};
+use serde_json::{Value, json};
+
+use super::{
+    peer::{OPENCV, Peer, SURF, floats},
+    scene,
+};
+
+/// Points an image.
+pub(crate) const COUNT: usize = 1000;
+
+/// A stage of the front end.
+pub(crate) struct Stage<'a> {
+    pub(crate) name: &'static str,
+    /// The environment variable of the peer.
+    pub(crate) asks: &'static str,
+    /// What it is asked; null: it has nothing like it.
+    pub(crate) request: Value,
+    /// Our time over the peer's, at most.
+    pub(crate) at_most: Option<f64>,
+    /// Our time at most (ms).
+    pub(crate) at_most_ms: Option<f64>,
+    /// Ours.
+    pub(crate) ours: Box<dyn FnMut(Threads) + Send + 'a>,
+}
+
+/// Two images and what is found in them.
+pub(crate) struct Scene {
+    images: [Image; 2],
+    rig: StereoRig,
+    keypoints: [Vec<Keypoint>; 2],
+    /// Pairs a few tenths of a pixel beside the truth.
+    matches: Vec<Match>,
+    /// Descriptors of many more points: made, since their values do not matter to the time.
+    crowds: [[Descriptors; 2]; 2],
+}
+
+const CROWDS: [usize; 2] = [1000, 3000];
+
+/// The component, if it is listed with these settings.
+fn listed<T: ?Sized>(registry: &'static Registry<T>, choice: &Choice) -> Option<Box<T>> {
+    registry.build(choice).ok()
+}
+
+/// Runs with memory of its own for each way to share the work.
+fn with_memory<'a>(mut run: impl FnMut(&mut Workspace) + Send + 'a) -> Box<dyn FnMut(Threads) + Send + 'a> {
+    let mut memory = [Threads::One, Threads::Pool].map(Workspace::new);
+    Box::new(move |threads| run(&mut memory[usize::from(threads == Threads::Pool)]))
+}
+
+/// Unit vectors, no two alike.
+fn unit_vectors(count: usize, seed: u32) -> Vec<f32> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / 16_777_216.0 - 0.5
+    };
+    let rows = (0..count).flat_map(|_| {
+        let row: [f32; 64] = std::array::from_fn(|_| next());
+        let norm = row.iter().map(|x| x * x).sum::<f32>().sqrt();
+        row.map(|x| x / norm)
+    });
+    rows.collect()
+}
+
+impl Scene {
+    /// The images, known to the peers as `left` and `right`.
+    pub(crate) fn new(base: &Image, size: [usize; 2], peers: [&mut Option<Peer>; 2]) -> Self {
+        let images = scene::stereo(base, size, size[0] as f64 / 1024.0);
+        let rig = scene::rig(size);
+        let harris = Choice::named("harris").with("features", COUNT as i64);
+        let harris = DETECTORS.build(&harris).expect("a detector");
+        let keypoints = [0, 1].map(|i| harris.detect(&images[i]));
+        let right_from_left = scene::right_from_left(&rig);
+        let aside = |i: usize| [0.6, -0.4, 0.3, -0.7, 0.1][i % 5];
+        let there = keypoints[0].iter().map(|keypoint| scene::map(&right_from_left, keypoint.at));
+        let right = there.enumerate().map(|(i, p)| Pixel { u: p.u + aside(i), v: p.v + aside(i + 2) });
+        let matches = right.enumerate().map(|(left, right)| Match { left, right, distance: 0.0 }).collect();
+        let values = CROWDS.map(|count| [1, 2].map(|seed| unit_vectors(count, seed)));
+        for peer in peers.into_iter().flatten() {
+            peer.keep("left", &images[0]);
+            peer.keep("right", &images[1]);
+            for (count, pair) in CROWDS.iter().zip(&values) {
+                for (side, values) in ["a", "b"].iter().zip(pair) {
+                    peer.keep_table(&format!("{side}{count}"), *count, values);
+                }
+            }
+        }
+        let crowds = values.map(|pair| pair.map(|values| Descriptors::Numbers(Table::new(64, values))));
+        Self { images, rig, keypoints, matches, crowds }
+    }
+
+    /// All stages for which we have a component.
+    pub(crate) fn stages(&self) -> Vec<Stage<'_>> {
+        let mut stages = Vec::new();
+        stages.extend(self.detectors());
+        stages.extend(self.features());
+        stages.extend(self.given());
+        stages.extend(self.matchers());
+        stages.extend(self.refinement());
+        stages.extend(self.pairs());
+        stages
+    }
+
+    fn detectors(&self) -> Vec<Stage<'_>> {
+        let features = COUNT as i64;
+        let corners = |harris: bool| json!({"do": "corners", "image": "left", "count": COUNT, "harris": harris});
+        let named = |name: &str| Choice::named(name).with("features", features);
+        let list = [
+            ("Harris, NMS, top 1000", named("harris").with("balance", 0), corners(true), Some(0.4)),
+            ("Harris as it stands by default", named("harris"), corners(true), None),
+            ("Shi-Tomasi, NMS, top 1000", named("shi-tomasi"), corners(false), None),
+            ("FAST", named("fast"), json!({"do": "fast", "image": "left", "threshold": 20}), None),
+        ];
+        let stages = list.into_iter().filter_map(|(name, choice, request, at_most)| {
+            let detector = listed(&DETECTORS, &choice)?;
+            let mut found = Vec::new();
+            let ours = with_memory(move |work| detector.detect_into(&self.images[0], work, &mut found));
+            Some(Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours })
+        });
+        stages.collect()
+    }
+
+    /// Detected and described in one.
+    fn features(&self) -> Vec<Stage<'_>> {
+        let features = |kind: &str| json!({"do": "features", "image": "left", "kind": kind, "count": COUNT});
+        let surf = |upright: bool| {
+            let mut request = features("surf");
+            request["upright"] = upright.into();
+            request
+        };
+        let detect = |name: &str| Choice::named(name).with("features", COUNT as i64);
+        let own = Choice::named("surf").with("scale", 0.0);
+        let list = [
+            ("SURF upright, detect and describe", SURF, surf(true), "surf", own.clone(), Some(0.25)),
+            ("SURF rotated, detect and describe", SURF, surf(false), "surf", own.with("upright", false), Some(0.25)),
+            ("SIFT, detect and describe", OPENCV, features("sift"), "dog", Choice::named("sift"), None),
+            ("ORB, detect and describe", OPENCV, features("orb"), "fast", Choice::named("orb"), None),
+        ];
+        let stages = list.into_iter().filter_map(|(name, asks, request, detects, describes, at_most)| {
+            let (detector, descriptor) = (listed(&DETECTORS, &detect(detects))?, listed(&DESCRIPTORS, &describes)?);
+            let (mut found, mut described) = (Vec::new(), Descriptors::default());
+            let ours = with_memory(move |work| {
+                detector.detect_into(&self.images[0], work, &mut found);
+                descriptor.describe_into(&self.images[0], &found, work, &mut described);
+            });
+            Some(Stage { name, asks, request, at_most, at_most_ms: None, ours })
+        });
+        stages.collect()
+    }
+
+    /// Described at given corners.
+    fn given(&self) -> Vec<Stage<'_>> {
+        let rows = self.keypoints[0].iter().flat_map(|k| [k.at.u as f32, k.at.v as f32, 11.25, -1.0, 1.0]);
+        let rows: Vec<f32> = rows.collect();
+        let request = |upright: bool| {
+            let keypoints = floats(&[rows.len() / 5, 5], &rows);
+            json!({"do": "describe", "image": "left", "upright": upright, "keypoints": keypoints})
+        };
+        let list = [
+            ("SURF upright at 1000 corners", Choice::named("surf"), request(true), Some(0.5)),
+            ("SURF rotated at 1000 corners", Choice::named("surf").with("upright", false), request(false), None),
+        ];
+        let stages = list.into_iter().filter_map(|(name, choice, request, at_most)| {
+            let descriptor = listed(&DESCRIPTORS, &choice)?;
+            let mut described = Descriptors::default();
+            let ours = with_memory(move |work| {
+                descriptor.describe_into(&self.images[0], &self.keypoints[0], work, &mut described);
+            });
+            Some(Stage { name, asks: SURF, request, at_most, at_most_ms: None, ours })
+        });
+        stages.collect()
+    }
+
+    /// Nearest two of each, by the matcher without geometry: it also looks back and applies the ratio test.
+    fn matchers(&self) -> Vec<Stage<'_>> {
+        let names = ["2-NN, 64 floats, 1000²", "2-NN, 64 floats, 3000²"];
+        let stages = names.into_iter().enumerate().map(|(i, name)| {
+            let choice = Choice::named("mutual-ratio").with("epipolar-px", 0.0).with("neighbours", 0);
+            let matcher: Box<dyn Matcher> = MATCHERS.build(&choice).expect("a matcher");
+            let count = CROWDS[i];
+            let keypoints = [vec![self.keypoints[0][0]; count], vec![self.keypoints[1][0]; count]];
+            let mut found = Vec::new();
+            let ours = with_memory(move |work| {
+                let view = |side: usize| View {
+                    image: &self.images[side],
+                    keypoints: &keypoints[side],
+                    descriptors: &self.crowds[i][side],
+                };
+                matcher.match_into(&view(0), &view(1), &self.rig, work, &mut found);
+            });
+            let request = json!({"do": "nearest_two", "a": format!("a{count}"), "b": format!("b{count}")});
+            Stage { name, asks: OPENCV, request, at_most: Some(1.0 / 3.0), at_most_ms: None, ours }
+        });
+        stages.collect()
+    }
+
+    fn refinement(&self) -> Vec<Stage<'_>> {
+        let flat = |at: &mut dyn Iterator<Item = Pixel>| {
+            let values: Vec<f32> = at.flat_map(|p| [p.u as f32, p.v as f32]).collect();
+            floats(&[values.len() / 2, 1, 2], &values)
+        };
+        let points = flat(&mut self.matches.iter().map(|m| self.keypoints[0][m.left].at));
+        let guess = flat(&mut self.matches.iter().map(|m| m.right));
+        let list = [
+            ("refinement, window 21, 1000 corners", Refine { window: 21, ..Refine::default() }, Some(1.0 / 3.0)),
+            ("refinement as it stands by default", Refine::default(), None),
+        ];
+        let stages = list.into_iter().map(|(name, refine, at_most)| {
+            let none = Descriptors::default();
+            let mut pixels = Vec::new();
+            let ours = with_memory(move |work| {
+                let view = |side: usize| View {
+                    image: &self.images[side],
+                    keypoints: &self.keypoints[side],
+                    descriptors: &none,
+                };
+                refine.align_into(&self.matches, &view(0), &view(1), 0.15, work, &mut pixels);
+            });
+            let request = json!({"do": "lucas_kanade", "points": points, "guess": guess, "window": 21});
+            Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours }
+        });
+        stages.collect()
+    }
+
+    fn pairs(&self) -> Vec<Stage<'_>> {
+        let [focal, _] = self.rig.left().focal();
+        let [cx, cy] = self.rig.left().principal();
+        let projection = |shift: f64| {
+            let values = [focal, 0.0, cx, -shift, 0.0, focal, cy, 0.0, 0.0, 0.0, 1.0, 0.0].map(|x| x as f32);
+            floats(&[3, 4], &values)
+        };
+        let projections = [projection(0.0), projection(focal * self.rig.baseline())];
+        let front_end = FrontEnd {
+            detector: listed(&DETECTORS, &Choice::named("harris").with("features", COUNT as i64)).expect("a detector"),
+            descriptor: listed(&DESCRIPTORS, &Choice::named("surf")).expect("a descriptor"),
+            matcher: MATCHERS.build(&Choice::named("mutual-ratio")).expect("a matcher"),
+            refine: Refine::default(),
+            triangulator: Triangulator::default(),
+        };
+        let mut looks = [Threads::One, Threads::Pool].map(Look::new);
+        let limit = if self.images[0].width() > 1024 { 40.0 } else { 25.0 };
+        vec![Stage {
+            name: "whole pair, the pipeline's defaults",
+            asks: SURF,
+            request: json!({"do": "pair", "count": COUNT, "projections": projections}),
+            at_most: None,
+            at_most_ms: Some(limit),
+            ours: Box::new(move |threads| {
+                let look = &mut looks[usize::from(threads == Threads::Pool)];
+                front_end.look(&self.images[0], &self.images[1], &self.rig, look);
+            }),
+        }]
+    }
+}

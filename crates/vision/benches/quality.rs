@@ -1,0 +1,320 @@
+//! How often the same places are found again, and the right ones paired: ours beside OpenCV's, at equal counts.
+//!
+//! `cargo bench -p seafix-vision --bench quality [-- PART-OF-A-NAME]`; what it needs is in the README beside.
+//!
+//! Photographs of scikit-image's wheel lie on planes; a second image of each is made through a known
+//! homography (cubic convolution, 8 bits; the smaller image averages the area of its pixels). Every method
+//! gives its 1000 strongest points of each image. Points that the other image does not show are left out; n is
+//! the smaller number of those that remain. With points taken to the other image by the homography:
+//!
+//! - *repeatability*: pairs of points, one of each image, within 1.5 px, nearest pairs first and no point in
+//!   two, over n (Mikolajczyk et al., *A comparison of affine region detectors*, IJCV 2005, with the distance of
+//!   points in place of the overlap of regions);
+//! - *matching score*: pairs that are each other's nearest by descriptor and within 3 px, over n (ibid.);
+//! - *matching accuracy*: the same, over all pairs that are each other's nearest by descriptor (HPatches;
+//!   Dusmanu et al., D2-Net, CVPR 2019), here at 3 px.
+//!
+//! Each is averaged over the photographs. Distances are Euclidean or Hamming, by one matcher for all methods.
+//! Under all of it stands the cosine between our SURF and OpenCV's at the same key points.
+
+#![allow(clippy::print_stdout, reason = "a bench prints")]
+
+mod common;
+
+use common::{
+    features::{Features, Scores, rows, scores},
+    peer::{OPENCV, Peer, SURF, floats, numbers},
+    scene::{eight_bits, render, rig, right_from_left},
+};
+use nalgebra::Matrix3;
+use seafix_component::Choice;
+use seafix_geometry::Pixel;
+use seafix_vision::{DESCRIPTORS, DETECTORS, Image, Keypoint};
+use serde_json::{Value, json};
+
+/// Points an image.
+const COUNT: usize = 1000;
+/// The shortest side of the images (px); smaller photographs are enlarged to it.
+const SIDE: usize = 768;
+const PHOTOGRAPHS: [&str; 8] = [
+    "astronaut.png",
+    "brick.png",
+    "coffee.png",
+    "grass.png",
+    "gravel.png",
+    "hubble_deep_field.jpg",
+    "motorcycle_left.png",
+    "rocket.jpg",
+];
+
+/// A second view.
+struct Change {
+    name: &'static str,
+    /// Where it shows a pixel of the first.
+    homography: fn([usize; 2]) -> Matrix3<f64>,
+    /// Places averaged along the side of a pixel.
+    samples: usize,
+    /// What happens to a grey value, with a normal deviate.
+    light: fn(f64, f64) -> f64,
+}
+
+const CHANGES: [Change; 5] = [
+    Change { name: "stereo", homography: |size| right_from_left(&rig(size)), samples: 1, light: same },
+    Change { name: "30° rotation", homography: |size| turned(size, 30.0, 1.0), samples: 1, light: same },
+    Change { name: "scale 0.7", homography: |size| turned(size, 0.0, 0.7), samples: 3, light: same },
+    Change { name: "perspective", homography: perspective, samples: 2, light: same },
+    Change { name: "gamma, noise", homography: |_| Matrix3::identity(), samples: 1, light: darker },
+];
+
+fn same(value: f64, _: f64) -> f64 {
+    value
+}
+
+/// γ = 1.5 and noise of 5 grey levels.
+fn darker(value: f64, deviate: f64) -> f64 {
+    255.0 * (value / 255.0).powf(1.5) + 5.0 * deviate
+}
+
+/// Turned by so many degrees and scaled about the middle.
+fn turned(size: [usize; 2], degrees: f64, scale: f64) -> Matrix3<f64> {
+    let [cx, cy] = size.map(|n| 0.5 * (n - 1) as f64);
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let middle = Matrix3::new(1.0, 0.0, cx, 0.0, 1.0, cy, 0.0, 0.0, 1.0);
+    let turn = Matrix3::new(scale * cos, -scale * sin, 0.0, scale * sin, scale * cos, 0.0, 0.0, 0.0, 1.0);
+    middle * turn * Matrix3::new(1.0, 0.0, -cx, 0.0, 1.0, -cy, 0.0, 0.0, 1.0)
+}
+
+/// The plane turned by 40° about the vertical, its centre kept, as a camera of 1 width focal length sees it.
+fn perspective(size: [usize; 2]) -> Matrix3<f64> {
+    let [cx, cy] = size.map(|n| 0.5 * (n - 1) as f64);
+    let f = size[0] as f64;
+    let camera = Matrix3::new(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0);
+    let (sin, cos) = 40.0_f64.to_radians().sin_cos();
+    // Points (x, y, 1) of the first view's plane z = 1, turned about the middle of that plane.
+    let turn = Matrix3::new(cos, 0.0, 0.0, 0.0, 1.0, 0.0, -sin, 0.0, 1.0);
+    camera * turn * camera.try_inverse().expect("a camera")
+}
+
+/// One way to get features.
+enum Method {
+    Ours {
+        detector: Choice,
+        descriptor: Choice,
+    },
+    Peer {
+        variable: &'static str,
+        request: Value,
+    },
+    /// OpenCV's Harris corners, described by its SURF.
+    PeerCorners,
+}
+
+struct Peers {
+    opencv: Peer,
+    surf: Peer,
+}
+
+impl Peers {
+    fn keep(&mut self, image: &Image) {
+        self.opencv.keep("image", image);
+        self.surf.keep("image", image);
+    }
+
+    fn corners(&mut self) -> Vec<[f32; 5]> {
+        rows(&self.opencv.ask(&json!({"do": "corners", "image": "image", "count": COUNT})))
+    }
+
+    fn described(&mut self, keypoints: &[[f32; 5]], upright: bool) -> Value {
+        let given = floats(&[keypoints.len(), 5], keypoints.as_flattened());
+        self.surf.ask(&json!({"do": "describe", "image": "image", "upright": upright, "keypoints": given}))
+    }
+}
+
+impl Method {
+    fn features(&self, image: &Image, peers: &mut Peers) -> Features {
+        match self {
+            Self::Ours { detector, descriptor } => {
+                let detector = DETECTORS.build(detector).expect("a listed detector");
+                let descriptor = DESCRIPTORS.build(descriptor).expect("a listed descriptor");
+                let found = detector.detect(image);
+                let descriptors = descriptor.describe(image, &found);
+                Features { at: found.iter().map(|keypoint| keypoint.at).collect(), descriptors }
+            }
+            Self::Peer { variable, request } => {
+                let peer = if *variable == OPENCV { &mut peers.opencv } else { &mut peers.surf };
+                Features::of_peer(&peer.ask(request), COUNT)
+            }
+            Self::PeerCorners => {
+                let corners = peers.corners();
+                Features::of_peer(&peers.described(&corners, true), COUNT)
+            }
+        }
+    }
+}
+
+/// Peers first, then those of ours that are listed.
+fn methods() -> Vec<(&'static str, Method)> {
+    let peer = |variable, kind: &str, upright: bool| Method::Peer {
+        variable,
+        request: json!({"do": "features", "image": "image", "kind": kind, "count": COUNT, "upright": upright}),
+    };
+    let ours = |detector: &str, descriptor: Choice| Method::Ours {
+        detector: Choice::named(detector).with("features", COUNT as i64),
+        descriptor,
+    };
+    let surf = Choice::named("surf");
+    let own = surf.clone().with("scale", 0.0);
+    let mut list = vec![
+        ("OpenCV SURF upright", peer(SURF, "surf", true)),
+        ("OpenCV SURF rotated", peer(SURF, "surf", false)),
+        ("OpenCV Harris + SURF upright", Method::PeerCorners),
+        ("OpenCV SIFT", peer(OPENCV, "sift", false)),
+        ("OpenCV ORB", peer(OPENCV, "orb", false)),
+        ("surf + surf upright", ours("surf", own.clone())),
+        ("surf + surf rotated", ours("surf", own.with("upright", false))),
+        ("harris + surf upright", ours("harris", surf.clone())),
+        ("harris + surf rotated", ours("harris", surf.clone().with("upright", false))),
+        ("shi-tomasi + surf upright", ours("shi-tomasi", surf)),
+        ("dog + sift", ours("dog", Choice::named("sift"))),
+        ("fast + orb", ours("fast", Choice::named("orb"))),
+        ("harris + zncc-patch", ours("harris", Choice::named("zncc-patch"))),
+    ];
+    list.retain(|(_, method)| match method {
+        Method::Ours { detector, descriptor } => {
+            DETECTORS.build(detector).is_ok() && DESCRIPTORS.build(descriptor).is_ok()
+        }
+        _ => true,
+    });
+    list
+}
+
+/// Deviates of a normal distribution, the same in every run.
+struct Deviates(u64);
+
+impl Deviates {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    fn next(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+impl Change {
+    fn image(&self, photograph: &Image) -> Image {
+        let size = [photograph.width(), photograph.height()];
+        let from = (self.homography)(size).try_inverse().expect("a view of a plane");
+        let seen = render(photograph, size, &from, self.samples);
+        let mut deviates = Deviates(1);
+        let pixels = seen.pixels().iter().map(|&p| eight_bits((self.light)(f64::from(p), deviates.next())));
+        Image::new(size[0], size[1], pixels.collect()).expect("as many as there were")
+    }
+}
+
+/// Enlarged to a shortest side of [`SIDE`].
+fn enlarged(photograph: Image) -> Image {
+    let scale = SIDE as f64 / photograph.width().min(photograph.height()) as f64;
+    if scale <= 1.0 {
+        return photograph;
+    }
+    let size = [photograph.width(), photograph.height()].map(|n| (n as f64 * scale).round() as usize);
+    let back = 1.0 / scale;
+    // The outer edges coincide, not the centres of the first pixels.
+    let shift = 0.5 * (back - 1.0);
+    render(&photograph, size, &Matrix3::new(back, 0.0, shift, 0.0, back, shift, 0.0, 0.0, 1.0), 1)
+}
+
+fn main() {
+    let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
+    let Some(opencv) = Peer::from_env(OPENCV, "quality beside OpenCV, on scikit-image's photographs") else { return };
+    let Some(surf) = Peer::from_env(SURF, "quality beside OpenCV's SURF") else { return };
+    let mut peers = Peers { opencv, surf };
+    println!("peers: {}; {}", peers.opencv.version, peers.surf.version);
+    println!("{COUNT} points; photographs at least {SIDE} px high: {}", PHOTOGRAPHS.join(", "));
+    let photographs = PHOTOGRAPHS.map(|name| enlarged(peers.opencv.photograph(name)));
+    let methods: Vec<_> = methods().into_iter().filter(|(name, _)| name.contains(&filter)).collect();
+    let firsts: Vec<Vec<Features>> = photographs
+        .iter()
+        .map(|image| {
+            peers.keep(image);
+            methods.iter().map(|(_, method)| method.features(image, &mut peers)).collect()
+        })
+        .collect();
+    for change in CHANGES {
+        println!(
+            "\n{:<32} {:>13} {:>15} {:>18} {:>9}",
+            change.name, "repeatability", "matching score", "matching accuracy", "points"
+        );
+        let mut sums = vec![Scores::default(); methods.len()];
+        for (photograph, firsts) in photographs.iter().zip(&firsts) {
+            let size = [photograph.width(), photograph.height()];
+            let second = change.image(photograph);
+            peers.keep(&second);
+            for ((sum, (_, method)), first) in sums.iter_mut().zip(&methods).zip(firsts) {
+                *sum += scores(first, &method.features(&second, &mut peers), &(change.homography)(size), size);
+            }
+        }
+        for ((name, _), sum) in methods.iter().zip(sums) {
+            let n = photographs.len() as f64;
+            let [repeated, matched, right] = [sum.repeatability, sum.matching, sum.accuracy].map(|s| s / n);
+            println!("{name:<32} {repeated:>13.3} {matched:>15.3} {right:>18.3} {:>9.0}", sum.points / n);
+        }
+    }
+    cosines(&photographs, &mut peers);
+}
+
+/// The cosine between our SURF and OpenCV's at the key points that OpenCV finds.
+fn cosines(photographs: &[Image], peers: &mut Peers) {
+    println!(
+        "\n{:<32} {:>13} {:>15} {:>18} {:>9}",
+        "SURF at OpenCV's key points", "mean cosine", "median", "5th percentile", "points"
+    );
+    for (name, upright, corners) in [
+        ("upright, Hessian points", true, false),
+        ("upright, Harris corners", true, true),
+        ("rotated, Hessian points", false, false),
+    ] {
+        let choice = Choice::named("surf").with("scale", 0.0);
+        let choice = if upright { choice } else { choice.with("upright", false) };
+        let Ok(descriptor) = DESCRIPTORS.build(&choice) else { continue };
+        let mut cosines = Vec::new();
+        for image in photographs {
+            peers.keep(image);
+            let request =
+                json!({"do": "features", "image": "image", "kind": "surf", "count": COUNT, "upright": upright});
+            let given = if corners { peers.corners() } else { rows(&peers.surf.ask(&request)) };
+            let answer = peers.described(&given, upright);
+            let (given, theirs) = (rows(&answer), numbers(&answer["descriptors"]));
+            let keypoint = |row: &[f32; 5]| Keypoint {
+                at: Pixel { u: f64::from(row[0]), v: f64::from(row[1]) },
+                response: row[4],
+                // A size of 9 px is the filter of scale 1.2.
+                scale: row[2] * 1.2 / 9.0,
+            };
+            let given: Vec<Keypoint> = given.iter().map(keypoint).collect();
+            let described = descriptor.describe(image, &given);
+            let ours = described.numbers().expect("SURF is numbers");
+            cosines.extend((0..given.len()).map(|i| {
+                let theirs = if upright { as_ours(&theirs[64 * i..][..64]) } else { theirs[64 * i..][..64].to_vec() };
+                ours.row(i).iter().zip(theirs).map(|(a, b)| f64::from(a * b)).sum::<f64>()
+            }));
+        }
+        cosines.sort_by(f64::total_cmp);
+        let n = cosines.len();
+        let mean = cosines.iter().sum::<f64>() / n as f64;
+        println!("{name:<32} {mean:>13.4} {:>15.4} {:>18.4} {n:>9}", cosines[n / 2], cosines[n / 20]);
+    }
+}
+
+/// OpenCV takes its upright window with x down and −y to the right: our row r, column c, dx, dy are its row c,
+/// column 3 − r, dy, −dx.
+fn as_ours(theirs: &[f32]) -> Vec<f32> {
+    let region = |i: usize| {
+        let (r, c) = (i / 4, i % 4);
+        let sums = &theirs[4 * (4 * c + 3 - r)..][..4];
+        [sums[1], -sums[0], sums[3], sums[2]]
+    };
+    (0..16).flat_map(region).collect()
+}
