@@ -31,6 +31,9 @@ pub(crate) struct Stage<'a> {
     pub(crate) ours: Box<dyn FnMut(Threads) + Send + 'a>,
 }
 
+/// Standard deviation of OpenCV's window, 3 px wide (px).
+const BLOCK: f64 = 0.82;
+
 /// Two images and what is found in them.
 pub(crate) struct Scene {
     images: [Image; 2],
@@ -113,10 +116,11 @@ impl Scene {
         let features = COUNT as i64;
         let corners = |harris: bool| json!({"do": "corners", "image": "left", "count": COUNT, "harris": harris});
         let named = |name: &str| Choice::named(name).with("features", features);
+        let plain = |name: &str| named(name).with("window", "box").with("sigma", BLOCK).with("selection", "strongest");
         let list = [
-            ("Harris, NMS, top 1000", named("harris").with("balance", 0), corners(true), Some(0.4)),
-            ("Harris as it stands by default", named("harris"), corners(true), None),
-            ("Shi-Tomasi, NMS, top 1000", named("shi-tomasi"), corners(false), None),
+            ("Harris, NMS, top 1000", plain("harris"), corners(true), Some(0.4)),
+            ("Harris by default: Gaussian, balanced", named("harris"), corners(true), None),
+            ("Shi-Tomasi, NMS, top 1000", plain("shi-tomasi"), corners(false), None),
             ("FAST", named("fast"), json!({"do": "fast", "image": "left", "threshold": 20}), None),
         ];
         let stages = list.into_iter().filter_map(|(name, choice, request, at_most)| {
@@ -209,11 +213,15 @@ impl Scene {
         };
         let points = flat(&mut self.matches.iter().map(|m| self.keypoints[0][m.left].at));
         let guess = flat(&mut self.matches.iter().map(|m| m.right));
+        let aside = json!({"do": "lucas_kanade", "points": points, "guess": guess, "window": 21});
+        let nothing = json!({"do": "lucas_kanade", "points": points, "window": 21});
+        let wide = || Refine { window: 21, ..Refine::default() };
         let list = [
-            ("refinement, window 21, 1000 corners", Refine { window: 21, ..Refine::default() }, Some(1.0 / 3.0)),
-            ("refinement as it stands by default", Refine::default(), None),
+            ("refine 1000, window 21; LK from nothing", wide(), nothing.clone(), Some(1.0 / 3.0)),
+            ("refine 1000, window 21; LK from matches", wide(), aside, None),
+            ("refine 1000, default; LK from nothing", Refine::default(), nothing, None),
         ];
-        let stages = list.into_iter().map(|(name, refine, at_most)| {
+        let stages = list.into_iter().map(|(name, refine, request, at_most)| {
             let none = Descriptors::default();
             let mut pixels = Vec::new();
             let ours = with_memory(move |work| {
@@ -224,7 +232,6 @@ impl Scene {
                 };
                 refine.align_into(&self.matches, &view(0), &view(1), 0.15, work, &mut pixels);
             });
-            let request = json!({"do": "lucas_kanade", "points": points, "guess": guess, "window": 21});
             Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours }
         });
         stages.collect()
