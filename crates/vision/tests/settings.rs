@@ -55,6 +55,23 @@ fn harris_refuses_what_finds_nothing() {
 }
 
 #[test]
+fn detectors_refuse_what_finds_nothing() {
+    range(&DETECTORS, "shi-tomasi", "sigma", &[0.5, 100.0], &[0.0, -1.0, 101.0]);
+    range(&DETECTORS, "shi-tomasi", "quality", &[0.0, 1.0], &[-0.1, 1.1]);
+    range(&DETECTORS, "fast", "threshold", &[0.0, 1e6], &[-1.0]);
+    for name in ["fast", "shi-tomasi"] {
+        for key in ["features", "cells"] {
+            let said = refusal(&DETECTORS, &Choice::named(name).with(key, 0)).unwrap_or_default();
+            assert_eq!(said, format!("detector `{name}`: {key} = 0; give at least 1"));
+        }
+        for selection in ["strongest", "balanced", "adaptive"] {
+            assert_eq!(refusal(&DETECTORS, &Choice::named(name).with("selection", selection)), None);
+        }
+        assert!(refusal(&DETECTORS, &Choice::named(name).with("selection", "best")).is_some());
+    }
+}
+
+#[test]
 fn surf_refuses_a_scale_that_is_none() {
     range(&DESCRIPTORS, "surf", "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
 }

@@ -110,10 +110,6 @@ mod tests {
         Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
     }
 
-    fn nearest(points: &[Keypoint], at: Pixel) -> f64 {
-        points.iter().map(|p| p.at.distance(&at)).fold(f64::INFINITY, f64::min)
-    }
-
     /// A quarter of the plane, x ≥ `x` and y ≥ `y`, brighter; blurred by one pixel's area.
     fn quadrant(x: f64, y: f64, size: usize) -> Image {
         let cover = |i: usize, edge: f64| (i as f64 + 0.5 - edge).clamp(0.0, 1.0);
@@ -149,59 +145,11 @@ mod tests {
     }
 
     #[test]
-    fn images_without_structure_have_no_corner() {
+    fn what_is_wider_than_the_image_and_what_is_straight_has_no_corner() {
         let vast = Harris { sigma: 1e300, radius: usize::MAX, cells: usize::MAX, ..Harris::default() };
         assert!(vast.detect(&texture(60, 50)).is_empty());
-        for (width, height) in [(1, 1), (2, 2), (1, 50), (64, 48), (300, 3)] {
-            let flat = Image::new(width, height, vec![128.0; width * height]).unwrap();
-            assert_eq!(Harris::default().detect(&flat), []);
-        }
         let ramp = Image::new(64, 48, (0..64 * 48).map(|i| (i % 64) as f32).collect()).unwrap();
         assert_eq!(Harris::default().detect(&ramp), [], "a straight edge is no corner");
-    }
-
-    #[test]
-    fn a_quarter_turn_of_the_image_turns_the_corners() {
-        let image = texture(90, 70);
-        // (x, y) goes to (y, width − 1 − x): a quarter turn to the left.
-        let turned = (0..90 * 70).map(|i| image.row(i % 70)[89 - i / 70]).collect();
-        let turned = Image::new(70, 90, turned).unwrap();
-        let (before, after) = (Harris::default().detect(&image), Harris::default().detect(&turned));
-        assert!(before.len() > 25);
-        assert_eq!(before.len(), after.len());
-        for point in &before {
-            let expected = Pixel { u: point.at.v, v: 89.0 - point.at.u };
-            assert!(nearest(&after, expected) < 1e-4, "{point:?}");
-        }
-    }
-
-    #[test]
-    fn a_shift_by_whole_pixels_shifts_the_corners() {
-        let big = texture(120, 100);
-        let crop = |x0: usize, y0: usize| {
-            let pixels = (0..80 * 60).map(|i| big.row(y0 + i / 80)[x0 + i % 80]).collect();
-            Image::new(80, 60, pixels).unwrap()
-        };
-        // No relative threshold: the strongest corner of one crop may be outside the other.
-        let harris = Harris { quality: 0.0, selection: Selection::Strongest, ..Harris::default() };
-        let (a, b) = (harris.detect(&crop(10, 10)), harris.detect(&crop(15, 17)));
-        let mut compared = 0;
-        for point in &a {
-            let shifted = Pixel { u: point.at.u - 5.0, v: point.at.v - 7.0 };
-            let inner = |at: &Pixel| at.u > 15.0 && at.u < 64.0 && at.v > 15.0 && at.v < 44.0;
-            if inner(&point.at) && inner(&shifted) {
-                assert!(nearest(&b, shifted) < 1e-12, "{point:?}");
-                compared += 1;
-            }
-        }
-        assert!(compared > 5, "{compared}");
-    }
-
-    #[test]
-    fn more_light_everywhere_changes_nothing() {
-        let image = texture(80, 60);
-        let brighter = Image::new(80, 60, image.pixels().iter().map(|p| p + 40.0).collect()).unwrap();
-        assert_eq!(Harris::default().detect(&image), Harris::default().detect(&brighter));
     }
 
     #[test]

@@ -1,12 +1,14 @@
 //! Detectors: where in an image there is something to find again.
 
 mod corners;
+mod fast;
 mod harris;
 mod peaks;
 mod select;
 mod shi_tomasi;
 mod tensor;
 
+pub use fast::Fast;
 pub use harris::Harris;
 use seafix_component::{Registry, entry};
 use seafix_geometry::Pixel;
@@ -41,4 +43,5 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
 }
 
 /// All detectors.
-pub static DETECTORS: Registry<dyn Detector> = Registry::new("detector", &[entry!(Harris), entry!(ShiTomasi)]);
+pub static DETECTORS: Registry<dyn Detector> =
+    Registry::new("detector", &[entry!(Fast), entry!(Harris), entry!(ShiTomasi)]);

@@ -64,8 +64,15 @@ struct Band {
 
 /// Columns of a strip: what a window needs of one stays in the first-level cache.
 const STRIP: usize = 128;
-/// xx, xy, yy of the columns of a strip.
-type Planes = [f32; 3 * STRIP];
+
+/// xx, xy, yy of the columns of a strip, on the boundary of a cache line.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+struct Planes([f32; 3 * STRIP]);
+
+impl Planes {
+    const ZERO: Self = Self([0.0; 3 * STRIP]);
+}
 
 impl Weights {
     fn new(window: Window, sigma: f64) -> Self {
@@ -133,7 +140,7 @@ impl Tensor {
             }
         }
         band.products.iter_mut().for_each(|plane| plane.resize(STRIP + 2 * weights.reach(), 0.0));
-        band.ring.resize(2 * weights.reach() + 1, [0.0; 3 * STRIP]);
+        band.ring.resize(2 * weights.reach() + 1, Planes::ZERO);
         band.strongest = 0.0;
         let rows = first.max(margin)..end.min(height - margin);
         let whole = Part { image, weights, measure: self.measure, first, rows, columns: 0..0 };
@@ -172,12 +179,12 @@ fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
     let Band { products, ring, strongest } = band;
     let size = ring.len();
     let count = columns.len();
-    let mut tensor: Planes = [0.0; 3 * STRIP];
+    let mut tensor = Planes::ZERO;
     let mut greatest = [0.0_f32; STRIP];
     for y in rows.start.saturating_sub(reach)..rows.end + reach {
         let row = |y: usize| &image.row(y)[columns.start - reach - 1..columns.end + reach + 1];
         gradient_products([row(y - 1), row(y), row(y + 1)], products);
-        for (smooth, product) in ring[y % size].as_chunks_mut::<STRIP>().0.iter_mut().zip(products.iter()) {
+        for (smooth, product) in ring[y % size].0.as_chunks_mut::<STRIP>().0.iter_mut().zip(products.iter()) {
             let at = |i: usize| product[i..].first_chunk::<STRIP>().expect("as long as a strip and its window");
             smooth_symmetric(smooth, half, at(reach), |step| [at(reach - step), at(reach + step)]);
         }
@@ -185,28 +192,39 @@ fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
             continue;
         }
         let centre = y - reach;
-        let at = |y: usize| &ring[y % size];
-        smooth_symmetric(&mut tensor, half, at(centre), |step| [at(centre - step), at(centre + step)]);
-        let out = &mut out[(centre - first) * image.width() + columns.start..][..count];
-        let [xx, xy, yy] = [0, 1, 2].map(|plane| &tensor[plane * STRIP..][..count]);
-        let greatest = &mut greatest[..count];
-        for x in 0..count {
-            let [xx, xy, yy] = [xx[x], xy[x], yy[x]].map(|sum| sum * weights.scale);
-            let r = match *measure {
-                Measure::Harris { k } => {
-                    let trace = xx + yy;
-                    (xx * yy - xy * xy) - k * (trace * trace)
-                }
-                Measure::LeastEigenvalue => {
-                    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-                    mean - (half * half + xy * xy).sqrt()
-                }
-            };
-            out[x] = r;
-            greatest[x] = if r > greatest[x] { r } else { greatest[x] };
+        let at = |y: usize| &ring[y % size].0;
+        smooth_symmetric(&mut tensor.0, half, at(centre), |step| [at(centre - step), at(centre + step)]);
+        let response = respond(*measure, &tensor, weights.scale);
+        out[(centre - first) * image.width() + columns.start..][..count].copy_from_slice(&response[..count]);
+        for (greatest, r) in greatest.iter_mut().zip(response) {
+            *greatest = if r > *greatest { r } else { *greatest };
         }
     }
-    *strongest = greatest.iter().copied().fold(*strongest, f32::max);
+    *strongest = greatest[..count].iter().copied().fold(*strongest, f32::max);
+}
+
+/// The response to each tensor, all of whose numbers are to be scaled first.
+#[inline(always)]
+fn respond(measure: Measure, tensor: &Planes, scale: f32) -> [f32; STRIP] {
+    let (planes, _) = tensor.0.as_chunks::<STRIP>();
+    let mut response = [0.0; STRIP];
+    match measure {
+        Measure::Harris { k } => {
+            for (x, r) in response.iter_mut().enumerate() {
+                let [xx, xy, yy] = [planes[0][x] * scale, planes[1][x] * scale, planes[2][x] * scale];
+                let trace = xx + yy;
+                *r = (xx * yy - xy * xy) - k * (trace * trace);
+            }
+        }
+        Measure::LeastEigenvalue => {
+            for (x, r) in response.iter_mut().enumerate() {
+                let [xx, xy, yy] = [planes[0][x] * scale, planes[1][x] * scale, planes[2][x] * scale];
+                let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+                *r = mean - (half * half + xy * xy).sqrt();
+            }
+        }
+    }
+    response
 }
 
 /// gx gx, gx gy, gy gy of a row, without its first and last column.
@@ -346,7 +364,7 @@ mod tests {
             let run = |strip: fn(&Part<'_>, &mut [f32], &mut Band)| {
                 let mut out = vec![0.0; 150 * 40];
                 let products = [0; 3].map(|_| vec![0.0; STRIP + 2 * weights.reach()]);
-                let ring = vec![[0.0; 3 * STRIP]; 2 * weights.reach() + 1];
+                let ring = vec![Planes::ZERO; 2 * weights.reach() + 1];
                 let mut band = Band { products, ring, strongest: 0.0 };
                 let part = Part { image: &image, weights: &weights, measure, first: 0, rows: 9..31, columns: 11..130 };
                 strip(&part, &mut out, &mut band);

@@ -1,0 +1,185 @@
+//! Laws of every detector.
+
+use seafix_component::Choice;
+use seafix_geometry::Pixel;
+use seafix_vision::{DETECTORS, Detector, Image, Keypoint, Threads, Workspace};
+
+fn hash(x: usize, y: usize) -> u32 {
+    let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+    h ^= h >> 15;
+    h = h.wrapping_mul(0x2C1B_3C6D);
+    h ^ (h >> 13)
+}
+
+/// A patchwork of dark and bright cells of 7 px with a little noise: whole grey levels from 0 to 203.
+fn patchwork(width: usize, height: usize) -> Image {
+    let value = |x: usize, y: usize| (hash(x / 7, y / 7) % 200 + hash(x, y) % 5) as f32;
+    Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
+}
+
+fn cut(image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Image {
+    let pixels = (0..height).flat_map(|y| image.row(top + y)[left..left + width].iter().copied()).collect();
+    Image::new(width, height, pixels).unwrap()
+}
+
+/// Runs the law on every detector, with those settings changed that it has.
+///
+/// No budget, and no threshold relative to the strongest of the image: which of two equals is the last,
+/// where a grid's lines fall and what else is in the image must not matter.
+fn every(window: &str, law: impl Fn(&str, &dyn Detector)) {
+    for listing in DETECTORS.listings() {
+        let mut choice = Choice::named(listing.name);
+        let has = |key: &str| listing.defaults.contains_key(key);
+        if has("features") {
+            choice = choice.with("features", 1_000_000);
+        }
+        if has("quality") {
+            choice = choice.with("quality", 0.0);
+        }
+        if has("window") {
+            choice = choice.with("window", window);
+        }
+        law(listing.name, &*DETECTORS.build(&choice).expect("the defaults are settings"));
+    }
+}
+
+/// How far rounding may move a point (px) when an image is brighter, or turned: sums of f32 then are
+/// rounded another way, a response moves by some 1e-6 of itself, and its vertex by that over the
+/// curvature. Differences of whole grey levels, and sums of these in a box, are exact.
+fn rounding(name: &str, turned: bool) -> f64 {
+    match name {
+        "fast" => 1e-9,
+        "harris" | "shi-tomasi" if !turned => 1e-9,
+        _ => 1e-3,
+    }
+}
+
+/// Every point of `a` is in `b`, at most this far away (px).
+fn within(name: &str, a: &[Keypoint], b: &[Keypoint], tolerance: f64) {
+    for point in a {
+        let nearest = b.iter().map(|other| other.at.distance(&point.at)).fold(f64::INFINITY, f64::min);
+        assert!(nearest <= tolerance, "{name}: the nearest to {point:?} is {nearest} px away");
+    }
+}
+
+fn same(name: &str, a: &[Keypoint], b: &[Keypoint], tolerance: f64) {
+    assert!(a.len() > 20, "{name}: only {}", a.len());
+    assert_eq!(a.len(), b.len(), "{name}");
+    within(name, a, b, tolerance);
+}
+
+/// P55. Sides of 16 n + 1 px, so that a pyramid or a coarser grid falls on the same pixels.
+#[test]
+fn a_quarter_turn_of_the_image_turns_the_points() {
+    let (width, height) = (161, 129);
+    let whole = patchwork(width, height);
+    // Of equals the first counts, and which is the first turns with the image: no two may be equal.
+    let unequal = |(i, p): (usize, &f32)| p + (hash(i, 1) % 1024) as f32 / 1024.0;
+    let unequal = Image::new(width, height, whole.pixels().iter().enumerate().map(unequal).collect()).unwrap();
+    for (window, image) in [("gaussian", unequal), ("box", whole)] {
+        // (x, y) goes to (y, width − 1 − x): a quarter turn to the left.
+        let turned = (0..width * height).map(|i| image.row(i % height)[width - 1 - i / height]).collect();
+        let turned = Image::new(height, width, turned).unwrap();
+        every(window, |name, detector| {
+            let tolerance = match (window, name) {
+                ("box", "harris" | "shi-tomasi") => 1e-9,
+                ("box", _) => return,
+                _ => rounding(name, true),
+            };
+            let mut points = detector.detect(&image);
+            points.iter_mut().for_each(|p| p.at = Pixel { u: p.at.v, v: (width - 1) as f64 - p.at.u });
+            same(name, &points, &detector.detect(&turned), tolerance);
+        });
+    }
+}
+
+/// P55, away from the border: a point's surroundings, ten times its scale, are in both images.
+#[test]
+fn a_shift_by_whole_pixels_shifts_the_points() {
+    let big = patchwork(209, 193);
+    let (size, shift) = ([193, 161], [16, 32]);
+    let (one, other) = (cut(&big, [0, 0], size), cut(&big, shift, size));
+    every("gaussian", |name, detector| {
+        let mut all = detector.detect(&one);
+        all.iter_mut().for_each(|p| p.at = Pixel { u: p.at.u - shift[0] as f64, v: p.at.v - shift[1] as f64 });
+        let shared = [size[0] - shift[0], size[1] - shift[1]].map(|n| n as f64);
+        let inner = |p: &&Keypoint| {
+            let margin = 10.0 * f64::from(p.scale) + 3.0;
+            let inside = |x: f64, n: f64| x > margin && x < n - margin;
+            inside(p.at.u, shared[0]) && inside(p.at.v, shared[1])
+        };
+        let found = detector.detect(&other);
+        let (a, b): (Vec<_>, Vec<_>) = (all.iter().filter(inner).collect(), found.iter().filter(inner).collect());
+        assert!(a.len() > 15, "{name}: only {}", a.len());
+        let copied = |points: Vec<&Keypoint>| points.into_iter().copied().collect::<Vec<_>>();
+        within(name, &copied(a), &found, rounding(name, false));
+        within(name, &copied(b), &all, rounding(name, false));
+    });
+}
+
+/// P56: 40 grey levels more, nothing clips.
+#[test]
+fn more_light_everywhere_changes_nothing() {
+    let image = patchwork(129, 97);
+    let brighter = image.pixels().iter().map(|p| p + 40.0).collect();
+    let brighter = Image::new(129, 97, brighter).unwrap();
+    every("gaussian", |name, detector| {
+        same(name, &detector.detect(&image), &detector.detect(&brighter), rounding(name, false));
+    });
+}
+
+/// P57.
+#[test]
+fn an_image_without_structure_has_no_point() {
+    every("gaussian", |name, detector| {
+        for (width, height) in [(1, 1), (2, 2), (1, 50), (50, 2), (64, 48), (300, 3)] {
+            for level in [0.0, 128.0, 255.0, 65535.0] {
+                let flat = Image::new(width, height, vec![level; width * height]).unwrap();
+                assert_eq!(detector.detect(&flat), [], "{name} {width}×{height} of {level}");
+            }
+        }
+    });
+}
+
+#[test]
+fn any_size_and_any_finite_values_are_an_image() {
+    every("gaussian", |name, detector| {
+        for (width, height) in (1..24).flat_map(|n| [(n, n), (n, 40), (90, n)]) {
+            for (scale, offset) in [(1.0, 0.0), (1e36, -1e38), (1e-40, 0.0)] {
+                let pixels = patchwork(width, height).pixels().iter().map(|p| p * scale + offset).collect();
+                for point in detector.detect(&Image::new(width, height, pixels).unwrap()) {
+                    let inside = |x: f64, n: usize| x > -1.0 && x < n as f64;
+                    assert!(inside(point.at.u, width) && inside(point.at.v, height), "{name}: {point:?}");
+                }
+            }
+        }
+    });
+}
+
+/// Whoever works, and whatever was looked at before.
+#[test]
+fn threads_and_memory_change_no_bit() {
+    let images = [patchwork(190, 150), patchwork(40, 90), patchwork(5, 5), patchwork(190, 150), patchwork(300, 70)];
+    for listing in DETECTORS.listings() {
+        let detector = DETECTORS.build(&Choice::named(listing.name)).unwrap();
+        for threads in [Threads::One, Threads::Pool] {
+            let (mut work, mut found) = (Workspace::new(threads), Vec::new());
+            for image in &images {
+                detector.detect_into(image, &mut work, &mut found);
+                assert_eq!(found, detector.detect(image), "{}", listing.name);
+                assert!(found.windows(2).all(|w| w[0].response >= w[1].response), "{}", listing.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_budget_is_kept() {
+    let image = patchwork(190, 150);
+    for listing in DETECTORS.listings().iter().filter(|listing| listing.defaults.contains_key("features")) {
+        for features in [1, 17, 40] {
+            let detector = DETECTORS.build(&Choice::named(listing.name).with("features", features)).unwrap();
+            assert_eq!(detector.detect(&image).len(), features as usize, "{}", listing.name);
+        }
+    }
+}
