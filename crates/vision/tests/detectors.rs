@@ -14,12 +14,13 @@ fn hash(x: usize, y: usize) -> u32 {
 /// A patchwork of dark and bright cells of 7 px with a little noise: whole grey levels from 0 to 203.
 fn patchwork(width: usize, height: usize) -> Image {
     let value = |x: usize, y: usize| (hash(x / 7, y / 7) % 200 + hash(x, y) % 5) as f32;
-    Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
+    Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect())
+        .expect("as many as it has")
 }
 
 fn cut(image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Image {
     let pixels = (0..height).flat_map(|y| image.row(top + y)[left..left + width].iter().copied()).collect();
-    Image::new(width, height, pixels).unwrap()
+    Image::new(width, height, pixels).expect("as many as it has")
 }
 
 /// Runs the law on every detector, with those settings changed that it has.
