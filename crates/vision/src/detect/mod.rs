@@ -6,6 +6,7 @@ mod harris;
 mod peaks;
 mod select;
 mod shi_tomasi;
+mod strip;
 mod tensor;
 
 pub use fast::Fast;

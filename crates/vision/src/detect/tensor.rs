@@ -1,8 +1,8 @@
 //! The structure tensor, streamed: from an image to a response at every pixel.
 
-use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 
+use super::strip::{Band, Part, Planes, STRIP, strip};
 use crate::{Image, Threads, gaussian::half_kernel};
 
 /// The weights that integrate the structure tensor.
@@ -44,38 +44,16 @@ pub(super) struct Scratch {
 
 /// The weights of a window along one axis.
 #[derive(Debug)]
-struct Weights {
+pub(super) struct Weights {
     of: (Window, f64),
     /// Of the centre, and of each step away from it.
-    half: Vec<f32>,
+    pub(super) half: Vec<f32>,
     /// What both axes together have to be scaled by.
-    scale: f32,
-}
-
-/// The memory of one band of rows, and the strongest response in it.
-#[derive(Debug, Default)]
-struct Band {
-    /// gx gx, gx gy, gy gy of one row of a strip, with what the window needs on either side.
-    products: [Vec<f32>; 3],
-    /// The three, smoothed along x, of as many rows as the window is high.
-    ring: Vec<Planes>,
-    strongest: f32,
-}
-
-/// Columns of a strip: what a window needs of one stays in the first-level cache.
-const STRIP: usize = 128;
-
-/// xx, xy, yy of the columns of a strip, on the boundary of a cache line.
-#[derive(Debug, Clone)]
-#[repr(align(64))]
-struct Planes([f32; 3 * STRIP]);
-
-impl Planes {
-    const ZERO: Self = Self([0.0; 3 * STRIP]);
+    pub(super) scale: f32,
 }
 
 impl Weights {
-    fn new(window: Window, sigma: f64) -> Self {
+    pub(super) fn new(window: Window, sigma: f64) -> Self {
         let of = (window, sigma);
         match window {
             Window::Gaussian => Self { of, half: half_kernel(sigma), scale: 1.0 },
@@ -87,7 +65,7 @@ impl Weights {
         }
     }
 
-    fn reach(&self) -> usize {
+    pub(super) fn reach(&self) -> usize {
         self.half.len() - 1
     }
 }
@@ -147,138 +125,6 @@ impl Tensor {
         for left in (margin..width - margin).step_by(STRIP) {
             let columns = left..(left + STRIP).min(width - margin);
             strip(&Part { columns, ..whole.clone() }, out, band);
-        }
-    }
-}
-
-/// A rectangle of the image, at most a strip wide, that the operator does not leave.
-#[derive(Clone)]
-struct Part<'a> {
-    image: &'a Image,
-    weights: &'a Weights,
-    measure: Measure,
-    /// The image's row that is the first of the band.
-    first: usize,
-    rows: std::ops::Range<usize>,
-    columns: std::ops::Range<usize>,
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn strip(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
-    strip_in_any_lanes(part, out, band);
-}
-
-/// The response of one part, row by row: products of gradients, smoothed along x into the ring; when the
-/// ring holds all rows of a window they are smoothed along y.
-///
-/// Smoothing works on whole strips; what lies beyond a narrower part is computed and never read.
-#[inline(always)]
-fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
-    let Part { image, weights, measure, first, rows, columns } = part;
-    let (reach, half) = (weights.reach(), weights.half.as_slice());
-    let Band { products, ring, strongest } = band;
-    let size = ring.len();
-    let count = columns.len();
-    let mut tensor = Planes::ZERO;
-    let mut greatest = [0.0_f32; STRIP];
-    for y in rows.start.saturating_sub(reach)..rows.end + reach {
-        let row = |y: usize| &image.row(y)[columns.start - reach - 1..columns.end + reach + 1];
-        gradient_products([row(y - 1), row(y), row(y + 1)], products);
-        for (smooth, product) in ring[y % size].0.as_chunks_mut::<STRIP>().0.iter_mut().zip(products.iter()) {
-            let at = |i: usize| product[i..].first_chunk::<STRIP>().expect("as long as a strip and its window");
-            smooth_symmetric(smooth, half, at(reach), |step| [at(reach - step), at(reach + step)]);
-        }
-        if y < rows.start + reach {
-            continue;
-        }
-        let centre = y - reach;
-        let at = |y: usize| &ring[y % size].0;
-        smooth_symmetric(&mut tensor.0, half, at(centre), |step| [at(centre - step), at(centre + step)]);
-        let response = respond(*measure, &tensor, weights.scale);
-        out[(centre - first) * image.width() + columns.start..][..count].copy_from_slice(&response[..count]);
-        for (greatest, r) in greatest.iter_mut().zip(response) {
-            *greatest = if r > *greatest { r } else { *greatest };
-        }
-    }
-    *strongest = greatest[..count].iter().copied().fold(*strongest, f32::max);
-}
-
-/// The response to each tensor, all of whose numbers are to be scaled first.
-#[inline(always)]
-fn respond(measure: Measure, tensor: &Planes, scale: f32) -> [f32; STRIP] {
-    let (planes, _) = tensor.0.as_chunks::<STRIP>();
-    let mut response = [0.0; STRIP];
-    match measure {
-        Measure::Harris { k } => {
-            for (x, r) in response.iter_mut().enumerate() {
-                let [xx, xy, yy] = [planes[0][x] * scale, planes[1][x] * scale, planes[2][x] * scale];
-                let trace = xx + yy;
-                *r = (xx * yy - xy * xy) - k * (trace * trace);
-            }
-        }
-        Measure::LeastEigenvalue => {
-            for (x, r) in response.iter_mut().enumerate() {
-                let [xx, xy, yy] = [planes[0][x] * scale, planes[1][x] * scale, planes[2][x] * scale];
-                let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-                *r = mean - (half * half + xy * xy).sqrt();
-            }
-        }
-    }
-    response
-}
-
-/// gx gx, gx gy, gy gy of a row, without its first and last column.
-#[inline(always)]
-fn gradient_products([above, here, below]: [&[f32]; 3], [xx, xy, yy]: &mut [Vec<f32>; 3]) {
-    let n = here.len() - 2;
-    // Sobel's operator sums eight differences of one pixel.
-    const EIGHTH: f32 = 0.125;
-    let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..n + 2]];
-    let [h0, h2] = [&here[..n], &here[2..n + 2]];
-    let [b0, b1, b2] = [&below[..n], &below[1..=n], &below[2..n + 2]];
-    let (xx, xy, yy) = (&mut xx[..n], &mut xy[..n], &mut yy[..n]);
-    for x in 0..n {
-        let gx = (((a2[x] - a0[x]) + (b2[x] - b0[x])) + 2.0 * (h2[x] - h0[x])) * EIGHTH;
-        let gy = (((b0[x] - a0[x]) + (b2[x] - a2[x])) + 2.0 * (b1[x] - a1[x])) * EIGHTH;
-        xx[x] = gx * gx;
-        xy[x] = gx * gy;
-        yy[x] = gy * gy;
-    }
-}
-
-/// out = half[0] · centre + Σ half[step] · (a + b), with the pair a, b at each step from the centre:
-/// both sides of a symmetric kernel at once. The sum runs in the order of the steps.
-#[inline(always)]
-fn smooth_symmetric<'a, const N: usize>(
-    out: &mut [f32; N],
-    half: &[f32],
-    centre: &[f32; N],
-    pair: impl Fn(usize) -> [&'a [f32; N]; 2],
-) {
-    // Several steps at a time: fewer passes over `out`.
-    let (groups, rest) = half[1..].as_chunks::<3>();
-    if groups.is_empty() {
-        for i in 0..N {
-            out[i] = half[0] * centre[i];
-        }
-    }
-    for (index, &[u, v, w]) in groups.iter().enumerate() {
-        let step = 1 + 3 * index;
-        let [[a, b], [c, d], [e, f]] = [pair(step), pair(step + 1), pair(step + 2)];
-        if index == 0 {
-            for i in 0..N {
-                out[i] = ((half[0] * centre[i] + u * (a[i] + b[i])) + v * (c[i] + d[i])) + w * (e[i] + f[i]);
-            }
-        } else {
-            for i in 0..N {
-                out[i] = ((out[i] + u * (a[i] + b[i])) + v * (c[i] + d[i])) + w * (e[i] + f[i]);
-            }
-        }
-    }
-    for (index, &u) in rest.iter().enumerate() {
-        let [a, b] = pair(1 + 3 * groups.len() + index);
-        for i in 0..N {
-            out[i] += u * (a[i] + b[i]);
         }
     }
 }
@@ -353,24 +199,6 @@ mod tests {
                 assert_eq!(strongest, found.iter().copied().fold(0.0, f32::max));
                 assert_eq!((found, strongest), response(&tensor, &image, Threads::Pool));
             }
-        }
-    }
-
-    #[test]
-    fn every_instruction_set_gives_the_same_bits() {
-        let image = rough(150, 40);
-        for (measure, window) in MEASURES.into_iter().zip([Window::Gaussian, Window::Box]) {
-            let weights = Weights::new(window, 1.5);
-            let run = |strip: fn(&Part<'_>, &mut [f32], &mut Band)| {
-                let mut out = vec![0.0; 150 * 40];
-                let products = [0; 3].map(|_| vec![0.0; STRIP + 2 * weights.reach()]);
-                let ring = vec![Planes::ZERO; 2 * weights.reach() + 1];
-                let mut band = Band { products, ring, strongest: 0.0 };
-                let part = Part { image: &image, weights: &weights, measure, first: 0, rows: 9..31, columns: 11..130 };
-                strip(&part, &mut out, &mut band);
-                out.iter().map(|r| r.to_bits()).collect::<Vec<_>>()
-            };
-            assert_eq!(run(strip), run(strip_in_any_lanes));
         }
     }
 
