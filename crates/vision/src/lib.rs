@@ -19,7 +19,7 @@ mod workspace;
 
 pub use cloud::Triangulator;
 pub use describe::{DESCRIPTORS, Descriptor, Descriptors, Surf, Table};
-pub use detect::{DETECTORS, Detector, Fast, Harris, Keypoint, Selection, ShiTomasi, Window};
+pub use detect::{DETECTORS, Detector, Fast, FastHessian, Harris, Keypoint, Selection, ShiTomasi, Window};
 pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
 pub use matching::{MATCHERS, Match, Matcher, MutualRatio, View};

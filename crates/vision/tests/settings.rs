@@ -72,6 +72,20 @@ fn detectors_refuse_what_finds_nothing() {
 }
 
 #[test]
+fn surf_blobs_refuse_what_finds_nothing() {
+    range(&DETECTORS, "surf", "threshold", &[0.0, 1e9], &[-1.0, 2e9]);
+    for (key, inside, beyond) in [("octaves", [1, 8], [0, 9]), ("layers", [1, 10], [0, 11])] {
+        for value in inside {
+            assert_eq!(refusal(&DETECTORS, &Choice::named("surf").with(key, value)), None, "{key} = {value}");
+        }
+        for value in beyond {
+            let said = refusal(&DETECTORS, &Choice::named("surf").with(key, value)).unwrap_or_default();
+            assert!(said.contains(&format!("{key} = {value}; give ")), "{said:?}");
+        }
+    }
+}
+
+#[test]
 fn surf_refuses_a_scale_that_is_none() {
     range(&DESCRIPTORS, "surf", "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
 }

@@ -1,6 +1,8 @@
 //! Descriptors: what the surroundings of a key point look like.
 
-mod integral;
+mod cells;
+mod halves;
+mod sector;
 mod surf;
 
 use seafix_component::{Registry, entry};

@@ -3,10 +3,13 @@
 mod corners;
 mod fast;
 mod harris;
+mod hessian;
+mod integral;
 mod peaks;
 mod select;
 mod shi_tomasi;
 mod strip;
+mod surf;
 mod tensor;
 
 pub use fast::Fast;
@@ -15,6 +18,7 @@ use seafix_component::{Registry, entry};
 use seafix_geometry::Pixel;
 pub use select::Selection;
 pub use shi_tomasi::ShiTomasi;
+pub use surf::FastHessian;
 pub use tensor::Window;
 
 use crate::{Image, Workspace};
@@ -45,4 +49,4 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
 
 /// All detectors.
 pub static DETECTORS: Registry<dyn Detector> =
-    Registry::new("detector", &[entry!(Fast), entry!(Harris), entry!(ShiTomasi)]);
+    Registry::new("detector", &[entry!(Fast), entry!(Harris), entry!(ShiTomasi), entry!(FastHessian)]);
