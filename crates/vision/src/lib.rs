@@ -18,7 +18,7 @@ mod refine;
 mod workspace;
 
 pub use cloud::Triangulator;
-pub use describe::{DESCRIPTORS, Descriptor, Descriptors, Surf, Table};
+pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Surf, Table};
 pub use detect::{DETECTORS, Detector, Fast, FastHessian, Harris, Keypoint, Selection, ShiTomasi, Window};
 pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};

@@ -135,6 +135,7 @@ fn the_result_is_the_same_for_any_threads_and_in_used_memory() {
 #[test]
 fn what_turns_with_its_surroundings_follows_a_quarter_turn() {
     let choices = [
+        Choice::named("orb"),
         Choice::named("surf").with("upright", false),
         Choice::named("surf").with("upright", false).with("extended", true),
     ];

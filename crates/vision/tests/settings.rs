@@ -86,8 +86,10 @@ fn surf_blobs_refuse_what_finds_nothing() {
 }
 
 #[test]
-fn surf_refuses_a_scale_that_is_none() {
-    range(&DESCRIPTORS, "surf", "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
+fn descriptors_refuse_a_scale_that_is_none() {
+    for name in ["brief", "orb", "surf"] {
+        range(&DESCRIPTORS, name, "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
+    }
 }
 
 #[test]

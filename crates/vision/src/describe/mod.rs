@@ -1,10 +1,15 @@
 //! Descriptors: what the surroundings of a key point look like.
 
+mod brief;
 mod cells;
+mod comparisons;
 mod halves;
+mod orb;
 mod sector;
 mod surf;
 
+pub use brief::Brief;
+pub use orb::Orb;
 use seafix_component::{Registry, entry};
 pub use surf::Surf;
 
@@ -150,4 +155,5 @@ pub trait Descriptor: Send + Sync + std::fmt::Debug {
 }
 
 /// All descriptors.
-pub static DESCRIPTORS: Registry<dyn Descriptor> = Registry::new("descriptor", &[entry!(Surf)]);
+pub static DESCRIPTORS: Registry<dyn Descriptor> =
+    Registry::new("descriptor", &[entry!(Brief), entry!(Orb), entry!(Surf)]);

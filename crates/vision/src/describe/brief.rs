@@ -1,0 +1,47 @@
+//! BRIEF: which of two places is the brighter, 256 times.
+
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::comparisons::{self, Settings};
+use super::{Descriptor, Descriptors};
+use crate::{Image, Keypoint, Workspace};
+
+/// BRIEF-256, upright: a bit for each of 256 pairs of places, set where the first is the darker.
+///
+/// The places are drawn from a Gaussian of 31/5 steps around the key point; what is compared are means
+/// over squares of 5 steps, at the key point's fraction of a pixel. Distances are counted in bits that differ.
+/// Light and contrast drop out, and so does any rising curve of brightness.
+///
+/// Source: Calonder, Lepetit, Strecha and Fua, *BRIEF: binary robust independent elementary features*,
+/// ECCV 2010 (its pattern G II).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Brief {
+    /// The step of the pattern (px): the window is 35 steps wide. 0: half the key point's own scale.
+    pub scale: f64,
+}
+
+impl Default for Brief {
+    fn default() -> Self {
+        Self { scale: 1.0 }
+    }
+}
+
+impl Component for Brief {
+    const NAME: &'static str = "brief";
+    const SUMMARY: &'static str = "BRIEF: 256 comparisons of brightness around the key point, upright";
+    const SOURCE: &'static str =
+        "Calonder, Lepetit, Strecha and Fua, BRIEF: binary robust independent elementary features, ECCV 2010";
+
+    fn check(&self) -> Result<(), String> {
+        in_range((0.0..=100.0).contains(&self.scale), "scale", self.scale, "a number from 0 to 100 (px)")
+    }
+}
+
+impl Descriptor for Brief {
+    fn describe_into(&self, image: &Image, keypoints: &[Keypoint], work: &mut Workspace, described: &mut Descriptors) {
+        let settings = Settings { scale: self.scale, turned: false };
+        comparisons::describe(&settings, image, keypoints, work, described);
+    }
+}
