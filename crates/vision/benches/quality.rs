@@ -182,7 +182,7 @@ fn methods() -> Vec<(&'static str, &'static str, Method)> {
         ("harris by default + surf upright", "", ours(named("harris"), named("surf"))),
         ("shi-tomasi + surf upright", "", ours(corners("shi-tomasi"), named("surf"))),
         ("dog + sift", "OpenCV SIFT", ours(named("dog"), named("sift"))),
-        ("fast + orb", "OpenCV ORB", ours(named("fast"), named("orb"))),
+        ("fast + orb", "OpenCV ORB", ours(named("fast").with("selection", "strongest"), named("orb"))),
         ("harris + zncc-patch", "", ours(corners("harris"), named("zncc-patch"))),
     ];
     list.retain(|(.., method)| match method {

@@ -117,11 +117,18 @@ impl Scene {
         let corners = |harris: bool| json!({"do": "corners", "image": "left", "count": COUNT, "harris": harris});
         let named = |name: &str| Choice::named(name).with("features", features);
         let plain = |name: &str| named(name).with("window", "box").with("sigma", BLOCK).with("selection", "strongest");
+        // As OpenCV's: every pixel that is stronger than its eight neighbours.
+        let every_fast = Choice::named("fast").with("radius", 1).with("subpixel", false).with("features", 1_000_000);
         let list = [
             ("Harris, NMS, top 1000", plain("harris"), corners(true), Some(0.4)),
             ("Harris by default: Gaussian, balanced", named("harris"), corners(true), None),
             ("Shi-Tomasi, NMS, top 1000", plain("shi-tomasi"), corners(false), None),
-            ("FAST", named("fast"), json!({"do": "fast", "image": "left", "threshold": 20}), None),
+            (
+                "FAST, every corner of threshold 20",
+                every_fast,
+                json!({"do": "fast", "image": "left", "threshold": 20}),
+                None,
+            ),
         ];
         let stages = list.into_iter().filter_map(|(name, choice, request, at_most)| {
             let detector = listed(&DETECTORS, &choice)?;
@@ -248,7 +255,9 @@ impl Scene {
         let front_end = FrontEnd {
             detector: listed(&DETECTORS, &Choice::named("harris").with("features", COUNT as i64)).expect("a detector"),
             descriptor: listed(&DESCRIPTORS, &Choice::named("surf")).expect("a descriptor"),
-            matcher: MATCHERS.build(&Choice::named("mutual-ratio")).expect("a matcher"),
+            // The band, once it is listed, is the default.
+            matcher: listed(&MATCHERS, &Choice::named("epipolar-band"))
+                .unwrap_or_else(|| MATCHERS.build(&Choice::named("mutual-ratio")).expect("a matcher")),
             refine: Refine::default(),
             triangulator: Triangulator::default(),
         };
