@@ -66,8 +66,9 @@ impl Grid {
             ];
             let pace = [(pitch * cos) as f32, (pitch * sin) as f32];
             sample(pixels, width, [whole[0] as i32, whole[1] as i32], start, pace, line);
+            let row = y / samples;
             for (cell, samples) in cells.iter_mut().zip(line.chunks_exact(samples)) {
-                cell[y / samples.len()] += samples.iter().fold(0.0, |sum, sample| sum + (sample - grey)) * share;
+                cell[row] += samples.iter().fold(0.0, |sum, sample| sum + (sample - grey)) * share;
             }
         }
     }
