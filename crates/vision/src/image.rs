@@ -49,6 +49,28 @@ impl Image {
         &self.pixels[y * self.width..(y + 1) * self.width]
     }
 
+    /// All pixels, row by row, to be changed in place.
+    pub fn pixels_mut(&mut self) -> &mut [f32] {
+        &mut self.pixels
+    }
+
+    /// Becomes the same as `other`, in the memory it has.
+    pub fn copy_from(&mut self, other: &Self) {
+        (self.width, self.height) = (other.width, other.height);
+        self.pixels.clear();
+        self.pixels.extend_from_slice(&other.pixels);
+    }
+
+    /// Takes `pixels` for its own and leaves its former ones in their place: a stage that cannot work
+    /// in place writes there and swaps.
+    ///
+    /// # Panics
+    /// When they are not as many.
+    pub(crate) fn swap_pixels(&mut self, pixels: &mut Vec<f32>) {
+        assert_eq!(pixels.len(), self.pixels.len(), "an image keeps its size");
+        std::mem::swap(pixels, &mut self.pixels);
+    }
+
     /// The pixels rounded to 8 bits, clipped at black and white.
     pub fn to_u8(&self) -> Vec<u8> {
         self.pixels.iter().map(|p| p.round().clamp(0.0, 255.0) as u8).collect()

@@ -1,8 +1,9 @@
 //! From two images to a cloud of measured points.
 //!
-//! A [`Detector`] finds corners in each image, a [`Descriptor`] describes their surroundings, a
-//! [`Matcher`] pairs left with right, and a [`Triangulator`] turns the pairs
-//! that pass the epipolar test into [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
+//! [`Filter`]s prepare the images, where that is asked for. A [`Detector`] finds corners in each
+//! image, a [`Descriptor`] describes their surroundings, a [`Matcher`] pairs left with right, and a
+//! [`Triangulator`] turns the pairs that pass the epipolar test into
+//! [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
 //!
 //! The centre of the first pixel is (0, 0); brightness is linear in the stored values, 0 is black
 //! and 255 the white of an 8-bit image.
@@ -10,16 +11,19 @@
 mod cloud;
 mod describe;
 mod detect;
+mod filter;
 mod front_end;
 mod gaussian;
 mod image;
 mod matching;
 mod refine;
+mod scale_space;
 mod workspace;
 
 pub use cloud::Triangulator;
-pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Surf, Table};
-pub use detect::{DETECTORS, Detector, Fast, FastHessian, Harris, Keypoint, Selection, ShiTomasi, Window};
+pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Sift, Surf, Table, ZnccPatch};
+pub use detect::{DETECTORS, Detector, Dog, Fast, FastHessian, Harris, Keypoint, Selection, ShiTomasi, Window};
+pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
 pub use matching::{MATCHERS, Match, Matcher, MutualRatio, View};

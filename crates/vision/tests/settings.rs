@@ -1,7 +1,7 @@
 //! Which settings the components of vision refuse, and how they say it.
 
 use seafix_component::{Choice, Registry};
-use seafix_vision::{DESCRIPTORS, DETECTORS, MATCHERS, Refine, Triangulator};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, MATCHERS, Refine, Triangulator};
 
 const NO_NUMBERS: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
@@ -26,6 +26,7 @@ fn numbers_must_be_numbers<T: ?Sized>(registry: &Registry<T>) {
 #[test]
 fn no_number_is_no_setting() {
     numbers_must_be_numbers(&DETECTORS);
+    numbers_must_be_numbers(&FILTERS);
     numbers_must_be_numbers(&DESCRIPTORS);
     numbers_must_be_numbers(&MATCHERS);
 }
@@ -89,6 +90,40 @@ fn surf_blobs_refuse_what_finds_nothing() {
 fn descriptors_refuse_a_scale_that_is_none() {
     for name in ["brief", "orb", "surf"] {
         range(&DESCRIPTORS, name, "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
+    }
+}
+
+#[test]
+fn filters_refuse_what_they_cannot_do() {
+    range(&FILTERS, "clahe", "clip", &[1.0, 1000.0], &[0.9, -1.0, 1001.0]);
+    range(&FILTERS, "guided", "sigma", &[0.01, 255.0], &[0.0, -5.0, 256.0]);
+    range(&FILTERS, "illumination", "sigma", &[1.0, 1000.0], &[0.5, 1001.0]);
+    range(&FILTERS, "illumination", "gain", &[1.0, 1000.0], &[0.5, 1001.0]);
+    let says = |name: &str, key: &str, value: i64| refusal(&FILTERS, &Choice::named(name).with(key, value)).unwrap();
+    assert_eq!(says("median", "radius", 3), "filter `median`: radius = 3; give 1 (3×3) or 2 (5×5)");
+    assert_eq!(says("clahe", "tiles", 0), "filter `clahe`: tiles = 0; give a number from 1 to 64");
+    assert_eq!(says("clahe", "bins", 15), "filter `clahe`: bins = 15; give a number from 16 to 4096");
+    assert_eq!(says("guided", "radius", 1001), "filter `guided`: radius = 1001; give a number from 1 to 1000 (px)");
+}
+
+#[test]
+fn dog_and_sift_refuse_what_they_cannot_do() {
+    range(&DETECTORS, "dog", "contrast", &[0.01, 255.0], &[0.0, -1.0, 256.0]);
+    range(&DETECTORS, "dog", "edge", &[1.0, 1e6], &[0.5, 1e7]);
+    for key in ["features", "cells"] {
+        let said = refusal(&DETECTORS, &Choice::named("dog").with(key, 0)).unwrap();
+        assert_eq!(said, format!("detector `dog`: {key} = 0; give at least 1"));
+    }
+    range(&DESCRIPTORS, "sift", "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
+}
+
+#[test]
+fn zncc_patch_refuses_what_is_no_window() {
+    range(&DESCRIPTORS, "zncc-patch", "step", &[0.1, 100.0], &[0.0, -1.0, 101.0]);
+    range(&DESCRIPTORS, "zncc-patch", "sigma", &[0.0, 100.0], &[-1.0, 101.0]);
+    for window in [1, 10, 53] {
+        let said = refusal(&DESCRIPTORS, &Choice::named("zncc-patch").with("window", window)).unwrap();
+        assert!(said.contains(&format!("window = {window}; give an odd number from 3 to 51")), "{said}");
     }
 }
 

@@ -5,13 +5,18 @@ mod cells;
 mod comparisons;
 mod halves;
 mod orb;
+mod sample;
 mod sector;
+mod sift;
 mod surf;
+mod zncc_patch;
 
 pub use brief::Brief;
 pub use orb::Orb;
 use seafix_component::{Registry, entry};
+pub use sift::Sift;
 pub use surf::Surf;
+pub use zncc_patch::ZnccPatch;
 
 use crate::{Image, Keypoint, Workspace};
 
@@ -156,4 +161,4 @@ pub trait Descriptor: Send + Sync + std::fmt::Debug {
 
 /// All descriptors.
 pub static DESCRIPTORS: Registry<dyn Descriptor> =
-    Registry::new("descriptor", &[entry!(Brief), entry!(Orb), entry!(Surf)]);
+    Registry::new("descriptor", &[entry!(Brief), entry!(Orb), entry!(Sift), entry!(Surf), entry!(ZnccPatch)]);

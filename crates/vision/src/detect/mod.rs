@@ -1,6 +1,8 @@
 //! Detectors: where in an image there is something to find again.
 
 mod corners;
+mod dog;
+mod extrema;
 mod fast;
 mod harris;
 mod hessian;
@@ -12,6 +14,7 @@ mod strip;
 mod surf;
 mod tensor;
 
+pub use dog::Dog;
 pub use fast::Fast;
 pub use harris::Harris;
 use seafix_component::{Registry, entry};
@@ -49,4 +52,4 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
 
 /// All detectors.
 pub static DETECTORS: Registry<dyn Detector> =
-    Registry::new("detector", &[entry!(Fast), entry!(Harris), entry!(ShiTomasi), entry!(FastHessian)]);
+    Registry::new("detector", &[entry!(Dog), entry!(Fast), entry!(Harris), entry!(ShiTomasi), entry!(FastHessian)]);

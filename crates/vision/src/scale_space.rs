@@ -1,0 +1,239 @@
+//! The Gaussian scale space of an image.
+
+use crate::{
+    Image, Threads,
+    gaussian::{half_kernel_into, smooth_into},
+};
+
+/// Levels from one octave to the next: Lowe found the most repeatable extrema with three.
+pub(crate) const INTERVALS: usize = 3;
+/// Levels kept of an octave: the three and one more either side have differences around them.
+pub(crate) const LEVELS: usize = INTERVALS + 3;
+/// Standard deviation of an octave's first level (px of the octave).
+const SIGMA: f64 = 1.6;
+/// The blur that an image has before anything is done (px).
+const IMAGE_SIGMA: f64 = 0.5;
+/// Where the Gaussians end (standard deviations).
+const CUT: f64 = 4.0;
+/// No octave is smaller (px).
+const LEAST_SIDE: usize = 16;
+
+/// An image under Gaussians of growing width, at half the resolution whenever the width has doubled.
+///
+/// Level l of octave o has the standard deviation 1.6 · 2^(o + l/3) px of the image. Octave 0 has the
+/// image's pixels, octave −1 twice as many along each side. Pixel (x, y) of octave o lies at
+/// (x, y) · 2^o in the image.
+///
+/// Levels are made when they are first asked for and kept: a descriptor that follows the detector on
+/// the same image finds them. They depend on the image alone. About 32 bytes a pixel are held, 130
+/// with octave −1.
+///
+/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.
+#[derive(Debug, Default)]
+pub(crate) struct ScaleSpace {
+    image: Option<Image>,
+    /// From octave −1 on.
+    octaves: Vec<Octave>,
+    kernel: Vec<f32>,
+    rows: Vec<Vec<f32>>,
+    doubled: Vec<f32>,
+}
+
+/// An image's levels at one resolution.
+#[derive(Debug, Default)]
+pub(crate) struct Octave {
+    width: usize,
+    levels: [Vec<f32>; LEVELS],
+    /// How many levels are made.
+    made: usize,
+}
+
+impl Octave {
+    /// Pixels in a row.
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub(crate) fn height(&self) -> usize {
+        self.levels[0].len() / self.width
+    }
+
+    /// The pixels of one level, row by row.
+    pub(crate) fn level(&self, level: usize) -> &[f32] {
+        &self.levels[level]
+    }
+}
+
+/// The standard deviation of a level (px of the image).
+pub(crate) fn sigma(octave: i32, level: f64) -> f64 {
+    SIGMA * libm::exp2(f64::from(octave) + level / INTERVALS as f64)
+}
+
+/// How many octaves from 0 on an image of this size has; at least one.
+pub(crate) fn octaves(width: usize, height: usize) -> i32 {
+    let mut count = 1;
+    while width.min(height) >> count >= LEAST_SIDE {
+        count += 1;
+    }
+    count
+}
+
+impl ScaleSpace {
+    /// The image whose space it is from now on; levels stay if it was the same.
+    pub(crate) fn look_at(&mut self, image: &Image) {
+        match &mut self.image {
+            Some(known) if known == image => return,
+            Some(known) => known.copy_from(image),
+            None => self.image = Some(image.clone()),
+        }
+        self.octaves.iter_mut().for_each(|octave| octave.made = 0);
+    }
+
+    /// An octave of the image with its levels made up to `level`.
+    ///
+    /// # Panics
+    /// When there is no image.
+    pub(crate) fn octave(&mut self, octave: i32, level: usize, threads: Threads) -> &Octave {
+        let index = index(octave);
+        if self.octaves.len() <= index {
+            self.octaves.resize_with(index + 1, Octave::default);
+        }
+        if self.octaves[index].made == 0 {
+            self.begin(octave, threads);
+        }
+        let Self { octaves, kernel, rows, .. } = self;
+        let Octave { width, levels, made } = &mut octaves[index];
+        while *made <= level {
+            let [from, to] = [*made - 1, *made].map(|level| sigma(0, level as f64));
+            half_kernel_into(libm::sqrt(to * to - from * from), CUT, kernel);
+            let (below, above) = levels.split_at_mut(*made);
+            smooth_into(&below[*made - 1], *width, kernel, threads, rows, &mut above[0]);
+            *made += 1;
+        }
+        &octaves[index]
+    }
+
+    /// An octave that [`octave`](Self::octave) has made.
+    pub(crate) fn made(&self, octave: i32) -> &Octave {
+        &self.octaves[index(octave)]
+    }
+
+    /// Makes the first level of an octave.
+    fn begin(&mut self, octave: i32, threads: Threads) {
+        let index = index(octave);
+        if octave > 0 {
+            self.octave(octave - 1, INTERVALS, threads);
+            let (finer, coarser) = self.octaves.split_at_mut(index);
+            let (finer, coarser) = (&finer[index - 1], &mut coarser[0]);
+            coarser.width = halve(&finer.levels[INTERVALS], finer.width, &mut coarser.levels[0]);
+            coarser.made = 1;
+            return;
+        }
+        let Self { image, octaves, kernel, rows, doubled } = self;
+        let image = image.as_ref().expect("an image was looked at");
+        let (pixels, pixel) = if octave < 0 {
+            double(image, doubled);
+            (&doubled[..], 0.5)
+        } else {
+            (image.pixels(), 1.0)
+        };
+        let known = IMAGE_SIGMA / pixel;
+        half_kernel_into(libm::sqrt(SIGMA * SIGMA - known * known), CUT, kernel);
+        let Octave { width, levels, made } = &mut octaves[index];
+        *width = if octave < 0 { 2 * image.width() } else { image.width() };
+        smooth_into(pixels, *width, kernel, threads, rows, &mut levels[0]);
+        *made = 1;
+    }
+}
+
+/// Where an octave is kept.
+fn index(octave: i32) -> usize {
+    (octave + 1) as usize
+}
+
+/// Every second pixel of every second row; returns the new width.
+fn halve(pixels: &[f32], width: usize, out: &mut Vec<f32>) -> usize {
+    out.clear();
+    for row in pixels.chunks_exact(width).step_by(2) {
+        out.extend(row.iter().step_by(2));
+    }
+    width.div_ceil(2)
+}
+
+/// Twice the pixels along each side, linear between: pixel (x, y) lies at (x/2, y/2) of the image.
+fn double(image: &Image, out: &mut Vec<f32>) {
+    let (width, height) = (image.width(), image.height());
+    out.resize(4 * width * height, 0.0);
+    for (y, rows) in out.chunks_exact_mut(4 * width).enumerate() {
+        let (here, next) = (image.row(y), image.row((y + 1).min(height - 1)));
+        let (even, odd) = rows.split_at_mut(2 * width);
+        for (x, (even, odd)) in even.chunks_exact_mut(2).zip(odd.chunks_exact_mut(2)).enumerate() {
+            let right = (x + 1).min(width - 1);
+            even[0] = here[x];
+            even[1] = 0.5 * (here[x] + here[right]);
+            odd[0] = 0.5 * (here[x] + next[x]);
+            odd[1] = 0.5 * (even[1] + 0.5 * (next[x] + next[right]));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A Gaussian blob of standard deviation `width`.
+    fn blob(width: f64, at: [f64; 2]) -> Image {
+        let value = |i: usize| {
+            let (x, y) = ((i % 160) as f64 - at[0], (i / 160) as f64 - at[1]);
+            100.0 * libm::exp(-0.5 * (x * x + y * y) / (width * width))
+        };
+        Image::new(160, 120, (0..160 * 120).map(|i| value(i) as f32).collect()).unwrap()
+    }
+
+    #[test]
+    fn a_level_has_the_width_and_place_it_should() {
+        // A blob of σ under a Gaussian of t is a blob of √(σ² + t²), its peak σ²/(σ² + t²) as high.
+        let (width, at) = (6.0, [80.0, 56.0]);
+        let image = blob(width, at);
+        let mut space = ScaleSpace::default();
+        space.look_at(&image);
+        for octave in [2, -1, 0, 1] {
+            for level in [0, 3, 5] {
+                let found = space.octave(octave, level, Threads::One);
+                let pixel = libm::exp2(f64::from(octave));
+                let (x, y) = ((at[0] / pixel) as usize, (at[1] / pixel) as usize);
+                let peak = f64::from(found.level(level)[y * found.width() + x]);
+                let added = sigma(octave, level as f64).powi(2) - IMAGE_SIGMA * IMAGE_SIGMA;
+                let expected = 100.0 * width * width / (width * width + added);
+                // Doubling by lines and the image's own pixels widen a little.
+                assert!((peak - expected).abs() < 0.5, "octave {octave} level {level}: {peak}, not {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn another_image_is_another_space_and_threads_change_nothing() {
+        let (a, b) = (blob(5.0, [70.0, 60.0]), blob(7.0, [60.0, 50.0]));
+        let mut space = ScaleSpace::default();
+        space.look_at(&b);
+        let fresh = space.octave(1, 4, Threads::One).level(4).to_vec();
+        space.look_at(&a);
+        assert_ne!(space.octave(1, 5, Threads::One).level(4), fresh);
+        space.look_at(&b);
+        assert_eq!(space.octave(1, 4, Threads::Pool).level(4), fresh);
+        assert_eq!(space.made(1).height(), 60);
+    }
+
+    #[test]
+    fn the_smallest_image_has_its_octaves() {
+        let one = Image::new(1, 1, vec![7.0]).unwrap();
+        let mut space = ScaleSpace::default();
+        space.look_at(&one);
+        for octave in -1..4 {
+            let found = space.octave(octave, 5, Threads::One);
+            assert!(found.level(5).iter().all(|value| (value - 7.0).abs() < 1e-4), "{octave}");
+        }
+        assert_eq!((octaves(1, 1), octaves(32, 500), octaves(1600, 1200)), (1, 2, 7));
+    }
+}
