@@ -10,7 +10,7 @@ use std::time::Duration;
 use common::scene::{rig, stereo, stones};
 use criterion::{Criterion, criterion_group, criterion_main};
 use seafix_component::{Choice, Registry};
-use seafix_vision::{DESCRIPTORS, DETECTORS, Descriptors, MATCHERS, View, Workspace};
+use seafix_vision::{DESCRIPTORS, DETECTORS, Descriptors, FILTERS, MATCHERS, View, Workspace};
 
 fn each<T: ?Sized>(registry: &'static Registry<T>, mut work: impl FnMut(&str, &T)) {
     for name in registry.names() {
@@ -24,6 +24,19 @@ fn stages(criterion: &mut Criterion) {
     let rig = rig(size);
     let detector = DETECTORS.build(&Choice::named("harris")).expect("it is listed");
     let keypoints = [&left, &right].map(|image| detector.detect(image));
+
+    let mut group = criterion.benchmark_group("filter");
+    each(&FILTERS, |name, filter| {
+        let (mut work, mut image) = (Workspace::default(), left.clone());
+        // The same image each time: what a filter leaves would be another one.
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                image.copy_from(&left);
+                filter.apply(&mut image, &mut work);
+            });
+        });
+    });
+    group.finish();
 
     let mut group = criterion.benchmark_group("detect");
     each(&DETECTORS, |name, detector| {
