@@ -110,7 +110,7 @@ impl FrontEnd {
         let right = View { image: right, keypoints: &r.keypoints, descriptors: &r.descriptors };
         times.match_ms = timed(|| self.matcher.match_into(&left, &right, rig, work, matches));
         let sigma = self.triangulator.sigma_px;
-        times.refine_ms = timed(|| self.refine.align_into(matches, &left, &right, sigma, work, pixels));
+        times.refine_ms = timed(|| self.refine.align_into(matches, &left, &right, rig, sigma, work, pixels));
         times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
     }
 }

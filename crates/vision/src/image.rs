@@ -71,6 +71,18 @@ impl Image {
         std::mem::swap(pixels, &mut self.pixels);
     }
 
+    /// An image of no pixels, which only this crate sees, to be given a size.
+    pub(crate) fn blank() -> Self {
+        Self { width: 0, height: 0, pixels: Vec::new() }
+    }
+
+    /// Gives this image another size, in the memory that it has; the pixels are to be written.
+    pub(crate) fn reshape(&mut self, width: usize, height: usize) -> &mut [f32] {
+        (self.width, self.height) = (width, height);
+        self.pixels.resize(width * height, 0.0);
+        &mut self.pixels
+    }
+
     /// The pixels rounded to 8 bits, clipped at black and white.
     pub fn to_u8(&self) -> Vec<u8> {
         self.pixels.iter().map(|p| p.round().clamp(0.0, 255.0) as u8).collect()

@@ -8,6 +8,7 @@
 //! The centre of the first pixel is (0, 0); brightness is linear in the stored values, 0 is black
 //! and 255 the white of an 8-bit image.
 
+mod align;
 mod cloud;
 mod describe;
 mod detect;
@@ -16,16 +17,17 @@ mod front_end;
 mod gaussian;
 mod image;
 mod matching;
-mod refine;
 mod scale_space;
+mod track;
 mod workspace;
 
+pub use align::{Refine, Warp, Weight};
 pub use cloud::Triangulator;
 pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Sift, Surf, Table, ZnccPatch};
 pub use detect::{DETECTORS, Detector, Dog, Fast, FastHessian, Harris, Keypoint, Selection, ShiTomasi, Window};
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
-pub use matching::{MATCHERS, Match, Matcher, MutualRatio, View};
-pub use refine::Refine;
+pub use matching::{LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View};
+pub use track::{Pyramid, Track, Tracker};
 pub use workspace::{Threads, Workspace};

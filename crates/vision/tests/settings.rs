@@ -1,7 +1,7 @@
 //! Which settings the components of vision refuse, and how they say it.
 
 use seafix_component::{Choice, Registry};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, MATCHERS, Refine, Triangulator};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, MATCHERS, Refine, Tracker, Triangulator};
 
 const NO_NUMBERS: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
@@ -140,6 +140,25 @@ fn mutual_ratio_refuses_what_matches_nothing() {
     );
     assert_eq!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("neighbours", 0)), None);
     assert!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("neighbours", 1001)).is_some());
+}
+
+#[test]
+fn lucas_kanade_refuses_what_follows_nothing() {
+    range(&MATCHERS, "lucas-kanade", "epipolar-px", &[0.1, 1000.0], &[0.0, -1.0, 1001.0]);
+    range(&MATCHERS, "lucas-kanade", "min-depth", &[0.1, 49.0], &[0.0, -0.1]);
+    range(&MATCHERS, "lucas-kanade", "max-depth", &[0.6], &[0.5, 0.0]);
+    assert!(refusal(&MATCHERS, &Choice::named("lucas-kanade").with("places", 0)).is_some());
+    for (tracker, key) in [
+        (Tracker { window: 4, ..Tracker::default() }, "window"),
+        (Tracker { levels: 0, ..Tracker::default() }, "levels"),
+        (Tracker { reach: f64::NAN, ..Tracker::default() }, "reach"),
+        (Tracker { least_correlation: 1.5, ..Tracker::default() }, "least-correlation"),
+        (Tracker { return_px: -1.0, ..Tracker::default() }, "return-px"),
+        (Tracker { iterations: 0, ..Tracker::default() }, "iterations"),
+    ] {
+        let said = tracker.check().expect_err(key);
+        assert!(said.starts_with(&format!("{key} = ")), "{said:?}");
+    }
 }
 
 #[test]

@@ -237,7 +237,7 @@ impl Scene {
                     keypoints: &self.keypoints[side],
                     descriptors: &none,
                 };
-                refine.align_into(&self.matches, &view(0), &view(1), 0.15, work, &mut pixels);
+                refine.align_into(&self.matches, &view(0), &view(1), &self.rig, 0.15, work, &mut pixels);
             });
             Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours }
         });

@@ -1,10 +1,12 @@
 //! Matchers: which key point of the right image is which of the left.
 
 mod epipolar;
+mod lucas_kanade;
 mod mutual_ratio;
 mod nearest;
 mod support;
 
+pub use lucas_kanade::LucasKanade;
 pub use mutual_ratio::MutualRatio;
 use seafix_component::{Registry, entry};
 use seafix_geometry::{Pixel, StereoRig};
@@ -54,4 +56,4 @@ pub trait Matcher: Send + Sync + std::fmt::Debug {
 }
 
 /// All matchers.
-pub static MATCHERS: Registry<dyn Matcher> = Registry::new("matcher", &[entry!(MutualRatio)]);
+pub static MATCHERS: Registry<dyn Matcher> = Registry::new("matcher", &[entry!(LucasKanade), entry!(MutualRatio)]);

@@ -1,0 +1,213 @@
+//! How far the alignment between two views errs, beside the Cramér–Rao bound, and whether it says so.
+//!
+//! `cargo bench -p seafix-vision --bench alignment`
+//!
+//! Scenes blurred by a Gaussian of 0.8 px, contrast ±60 grey levels, noise of 0, 2 or 5 grey levels, rounded to 8 bits;
+//! the left place and the disparity have random fractions. The bound is √2 σ (Σ w g gᵀ)^(−1/2): both images are
+//! noisy, σ² includes rounding (1/12), all pixels of the window count in full and the scene is known.
+
+#![allow(clippy::print_stdout, reason = "a program that prints a table")]
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
+use seafix_geometry::{Pinhole, Pixel, StereoRig, Transform};
+use seafix_vision::{Descriptors, Image, Keypoint, Match, Refine, View, Warp, Weight};
+
+/// Random numbers (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (2.0 * PI * self.uniform()).cos()
+    }
+}
+
+const BLUR: f64 = 0.8;
+const CONTRAST: f64 = 60.0;
+
+/// A blurred step from −1 to 1.
+fn step(x: f64) -> f64 {
+    libm::erf(x / (BLUR * 2f64.sqrt()))
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Kind {
+    X,
+    L,
+    Gravel,
+}
+
+/// Brightness around the origin.
+struct Scene {
+    kind: Kind,
+    turn: f64,
+    stones: Vec<[f64; 4]>,
+}
+
+/// Half of the side of the gravel bed (px).
+const BED: f64 = 34.0;
+/// Spacing of the stones (px).
+const SPACING: f64 = 4.5;
+
+impl Scene {
+    fn new(kind: Kind, random: &mut Random) -> Self {
+        let turn = 2.0 * PI * random.uniform();
+        let across = (2.0 * BED / SPACING) as usize;
+        let stone = |i: usize, random: &mut Random| {
+            let [x, y] = [i % across, i / across].map(|k| -BED + SPACING * (k as f64 + 0.2 + 0.6 * random.uniform()));
+            let sign = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+            [x, y, 1.2 + 1.2 * random.uniform(), sign * (0.5 + 0.5 * random.uniform())]
+        };
+        let stones = (0..across * across).map(|i| stone(i, random)).collect();
+        Self { kind, turn, stones }
+    }
+
+    fn at(&self, x: f64, y: f64) -> f64 {
+        let (sin, cos) = self.turn.sin_cos();
+        let (u, v) = (cos * x + sin * y, cos * y - sin * x);
+        let value = match self.kind {
+            Kind::X => step(u) * step(v),
+            Kind::L => 0.5 * (1.0 + step(u)) * (1.0 + step(v)) - 1.0,
+            Kind::Gravel => {
+                let across = (2.0 * BED / SPACING) as isize;
+                let [i, j] = [x, y].map(|x| ((x + BED) / SPACING).floor() as isize);
+                let mut sum = 0.0;
+                for j in (j - 1).max(0)..(j + 2).min(across) {
+                    for i in (i - 1).max(0)..(i + 2).min(across) {
+                        let [cx, cy, radius, value] = self.stones[(j * across + i) as usize];
+                        let off = ((x - cx).powi(2) + (y - cy).powi(2)).sqrt();
+                        sum += 0.5 * value * (1.0 + step(radius - off));
+                    }
+                }
+                sum.clamp(-1.0, 1.0)
+            }
+        };
+        128.0 + CONTRAST * value
+    }
+}
+
+const SIDE: usize = 65;
+
+/// What a camera makes of the scene: the pixel p shows the place map(p).
+fn picture(scene: &Scene, map: impl Fn(Vector2<f64>) -> Vector2<f64>, noise: f64, random: &mut Random) -> Image {
+    let pixel = |i: usize, random: &mut Random| {
+        let place = map(Vector2::new((i % SIDE) as f64, (i / SIDE) as f64));
+        let value = scene.at(place.x, place.y) + noise * random.normal();
+        value.round().clamp(0.0, 255.0) as f32
+    };
+    Image::new(SIDE, SIDE, (0..SIDE * SIDE).map(|i| pixel(i, random)).collect()).expect("square")
+}
+
+/// Sums over the trials of one row of the table.
+#[derive(Default)]
+struct Sums {
+    count: usize,
+    failed: usize,
+    squares: f64,
+    along: f64,
+    bound: f64,
+    normalised: f64,
+    predicted: f64,
+}
+
+fn rig() -> StereoRig {
+    let camera = Pinhole::new([SIDE as u32; 2], [500.0; 2], [32.0; 2], &[]).expect("a camera");
+    StereoRig::new(camera, camera, Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0)))
+        .expect("a rig")
+}
+
+/// `trials` pairs, seen with this slope of the disparity along each axis.
+fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -> Sums {
+    let (mut sums, rig, none) = (Sums::default(), rig(), Descriptors::default());
+    for trial in 0..trials {
+        let mut random = Random(trial as u64 * 7919 + 17);
+        let scene = Scene::new(kind, &mut random);
+        let [du, dv, sx, sy] = [0; 4].map(|_| random.uniform() - 0.5);
+        let left_at = Vector2::new(32.0 + du, 32.0 + dv);
+        let right_at = Vector2::new(32.0 + sx, 32.0 + sy);
+        let tilt = 2.0 * PI * random.uniform();
+        // right = right_at + shape · (left − left_at)
+        let shape = Matrix2::new(1.0 + slope * tilt.cos(), slope * tilt.sin(), 0.0, 1.0);
+        let back = shape.try_inverse().expect("a gentle slope");
+        let left = picture(&scene, |p| p - left_at, noise, &mut random);
+        let right = picture(&scene, |p| back * (p - right_at), noise, &mut random);
+        let start = right_at + Vector2::new(random.uniform() - 0.5, random.uniform() - 0.5);
+        let pixel = |v: &Vector2<f64>| Pixel { u: v.x, v: v.y };
+        let keypoint = [Keypoint { at: pixel(&left_at), response: 1.0, scale: 1.0 }];
+        let view = |image| View { image, keypoints: &keypoint, descriptors: &none };
+        let found = [Match { left: 0, right: pixel(&start), distance: 0.0 }];
+        let pair = refine.align(&found, &view(&left), &view(&right), &rig, 0.15)[0];
+        sums.count += 1;
+        if pair.at.right == pixel(&start) {
+            sums.failed += 1;
+            continue;
+        }
+        let error = Vector2::new(pair.at.right.u, pair.at.right.v) - right_at;
+        sums.squares += error.norm_squared();
+        sums.along += error.x * error.x;
+        let common = pair.covariance.fixed_view::<2, 2>(0, 2).into_owned();
+        let place = pair.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        let own =
+            pair.covariance.fixed_view::<2, 2>(2, 2) - common.transpose() * place.try_inverse().expect("L") * common;
+        sums.normalised += (error.transpose() * own.try_inverse().expect("A") * error).x;
+        sums.predicted += own.trace();
+        let half = (refine.window / 2) as isize;
+        let mut information = Matrix2::zeros();
+        for y in -half..=half {
+            for x in -half..=half {
+                let (x, y, h) = (x as f64, y as f64, 1e-3);
+                let g = Vector2::new(scene.at(x + h, y) - scene.at(x - h, y), scene.at(x, y + h) - scene.at(x, y - h))
+                    / (2.0 * h);
+                information += g * g.transpose();
+            }
+        }
+        sums.bound += 2.0 * (noise * noise + 1.0 / 12.0) * information.try_inverse().map_or(f64::NAN, |i| i.trace());
+    }
+    sums
+}
+
+fn main() {
+    let trials = std::env::args().filter_map(|a| a.parse().ok()).next().unwrap_or(400);
+    println!("scene    slope noise window   warp         weight     RMS px  bound   ratio  predicted  NEES/2  failed");
+    let row = |kind: Kind, slope: f64, noise: f64, refine: &Refine| {
+        let sums = measure(kind, slope, noise, refine, trials);
+        let n = (sums.count - sums.failed).max(1) as f64;
+        let rms = |sum: f64| (sum / (2.0 * n)).sqrt();
+        let (error, bound) = (rms(sums.squares), rms(sums.bound));
+        println!(
+            "{:<8} {slope:5.2} {noise:4.0} {:5}    {:<12} {:<9} {error:.4}  {bound:.4}  {:.3}   {:.4}     {:.2}    {}",
+            format!("{kind:?}"),
+            refine.window,
+            format!("{:?}", refine.warp),
+            format!("{:?}", refine.weight),
+            error / bound,
+            rms(sums.predicted),
+            sums.normalised / (2.0 * n),
+            sums.failed
+        );
+    };
+    let uniform = Refine { window: 21, weight: Weight::Uniform, ..Refine::default() };
+    for kind in [Kind::X, Kind::L, Kind::Gravel] {
+        for noise in [0.0, 2.0, 5.0] {
+            for refine in [&uniform, &Refine::default()] {
+                row(kind, 0.0, noise, refine);
+            }
+        }
+    }
+    for slope in [0.05, 0.15] {
+        for warp in [Warp::Translation, Warp::Slanted, Warp::Affine] {
+            row(Kind::Gravel, slope, 2.0, &Refine { warp, ..uniform.clone() });
+        }
+    }
+    row(Kind::X, 0.15, 2.0, &Refine { warp: Warp::Slanted, ..uniform.clone() });
+    row(Kind::L, 0.15, 2.0, &Refine { warp: Warp::Slanted, ..uniform.clone() });
+}

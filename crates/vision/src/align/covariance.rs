@@ -1,0 +1,85 @@
+//! How well an alignment is known.
+
+use nalgebra::{Matrix2, SMatrix};
+
+use super::window::Normal;
+
+/// What is left between two aligned windows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Residual {
+    /// Σ w (Ĩ − T̃)², Σ w = 1.
+    pub(super) energy: f64,
+    /// Variance of the right window (squares of grey levels).
+    pub(super) variance: f64,
+    /// The fractions at which the right window was interpolated, where they are the same for all its pixels.
+    pub(super) fractions: Option<[f64; 2]>,
+    /// Σ w².
+    pub(super) squared_weights: f64,
+}
+
+/// The prior pulls deformations towards none; they are about this great, one standard deviation.
+const SLOPE: f64 = 0.15;
+/// Rounding to whole grey levels errs by this variance.
+const ROUNDING: f64 = 1.0 / 12.0;
+
+/// The covariance of the aligned place (px²), in the pixels of the left image; `None` if noise makes up all
+/// that the window shows.
+///
+/// Noise of variance σ² in both images, T of variance s_T², I of s_I², both scaled to 1, moves the
+/// place by δ = G⁻¹ Σ w J̃ᵀ(ñ_T − ñ_I), so Cov δ = σ² (1/s_T² + 1/s_I²) G⁻¹ (Σ w² J̃ᵀJ̃) G⁻¹. G is
+/// Σ w J̃ᵀJ̃ without what noise adds to it, since noise in J̃ is not found again in the other image; and that part
+/// of Σ w² J̃ᵀJ̃ which is noise meets the noise of the right image only, since with its own it makes an odd sum,
+/// that vanishes. Interpolation keeps only a share q of the noise ([`kept`]) in the residual and in what meets
+/// noise, but not in what meets the scene, which has low frequencies only:
+/// σ² = Σ w (Ĩ − T̃)² / (1/s_T² + q/s_I²), corrected for the fitted parameters.
+pub(super) fn covariance<const P: usize>(normal: &Normal<P>, residual: &Residual) -> Option<Matrix2<f64>> {
+    let (left, right) = (1.0 / normal.variance, 1.0 / residual.variance);
+    let kept = residual.fractions.map_or(MEAN_KEPT * MEAN_KEPT, |[x, y]| kept(x) * kept(y));
+    let free = 1.0 - (P + 2) as f64 * residual.squared_weights;
+    let noise = residual.energy / (left + kept * right) / free.max(0.1);
+    let noise = noise.max(ROUNDING);
+    let signal: SMatrix<f64, P, P> = normal.information - normal.noise * (noise * left);
+    let prior = normal.prior(residual.energy);
+    let inverse = (signal + prior).cholesky()?.inverse();
+    let of_noise = normal.noise_spread * (noise * left);
+    let spread = (normal.spread - of_noise) * (left + right) + of_noise * (kept * right);
+    let all = inverse * (spread * noise + prior * prior * (SLOPE * SLOPE)) * inverse;
+    let place: Matrix2<f64> = all.fixed_view::<2, 2>(0, 0).into();
+    Some((place + place.transpose()) * 0.5)
+}
+
+/// Σ_k η(t − k)², η the cardinal cubic spline: what interpolation at the fraction t keeps of the variance of white
+/// noise, a cubic in t (1 − t).
+fn kept(t: f64) -> f64 {
+    let p = t * (1.0 - t);
+    1.0 - p * p * (3.0 + 3.607_695_15 * p)
+}
+
+/// The mean of [`kept`] over all fractions.
+const MEAN_KEPT: f64 = 0.874_23;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// η(t − k), by the prefilter's exact response.
+    fn cardinal(t: f64, k: i32) -> f64 {
+        let beta = |x: f64| match x.abs() {
+            x if x < 1.0 => 2.0 / 3.0 - x * x + 0.5 * x * x * x,
+            x if x < 2.0 => (2.0 - x).powi(3) / 6.0,
+            _ => 0.0,
+        };
+        let root = 3f64.sqrt();
+        (-30..=30).map(|j: i32| root * (root - 2.0).powi((j - k).abs()) * beta(t - f64::from(j))).sum()
+    }
+
+    #[test]
+    fn interpolation_keeps_the_share_of_noise_that_the_cardinal_spline_does() {
+        for t in [0.0, 0.1, 0.25, 0.5, 0.9] {
+            let sum: f64 = (-25..=25).map(|k| cardinal(t, k).powi(2)).sum();
+            assert!((kept(t) - sum).abs() < 1e-6, "{t}: {} not {sum}", kept(t));
+        }
+        let mean = (0..1000).map(|i| kept((f64::from(i) + 0.5) / 1000.0)).sum::<f64>() / 1000.0;
+        assert!((MEAN_KEPT - mean).abs() < 1e-4, "{mean}");
+    }
+}

@@ -1,0 +1,277 @@
+//! Inverse-compositional Gauss–Newton on windows of zero mean and unit variance.
+
+use nalgebra::{Matrix2, SVector, Vector2};
+
+use super::{
+    covariance::{Residual, covariance},
+    lanes::{dot, dot3},
+    spline::Spline,
+    warp::{Model, Translation},
+    window::{Grid, LEAST_VARIANCE, Normal, Template, Weight},
+};
+use crate::Image;
+
+/// When an alignment is believed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rules {
+    /// Half of the window's side (px).
+    pub(crate) half: usize,
+    /// How its pixels count.
+    pub(crate) weight: Weight,
+    /// How far the place may move (px).
+    pub(crate) reach: f64,
+    /// The least correlation of the windows.
+    pub(crate) least_correlation: f64,
+    /// The greatest number of steps.
+    pub(crate) iterations: usize,
+    /// A step shorter than this (px) is the last.
+    pub(crate) precision: f64,
+    /// Whether windows may reach beyond the images, which are continued as their mirror images.
+    pub(crate) beyond: bool,
+}
+
+/// Pixels of the greatest spline that is made for many places.
+const MOST_AT_ONCE: f64 = 20_000.0;
+
+impl Rules {
+    /// Far below what any window tells.
+    pub(crate) const FINE: f64 = 3e-3;
+}
+
+/// Where the window was found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Aligned {
+    /// The place.
+    pub(crate) at: Vector2<f64>,
+    /// What the window's neighbourhood became: the place of the left pixel + x is at + shape · x.
+    pub(crate) shape: Matrix2<f64>,
+    /// Covariance of `at`, given the left place (px²).
+    pub(crate) covariance: Matrix2<f64>,
+    /// Zero-normalised cross correlation of the windows.
+    pub(crate) correlation: f64,
+}
+
+/// Memory to align in, used again for every match.
+#[derive(Debug, Default)]
+pub(crate) struct Aligner {
+    grid: Grid,
+    template: Template,
+    spline: Spline,
+    across: Vec<f32>,
+    patch: Vec<f32>,
+}
+
+impl Aligner {
+    /// The place in `right` whose window is that around `centre` in `left`, searched from `start` and `shape`.
+    pub(crate) fn align<const P: usize>(
+        &mut self,
+        left: &Image,
+        right: &Image,
+        centre: &Vector2<f64>,
+        (start, shape): (&Vector2<f64>, &Matrix2<f64>),
+        rules: &Rules,
+        model: &impl Model<P>,
+    ) -> Option<Aligned> {
+        // Far outside there is nothing, and numbers too great for whole ones.
+        let possible = |at: &Vector2<f64>| at.iter().all(|x| x.abs() < 1e9);
+        if !(possible(centre) && possible(start)) {
+            return None;
+        }
+        self.grid.place(centre, rules.half, rules.weight);
+        let normal = self.template.take(left, &self.grid, rules.beyond, model)?;
+        let begun = shape.try_inverse()?;
+        let (mut at, mut shape, start) = (*start, *shape, start);
+        self.patch.resize(self.grid.weights.len(), 0.0);
+        self.load(right, &at, &shape)?;
+        for _ in 0..rules.iterations {
+            let found = self.compare::<P>(right, &at, &shape, rules)?;
+            let prior = normal.prior(2.0 * (1.0 - found.correlation));
+            let deformed = SVector::from(model.parameters(&(begun * shape - Matrix2::identity())));
+            let step = (normal.information + prior).cholesky()?.solve(&(found.gradient + prior * deformed));
+            // W ← W ∘ ΔW⁻¹ with ΔW(x) = δ + (1 + Δ) x.
+            let change = model.shape(&step.into());
+            if change != Matrix2::zeros() {
+                shape *= (Matrix2::identity() + change).try_inverse()?;
+            }
+            let moved = shape * step.fixed_rows::<2>(0);
+            at -= moved;
+            if !((at - start).norm() <= rules.reach) {
+                return None;
+            }
+            if moved.norm() < rules.precision {
+                return self.judge(right, &at, &shape, &normal, rules);
+            }
+        }
+        None
+    }
+
+    /// The correlation of the left window with that around each of `places` in the right image; −1 where there
+    /// is none.
+    pub(crate) fn survey(
+        &mut self,
+        left: &Image,
+        right: &Image,
+        centre: &Vector2<f64>,
+        places: &[Vector2<f64>],
+        rules: &Rules,
+        correlations: &mut Vec<f64>,
+    ) {
+        correlations.clear();
+        correlations.resize(places.len(), -1.0);
+        self.grid.place(centre, rules.half, rules.weight);
+        if self.template.take(left, &self.grid, rules.beyond, &Translation).is_none() {
+            return;
+        }
+        self.patch.resize(self.grid.weights.len(), 0.0);
+        self.spline.forget();
+        let here = Matrix2::identity();
+        // One spline for the places that lie close together.
+        let size = [right.width() as f64, right.height() as f64];
+        let inside = |at: &&Vector2<f64>| (0..2).all(|i| at[i] >= 0.0 && at[i] < size[i]);
+        let corners = places.iter().filter(inside).map(|at| self.extent(at, &here));
+        let corners = corners.reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])]);
+        if let Some([first, last]) = corners.filter(|[first, last]| (last - first).product() < MOST_AT_ONCE) {
+            self.load_between(right, &first, &last);
+        }
+        for (at, correlation) in places.iter().zip(correlations).filter(|(at, _)| inside(at)) {
+            *correlation = self.compare::<2>(right, at, &here, rules).map_or(-1.0, |found| found.correlation);
+        }
+    }
+
+    /// The alignment that ended here, if it is believed.
+    fn judge<const P: usize>(
+        &mut self,
+        right: &Image,
+        at: &Vector2<f64>,
+        shape: &Matrix2<f64>,
+        normal: &Normal<P>,
+        rules: &Rules,
+    ) -> Option<Aligned> {
+        let found = self.compare::<P>(right, at, shape, rules)?;
+        if !(found.correlation >= rules.least_correlation) {
+            return None;
+        }
+        let own = covariance(normal, &self.residual(at, shape, &found))?;
+        let covariance = shape * own * shape.transpose();
+        // What is known worse than the start is not found.
+        let known = covariance.trace() <= rules.reach * rules.reach;
+        known.then_some(Aligned { at: *at, shape: *shape, covariance, correlation: found.correlation })
+    }
+
+    /// The corners of the warped window.
+    fn extent(&self, at: &Vector2<f64>, shape: &Matrix2<f64>) -> [Vector2<f64>; 2] {
+        let side = shape.abs() * Vector2::repeat(self.grid.reach());
+        [at - side, at + side]
+    }
+
+    /// Makes the spline cover the warped window and a little more.
+    fn load(&mut self, image: &Image, at: &Vector2<f64>, shape: &Matrix2<f64>) -> Option<()> {
+        let [first, last] = self.extent(at, shape);
+        // A window that is stretched beyond reason costs more than it is worth.
+        if !((last - first).max() <= 4.0 * self.grid.side as f64 + 8.0) {
+            return None;
+        }
+        self.load_between(image, &first, &last);
+        Some(())
+    }
+
+    /// Makes the spline cover these corners of windows and a little more.
+    fn load_between(&mut self, image: &Image, first: &Vector2<f64>, last: &Vector2<f64>) {
+        let fill = (self.grid.columns - self.grid.side) as f64;
+        let whole = |x: f64| x.floor() as isize;
+        let (start, end) = ([whole(first.x) - 2, whole(first.y) - 2], [whole(last.x + fill) + 5, whole(last.y) + 5]);
+        self.spline.load(image, start, end);
+    }
+
+    /// Compares the template with the window of the right image that the warp gives; `None` where the image ends.
+    fn compare<const P: usize>(
+        &mut self,
+        right: &Image,
+        at: &Vector2<f64>,
+        shape: &Matrix2<f64>,
+        rules: &Rules,
+    ) -> Option<Found<P>> {
+        let [first, last] = self.extent(at, shape);
+        let size = [right.width(), right.height()];
+        let inside = (0..2).all(|i| {
+            let (first, last) = if rules.beyond { (at[i], at[i]) } else { (first[i] - 1.0, last[i] + 1.0) };
+            first >= 0.0 && last <= (size[i] - 1) as f64
+        });
+        if !inside {
+            return None;
+        }
+        let fill = (self.grid.columns - self.grid.side) as f64;
+        let covers = |spline: &Spline| spline.covers([first.x, first.y], [last.x + fill, last.y + 1.0]);
+        if !covers(&self.spline) {
+            self.load(right, at, shape)?;
+        }
+        let Self { grid, template, spline, across, patch } = self;
+        if *shape == Matrix2::identity() {
+            let first = [at.x + grid.first[0], at.y + grid.first[1]];
+            spline.grid(first, grid.columns, grid.side, across, patch);
+        } else {
+            let corner = spline.corner();
+            let base = [at.x - corner[0] as f64, at.y - corner[1] as f64];
+            for (y, row) in patch.chunks_exact_mut(grid.columns).enumerate() {
+                let y = grid.first[1] + y as f64;
+                let begin = [0, 1].map(|i| (base[i] + shape[(i, 0)] * grid.first[0] + shape[(i, 1)] * y) as f32);
+                let step = [shape[(0, 0)] as f32, shape[(1, 0)] as f32];
+                for (x, out) in row[..grid.side].iter_mut().enumerate() {
+                    *out = spline.at([begin[0] + step[0] * x as f32, begin[1] + step[1] * x as f32]);
+                }
+            }
+        }
+        let mut gradient = [0.0; P];
+        let (variance, correlation) = sums(patch, &grid.weights, &template.values, &template.weighted, &mut gradient)?;
+        let variance = f64::from(variance);
+        let scale = 1.0 / variance.sqrt();
+        Some(Found {
+            gradient: SVector::from(gradient.map(f64::from)) * scale,
+            variance,
+            correlation: f64::from(correlation) * scale,
+        })
+    }
+
+    /// What is left between the windows.
+    fn residual<const P: usize>(&self, at: &Vector2<f64>, shape: &Matrix2<f64>, found: &Found<P>) -> Residual {
+        let whole = *shape == Matrix2::identity();
+        let squares: f32 = self.grid.weights.iter().map(|w| w * w).sum();
+        Residual {
+            energy: 2.0 * (1.0 - found.correlation),
+            variance: found.variance,
+            fractions: whole.then(|| [0, 1].map(|i| (at[i] + self.grid.first[i]).rem_euclid(1.0))),
+            squared_weights: f64::from(squares),
+        }
+    }
+}
+
+/// What the comparison gave.
+struct Found<const P: usize> {
+    /// Σ w J̃ᵀ(Ĩ − T̃).
+    gradient: SVector<f64, P>,
+    /// Variance of the right window (squares of grey levels).
+    variance: f64,
+    /// Correlation of the windows.
+    correlation: f64,
+}
+
+/// Variance of the patch, after its mean was subtracted, its product with T̃ and with the columns of J̃.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn sums(
+    patch: &mut [f32],
+    weights: &[f32],
+    template: &[f32],
+    jacobian: &[f32],
+    gradient: &mut [f32],
+) -> Option<(f32, f32)> {
+    let mean = dot(patch, weights);
+    patch.iter_mut().for_each(|p| *p -= mean);
+    let variance = dot3(patch, patch, weights);
+    if !(f64::from(variance) > LEAST_VARIANCE && variance.is_finite()) {
+        return None;
+    }
+    for (sum, column) in gradient.iter_mut().zip(jacobian.chunks_exact(patch.len())) {
+        *sum = dot(patch, column);
+    }
+    Some((variance, dot(patch, template)))
+}

@@ -1,0 +1,229 @@
+//! Interpolation by cubic splines.
+
+use crate::Image;
+
+/// Taps to either side of the prefilter; what is cut off is 1e-4 of a pixel's value.
+const REACH: usize = 7;
+
+/// The coefficients c of the cubic B-spline Σ c_ij β(x − i) β(y − j) that passes through the pixels of
+/// one rectangle of an image, continued as a mirror image beyond its border.
+///
+/// The prefilter is applied as its impulse response √3 (√3 − 2)^|k|, cut off and scaled to sum 1.
+///
+/// Source: Unser, *Splines: a perfect fit for signal and image processing*, 1999.
+#[derive(Debug, Default)]
+pub(super) struct Spline {
+    /// The first column and row.
+    corner: [isize; 2],
+    width: usize,
+    height: usize,
+    coefficients: Vec<f32>,
+    raw: Vec<f32>,
+    across: Vec<f32>,
+}
+
+/// The pixels of the rectangle of `width` × `height` at `corner`, mirrored at the border.
+pub(super) fn copy(image: &Image, corner: [isize; 2], width: usize, height: usize, out: &mut Vec<f32>) {
+    let ([x, y], w) = (corner, image.width() as isize);
+    out.clear();
+    out.reserve(width * height);
+    for y in y..y + height as isize {
+        let row = image.row(mirrored(y, image.height()));
+        if x >= 0 && x + width as isize <= w {
+            out.extend_from_slice(&row[x as usize..x as usize + width]);
+        } else {
+            out.extend((x..x + width as isize).map(|x| row[mirrored(x, image.width())]));
+        }
+    }
+}
+
+/// The pixel that the mirror image shows at `i`, of `n`.
+fn mirrored(i: isize, n: usize) -> usize {
+    let period = (2 * n as isize - 2).max(1);
+    let i = i.rem_euclid(period);
+    i.min(period - i).min(n as isize - 1) as usize
+}
+
+impl Spline {
+    /// Makes this the spline of the rectangle with these first and last columns and rows.
+    pub(super) fn load(&mut self, image: &Image, first: [isize; 2], last: [isize; 2]) {
+        let reach = REACH as isize;
+        self.corner = first;
+        self.width = ((last[0] - first[0]).max(0) as usize + 1).next_multiple_of(8);
+        self.height = (last[1] - first[1]).max(0) as usize + 1;
+        let (wide, high) = (self.width + 2 * REACH, self.height + 2 * REACH);
+        copy(image, [first[0] - reach, first[1] - reach], wide, high, &mut self.raw);
+        self.across.resize(self.width * high, 0.0);
+        self.coefficients.resize(self.width * self.height, 0.0);
+        prefilter(&self.raw, self.width, self.height, &mut self.across, &mut self.coefficients);
+    }
+
+    /// Makes this cover nothing.
+    pub(super) fn forget(&mut self) {
+        self.coefficients.clear();
+    }
+
+    /// Whether the spline is known at all places between these two corners.
+    pub(super) fn covers(&self, first: [f64; 2], last: [f64; 2]) -> bool {
+        let size = [self.width, self.height];
+        !self.coefficients.is_empty()
+            && (0..2).all(|i| {
+                let start = self.corner[i] as f64;
+                first[i] >= start + 1.0 && last[i] < start + size[i] as f64 - 2.0
+            })
+    }
+
+    /// The values on a grid with steps of one pixel from `at`, `columns` (a multiple of 8) by `rows`. Where the
+    /// spline is not known they mean nothing.
+    pub(super) fn grid(&self, at: [f64; 2], columns: usize, rows: usize, across: &mut Vec<f32>, out: &mut [f32]) {
+        let [(x, tx), (y, ty)] = [0, 1].map(|i| split(at[i] - self.corner[i] as f64));
+        across.resize(columns * (rows + 3), 0.0);
+        let first = (y - 1) * self.width + x - 1;
+        let (wx, wy) = (weights(tx), weights(ty));
+        separable(&self.coefficients[first..], self.width, [wx, wy], columns, across, &mut out[..columns * rows]);
+    }
+
+    /// The value at a place that the spline covers.
+    pub(super) fn at(&self, place: [f32; 2]) -> f32 {
+        let (x, y) = (place[0] as usize, place[1] as usize);
+        let (wx, wy) = (weights(place[0] - x as f32), weights(place[1] - y as f32));
+        let first = (y - 1) * self.width + x - 1;
+        let row = |i: usize| {
+            let c = &self.coefficients[first + i * self.width..][..4];
+            wx[0] * c[0] + wx[1] * c[1] + (wx[2] * c[2] + wx[3] * c[3])
+        };
+        wy[0] * row(0) + wy[1] * row(1) + (wy[2] * row(2) + wy[3] * row(3))
+    }
+
+    /// Where the rectangle begins.
+    pub(super) fn corner(&self) -> [isize; 2] {
+        self.corner
+    }
+}
+
+/// A coordinate inside the rectangle as a whole and a fraction.
+fn split(at: f64) -> (usize, f32) {
+    let whole = at.floor();
+    (whole as usize, (at - whole) as f32)
+}
+
+/// The four values β(t + 1), β(t), β(t − 1), β(t − 2).
+#[inline(always)]
+fn weights(t: f32) -> [f32; 4] {
+    let u = 1.0 - t;
+    let (a, d) = (u * u * u / 6.0, t * t * t / 6.0);
+    let b = 2.0 / 3.0 - t * t * (1.0 - 0.5 * t);
+    [a, b, 1.0 - a - b - d, d]
+}
+
+/// √3 (√3 − 2)^k for k = 0 … 7, scaled to sum 1 over both sides.
+const fn response() -> [f32; REACH + 1] {
+    let (mut taps, mut k) = ([0.0; REACH + 1], 1);
+    let mut exact = [1.0; REACH + 1];
+    let mut sum = 1.0;
+    while k <= REACH {
+        exact[k] = exact[k - 1] * (1.732_050_807_568_877_2 - 2.0);
+        sum += 2.0 * exact[k];
+        k += 1;
+    }
+    k = 0;
+    while k <= REACH {
+        taps[k] = (exact[k] / sum) as f32;
+        k += 1;
+    }
+    taps
+}
+
+/// Pixels to coefficients, along the rows and then along the columns.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn prefilter(raw: &[f32], width: usize, height: usize, across: &mut [f32], out: &mut [f32]) {
+    const TAPS: [f32; REACH + 1] = response();
+    for (row, to) in raw.chunks_exact(width + 2 * REACH).zip(across.chunks_exact_mut(width)) {
+        for (x, to) in to.chunks_exact_mut(8).enumerate() {
+            let from: &[f32] = &row[8 * x..8 * x + 8 + 2 * REACH];
+            let mut sum: [f32; 8] = std::array::from_fn(|i| TAPS[0] * from[REACH + i]);
+            for (k, tap) in TAPS.iter().enumerate().skip(1) {
+                let (a, b) = (&from[REACH - k..][..8], &from[REACH + k..][..8]);
+                for i in 0..8 {
+                    sum[i] += tap * (a[i] + b[i]);
+                }
+            }
+            to.copy_from_slice(&sum);
+        }
+    }
+    for (y, to) in out.chunks_exact_mut(width).enumerate().take(height) {
+        let rows: [&[f32]; 2 * REACH + 1] = std::array::from_fn(|k| &across[(y + k) * width..][..width]);
+        for (x, to) in to.chunks_exact_mut(8).enumerate() {
+            let from = |k: usize| &rows[k][8 * x..8 * x + 8];
+            let centre = from(REACH);
+            let mut sum: [f32; 8] = std::array::from_fn(|i| TAPS[0] * centre[i]);
+            for (k, tap) in TAPS.iter().enumerate().skip(1) {
+                let (a, b) = (from(REACH - k), from(REACH + k));
+                for i in 0..8 {
+                    sum[i] += tap * (a[i] + b[i]);
+                }
+            }
+            to.copy_from_slice(&sum);
+        }
+    }
+}
+
+/// A grid of one fraction: along the rows and then along the columns.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn separable(
+    coefficients: &[f32],
+    width: usize,
+    weights: [[f32; 4]; 2],
+    columns: usize,
+    across: &mut [f32],
+    out: &mut [f32],
+) {
+    let [wx, wy] = weights;
+    for (y, to) in across.chunks_exact_mut(columns).enumerate() {
+        let from = &coefficients[y * width..][..columns + 3];
+        let (a, b, c, d) = (&from[..columns], &from[1..=columns], &from[2..columns + 2], &from[3..]);
+        for i in 0..columns {
+            to[i] = wx[0] * a[i] + wx[1] * b[i] + (wx[2] * c[i] + wx[3] * d[i]);
+        }
+    }
+    for (y, to) in out.chunks_exact_mut(columns).enumerate() {
+        let row = |k: usize| &across[(y + k) * columns..][..columns];
+        let (a, b, c, d) = (row(0), row(1), row(2), row(3));
+        for i in 0..columns {
+            to[i] = wy[0] * a[i] + wy[1] * b[i] + (wy[2] * c[i] + wy[3] * d[i]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_passes_through_the_pixels_up_to_the_border() {
+        let value = |x: f64, y: f64| 100.0 + 40.0 * libm::sin(0.8 * x + 0.3 * y) + 30.0 * libm::cos(0.7 * y);
+        let image = Image::new(30, 20, (0..600).map(|i| value((i % 30) as f64, (i / 30) as f64) as f32).collect());
+        let image = image.unwrap();
+        let mut spline = Spline::default();
+        spline.load(&image, [-1, -1], [31, 21]);
+        let (mut out, mut across) = (vec![0.0; 8 * 20], Vec::new());
+        for x in [0, 11, 22] {
+            spline.grid([x as f64, 0.0], 8, 20, &mut across, &mut out);
+            for (row, y) in out.chunks(8).zip(0..) {
+                for (found, pixel) in row.iter().zip(&image.row(y)[x..]) {
+                    assert!((found - pixel).abs() < 0.05, "({x}, {y}): {found}, not {pixel}");
+                }
+            }
+        }
+        // Between them, and the same as sample by sample.
+        spline.grid([11.3, 8.6], 8, 3, &mut across, &mut out[..24]);
+        assert!((f64::from(out[9]) - value(12.3, 9.6)).abs() < 0.15);
+        assert!((out[9] - spline.at([12.3 + 1.0, 9.6 + 1.0])).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_mirror_image_continues_the_image() {
+        assert_eq!([-2, -1, 0, 2, 3, 4, 5].map(|i| mirrored(i, 4)), [2, 1, 0, 2, 3, 2, 1]);
+        assert_eq!([-5, 0, 7].map(|i| mirrored(i, 1)), [0, 0, 0]);
+    }
+}

@@ -1,0 +1,257 @@
+//! Matching without descriptors: each left key point is sought in the right image itself.
+
+use nalgebra::Vector2;
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Pixel, Point, StereoPixels, StereoRig};
+use serde::{Deserialize, Serialize};
+
+use super::{Match, Matcher, View};
+use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
+
+/// Left key points, followed into the right image from coarse to fine.
+///
+/// On a level of a pyramid (1/8 of the size, finer near the border) the window around the key point is compared
+/// by zero-normalised cross correlation at every pixel of its epipolar curve between the depths. The best of
+/// these places are followed to the full size and back by the tracker; a pair is the one that correlates best, if it
+/// lies on the epipolar curve. The right places are wherever they are found: right key points play no part.
+/// The distance of a pair is 1 minus the correlation. Of two pairs that end within a pixel the better stays.
+///
+/// Source: Lucas and Kanade, *An iterative image registration technique with an application to stereo vision*, 1981;
+/// Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct LucasKanade {
+    /// The greatest distance from the epipolar curve (px, Sampson).
+    pub epipolar_px: f64,
+    /// Least depth in the left camera (m).
+    pub min_depth: f64,
+    /// Greatest depth in the left camera (m).
+    pub max_depth: f64,
+    /// How many places on the epipolar curve are followed.
+    pub places: usize,
+    /// How they are followed.
+    pub tracker: Tracker,
+}
+
+impl Default for LucasKanade {
+    fn default() -> Self {
+        Self { epipolar_px: 1.0, min_depth: 0.5, max_depth: 50.0, places: 3, tracker: Tracker::default() }
+    }
+}
+
+impl Component for LucasKanade {
+    const NAME: &'static str = "lucas-kanade";
+    const SUMMARY: &'static str =
+        "left key points sought along the right image's epipolar curves, coarse to fine and back";
+    const SOURCE: &'static str = "Lucas and Kanade, An iterative image registration technique with an application to \
+                                  stereo vision, 1981; Bouguet, Pyramidal implementation of the Lucas Kanade feature \
+                                  tracker, 2000";
+
+    fn check(&self) -> Result<(), String> {
+        let Self { epipolar_px, min_depth, max_depth, places, ref tracker } = *self;
+        let band = epipolar_px > 0.0 && epipolar_px <= 1000.0;
+        in_range(band, "epipolar-px", epipolar_px, "more than 0, at most 1000 (px)")?;
+        in_range(min_depth > 0.0 && min_depth.is_finite(), "min-depth", min_depth, "a positive depth (m)")?;
+        let beyond = format!("a depth beyond min-depth = {min_depth} (m)");
+        in_range(max_depth > min_depth && max_depth.is_finite(), "max-depth", max_depth, &beyond)?;
+        in_range((1..=100).contains(&places), "places", places, "a number from 1 to 100")?;
+        tracker.check().map_err(|said| format!("tracker.{said}"))
+    }
+}
+
+/// The level on which the epipolar curve is searched, at most.
+const SEARCHED: usize = 3;
+/// Places on a curve, at most.
+const MOST: f64 = 512.0;
+/// Places on a curve that correlate worse than the best by this are not followed.
+const MUCH_WORSE: f64 = 0.3;
+/// Pairs that end nearer to each other (px) are one place.
+const SAME: f64 = 1.0;
+
+/// Left key points that are sought one after the other.
+const PIECE: usize = 32;
+
+/// Memory from frame to frame.
+#[derive(Debug, Default)]
+struct Memory {
+    pyramids: [Pyramid; 2],
+    seekers: Vec<Seeker>,
+    pairs: Vec<Option<Match>>,
+    order: Vec<usize>,
+    taken: Vec<Pixel>,
+}
+
+/// Memory for one piece of the work.
+#[derive(Debug, Default)]
+struct Seeker {
+    aligner: Aligner,
+    curve: Vec<Vector2<f64>>,
+    correlations: Vec<f64>,
+    best: Vec<(f64, Vector2<f64>)>,
+}
+
+impl Matcher for LucasKanade {
+    fn match_into(
+        &self,
+        left: &View<'_>,
+        right: &View<'_>,
+        rig: &StereoRig,
+        work: &mut Workspace,
+        found: &mut Vec<Match>,
+    ) {
+        let threads = work.threads();
+        let Memory { pyramids, seekers, pairs, order, taken } = work.get();
+        let [from, to] = pyramids;
+        threads.join(|| from.build(left.image, self.tracker.levels), || to.build(right.image, self.tracker.levels));
+        let levels = [from.levels(), to.levels()];
+        pairs.clear();
+        pairs.resize(left.keypoints.len(), None);
+        threads.pieces(pairs, PIECE, seekers, |index, piece, seeker| {
+            for (k, pair) in piece.iter_mut().enumerate() {
+                let left_index = index * PIECE + k;
+                *pair = self.seek(levels, &left.keypoints[left_index].at, rig, seeker).map(|(right, correlation)| {
+                    Match { left: left_index, right, distance: (1.0 - correlation) as f32 }
+                });
+            }
+        });
+        // The best first; the order of the left key points decides between equals.
+        order.clear();
+        order.extend((0..pairs.len()).filter(|&i| pairs[i].is_some()));
+        let distance = |i: usize| pairs[i].map_or(f32::INFINITY, |pair| pair.distance);
+        order.sort_unstable_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+        taken.clear();
+        found.clear();
+        for pair in order.iter().filter_map(|&i| pairs[i]) {
+            if taken.iter().all(|place| place.distance(&pair.right) >= SAME) {
+                taken.push(pair.right);
+                found.push(pair);
+            }
+        }
+        found.sort_unstable_by_key(|pair| pair.left);
+    }
+}
+
+impl LucasKanade {
+    /// Where the right image shows `place`, and the correlation there.
+    ///
+    /// Near the border a window fits on finer levels only, and a pair that a coarse level does not show may
+    /// be seen on a finer one.
+    fn seek(&self, levels: [&[Image]; 2], place: &Pixel, rig: &StereoRig, seeker: &mut Seeker) -> Option<(Pixel, f64)> {
+        let coarsest = SEARCHED.min(levels[0].len().saturating_sub(1));
+        (0..=coarsest).rev().find_map(|level| self.seek_from(level, levels, place, rig, seeker))
+    }
+
+    /// The same, beginning on one level.
+    fn seek_from(
+        &self,
+        level: usize,
+        levels: [&[Image]; 2],
+        place: &Pixel,
+        rig: &StereoRig,
+        seeker: &mut Seeker,
+    ) -> Option<(Pixel, f64)> {
+        let Seeker { aligner, curve, correlations, best } = seeker;
+        let levels = [levels[0].get(..=level)?, levels[1].get(..=level)?];
+        let scale = (1_u32 << level) as f64;
+        self.curve(place, rig, scale, curve);
+        curve.iter_mut().for_each(|place| *place /= scale);
+        let at = Vector2::new(place.u, place.v) / scale;
+        aligner.survey(&levels[0][level], &levels[1][level], &at, curve, &self.tracker.rules(), correlations);
+        best.clear();
+        for (i, &correlation) in correlations.iter().enumerate().filter(|(_, c)| **c > 0.0) {
+            let beside = |k: usize| correlations.get(k).copied().unwrap_or(-1.0);
+            if correlation >= beside(i.wrapping_sub(1)) && correlation > beside(i + 1) {
+                best.push((correlation, curve[i] * scale));
+            }
+        }
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let least = best.first()?.0 - MUCH_WORSE;
+        let likely = best.iter().take(self.places).filter(|(correlation, _)| *correlation >= least);
+        let tracks = likely.filter_map(|(_, start)| {
+            let start = Pixel { u: start.x, v: start.y };
+            let track = self.tracker.there(levels, place, &start, aligner)?;
+            let off = rig.epipolar_distance(&StereoPixels { left: *place, right: track.at })?;
+            (off <= self.epipolar_px).then_some((start, track))
+        });
+        let (start, track) = tracks.max_by(|a, b| a.1.correlation.total_cmp(&b.1.correlation))?;
+        let returns = self.tracker.returns(levels, [place, &start], &track, aligner);
+        returns.then_some((track.at, track.correlation))
+    }
+
+    /// The places of the epipolar curve of `place`, about `step` px apart, those beyond the image among them.
+    fn curve(&self, place: &Pixel, rig: &StereoRig, step: f64, curve: &mut Vec<Vector2<f64>>) {
+        curve.clear();
+        let Some(ray) = rig.left().normalize(place) else { return };
+        let seen = |inverse: f64| {
+            let right = rig.right().project(&(*rig.right_from_left() * Point::from(ray.push(1.0) / inverse)))?;
+            Some(Vector2::new(right.u, right.v))
+        };
+        let (far, mut near) = (1.0 / self.max_depth, 1.0 / self.min_depth);
+        let Some(end) = seen(far) else { return };
+        // So near that the right camera does not see it: half of that.
+        let mut begin = seen(near);
+        while begin.is_none() && near > 2.0 * far {
+            near *= 0.5;
+            begin = seen(near);
+        }
+        let Some(begin) = begin else { return };
+        let count = ((begin - end).norm() / step).ceil().min(MOST);
+        let places = (0..=count as usize).map(|i| far + (near - far) * i as f64 / count.max(1.0));
+        curve.extend(places.filter_map(seen));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Descriptors, Keypoint, track::stones};
+    use nalgebra::{UnitQuaternion, Vector3};
+    use seafix_geometry::{Pinhole, Transform};
+
+    /// f = 500 px, the right camera `step` (m) away.
+    fn rig(step: Vector3<f64>) -> StereoRig {
+        let camera = Pinhole::new([240, 180], [500.0; 2], [119.5, 89.5], &[]).unwrap();
+        StereoRig::new(camera, camera, Transform::new(UnitQuaternion::identity(), -step)).unwrap()
+    }
+
+    fn matches(rig: &StereoRig, shift: [f64; 2]) -> (Vec<Keypoint>, Vec<Match>) {
+        let at = |i: usize| Pixel { u: 75.3 + 15.0 * (i % 10) as f64, v: 65.6 + 15.0 * (i / 10) as f64 };
+        let keypoints: Vec<_> = (0..70).map(|i| Keypoint { at: at(i), response: 1.0, scale: 1.0 }).collect();
+        let (left, right, none) = (stones(240, [0.0; 2]), stones(240, shift), Descriptors::default());
+        let view = |image, keypoints| View { image, keypoints, descriptors: &none };
+        let found = LucasKanade::default().matches(&view(&left, &keypoints), &view(&right, &[]), rig);
+        (keypoints, found)
+    }
+
+    #[test]
+    fn disparities_near_and_far_are_found() {
+        for (step, shift) in [
+            (Vector3::new(0.25, 0.0, 0.0), [-11.4, 0.0]), // 11.0 m
+            (Vector3::new(0.25, 0.0, 0.0), [-62.5, 0.0]), // 2.0 m
+            (Vector3::new(0.0, 0.2, 0.0), [0.0, -50.2]),  // one above the other
+        ] {
+            let (keypoints, found) = matches(&rig(step), shift);
+            let [u, v] = shift;
+            let fits = |k: &Pixel| k.u + u > 15.0 && k.v + v > 15.0;
+            let possible = keypoints.iter().filter(|k| fits(&k.at)).count();
+            assert!(10 * found.len() >= 9 * possible, "{shift:?}: {} of {possible}", found.len());
+            assert!(found.windows(2).all(|pair| pair[0].left < pair[1].left));
+            for pair in &found {
+                let place = keypoints[pair.left].at;
+                let expected = Pixel { u: place.u + u, v: place.v + v };
+                assert!(pair.right.distance(&expected) < 0.1, "{shift:?}: {place:?} {pair:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_lies_off_the_epipolar_line_is_no_pair() {
+        let (keypoints, found) = matches(&rig(Vector3::new(0.25, 0.0, 0.0)), [-30.0, 4.0]);
+        // A window may look like another by chance.
+        assert!(found.len() <= 3, "{found:?}");
+        for pair in &found {
+            let place = keypoints[pair.left].at;
+            assert!(pair.right.distance(&Pixel { u: place.u - 30.0, v: place.v + 4.0 }) > 2.0, "{place:?} {pair:?}");
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! Tracking: where places of one image are in another, near or far.
+
+mod pyramid;
+
+use nalgebra::{Matrix2, Vector2};
+pub use pyramid::Pyramid;
+use seafix_component::in_range;
+use seafix_geometry::Pixel;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Image, Weight, Workspace,
+    align::{Aligned, Aligner, Rules, Translation},
+};
+
+/// Follows places from one image to another, from coarse to fine, and back.
+///
+/// On each level of a pyramid, the coarsest first, the window around the place is aligned to the other
+/// image as in [`Refine`](crate::Refine), by translation; each level begins where the one before ended. A place is
+/// followed if the finest level is aligned and the way back ends where the way there began.
+///
+/// Source: Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000; Kalal, Mikolajczyk and
+/// Matas, *Forward-backward error*, 2010.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Tracker {
+    /// Side of the window (px, on every level), odd, 3 to 201.
+    pub window: usize,
+    /// How the pixels of the window count.
+    pub weight: Weight,
+    /// Levels of the pyramid, 1 to 12: with each the reach doubles.
+    pub levels: usize,
+    /// How far a place may move on one level (px of that level).
+    pub reach: f64,
+    /// The least zero-normalised cross correlation of the windows on the finest level.
+    pub least_correlation: f64,
+    /// The greatest distance between the beginning and the end of the way there and back (px); 0: no way back.
+    pub return_px: f64,
+    /// The greatest number of iterations on a level.
+    pub iterations: usize,
+}
+
+/// A place that was followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Track {
+    /// Where it is in the other image.
+    pub at: Pixel,
+    /// The covariance of that, given the place in the first image (px²).
+    pub covariance: Matrix2<f64>,
+    /// The zero-normalised cross correlation of the windows.
+    pub correlation: f64,
+}
+
+impl Default for Tracker {
+    fn default() -> Self {
+        Self {
+            window: 15,
+            weight: Weight::Gaussian,
+            levels: 5,
+            reach: 8.0,
+            least_correlation: 0.8,
+            return_px: 0.5,
+            iterations: 20,
+        }
+    }
+}
+
+/// Places that are followed one after the other.
+const PIECE: usize = 64;
+/// Steps on levels that are only passed through end here (px of the level).
+const COARSE: f64 = 0.03;
+/// The least correlation on these levels.
+const ALIKE: f64 = 0.5;
+
+impl Tracker {
+    /// Whether the settings can be.
+    ///
+    /// # Errors
+    /// The setting that is out of its range, its value, and the range.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { window, weight: _, levels, reach, least_correlation, return_px, iterations } = *self;
+        let odd = window % 2 == 1 && (3..=201).contains(&window);
+        in_range(odd, "window", window, "an odd number of pixels from 3 to 201")?;
+        in_range((1..=12).contains(&levels), "levels", levels, "a number from 1 to 12")?;
+        in_range(reach > 0.0 && reach <= 100.0, "reach", reach, "more than 0, at most 100 (px)")?;
+        let correlated = (-1.0..=1.0).contains(&least_correlation);
+        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
+        in_range((0.0..=100.0).contains(&return_px), "return-px", return_px, "a number from 0 to 100 (px)")?;
+        in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
+    }
+
+    /// Replaces `found` by where each of `places` (in the first image, and where to begin in the second) is in the
+    /// second image.
+    pub fn track_into(
+        &self,
+        [from, to]: [&Pyramid; 2],
+        places: &[[Pixel; 2]],
+        work: &mut Workspace,
+        found: &mut Vec<Option<Track>>,
+    ) {
+        found.clear();
+        found.resize(places.len(), None);
+        let threads = work.threads();
+        let aligners = work.get::<Vec<Aligner>>();
+        threads.pieces(found, PIECE, aligners, |index, piece, aligner| {
+            for (found, [place, start]) in piece.iter_mut().zip(&places[index * PIECE..]) {
+                *found = self.track([from.levels(), to.levels()], place, start, aligner);
+            }
+        });
+    }
+
+    /// Where each of `places` of the first image is in the second, beginning where it was.
+    pub fn track_all(&self, from: &Image, to: &Image, places: &[Pixel]) -> Vec<Option<Track>> {
+        let pyramids = [from, to].map(|image| Pyramid::new(image, self.levels));
+        let places: Vec<[Pixel; 2]> = places.iter().map(|place| [*place; 2]).collect();
+        let mut found = Vec::new();
+        self.track_into([&pyramids[0], &pyramids[1]], &places, &mut Workspace::default(), &mut found);
+        found
+    }
+
+    /// When an alignment on the finest level is believed.
+    pub(crate) fn rules(&self) -> Rules {
+        Rules {
+            half: self.window / 2,
+            weight: self.weight,
+            reach: self.reach,
+            least_correlation: self.least_correlation,
+            iterations: self.iterations,
+            precision: Rules::FINE,
+            beyond: false,
+        }
+    }
+
+    /// One place, there and back.
+    pub(crate) fn track(
+        &self,
+        [from, to]: [&[Image]; 2],
+        place: &Pixel,
+        start: &Pixel,
+        aligner: &mut Aligner,
+    ) -> Option<Track> {
+        let there = self.there([from, to], place, start, aligner)?;
+        self.returns([from, to], [place, start], &there, aligner).then_some(there)
+    }
+
+    /// One place, there.
+    pub(crate) fn there(
+        &self,
+        levels: [&[Image]; 2],
+        place: &Pixel,
+        start: &Pixel,
+        aligner: &mut Aligner,
+    ) -> Option<Track> {
+        let found = self.follow(levels, &vector(place), &vector(start), aligner)?;
+        let at = Pixel { u: found.at.x, v: found.at.y };
+        Some(Track { at, covariance: found.covariance, correlation: found.correlation })
+    }
+
+    /// Whether the way back, which begins as wrong as the way there did, ends at `place`.
+    pub(crate) fn returns(
+        &self,
+        [from, to]: [&[Image]; 2],
+        [place, start]: [&Pixel; 2],
+        there: &Track,
+        aligner: &mut Aligner,
+    ) -> bool {
+        let [place, start, there] = [place, start, &there.at].map(vector);
+        self.return_px == 0.0
+            || self
+                .follow([to, from], &there, &(there + place - start), aligner)
+                .is_some_and(|back| (back.at - place).norm() <= self.return_px)
+    }
+
+    /// From the coarsest level to the finest. A level that cannot align leaves the place to the next.
+    fn follow(
+        &self,
+        [from, to]: [&[Image]; 2],
+        place: &Vector2<f64>,
+        start: &Vector2<f64>,
+        aligner: &mut Aligner,
+    ) -> Option<Aligned> {
+        let fine = self.rules();
+        let coarse = Rules { least_correlation: ALIKE, precision: COARSE, beyond: true, ..fine };
+        let mut at = *start;
+        let levels = from.iter().zip(to).enumerate();
+        for (level, (from, to)) in levels.skip(1).rev() {
+            let scale = (1_u32 << level) as f64;
+            let begin = (&(at / scale), &Matrix2::identity());
+            if let Some(found) = aligner.align(from, to, &(place / scale), begin, &coarse, &Translation) {
+                at = found.at * scale;
+            }
+        }
+        let (from, to) = (from.first()?, to.first()?);
+        aligner.align(from, to, place, (&at, &Matrix2::identity()), &fine, &Translation)
+    }
+}
+
+fn vector(pixel: &Pixel) -> Vector2<f64> {
+    Vector2::new(pixel.u, pixel.v)
+}
+
+/// Soft discs of random size, place and brightness, moved by `shift`: an image of `width` × ¾ `width`.
+#[cfg(test)]
+pub(crate) fn stones(width: usize, shift: [f64; 2]) -> Image {
+    let mut state = 1_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / (1 << 24) as f64
+    };
+    let height = width * 3 / 4;
+    let mut pixels = vec![100.0_f32; width * height];
+    for _ in 0..width * width / 30 {
+        let [x, y] = [0, 1].map(|i| 1.4 * width as f64 * random() - 0.2 * width as f64 + shift[i]);
+        let (radius, bright) = (2.0 + 8.0 * random(), 60.0 * random() - 30.0);
+        let around =
+            |x: f64, n: usize| (x - radius - 6.0).max(0.0) as usize..((x + radius + 7.0).max(0.0) as usize).min(n);
+        for v in around(y, height) {
+            for u in around(x, width) {
+                let off = ((u as f64 - x).powi(2) + (v as f64 - y).powi(2)).sqrt() - radius;
+                pixels[v * width + u] += (bright / (1.0 + libm::exp(1.5 * off))) as f32;
+            }
+        }
+    }
+    Image::new(width, height, pixels).unwrap()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHIFT: [f64; 2] = [31.3, -6.6];
+
+    /// 48 places well inside an image of 480 px.
+    fn places() -> Vec<Pixel> {
+        (0..48).map(|i| Pixel { u: 130.5 + 20.0 * (i % 8) as f64, v: 110.25 + 22.0 * (i / 8) as f64 }).collect()
+    }
+
+    fn moved(place: &Pixel) -> Pixel {
+        Pixel { u: place.u + SHIFT[0], v: place.v + SHIFT[1] }
+    }
+
+    #[test]
+    fn a_far_shift_is_followed() {
+        let (from, to, places) = (stones(480, [0.0; 2]), stones(480, SHIFT), places());
+        let right = |tracker: &Tracker| {
+            let found = tracker.track_all(&from, &to, &places);
+            let errors =
+                places.iter().zip(&found).filter_map(|(place, track)| Some(track.as_ref()?.at.distance(&moved(place))));
+            let errors: Vec<f64> = errors.collect();
+            (errors.len(), errors.iter().filter(|error| **error < 0.05).count())
+        };
+        let (followed, rightly) = right(&Tracker::default());
+        assert!(followed >= 46 && rightly == followed, "{rightly} of {followed} of 48");
+        assert_eq!(right(&Tracker { levels: 1, ..Tracker::default() }).1, 0, "31 px are too far for one level");
+    }
+
+    #[test]
+    fn what_is_gone_is_not_followed() {
+        let (from, places) = (stones(240, [0.0; 2]), [Pixel { u: 120.0, v: 90.0 }]);
+        let flat = Image::new(240, 180, vec![100.0; 240 * 180]).unwrap();
+        assert_eq!(Tracker::default().track_all(&from, &flat, &places), [None]);
+        let tiny = Image::new(1, 1, vec![100.0]).unwrap();
+        assert_eq!(Tracker::default().track_all(&tiny, &from, &places), [None]);
+        assert_eq!(Tracker::default().track_all(&from, &tiny, &places), [None]);
+    }
+
+    #[test]
+    fn the_way_back_must_end_where_it_began() {
+        let images = [[0.0; 2], SHIFT].map(|shift| Pyramid::new(&stones(480, shift), 5));
+        let levels = [images[0].levels(), images[1].levels()];
+        let (tracker, aligner) = (Tracker::default(), &mut Aligner::default());
+        let place = Pixel { u: 210.5, v: 150.25 };
+        let there = tracker.there(levels, &place, &place, aligner).unwrap();
+        assert!(tracker.returns(levels, [&place, &place], &there, aligner));
+        let beside = Track { at: Pixel { u: there.at.u + 1.0, v: there.at.v }, ..there };
+        assert!(!tracker.returns(levels, [&place, &place], &beside, aligner), "it ends a pixel beside");
+        let free = Tracker { return_px: 0.0, ..tracker };
+        assert!(free.returns(levels, [&place, &place], &beside, aligner));
+    }
+}
