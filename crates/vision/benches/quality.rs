@@ -181,7 +181,11 @@ fn methods() -> Vec<(&'static str, &'static str, Method)> {
         ("harris + surf rotated", "", ours(corners("harris"), named("surf").with("upright", false))),
         ("harris by default + surf upright", "", ours(named("harris"), named("surf"))),
         ("shi-tomasi + surf upright", "", ours(corners("shi-tomasi"), named("surf"))),
-        ("dog + sift", "OpenCV SIFT", ours(named("dog"), named("sift"))),
+        (
+            "dog + sift",
+            "OpenCV SIFT",
+            ours(named("dog").with("selection", "strongest"), named("sift").with("upright", false)),
+        ),
         ("fast + orb", "OpenCV ORB", ours(named("fast").with("selection", "strongest"), named("orb"))),
         ("harris + zncc-patch", "", ours(corners("harris"), named("zncc-patch"))),
     ];

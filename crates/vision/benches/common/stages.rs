@@ -152,7 +152,14 @@ impl Scene {
         let list = [
             ("SURF upright, detect and describe", SURF, surf(true), "surf", own.clone(), Some(0.25)),
             ("SURF rotated, detect and describe", SURF, surf(false), "surf", own.with("upright", false), Some(0.25)),
-            ("SIFT, detect and describe", OPENCV, features("sift"), "dog", Choice::named("sift"), None),
+            (
+                "SIFT, detect and describe",
+                OPENCV,
+                features("sift"),
+                "dog",
+                Choice::named("sift").with("upright", false),
+                None,
+            ),
             ("ORB, detect and describe", OPENCV, features("orb"), "fast", Choice::named("orb"), None),
         ];
         let stages = list.into_iter().filter_map(|(name, asks, request, detects, describes, at_most)| {
