@@ -18,6 +18,7 @@ mod gaussian;
 mod image;
 mod matching;
 mod scale_space;
+mod swapped;
 mod track;
 mod workspace;
 
@@ -28,6 +29,7 @@ pub use detect::{DETECTORS, Detector, Dog, Fast, FastHessian, Harris, Keypoint, 
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
-pub use matching::{LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View};
+pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View};
+pub use swapped::Sides;
 pub use track::{Pyramid, Track, Tracker};
 pub use workspace::{Threads, Workspace};

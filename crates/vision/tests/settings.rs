@@ -128,6 +128,12 @@ fn zncc_patch_refuses_what_is_no_window() {
 }
 
 #[test]
+fn epipolar_band_needs_a_band() {
+    range(&MATCHERS, "epipolar-band", "epipolar-px", &[0.1, 1000.0], &[0.0, -1.0, 1001.0]);
+    range(&MATCHERS, "epipolar-band", "max-hamming", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
+}
+
+#[test]
 fn mutual_ratio_refuses_what_matches_nothing() {
     range(&MATCHERS, "mutual-ratio", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
     range(&MATCHERS, "mutual-ratio", "max-distance", &[0.1, 2.0], &[0.0, -0.7, 2.1]);
@@ -190,6 +196,7 @@ fn triangulation_names_the_setting_that_cannot_be() {
         for (settings, key) in [
             (Triangulator { sigma_px: bad, ..settings.clone() }, "sigma-px"),
             (Triangulator { epipolar_px: bad, ..settings.clone() }, "epipolar-px"),
+            (Triangulator { confidence: bad, ..settings.clone() }, "confidence"),
             (Triangulator { max_depth: bad, ..settings.clone() }, "max-depth"),
         ] {
             let said = settings.check().expect_err(key);

@@ -2,7 +2,6 @@
 
 mod check;
 mod describe;
-mod encoded;
 mod folder;
 mod open;
 mod picture;

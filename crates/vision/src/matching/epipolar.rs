@@ -3,19 +3,35 @@
 use nalgebra::{Vector2, Vector3};
 use seafix_geometry::StereoRig;
 
+use super::grid::Grid;
 use crate::Keypoint;
+
+/// How far from seeing one point two key points may be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Half width of the epipolar band (px, Sampson distance).
+    pub(super) px: f64,
+    /// Least and greatest depth in the left camera (m).
+    pub(super) depths: [f64; 2],
+}
 
 /// The pairs that see one point within a distance in pixels and limits of depth.
 ///
+/// The right key points lie in a grid of their undistorted directions, where epipolar lines are straight: only those
+/// beside a line are looked at. This holds for any displacement of the cameras, with epipoles inside the images too.
+///
 /// Source: Hartley and Zisserman, *Multiple View Geometry*, 2nd ed. 2004, eq. 11.9 (Sampson distance).
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Band {
     left: Vec<LeftRay>,
     right: Vec<RightRay>,
+    grid: Grid,
     /// Translation of right_from_left (m).
     step: Vector3<f64>,
     /// Depth limits in the left camera (m).
     depths: [f64; 2],
+    /// The greatest squared slope among the right rays.
+    steepest: f64,
 }
 
 #[derive(Debug)]
@@ -36,30 +52,40 @@ struct RightRay {
 }
 
 impl Band {
-    /// The band of half width `px` (px) for points between these depths (m).
-    pub(super) fn new(
-        left: &[Keypoint],
-        right: &[Keypoint],
-        rig: &StereoRig,
-        px: f64,
-        min_depth: f64,
-        max_depth: f64,
-    ) -> Self {
+    /// Replaces its key points by these.
+    pub(super) fn fill(&mut self, left: &[Keypoint], right: &[Keypoint], rig: &StereoRig, limits: &Limits) {
         let motion = rig.right_from_left();
-        let (rotation, step) = (motion.rotation_matrix(), motion.translation());
-        let (essential, focal) = (rig.essential(), rig.mean_focal());
+        let (rotation, essential) = (motion.rotation_matrix(), rig.essential());
+        let (scale, transposed) = (rig.mean_focal() / limits.px, essential.transpose());
+        (self.step, self.depths) = (motion.translation(), limits.depths);
         // Where the lens model has no direction the ray is not a number, which no comparison allows.
         let nowhere = Vector2::repeat(f64::NAN);
-        let left = left.iter().map(|keypoint| {
+        self.left.clear();
+        self.left.extend(left.iter().map(|keypoint| {
             let ray = rig.left().normalize(&keypoint.at).unwrap_or(nowhere).push(1.0);
             let line = essential * ray;
-            LeftRay { line: line * (focal / px), slope: line.xy().norm_squared(), turned: rotation * ray }
-        });
-        let right = right.iter().map(|keypoint| {
+            LeftRay { line: line * scale, slope: line.xy().norm_squared(), turned: rotation * ray }
+        }));
+        self.right.clear();
+        self.right.extend(right.iter().map(|keypoint| {
             let ray = rig.right().normalize(&keypoint.at).unwrap_or(nowhere);
-            RightRay { ray, slope: (essential.transpose() * ray.push(1.0)).xy().norm_squared() }
-        });
-        Self { left: left.collect(), right: right.collect(), step, depths: [min_depth, max_depth] }
+            RightRay { ray, slope: (transposed * ray.push(1.0)).xy().norm_squared() }
+        }));
+        self.steepest = self.right.iter().map(|right| right.slope).fold(0.0, f64::max);
+        self.grid.fill(self.right.iter().map(|right| right.ray.into()));
+    }
+
+    /// Visits every right key point that left key point `i` may be, in no order that means anything.
+    pub(super) fn visit(&self, i: usize, mut visit: impl FnMut(usize)) {
+        let left = &self.left[i];
+        if left.slope.is_finite() {
+            let half = (left.slope + self.steepest).sqrt();
+            self.grid.along_line(left.line.into(), half, |j| {
+                if self.allows(i, j) {
+                    visit(j);
+                }
+            });
+        }
     }
 
     /// Whether left key point `i` and right key point `j` can see one point.

@@ -1,11 +1,19 @@
 //! Matchers: which key point of the right image is which of the left.
 
+mod along;
 mod epipolar;
+mod epipolar_band;
+mod exhaustive;
+mod grid;
 mod lucas_kanade;
+mod metric;
 mod mutual_ratio;
 mod nearest;
 mod support;
+#[cfg(test)]
+mod test_scene;
 
+pub use epipolar_band::EpipolarBand;
 pub use lucas_kanade::LucasKanade;
 pub use mutual_ratio::MutualRatio;
 use seafix_component::{Registry, entry};
@@ -56,4 +64,5 @@ pub trait Matcher: Send + Sync + std::fmt::Debug {
 }
 
 /// All matchers.
-pub static MATCHERS: Registry<dyn Matcher> = Registry::new("matcher", &[entry!(LucasKanade), entry!(MutualRatio)]);
+pub static MATCHERS: Registry<dyn Matcher> =
+    Registry::new("matcher", &[entry!(EpipolarBand), entry!(LucasKanade), entry!(MutualRatio)]);

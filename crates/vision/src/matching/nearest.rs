@@ -1,23 +1,21 @@
-//! Exact nearest and second nearest neighbours between two sets of descriptors.
+//! Nearest and second nearest neighbours between two sets.
 
-use crate::Table;
-
-/// For every descriptor of either side, the nearest on the other side and the distance of the second.
-#[derive(Debug)]
+/// For everything on either side, the nearest on the other side and the distance of the second.
+#[derive(Debug, Default)]
 pub(super) struct Nearest {
-    left: Vec<Two>,
-    right: Vec<Two>,
+    pub(super) left: Vec<Two>,
+    pub(super) right: Vec<Two>,
 }
 
 /// The nearest of those seen so far and the squared distances of the nearest two.
-#[derive(Debug, Clone, Copy)]
-struct Two {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Two {
     index: usize,
     squared: f32,
     second: f32,
 }
 
-/// Two descriptors that are each other's nearest.
+/// Two that are each other's nearest.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mutual {
     pub(super) left: usize,
@@ -29,11 +27,11 @@ pub(super) struct Mutual {
 }
 
 impl Two {
-    const NONE: Self = Self { index: usize::MAX, squared: f32::INFINITY, second: f32::INFINITY };
+    pub(super) const NONE: Self = Self { index: usize::MAX, squared: f32::INFINITY, second: f32::INFINITY };
 
-    /// Of equals the first offered stays.
-    fn offer(&mut self, index: usize, squared: f32) {
-        if squared < self.squared {
+    /// Of equals the one of the lowest index stays, in whatever order they come.
+    pub(super) fn offer(&mut self, index: usize, squared: f32) {
+        if squared < self.squared || squared == self.squared && index < self.index {
             *self = Self { index, squared, second: self.squared };
         } else if squared < self.second {
             self.second = squared;
@@ -41,50 +39,27 @@ impl Two {
     }
 }
 
-/// Left and right descriptors compared at once.
-const ROWS: usize = 2;
-const COLUMNS: usize = 8;
+impl Mutual {
+    /// Whether they are nearer than `ratio` times the second; 1 asks for nothing. Where the second is no
+    /// further, as where all look alike, no ratio below 1 passes.
+    pub(super) fn clear(&self, squared_ratio: f32) -> bool {
+        squared_ratio >= 1.0 || self.squared < squared_ratio * self.second
+    }
+}
 
 impl Nearest {
-    /// Of so many left and right descriptors, none compared yet.
-    pub(super) fn none(left: usize, right: usize) -> Self {
-        Self { left: vec![Two::NONE; left], right: vec![Two::NONE; right] }
+    /// Of so many on the left and on the right, none compared yet.
+    pub(super) fn reset(&mut self, left: usize, right: usize) {
+        self.left.clear();
+        self.left.resize(left, Two::NONE);
+        self.right.clear();
+        self.right.resize(right, Two::NONE);
     }
 
-    /// Left descriptor `i` and right descriptor `j` are this far apart.
+    /// Left `i` and right `j` are this far apart.
     pub(super) fn offer(&mut self, i: usize, j: usize, squared: f32) {
         self.left[i].offer(j, squared);
         self.right[j].offer(i, squared);
-    }
-
-    /// Among all pairs: blocks of a few left and eight right descriptors stay in registers. Every sum
-    /// runs in the descriptor's order, so the distances are those of [`squared`] to the last bit.
-    pub(super) fn of_all(left: &Table<f32>, right: &Table<f32>) -> Self {
-        let mut nearest = Self::none(left.len(), right.len());
-        if left.is_empty() || right.is_empty() {
-            return nearest;
-        }
-        let length = right.length();
-        // Panels of eight right descriptors, number by number; the last one is filled up with zeros.
-        let panels: Vec<Vec<[f32; COLUMNS]>> = (0..right.len())
-            .step_by(COLUMNS)
-            .map(|first| {
-                let value = |k: usize, j: usize| if j < right.len() { right.row(j)[k] } else { 0.0 };
-                (0..length).map(|k| std::array::from_fn(|c| value(k, first + c))).collect()
-            })
-            .collect();
-        for first in (0..left.len()).step_by(ROWS) {
-            let rows: [&[f32]; ROWS] = std::array::from_fn(|r| left.row((first + r).min(left.len() - 1)));
-            for (panel, values) in panels.iter().enumerate() {
-                let squared = block(rows, values);
-                for (i, squared) in (first..left.len()).zip(squared) {
-                    for (j, squared) in (panel * COLUMNS..right.len()).zip(squared) {
-                        nearest.offer(i, j, squared);
-                    }
-                }
-            }
-        }
-        nearest
     }
 
     /// The pairs that are each other's nearest, in the order of the left side.
@@ -97,57 +72,34 @@ impl Nearest {
     }
 }
 
-/// The squared Euclidean distance.
-pub(super) fn squared(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a - b).fold(0.0, |sum, d| sum + d * d)
-}
-
-/// Squared distances between the rows and the columns of a panel.
-fn block(rows: [&[f32]; ROWS], panel: &[[f32; COLUMNS]]) -> [[f32; COLUMNS]; ROWS] {
-    let mut sums = [[0.0; COLUMNS]; ROWS];
-    let [a, b] = rows.map(|row| &row[..panel.len()]);
-    for (k, values) in panel.iter().enumerate() {
-        for (sum, value) in sums[0].iter_mut().zip(values) {
-            let d = a[k] - value;
-            *sum += d * d;
-        }
-        for (sum, value) in sums[1].iter_mut().zip(values) {
-            let d = b[k] - value;
-            *sum += d * d;
-        }
-    }
-    sums
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn nearest_and_second_by_hand() {
-        let left = Table::new(1, vec![0.0, 5.0, 5.5]);
-        let right = Table::new(1, vec![5.1, 0.5, 9.0]);
-        let pairs: Vec<_> = Nearest::of_all(&left, &right).mutual().map(|m| (m.left, m.right, m.second)).collect();
+        let (left, right) = ([0.0_f32, 5.0, 5.5], [5.1_f32, 0.5, 9.0]);
+        let mut nearest = Nearest::default();
+        nearest.reset(3, 3);
+        for (i, j) in (0..9).map(|pair| (pair / 3, pair % 3)) {
+            nearest.offer(i, j, (left[i] - right[j]).powi(2));
+        }
+        let pairs: Vec<_> = nearest.mutual().collect();
         assert_eq!(pairs.len(), 2);
-        assert_eq!((pairs[0].0, pairs[0].1), (0, 1));
-        assert!((pairs[0].2 - 20.25).abs() < 1e-4, "from right 1 the second is left 1");
-        assert_eq!((pairs[1].0, pairs[1].1), (1, 0));
-        assert!((pairs[1].2 - 0.16).abs() < 1e-4, "from right 0 the second is left 2");
+        assert_eq!((pairs[0].left, pairs[0].right), (0, 1));
+        assert!((pairs[0].second - 20.25).abs() < 1e-4, "from right 1 the second is left 1");
+        assert_eq!((pairs[1].left, pairs[1].right), (1, 0));
+        assert!((pairs[1].second - 0.16).abs() < 1e-4, "from right 0 the second is left 2");
+        assert!(pairs[0].clear(0.7) && pairs[1].clear(0.7) && !pairs[1].clear(0.05));
     }
 
     #[test]
-    fn blocks_give_the_same_bits() {
-        for (n, m) in [(1, 1), (2, 8), (13, 21), (40, 7)] {
-            let values = |n: usize, seed: usize| (0..n * 5).map(|i| ((i * 37 + seed) % 101) as f32 * 0.013).collect();
-            let (left, right) = (Table::new(5, values(n, 3)), Table::new(5, values(m, 50)));
-            let bits = |nearest: Nearest| -> Vec<_> {
-                nearest.mutual().map(|m| (m.left, m.right, m.squared.to_bits(), m.second.to_bits())).collect()
-            };
-            let mut one_by_one = Nearest::none(n, m);
-            for (i, j) in (0..n).flat_map(|i| (0..m).map(move |j| (i, j))) {
-                one_by_one.offer(i, j, super::squared(left.row(i), right.row(j)));
-            }
-            assert_eq!(bits(Nearest::of_all(&left, &right)), bits(one_by_one));
-        }
+    fn what_is_no_nearer_than_another_is_not_clear() {
+        let mut two = [Two::NONE; 2];
+        [(4, 0.0), (2, 0.0), (9, 1.0)].into_iter().for_each(|(index, squared)| two[0].offer(index, squared));
+        [(9, 1.0), (2, 0.0), (4, 0.0)].into_iter().for_each(|(index, squared)| two[1].offer(index, squared));
+        assert_eq!(two, [Two { index: 2, squared: 0.0, second: 0.0 }; 2]);
+        let alike = Mutual { left: 0, right: 2, squared: 0.0, second: 0.0 };
+        assert!(!alike.clear(0.99) && alike.clear(1.0));
     }
 }

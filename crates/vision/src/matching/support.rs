@@ -1,12 +1,13 @@
 //! Support of a pair by the pairs around it.
 
-use seafix_geometry::Pixel;
-
+use super::grid::Grid;
 use crate::Keypoint;
 
 /// A right key point that a left one may be.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Candidate {
+    /// Index among the left key points.
+    left: usize,
     /// Index among the right key points.
     pub(super) right: usize,
     /// Squared distance of the descriptors.
@@ -15,46 +16,89 @@ pub(super) struct Candidate {
     pub(super) weight: f32,
     /// The weight as a share of all candidates' weights at either key point of the pair.
     share: f32,
+    /// From the left key point to the right one (px).
+    displacement: [f32; 2],
 }
 
-/// The candidates of every left key point, the nearest descriptors first.
-#[derive(Debug)]
+/// The candidates of every left key point, the nearest descriptors first, and what supports them.
+#[derive(Debug, Default)]
 pub(super) struct Candidates {
-    of_left: Vec<Vec<Candidate>>,
+    all: Vec<Candidate>,
+    /// Where each left key point's candidates begin, and where the last one's end.
+    starts: Vec<usize>,
+    links: Vec<Link>,
+    /// Where each candidate's links begin, and where the last one's end.
+    link_starts: Vec<usize>,
+    /// The left key points that have candidates.
+    occupied: Vec<usize>,
+    grid: Grid,
+    near: Vec<(f32, u32)>,
+    columns: Vec<f32>,
+    /// Whether each candidate that was chosen has a rival.
+    verdicts: Vec<Option<bool>>,
+}
+
+/// An agreeing candidate of a neighbour.
+#[derive(Debug, Clone, Copy)]
+struct Link {
+    candidate: u32,
+    agreement: f32,
+    /// Which neighbour it belongs to.
+    rank: u16,
 }
 
 /// No left key point has more candidates than this.
 const MOST: usize = 8;
 /// No candidate's descriptor is further than this many times the nearest one's.
 const FURTHEST: f32 = 2.0;
+/// What counts as no distance: descriptors nearer than this are equally near.
+const NEAREST: f32 = 1e-6;
 /// Rounds of mutual support.
 const ROUNDS: usize = 10;
 /// Greatest gradient of the displacement that still gives support: a surface seen at a grazing angle.
-const GRADIENT: f64 = 0.3;
+const GRADIENT: f32 = 0.3;
 /// What detectors may err (px).
-const SLACK: f64 = 1.0;
+const SLACK: f32 = 1.0;
 /// The support that every pair has.
 const FLOOR: f32 = 0.05;
+/// A rival that so great a share of the neighbours agrees with as well is one to be told from.
+const RIVAL: f32 = 0.5;
+/// Standard errors by which the neighbourhood's descriptors must prefer a pair to its rival.
+const CLEARLY: f32 = 3.0;
+/// Fewer neighbours give no standard error.
+const FEW: usize = 4;
 
 impl Candidates {
-    /// From all allowed pairs of `n` left key points: (left, right, squared distance).
-    pub(super) fn new(n: usize, pairs: impl Iterator<Item = (usize, usize, f32)>) -> Self {
-        let mut of_left = vec![Vec::new(); n];
-        for (left, right, squared) in pairs {
-            of_left[left].push(Candidate { right, squared, weight: 1.0 / squared.max(1e-6), share: 0.0 });
+    /// Replaces them by the pairs that `visit(i, ..)` names for each left key point, so far apart.
+    pub(super) fn fill(
+        &mut self,
+        [left, right]: [&[Keypoint]; 2],
+        visit: impl Fn(usize, &mut dyn FnMut(usize)),
+        squared: impl Fn(usize, usize) -> f32,
+    ) {
+        self.all.clear();
+        self.starts.clear();
+        self.starts.push(0);
+        for (i, from) in left.iter().enumerate() {
+            let first = self.all.len();
+            visit(i, &mut |j| {
+                let (to, squared) = (&right[j].at, squared(i, j));
+                let displacement = [(to.u - from.at.u) as f32, (to.v - from.at.v) as f32];
+                let weight = 1.0 / squared.max(NEAREST);
+                self.all.push(Candidate { left: i, right: j, squared, weight, share: 0.0, displacement });
+            });
+            let mine = &mut self.all[first..];
+            mine.sort_unstable_by(|a, b| a.squared.total_cmp(&b.squared).then(a.right.cmp(&b.right)));
+            let most = mine.first().map_or(0.0, |nearest| FURTHEST * FURTHEST * nearest.squared.max(NEAREST));
+            let kept = mine.iter().take(MOST).take_while(|c| c.squared <= most).count();
+            self.all.truncate(first + kept);
+            self.starts.push(self.all.len());
         }
-        for candidates in &mut of_left {
-            candidates.sort_by(|a, b| a.squared.total_cmp(&b.squared)); // stable: of equals the first stays first
-            candidates.truncate(MOST);
-            let nearest = candidates.first().map_or(0.0, |c| c.squared);
-            candidates.retain(|c| c.squared <= FURTHEST * FURTHEST * nearest.max(1e-6));
-        }
-        Self { of_left }
     }
 
     /// The candidates of left key point `i`.
     pub(super) fn of(&self, i: usize) -> &[Candidate] {
-        &self.of_left[i]
+        &self.all[self.starts[i]..self.starts[i + 1]]
     }
 
     /// Shifts belief to the candidates that agree with those of the `neighbours` nearest left key points.
@@ -67,86 +111,177 @@ impl Candidates {
     ///
     /// Source: Barnard and Thompson, *Disparity analysis of images*, PAMI 1980; Pollard, Mayhew and
     /// Frisby, *PMF: a stereo correspondence algorithm using a disparity gradient limit*, 1985.
-    pub(super) fn support(&mut self, left: &[Keypoint], right: &[Keypoint], neighbours: usize) {
-        let links = self.links(left, right, neighbours);
+    pub(super) fn support(&mut self, left: &[Keypoint], right: usize, neighbours: usize) {
+        self.link(left, neighbours);
         for _ in 0..ROUNDS {
-            self.share(right.len());
-            let before = self.of_left.clone();
-            for (candidates, links) in self.of_left.iter_mut().zip(&links) {
-                for (candidate, links) in candidates.iter_mut().zip(links) {
-                    let share = |link: &Link| before[link.left][link.candidate].share * link.agreement;
-                    let greatest = |same: &[Link]| same.iter().map(share).fold(0.0, f32::max);
-                    let sum: f32 = links.chunk_by(|a, b| a.left == b.left).map(greatest).sum();
-                    candidate.weight *= FLOOR + sum / neighbours as f32;
-                }
+            self.share(right);
+            for c in 0..self.all.len() {
+                let share = |link: &Link| self.all[link.candidate as usize].share * link.agreement;
+                let greatest = |same: &[Link]| same.iter().map(share).fold(0.0, f32::max);
+                let sum: f32 = self.neighbours_of(c).map(greatest).sum();
+                self.all[c].weight *= FLOOR + sum / neighbours as f32;
             }
         }
+    }
+
+    /// Says of each of these pairs, in the order of the left key points, whether all that speaks for it speaks as
+    /// well for another: a pattern that repeats itself, shifted by a period.
+    ///
+    /// A pair's rival is another candidate of its left key point that the neighbours agree with at least half as
+    /// much, by candidates of their own. Of each such neighbour, and of the point itself, take the logarithm of the
+    /// ratio of two squared distances: that of the candidate that agrees with the rival and that of the one that
+    /// agrees with the pair. The pair stands when their mean is at least three standard errors above zero; with
+    /// fewer than four neighbours, when it passes the plain ratio test. One point's neighbourhood may mislead:
+    /// a pair is ambiguous where more than half of the pairs that agree with it, itself among them, do not stand.
+    pub(super) fn ambiguous(&mut self, pairs: &[(usize, usize)], squared_ratio: f32, ambiguous: &mut Vec<bool>) {
+        let place = |this: &Self, (i, j): (usize, usize)| {
+            (this.starts[i]..this.starts[i + 1]).find(|&c| this.all[c].right == j).expect("a pair is a candidate")
+        };
+        let mut verdicts = std::mem::take(&mut self.verdicts);
+        verdicts.clear();
+        verdicts.resize(self.all.len(), None);
+        for &pair in pairs {
+            let (chosen, all) = (place(self, pair), self.starts[pair.0]..self.starts[pair.0 + 1]);
+            let rivalled = all.into_iter().any(|c| c != chosen && self.rivals(chosen, c, squared_ratio));
+            verdicts[chosen] = Some(rivalled);
+        }
+        ambiguous.clear();
+        ambiguous.extend(pairs.iter().map(|&pair| {
+            let chosen = place(self, pair);
+            let around = self.links[self.link_starts[chosen]..self.link_starts[chosen + 1]].iter();
+            let around = around.filter_map(|link| verdicts[link.candidate as usize]).chain(verdicts[chosen]);
+            let (count, rivalled) = around.fold((0, 0), |(n, k), rivalled| (n + 1, k + i32::from(rivalled)));
+            2 * rivalled > count
+        }));
+        self.verdicts = verdicts;
+    }
+
+    /// Whether `rival` is as good a candidate as `chosen`, of the same left key point.
+    fn rivals(&self, chosen: usize, rival: usize, squared_ratio: f32) -> bool {
+        let preference = |a: usize, b: usize| {
+            let squared = |c: usize| self.all[c].squared.max(NEAREST);
+            libm::logf(squared(b) / squared(a))
+        };
+        let own = preference(chosen, rival);
+        let (mut agree, mut agree_with_rival, mut compared) = (0.0, 0.0, 1);
+        let (mut sum, mut squares) = (own, own * own);
+        let mut others = self.neighbours_of(rival).peekable();
+        for same in self.neighbours_of(chosen) {
+            let belief = |link: &&Link| self.all[link.candidate as usize].share * link.agreement;
+            let Some(here) = same.iter().max_by(|a, b| belief(a).total_cmp(&belief(b))) else { continue };
+            agree += here.agreement;
+            while others.next_if(|other| other[0].rank < here.rank).is_some() {}
+            let Some(other) = others.next_if(|other| other[0].rank == here.rank) else { continue };
+            let Some(there) = other.iter().max_by(|a, b| a.agreement.total_cmp(&b.agreement)) else { continue };
+            if there.candidate != here.candidate {
+                agree_with_rival += there.agreement;
+                compared += 1;
+                let preference = preference(here.candidate as usize, there.candidate as usize);
+                sum += preference;
+                squares += preference * preference;
+            }
+        }
+        if compared == 1 || agree_with_rival < RIVAL * agree {
+            return false;
+        }
+        if compared <= FEW {
+            return libm::expf(-own) >= squared_ratio;
+        }
+        let n = compared as f32;
+        let mean = sum / n;
+        let variance = (squares - n * mean * mean).max(0.0) / (n - 1.0);
+        !(mean > 0.0 && mean * mean * n >= CLEARLY * CLEARLY * variance)
+    }
+
+    /// What agrees with a candidate, neighbour by neighbour.
+    fn neighbours_of(&self, candidate: usize) -> impl Iterator<Item = &[Link]> {
+        let links = &self.links[self.link_starts[candidate]..self.link_starts[candidate + 1]];
+        links.chunk_by(|a, b| a.rank == b.rank)
     }
 
     /// The shares that belong to the weights.
     fn share(&mut self, right: usize) {
-        let mut columns = vec![0.0; right];
-        self.of_left.iter().flatten().for_each(|c| columns[c.right] += c.weight);
-        for candidates in &mut self.of_left {
+        self.columns.clear();
+        self.columns.resize(right, 0.0);
+        self.all.iter().for_each(|c| self.columns[c.right] += c.weight);
+        for candidates in self.all.chunk_by_mut(|a, b| a.left == b.left) {
             let row: f32 = candidates.iter().map(|c| c.weight).sum();
-            candidates.iter_mut().for_each(|c| c.share = c.weight / (row + columns[c.right] - c.weight));
+            candidates.iter_mut().for_each(|c| c.share = c.weight / (row + self.columns[c.right] - c.weight));
         }
     }
 
-    /// What agrees with each candidate of each left key point, neighbour by neighbour.
-    fn links(&self, left: &[Keypoint], right: &[Keypoint], neighbours: usize) -> Vec<Vec<Vec<Link>>> {
-        let occupied: Vec<usize> = (0..left.len()).filter(|&i| !self.of_left[i].is_empty()).collect();
-        let mut near: Vec<(f64, usize)> = Vec::with_capacity(occupied.len());
-        let mut all = Vec::with_capacity(left.len());
-        for (i, candidates) in self.of_left.iter().enumerate() {
-            let mut links = vec![Vec::new(); candidates.len()];
-            if !candidates.is_empty() {
-                let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-                near.clear();
-                near.extend(occupied.iter().filter(|&&k| k != i).map(|&k| (squared(&left[i].at, &left[k].at), k)));
-                if near.len() > neighbours {
-                    near.select_nth_unstable_by(neighbours, order);
-                    near.truncate(neighbours);
-                }
-                near.sort_unstable_by(order);
-                for &(apart, k) in &near {
+    /// Finds what agrees with each candidate.
+    fn link(&mut self, left: &[Keypoint], neighbours: usize) {
+        let Self { all, starts, links, link_starts, occupied, grid, near, .. } = self;
+        occupied.clear();
+        occupied.extend((0..left.len()).filter(|&i| starts[i] < starts[i + 1]));
+        grid.fill(occupied.iter().map(|&i| [left[i].at.u, left[i].at.v]));
+        links.clear();
+        link_starts.clear();
+        link_starts.push(0);
+        for &i in &*occupied {
+            nearest_neighbours(grid, left, occupied, i, neighbours, near);
+            for candidate in &all[starts[i]..starts[i + 1]] {
+                for (rank, &(apart, k)) in near.iter().enumerate() {
                     let tolerance = SLACK + GRADIENT * apart.sqrt();
-                    let base = (left[k].at.u - left[i].at.u, left[k].at.v - left[i].at.v);
-                    for (candidate, found) in candidates.iter().zip(&mut links) {
-                        let here = &right[candidate.right].at;
-                        let expected = Pixel { u: here.u + base.0, v: here.v + base.1 };
-                        for (index, other) in self.of_left[k].iter().enumerate() {
-                            let off = squared(&expected, &right[other.right].at);
-                            if other.right != candidate.right && off < tolerance * tolerance {
-                                let agreement = (1.0 - off.sqrt() / tolerance) as f32;
-                                found.push(Link { left: k, candidate: index, agreement });
-                            }
+                    let others = starts[k as usize]..starts[k as usize + 1];
+                    for (index, other) in others.clone().zip(&all[others]) {
+                        let (here, there) = (candidate.displacement, other.displacement);
+                        let (u, v) = (here[0] - there[0], here[1] - there[1]);
+                        let off = u * u + v * v;
+                        if off < tolerance * tolerance && other.right != candidate.right {
+                            let agreement = 1.0 - off.sqrt() / tolerance;
+                            links.push(Link { candidate: index as u32, agreement, rank: rank as u16 });
                         }
                     }
                 }
+                link_starts.push(links.len());
             }
-            all.push(links);
         }
-        all
     }
 }
 
-/// An agreeing candidate of another left key point.
-#[derive(Debug, Clone, Copy)]
-struct Link {
-    left: usize,
-    candidate: usize,
-    agreement: f32,
-}
-
-fn squared(a: &Pixel, b: &Pixel) -> f64 {
-    let (u, v) = (a.u - b.u, a.v - b.v);
-    u * u + v * v
+/// The squared distances and indices of the `count` left key points nearest to `i`, among those that are occupied.
+fn nearest_neighbours(
+    grid: &Grid,
+    left: &[Keypoint],
+    occupied: &[usize],
+    i: usize,
+    count: usize,
+    near: &mut Vec<(f32, u32)>,
+) {
+    let at = left[i].at;
+    let [width, height] = grid.extent();
+    // Twice the area that so many points take on average.
+    let mut reach = 1.0 + (width * height * (count + 1) as f64 / (2.0 * grid.len() as f64)).sqrt();
+    loop {
+        near.clear();
+        let within = (reach * reach) as f32;
+        grid.around([at.u, at.v], reach, |index| {
+            let k = occupied[index];
+            let (u, v) = (left[k].at.u - at.u, left[k].at.v - at.v);
+            let apart = (u * u + v * v) as f32;
+            if k != i && apart <= within {
+                near.push((apart, k as u32));
+            }
+        });
+        if near.len() >= count || reach > width + height {
+            break;
+        }
+        reach *= 1.5;
+    }
+    let order = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    if near.len() > count {
+        near.select_nth_unstable_by(count, order);
+        near.truncate(count);
+    }
+    near.sort_unstable_by(order);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use seafix_geometry::Pixel;
 
     const COLUMNS: usize = 8;
     const ROWS: usize = 6;
@@ -162,15 +297,20 @@ mod tests {
         [left.collect(), right.collect()]
     }
 
-    /// Left point `i` may be every right point of its row, and all look alike: every third is a
-    /// little more like its neighbour than like itself, the others the other way round.
-    fn alike() -> impl Iterator<Item = (usize, usize, f32)> {
-        let pairs = (0..COUNT).flat_map(|i| (0..COLUMNS).map(move |column| (i, i / COLUMNS * COLUMNS + column)));
-        pairs.map(|(i, j)| {
-            let itself = i == j;
-            let misled = i % 3 == 0;
-            (i, j, if itself == misled { 0.05 } else { 0.04 })
-        })
+    /// Left point `i` may be every right point of its row, and all look alike: so far apart are they.
+    fn of_rows(views: [&[Keypoint]; 2], squared: impl Fn(usize, usize) -> f32) -> Candidates {
+        let mut candidates = Candidates::default();
+        let row = |i: usize, visit: &mut dyn FnMut(usize)| {
+            (0..COLUMNS).for_each(|column| visit(i / COLUMNS * COLUMNS + column));
+        };
+        candidates.fill(views, row, squared);
+        candidates
+    }
+
+    /// Every third is a little more like its neighbours than like itself, the others the other way round.
+    fn alike(i: usize, j: usize) -> f32 {
+        let (itself, misled) = (i == j, i.is_multiple_of(3));
+        if itself == misled { 0.05 } else { 0.04 }
     }
 
     /// The right point that each left one believes in most, and whether clearly: the second has less than
@@ -187,11 +327,11 @@ mod tests {
     #[test]
     fn neighbours_decide_where_all_points_look_alike() {
         let [left, right] = lattice();
-        let mut candidates = Candidates::new(COUNT, alike());
+        let mut candidates = of_rows([&left, &right], alike);
         let alone = believed(&candidates);
         assert_eq!((0..COUNT).filter(|&i| alone[i].0 == i).count(), COUNT - COUNT / 3, "a third is misled");
         assert!(alone.iter().all(|(_, clearly)| !clearly), "and nothing is clear");
-        candidates.support(&left, &right, 12);
+        candidates.support(&left, COUNT, 12);
         let together = believed(&candidates);
         assert!((0..COUNT).all(|i| together[i] == (i, true)), "{together:?}");
     }
@@ -205,14 +345,14 @@ mod tests {
             .enumerate()
             .map(|(i, point)| Keypoint { at: Pixel { u: 1e4 * i as f64, v: point.at.v }, ..*point })
             .collect();
-        let mut candidates = Candidates::new(COUNT, alike());
+        let mut candidates = of_rows([&left, &scattered], alike);
         let ratios = |candidates: &Candidates| -> Vec<f32> {
             (0..COUNT)
                 .flat_map(|i| candidates.of(i).iter().map(move |c| c.weight / candidates.of(i)[0].weight))
                 .collect()
         };
         let before = ratios(&candidates);
-        candidates.support(&left, &scattered, 12);
+        candidates.support(&left, COUNT, 12);
         let furthest = before.iter().zip(ratios(&candidates)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(furthest < 1e-5, "{furthest}");
     }

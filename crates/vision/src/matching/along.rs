@@ -1,0 +1,63 @@
+//! Matching within a band: the nearest descriptors there, with the support of their neighbours.
+
+use super::{nearest::Nearest, support::Candidates};
+use crate::Keypoint;
+
+/// The memory of the search.
+#[derive(Debug, Default)]
+pub(super) struct Along {
+    nearest: Nearest,
+    candidates: Candidates,
+    pairs: Vec<(usize, usize)>,
+    ambiguous: Vec<bool>,
+}
+
+/// What a pair must pass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Test {
+    /// The greatest squared distance, as a share of that to the second nearest; 1: any.
+    pub(super) squared_ratio: f32,
+    /// How many neighbours support a pair; 0: descriptors alone decide.
+    pub(super) neighbours: usize,
+}
+
+impl Along {
+    /// Visits the pairs that are each other's clearly nearest, with the squared distance of their descriptors, in the
+    /// order of the left key points. Only pairs compete that `visit(i, ..)` names for left key point `i`; distance is
+    /// that of the descriptors or, with neighbours, the inverse of a pair's supported weight, and then an
+    /// ambiguous pair is left out.
+    pub(super) fn search(
+        &mut self,
+        test: Test,
+        keypoints: [&[Keypoint]; 2],
+        visit: impl Fn(usize, &mut dyn FnMut(usize)),
+        squared: impl Fn(usize, usize) -> f32,
+        mut accept: impl FnMut(usize, usize, f32),
+    ) {
+        let [left, right] = keypoints;
+        let Self { nearest, candidates, pairs, ambiguous } = self;
+        nearest.reset(left.len(), right.len());
+        let (supported, clear) = (test.neighbours > 0, test.squared_ratio);
+        if supported {
+            candidates.fill(keypoints, visit, &squared);
+            candidates.support(left, right.len(), test.neighbours);
+            for i in 0..left.len() {
+                candidates.of(i).iter().for_each(|c| nearest.offer(i, c.right, 1.0 / c.weight));
+            }
+        } else {
+            for i in 0..left.len() {
+                visit(i, &mut |j| nearest.offer(i, j, squared(i, j)));
+            }
+        }
+        pairs.clear();
+        pairs.extend(nearest.mutual().filter(|pair| pair.clear(clear)).map(|pair| (pair.left, pair.right)));
+        ambiguous.clear();
+        ambiguous.resize(pairs.len(), false);
+        if supported && clear < 1.0 {
+            candidates.ambiguous(pairs, clear, ambiguous);
+        }
+        for (&(i, j), _) in pairs.iter().zip(ambiguous).filter(|(_, ambiguous)| !**ambiguous) {
+            accept(i, j, squared(i, j));
+        }
+    }
+}

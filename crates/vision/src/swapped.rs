@@ -1,0 +1,57 @@
+//! Whether the left and the right image have changed places.
+
+use seafix_geometry::{StereoRig, Transform};
+
+use crate::{EpipolarBand, Match, Matcher, View, Workspace};
+
+/// How many matches two images have as they came and with their places exchanged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Sides {
+    /// The left image seen by the left camera.
+    pub given: usize,
+    /// The left image seen by the right camera.
+    pub exchanged: usize,
+}
+
+/// Fewer matches say nothing about the order of the images.
+const FEW: usize = 20;
+
+impl Sides {
+    /// What these two views of one frame say, matched along the epipolar band in both orders.
+    ///
+    /// Points lie in front of the cameras, so a rig allows the true order's matches and few of the other: with
+    /// exchanged images of a rectified rig every depth is negative, and of any other rig the points are off their
+    /// epipolar lines besides. It takes as long as matching twice; a data set's first frames are enough, their
+    /// counts added up.
+    pub fn of(left: &View<'_>, right: &View<'_>, rig: &StereoRig, work: &mut Workspace) -> Self {
+        let back = rig.right_from_left().inverse();
+        let back = Transform::new(back.rotation(), back.translation());
+        let Ok(exchanged) = StereoRig::new(*rig.right(), *rig.left(), back) else { return Self::default() };
+        let mut find = |rig: &StereoRig| {
+            let mut found = Vec::new();
+            EpipolarBand::default().match_into(left, right, rig, work, &mut found);
+            found
+        };
+        let (given, exchanged) = (find(rig), find(&exchanged));
+        // A left key point that found something in either order speaks for the one that looks more alike.
+        let better = |found: &[Match], other: &[Match]| {
+            let beaten = |m: &&Match| other.iter().any(|o| o.left == m.left && o.distance < m.distance);
+            found.iter().filter(|m| !beaten(m)).count()
+        };
+        Self { given: better(&given, &exchanged), exchanged: better(&exchanged, &given) }
+    }
+
+    /// Whether the images have changed places: more than nine in ten of at least twenty matches say so.
+    pub fn are_swapped(&self) -> bool {
+        let all = self.given + self.exchanged;
+        all >= FEW && 10 * self.exchanged > 9 * all
+    }
+}
+
+impl std::ops::Add for Sides {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { given: self.given + other.given, exchanged: self.exchanged + other.exchanged }
+    }
+}
