@@ -19,6 +19,7 @@
 pub mod admissible;
 mod law;
 pub mod least_squares;
+pub mod monte_carlo;
 pub mod points;
 pub mod poses;
 pub mod problems;

@@ -48,11 +48,13 @@ impl Asked {
 
 /// Every solver with every value of its switches.
 ///
-/// One that refuses the corners of a box without noise is taken to need pixels; it is held to the laws
-/// where there are some. One that claims least squares must do without.
+/// One that needs pixels refuses the corners of a box without them, and is held to the laws where there are
+/// some; every other answers. One that claims least squares must do without.
 fn solvers() -> Vec<Asked> {
     let solvers = variants(&SOLVERS, &[]).into_iter().map(|solver| {
-        let takes_bare = solver.component.solve(&corners().observations()).is_ok();
+        let takes_bare = !solver.component.needs_pixels();
+        let answers = solver.component.solve(&corners().observations()).is_ok();
+        assert_eq!(answers, takes_bare, "{}: the corners of a box, bare", solver.name);
         let claims = solver.component.least_squares();
         assert!(takes_bare || !claims, "{} claims least squares and refuses the corners of a box", solver.name);
         Asked { solver, takes_bare, due: Cell::new(0), answered: Cell::new(0) }
@@ -273,4 +275,52 @@ fn mirrored_points_leave_a_large_residual() {
         Ok(())
     });
     all_answer(&solvers, cases, false);
+}
+
+/// P42. The order of the points does not matter: ≤ 1e-10 between a scene and itself reversed, for noisy bare
+/// points and for noisy pixels; sums are rounded in another order, and what iterates ends a step apart. Held
+/// wherever the pose rests on all points, and not for the triad: its frame begins at the first of three.
+///
+/// Seen to fail for triads, when they are not left out.
+#[test]
+fn the_order_of_points_does_not_matter() {
+    let solvers = solvers();
+    let scene = prop_oneof![bare(5.0, 5e-3).boxed(), seen(0.5).boxed()];
+    let cases = law(128, scene, |scene| {
+        let mut reversed = scene.clone();
+        reversed.points.reverse();
+        let data = scene.observations();
+        let rests_on_all = |asked: &&Asked| {
+            !asked.name().starts_with("triad") && asked.solver.component.used(&data).len() == scene.points.len()
+        };
+        for solver in solvers.iter().filter(|solver| solver.has_enough(&scene)).filter(rests_on_all) {
+            let (Ok(before), Ok(after)) = (solver.solve(&scene), solver.solve(&reversed)) else { continue };
+            let (angle, distance) = apart(&before, &after);
+            within(&format!("{}: rotation", solver.name()), angle, 1e-10)?;
+            within(&format!("{}: translation", solver.name()), distance, 1e-10)?;
+        }
+        Ok(())
+    });
+    assert!(cases > 0);
+}
+
+/// P43. Inverse problem: solve(x, y) = solve(y, x)⁻¹ for equal weights, ≤ 1e-11 (1 + L), for every solver that claims
+/// least squares.
+#[test]
+fn the_inverse_problem_has_the_inverse_answer() {
+    let solvers = solvers();
+    law(128, bare(5.0, 5e-3), |scene| {
+        let mut inverse = scene.clone();
+        for point in &mut inverse.points {
+            (point.model, point.measured.at) = (point.measured.at.coords.into(), point.model.coords.into());
+        }
+        for solver in claimants(&solvers).filter(|solver| solver.has_enough(&scene)) {
+            let (Ok(there), Ok(back)) = (solver.solve(&scene), solver.solve(&inverse)) else { continue };
+            let (angle, distance) = apart(&there, &back.inverse().relabel());
+            let limit = 1e-11 * (1.0 + there.translation().norm());
+            within(&format!("{}: rotation", solver.name()), angle, limit)?;
+            within(&format!("{}: translation", solver.name()), distance, limit)?;
+        }
+        Ok(())
+    });
 }

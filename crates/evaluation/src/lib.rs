@@ -2,8 +2,10 @@
 //!
 //! Nothing here can see which algorithm made a number.
 
+mod bound;
 mod fix;
 mod statistics;
 
+pub use bound::{Seen, cramer_rao, transfer_bound};
 pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
 pub use statistics::{clopper_pearson, quantile};

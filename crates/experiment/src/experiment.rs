@@ -253,7 +253,10 @@ mod tests {
         let message = |text: &str| plan(text).unwrap_err();
         assert_eq!(
             message("question = 'why'\nsource = 'virtual-points'\n\n[pipeline]\nsolver = 'kabsh'\n").trim(),
-            "no solver is called `kabsh`, did you mean `kabsch`? There are kabsch, triad in e.toml:5"
+            format!(
+                "no solver is called `kabsh`, did you mean `kabsch`? There are {} in e.toml:5",
+                seafix_referencing::SOLVERS.names().collect::<Vec<_>>().join(", ")
+            )
         );
         assert!(
             message("question = 'why'\nsorce = 'virtual-points'\n")

@@ -58,7 +58,7 @@ impl Default for Pipeline {
             gate: Gate::default(),
             tolerance: Tolerance::Sigmas(3.0),
             search: Choice::named("maximum-clique"),
-            solver: Choice::named("kabsch"),
+            solver: Choice::named("stereo-reprojection"),
             acceptance: Acceptance::default(),
         }
     }

@@ -13,6 +13,13 @@ pub struct StereoPixels {
     pub right: Pixel,
 }
 
+impl StereoPixels {
+    /// (u left, v left, u right, v right), in the order of covariances (px).
+    pub fn coordinates(&self) -> Vector4<f64> {
+        Vector4::new(self.left.u, self.left.v, self.right.u, self.right.v)
+    }
+}
+
 /// Two calibrated cameras with fixed, arbitrary extrinsics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StereoRig {
@@ -118,6 +125,17 @@ impl StereoRig {
         Some(StereoPixels { left, right })
     }
 
+    /// As [`project`](Self::project), with the derivative of (u left, v left, u right, v right) by the point (px/m).
+    pub fn project_with_jacobian(&self, point: &Point<Camera>) -> Option<(StereoPixels, Matrix4x3<f64>)> {
+        let (left, by_left) = self.left.project_with_jacobian(point)?;
+        let (right, by_right) = self.right.project_with_jacobian(&(self.right_from_left * *point))?;
+        let by_right = by_right * self.right_from_left.rotation_matrix();
+        let mut j = Matrix4x3::zeros();
+        j.fixed_rows_mut::<2>(0).copy_from(&by_left);
+        j.fixed_rows_mut::<2>(2).copy_from(&by_right);
+        Some((StereoPixels { left, right }, j))
+    }
+
     /// Where both cameras see `point` in their images, at least `margin` pixels from the border.
     pub fn sees(&self, point: &Point<Camera>, margin: f64) -> Option<StereoPixels> {
         self.project(point)
@@ -173,14 +191,8 @@ impl StereoRig {
         seen: &StereoPixels,
         weight: &Matrix4<f64>,
     ) -> Option<(Matrix3<f64>, Vector3<f64>, f64)> {
-        let (left, jl) = self.left.project_with_jacobian(point)?;
-        let (right, jr) = self.right.project_with_jacobian(&(self.right_from_left * *point))?;
-        let jr = jr * self.right_from_left.rotation_matrix();
-        let mut j = Matrix4x3::zeros();
-        j.fixed_rows_mut::<2>(0).copy_from(&jl);
-        j.fixed_rows_mut::<2>(2).copy_from(&jr);
-        let r =
-            Vector4::new(seen.left.u - left.u, seen.left.v - left.v, seen.right.u - right.u, seen.right.v - right.v);
+        let (expected, j) = self.project_with_jacobian(point)?;
+        let r = seen.coordinates() - expected.coordinates();
         let weighted = weight * j;
         Some((j.transpose() * weighted, weighted.transpose() * r, r.dot(&(weight * r))))
     }

@@ -20,7 +20,10 @@ mod solve;
 pub use candidates::{Candidates, Gate, candidates};
 pub use observations::{Observation, Observations};
 pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
-pub use reference::{Acceptance, Alternative, Attempt, Outcome, Reference, Refusal, judge, reference, rms_apart};
+pub use reference::{
+    Acceptance, Alternative, Attempt, Integrity, Outcome, Protection, Redundancy, Reference, Refusal, judge, reference,
+    rms_apart,
+};
 pub use search::{Identification, MaximumClique, SEARCHES, Samples, Search, StructuralCoherence, Unidentified};
 pub use site::{Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};
-pub use solve::{Choose, Degenerate, Kabsch, SOLVERS, Solver, Triad};
+pub use solve::{Choose, Degenerate, Kabsch, Mahalanobis, SOLVERS, Solver, StereoReprojection, Triad};

@@ -124,6 +124,14 @@ pub enum BadDive {
         /// What it may be.
         remedy: &'static str,
     },
+    /// No layout lies before both cameras.
+    #[error("no layout of {points} points at {distance} m lies in both images; bring it nearer to 1 to 10 m")]
+    Layout {
+        /// How many points.
+        points: usize,
+        /// Their mean depth (m).
+        distance: f64,
+    },
     /// No camera.
     #[error("rig: {0}")]
     Camera(#[from] BadCamera),

@@ -25,6 +25,7 @@
 mod bed;
 mod blueprint;
 mod dive;
+mod layout;
 mod noise;
 mod paint;
 mod points;
@@ -37,6 +38,7 @@ mod survey;
 
 pub use blueprint::{Blueprint, BoxPlan, ChequerPlan, ObjectPlan, PanelPlan, PipePlan, PointPlan};
 pub use dive::{BadDive, Dive, DiveFrame, FrameTruth, PlannedDive, RoughPose, VirtualRig, VisiblePoint};
+pub use layout::{Layout, Placed, Shape};
 pub use points::PointNoise;
 pub use sensor::Sensor;
 pub use stream::{Purpose, Stream};

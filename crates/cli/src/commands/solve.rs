@@ -24,8 +24,8 @@ pub(crate) struct Solve {
     /// The search.
     #[arg(long, default_value = "maximum-clique")]
     search: String,
-    /// The solver.
-    #[arg(long, default_value = "kabsch")]
+    /// The solver. These problems have no pixels, so it must take bare points.
+    #[arg(long, default_value = "mahalanobis")]
     solver: String,
     /// How many problems are worked on at a time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -40,6 +40,10 @@ impl Solve {
         let usage = |error| Failure::new(USAGE, error);
         let search = SEARCHES.build(&Choice::named(&self.search)).map_err(usage)?;
         let solver = SOLVERS.build(&Choice::named(&self.solver)).map_err(usage)?;
+        if solver.needs_pixels() {
+            let what = format!("solver `{}` needs pixels and a rig, which these problems have not", self.solver);
+            return Err(Failure::new(USAGE, format!("{what}; use `mahalanobis`")));
+        }
         let acceptance = Acceptance::default();
         let method =
             Method { search: (&self.search, &*search), solver: (&self.solver, &*solver), acceptance: &acceptance };

@@ -17,11 +17,22 @@ pub struct Acceptance {
     /// diameter if that is less, are different answers; a pose that by its own covariance may be off
     /// by as much is none.
     pub alert_limit: f64,
+    /// With what probability a protection level may be exceeded.
+    pub risk: f64,
+    /// Share of believed sets that hold one wrong match, as protection levels assume it.
+    pub wrong_match_rate: f64,
 }
 
 impl Default for Acceptance {
     fn default() -> Self {
-        Self { least_points: 3, chance_budget: 0.01, confidence: 0.999, alert_limit: 0.10 }
+        Self {
+            least_points: 3,
+            chance_budget: 0.01,
+            confidence: 0.999,
+            alert_limit: 0.10,
+            risk: 1e-4,
+            wrong_match_rate: 0.1,
+        }
     }
 }
 
@@ -39,7 +50,11 @@ impl Acceptance {
             let confident = self.confidence > 0.0 && self.confidence < 1.0;
             in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
             let alert = self.alert_limit > 0.0 && self.alert_limit.is_finite();
-            in_range(alert, "alert-limit", self.alert_limit, "a positive number of metres")
+            in_range(alert, "alert-limit", self.alert_limit, "a positive number of metres")?;
+            let risk = self.risk > 0.0 && self.risk < 1.0;
+            in_range(risk, "risk", self.risk, "a probability between 0 and 1")?;
+            let rate = self.wrong_match_rate > 0.0 && self.wrong_match_rate <= 1.0;
+            in_range(rate, "wrong-match-rate", self.wrong_match_rate, "a share above 0, at most 1")
         };
         check().map_err(|message| format!("acceptance: {message}"))
     }

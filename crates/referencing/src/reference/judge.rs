@@ -5,6 +5,7 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use super::{
     Acceptance, Alternative, Outcome, Reference, Refusal,
     hypothesis::{Fallen, Hypothesis, by_score},
+    integrity::{Integrity, Redundancy, protection},
     rms_apart,
 };
 use crate::{
@@ -203,17 +204,29 @@ impl Judge<'_> {
 
     fn fix(&self, hypothesis: Hypothesis) -> Outcome {
         let data = self.observations(&hypothesis.pairs);
-        match self.solver.covariance(&data, &hypothesis.pose) {
-            Ok(covariance) => Outcome::Referenced(Box::new(Reference {
-                object_from_camera: hypothesis.pose,
-                covariance,
-                used: self.solver.used(&data),
-                residual_rms: data.residual_rms(&hypothesis.pose),
-                score: hypothesis.score,
-                pairs: hypothesis.pairs,
-            })),
-            Err(why) => Outcome::Degenerate(why),
-        }
+        let covariance = match self.solver.covariance(&data, &hypothesis.pose) {
+            Ok(covariance) => covariance,
+            Err(why) => return Outcome::Degenerate(why),
+        };
+        let (separation, protection) = protection(&data, &hypothesis.pose, &covariance, self.acceptance);
+        let freedom = 3 * hypothesis.pairs.len() - 6;
+        let integrity = Integrity {
+            redundancy: Redundancy::of(hypothesis.pairs.len()),
+            chi2: hypothesis.likelihood.cost,
+            freedom,
+            chi2_limit: chi_square(freedom, self.acceptance.confidence),
+            separation,
+            protection,
+        };
+        Outcome::Referenced(Box::new(Reference {
+            object_from_camera: hypothesis.pose,
+            covariance,
+            used: self.solver.used(&data),
+            residual_rms: data.residual_rms(&hypothesis.pose),
+            score: hypothesis.score,
+            integrity,
+            pairs: hypothesis.pairs,
+        }))
     }
 }
 

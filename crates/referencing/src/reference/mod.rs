@@ -10,11 +10,13 @@ use crate::{
 mod acceptance;
 mod exclusion;
 mod hypothesis;
+mod integrity;
 mod judge;
 mod outcome;
 mod refusal;
 
 pub use acceptance::Acceptance;
+pub use integrity::{Integrity, Protection, Redundancy};
 pub use outcome::{Alternative, Attempt, Outcome, Reference};
 pub use refusal::Refusal;
 

@@ -1,8 +1,9 @@
 //! What comes of an attempt: a fix, rivals, or a refusal.
 
-use seafix_geometry::{Camera, Covariance6, Object, Transform};
+use nalgebra::Matrix3;
+use seafix_geometry::{Camera, Covariance6, Object, Point, Transform};
 
-use super::Refusal;
+use super::{Integrity, Refusal};
 use crate::{Correspondence, Degenerate, Unidentified};
 
 /// A fix: the pose relative to the target and everything that supports it.
@@ -22,6 +23,15 @@ pub struct Reference {
     /// χ²₃(confidence) for each pair fewer than the largest set has (a truncated χ²: sets of
     /// different size compare); larger is better.
     pub score: f64,
+    /// What supports it beyond its covariance.
+    pub integrity: Integrity,
+}
+
+impl Reference {
+    /// The covariance (m², camera axes) of the place where the fix puts a point of the object.
+    pub fn point_covariance(&self, point: &Point<Object>) -> Matrix3<f64> {
+        self.covariance.of_point(&(self.object_from_camera.inverse() * *point))
+    }
 }
 
 /// Another pose that explains the data as well.

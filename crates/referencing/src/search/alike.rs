@@ -25,7 +25,7 @@ pub(super) fn all_alike(
     sense: Sense,
     budget: u64,
 ) -> (bool, u64) {
-    let motion = least_squares(&Observations::of(best, problem.model, problem.cloud, None)).inverse();
+    let motion = least_squares(&Observations::of(best, problem.model, problem.cloud, None).points).inverse();
     let fits = |pair: Correspondence| {
         let off = (motion * problem.model[pair.model].at).distance(&problem.cloud[pair.cloud].position.at);
         off <= slack(problem, pair)

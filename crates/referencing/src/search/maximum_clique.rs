@@ -168,7 +168,7 @@ fn least_residual(problem: &Problem<'_>, graph: &Association, cliques: &[Vec<usi
     let quantum = 1e-9 * problem.model.iter().map(|point| point.at.coords.amax()).fold(f64::MIN_POSITIVE, f64::max);
     let rank = |clique: &[usize]| {
         let data = Observations::of(&pairs_of(graph, clique), problem.model, problem.cloud, None);
-        (data.residual_rms(&least_squares(&data)) / quantum).round()
+        (data.residual_rms(&least_squares(&data.points)) / quantum).round()
     };
     let ranks: Vec<f64> = cliques.iter().map(|clique| rank(clique)).collect();
     // `min_by` keeps the first of equals, and the cliques are sorted.

@@ -2,14 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform, so3};
+use seafix_geometry::{Camera, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    spread::{centroid, check},
-};
-use crate::Observations;
+use super::{Degenerate, Solver, spread::check};
+use crate::{Observation, Observations};
 
 /// The rigid motion of least squared residuals, min Σ ‖P_k − C_k H‖² over SE(3): the paper's
 /// "standard method", every identified point with the same weight.
@@ -49,53 +46,72 @@ impl Solver for Kabsch {
 
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
-        Ok(fit(data))
+        Ok(fit(&data.points))
     }
 }
 
 /// The least-squares motion of three or more points that do not lie on a line.
-pub(crate) fn fit(data: &Observations<'_>) -> Transform<Object, Camera> {
-    let points = &data.points;
-    let model = centroid(points.iter().map(|point| point.model.coords));
-    let measured = centroid(points.iter().map(|point| point.measured.at.coords));
-    let m: Matrix3<f64> = points
-        .iter()
-        .map(|point| (point.model.coords - model) * (point.measured.at.coords - measured).transpose())
-        .sum();
-    let rotation = polish(rotation_of(&m), &m);
-    let mut motion = Transform::from_axes(&rotation, Vector3::zeros());
-    motion = Transform::new(motion.rotation(), model - motion.rotation() * measured);
-    motion
+pub(crate) fn fit(points: &[Observation]) -> Transform<Object, Camera> {
+    fit_weighted(points, |_| 1.0)
+}
+
+/// The motion of least Σ w_k ‖P_k − C_k H‖², w_k = `weight(k)`, not all zero.
+pub(super) fn fit_weighted(points: &[Observation], weight: impl Fn(usize) -> f64) -> Transform<Object, Camera> {
+    let (mut model, mut measured, mut all) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+    for (k, point) in points.iter().enumerate() {
+        let w = weight(k);
+        model += point.model.coords * w;
+        measured += point.measured.at.coords * w;
+        all += w;
+    }
+    let (model, measured) = (model / all, measured / all);
+    let mut m = Matrix3::zeros();
+    for (k, point) in points.iter().enumerate() {
+        m += (point.model.coords - model) * weight(k) * (point.measured.at.coords - measured).transpose();
+    }
+    let rotation = Transform::<Object, Camera>::from_axes(&rotation_of(&m), Vector3::zeros()).rotation();
+    Transform::new(rotation, model - rotation * measured)
 }
 
 /// The rotation R that maximises tr(Rᵀ M).
+///
+/// One-sided Jacobi (Hestenes, 1958): rotations from the right make the columns of M orthogonal, M V = U S, which
+/// costs no digits of the weaker directions as MᵀM would. Of U and V the two stronger columns are taken and the
+/// third is their cross product, so that det R = +1 by construction.
 fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
-    let svd = m.svd(true, true);
-    let (u, v_t) = (svd.u.expect("u was asked for"), svd.v_t.expect("v_t was asked for"));
-    let sign = if (u * v_t).determinant() < 0.0 { -1.0 } else { 1.0 };
-    u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t
-}
-
-/// Newton's steps on the same objective. The 3×3 singular value decomposition is computed by way of
-/// MᵀM, which costs half the digits of the weaker directions; a step or two give them back.
-fn polish(mut rotation: Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
-    for _ in 0..4 {
-        // At R Exp(φ): tr((R Exp φ)ᵀ M) has gradient g = vex(N − Nᵀ), N = Rᵀ M, and Hessian −(tr(N) I − sym N).
-        let n = rotation.transpose() * m;
-        let gradient = Vector3::new(n[(2, 1)] - n[(1, 2)], n[(0, 2)] - n[(2, 0)], n[(1, 0)] - n[(0, 1)]);
-        let hessian = Matrix3::identity() * n.trace() - (n + n.transpose()) * 0.5;
-        let Some(cholesky) = hessian.cholesky() else { break };
-        let step = cholesky.solve(&gradient);
-        if !(step.norm() < 1e-3) {
-            break; // far from a maximum: what the singular values said stands
+    let mut a = [0, 1, 2].map(|k| m.column(k).into_owned());
+    let mut v = [Vector3::x(), Vector3::y(), Vector3::z()];
+    for _ in 0..MOST_SWEEPS {
+        let mut turned = false;
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let (alpha, beta, gamma) = (a[p].norm_squared(), a[q].norm_squared(), a[p].dot(&a[q]));
+            if gamma * gamma <= ORTHOGONAL * ORTHOGONAL * alpha * beta {
+                continue;
+            }
+            turned = true;
+            let zeta = (beta - alpha) / (2.0 * gamma);
+            let t = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+            let c = 1.0 / (1.0 + t * t).sqrt();
+            let s = c * t;
+            (a[p], a[q]) = (a[p] * c - a[q] * s, a[p] * s + a[q] * c);
+            (v[p], v[q]) = (v[p] * c - v[q] * s, v[p] * s + v[q] * c);
         }
-        rotation *= so3::exp(&step).to_rotation_matrix().into_inner();
-        if step.norm() < 1e-15 {
+        if !turned {
             break;
         }
     }
-    rotation
+    let size = [0, 1, 2].map(|k| a[k].norm_squared());
+    let weakest = (0..3).fold(0, |least, k| if size[k] < size[least] { k } else { least });
+    // Cyclic order: the third is the cross product of the two after it.
+    let (i, j) = ((weakest + 1) % 3, (weakest + 2) % 3);
+    let (u1, u2) = (a[i].normalize(), a[j].normalize());
+    u1 * v[i].transpose() + u2 * v[j].transpose() + u1.cross(&u2) * v[i].cross(&v[j]).transpose()
 }
+
+/// Cosine of two columns that count as orthogonal.
+const ORTHOGONAL: f64 = 1e-15;
+/// Three or four sweeps are enough; convergence is quadratic.
+const MOST_SWEEPS: usize = 30;
 
 #[cfg(test)]
 mod tests {

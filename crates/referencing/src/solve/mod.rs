@@ -5,16 +5,31 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::Observations;
 
+mod descent;
+mod fast_local_matrix;
+mod gnc_tls;
+mod horn;
+mod irls;
 mod kabsch;
 pub(crate) mod likelihood;
+mod mahalanobis;
 mod numerical;
+mod p3p;
+mod p3p_stereo;
+mod roots;
 mod spread;
+mod starts;
+mod stereo_reprojection;
 #[cfg(test)]
 mod tests;
 mod triad;
+mod umeyama;
+mod weighted_kabsch;
 
 pub use kabsch::Kabsch;
 pub(crate) use kabsch::fit as least_squares;
+pub use mahalanobis::Mahalanobis;
+pub use stereo_reprojection::StereoReprojection;
 pub use triad::{Choose, Triad};
 
 /// Geometry that determines no pose.
@@ -38,6 +53,31 @@ pub enum Degenerate {
         /// The least accepted.
         least: f64,
     },
+    /// A measured point lies behind the left camera.
+    #[error("point {index} was measured {depth:.3} m before the left camera; a camera sees what is in front of it")]
+    Behind {
+        /// Its place among the points.
+        index: usize,
+        /// Its depth (m), zero or less.
+        depth: f64,
+    },
+    /// The solver looks at pixels, and there are none, or no rig.
+    #[error("the points have no pixels or there is no rig; `mahalanobis` takes points alone")]
+    NoPixels,
+    /// Three points and their pixels allow no pose.
+    #[error("no pose lets the left camera see three points where it saw them")]
+    NoRoot,
+    /// The measured points have not the size of the model's.
+    #[error("the model is {scale:.4} times as large as what was measured; {most} off one is accepted")]
+    Scale {
+        /// The scale of the best similarity.
+        scale: f64,
+        /// Largest accepted distance from one.
+        most: f64,
+    },
+    /// The normal equations have no solution: some motion changes nothing that was measured.
+    #[error("the points leave a motion undetermined: their information matrix is singular")]
+    Singular,
     /// A number is not finite.
     #[error("a coordinate is not finite")]
     NotFinite,
@@ -48,6 +88,11 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// The least number of points it works with.
     fn minimum(&self) -> usize {
         3
+    }
+
+    /// Whether it looks at the pixels of both images, and refuses points without them.
+    fn needs_pixels(&self) -> bool {
+        false
     }
 
     /// Whether its pose claims the least sum of squared, unweighted residuals of all rigid motions.
@@ -83,4 +128,19 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
 }
 
 /// All solvers.
-pub static SOLVERS: Registry<dyn Solver> = Registry::new("solver", &[entry!(Kabsch), entry!(Triad)]);
+pub static SOLVERS: Registry<dyn Solver> = Registry::new(
+    "solver",
+    &[
+        entry!(fast_local_matrix::FastLocalMatrix),
+        entry!(gnc_tls::GncTls),
+        entry!(horn::Horn),
+        entry!(irls::Irls),
+        entry!(Kabsch),
+        entry!(Mahalanobis),
+        entry!(p3p_stereo::P3pStereo),
+        entry!(StereoReprojection),
+        entry!(Triad),
+        entry!(umeyama::Umeyama),
+        entry!(weighted_kabsch::WeightedKabsch),
+    ],
+);

@@ -1,20 +1,22 @@
 //! The covariance of any solver's answer, by central differences through the solver.
 
-use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
-use seafix_geometry::{Camera, Covariance6, Object, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels};
+use nalgebra::{Matrix4x3, Matrix6, SMatrix, SVector, Vector3, Vector4, Vector6};
+use seafix_geometry::{Camera, Covariance6, Object, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels};
 
 use super::Degenerate;
-use crate::Observations;
+use crate::{Observation, Observations};
 
 /// The step (m) of the differences: rounding (1e-15 of the coordinates over the step) and the
 /// third derivative (the step squared) are then both below 1e-9 of the result.
 const STEP: f64 = 1e-5;
+/// The same of pixel coordinates (px).
+const PIXEL_STEP: f64 = 1e-3;
 
 /// Σ = Σ_i J_i Σ_i J_iᵀ over every measured point (its covariance) and every model point (σ² I), where
 /// J_i = ∂ξ/∂point_i and ξ is the change of the answer, `solve(moved) = at · Exp(ξ)`.
 ///
-/// Where a point has pixels they move with it, so that a solver that looks only at pixels is
-/// differentiated too.
+/// Where pixels and rig are known, the four pixel coordinates are what is measured: they are moved one by one, and
+/// the triangulated point with them, so that solvers of pixels and of points are differentiated alike.
 pub(super) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
@@ -24,27 +26,36 @@ pub(super) fn covariance(
     let mut moved = data.clone();
     for i in 0..data.points.len() {
         let original = data.points[i];
-        if original.measured.covariance != Matrix3::zeros() {
-            let j = jacobian(at, |step| {
-                moved.points[i].measured.at = original.measured.at + step;
-                moved.points[i].pixels = data.rig.map_or(original.pixels, |rig| {
-                    original.pixels.map(|seen| {
-                        let at = shifted(rig, seen.at, &original.measured.at, &step);
-                        UncertainPixels { at, ..seen }
-                    })
-                });
-                let answer = solve(&moved);
-                moved.points[i] = original;
-                answer
-            })?;
-            sum += j * original.measured.covariance * j.transpose();
+        let mut answer = |point: Observation| {
+            moved.points[i] = point;
+            let answer = solve(&moved);
+            moved.points[i] = original;
+            answer
+        };
+        match (original.pixels, data.rig.and_then(|rig| by_pixels(rig, &original))) {
+            (Some(pixels), Some(by_pixels)) => {
+                let j = jacobian(at, PIXEL_STEP, |step: Vector4<f64>| {
+                    let mut point = original;
+                    point.measured.at = original.measured.at + by_pixels * step;
+                    point.pixels = Some(UncertainPixels { at: shifted(&pixels.at, &step), ..pixels });
+                    answer(point)
+                })?;
+                sum += j * pixels.covariance * j.transpose();
+            }
+            _ => {
+                let j = jacobian(at, STEP, |step: Vector3<f64>| {
+                    let mut point = original;
+                    point.measured.at = original.measured.at + step;
+                    answer(point)
+                })?;
+                sum += j * original.measured.covariance * j.transpose();
+            }
         }
         if original.model_sigma > 0.0 {
-            let j = jacobian(at, |step| {
-                moved.points[i].model = original.model + step;
-                let answer = solve(&moved);
-                moved.points[i] = original;
-                answer
+            let j = jacobian(at, STEP, |step: Vector3<f64>| {
+                let mut point = original;
+                point.model = original.model + step;
+                answer(point)
             })?;
             sum += j * j.transpose() * original.model_sigma.powi(2);
         }
@@ -53,25 +64,29 @@ pub(super) fn covariance(
 }
 
 /// ∂ξ/∂step at step 0.
-fn jacobian(
+fn jacobian<const N: usize>(
     at: &Transform<Object, Camera>,
-    mut answer: impl FnMut(Vector3<f64>) -> Result<Transform<Object, Camera>, Degenerate>,
-) -> Result<Matrix6x3<f64>, Degenerate> {
-    let mut j = Matrix6x3::zeros();
-    for axis in 0..3 {
-        let step = Vector3::ith(axis, STEP);
+    size: f64,
+    mut answer: impl FnMut(SVector<f64, N>) -> Result<Transform<Object, Camera>, Degenerate>,
+) -> Result<SMatrix<f64, 6, N>, Degenerate> {
+    let mut j = SMatrix::<f64, 6, N>::zeros();
+    for axis in 0..N {
+        let mut step = SVector::<f64, N>::zeros();
+        step[axis] = size;
         let (plus, minus): (Vector6<f64>, Vector6<f64>) = (at.error_to(&answer(step)?), at.error_to(&answer(-step)?));
-        j.set_column(axis, &((plus - minus) / (2.0 * STEP)));
+        j.set_column(axis, &((plus - minus) / (2.0 * size)));
     }
     Ok(j)
 }
 
-/// The pixels when the point they show moves by `step`.
-fn shifted(rig: &StereoRig, pixels: StereoPixels, from: &Point<Camera>, step: &Vector3<f64>) -> StereoPixels {
-    let (Some(before), Some(after)) = (rig.project(from), rig.project(&(*from + *step))) else { return pixels };
-    let by = |pixel: Pixel, before: Pixel, after: Pixel| Pixel {
-        u: pixel.u + after.u - before.u,
-        v: pixel.v + after.v - before.v,
-    };
-    StereoPixels { left: by(pixels.left, before.left, after.left), right: by(pixels.right, before.right, after.right) }
+/// How the triangulated point moves with its pixels, (Jᵀ W J)⁻¹ Jᵀ W.
+fn by_pixels(rig: &StereoRig, point: &Observation) -> Option<SMatrix<f64, 3, 4>> {
+    let weight = point.pixels?.covariance.try_inverse()?;
+    let (_, j): (_, Matrix4x3<f64>) = rig.project_with_jacobian(&point.measured.at)?;
+    Some((j.transpose() * weight * j).try_inverse()? * j.transpose() * weight)
+}
+
+fn shifted(pixels: &StereoPixels, step: &Vector4<f64>) -> StereoPixels {
+    let by = |pixel: &Pixel, u: f64, v: f64| Pixel { u: pixel.u + u, v: pixel.v + v };
+    StereoPixels { left: by(&pixels.left, step[0], step[1]), right: by(&pixels.right, step[2], step[3]) }
 }

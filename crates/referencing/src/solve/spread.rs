@@ -11,10 +11,27 @@ pub(crate) fn centroid(points: impl ExactSizeIterator<Item = Vector3<f64>>) -> V
     points.sum::<Vector3<f64>>() / count
 }
 
+/// Σ (p − p̄)(p − p̄)ᵀ.
+fn scatter(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> Matrix3<f64> {
+    let centre = centroid(points.clone());
+    let mut scatter = Matrix3::zeros();
+    for p in points {
+        scatter += (p - centre) * (p - centre).transpose();
+    }
+    scatter
+}
+
+/// Whether the second extent is at least `least` of the first by a margin that needs no eigenvalues: with the
+/// eigenvalues l₁ ≥ l₂ ≥ l₃ of the scatter, l₂/l₁ ≥ (l₁l₂ + l₁l₃ + l₂l₃) / 2(l₁ + l₂ + l₃)².
+fn clearly_wide(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone, least: f64) -> bool {
+    let s = scatter(points);
+    let minor = |i: usize, j: usize| s[(i, i)] * s[(j, j)] - s[(i, j)] * s[(i, j)];
+    minor(0, 1) + minor(0, 2) + minor(1, 2) > 4.0 * least * least * s.trace() * s.trace()
+}
+
 /// Second singular value over the first of the points about their centroid: 0 on a line, 1 on a disc.
 pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> f64 {
-    let centre = centroid(points.clone());
-    let scatter: Matrix3<f64> = points.map(|p| (p - centre) * (p - centre).transpose()).sum();
+    let scatter = scatter(points);
     let mut values: [f64; 3] = scatter.symmetric_eigenvalues().into();
     values.sort_by(f64::total_cmp);
     if values[2] > 0.0 { (values[1].max(0.0) / values[2]).sqrt() } else { 0.0 }
@@ -30,9 +47,18 @@ pub(super) fn check(data: &Observations<'_>, needed: usize, least: f64) -> Resul
     if !data.points.iter().all(Observation::is_finite) {
         return Err(Degenerate::NotFinite);
     }
-    let model = second_ratio(data.points.iter().map(|point| point.model.coords));
-    let measured = second_ratio(data.points.iter().map(|point| point.measured.at.coords));
-    let ratio = model.min(measured);
+    let model = data.points.iter().map(|point| point.model.coords);
+    let measured = data.points.iter().map(|point| point.measured.at.coords);
+    if clearly_wide(model.clone(), least) && clearly_wide(measured.clone(), least) {
+        return Ok(());
+    }
+    let ratio = second_ratio(model).min(second_ratio(measured));
     // Written so that a NaN is refused too.
     if ratio >= least { Ok(()) } else { Err(Degenerate::Collinear { ratio, least }) }
+}
+
+/// Refuses points measured behind the left camera: where a rig is given, they were seen.
+pub(super) fn in_front(data: &Observations<'_>) -> Result<(), Degenerate> {
+    let behind = data.points.iter().position(|point| !(point.measured.at.coords.z > 0.0));
+    behind.map_or(Ok(()), |index| Err(Degenerate::Behind { index, depth: data.points[index].measured.at.coords.z }))
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use seafix_geometry::{Camera, Object, Point, Transform, UncertainPoint};
+use seafix_geometry::{Camera, Object, Pinhole, Point, StereoRig, Transform, UncertainPixels, UncertainPoint};
 
 use super::*;
 use crate::Observation;
@@ -24,8 +24,10 @@ fn seen(model: &[[f64; 3]], sigma: f64) -> Observations<'static> {
 
 const SPREAD: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.4, 0.3, 0.9], [-0.7, 0.5, 0.4]];
 
+/// The solvers that take bare points.
 fn solvers() -> Vec<Box<dyn Solver>> {
-    SOLVERS.names().map(|name| SOLVERS.build(&seafix_component::Choice::named(name)).unwrap()).collect()
+    let all = SOLVERS.names().map(|name| SOLVERS.build(&seafix_component::Choice::named(name)).unwrap());
+    all.filter(|solver| !solver.needs_pixels()).collect()
 }
 
 #[test]
@@ -138,5 +140,76 @@ fn the_covariance_is_what_many_draws_show() {
             nees += xi.dot(&weight.solve(&xi)) / f64::from(draws);
         }
         assert!((5.6..6.4).contains(&nees), "{solver:?}: NEES {nees}");
+    }
+}
+
+/// The points of `SPREAD` as a rig sees them from 4 m, without noise, their pixels known as two aligned views know
+/// them: each view's error, and one in common.
+fn through_a_rig(rig: &StereoRig) -> (Observations<'_>, Transform<Object, Camera>) {
+    let pose = Transform::<Object, Camera>::exp(&Vector6::new(0.4, -0.3, 0.7, 0.2, 0.3, -4.0));
+    let mut covariance = nalgebra::Matrix4::identity() * 0.3_f64.powi(2);
+    for i in 0..2 {
+        (covariance[(i, i + 2)], covariance[(i + 2, i)]) = (0.05, 0.05);
+    }
+    let points = SPREAD.iter().map(|at| {
+        let model = Point::from(*at);
+        let pixels = UncertainPixels { at: rig.project(&(pose.inverse() * model)).unwrap(), covariance };
+        let found = rig.triangulate(&pixels).unwrap();
+        let measured = UncertainPoint { at: found.point, covariance: found.covariance };
+        Observation { measured, pixels: Some(pixels), model, model_sigma: 2e-3 }
+    });
+    (Observations { points: points.collect(), rig: Some(rig) }, pose)
+}
+
+fn rig() -> StereoRig {
+    let camera = Pinhole::new([1024, 768], [500.0, 510.0], [511.5, 383.5], &[-0.1, 0.02, 1e-3, -5e-4]).unwrap();
+    let right_from_left = Transform::exp(&Vector6::new(0.02, -0.05, 0.01, -0.25, 0.01, 0.02));
+    StereoRig::new(camera, camera, right_from_left).unwrap()
+}
+
+#[test]
+fn analytic_covariances_are_the_numerical_ones() {
+    let rig = rig();
+    let (data, pose) = through_a_rig(&rig);
+    let (mahalanobis, pixels) = (Mahalanobis::default(), StereoReprojection::default());
+    let solvers: [&dyn Solver; 2] = [&mahalanobis, &pixels];
+    for solver in solvers {
+        let analytic = solver.covariance(&data, &pose).unwrap().matrix;
+        let numeric = numerical::covariance(|moved| solver.solve(moved), &data, &pose).unwrap().matrix;
+        assert!((analytic - numeric).amax() < 1e-6 * analytic.amax(), "{solver:?}: {}", analytic - numeric);
+    }
+    let bare = Observations { rig: None, ..data };
+    let analytic = mahalanobis.covariance(&bare, &pose).unwrap().matrix;
+    let numeric = numerical::covariance(|moved| mahalanobis.solve(moved), &bare, &pose).unwrap().matrix;
+    assert!((analytic - numeric).amax() < 1e-6 * analytic.amax());
+}
+
+#[test]
+fn pixels_are_asked_for_by_name() {
+    let data = seen(&SPREAD, 0.01);
+    let why = StereoReprojection::default().solve(&data).unwrap_err();
+    assert_eq!(why, Degenerate::NoPixels);
+    assert!(why.to_string().contains("`mahalanobis`"));
+    let rig = rig();
+    let (mut data, _) = through_a_rig(&rig);
+    data.points[2].measured.at.coords.z = -1.0;
+    let behind = Err(Degenerate::Behind { index: 2, depth: -1.0 });
+    assert_eq!(
+        (StereoReprojection::default().solve(&data), Mahalanobis::default().solve(&data)),
+        (behind.clone(), behind)
+    );
+}
+
+#[test]
+fn truncated_squares_leave_outliers_out() {
+    let mut data = seen(&SPREAD, 0.01);
+    data.points[3].measured.at = data.points[3].measured.at + Vector3::new(0.5, -0.3, 0.2);
+    let solver = gnc_tls::GncTls::default();
+    assert_eq!(solver.used(&data), [0, 1, 2, 4]);
+    assert!(motion().error_to(&solver.solve(&data).unwrap()).amax() < 1e-12);
+    for loss in [irls::Loss::Cauchy, irls::Loss::Huber, irls::Loss::UnSquared] {
+        let robust = irls::Irls { loss, ..Default::default() }.solve(&data).unwrap();
+        let plain = Kabsch::default().solve(&data).unwrap();
+        assert!(motion().error_to(&robust).norm() < 0.7 * motion().error_to(&plain).norm(), "{loss:?}");
     }
 }

@@ -1,0 +1,106 @@
+//! The Cramér–Rao bound: how well any unbiased estimate of a pose could be.
+
+use nalgebra::{Matrix4, Matrix4x3, Matrix4x6, Matrix6, Vector3, Vector6};
+use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
+
+/// A model point and how well it is seen and known.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen {
+    /// Its true place.
+    pub at: Point<Object>,
+    /// Standard deviation of each of its coordinates in the model (m).
+    pub model_sigma: f64,
+    /// Covariance of (u left, v left, u right, v right) (px²).
+    pub pixels: Matrix4<f64>,
+}
+
+/// The least covariance of any unbiased estimate of the true pose from these points: the inverse of Fisher's
+/// information Σ Jᵀ S⁻¹ J, J the derivative of a point's four pixel coordinates by ξ, S the covariance of their
+/// noise and of the model's error as it appears in the images. `None` when a point is not seen or the points
+/// determine no pose.
+///
+/// Derivatives are central differences of the projection: nothing is shared with any estimator.
+pub fn cramer_rao(
+    rig: &StereoRig,
+    object_from_camera: &Transform<Object, Camera>,
+    points: &[Seen],
+) -> Option<Covariance6<Object, Camera>> {
+    const STEP: f64 = 1e-5;
+    let project = |pose: &Transform<Object, Camera>, point: &Point<Object>| {
+        Some(rig.project(&(pose.inverse() * *point))?.coordinates())
+    };
+    if points.len() < 3 {
+        return None; // the turn about their line is open, whatever rounding says
+    }
+    let mut information = Matrix6::zeros();
+    for point in points {
+        let mut by_pose = Matrix4x6::zeros();
+        for i in 0..6 {
+            let xi = Vector6::ith(i, STEP);
+            let plus = project(&object_from_camera.perturbed(&xi), &point.at)?;
+            let minus = project(&object_from_camera.perturbed(&-xi), &point.at)?;
+            by_pose.set_column(i, &((plus - minus) / (2.0 * STEP)));
+        }
+        let mut by_model = Matrix4x3::zeros();
+        for i in 0..3 {
+            let step = Vector3::ith(i, STEP);
+            let plus = project(object_from_camera, &(point.at + step))?;
+            let minus = project(object_from_camera, &(point.at + -step))?;
+            by_model.set_column(i, &((plus - minus) / (2.0 * STEP)));
+        }
+        let noise = point.pixels + by_model * by_model.transpose() * (point.model_sigma * point.model_sigma);
+        information += by_pose.transpose() * noise.try_inverse()? * by_pose;
+    }
+    Some(Covariance6::new(information.cholesky()?.inverse()))
+}
+
+/// The bound on m2 (m): root mean square over `model` of the standard deviation of a transferred point.
+pub fn transfer_bound(
+    bound: &Covariance6<Object, Camera>,
+    object_from_camera: &Transform<Object, Camera>,
+    model: &[Point<Object>],
+) -> f64 {
+    let camera_from_object = object_from_camera.inverse();
+    let sum: f64 = model.iter().map(|point| bound.of_point(&(camera_from_object * *point)).trace()).sum();
+    (sum / model.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_geometry::Pinhole;
+
+    /// Many points on a far ring about the axis: the lateral position is known as f·σ_x/z = σ_px/√(2n) says, when
+    /// the attitude is known; with the attitude open it is known less.
+    #[test]
+    fn depth_is_known_as_disparity_and_scale_say() {
+        let camera = Pinhole::new([1000, 1000], [500.0, 500.0], [499.5, 499.5], &[]).unwrap();
+        let right_from_left = Transform::exp(&Vector6::new(0.0, 0.0, 0.0, -0.25, 0.0, 0.0));
+        let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
+        let pose = Transform::<Object, Camera>::exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, -4.0));
+        let (n, radius, sigma) = (16, 1.0, 0.2);
+        let seen = |k: i32| {
+            let (sine, cosine) = (f64::from(k) * std::f64::consts::TAU / f64::from(n)).sin_cos();
+            let at = Point::new(radius * cosine, radius * sine, 0.0);
+            Seen { at, model_sigma: 0.0, pixels: Matrix4::identity() * sigma * sigma }
+        };
+        let points: Vec<Seen> = (0..n).map(seen).collect();
+        let bound = cramer_rao(&rig, &pose, &points).unwrap();
+        // By symmetry depth is independent of all else but the turn about y, which the right camera's offset
+        // mixes in. Its information alone: each camera sees a point move by f r/z² per metre of depth, r its
+        // distance from that camera's axis.
+        let information: f64 = points
+            .iter()
+            .map(|p| {
+                let square = |x: f64| (x * x + p.at.coords.y.powi(2)) * (500.0 / 16.0_f64).powi(2);
+                (square(p.at.coords.x) + square(p.at.coords.x - 0.25)) / (sigma * sigma)
+            })
+            .sum();
+        let alone = 1.0 / bound.matrix.try_inverse().unwrap()[(5, 5)];
+        assert!((alone * information - 1.0).abs() < 1e-6);
+        assert!(bound.matrix[(5, 5)] >= alone);
+        let m2 = transfer_bound(&bound, &pose, &points.iter().map(|p| p.at).collect::<Vec<_>>());
+        assert!(m2 > 0.0 && m2 < 0.01, "{m2}");
+        assert!(cramer_rao(&rig, &pose, &points[..2]).is_none(), "two points leave a turn about their line");
+    }
+}

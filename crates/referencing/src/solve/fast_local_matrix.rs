@@ -1,0 +1,62 @@
+//! Fast local matrix: the rotation linearised, a closed 6×6 solve, repeated.
+
+use nalgebra::Matrix3;
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Object, Point, Transform, triad};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Degenerate, Solver,
+    descent::{Term, minimize},
+    roots::widest,
+    spread::check,
+};
+use crate::{Observation, Observations};
+
+/// The motion of least Σ ‖P_k − C_k H‖², for motions that are small after the auxiliary frames of three widely
+/// spread points have been laid on each other: R ≈ I + \[φ\]× makes the sum a quadratic form of (φ, ρ), one 6×6 system
+/// gives its minimum, the exponential makes the answer a rotation again; repeated until nothing moves.
+///
+/// Where the points fit no motion (a mirror image) steps shrink slowly, and it may end short of the minimum: it does
+/// not claim it. This is our own reading of the phrase "fast computation of the local matrix", whose source was not available.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct FastLocalMatrix {
+    /// Second extent of the points over the first below which they count as a line.
+    pub(crate) least_ratio: f64,
+}
+
+impl Default for FastLocalMatrix {
+    fn default() -> Self {
+        Self { least_ratio: 1e-3 }
+    }
+}
+
+impl Component for FastLocalMatrix {
+    const NAME: &'static str = "fast-local-matrix";
+    const SUMMARY: &'static str = "unweighted least squares by a linearised rotation, repeated";
+    const SOURCE: &'static str = "ours, after a phrase in Bobkov, Kudryashov, Inzartsev 2021";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
+        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+    }
+}
+
+impl Solver for FastLocalMatrix {
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        check(data, self.minimum(), self.least_ratio)?;
+        let [a, b, c] = widest(data).map(|i| data.points[i]);
+        let line = |thin: seafix_geometry::Collinear| Degenerate::Collinear { ratio: thin.sine, least: thin.least };
+        let camera = triad::<Camera, Object>(&a.measured.at, &b.measured.at, &c.measured.at).map_err(line)?;
+        let object = triad::<Object, Object>(&a.model, &b.model, &c.model).map_err(line)?;
+        minimize(&data.points, &(object * camera.inverse()), &unweighted).ok_or(Degenerate::Singular)
+    }
+}
+
+/// Every point with the same weight; its size only says when a step is small.
+fn unweighted(point: &Observation, at: &Point<Camera>) -> Option<Term> {
+    const UNIT: f64 = 1e-4;
+    Some(Term::of(Matrix3::identity() / (UNIT * UNIT), &(point.measured.at - *at)))
+}

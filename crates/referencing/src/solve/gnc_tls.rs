@@ -1,0 +1,122 @@
+//! Graduated non-convexity with truncated least squares: outliers count no more than the threshold.
+
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Object, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::{Degenerate, Solver, irls::distance, kabsch::fit_weighted, numerical, spread::check};
+use crate::Observations;
+
+/// The motion of least Σ σ_k² min(d_k², c²), d_k = ‖C·H − P‖ / σ_k, σ_k² = tr(Σ_k + σ_model² I)/3, c the threshold: least
+/// squares over the points it keeps, which it chooses itself.
+///
+/// The sum has many minima. A convex one is solved first and bent step by step into it: with μ growing by
+/// `growth`, a point weighs 1 below c²μ/(μ+1), 0 above c²(μ+1)/μ, and (c/d)√(μ(μ+1)) − μ between.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct GncTls {
+    /// c (standard deviations of a point): 4.5 keeps 99 % of true points even where all noise is along one axis.
+    pub(crate) threshold: f64,
+    /// By how much μ grows a step.
+    pub(crate) growth: f64,
+    /// Second extent of the points over the first below which they count as a line.
+    pub(crate) least_ratio: f64,
+}
+
+impl Default for GncTls {
+    fn default() -> Self {
+        Self { threshold: 4.5, growth: 1.4, least_ratio: 1e-3 }
+    }
+}
+
+impl Component for GncTls {
+    const NAME: &'static str = "gnc-tls";
+    const SUMMARY: &'static str = "truncated least squares by graduated non-convexity: leaves outliers out";
+    const SOURCE: &'static str = "Yang, Antonante, Tzoumas, Carlone, Graduated non-convexity for robust spatial \
+                                  perception, 2020";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let positive = self.threshold > 0.0 && self.threshold.is_finite();
+        in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
+        let grows = self.growth > 1.0 && self.growth <= 10.0;
+        in_range(grows, "growth", self.growth, "a number above 1, at most 10")?;
+        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
+        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+    }
+}
+
+/// Steps of the iteration: μ passes through twenty decades.
+const MOST_STEPS: usize = 200;
+
+impl Solver for GncTls {
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        check(data, self.minimum(), self.least_ratio)?;
+        Ok(self.keep(data)?.0)
+    }
+
+    /// The points it keeps.
+    fn used(&self, data: &Observations<'_>) -> Vec<usize> {
+        let kept = check(data, self.minimum(), self.least_ratio).and_then(|()| self.keep(data));
+        let kept = kept.map(|(_, kept)| kept).unwrap_or_default();
+        (0..kept.len()).filter(|&k| kept[k]).collect()
+    }
+
+    /// The derivatives are those of least squares over the points it keeps.
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<seafix_geometry::Covariance6<Object, Camera>, Degenerate> {
+        let kept = self.used(data).into_iter().map(|k| data.points[k]).collect();
+        let kept = Observations { points: kept, rig: data.rig };
+        numerical::covariance(|moved| Ok(fit_weighted(&moved.points, |_| 1.0)), &kept, at)
+    }
+}
+
+impl GncTls {
+    /// The pose and which points it rests on.
+    fn keep(&self, data: &Observations<'_>) -> Result<(Transform<Object, Camera>, Vec<bool>), Degenerate> {
+        let points = &data.points;
+        let c2 = self.threshold * self.threshold;
+        let mut pose = fit_weighted(points, |_| 1.0);
+        let mut squares: Vec<f64> = points.iter().map(|point| distance(point, &pose).powi(2)).collect();
+        let largest = squares.iter().copied().fold(0.0, f64::max);
+        if !largest.is_finite() {
+            return Err(Degenerate::NotFinite);
+        }
+        let mut weights = vec![1.0; points.len()];
+        if 2.0 * largest > c2 {
+            let mut mu = c2 / (2.0 * largest - c2);
+            for _ in 0..MOST_STEPS {
+                let weight = |d2: f64| {
+                    if d2 <= c2 * mu / (mu + 1.0) {
+                        1.0
+                    } else if d2 >= c2 * (mu + 1.0) / mu {
+                        0.0
+                    } else {
+                        ((c2 / d2 * mu * (mu + 1.0)).sqrt() - mu).clamp(0.0, 1.0)
+                    }
+                };
+                let next: Vec<f64> = squares.iter().map(|&d2| weight(d2)).collect();
+                if !self.determined(data, &next) {
+                    return Ok((pose, weights.iter().map(|&w| w > 0.0).collect()));
+                }
+                weights = next;
+                pose = fit_weighted(points, |k| weights[k]);
+                squares.iter_mut().zip(points).for_each(|(d2, point)| *d2 = distance(point, &pose).powi(2));
+                if weights.iter().all(|&w| w == 0.0 || w == 1.0) {
+                    break;
+                }
+                mu *= self.growth;
+            }
+        }
+        Ok((pose, weights.iter().map(|&w| w > 0.5).collect()))
+    }
+
+    /// Whether the points that these weights keep are three and no line.
+    fn determined(&self, data: &Observations<'_>, weights: &[f64]) -> bool {
+        let kept = data.points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(point, _)| *point).collect();
+        check(&Observations { points: kept, rig: data.rig }, self.minimum(), self.least_ratio).is_ok()
+    }
+}

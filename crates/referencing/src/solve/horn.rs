@@ -1,0 +1,68 @@
+//! Horn: unweighted least squares by unit quaternions.
+
+use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion};
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Object, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Degenerate, Solver,
+    spread::{centroid, check},
+};
+use crate::Observations;
+
+/// The motion of least Σ ‖P_k − C_k H‖²: its quaternion is the eigenvector of the greatest eigenvalue of the symmetric
+/// 4×4 matrix N of the sums S_ij = Σ c_i p_j, and qᵀ N q = tr(Rᵀ M) is what is maximised.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Horn {
+    /// Second extent of the points over the first below which they count as a line.
+    pub(crate) least_ratio: f64,
+}
+
+impl Default for Horn {
+    fn default() -> Self {
+        Self { least_ratio: 1e-3 }
+    }
+}
+
+impl Component for Horn {
+    const NAME: &'static str = "horn";
+    const SUMMARY: &'static str = "unweighted least squares by unit quaternions";
+    const SOURCE: &'static str = "Horn, Closed-form solution of absolute orientation using unit quaternions, 1987";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
+        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+    }
+}
+
+impl Solver for Horn {
+    fn least_squares(&self) -> bool {
+        true
+    }
+
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        check(data, self.minimum(), self.least_ratio)?;
+        let model = centroid(data.points.iter().map(|point| point.model.coords));
+        let measured = centroid(data.points.iter().map(|point| point.measured.at.coords));
+        let s: Matrix3<f64> = data
+            .points
+            .iter()
+            .map(|point| (point.measured.at.coords - measured) * (point.model.coords - model).transpose())
+            .sum();
+        let (x, y, z) = (s.m23 - s.m32, s.m31 - s.m13, s.m12 - s.m21);
+        #[rustfmt::skip]
+        let n = Matrix4::new(
+            s.trace(), x,                     y,                     z,
+            x,         s.m11 - s.m22 - s.m33, s.m12 + s.m21,         s.m31 + s.m13,
+            y,         s.m12 + s.m21,         s.m22 - s.m11 - s.m33, s.m23 + s.m32,
+            z,         s.m31 + s.m13,         s.m23 + s.m32,         s.m33 - s.m11 - s.m22,
+        );
+        let eigen = n.symmetric_eigen();
+        let q = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+        let rotation = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+        Ok(Transform::new(rotation, model - rotation * measured))
+    }
+}

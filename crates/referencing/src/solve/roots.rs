@@ -1,0 +1,91 @@
+//! The poses that three of the points allow the left camera alone.
+
+use nalgebra::Vector3;
+use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
+
+use super::{kabsch, p3p};
+use crate::{Observation, Observations};
+
+/// Up to four poses, the one that explains the pixels of all points best first.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Roots {
+    poses: [Transform<Object, Camera>; 4],
+    costs: [f64; 4],
+    count: usize,
+}
+
+impl Default for Roots {
+    fn default() -> Self {
+        Self { poses: [Transform::identity(); 4], costs: [f64::INFINITY; 4], count: 0 }
+    }
+}
+
+impl Roots {
+    pub(super) fn as_slice(&self) -> &[Transform<Object, Camera>] {
+        &self.poses[..self.count]
+    }
+
+    /// Keeps the poses in the order of their costs.
+    fn insert(&mut self, pose: Transform<Object, Camera>, cost: f64) {
+        let place = self.costs[..self.count].partition_point(|&known| known <= cost);
+        if place < 4 {
+            self.poses[place..].rotate_right(1);
+            self.costs[place..].rotate_right(1);
+            (self.poses[place], self.costs[place]) = (pose, cost);
+            self.count = (self.count + 1).min(4);
+        }
+    }
+}
+
+/// The poses from which the left camera would see three widely spread points where it does see them.
+pub(super) fn roots(data: &Observations<'_>, rig: &StereoRig) -> Roots {
+    roots_of(data, rig, widest(data))
+}
+
+/// The same of these three.
+pub(super) fn roots_of(data: &Observations<'_>, rig: &StereoRig, three: [usize; 3]) -> Roots {
+    let mut roots = Roots::default();
+    let three = three.map(|i| data.points[i]);
+    let ray = |point: &Observation| -> Option<Vector3<f64>> {
+        Some(rig.left().normalize(&point.pixels?.at.left)?.push(1.0).normalize())
+    };
+    let [Some(a), Some(b), Some(c)] = [0, 1, 2].map(|i| ray(&three[i])) else { return roots };
+    let rays = [a, b, c];
+    for lambda in p3p::distances(&rays, &three.map(|point| point.model.coords)).as_slice() {
+        let mut placed = three;
+        for ((point, ray), distance) in placed.iter_mut().zip(&rays).zip(lambda.iter()) {
+            point.measured.at = Point::from(ray * *distance);
+        }
+        let pose = kabsch::fit(&placed);
+        if let Some(cost) = squares(data, rig, &pose) {
+            roots.insert(pose, cost);
+        }
+    }
+    roots
+}
+
+/// Σ of the squared pixel residuals, unweighted (px²); `None` where a point is behind a camera.
+fn squares(data: &Observations<'_>, rig: &StereoRig, pose: &Transform<Object, Camera>) -> Option<f64> {
+    let camera_from_object = pose.inverse();
+    let of = |point: &Observation| {
+        let expected = rig.project(&(camera_from_object * point.model))?;
+        Some((point.pixels?.at.coordinates() - expected.coordinates()).norm_squared())
+    };
+    data.points.iter().map(of).sum()
+}
+
+/// Three points of the model far from each other: the farthest from the centroid, the farthest from that, and the
+/// farthest from the line through both.
+pub(super) fn widest(data: &Observations<'_>) -> [usize; 3] {
+    let at = |i: usize| data.points[i].model.coords;
+    let centre = data.points.iter().map(|point| point.model.coords).sum::<Vector3<f64>>() / data.points.len() as f64;
+    let farthest = |measure: &dyn Fn(usize) -> f64| {
+        let better = |best: usize, i: usize| if measure(i) > measure(best) { i } else { best };
+        (0..data.points.len()).fold(0, better)
+    };
+    let first = farthest(&|i| (at(i) - centre).norm_squared());
+    let second = farthest(&|i| (at(i) - at(first)).norm_squared());
+    let along = at(second) - at(first);
+    let third = farthest(&|i| along.cross(&(at(i) - at(first))).norm_squared());
+    [first, second, third]
+}

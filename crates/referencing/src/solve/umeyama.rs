@@ -1,0 +1,125 @@
+//! Umeyama: least squares by singular values, with the scale as a diagnostic.
+
+use nalgebra::{Matrix3, Vector3};
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Object, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Degenerate, Solver,
+    spread::{centroid, check},
+};
+use crate::Observations;
+
+/// The motion of least Σ ‖P_k − C_k H‖² as Umeyama writes it: M = U S Vᵀ, R = U diag(1, 1, det U det V) Vᵀ, and the
+/// scale s = tr(S diag(…)) / Σ‖c_k‖² that a similarity would have.
+///
+/// A fix is rigid, so the scale is not applied: the measured points' scale differs from one by noise, a wrong
+/// focal length, a wrong baseline or a model in other units, and beyond `most_scale_error` it is refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Umeyama {
+    /// Second extent of the points over the first below which they count as a line.
+    pub(crate) least_ratio: f64,
+    /// Largest |s − 1| that is accepted; any where infinite.
+    pub(crate) most_scale_error: f64,
+}
+
+impl Default for Umeyama {
+    fn default() -> Self {
+        Self { least_ratio: 1e-3, most_scale_error: f64::INFINITY }
+    }
+}
+
+impl Component for Umeyama {
+    const NAME: &'static str = "umeyama";
+    const SUMMARY: &'static str = "unweighted least squares by singular values, the scale as a diagnostic";
+    const SOURCE: &'static str = "Umeyama, Least-squares estimation of transformation parameters between two point \
+                                  patterns, 1991";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
+        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")?;
+        in_range(self.most_scale_error > 0.0, "most-scale-error", self.most_scale_error, "a positive number")
+    }
+}
+
+impl Solver for Umeyama {
+    fn least_squares(&self) -> bool {
+        true
+    }
+
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        check(data, self.minimum(), self.least_ratio)?;
+        let (pose, scale) = similarity(data);
+        if (scale - 1.0).abs() <= self.most_scale_error {
+            Ok(pose)
+        } else {
+            Err(Degenerate::Scale { scale, most: self.most_scale_error })
+        }
+    }
+}
+
+/// The rigid motion and the scale that a similarity would have besides.
+fn similarity(data: &Observations<'_>) -> (Transform<Object, Camera>, f64) {
+    let model = centroid(data.points.iter().map(|point| point.model.coords));
+    let measured = centroid(data.points.iter().map(|point| point.measured.at.coords));
+    let (mut m, mut size) = (Matrix3::zeros(), 0.0);
+    for point in &data.points {
+        let (p, c) = (point.model.coords - model, point.measured.at.coords - measured);
+        m += p * c.transpose();
+        size += c.norm_squared();
+    }
+    let svd = m.svd(true, true);
+    let (u, v_t) = (svd.u.expect("u was asked for"), svd.v_t.expect("v_t was asked for"));
+    let sign = if u.determinant() * v_t.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let guard = Vector3::new(1.0, 1.0, sign);
+    let rotation = polish(u * Matrix3::from_diagonal(&guard) * v_t, &m);
+    let rotation = Transform::<Object, Camera>::from_axes(&rotation, Vector3::zeros()).rotation();
+    let scale = svd.singular_values.dot(&guard) / size;
+    (Transform::new(rotation, model - rotation * measured), scale)
+}
+
+/// Newton's steps on tr(Rᵀ M). The library's 3×3 decomposition goes by way of MᵀM, which costs half the digits of the
+/// weaker directions; a step or two give them back.
+fn polish(mut rotation: Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
+    for _ in 0..4 {
+        // At R Exp(φ): tr((R Exp φ)ᵀ M) has gradient g = vex(N − Nᵀ), N = Rᵀ M, and Hessian −(tr(N) I − sym N).
+        let n = rotation.transpose() * m;
+        let gradient = Vector3::new(n[(2, 1)] - n[(1, 2)], n[(0, 2)] - n[(2, 0)], n[(1, 0)] - n[(0, 1)]);
+        let hessian = Matrix3::identity() * n.trace() - (n + n.transpose()) * 0.5;
+        let Some(cholesky) = hessian.cholesky() else { break };
+        let step = cholesky.solve(&gradient);
+        if !(step.norm() < 1e-3) {
+            break; // far from a maximum: what the singular values said stands
+        }
+        rotation *= seafix_geometry::so3::exp(&step).to_rotation_matrix().into_inner();
+        if step.norm() < 1e-15 {
+            break;
+        }
+    }
+    rotation
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Observation;
+    use seafix_geometry::{Point, UncertainPoint};
+
+    #[test]
+    fn a_model_in_millimetres_is_refused_by_its_scale() {
+        let points = [[0.0, 0.0, 3.0], [1.0, 0.0, 3.0], [0.0, 1.0, 3.5], [1.0, 1.0, 2.5]].map(|at| Observation {
+            measured: UncertainPoint::isotropic(Point::from(at), 0.01),
+            pixels: None,
+            model: Point::from(at.map(|x| x * 1000.0)),
+            model_sigma: 0.0,
+        });
+        let data = Observations { points: points.to_vec(), rig: None };
+        let careful = Umeyama { most_scale_error: 0.1, ..Umeyama::default() };
+        let Err(Degenerate::Scale { scale, .. }) = careful.solve(&data) else { panic!("a thousandfold model") };
+        assert!((scale - 1000.0).abs() < 1e-9);
+        assert!(Umeyama::default().solve(&data).is_ok());
+    }
+}

@@ -1,0 +1,50 @@
+//! Weighted Kabsch: one number a point says how well it is known.
+
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Object, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::{Degenerate, Solver, kabsch::fit_weighted, spread::check};
+use crate::{Observation, Observations};
+
+/// The motion of least Σ w_k ‖P_k − C_k H‖² with w_k = 3 / tr(Σ_k + σ_model² I): near points count more than far ones.
+/// That a far point is well known across the line of sight, one number cannot say: see `mahalanobis`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct WeightedKabsch {
+    /// Second extent of the points over the first below which they count as a line.
+    pub(crate) least_ratio: f64,
+}
+
+impl Default for WeightedKabsch {
+    fn default() -> Self {
+        Self { least_ratio: 1e-3 }
+    }
+}
+
+impl Component for WeightedKabsch {
+    const NAME: &'static str = "weighted-kabsch";
+    const SUMMARY: &'static str = "least squares over rigid motions, one weight a point from its variance";
+    const SOURCE: &'static str = "Kabsch, A solution for the best rotation to relate two sets of vectors, 1976; \
+                                  Sorkine-Hornung, Rabinovich, Least-squares rigid motion using SVD, 2017";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
+        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+    }
+}
+
+impl Solver for WeightedKabsch {
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        check(data, self.minimum(), self.least_ratio)?;
+        Ok(fit_weighted(&data.points, |k| 1.0 / variance(&data.points[k])))
+    }
+}
+
+/// Mean variance of a residual along an axis (m²).
+pub(super) fn variance(point: &Observation) -> f64 {
+    /// Nothing is known better than this (m).
+    const FLOOR: f64 = 1e-9;
+    point.noise().trace() / 3.0 + FLOOR * FLOOR
+}

@@ -1,0 +1,203 @@
+//! Points before two cameras and nothing else: what a Monte Carlo of solvers draws from.
+
+use nalgebra::{Matrix3, Vector3};
+use seafix_geometry::{
+    Camera, MeasuredPoint, Object, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    dive::{BadDive, VirtualRig},
+    stream::{Purpose, Stream},
+};
+
+/// How the points lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shape {
+    /// Over the middle 70 % of the width and of the height of the common field, depths within ±10 %.
+    #[default]
+    Spread,
+    /// In a box of 0.5 × 0.4 × 0.3 m, turned at random.
+    Compact,
+}
+
+/// A layout of model points before a rig, and how they are measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Layout {
+    /// How the points lie.
+    pub shape: Shape,
+    /// How many there are.
+    pub points: usize,
+    /// Which of all such layouts.
+    pub number: u64,
+    /// Mean depth (m).
+    pub distance: f64,
+    /// Standard deviation of each pixel coordinate, in each image (px).
+    pub sigma_px: f64,
+    /// Standard deviation of each coordinate of a model point (m), drawn afresh each draw.
+    pub model_sigma: f64,
+    /// The cameras.
+    pub rig: VirtualRig,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self {
+            shape: Shape::Spread,
+            points: 13,
+            number: 0,
+            distance: 3.25,
+            sigma_px: 0.2,
+            model_sigma: 0.0,
+            rig: VirtualRig::default(),
+        }
+    }
+}
+
+/// A layout, drawn: the model as its survey has it, and the true pose.
+#[derive(Debug, Clone)]
+pub struct Placed {
+    settings: Layout,
+    seed: u64,
+    /// The cameras.
+    pub rig: StereoRig,
+    /// The model's points.
+    pub model: Vec<Point<Object>>,
+    /// The true pose.
+    pub object_from_camera: Transform<Object, Camera>,
+}
+
+/// Second extent of a layout over the first: below it points are nearly a line.
+const LEAST_RATIO: f64 = 0.15;
+/// Layouts that are drawn before none is said to fit.
+const MOST_TRIES: usize = 10_000;
+
+impl Layout {
+    /// The layout of this `seed`.
+    ///
+    /// # Errors
+    /// [`BadDive`] when the numbers describe no rig, or when no layout lies before both cameras.
+    pub fn place(&self, seed: u64) -> Result<Placed, BadDive> {
+        let rig = self.rig.build()?;
+        let mut stream = Stream::new(seed, self.number, 0, Purpose::View);
+        for _ in 0..MOST_TRIES {
+            let places = match self.shape {
+                Shape::Spread => self.spread(&rig, &mut stream),
+                Shape::Compact => self.compact(&rig, &mut stream),
+            };
+            let Some(places) = places.filter(|places| is_wide(places)) else { continue };
+            let centre = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+            let turn = rotation(&mut stream);
+            let object_from_camera = Transform::new(turn, -(turn * centre) + stream.normal3(0.1));
+            let model = places.iter().map(|at| object_from_camera * Point::from(*at)).collect();
+            return Ok(Placed { settings: self.clone(), seed, rig, model, object_from_camera });
+        }
+        Err(BadDive::Layout { points: self.points, distance: self.distance })
+    }
+
+    fn spread(&self, rig: &StereoRig, stream: &mut Stream) -> Option<Vec<Vector3<f64>>> {
+        const SHARE: f64 = 0.7;
+        let [width, height] = rig.left().size().map(|n| f64::from(n - 1));
+        let one = |_| {
+            let depth = self.distance * stream.between(0.9, 1.1);
+            // What both cameras see at this depth begins where the right image begins.
+            let hidden = self.rig.focal * self.rig.baseline / depth;
+            let across = hidden + (width - hidden) * (0.5 + SHARE * (stream.unit() - 0.5));
+            let pixel = Pixel { u: across, v: height * (0.5 + SHARE * (stream.unit() - 0.5)) };
+            let at = rig.left().normalize(&pixel)?.push(1.0) * depth;
+            rig.sees(&Point::from(at), 0.0).map(|_| at)
+        };
+        (0..self.points).map(one).collect()
+    }
+
+    fn compact(&self, rig: &StereoRig, stream: &mut Stream) -> Option<Vec<Vector3<f64>>> {
+        const SIZE: [f64; 3] = [0.5, 0.4, 0.3];
+        let turn = rotation(stream);
+        let centre = Vector3::new(0.5 * self.rig.baseline, 0.0, self.distance);
+        let one = |_| {
+            let within = Vector3::from(SIZE.map(|size| size * (stream.unit() - 0.5)));
+            let at = centre + turn * within;
+            rig.sees(&Point::from(at), 0.0).map(|_| at)
+        };
+        (0..self.points).map(one).collect()
+    }
+}
+
+impl Placed {
+    /// One draw: the points in the order of the model, as triangulated from disturbed pixels; `None` where noise
+    /// leaves a point untriangulable.
+    pub fn draw(&self, draw: u64) -> Option<Vec<MeasuredPoint>> {
+        let mut stream = Stream::new(self.seed, self.settings.number, draw, Purpose::Points);
+        let camera_from_object = self.object_from_camera.inverse();
+        let sigma = self.settings.sigma_px;
+        let mut measure = |model: &Point<Object>| {
+            let truly = *model + stream.normal3(self.settings.model_sigma);
+            let exact = self.rig.project(&(camera_from_object * truly))?;
+            let mut disturbed = |p: Pixel| Pixel { u: p.u + sigma * stream.normal(), v: p.v + sigma * stream.normal() };
+            let seen = StereoPixels { left: disturbed(exact.left), right: disturbed(exact.right) };
+            // A covariance of zero would claim what no camera can know.
+            let pixels = UncertainPixels::independent(seen, sigma.max(1e-3));
+            let found = self.rig.triangulate(&pixels).ok()?;
+            let position = UncertainPoint { at: found.point, covariance: found.covariance };
+            Some(MeasuredPoint { position, pixels: Some(pixels) })
+        };
+        self.model.iter().map(&mut measure).collect()
+    }
+}
+
+/// A rotation, uniform over all (Shoemake, *Uniform random rotations*, 1992): that of a normal quaternion.
+fn rotation(stream: &mut Stream) -> nalgebra::UnitQuaternion<f64> {
+    let imaginary = stream.normal3(1.0);
+    nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::from_parts(stream.normal(), imaginary))
+}
+
+/// Whether the second extent of the points is more than 0.15 of the first.
+fn is_wide(places: &[Vector3<f64>]) -> bool {
+    let centre = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+    let scatter: Matrix3<f64> = places.iter().map(|p| (p - centre) * (p - centre).transpose()).sum();
+    let mut values: [f64; 3] = scatter.symmetric_eigenvalues().into();
+    values.sort_by(f64::total_cmp);
+    values[1] > LEAST_RATIO * LEAST_RATIO * values[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_seen_where_the_layout_says() {
+        for shape in [Shape::Spread, Shape::Compact] {
+            for number in 0..20 {
+                let layout = Layout { shape, number, points: 8, distance: 2.0, ..Layout::default() };
+                let placed = layout.place(1).unwrap();
+                let places: Vec<_> = placed.model.iter().map(|p| placed.object_from_camera.inverse() * *p).collect();
+                assert_eq!((places.len(), placed.draw(1).unwrap().len()), (8, 8));
+                assert!(places.iter().all(|at| placed.rig.sees(at, 0.0).is_some()));
+                let reach = places.iter().flat_map(|a| places.iter().map(|b| a.distance(b))).fold(0.0, f64::max);
+                let deep = places.iter().all(|at| (at.coords.z / 2.0 - 1.0).abs() <= 0.1 + 1e-9);
+                match shape {
+                    Shape::Spread => assert!(deep),
+                    Shape::Compact => assert!(reach < 0.71),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_noise_every_draw_is_the_truth() {
+        let placed = Layout { sigma_px: 0.0, ..Layout::default() }.place(3).unwrap();
+        for (seen, model) in placed.draw(5).unwrap().iter().zip(&placed.model) {
+            assert!((placed.object_from_camera * seen.position.at).distance(model) < 1e-10);
+        }
+        let noisy = Layout::default().place(3).unwrap();
+        assert_ne!(noisy.draw(1).unwrap()[0], noisy.draw(2).unwrap()[0]);
+        assert_eq!(noisy.draw(1).unwrap(), noisy.draw(1).unwrap());
+    }
+
+    #[test]
+    fn a_layout_that_no_camera_sees_is_refused() {
+        assert!(Layout { distance: 0.2, shape: Shape::Compact, ..Layout::default() }.place(1).is_err());
+    }
+}

@@ -1,0 +1,100 @@
+//! Many draws of one layout: the errors of a solver beside the Cramér–Rao bound.
+
+use nalgebra::{Matrix4, Vector3};
+use seafix_evaluation::{Seen, attitude_error, cramer_rao, nees, position_error, transfer_bound, transfer_rms};
+use seafix_geometry::Point;
+use seafix_referencing::{Observation, Observations, Solver};
+use seafix_simulation::{Layout, Placed};
+
+/// What the draws of one cell say of one solver.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Cell {
+    /// Draws that were answered.
+    pub answered: u32,
+    /// Draws that were not.
+    pub refused: u32,
+    /// Root mean square of m2 over that of its bound.
+    pub m2: f64,
+    /// Root mean square of the position's error (m3) over that of its bound.
+    pub m3: f64,
+    /// Root mean square of m2 (m).
+    pub m2_rms: f64,
+    /// Root mean square of the position's error (m).
+    pub m3_rms: f64,
+    /// Length of the mean error of the position over its standard deviation by the bound.
+    pub bias: f64,
+    /// Mean NEES.
+    pub nees: f64,
+    /// Share of draws whose NEES lies below the 95 % quantile of χ² with six degrees of freedom.
+    pub coverage: f64,
+    /// Greatest standard deviation of the attitude by the bound, over three axes together (rad).
+    pub attitude_sigma: f64,
+    /// Root mean square error of the attitude (rad).
+    pub attitude_rms: f64,
+}
+
+/// What a solver makes of `draws` draws, spread evenly over `layouts` layouts of these settings.
+///
+/// # Panics
+/// When the settings describe no layout.
+pub fn cell(solver: &dyn Solver, settings: &Layout, layouts: u64, draws: u64, covariance: bool) -> Cell {
+    /// χ²₆ at 95 %.
+    const NINETY_FIVE: f64 = 12.591_587_243_743_977;
+    let mut cell = Cell::default();
+    let (mut m2, mut m3, mut m2_bound, mut m3_bound, mut counted, mut angle) = (0.0, 0.0, 0.0, 0.0, 0u32, 0.0);
+    for number in 0..layouts {
+        let placed = Layout { number, ..settings.clone() }.place(1).expect("the layout can be placed");
+        let pixels = Matrix4::identity() * settings.sigma_px.powi(2);
+        let seen = placed.model.iter().map(|&at| Seen { at, model_sigma: settings.model_sigma, pixels });
+        let bound = cramer_rao(&placed.rig, &placed.object_from_camera, &seen.collect::<Vec<_>>())
+            .expect("three points and more determine a pose");
+        cell.attitude_sigma = cell.attitude_sigma.max(bound.attitude_sigma());
+        let (m2_limit, m3_limit) =
+            (transfer_bound(&bound, &placed.object_from_camera, &placed.model), bound.position_sigma());
+        let mut mean = Vector3::zeros();
+        let mut here = 0u32;
+        for draw in 0..draws / layouts {
+            let Some(points) = observations(&placed, draw, settings.model_sigma) else { continue };
+            let data = Observations { points, rig: Some(&placed.rig) };
+            let Ok(pose) = solver.solve(&data) else {
+                cell.refused += 1;
+                continue;
+            };
+            let truth = &placed.object_from_camera;
+            m2 += transfer_rms(&pose, truth, &placed.model).expect("there are points").powi(2);
+            m3 += position_error(&pose, truth).powi(2);
+            angle += attitude_error(&pose, truth).powi(2);
+            m2_bound += m2_limit * m2_limit;
+            m3_bound += m3_limit * m3_limit;
+            mean += pose.translation() - truth.translation();
+            (cell.answered, here) = (cell.answered + 1, here + 1);
+            if covariance && let Ok(covariance) = solver.covariance(&data, &pose) {
+                let used = solver.used(&data);
+                let sum: Vector3<f64> = used.iter().map(|&i| data.points[i].measured.at.coords).sum();
+                if let Some(error) = nees(&pose, truth, &covariance, &Point::from(sum / used.len() as f64)) {
+                    counted += 1;
+                    cell.nees += error;
+                    cell.coverage += f64::from(u8::from(error <= NINETY_FIVE));
+                }
+            }
+        }
+        cell.bias += mean.norm() / f64::from(here.max(1)) / m3_limit / layouts as f64;
+    }
+    let n = f64::from(cell.answered);
+    (cell.m2, cell.m3) = ((m2 / m2_bound).sqrt(), (m3 / m3_bound).sqrt());
+    (cell.m2_rms, cell.m3_rms, cell.attitude_rms) = ((m2 / n).sqrt(), (m3 / n).sqrt(), (angle / n).sqrt());
+    (cell.nees, cell.coverage) = (cell.nees / f64::from(counted), cell.coverage / f64::from(counted));
+    cell
+}
+
+/// The draw as a solver takes it.
+pub fn observations(placed: &Placed, draw: u64, model_sigma: f64) -> Option<Vec<Observation>> {
+    let cloud = placed.draw(draw)?;
+    let point = |(seen, &model): (&seafix_geometry::MeasuredPoint, _)| Observation {
+        measured: seen.position,
+        pixels: seen.pixels,
+        model,
+        model_sigma,
+    };
+    Some(cloud.iter().zip(&placed.model).map(point).collect())
+}
