@@ -86,6 +86,16 @@ fn the_cloud_is_written_whole() {
 }
 
 #[test]
+fn images_that_changed_places_are_refused() {
+    let mut command = Command::cargo_bin("seafix").unwrap();
+    let table = fs::read_to_string(sample("frames.csv")).unwrap();
+    let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
+    command.arg("cloud").args([sample(pair[1]), sample(pair[0])]).arg("--rig").arg(sample("dataset.toml"));
+    let said = String::from_utf8(command.assert().code(3).get_output().stderr.clone()).unwrap();
+    assert!(said.contains("left and right images that have changed places") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
 fn what_cannot_be_is_refused_in_one_line() {
     assert!(refusal(&["--detector", "haris"], 2).contains("did you mean `harris`?"));
     assert!(refusal(&["--features", "0"], 2).contains("features"));

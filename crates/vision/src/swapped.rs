@@ -2,7 +2,7 @@
 
 use seafix_geometry::{StereoRig, Transform};
 
-use crate::{EpipolarBand, Match, Matcher, View, Workspace};
+use crate::{Descriptor, Detector, EpipolarBand, Harris, Image, Match, Matcher, Surf, View, Workspace};
 
 /// How many matches two images have as they came and with their places exchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,6 +39,15 @@ impl Sides {
             found.iter().filter(|m| !beaten(m)).count()
         };
         Self { given: better(&given, &exchanged), exchanged: better(&exchanged, &given) }
+    }
+
+    /// What two images say by their corners, found and described with the defaults.
+    pub fn of_images(left: &Image, right: &Image, rig: &StereoRig) -> Self {
+        let corners = [left, right].map(|image| Harris::default().detect(image));
+        let described =
+            [(left, &corners[0]), (right, &corners[1])].map(|(image, at)| Surf::default().describe(image, at));
+        let view = |image, side: usize| View { image, keypoints: &corners[side], descriptors: &described[side] };
+        Self::of(&view(left, 0), &view(right, 1), rig, &mut Workspace::default())
     }
 
     /// Whether the images have changed places: more than nine in ten of at least twenty matches say so.

@@ -7,10 +7,10 @@ use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
 use seafix_experiment::{
     Pipeline,
-    dataset::{read_image, read_rig},
+    dataset::{read_image, read_rig, swapped_fault},
 };
 use seafix_geometry::StereoRig;
-use seafix_vision::{FrontEnd, Image, Look, StageTimes, Threads};
+use seafix_vision::{FrontEnd, Image, Look, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
 use crate::{
@@ -65,6 +65,9 @@ impl Cloud {
         let (rig, bits) = read_rig(&self.rig).map_err(input)?;
         let left = read_image(&self.left, rig.left().size(), bits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits).map_err(input)?;
+        if let Some(fault) = swapped_fault(Sides::of_images(&left, &right, &rig), &self.left) {
+            return Err(Failure::new(INPUT, fault));
+        }
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()

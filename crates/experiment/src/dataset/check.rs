@@ -1,8 +1,12 @@
 //! Everything that is wrong with a data set, images included.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::Add,
+    path::{Path, PathBuf},
+};
 
 use seafix_component::Fault;
+use seafix_vision::Sides;
 use sha2::{Digest, Sha256};
 
 use super::{Dataset, folder::inside};
@@ -19,7 +23,30 @@ pub fn check(folder: &Path) -> (Vec<Fault>, Vec<Fault>) {
     let mut faults: Vec<Fault> = dataset.frames.iter().filter_map(|frame| dataset.pair(frame).err()).collect();
     faults.dedup();
     faults.extend(hash_faults(&dataset));
+    if faults.is_empty() {
+        faults.extend(swapped(&dataset));
+    }
     (faults, dataset.warnings)
+}
+
+/// Frames whose images are looked at for their order.
+const LOOKED_AT: usize = 3;
+
+/// Left and right images that have changed places, as three frames from the whole length of the set show.
+pub(crate) fn swapped(dataset: &Dataset) -> Option<Fault> {
+    let step = dataset.frames.len().div_ceil(LOOKED_AT).max(1);
+    let pairs = dataset.frames.iter().step_by(step).filter_map(|frame| dataset.pair(frame).ok());
+    let sides = pairs.map(|(left, right)| Sides::of_images(&left, &right, &dataset.rig));
+    swapped_fault(sides.fold(Sides::default(), Sides::add), &dataset.folder.join(&dataset.table))
+}
+
+/// What is wrong with the images of `file` if left and right have changed places.
+pub fn swapped_fault(sides: Sides, file: &Path) -> Option<Fault> {
+    sides.are_swapped().then(|| {
+        Fault::new("left and right images that have changed places", file)
+            .value(format!("{} of {} matches lie behind the cameras", sides.exchanged, sides.exchanged + sides.given))
+            .remedy("exchange the images, or the cameras of the rig")
+    })
 }
 
 /// Files that are not those whose hashes the description has.

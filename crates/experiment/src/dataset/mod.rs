@@ -9,8 +9,8 @@ mod tables;
 pub mod tum;
 mod write;
 
-pub use check::check;
-pub(crate) use check::{hash_faults, input_hashes, sha256};
+pub use check::{check, swapped_fault};
+pub(crate) use check::{hash_faults, input_hashes, sha256, swapped};
 pub use open::{Dataset, DatasetFrame, read_rig};
 pub use picture::{read_image, write_png};
 pub use write::write;

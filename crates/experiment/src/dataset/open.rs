@@ -40,6 +40,8 @@ pub struct Dataset {
     pub has_visibility: bool,
     /// Depth of the pixels in images of 16 bits.
     pub bits: u8,
+    /// The table of the frames, relative to the folder.
+    pub(super) table: String,
     pub(super) hashes: Vec<(String, String)>,
     /// What is odd but not wrong.
     pub warnings: Vec<Fault>,
@@ -195,6 +197,7 @@ impl Reader<'_> {
                 rig,
                 site,
                 body_from_camera,
+                table: d.frames.clone(),
                 frames,
                 objects,
                 has_visibility: visibility.is_some(),

@@ -9,7 +9,7 @@ use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
 use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
-use crate::dataset::{Dataset, hash_faults, input_hashes};
+use crate::dataset::{Dataset, hash_faults, input_hashes, swapped};
 
 /// Reads a `seafix-dataset/1` folder.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -44,6 +44,9 @@ impl Source for DatasetSource {
             dataset.frames.par_iter().flat_map_iter(|frame| dataset.pair(frame).err()).collect();
         faults.dedup();
         faults.extend(hash_faults(&dataset));
+        if faults.is_empty() {
+            faults.extend(swapped(&dataset));
+        }
         if faults.is_empty() { Ok(Box::new(Recorded { dataset, site })) } else { Err(faults) }
     }
 }
