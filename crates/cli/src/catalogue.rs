@@ -3,7 +3,7 @@
 use seafix_component::{Listing, Registry};
 use seafix_experiment::source::SOURCES;
 use seafix_referencing::{SEARCHES, SOLVERS};
-use seafix_vision::{DESCRIPTORS, DETECTORS, MATCHERS};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, MATCHERS};
 
 /// One kind of component: its plural and its components.
 pub(crate) struct Kind {
@@ -16,6 +16,7 @@ pub(crate) struct Kind {
 pub(crate) fn kinds() -> Vec<Kind> {
     vec![
         kind("sources", &SOURCES),
+        kind("filters", &FILTERS),
         kind("detectors", &DETECTORS),
         kind("descriptors", &DESCRIPTORS),
         kind("matchers", &MATCHERS),

@@ -232,6 +232,14 @@ fn an_unknown_setting() {
 }
 
 #[test]
+fn an_unknown_filter_among_filters() {
+    let (_folder, file) = experiment(
+        "question = 'why'\nsource = 'virtual-points'\n[pipeline]\nfilters = [\n  'clahe',\n  { name = 'medain' },\n]\n",
+    );
+    refused(&["run", &file], 2, &["e.toml:6", "no filter is called `medain`, did you mean `median`?"]);
+}
+
+#[test]
 fn a_value_out_of_range() {
     let (_folder, file) = experiment("question = 'why'\n[source]\nname = 'virtual-points'\ndistance = -1.0\n");
     let run = Path::new(&file).with_file_name("out");
@@ -253,6 +261,7 @@ fn settings_of_the_pipeline_out_of_range() {
         "tolerance={fixed=nan}",
         "refine.window=10000",
         "triangulation.sigma-px=-1",
+        "filters=[{name='median',radius=9}]",
         "detector.sigma=nan",
         "descriptor.scale=-1",
         "matcher.ratio=-1",

@@ -50,7 +50,7 @@ fn a_program_gets_every_point_and_the_times() {
         let row = |side: &str| point[side][1].as_f64().unwrap();
         assert!((row("left") - row("right")).abs() < 3.0, "{point}");
     }
-    for stage in ["detect", "describe", "match", "refine", "triangulate", "total"] {
+    for stage in ["filter", "detect", "describe", "match", "refine", "triangulate", "total"] {
         let times = &all["times_ms"][stage];
         let (least, median) = (times["least"].as_f64().unwrap(), times["median"].as_f64().unwrap());
         assert!(0.0 <= least && least <= median, "{stage}: {times}");

@@ -10,7 +10,9 @@ use seafix_referencing::{
     Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind,
     Tolerance, candidates, judge,
 };
-use seafix_vision::{DESCRIPTORS, DETECTORS, FrontEnd, Keypoint, Look, MATCHERS, Refine, Triangulator};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, Look, MATCHERS, Refine, Triangulator,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -24,6 +26,8 @@ use crate::{
 pub struct Pipeline {
     /// What is searched for: each object in view, or the whole site at once.
     pub target: TargetKind,
+    /// Prepare each image, one after the other; none by default.
+    pub filters: Vec<Choice>,
     /// Finds corners in each image.
     pub detector: Choice,
     /// Describes their surroundings.
@@ -50,6 +54,7 @@ impl Default for Pipeline {
     fn default() -> Self {
         Self {
             target: TargetKind::Object,
+            filters: Vec::new(),
             detector: Choice::named("harris"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band"),
@@ -83,6 +88,7 @@ impl Pipeline {
     /// [`PipelineError`] names the setting.
     pub fn resolved(&self) -> Result<Self, PipelineError> {
         Ok(Self {
+            filters: each_filter(&self.filters, resolve)?,
             detector: resolve(&DETECTORS, &self.detector)?,
             descriptor: resolve(&DESCRIPTORS, &self.descriptor)?,
             matcher: resolve(&MATCHERS, &self.matcher)?,
@@ -109,6 +115,7 @@ impl Pipeline {
         fits("refine", self.refine.check())?;
         fits("triangulation", self.triangulation.check())?;
         Ok(FrontEnd {
+            filters: each_filter(&self.filters, build)?,
             detector: build(&DETECTORS, &self.detector)?,
             descriptor: build(&DESCRIPTORS, &self.descriptor)?,
             matcher: build(&MATCHERS, &self.matcher)?,
@@ -144,6 +151,21 @@ fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice,
 
 fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Box<T>, PipelineError> {
     registry.build(choice).map_err(|error| in_pipeline(registry, &error))
+}
+
+/// What `make` makes of each filter; an error names its place in the list.
+fn each_filter<T>(
+    choices: &[Choice],
+    make: fn(&Registry<dyn Filter>, &Choice) -> Result<T, PipelineError>,
+) -> Result<Vec<T>, PipelineError> {
+    let in_list = |(place, choice): (usize, &Choice)| {
+        make(&FILTERS, choice).map_err(|error| PipelineError {
+            setting: "filters",
+            key: Some(place.to_string()),
+            ..error
+        })
+    };
+    choices.iter().enumerate().map(in_list).collect()
 }
 
 fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {
@@ -223,7 +245,7 @@ impl Stages {
         let mut look = Look::default();
         self.front_end.look(left, right, rig, &mut look);
         let times = FrameTimes {
-            detect_ms: Some(look.times.detect_ms),
+            detect_ms: Some(look.times.filter_ms + look.times.detect_ms),
             describe_ms: Some(look.times.describe_ms),
             match_ms: Some(look.times.match_ms + look.times.refine_ms),
             triangulate_ms: Some(look.times.triangulate_ms),

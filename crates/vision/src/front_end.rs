@@ -5,12 +5,15 @@ use std::time::Instant;
 use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels};
 
 use crate::{
-    Descriptor, Descriptors, Detector, Image, Keypoint, Match, Matcher, Refine, Threads, Triangulator, View, Workspace,
+    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Match, Matcher, Refine, Threads, Triangulator, View,
+    Workspace,
 };
 
 /// The stages between two images and a cloud.
 #[derive(Debug)]
 pub struct FrontEnd {
+    /// Prepare the images, one after the other; often none.
+    pub filters: Vec<Box<dyn Filter>>,
     /// Finds key points in each image.
     pub detector: Box<dyn Detector>,
     /// Describes their surroundings.
@@ -30,6 +33,8 @@ pub struct FrontEnd {
 pub struct Look {
     /// Left and right.
     eyes: [Eye; 2],
+    /// The images as the filters leave them; where there is no filter the images are looked at themselves.
+    filtered: [Option<Image>; 2],
     work: Workspace,
     /// Left key points and where the right image shows them.
     pub matches: Vec<Match>,
@@ -52,6 +57,8 @@ struct Eye {
 /// Milliseconds that each stage took, both images together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StageTimes {
+    /// Filters.
+    pub filter_ms: f64,
     /// Key points.
     pub detect_ms: f64,
     /// Descriptors.
@@ -67,8 +74,9 @@ pub struct StageTimes {
 impl StageTimes {
     /// Each stage by its name, in the order of the work.
     pub fn stages(&self) -> Vec<(&'static str, f64)> {
-        let Self { detect_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *self;
+        let Self { filter_ms, detect_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *self;
         vec![
+            ("filter", filter_ms),
             ("detect", detect_ms),
             ("describe", describe_ms),
             ("match", match_ms),
@@ -94,8 +102,17 @@ impl Look {
 impl FrontEnd {
     /// Replaces what is in `look` by what these two images show.
     pub fn look(&self, left: &Image, right: &Image, rig: &StereoRig, look: &mut Look) {
-        let Look { eyes: [l, r], work, matches, pixels, cloud, times } = look;
+        let Look { eyes: [l, r], filtered: [clear_left, clear_right], work, matches, pixels, cloud, times } = look;
         let threads = work.threads();
+        let (mut left, mut right) = (left, right);
+        times.filter_ms = timed(|| {
+            if !self.filters.is_empty() {
+                (left, right) = threads.join(
+                    || self.filter(left, clear_left, &mut l.work),
+                    || self.filter(right, clear_right, &mut r.work),
+                );
+            }
+        });
         times.detect_ms = timed(|| {
             let detect = |image, eye: &mut Eye| self.detector.detect_into(image, &mut eye.work, &mut eye.keypoints);
             threads.join(|| detect(left, l), || detect(right, r));
@@ -112,6 +129,19 @@ impl FrontEnd {
         let sigma = self.triangulator.sigma_px;
         times.refine_ms = timed(|| self.refine.align_into(matches, &left, &right, rig, sigma, work, pixels));
         times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
+    }
+
+    /// `image` as the filters leave it, in the memory of `kept`.
+    fn filter<'a>(&self, image: &Image, kept: &'a mut Option<Image>, work: &mut Workspace) -> &'a Image {
+        let kept = match kept {
+            Some(kept) => {
+                kept.copy_from(image);
+                kept
+            }
+            None => kept.insert(image.clone()),
+        };
+        self.filters.iter().for_each(|filter| filter.apply(kept, work));
+        kept
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod check;
 mod describe;
+mod encoded;
 mod folder;
 mod open;
 mod picture;

@@ -1,12 +1,13 @@
 //! Image files in and out.
 
-use std::{fs::File, io::BufReader, path::Path};
+use std::{io::Cursor, path::Path};
 
-use image::{ColorType, ImageReader, Limits};
+use image::{DynamicImage, ImageReader, Limits};
 use seafix_component::Fault;
 use seafix_log::encode_png;
 use seafix_vision::Image;
 
+use super::encoded::objection;
 use crate::record::grey;
 
 /// The most pixels an image may declare.
@@ -14,34 +15,43 @@ const MOST_PIXELS: u64 = 64 << 20;
 /// The most memory its decoder may take (bytes).
 const MOST_MEMORY: u64 = 512 << 20;
 
-/// Reads a PNG, JPEG or PNM image as grey; colour becomes luma (Rec. 709 weights). `expected` is the
-/// size that the calibration has, `bits` the depth of the pixels in images of 16 bits.
+/// The largest file worth reading (bytes): what its decoded image may take.
+const MOST_BYTES: u64 = MOST_MEMORY;
+
+/// Reads a PNG, JPEG or PNM image as grey, 0 to 255 for black to white, as finely as its file has it;
+/// colour becomes luma (Rec. 709 weights). `expected` is the size that the calibration has, `bits` the
+/// depth of the pixels in images of 16 bits.
 ///
 /// # Errors
-/// An unreadable, truncated or foreign file, a size other than expected or beyond 64 Mpx
-/// (checked from the header, before anything is decoded).
+/// An unreadable, truncated or foreign file, a moving image, four inks, transparent pixels, pixels
+/// beyond the depth, a size other than expected or beyond 64 Mpx (checked from the header, before
+/// anything is decoded).
 pub fn read_image(path: &Path, expected: [u32; 2], bits: u8) -> Result<Image, Fault> {
-    let (width, height) = image_size(path, expected)?;
-    let mut reader = open(path)?;
+    let unreadable =
+        |error| Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions");
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > MOST_BYTES {
+        let remedy = format!("at most {MOST_BYTES} bytes are read");
+        return Err(Fault::new("an image file too large", path).value(format!("{size} bytes")).remedy(remedy));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let reader = || ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(unreadable);
+    let (width, height) = reader()?.into_dimensions().map_err(|error| damaged(path, &error))?;
+    check_size(path, [width, height], expected)?;
+    if let Some((what, remedy)) = objection(&bytes) {
+        return Err(Fault::new(what, path).remedy(remedy));
+    }
+    let mut reader = reader()?;
     let mut limits = Limits::default();
     limits.max_alloc = Some(MOST_MEMORY);
     reader.limits(limits);
     let decoded = reader.decode().map_err(|error| damaged(path, &error))?;
-    let pixels: Vec<f32> = match decoded.color() {
-        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
-            decoded.into_luma8().into_raw().into_iter().map(f32::from).collect()
-        }
-        _ => {
-            let white = (1_u32 << bits.min(16)) - 1;
-            decoded.into_luma16().into_raw().into_iter().map(|p| f32::from(p) * (255.0 / white as f32)).collect()
-        }
-    };
+    let pixels = grey_levels(&decoded, bits).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
 }
 
-/// Width and height from the header alone; `expected` is the size that the calibration has.
-fn image_size(path: &Path, expected: [u32; 2]) -> Result<(u32, u32), Fault> {
-    let (width, height) = open(path)?.into_dimensions().map_err(|error| damaged(path, &error))?;
+/// `expected` is the size that the calibration has.
+fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2]) -> Result<(), Fault> {
     if u64::from(width) * u64::from(height) > MOST_PIXELS {
         return Err(Fault::new("an image too large", path)
             .value(format!("{width}×{height}"))
@@ -53,13 +63,48 @@ fn image_size(path: &Path, expected: [u32; 2]) -> Result<(u32, u32), Fault> {
             .value(format!("{width}×{height}, calibrated {w}×{h}"))
             .remedy("give the images the rig was calibrated with, or correct `size`"));
     }
-    Ok((width, height))
+    Ok(())
 }
 
-fn open(path: &Path) -> Result<ImageReader<BufReader<File>>, Fault> {
-    ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|error| {
-        Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
-    })
+/// Rec. 709's weights of red, green and blue, in ten thousandths.
+const LUMA: [u32; 3] = [2126, 7152, 722];
+
+/// The brightness of every pixel, 0 to 255.
+fn grey_levels(decoded: &DynamicImage, bits: u8) -> Result<Vec<f32>, Fault> {
+    let color = decoded.color();
+    let channels = usize::from(color.channel_count());
+    let bytes = decoded.as_bytes();
+    if usize::from(color.bytes_per_pixel()) == channels {
+        let samples: Vec<u16> = bytes.iter().map(|&byte| byte.into()).collect();
+        return levels_of(&samples, channels, u8::MAX.into(), u8::MAX.into());
+    }
+    let samples: Vec<u16> = bytes.chunks_exact(2).map(|pair| u16::from_ne_bytes([pair[0], pair[1]])).collect();
+    let white = ((1_u32 << bits.min(16)) - 1) as u16;
+    levels_of(&samples, channels, white, u16::MAX)
+}
+
+fn levels_of(samples: &[u16], channels: usize, white: u16, opaque: u16) -> Result<Vec<f32>, Fault> {
+    let here = Path::new("");
+    let colours = if channels > 2 { 3 } else { 1 };
+    let pixels = samples.chunks_exact(channels);
+    if pixels.clone().any(|pixel| pixel[colours..].iter().any(|&alpha| alpha < opaque)) {
+        return Err(Fault::new("an image with transparent pixels", here).remedy("give it without an alpha channel"));
+    }
+    if let Some(most) = pixels.clone().flat_map(|pixel| &pixel[..colours]).filter(|&&value| value > white).max() {
+        return Err(Fault::new("a pixel beyond the depth", here)
+            .value(format!("{most}, white is {white}"))
+            .remedy("correct `bits` of dataset.toml"));
+    }
+    // Integers up to here: a grey pixel comes out the same whether it is stored as grey or as colour.
+    let whole = f64::from(LUMA.iter().sum::<u32>()) * f64::from(white);
+    let level = |pixel: &[u16]| {
+        let luma: u32 = match pixel {
+            [grey] | [grey, _] => u32::from(*grey) * LUMA.iter().sum::<u32>(),
+            _ => pixel.iter().zip(LUMA).map(|(&value, weight)| u32::from(value) * weight).sum(),
+        };
+        (f64::from(luma) * 255.0 / whole) as f32
+    };
+    Ok(pixels.map(level).collect())
 }
 
 fn damaged(path: &Path, error: &image::ImageError) -> Fault {
@@ -76,4 +121,120 @@ pub fn write_png(path: &Path, image: &Image) -> Result<(), Fault> {
     encode_png(&grey(image))
         .and_then(|bytes| std::fs::write(path, bytes).map_err(|error| error.to_string()))
         .map_err(|error| Fault::new(format!("cannot write ({error})"), path).remedy("check space and permissions"))
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{ExtendedColorType, ImageFormat};
+
+    use super::*;
+
+    /// An image file of these bytes, read back.
+    fn read(name: &str, bytes: &[u8], size: [u32; 2], bits: u8) -> Result<Image, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        read_image(&path, size, bits).map_err(|fault| fault.to_string())
+    }
+
+    fn refused(name: &str, bytes: &[u8], parts: &[&str]) {
+        let said = read(name, bytes, [8, 6], 16).unwrap_err();
+        for part in [&[name], parts].concat() {
+            assert!(said.contains(part), "no `{part}` in {said}");
+        }
+        assert_eq!(said.lines().count(), 1);
+    }
+
+    /// 8×6 pixels of this kind in this format.
+    fn encoded(samples: &[u8], color: ExtendedColorType, format: ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image::write_buffer_with_format(&mut bytes, samples, 8, 6, color, format).unwrap();
+        bytes.into_inner()
+    }
+
+    fn words(values: impl Iterator<Item = u16>) -> Vec<u8> {
+        values.flat_map(u16::to_ne_bytes).collect()
+    }
+
+    #[test]
+    fn grey_is_read_as_finely_as_it_is_stored() {
+        let eight: Vec<u8> = (0..48).map(|i| i * 5).collect();
+        for format in [ImageFormat::Png, ImageFormat::Pnm] {
+            let found = read("a", &encoded(&eight, ExtendedColorType::L8, format), [8, 6], 16).unwrap();
+            assert!(found.pixels().iter().zip(&eight).all(|(a, b)| *a == f32::from(*b)));
+        }
+        let sixteen = words((0..48).map(|i| i * 1394));
+        let found = read("a", &encoded(&sixteen, ExtendedColorType::L16, ImageFormat::Png), [8, 6], 16).unwrap();
+        for (i, value) in found.pixels().iter().enumerate() {
+            assert_eq!(*value, (i as f64 * 1394.0 * 255.0 / 65535.0) as f32);
+        }
+        let twelve = encoded(&words((0..48).map(|i| 4095 - i)), ExtendedColorType::L16, ImageFormat::Png);
+        let found = read("a", &twelve, [8, 6], 12).unwrap();
+        assert_eq!(found.pixels()[0], 255.0);
+        assert_eq!(found.pixels()[47], (4048.0 * 255.0 / 4095.0_f64) as f32);
+        let said = read("a", &twelve, [8, 6], 8).unwrap_err();
+        assert!(said.contains("4095, white is 255; correct `bits`"), "{said}");
+    }
+
+    #[test]
+    fn colour_becomes_luma_without_rounding() {
+        let grey: Vec<u8> = (0..48).flat_map(|i| [i * 5; 3]).collect();
+        let found = read("a", &encoded(&grey, ExtendedColorType::Rgb8, ImageFormat::Png), [8, 6], 16).unwrap();
+        assert!(found.pixels().iter().enumerate().all(|(i, value)| *value == i as f32 * 5.0));
+        let red: Vec<u8> = (0..48).flat_map(|_| [255, 0, 0, 255]).collect();
+        let found = read("a", &encoded(&red, ExtendedColorType::Rgba8, ImageFormat::Png), [8, 6], 16).unwrap();
+        assert!((found.pixels()[7] - 54.213).abs() < 1e-4);
+        let wide = words((0..48).flat_map(|i| [i, 65535, 0]));
+        let found = read("a", &encoded(&wide, ExtendedColorType::Rgb16, ImageFormat::Png), [8, 6], 16).unwrap();
+        assert!((f64::from(found.pixels()[40]) - 255.0 * (0.7152 + 0.2126 * 40.0 / 65535.0)).abs() < 1e-4);
+    }
+
+    #[test]
+    fn what_is_no_still_image_of_light_is_refused_by_name() {
+        let glass: Vec<u8> = (0..48).flat_map(|i| [100, 200 + i]).collect();
+        refused("a.png", &encoded(&glass, ExtendedColorType::La8, ImageFormat::Png), &["transparent pixels"]);
+        // The chunk that announces frames stands behind the header's 33 bytes.
+        let mut moving = encoded(&[7; 48], ExtendedColorType::L8, ImageFormat::Png);
+        let frames = [0, 0, 0, 8, b'a', b'c', b'T', b'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xF3, 0x8D, 0x93, 0x70];
+        moving.splice(33..33, frames);
+        refused("a.png", &moving, &["a moving image"]);
+        refused("a.png", b"GIF89a", &["PNG, JPEG and PNM"]);
+        refused("a.png", b"", &["PNG, JPEG and PNM"]);
+    }
+
+    #[test]
+    fn a_truncated_image_is_refused_wherever_it_ends() {
+        let samples: Vec<u8> = (0..48).map(|i| i * 37 % 251).collect();
+        for (name, format) in [("a.png", ImageFormat::Png), ("a.jpg", ImageFormat::Jpeg), ("a.pgm", ImageFormat::Pnm)] {
+            let whole = encoded(&samples, ExtendedColorType::L8, format);
+            assert!(read(name, &whole, [8, 6], 16).is_ok());
+            // The PNG's last chunk, 12 bytes, says no more than that there is none.
+            let last = if format == ImageFormat::Png { whole.len() - 13 } else { whole.len() - 1 };
+            for end in [0, 1, 5, 20, last / 2, last - 10, last] {
+                assert!(read(name, &whole[..end], [8, 6], 16).is_err(), "{name}: {end} of {}", whole.len());
+            }
+        }
+        // The wrong extension does not matter: the content says what it is.
+        assert!(read("a.jpg", &encoded(&samples, ExtendedColorType::L8, ImageFormat::Png), [8, 6], 16).is_ok());
+    }
+
+    #[test]
+    fn huge_and_empty_sizes_are_refused_from_the_header() {
+        refused("a.pgm", b"P5 0 0 255\n", &["a.pgm"]);
+        refused("a.pgm", b"P5 100000 100000 255\n1234", &["too large: 100000×100000", "at most 67108864 pixels"]);
+        let header = |width: u32, height: u32| {
+            let mut bytes = encoded(&[7; 48], ExtendedColorType::L8, ImageFormat::Png);
+            bytes[16..20].copy_from_slice(&width.to_be_bytes());
+            bytes[20..24].copy_from_slice(&height.to_be_bytes());
+            bytes.truncate(41);
+            bytes
+        };
+        for (width, height) in [(8_000_000, 4_000_000_000), (60_000, 60_000), (0, 6)] {
+            refused("a.png", &header(width, height), &[]);
+        }
+        let mut jpeg = encoded(&[7; 48], ExtendedColorType::L8, ImageFormat::Jpeg);
+        let frame = jpeg.windows(2).position(|pair| pair == [0xFF, 0xC0]).unwrap();
+        jpeg[frame + 5..frame + 9].fill(0xFF);
+        refused("a.jpg", &jpeg, &["too large: 65535×65535"]);
+    }
 }

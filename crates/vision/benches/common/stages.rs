@@ -260,6 +260,7 @@ impl Scene {
         };
         let projections = [projection(0.0), projection(focal * self.rig.baseline())];
         let front_end = FrontEnd {
+            filters: Vec::new(),
             detector: listed(&DETECTORS, &Choice::named("harris").with("features", COUNT as i64)).expect("a detector"),
             descriptor: listed(&DESCRIPTORS, &Choice::named("surf")).expect("a descriptor"),
             // The band, once it is listed, is the default.
