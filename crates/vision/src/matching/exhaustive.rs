@@ -239,7 +239,7 @@ fn offer(i: usize, values: &[f32; COLUMNS], first: usize, found: &mut Three, lan
     lanes.offer(i as u32, values);
     let furthest = found.value[2];
     // Seldom true once some have been seen.
-    if values.iter().fold(false, |any, &value| any | (value < furthest)) {
+    if values.iter().fold(0, |any, &value| any | u32::from(value < furthest)) != 0 {
         values.iter().enumerate().for_each(|(c, &value)| found.offer((first + c) as u32, value));
     }
 }
