@@ -3,7 +3,7 @@
 use seafix_component::{Listing, Registry};
 use seafix_experiment::source::SOURCES;
 use seafix_referencing::{SEARCHES, SOLVERS};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, MATCHERS};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS};
 
 /// One kind of component: its plural and its components.
 pub(crate) struct Kind {
@@ -20,6 +20,7 @@ pub(crate) fn kinds() -> Vec<Kind> {
         kind("detectors", &DETECTORS),
         kind("descriptors", &DESCRIPTORS),
         kind("matchers", &MATCHERS),
+        kind("locators", &LOCATORS),
         kind("searches", &SEARCHES),
         kind("solvers", &SOLVERS),
     ]

@@ -11,7 +11,7 @@ use seafix_referencing::{
     Tolerance, candidates, judge,
 };
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, Look, MATCHERS, Refine, Triangulator,
+    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, Refine, Triangulator,
 };
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,8 @@ pub struct Pipeline {
     pub descriptor: Choice,
     /// Pairs left with right.
     pub matcher: Choice,
+    /// Says where exactly the left corners are.
+    pub locator: Choice,
     /// Aligns each pair between the views.
     pub refine: Refine,
     /// Turns pairs into points.
@@ -58,6 +60,7 @@ impl Default for Pipeline {
             detector: Choice::named("harris"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band"),
+            locator: Choice::named("corner"),
             refine: Refine::default(),
             triangulation: Triangulator::default(),
             gate: Gate::default(),
@@ -92,6 +95,7 @@ impl Pipeline {
             detector: resolve(&DETECTORS, &self.detector)?,
             descriptor: resolve(&DESCRIPTORS, &self.descriptor)?,
             matcher: resolve(&MATCHERS, &self.matcher)?,
+            locator: resolve(&LOCATORS, &self.locator)?,
             search: resolve(&SEARCHES, &self.search)?,
             solver: resolve(&SOLVERS, &self.solver)?,
             ..self.clone()
@@ -119,6 +123,7 @@ impl Pipeline {
             detector: build(&DETECTORS, &self.detector)?,
             descriptor: build(&DESCRIPTORS, &self.descriptor)?,
             matcher: build(&MATCHERS, &self.matcher)?,
+            locator: build(&LOCATORS, &self.locator)?,
             refine: self.refine.clone(),
             triangulator: self.triangulation.clone(),
         })
@@ -247,7 +252,7 @@ impl Stages {
         let times = FrameTimes {
             detect_ms: Some(look.times.filter_ms + look.times.detect_ms),
             describe_ms: Some(look.times.describe_ms),
-            match_ms: Some(look.times.match_ms + look.times.refine_ms),
+            match_ms: Some(look.times.match_ms + look.times.locate_ms + look.times.refine_ms),
             triangulate_ms: Some(look.times.triangulate_ms),
         };
         (look.keypoints()[0].to_vec(), look.cloud, times)

@@ -11,7 +11,7 @@ use seafix_log::{
     Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
 };
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
-use seafix_vision::{DESCRIPTORS, DETECTORS, Image, MATCHERS};
+use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
 
 use crate::{
     Attempt, Pipeline, Plan, Sighting, Trial,
@@ -157,6 +157,7 @@ fn components(pipeline: &Pipeline, images: bool) -> Vec<Component> {
         component(&DETECTORS, &pipeline.detector),
         component(&DESCRIPTORS, &pipeline.descriptor),
         component(&MATCHERS, &pipeline.matcher),
+        component(&LOCATORS, &pipeline.locator),
     ];
     let back = [component(&SEARCHES, &pipeline.search), component(&SOLVERS, &pipeline.solver)];
     front.into_iter().filter(|_| images).chain(back).collect()

@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 use seafix_geometry::{Pinhole, Pixel, StereoRig, Transform};
-use seafix_vision::{Descriptors, Image, Keypoint, Match, Refine, View, Warp, Weight};
+use seafix_vision::{Image, Pair, Place, Refine, Warp, Weight};
 
 /// Random numbers (SplitMix64).
 struct Random(u64);
@@ -127,7 +127,7 @@ fn rig() -> StereoRig {
 
 /// `trials` pairs, seen with this slope of the disparity along each axis.
 fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -> Sums {
-    let (mut sums, rig, none) = (Sums::default(), rig(), Descriptors::default());
+    let (mut sums, rig) = (Sums::default(), rig());
     for trial in 0..trials {
         let mut random = Random(trial as u64 * 7919 + 17);
         let scene = Scene::new(kind, &mut random);
@@ -142,10 +142,8 @@ fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -
         let right = picture(&scene, |p| back * (p - right_at), noise, &mut random);
         let start = right_at + Vector2::new(random.uniform() - 0.5, random.uniform() - 0.5);
         let pixel = |v: &Vector2<f64>| Pixel { u: v.x, v: v.y };
-        let keypoint = [Keypoint { at: pixel(&left_at), response: 1.0, scale: 1.0 }];
-        let view = |image| View { image, keypoints: &keypoint, descriptors: &none };
-        let found = [Match { left: 0, right: pixel(&start), distance: 0.0 }];
-        let pair = refine.align(&found, &view(&left), &view(&right), &rig, 0.15)[0];
+        let [l, r] = [&left_at, &start].map(|at| Place::independent(pixel(at), 0.15));
+        let pair = refine.align(&[Pair { left: l, right: r }], &left, &right, &rig)[0];
         sums.count += 1;
         if pair.at.right == pixel(&start) {
             sums.failed += 1;

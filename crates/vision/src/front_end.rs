@@ -5,8 +5,8 @@ use std::time::Instant;
 use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels};
 
 use crate::{
-    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Match, Matcher, Refine, Threads, Triangulator, View,
-    Workspace,
+    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Locator, Match, Matcher, Pair, Place, Refine, Threads,
+    Triangulator, View, Workspace,
 };
 
 /// The stages between two images and a cloud.
@@ -20,6 +20,8 @@ pub struct FrontEnd {
     pub descriptor: Box<dyn Descriptor>,
     /// Pairs left with right.
     pub matcher: Box<dyn Matcher>,
+    /// Says where exactly the left corners are.
+    pub locator: Box<dyn Locator>,
     /// Aligns each pair between the views.
     pub refine: Refine,
     /// Turns pairs into points.
@@ -36,8 +38,12 @@ pub struct Look {
     /// The images as the filters leave them; where there is no filter the images are looked at themselves.
     filtered: [Option<Image>; 2],
     work: Workspace,
+    matched: Vec<Keypoint>,
+    located: Vec<Option<Place>>,
     /// Left key points and where the right image shows them.
     pub matches: Vec<Match>,
+    /// The same, with the left corners exactly located.
+    pub pairs: Vec<Pair>,
     /// The same, aligned, with their covariance.
     pub pixels: Vec<UncertainPixels>,
     /// The cloud.
@@ -65,6 +71,8 @@ pub struct StageTimes {
     pub describe_ms: f64,
     /// Matches.
     pub match_ms: f64,
+    /// Exact corners.
+    pub locate_ms: f64,
     /// Alignment between the views.
     pub refine_ms: f64,
     /// Triangulation.
@@ -74,12 +82,13 @@ pub struct StageTimes {
 impl StageTimes {
     /// Each stage by its name, in the order of the work.
     pub fn stages(&self) -> Vec<(&'static str, f64)> {
-        let Self { filter_ms, detect_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *self;
+        let Self { filter_ms, detect_ms, describe_ms, match_ms, locate_ms, refine_ms, triangulate_ms } = *self;
         vec![
             ("filter", filter_ms),
             ("detect", detect_ms),
             ("describe", describe_ms),
             ("match", match_ms),
+            ("locate", locate_ms),
             ("refine", refine_ms),
             ("triangulate", triangulate_ms),
         ]
@@ -102,7 +111,8 @@ impl Look {
 impl FrontEnd {
     /// Replaces what is in `look` by what these two images show.
     pub fn look(&self, left: &Image, right: &Image, rig: &StereoRig, look: &mut Look) {
-        let Look { eyes: [l, r], filtered: [clear_left, clear_right], work, matches, pixels, cloud, times } = look;
+        let Look { eyes: [l, r], filtered, work, matched, located, matches, pairs, pixels, cloud, times } = look;
+        let [clear_left, clear_right] = filtered;
         let threads = work.threads();
         let (mut left, mut right) = (left, right);
         times.filter_ms = timed(|| {
@@ -127,7 +137,15 @@ impl FrontEnd {
         let right = View { image: right, keypoints: &r.keypoints, descriptors: &r.descriptors };
         times.match_ms = timed(|| self.matcher.match_into(&left, &right, rig, work, matches));
         let sigma = self.triangulator.sigma_px;
-        times.refine_ms = timed(|| self.refine.align_into(matches, &left, &right, rig, sigma, work, pixels));
+        times.locate_ms = timed(|| {
+            matched.clear();
+            matched.extend(matches.iter().map(|found| left.keypoints[found.left]));
+            self.locator.locate_into(left.image, matched, work, located);
+            pairs.clear();
+            let pair = |((keypoint, found), place): ((&_, &_), &_)| Pair::new(keypoint, found, *place, sigma);
+            pairs.extend(matched.iter().zip(&*matches).zip(&*located).map(pair));
+        });
+        times.refine_ms = timed(|| self.refine.align_into(pairs, left.image, right.image, rig, work, pixels));
         times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
     }
 

@@ -1,8 +1,9 @@
 //! From two images to a cloud of measured points.
 //!
 //! [`Filter`]s prepare the images, where that is asked for. A [`Detector`] finds corners in each
-//! image, a [`Descriptor`] describes their surroundings, a [`Matcher`] pairs left with right, and a
-//! [`Triangulator`] turns the pairs that pass the epipolar test into
+//! image, a [`Descriptor`] describes their surroundings, a [`Matcher`] pairs left with right, a
+//! [`Locator`] says where exactly the left corners are, [`Refine`] finds the same places in the right
+//! image, and a [`Triangulator`] turns the pairs that pass the epipolar test into
 //! [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
 //!
 //! The centre of the first pixel is (0, 0); brightness is linear in the stored values, 0 is black
@@ -16,6 +17,7 @@ mod filter;
 mod front_end;
 mod gaussian;
 mod image;
+mod locate;
 mod matching;
 mod scale_space;
 mod swapped;
@@ -29,6 +31,7 @@ pub use detect::{DETECTORS, Detector, Dog, Fast, FastHessian, Harris, Keypoint, 
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
+pub use locate::{Corner, CornerFit, Junction, LCorner, LOCATORS, Locator, Pair, Peak, Place, XCorner};
 pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View};
 pub use swapped::Sides;
 pub use track::{Pyramid, Track, Tracker};

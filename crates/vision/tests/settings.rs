@@ -1,7 +1,7 @@
 //! Which settings the components of vision refuse, and how they say it.
 
 use seafix_component::{Choice, Registry};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, MATCHERS, Refine, Tracker, Triangulator};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, Refine, Tracker, Triangulator};
 
 const NO_NUMBERS: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
@@ -28,6 +28,7 @@ fn no_number_is_no_setting() {
     numbers_must_be_numbers(&DETECTORS);
     numbers_must_be_numbers(&FILTERS);
     numbers_must_be_numbers(&DESCRIPTORS);
+    numbers_must_be_numbers(&LOCATORS);
     numbers_must_be_numbers(&MATCHERS);
 }
 
@@ -201,6 +202,24 @@ fn triangulation_names_the_setting_that_cannot_be() {
         ] {
             let said = settings.check().expect_err(key);
             assert!(said.starts_with(&format!("{key} = {bad}; give ")), "{said:?}");
+        }
+    }
+}
+
+#[test]
+fn junction_refuses_a_window_that_is_none() {
+    range(&LOCATORS, "junction", "sigma", &[0.5, 100.0], &[0.0, -2.5, 101.0]);
+}
+
+#[test]
+fn fits_of_corners_refuse_what_cannot_be_fitted() {
+    for name in ["corner", "l-corner", "x-corner"] {
+        range(&LOCATORS, name, "reach", &[0.1, 10.0], &[0.0, 10.1]);
+        range(&LOCATORS, name, "contrast", &[0.0, 255.0], &[-1.0, 256.0]);
+        range(&LOCATORS, name, "explained", &[0.0, 1.0], &[-0.1, 1.1]);
+        for window in [5, 12, 33] {
+            let said = refusal(&LOCATORS, &Choice::named(name).with("window", window)).unwrap_or_default();
+            assert!(said.contains(&format!("`{name}`: window = {window}; give an odd number")), "{said:?}");
         }
     }
 }

@@ -75,6 +75,7 @@ pub(super) fn section(run: &Run) -> Markup {
 
 /// The components that did some work in `trial`: those that see images only where there were images.
 fn components(trial: &Trial) -> impl Iterator<Item = &Component> {
-    let sees = |component: &Component| matches!(&component.stage[..], "detector" | "descriptor" | "matcher");
+    let sees =
+        |component: &Component| matches!(&component.stage[..], "detector" | "descriptor" | "matcher" | "locator");
     trial.header.components.iter().filter(move |component| trial.images || !sees(component))
 }

@@ -3,8 +3,8 @@
 use seafix_component::{Choice, Registry};
 use seafix_geometry::{Pixel, StereoRig};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptors, FrontEnd, Image, Keypoint, Look, MATCHERS, Match, Matcher, Refine, Table,
-    Threads, Triangulator, View, Workspace,
+    DESCRIPTORS, DETECTORS, Descriptors, FrontEnd, Image, Keypoint, LOCATORS, Look, MATCHERS, Match, Matcher, Pair,
+    Refine, Table, Threads, Triangulator, View, Workspace,
 };
 use serde_json::{Value, json};
 
@@ -236,15 +236,11 @@ impl Scene {
             ("refine 1000, default; LK from nothing", Refine::default(), nothing, None),
         ];
         let stages = list.into_iter().map(|(name, refine, request, at_most)| {
-            let none = Descriptors::default();
             let mut pixels = Vec::new();
+            let pair = |found: &Match| Pair::new(&self.keypoints[0][found.left], found, None, 0.15);
+            let pairs: Vec<Pair> = self.matches.iter().map(pair).collect();
             let ours = with_memory(move |work| {
-                let view = |side: usize| View {
-                    image: &self.images[side],
-                    keypoints: &self.keypoints[side],
-                    descriptors: &none,
-                };
-                refine.align_into(&self.matches, &view(0), &view(1), &self.rig, 0.15, work, &mut pixels);
+                refine.align_into(&pairs, &self.images[0], &self.images[1], &self.rig, work, &mut pixels);
             });
             Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours }
         });
@@ -266,6 +262,7 @@ impl Scene {
             // The band, once it is listed, is the default.
             matcher: listed(&MATCHERS, &Choice::named("epipolar-band"))
                 .unwrap_or_else(|| MATCHERS.build(&Choice::named("mutual-ratio")).expect("a matcher")),
+            locator: LOCATORS.build(&Choice::named("corner")).expect("a locator"),
             refine: Refine::default(),
             triangulator: Triangulator::default(),
         };

@@ -8,12 +8,12 @@ mod spline;
 mod warp;
 mod window;
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix4, Vector2};
 use seafix_component::in_range;
 use seafix_geometry::{Pixel, StereoPixels, StereoRig, UncertainPixels};
 use serde::{Deserialize, Serialize};
 
-use crate::{Image, Match, View, Workspace};
+use crate::{Image, Pair, Place, Workspace};
 pub(crate) use inverse_compositional::{Aligned, Aligner, Rules};
 use local::Local;
 pub(crate) use warp::Translation;
@@ -86,48 +86,35 @@ impl Refine {
         in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
     }
 
-    /// Replaces `pixels` by the places of the matched key points, in the order of `matches`, aligned as
-    /// these settings say; `sigma` is the error of a place that a detector found (px, each coordinate).
-    #[allow(clippy::too_many_arguments, reason = "two views of one rig, and where to put what they show")]
+    /// Replaces `pixels` by the places of `pairs`, in their order, aligned as these settings say.
     pub fn align_into(
         &self,
-        matches: &[Match],
-        left: &View<'_>,
-        right: &View<'_>,
+        pairs: &[Pair],
+        left: &Image,
+        right: &Image,
         rig: &StereoRig,
-        sigma: f64,
         work: &mut Workspace,
         pixels: &mut Vec<UncertainPixels>,
     ) {
         pixels.clear();
-        pixels.extend(matches.iter().map(|found| {
-            let at = StereoPixels { left: left.keypoints[found.left].at, right: found.right };
-            UncertainPixels::independent(at, sigma)
-        }));
+        pixels.extend(pairs.iter().map(apart));
         if self.refine {
             let threads = work.threads();
             let aligners = work.get::<Vec<Aligner>>();
-            threads.pieces(pixels, PIECE, aligners, |_, piece, aligner| {
-                for pair in piece {
-                    if let Some(aligned) = self.align_pair(left.image, right.image, rig, &pair.at, aligner) {
-                        *pair = together(&pair.at.left, &aligned, sigma);
+            threads.pieces(pixels, PIECE, aligners, |index, piece, aligner| {
+                for (pixels, pair) in piece.iter_mut().zip(&pairs[index * PIECE..]) {
+                    if let Some(aligned) = self.align_pair(left, right, rig, &pixels.at, aligner) {
+                        *pixels = together(&pair.left, &aligned);
                     }
                 }
             });
         }
     }
 
-    /// The places of the matched key points, aligned, in the order of `matches`.
-    pub fn align(
-        &self,
-        matches: &[Match],
-        left: &View<'_>,
-        right: &View<'_>,
-        rig: &StereoRig,
-        sigma: f64,
-    ) -> Vec<UncertainPixels> {
+    /// The places of `pairs`, aligned, in their order.
+    pub fn align(&self, pairs: &[Pair], left: &Image, right: &Image, rig: &StereoRig) -> Vec<UncertainPixels> {
         let mut pixels = Vec::new();
-        self.align_into(matches, left, right, rig, sigma, &mut Workspace::default(), &mut pixels);
+        self.align_into(pairs, left, right, rig, &mut Workspace::default(), &mut pixels);
         pixels
     }
 
@@ -163,9 +150,17 @@ impl Refine {
 /// Matches that are aligned one after the other.
 const PIECE: usize = 64;
 
-/// A place found in the left image with error `sigma` and aligned to the right one, which errs with it.
-fn together(left: &Pixel, aligned: &Aligned, sigma: f64) -> UncertainPixels {
-    let place = Matrix2::identity() * (sigma * sigma);
+/// Two places found each for itself.
+fn apart(pair: &Pair) -> UncertainPixels {
+    let mut covariance = Matrix4::zeros();
+    covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&pair.left.covariance);
+    covariance.fixed_view_mut::<2, 2>(2, 2).copy_from(&pair.right.covariance);
+    UncertainPixels { at: StereoPixels { left: pair.left.at, right: pair.right.at }, covariance }
+}
+
+/// A place found in the left image and aligned to the right one, which errs with it.
+fn together(left: &Place, aligned: &Aligned) -> UncertainPixels {
+    let place = left.covariance;
     let across = place * aligned.shape.transpose();
     let mut covariance = Matrix4::zeros();
     covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&place);
@@ -173,14 +168,13 @@ fn together(left: &Pixel, aligned: &Aligned, sigma: f64) -> UncertainPixels {
     covariance.fixed_view_mut::<2, 2>(2, 0).copy_from(&across.transpose());
     covariance.fixed_view_mut::<2, 2>(2, 2).copy_from(&(aligned.shape * across + aligned.covariance));
     let right = Pixel { u: aligned.at.x, v: aligned.at.y };
-    UncertainPixels { at: StereoPixels { left: *left, right }, covariance }
+    UncertainPixels { at: StereoPixels { left: left.at, right }, covariance }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Descriptors, Keypoint};
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::{Matrix2, UnitQuaternion, Vector3};
     use seafix_geometry::{Pinhole, Transform};
 
     /// Waves, seen `shift` px further to the right and half of that down, with other light and contrast.
@@ -200,11 +194,8 @@ mod tests {
     }
 
     fn pairs([left, right]: &[Image; 2], at: Pixel, start: Pixel, refine: &Refine) -> UncertainPixels {
-        let none = Descriptors::default();
-        let keypoints = [Keypoint { at, response: 1.0, scale: 1.0 }];
-        let view = |image| View { image, keypoints: &keypoints, descriptors: &none };
-        let found = [Match { left: 0, right: start, distance: 0.0 }];
-        refine.align(&found, &view(left), &view(right), &rig(), 0.15)[0]
+        let pair = Pair { left: Place::independent(at, 0.15), right: Place::independent(start, 0.15) };
+        refine.align(&[pair], left, right, &rig())[0]
     }
 
     fn aligned(right: &Image, at: Pixel, start: Pixel, refine: &Refine) -> StereoPixels {

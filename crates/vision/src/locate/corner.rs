@@ -1,0 +1,197 @@
+//! Locators that fit blurred corners.
+
+use seafix_component::Component;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Locator, Place,
+    fit::{CornerFit, Fitter},
+    model::Shape,
+};
+use crate::{Image, Keypoint, Threads, Workspace};
+
+/// Whichever of [`XCorner`] and [`LCorner`] explains the pixels better; texture stays where it is.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Corner(pub CornerFit);
+
+/// The corner of a chequer-board: two blurred edges that cross, bright in two opposite parts.
+///
+/// Seven parameters (centre, two directions, blur, two grey levels) are fitted to the pixels by least squares,
+/// r = I − a − b·U; the covariance of the centre is that of JᵀJ, scaled by what remains.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct XCorner(pub CornerFit);
+
+/// The corner of a box: two blurred edges that end where they meet. Fitted as [`XCorner`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct LCorner(pub CornerFit);
+
+const SOURCE: &str = "Rohr, Recognizing corners by fitting parametric models, IJCV 1992";
+
+impl Component for Corner {
+    const NAME: &'static str = "corner";
+    const SUMMARY: &'static str = "whichever of x-corner and l-corner explains the pixels better; texture stays";
+    const SOURCE: &'static str = SOURCE;
+
+    fn check(&self) -> Result<(), String> {
+        self.0.check()
+    }
+}
+
+impl Component for XCorner {
+    const NAME: &'static str = "x-corner";
+    const SUMMARY: &'static str = "fits two blurred edges that cross: the corner of a chequer-board";
+    const SOURCE: &'static str = SOURCE;
+
+    fn check(&self) -> Result<(), String> {
+        self.0.check()
+    }
+}
+
+impl Component for LCorner {
+    const NAME: &'static str = "l-corner";
+    const SUMMARY: &'static str = "fits two blurred edges that end where they meet: the corner of a box";
+    const SOURCE: &'static str = SOURCE;
+
+    fn check(&self) -> Result<(), String> {
+        self.0.check()
+    }
+}
+
+impl Locator for Corner {
+    fn locate_into(
+        &self,
+        image: &Image,
+        keypoints: &[Keypoint],
+        work: &mut Workspace,
+        places: &mut Vec<Option<Place>>,
+    ) {
+        fit_into(&self.0, &[Shape::Wedge, Shape::Crossing], image, keypoints, work, places);
+    }
+}
+
+impl Locator for XCorner {
+    fn locate_into(
+        &self,
+        image: &Image,
+        keypoints: &[Keypoint],
+        work: &mut Workspace,
+        places: &mut Vec<Option<Place>>,
+    ) {
+        fit_into(&self.0, &[Shape::Crossing], image, keypoints, work, places);
+    }
+}
+
+impl Locator for LCorner {
+    fn locate_into(
+        &self,
+        image: &Image,
+        keypoints: &[Keypoint],
+        work: &mut Workspace,
+        places: &mut Vec<Option<Place>>,
+    ) {
+        fit_into(&self.0, &[Shape::Wedge], image, keypoints, work, places);
+    }
+}
+
+/// One fitter for each piece of the work.
+#[derive(Debug, Default)]
+struct Fitters(Vec<Fitter>);
+
+/// Fits the best of `shapes` at every key point.
+pub(super) fn fit_into(
+    settings: &CornerFit,
+    shapes: &[Shape],
+    image: &Image,
+    keypoints: &[Keypoint],
+    work: &mut Workspace,
+    places: &mut Vec<Option<Place>>,
+) {
+    /// Key points in a piece of the work.
+    const PIECE: usize = 64;
+    let threads: Threads = work.threads();
+    let Fitters(fitters) = work.get();
+    places.clear();
+    places.resize(keypoints.len(), None);
+    threads.pieces(places, PIECE, fitters, |index, places, fitter| {
+        for (place, keypoint) in places.iter_mut().zip(&keypoints[index * PIECE..]) {
+            *place = fitter.near(settings, shapes, image, keypoint);
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use seafix_geometry::Pixel;
+
+    use super::*;
+
+    /// A quarter of the plane, x ≥ `x` and y ≥ `y`, brighter; with `chequer` the opposite one as well; blurred
+    /// by a Gaussian of 0.8 px.
+    fn quarters(x: f64, y: f64, chequer: bool) -> Image {
+        let cover = |i: usize, edge: f64| 0.5 * libm::erfc((edge - i as f64) / (0.8 * std::f64::consts::SQRT_2));
+        let pixel = |i: usize| {
+            let (a, b) = (cover(i % 41, x), cover(i / 41, y));
+            50.0 + 100.0 * (a * b + if chequer { (1.0 - a) * (1.0 - b) } else { 0.0 })
+        };
+        Image::new(41, 41, (0..41 * 41).map(|i| pixel(i) as f32).collect()).unwrap()
+    }
+
+    fn keypoint(u: f64, v: f64) -> Keypoint {
+        Keypoint { at: Pixel { u, v }, response: 1.0, scale: 2.0 }
+    }
+
+    #[test]
+    fn each_kind_is_found_by_its_own_model_and_by_the_common_one() {
+        let locators: [&dyn Locator; 3] = [&LCorner::default(), &XCorner::default(), &Corner::default()];
+        for (x, y) in [(20.0, 20.0), (20.5, 19.5), (20.25, 20.7), (19.9, 20.3)] {
+            for chequer in [false, true] {
+                let image = quarters(x, y, chequer);
+                let off = if chequer { 0.3 } else { 1.2 };
+                let found = locators.map(|locator| locator.locate(&image, &[keypoint(x + off, y + off)])[0]);
+                let [l, x_only, either] =
+                    found.map(|place| place.map(|place| place.at.distance(&Pixel { u: x, v: y })));
+                let (own, other) = if chequer { (x_only, l) } else { (l, x_only) };
+                assert!(own.expect("its own kind") < 1e-3, "{own:?} for {x}, {y}, {chequer}");
+                assert_eq!(own, either);
+                assert_eq!(other, None);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_corner_stays() {
+        let locator = Corner::default();
+        let image = |value: &dyn Fn(usize, usize) -> f32| {
+            Image::new(41, 41, (0..41 * 41).map(|i| value(i % 41, i / 41)).collect()).unwrap()
+        };
+        let hash = |x: usize, y: usize| ((((x * 7919 + y * 104_729) * 2_654_435_761_usize) >> 7) & 0xFF) as f32;
+        let at = [keypoint(20.2, 20.4)];
+        for (name, image) in [
+            ("flat", image(&|_, _| 90.0)),
+            ("an edge", image(&|x, _| if x < 20 { 40.0 } else { 160.0 })),
+            ("noise", image(&hash)),
+            ("faint", quarters(20.0, 20.0, true)),
+        ] {
+            let strict = Corner(CornerFit { contrast: 120.0, ..CornerFit::default() });
+            let found = if name == "faint" { strict.locate(&image, &at) } else { locator.locate(&image, &at) };
+            assert_eq!(found, [None], "{name}");
+        }
+        let tiny = Image::new(1, 1, vec![3.0]).unwrap();
+        assert_eq!(locator.locate(&tiny, &[keypoint(0.0, 0.0)]), [None]);
+        let border = quarters(5.0, 20.0, true);
+        assert_eq!(locator.locate(&border, &[keypoint(5.0, 20.0)]), [None], "a window cut off");
+    }
+
+    #[test]
+    fn threads_change_nothing() {
+        let image = quarters(20.3, 19.8, true);
+        let points: Vec<Keypoint> = (0..150).map(|i| keypoint(19.0 + 0.02 * i as f64, 19.9)).collect();
+        let mut pooled = Vec::new();
+        Corner::default().locate_into(&image, &points, &mut Workspace::new(Threads::Pool), &mut pooled);
+        assert_eq!(pooled, Corner::default().locate(&image, &points));
+        assert!(pooled.iter().flatten().count() > 100);
+    }
+}

@@ -1,0 +1,211 @@
+//! The fit of a blurred corner to the pixels around a key point.
+
+use nalgebra::{Cholesky, Matrix2, SMatrix, SVector};
+use seafix_component::in_range;
+use seafix_geometry::Pixel;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Place,
+    model::{Model, Normal, PARAMETERS, Pixels, Shape},
+    start::Start,
+};
+use crate::{Image, Keypoint};
+
+/// How a model of a corner is fitted, and when it is believed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct CornerFit {
+    /// Side of the square of pixels that the model explains (px), odd, 7 to 31.
+    pub window: usize,
+    /// How far the corner may lie from the key point (px).
+    pub reach: f64,
+    /// The least difference between bright and dark (grey levels).
+    pub contrast: f64,
+    /// The least share of the window's variance that the model must explain: what stays is noise and
+    /// whatever else is there.
+    pub explained: f64,
+}
+
+impl Default for CornerFit {
+    fn default() -> Self {
+        Self { window: 11, reach: 3.5, contrast: 10.0, explained: 0.95 }
+    }
+}
+
+impl CornerFit {
+    /// Whether the settings can be.
+    ///
+    /// # Errors
+    /// The setting that is out of its range, its value, and the range.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { window, reach, contrast, explained } = *self;
+        let odd = window % 2 == 1 && (7..=31).contains(&window);
+        in_range(odd, "window", window, "an odd number of pixels from 7 to 31")?;
+        in_range(reach > 0.0 && reach <= 10.0, "reach", reach, "more than 0, at most 10 (px)")?;
+        in_range((0.0..=255.0).contains(&contrast), "contrast", contrast, "a number from 0 to 255 (grey levels)")?;
+        in_range((0.0..=1.0).contains(&explained), "explained", explained, "a number from 0 to 1")
+    }
+}
+
+/// A window and its middle in the image.
+#[derive(Debug, Default)]
+pub(super) struct Fitter {
+    pixels: Pixels,
+    middle: [usize; 2],
+    /// The mean, subtracted from the values, and the sum of their squares then.
+    mean: f64,
+    variation: f64,
+}
+
+/// Steps of the fit at most, in all its windows.
+const STEPS: usize = 20;
+/// A step shorter than this ends it (px).
+const SHORT: f64 = 1e-3;
+/// The blur's standard deviation must be within these (px).
+const BLUR: [f64; 2] = [0.3, 3.0];
+/// Sine of the least angle between the edges.
+const PARALLEL: f64 = 0.3;
+/// The variance of an error of rounding to 8 bits: no residual is believed to be less.
+const ROUNDING: f64 = 1.0 / 12.0;
+
+impl Fitter {
+    /// The corner near `keypoint` that explains the pixels best among `shapes`; `None` where none does well
+    /// enough.
+    pub(super) fn near(
+        &mut self,
+        settings: &CornerFit,
+        shapes: &[Shape],
+        image: &Image,
+        keypoint: &Keypoint,
+    ) -> Option<Place> {
+        let half = settings.window / 2;
+        let near = [keypoint.at.u, keypoint.at.v].map(libm::round);
+        let [x, y] = whole(near, half + 1, image)?;
+        let start = Start::of(image, x, y, half)?;
+        let mut guesses = [(0.0, Shape::Wedge, [0.0; 2], 0.0, 0.0); 2];
+        for (guess, &shape) in guesses.iter_mut().zip(shapes) {
+            let (explained, normals, a, b) = start.guess(shape);
+            *guess = (explained, shape, normals, a, b);
+        }
+        let guesses = &mut guesses[..shapes.len()];
+        guesses.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let reached = start.at.norm() <= settings.reach;
+        let at = if reached { [start.at.x + near[0], start.at.y + near[1]] } else { [keypoint.at.u, keypoint.at.v] };
+        for (_, shape, normals, a, b) in guesses {
+            // A guess at the blur that is neither sharp nor soft.
+            let model = Model { shape: *shape, at: [at[0], at[1], normals[0], normals[1], 1.0, *a, *b] };
+            let place = self.fit(settings, image, keypoint, model);
+            if place.is_some() {
+                return place;
+            }
+        }
+        None
+    }
+
+    /// Gauss and Newton's iteration, damped by Levenberg and Marquardt's rule where a step does not help; the
+    /// window follows the corner. The centre of `model` counts from the image's first pixel.
+    fn fit(&mut self, settings: &CornerFit, image: &Image, keypoint: &Keypoint, mut model: Model) -> Option<Place> {
+        let half = settings.window / 2;
+        let mut middle = [model.at[0], model.at[1]].map(libm::round);
+        self.take(image, middle, half)?;
+        model.at[0] -= middle[0];
+        model.at[1] -= middle[1];
+        model.at[5] -= self.mean;
+        let mut damping = 0.0;
+        let mut moved_window = 0;
+        let mut best = self.pixels.normal(&model);
+        for _ in 0..STEPS {
+            let step = solve(&best, damping)?;
+            let mut trial = model;
+            for (value, step) in trial.at.iter_mut().zip(step.iter()) {
+                *value += step;
+            }
+            let sane = trial.at[..2].iter().all(|c| c.abs() <= half as f64)
+                && (1.0 / BLUR[1]..=1.0 / BLUR[0]).contains(&trial.at[4])
+                && libm::sin(trial.at[2] - trial.at[3]).abs() >= PARALLEL;
+            let next = if sane { Some(self.pixels.normal(&trial)) } else { None };
+            let Some(next) = next.filter(|next| next.squares <= best.squares * (1.0 + 1e-5)) else {
+                damping = (damping * 8.0).max(1e-2);
+                if damping > 1e4 {
+                    return None;
+                }
+                continue;
+            };
+            (model, best, damping) = (trial, next, damping * 0.2);
+            if damping < 1e-3 {
+                damping = 0.0;
+            }
+            if libm::hypot(step[0], step[1]) < SHORT {
+                let off = [model.at[0], model.at[1]].map(libm::round);
+                if off == [0.0, 0.0] || moved_window == 2 {
+                    return self.judge(settings, keypoint, &model, &best);
+                }
+                // The corner is not in the middle: look again from where it is.
+                moved_window += 1;
+                let before = self.mean;
+                middle = [middle[0] + off[0], middle[1] + off[1]];
+                self.take(image, middle, half)?;
+                model.at[0] -= off[0];
+                model.at[1] -= off[1];
+                model.at[5] += before - self.mean;
+                best = self.pixels.normal(&model);
+            }
+        }
+        None
+    }
+
+    /// The corner, if it is believed.
+    fn judge(&self, settings: &CornerFit, keypoint: &Keypoint, model: &Model, normal: &Normal) -> Option<Place> {
+        let [x, y] = self.middle.map(|x| x as f64);
+        let at = Pixel { u: x + model.at[0], v: y + model.at[1] };
+        let difference = model.at[6].abs() * if model.shape == Shape::Crossing { 2.0 } else { 1.0 };
+        let explained = 1.0 - normal.squares / self.variation;
+        let believed = at.distance(&keypoint.at) <= settings.reach
+            && difference >= settings.contrast
+            && explained >= settings.explained;
+        let freedom = (settings.window * settings.window - PARAMETERS) as f64;
+        let inverse = factor(normal, 0.0)?.inverse();
+        let covariance = inverse.fixed_view::<2, 2>(0, 0) * (normal.squares / freedom).max(ROUNDING);
+        let covariance = Matrix2::new(covariance[(0, 0)], covariance[(0, 1)], covariance[(0, 1)], covariance[(1, 1)]);
+        (believed && covariance.trace() < 0.25).then_some(Place { at, covariance })
+    }
+
+    /// Takes the values of the window around `middle`, less their mean.
+    fn take(&mut self, image: &Image, middle: [f64; 2], half: usize) -> Option<()> {
+        let [x, y] = whole(middle, half, image)?;
+        let side = 2 * half + 1;
+        self.pixels.shape(half);
+        let values = &mut self.pixels.values_mut()[..side * side];
+        let mut sum = 0.0;
+        for (row, values) in (y - half..).zip(values.chunks_exact_mut(side)) {
+            values.copy_from_slice(&image.row(row)[x - half..][..side]);
+            sum += f64::from(values.iter().sum::<f32>());
+        }
+        self.middle = [x, y];
+        self.mean = sum / (side * side) as f64;
+        let mean = self.mean as f32;
+        values.iter_mut().for_each(|value| *value -= mean);
+        self.mean = f64::from(mean);
+        self.variation = f64::from(values.iter().map(|value| value * value).sum::<f32>());
+        Some(())
+    }
+}
+
+/// The pixel, if the square of `half` around it lies in the image.
+fn whole(at: [f64; 2], half: usize, image: &Image) -> Option<[usize; 2]> {
+    let inside = |x: f64, n: usize| x >= half as f64 && x + half as f64 <= (n - 1) as f64;
+    (inside(at[0], image.width()) && inside(at[1], image.height())).then(|| at.map(|x| x as usize))
+}
+
+fn factor(normal: &Normal, damping: f64) -> Option<Cholesky<f64, nalgebra::Const<PARAMETERS>>> {
+    let mut matrix = SMatrix::<f64, PARAMETERS, PARAMETERS>::from(normal.matrix);
+    for i in 0..PARAMETERS {
+        matrix[(i, i)] *= 1.0 + damping + 1e-9;
+    }
+    matrix.cholesky()
+}
+
+fn solve(normal: &Normal, damping: f64) -> Option<SVector<f64, PARAMETERS>> {
+    factor(normal, damping).map(|factor| factor.solve(&SVector::from(normal.gradient)))
+}

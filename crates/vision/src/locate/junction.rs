@@ -1,0 +1,210 @@
+//! Where the edges around a corner meet.
+
+use nalgebra::{Matrix2, Vector2};
+use seafix_component::{Component, in_range};
+use seafix_geometry::Pixel;
+use serde::{Deserialize, Serialize};
+
+use super::{Locator, Place};
+use crate::{Image, Keypoint, Workspace};
+
+/// Places corners where the edges around them meet: the point p to whose surroundings' gradients
+/// the lines towards it are perpendicular, Σ w g gᵀ (x − p) = 0 over the pixels x.
+///
+/// A Harris response peaks inside a convex corner by 1 to 2 px, at the apex of the blurred edge's
+/// curve; the edges themselves still meet at the true corner. The weight
+/// w = exp(−r²/2σ²) (1 − exp(−r²/2h²)), h = 0.6 σ, r the distance from p, therefore spares
+/// the middle, where blur has rounded the corner off. Gradients are taken at whole pixels and only
+/// the weights move with p: nothing is interpolated.
+///
+/// The covariance is A⁻¹ (Σ w² (gᵀd)² g gᵀ) A⁻¹ with A = Σ w g gᵀ, d = x − p: what the lines miss p by.
+///
+/// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct
+/// points, corners and centres of circular features*, ISPRS 1987.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Junction {
+    /// Standard deviation σ of the window (px).
+    pub sigma: f64,
+}
+
+impl Default for Junction {
+    fn default() -> Self {
+        Self { sigma: 2.5 }
+    }
+}
+
+impl Component for Junction {
+    const NAME: &'static str = "junction";
+    const SUMMARY: &'static str = "where the edges around a corner meet, by their gradients";
+    const SOURCE: &'static str =
+        "Förstner and Gülch, A fast operator for detection and precise location of distinct points, ISPRS 1987";
+
+    fn check(&self) -> Result<(), String> {
+        let Self { sigma } = *self;
+        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")
+    }
+}
+
+impl Locator for Junction {
+    fn locate_into(
+        &self,
+        image: &Image,
+        keypoints: &[Keypoint],
+        work: &mut Workspace,
+        places: &mut Vec<Option<Place>>,
+    ) {
+        let window = Window::new(self.sigma);
+        let gradients: &mut Gradients = work.get();
+        places.clear();
+        places.extend(keypoints.iter().map(|keypoint| window.near(image, &keypoint.at, gradients)));
+    }
+}
+
+/// The pixels' weights, by their distance.
+struct Window {
+    /// −1/2σ² and −1/2σ² − 1/2h² (px⁻²).
+    exponents: [f64; 2],
+    /// The window ends at this many pixels.
+    half: usize,
+}
+
+/// The gradients of the square around a key point, and the weights of a window's columns and rows.
+#[derive(Debug, Default)]
+struct Gradients {
+    side: usize,
+    squares: Vec<[f32; 2]>,
+    along: Vec<[f64; 3]>,
+    down: Vec<[f64; 3]>,
+}
+
+/// How far the junction may lie from the detector's peak (px).
+const REACH: f64 = 3.5;
+/// The gradients around the peak that some window within reach needs.
+const SLACK: usize = 4;
+
+impl Window {
+    fn new(sigma: f64) -> Self {
+        let outer = -0.5 / (sigma * sigma);
+        Self { exponents: [outer, outer / (0.6 * 0.6) + outer], half: libm::ceil(2.5 * sigma) as usize }
+    }
+
+    /// The junction near `start`; `None` when there is none within reach, when the edges are parallel,
+    /// or when the window leaves the image.
+    fn near(&self, image: &Image, start: &Pixel, gradients: &mut Gradients) -> Option<Place> {
+        let (x0, y0) = (libm::round(start.u) as usize, libm::round(start.v) as usize);
+        let reach = self.half + SLACK;
+        let inside = |x: usize, n: usize| x > reach && x + reach + 1 < n;
+        if !(inside(x0, image.width()) && inside(y0, image.height())) {
+            return None;
+        }
+        let (left, top) = (x0 - reach, y0 - reach);
+        gradients.take(image, left, top, 2 * reach + 1);
+        let origin = Vector2::new(left as f64, top as f64);
+        let begin = Vector2::new(start.u, start.v) - origin;
+        let mut at = begin;
+        for _ in 0..15 {
+            let sums = self.sums(gradients, &at);
+            let inverse = sums.inverse()?;
+            let step = inverse * sums.towards;
+            at += step;
+            if !((at - begin).norm() <= REACH) {
+                return None;
+            }
+            if step.norm_squared() < 1e-6 {
+                let place = at + origin;
+                let covariance = inverse * self.sums(gradients, &at).spread * inverse;
+                return Some(Place { at: Pixel { u: place.x, v: place.y }, covariance });
+            }
+        }
+        None
+    }
+
+    /// The sums over the window around `at`.
+    fn sums(&self, gradients: &mut Gradients, at: &Vector2<f64>) -> Sums {
+        let Gradients { side, squares, along, down } = gradients;
+        let corner = |x: f64| libm::round(x) as usize - self.half;
+        let (left, top) = (corner(at.x), corner(at.y));
+        let width = 2 * self.half + 1;
+        for (weights, from, at) in [(&mut *along, left, at.x), (&mut *down, top, at.y)] {
+            weights.clear();
+            weights.extend((from..from + width).map(|i| {
+                let d = i as f64 - at;
+                [d, libm::exp(self.exponents[0] * d * d), libm::exp(self.exponents[1] * d * d)]
+            }));
+        }
+        let mut sums = Sums::default();
+        for (j, [dy, outer_y, inner_y]) in down.iter().enumerate() {
+            let row = &squares[(top + j) * *side + left..][..width];
+            for (g, [dx, outer_x, inner_x]) in row.iter().zip(&*along) {
+                let g = Vector2::new(f64::from(g[0]), f64::from(g[1]));
+                let weight = outer_x * outer_y - inner_x * inner_y;
+                let towards = g.x * dx + g.y * dy;
+                let square = g * g.transpose();
+                sums.tensor += weight * square;
+                sums.towards += weight * towards * g;
+                sums.spread += weight * weight * towards * towards * square;
+            }
+        }
+        sums
+    }
+}
+
+/// Σ w g gᵀ, Σ w g gᵀ d and Σ w² (gᵀ d)² g gᵀ over the pixels of a window, d from its centre.
+#[derive(Debug, Default)]
+struct Sums {
+    tensor: Matrix2<f64>,
+    towards: Vector2<f64>,
+    spread: Matrix2<f64>,
+}
+
+impl Sums {
+    fn inverse(&self) -> Option<Matrix2<f64>> {
+        let trace = self.tensor.trace();
+        // Edges that cross at less than about 10° meet nowhere in particular.
+        if !(self.tensor.determinant() > 0.01 * trace * trace) {
+            return None;
+        }
+        self.tensor.try_inverse()
+    }
+}
+
+impl Gradients {
+    /// Sobel's gradients (grey levels per 8 px) of a square of pixels, row by row.
+    fn take(&mut self, image: &Image, left: usize, top: usize, side: usize) {
+        self.side = side;
+        self.squares.clear();
+        for y in top..top + side {
+            let row = |y: usize| &image.row(y)[left - 1..left + side + 1];
+            let rows = row(y - 1).windows(3).zip(row(y).windows(3)).zip(row(y + 1).windows(3));
+            self.squares.extend(rows.map(|((a, h), b)| {
+                let gx = ((a[2] - a[0]) + (b[2] - b[0])) + 2.0 * (h[2] - h[0]);
+                let gy = ((b[0] - a[0]) + (b[2] - a[2])) + 2.0 * (b[1] - a[1]);
+                [gx, gy]
+            }));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quarter of the plane, x ≥ `x` and y ≥ `y`, brighter; blurred by one pixel's area.
+    fn quadrant(x: f64, y: f64, size: usize) -> Image {
+        let cover = |i: usize, edge: f64| (i as f64 + 0.5 - edge).clamp(0.0, 1.0);
+        let pixel = |i: usize| 50.0 + 100.0 * cover(i % size, x) * cover(i / size, y);
+        Image::new(size, size, (0..size * size).map(|i| pixel(i) as f32).collect()).unwrap()
+    }
+
+    #[test]
+    fn the_corner_of_a_box_is_where_its_edges_meet() {
+        for (x, y) in [(20.0, 20.0), (20.5, 19.5), (20.25, 20.7), (19.9, 20.3)] {
+            let peak = Pixel { u: libm::floor(x) + 1.2, v: libm::floor(y) + 1.4 };
+            let found =
+                Junction::default().locate(&quadrant(x, y, 41), &[Keypoint { at: peak, response: 1.0, scale: 2.0 }]);
+            let at = found[0].expect("a corner").at;
+            assert!(at.distance(&Pixel { u: x, v: y }) < 0.15, "{at:?} for {x}, {y}");
+        }
+    }
+}
