@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use seafix_component::Choice;
-use seafix_proptests::monte_carlo::cell;
-use seafix_referencing::SOLVERS;
+use seafix_proptests::monte_carlo::{cell, observations};
+use seafix_referencing::{Observations, SOLVERS};
 use seafix_simulation::{Layout, Shape, VirtualRig};
 
 /// The paper's cameras: the virtual one, and Karmin2.
@@ -68,5 +68,50 @@ fn table() {
                 }
             }
         }
+    }
+}
+
+/// P46, P47, short form: over 2000 draws of a spread layout the two solvers that weigh by covariance have m2 and m3
+/// within 6 % of the Cramér–Rao bound, and a NEES whose mean is six to four of its own standard deviations. The long
+/// form is the table below with 10 000 draws.
+#[test]
+fn weighed_solvers_reach_the_bound() {
+    for (_, rig) in cameras() {
+        for name in ["mahalanobis", "stereo-reprojection"] {
+            let solver = SOLVERS.build(&Choice::named(name)).expect("a solver");
+            let settings = Layout { sigma_px: 0.5, rig: rig.clone(), ..Layout::default() };
+            let found = cell(&*solver, &settings, 20, 2000, true);
+            for ratio in [found.m2, found.m3] {
+                assert!((0.94..1.06).contains(&ratio), "{name}: {found:?}");
+            }
+            assert!((found.nees - 6.0).abs() < 4.0 * (12.0 / 2000.0_f64).sqrt(), "{name}: {found:?}");
+        }
+    }
+}
+
+/// Cost of a call beside kabsch, 13 points, minima of interleaved repetitions:
+/// `cargo test --release -p seafix-proptests --test limits -- --ignored --nocapture costs`.
+#[test]
+#[ignore = "prints times"]
+fn costs() {
+    let layout = Layout { rig: cameras()[1].1.clone(), ..Layout::default() }.place(1).expect("a layout");
+    let data = Observations { points: observations(&layout, 1, 0.0).expect("points"), rig: Some(&layout.rig) };
+    let mut choices: Vec<Choice> = SOLVERS.names().map(Choice::named).collect();
+    choices.push(Choice::named("triad").with("choose", "first"));
+    choices.push(Choice::named("stereo-reprojection").with("starts", 1));
+    let solvers: Vec<_> = choices.iter().map(|choice| SOLVERS.build(choice).expect("a solver")).collect();
+    let mut least = vec![f64::INFINITY; solvers.len()];
+    for _ in 0..200 {
+        for (solver, least) in solvers.iter().zip(&mut least) {
+            let start = Instant::now();
+            for _ in 0..50 {
+                std::hint::black_box(solver.solve(std::hint::black_box(&data)).expect("a pose"));
+            }
+            *least = least.min(start.elapsed().as_secs_f64() * 1e6 / 50.0);
+        }
+    }
+    let kabsch = least[choices.iter().position(|choice| choice.name == "kabsch").expect("kabsch")];
+    for (choice, us) in choices.iter().zip(&least) {
+        println!("{:20} {:8.3} µs {:6.2} kabsch  {}", choice.name, us, us / kabsch, choice.settings);
     }
 }
