@@ -1,5 +1,6 @@
 //! From matched pixels to measured points.
 
+use nalgebra::Matrix4;
 use seafix_component::in_range;
 use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels, UncertainPoint};
 use serde::{Deserialize, Serialize};
@@ -8,8 +9,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Triangulator {
-    /// Standard deviation of a key point's coordinate (px): the covariance of every point scales with it.
+    /// Standard deviation of the coordinates of a key point that no corner was fitted to (px).
     pub sigma_px: f64,
+    /// Standard deviation of what the camera model leaves unexplained (px): calibration, lens, housing. It
+    /// comes to every coordinate in both images: an alignment may be good to a hundredth of a pixel, the
+    /// directions that belong to it are not.
+    pub calibration_px: f64,
     /// Largest distance from the epipolar line (px, Sampson).
     pub epipolar_px: f64,
     /// Share of good pairs that the χ² test of their disagreement across the epipolar line keeps, one degree of
@@ -21,7 +26,7 @@ pub struct Triangulator {
 
 impl Default for Triangulator {
     fn default() -> Self {
-        Self { sigma_px: 0.15, epipolar_px: 1.5, confidence: 1.0, max_depth: 20.0 }
+        Self { sigma_px: 0.15, calibration_px: 0.15, epipolar_px: 1.5, confidence: 1.0, max_depth: 20.0 }
     }
 }
 
@@ -31,8 +36,10 @@ impl Triangulator {
     /// # Errors
     /// The setting that is out of its range, its value, and the range.
     pub fn check(&self) -> Result<(), String> {
-        let Self { sigma_px, epipolar_px, confidence, max_depth } = *self;
+        let Self { sigma_px, calibration_px, epipolar_px, confidence, max_depth } = *self;
         in_range(sigma_px > 0.0 && sigma_px <= 100.0, "sigma-px", sigma_px, "more than 0, at most 100 (px)")?;
+        let calibrated = (0.0..=100.0).contains(&calibration_px);
+        in_range(calibrated, "calibration-px", calibration_px, "a number from 0 to 100 (px)")?;
         let band = epipolar_px > 0.0 && epipolar_px <= 1000.0;
         in_range(band, "epipolar-px", epipolar_px, "more than 0, at most 1000 (px)")?;
         let share = confidence > 0.0 && confidence <= 1.0;
@@ -50,13 +57,15 @@ impl Triangulator {
             .iter()
             .filter(|pair| rig.epipolar_distance(&pair.at).is_some_and(|distance| distance <= self.epipolar_px));
         cloud.extend(near.filter_map(|pair| {
-            let found = rig.triangulate(pair).ok()?;
+            let calibration = Matrix4::identity() * (self.calibration_px * self.calibration_px);
+            let pair = UncertainPixels { covariance: pair.covariance + calibration, ..*pair };
+            let found = rig.triangulate(&pair).ok()?;
             // The distribution of χ² with one degree of freedom is P(x) = erf √(x/2).
             let likely = libm::erf((0.5 * found.disagreement).sqrt()) <= self.confidence;
             let kept = likely && found.point.coords.z <= self.max_depth;
             kept.then_some(MeasuredPoint {
                 position: UncertainPoint { at: found.point, covariance: found.covariance },
-                pixels: Some(*pair),
+                pixels: Some(pair),
             })
         }));
     }
@@ -77,7 +86,8 @@ mod tests {
             let mut at = rig.project(&Point::new(0.3, -0.2, 3.0)).unwrap();
             // Between two rows that err by 0.1 px each.
             at.right.v += sigmas * 0.1 * 2f64.sqrt();
-            let (settings, mut cloud) = (Triangulator { confidence, ..Triangulator::default() }, Vec::new());
+            let (settings, mut cloud) =
+                (Triangulator { confidence, calibration_px: 0.0, ..Triangulator::default() }, Vec::new());
             settings.triangulate_into(&[UncertainPixels::independent(at, 0.1)], &rig, &mut cloud);
             cloud.len() == 1
         };

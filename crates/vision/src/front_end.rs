@@ -20,7 +20,7 @@ pub struct FrontEnd {
     pub descriptor: Box<dyn Descriptor>,
     /// Pairs left with right.
     pub matcher: Box<dyn Matcher>,
-    /// Says where exactly the left corners are.
+    /// Says where exactly the corners are.
     pub locator: Box<dyn Locator>,
     /// Aligns each pair between the views.
     pub refine: Refine,
@@ -38,11 +38,9 @@ pub struct Look {
     /// The images as the filters leave them; where there is no filter the images are looked at themselves.
     filtered: [Option<Image>; 2],
     work: Workspace,
-    matched: Vec<Keypoint>,
-    located: Vec<Option<Place>>,
     /// Left key points and where the right image shows them.
     pub matches: Vec<Match>,
-    /// The same, with the left corners exactly located.
+    /// The same, with how well each place is known.
     pub pairs: Vec<Pair>,
     /// The same, aligned, with their covariance.
     pub pixels: Vec<UncertainPixels>,
@@ -57,6 +55,7 @@ pub struct Look {
 struct Eye {
     work: Workspace,
     keypoints: Vec<Keypoint>,
+    located: Vec<Option<Place>>,
     descriptors: Descriptors,
 }
 
@@ -111,7 +110,7 @@ impl Look {
 impl FrontEnd {
     /// Replaces what is in `look` by what these two images show.
     pub fn look(&self, left: &Image, right: &Image, rig: &StereoRig, look: &mut Look) {
-        let Look { eyes: [l, r], filtered, work, matched, located, matches, pairs, pixels, cloud, times } = look;
+        let Look { eyes: [l, r], filtered, work, matches, pairs, pixels, cloud, times } = look;
         let [clear_left, clear_right] = filtered;
         let threads = work.threads();
         let (mut left, mut right) = (left, right);
@@ -127,6 +126,9 @@ impl FrontEnd {
             let detect = |image, eye: &mut Eye| self.detector.detect_into(image, &mut eye.work, &mut eye.keypoints);
             threads.join(|| detect(left, l), || detect(right, r));
         });
+        times.locate_ms = timed(|| {
+            threads.join(|| self.locate(left, l), || self.locate(right, r));
+        });
         times.describe_ms = timed(|| {
             let describe = |image, eye: &mut Eye| {
                 self.descriptor.describe_into(image, &eye.keypoints, &mut eye.work, &mut eye.descriptors);
@@ -137,16 +139,38 @@ impl FrontEnd {
         let right = View { image: right, keypoints: &r.keypoints, descriptors: &r.descriptors };
         times.match_ms = timed(|| self.matcher.match_into(&left, &right, rig, work, matches));
         let sigma = self.triangulator.sigma_px;
-        times.locate_ms = timed(|| {
-            matched.clear();
-            matched.extend(matches.iter().map(|found| left.keypoints[found.left]));
-            self.locator.locate_into(left.image, matched, work, located);
+        times.refine_ms = timed(|| {
             pairs.clear();
-            let pair = |((keypoint, found), place): ((&_, &_), &_)| Pair::new(keypoint, found, *place, sigma);
-            pairs.extend(matched.iter().zip(&*matches).zip(&*located).map(pair));
+            let place = |found: &Match| {
+                let found_at = left.keypoints[found.left].at;
+                l.located[found.left].unwrap_or(Place::independent(found_at, sigma))
+            };
+            let pair = |found| Pair { left: place(found), right: Place::independent(found.right, sigma) };
+            pairs.extend(matches.iter().map(pair));
+            self.refine.align_into(pairs, left.image, right.image, rig, work, pixels);
         });
-        times.refine_ms = timed(|| self.refine.align_into(pairs, left.image, right.image, rig, work, pixels));
         times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
+    }
+
+    /// Moves the key points of `image` to the corners they are near. Key points of one corner are one: the
+    /// strongest, which comes first.
+    fn locate(&self, image: &Image, eye: &mut Eye) {
+        let Eye { work, keypoints, located, .. } = eye;
+        self.locator.locate_into(image, keypoints, work, located);
+        let mut kept = 0;
+        for i in 0..keypoints.len() {
+            let (mut keypoint, place) = (keypoints[i], located[i]);
+            if let Some(place) = place {
+                keypoint.at = place.at;
+            }
+            let repeats = |earlier: &Keypoint| earlier.at.distance(&keypoint.at) < SAME;
+            if !(place.is_some() && keypoints[..kept].iter().any(repeats)) {
+                (keypoints[kept], located[kept]) = (keypoint, place);
+                kept += 1;
+            }
+        }
+        keypoints.truncate(kept);
+        located.truncate(kept);
     }
 
     /// `image` as the filters leave it, in the memory of `kept`.
@@ -162,6 +186,9 @@ impl FrontEnd {
         kept
     }
 }
+
+/// Corners nearer to each other than this are one (px).
+const SAME: f64 = 1.0;
 
 fn timed(work: impl FnOnce()) -> f64 {
     let start = Instant::now();

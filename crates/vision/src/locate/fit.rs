@@ -60,6 +60,14 @@ pub(super) struct Fitter {
 
 /// Steps of the fit at most, in all its windows.
 const STEPS: usize = 20;
+/// A fit is given up when it leaves this many times what a believed one may leave unexplained, and a step
+/// lowers that by less than a fifth: most key points are texture, and the time goes to them.
+const FAR: f64 = 1.5;
+const SLOW: f64 = 0.8;
+/// Nor is a fit begun from a guess that leaves more than this share unexplained.
+const HOPELESS: f64 = 0.5;
+/// A shape is tried if its first guess explains at least this share of what the other's does.
+const WORSE: f64 = 0.7;
 /// A step shorter than this ends it (px).
 const SHORT: f64 = 1e-3;
 /// The blur's standard deviation must be within these (px).
@@ -92,7 +100,8 @@ impl Fitter {
         guesses.sort_by(|a, b| b.0.total_cmp(&a.0));
         let reached = start.at.norm() <= settings.reach;
         let at = if reached { [start.at.x + near[0], start.at.y + near[1]] } else { [keypoint.at.u, keypoint.at.v] };
-        for (_, shape, normals, a, b) in guesses {
+        let promising = WORSE * guesses[0].0;
+        for (_, shape, normals, a, b) in guesses.iter().filter(|guess| guess.0 >= promising) {
             // A guess at the blur that is neither sharp nor soft.
             let model = Model { shape: *shape, at: [at[0], at[1], normals[0], normals[1], 1.0, *a, *b] };
             let place = self.fit(settings, image, keypoint, model);
@@ -115,6 +124,9 @@ impl Fitter {
         let mut damping = 0.0;
         let mut moved_window = 0;
         let mut best = self.pixels.normal(&model);
+        if best.squares > HOPELESS * self.variation {
+            return None;
+        }
         for _ in 0..STEPS {
             let step = solve(&best, damping)?;
             let mut trial = model;
@@ -125,13 +137,17 @@ impl Fitter {
                 && (1.0 / BLUR[1]..=1.0 / BLUR[0]).contains(&trial.at[4])
                 && libm::sin(trial.at[2] - trial.at[3]).abs() >= PARALLEL;
             let next = if sane { Some(self.pixels.normal(&trial)) } else { None };
+            let far = best.squares > FAR * (1.0 - settings.explained) * self.variation;
             let Some(next) = next.filter(|next| next.squares <= best.squares * (1.0 + 1e-5)) else {
                 damping = (damping * 8.0).max(1e-2);
-                if damping > 1e4 {
+                if damping > if far { 1.0 } else { 1e4 } {
                     return None;
                 }
                 continue;
             };
+            if far && next.squares > SLOW * best.squares {
+                return None;
+            }
             (model, best, damping) = (trial, next, damping * 0.2);
             if damping < 1e-3 {
                 damping = 0.0;
