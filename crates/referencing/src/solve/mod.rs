@@ -15,7 +15,6 @@ pub(crate) mod likelihood;
 mod mahalanobis;
 mod numerical;
 mod p3p;
-mod p3p_stereo;
 mod roots;
 mod spread;
 mod starts;
@@ -137,7 +136,6 @@ pub static SOLVERS: Registry<dyn Solver> = Registry::new(
         entry!(irls::Irls),
         entry!(Kabsch),
         entry!(Mahalanobis),
-        entry!(p3p_stereo::P3pStereo),
         entry!(StereoReprojection),
         entry!(Triad),
         entry!(umeyama::Umeyama),
