@@ -18,9 +18,9 @@ pub(crate) fn kinds() -> Vec<Kind> {
         kind("sources", &SOURCES),
         kind("filters", &FILTERS),
         kind("detectors", &DETECTORS),
+        kind("locators", &LOCATORS),
         kind("descriptors", &DESCRIPTORS),
         kind("matchers", &MATCHERS),
-        kind("locators", &LOCATORS),
         kind("searches", &SEARCHES),
         kind("solvers", &SOLVERS),
     ]

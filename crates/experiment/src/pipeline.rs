@@ -30,12 +30,12 @@ pub struct Pipeline {
     pub filters: Vec<Choice>,
     /// Finds corners in each image.
     pub detector: Choice,
+    /// Says where exactly the corners are.
+    pub locator: Choice,
     /// Describes their surroundings.
     pub descriptor: Choice,
     /// Pairs left with right.
     pub matcher: Choice,
-    /// Says where exactly the left corners are.
-    pub locator: Choice,
     /// Aligns each pair between the views.
     pub refine: Refine,
     /// Turns pairs into points.
@@ -58,9 +58,9 @@ impl Default for Pipeline {
             target: TargetKind::Object,
             filters: Vec::new(),
             detector: Choice::named("harris"),
+            locator: Choice::named("corner"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band"),
-            locator: Choice::named("corner"),
             refine: Refine::default(),
             triangulation: Triangulator::default(),
             gate: Gate::default(),

@@ -155,9 +155,9 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
 fn components(pipeline: &Pipeline, images: bool) -> Vec<Component> {
     let front = [
         component(&DETECTORS, &pipeline.detector),
+        component(&LOCATORS, &pipeline.locator),
         component(&DESCRIPTORS, &pipeline.descriptor),
         component(&MATCHERS, &pipeline.matcher),
-        component(&LOCATORS, &pipeline.locator),
     ];
     let back = [component(&SEARCHES, &pipeline.search), component(&SOLVERS, &pipeline.solver)];
     front.into_iter().filter(|_| images).chain(back).collect()

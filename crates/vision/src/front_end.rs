@@ -16,12 +16,12 @@ pub struct FrontEnd {
     pub filters: Vec<Box<dyn Filter>>,
     /// Finds key points in each image.
     pub detector: Box<dyn Detector>,
+    /// Says where exactly the corners are.
+    pub locator: Box<dyn Locator>,
     /// Describes their surroundings.
     pub descriptor: Box<dyn Descriptor>,
     /// Pairs left with right.
     pub matcher: Box<dyn Matcher>,
-    /// Says where exactly the corners are.
-    pub locator: Box<dyn Locator>,
     /// Aligns each pair between the views.
     pub refine: Refine,
     /// Turns pairs into points.
@@ -66,12 +66,12 @@ pub struct StageTimes {
     pub filter_ms: f64,
     /// Key points.
     pub detect_ms: f64,
+    /// Exact corners.
+    pub locate_ms: f64,
     /// Descriptors.
     pub describe_ms: f64,
     /// Matches.
     pub match_ms: f64,
-    /// Exact corners.
-    pub locate_ms: f64,
     /// Alignment between the views.
     pub refine_ms: f64,
     /// Triangulation.
@@ -81,13 +81,13 @@ pub struct StageTimes {
 impl StageTimes {
     /// Each stage by its name, in the order of the work.
     pub fn stages(&self) -> Vec<(&'static str, f64)> {
-        let Self { filter_ms, detect_ms, describe_ms, match_ms, locate_ms, refine_ms, triangulate_ms } = *self;
+        let Self { filter_ms, detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *self;
         vec![
             ("filter", filter_ms),
             ("detect", detect_ms),
+            ("locate", locate_ms),
             ("describe", describe_ms),
             ("match", match_ms),
-            ("locate", locate_ms),
             ("refine", refine_ms),
             ("triangulate", triangulate_ms),
         ]
@@ -141,11 +141,11 @@ impl FrontEnd {
         let sigma = self.triangulator.sigma_px;
         times.refine_ms = timed(|| {
             pairs.clear();
-            let place = |found: &Match| {
-                let found_at = left.keypoints[found.left].at;
-                l.located[found.left].unwrap_or(Place::independent(found_at, sigma))
+            let pair = |found: &Match| {
+                let rough = || Place::independent(left.keypoints[found.left].at, sigma);
+                let place = l.located[found.left].unwrap_or_else(rough);
+                Pair { left: place, right: Place::independent(found.right, sigma) }
             };
-            let pair = |found| Pair { left: place(found), right: Place::independent(found.right, sigma) };
             pairs.extend(matches.iter().map(pair));
             self.refine.align_into(pairs, left.image, right.image, rig, work, pixels);
         });

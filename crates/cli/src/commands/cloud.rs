@@ -148,7 +148,9 @@ impl Cloud {
             "repeats": self.repeat,
             "threads": self.threads,
             "pipeline": {
+                "filters": pipeline.filters,
                 "detector": pipeline.detector,
+                "locator": pipeline.locator,
                 "descriptor": pipeline.descriptor,
                 "matcher": pipeline.matcher,
                 "refine": pipeline.refine,

@@ -4,7 +4,7 @@ use seafix_component::{Choice, Registry};
 use seafix_geometry::{Pixel, StereoRig};
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, Descriptors, FrontEnd, Image, Keypoint, LOCATORS, Look, MATCHERS, Match, Matcher, Pair,
-    Refine, Table, Threads, Triangulator, View, Workspace,
+    Place, Refine, Table, Threads, Triangulator, View, Workspace,
 };
 use serde_json::{Value, json};
 
@@ -237,7 +237,10 @@ impl Scene {
         ];
         let stages = list.into_iter().map(|(name, refine, request, at_most)| {
             let mut pixels = Vec::new();
-            let pair = |found: &Match| Pair::new(&self.keypoints[0][found.left], found, None, 0.15);
+            let pair = |found: &Match| Pair {
+                left: Place::independent(self.keypoints[0][found.left].at, 0.15),
+                right: Place::independent(found.right, 0.15),
+            };
             let pairs: Vec<Pair> = self.matches.iter().map(pair).collect();
             let ours = with_memory(move |work| {
                 refine.align_into(&pairs, &self.images[0], &self.images[1], &self.rig, work, &mut pixels);

@@ -1,9 +1,10 @@
 //! Locators: where exactly a corner is.
 //!
 //! A detector's response peaks near a corner, not at it: 1 to 2 px inside the corner of a box. A locator
-//! fits a model of the corner to the pixels around. Only the left places of matched key points are
-//! located; the alignment between the views then finds the same place in the right image, more exactly
-//! than a second fit would.
+//! fits a model of the corner to the pixels around. Both images' key points are located before they are
+//! described: a response may have two maxima beside one corner, and those of one image would match the
+//! others of the other. What is no corner stays; the alignment between the views then replaces the right
+//! place, which it finds more exactly than a second fit.
 
 mod corner;
 mod fit;
@@ -20,7 +21,7 @@ pub use peak::Peak;
 use seafix_component::{Registry, entry};
 use seafix_geometry::Pixel;
 
-use crate::{Image, Keypoint, Match, Workspace};
+use crate::{Image, Keypoint, Workspace};
 
 /// A place in an image and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,24 +39,13 @@ impl Place {
     }
 }
 
-/// A matched point: where exactly the left image shows it, and where about the right one.
+/// A matched point: where the left image shows it, and where about the right one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// In the left image.
     pub left: Place,
-    /// In the right image, as far from the matcher's place as the left is from the detector's.
+    /// In the right image.
     pub right: Place,
-}
-
-impl Pair {
-    /// The pair of a match of `keypoint`; both places err by `sigma` (px, each coordinate) but for the left
-    /// if it is `located`.
-    pub fn new(keypoint: &Keypoint, found: &Match, located: Option<Place>, sigma: f64) -> Self {
-        let left = located.unwrap_or(Place::independent(keypoint.at, sigma));
-        let (u, v) = (left.at.u - keypoint.at.u, left.at.v - keypoint.at.v);
-        let right = Pixel { u: found.right.u + u, v: found.right.v + v };
-        Self { left, right: Place::independent(right, sigma) }
-    }
 }
 
 /// Finds the exact place of corners that a detector found roughly.
@@ -75,20 +65,3 @@ pub trait Locator: Send + Sync + std::fmt::Debug {
 /// All locators.
 pub static LOCATORS: Registry<dyn Locator> =
     Registry::new("locator", &[entry!(Corner), entry!(Junction), entry!(LCorner), entry!(Peak), entry!(XCorner)]);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_right_place_moves_with_the_left() {
-        let keypoint = Keypoint { at: Pixel { u: 10.0, v: 20.0 }, response: 1.0, scale: 2.0 };
-        let found = Match { left: 0, right: Pixel { u: 4.5, v: 20.5 }, distance: 0.0 };
-        let left = Place::independent(Pixel { u: 9.0, v: 18.5 }, 0.01);
-        let pair = Pair::new(&keypoint, &found, Some(left), 0.5);
-        assert_eq!(pair, Pair { left, right: Place::independent(Pixel { u: 3.5, v: 19.0 }, 0.5) });
-        let stays = Pair::new(&keypoint, &found, None, 0.5);
-        assert_eq!((stays.left.at, stays.right.at), (keypoint.at, found.right));
-        assert_eq!(stays.left.covariance, Matrix2::identity() * 0.25);
-    }
-}
