@@ -25,7 +25,13 @@ pub struct Planted {
 impl Planted {
     /// The problem as a search takes it.
     pub fn problem(&self) -> Problem<'_> {
-        Problem { model: &self.model, cloud: &self.cloud, candidates: &self.candidates, tolerance: self.tolerance }
+        Problem {
+            model: &self.model,
+            cloud: &self.cloud,
+            candidates: &self.candidates,
+            tolerance: self.tolerance,
+            prior: None,
+        }
     }
 }
 

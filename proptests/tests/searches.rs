@@ -87,8 +87,10 @@ fn a_difference_of_exactly_delta_is_coherent() {
         for search in &searches {
             let size = |delta: f64| {
                 let tolerance = Tolerance::Fixed(delta);
-                let found =
-                    answer(search, &Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance });
+                let found = answer(
+                    search,
+                    &Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None },
+                );
                 found.map_or(0, |found| found.pairs.len())
             };
             prop_assert_eq!(size(greatest), known.len(), "{} at Δ", &search.name);

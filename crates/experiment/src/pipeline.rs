@@ -272,10 +272,10 @@ impl Stages {
         let started = Instant::now();
         let settings = &self.settings;
         let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)));
-        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: settings.tolerance };
+        let tolerance = settings.tolerance;
+        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
-        let (answer, solution) =
-            timed(|| judge(&problem, prior, found, &*self.solver, &settings.acceptance, Some(rig)));
+        let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, &settings.acceptance, Some(rig)));
         let times = TargetTimes {
             candidates_ms: Some(stage1),
             search_ms: Some(stage2),

@@ -117,8 +117,13 @@ mod tests {
         // points: 3 · 4 = 12, so q = (0 + 1) / (12 + 2) and E_3 = 2³ q³.
         let (model, cloud) = (model(&[0.0, 1.0, 3.0]), cloud(&[0.0, 100.0, 1000.0, 5000.0, 20000.0, 90000.0]));
         let candidates = Candidates { lists: vec![vec![0, 1], vec![2, 3], vec![4, 5]] };
-        let problem =
-            Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.1) };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance: Tolerance::Fixed(0.1),
+            prior: None,
+        };
         let nothing = [Correspondence { model: 9, cloud: 0 }; 3];
         assert!((expected_sets(&problem, &nothing) / (8.0 / 14f64.powi(3)) - 1.0).abs() < 1e-12);
         assert_eq!(expected_sets(&problem, &nothing[..2]), f64::INFINITY);
@@ -129,8 +134,13 @@ mod tests {
         // e_3 of (1, 2, 3, 4) = 6 + 8 + 12 + 24.
         let (model, cloud) = (model(&[0.0, 1.0, 3.0, 7.0]), cloud(&[0.0; 4]));
         let candidates = Candidates { lists: (1..=4).map(|length| (0..length).collect()).collect() };
-        let problem =
-            Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.1) };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance: Tolerance::Fixed(0.1),
+            prior: None,
+        };
         assert!((ln_products(&problem, 3).exp() - 50.0).abs() < 1e-9);
         assert_eq!(ln_products(&problem, 5), f64::NEG_INFINITY);
     }
@@ -151,7 +161,7 @@ mod tests {
                 .collect();
             let candidates = Candidates { lists: (0..6).map(|i| (5 * i..5 * i + 5).collect()).collect() };
             let tolerance = Tolerance::Fixed(0.03);
-            let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance };
+            let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
             expected += expected_sets(&problem, &[Correspondence { model: 9, cloud: 99 }; 4]);
             let pairs: Vec<Correspondence> = (0..30).map(|cloud| Correspondence { model: cloud / 5, cloud }).collect();
             let agree = |a: usize, b: usize| problem.coherent(pairs[a], pairs[b]);

@@ -76,6 +76,8 @@ pub struct Problem<'a> {
     pub candidates: &'a Candidates,
     /// When two distances agree.
     pub tolerance: Tolerance,
+    /// The rough pose, where one is known: it bounds the pose as a whole, not only the candidates.
+    pub prior: Option<&'a Prior>,
 }
 
 impl Problem<'_> {

@@ -21,7 +21,13 @@ struct Case {
 
 impl Case {
     fn problem(&self) -> Problem<'_> {
-        Problem { model: &self.model, cloud: &self.cloud, candidates: &self.candidates, tolerance: self.tolerance }
+        Problem {
+            model: &self.model,
+            cloud: &self.cloud,
+            candidates: &self.candidates,
+            tolerance: self.tolerance,
+            prior: None,
+        }
     }
 }
 

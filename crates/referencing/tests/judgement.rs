@@ -41,10 +41,10 @@ fn cloud_of(model: &[ModelPoint], rng: &mut ChaCha8Rng) -> Vec<MeasuredPoint> {
 }
 
 fn attempt(model: &[ModelPoint], cloud: &[MeasuredPoint], candidates: &Candidates, prior: Option<&Prior>) -> Attempt {
-    let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Sigmas(4.0) };
+    let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Sigmas(4.0), prior };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let (search, solver) = (MaximumClique::default(), Kabsch::default());
-    reference(&problem, prior, &search, &solver, &Acceptance::default(), None, &mut rng)
+    reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng)
 }
 
 #[test]
@@ -98,11 +98,16 @@ fn a_set_that_fits_no_rigid_motion_falls_at_the_residuals() {
         cloud[i].position.at = cloud[i].position.at + Vector3::new(0.0, 0.0, side * SIGMA);
     }
     let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
-    let problem =
-        Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(20.0 * SIGMA) };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Fixed(20.0 * SIGMA),
+        prior: None,
+    };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let (search, solver) = (MaximumClique::default(), Kabsch::default());
-    let found = reference(&problem, None, &search, &solver, &Acceptance::default(), None, &mut rng);
+    let found = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
     assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
     assert_eq!((found.outcome.name(), found.outcome.reason()), ("unidentified", Some("gate")));
 }
@@ -183,10 +188,16 @@ fn a_mirror_image_is_refused_by_name() {
     assert_eq!(found.outcome, Outcome::Unidentified(expected));
     assert_eq!(found.outcome.reason(), Some("mirrored"));
     // The paper's distances alone accept it; no rigid motion then fits.
-    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Sigmas(4.0) };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Sigmas(4.0),
+        prior: None,
+    };
     let search = StructuralCoherence { orientation: false, ..StructuralCoherence::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let found = reference(&problem, None, &search, &Kabsch::default(), &Acceptance::default(), None, &mut rng);
+    let found = reference(&problem, &search, &Kabsch::default(), &Acceptance::default(), None, &mut rng);
     assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
 }
 
@@ -227,16 +238,22 @@ fn a_blow_up_stops_at_the_budget_with_an_honest_bound() {
         .map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None })
         .collect();
     let candidates = Candidates::all(50, 100);
-    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.05) };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Fixed(0.05),
+        prior: None,
+    };
     let search = StructuralCoherence { budget: 100_000, ..StructuralCoherence::default() };
     let solver = Kabsch::default();
-    let found = reference(&problem, None, &search, &solver, &Acceptance::default(), None, &mut rng);
+    let found = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
     let Outcome::Unidentified(Refusal::Search(Unidentified::Budget { best, bound, .. })) = found.outcome else {
         panic!("{:?}", found.outcome)
     };
     assert!(best >= 1 && bound == 50 && !found.optimal, "{best} {bound}");
     let search = MaximumClique { budget: 10_000, ..MaximumClique::default() };
-    let found = reference(&problem, None, &search, &solver, &Acceptance::default(), None, &mut rng);
+    let found = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
     assert!(!found.optimal && found.size_bound.unwrap() <= 50, "{found:?}");
     assert!(!matches!(found.outcome, Outcome::Referenced(_)));
 }
@@ -264,10 +281,10 @@ fn judged(
     rivals: Vec<Vec<Correspondence>>,
 ) -> Attempt {
     let tolerance = Tolerance::Fixed(20.0 * SIGMA);
-    let problem = Problem { model, cloud, candidates, tolerance };
+    let problem = Problem { model, cloud, candidates, tolerance, prior };
     let mut found = MaximumClique::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a set");
     found.rivals.extend(rivals);
-    judge(&problem, prior, Ok(found), &Kabsch::default(), acceptance, None)
+    judge(&problem, Ok(found), &Kabsch::default(), acceptance, None)
 }
 
 #[test]
@@ -335,14 +352,20 @@ fn what_was_not_looked_at_is_not_believed() {
     let (model, mut rng) = (model_of(&MODEL), ChaCha8Rng::seed_from_u64(1));
     let cloud = cloud_of(&model, &mut rng);
     let candidates = Candidates::all(7, 7);
-    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Sigmas(4.0) };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Sigmas(4.0),
+        prior: None,
+    };
     let mut found = MaximumClique::default().search(&problem, &mut rng).expect("a set");
     assert_eq!(found.undecided, None);
     let why = Unidentified::Budget { budget: 5, best: 7, bound: 7, tests: 9 };
     found.undecided = Some(why.clone());
-    let refused = judge(&problem, None, Ok(found), &Kabsch::default(), &Acceptance::default(), None);
+    let refused = judge(&problem, Ok(found), &Kabsch::default(), &Acceptance::default(), None);
     assert_eq!(refused.outcome, Outcome::Unidentified(Refusal::Search(why.clone())));
     assert_eq!((refused.outcome.reason(), refused.identified.len()), (Some("budget"), 7));
-    let none = judge(&problem, None, Err(why), &Kabsch::default(), &Acceptance::default(), None);
+    let none = judge(&problem, Err(why), &Kabsch::default(), &Acceptance::default(), None);
     assert_eq!((none.tests, none.size_bound, none.optimal), (Some(9), Some(7), false));
 }

@@ -173,8 +173,9 @@ impl CoherenceProblem {
             cloud: &self.cloud,
             candidates: &candidates,
             tolerance: Tolerance::Fixed(self.delta),
+            prior: self.prior.as_ref(),
         };
-        reference(&problem, self.prior.as_ref(), search, solver, acceptance, None, rng)
+        reference(&problem, search, solver, acceptance, None, rng)
     }
 }
 

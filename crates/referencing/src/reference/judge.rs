@@ -16,7 +16,6 @@ use crate::{
 /// What a set is judged by.
 pub(super) struct Judge<'a> {
     pub(super) problem: &'a Problem<'a>,
-    pub(super) prior: Option<&'a Prior>,
     pub(super) solver: &'a dyn Solver,
     pub(super) acceptance: &'a Acceptance,
     /// Poses further apart (m) are different answers.
@@ -127,7 +126,7 @@ impl Judge<'_> {
         let data = self.observations(pairs);
         let pose = self.solver.solve(&data)?;
         let likelihood = likelihood::maximum(&data, &pose);
-        let prior = match self.prior {
+        let prior = match self.problem.prior {
             Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) }) => {
                 let xi = object_from_camera.error_to(&likelihood.pose);
                 covariance.matrix.cholesky().map_or(0.0, |c| xi.dot(&c.solve(&xi)))
@@ -155,7 +154,7 @@ impl Judge<'_> {
         if !(2.0 * rms <= limit) {
             return Err(Fallen::Refused(Refusal::Imprecise { rms, limit }));
         }
-        let Some(prior) = self.prior else { return Ok(()) };
+        let Some(prior) = self.problem.prior else { return Ok(()) };
         let off = match &prior.bound {
             PriorBound::Gaussian(of_prior) => {
                 let xi = prior.object_from_camera.error_to(&hypothesis.pose);

@@ -3,9 +3,7 @@
 use rand::Rng;
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
-use crate::{
-    Identification, ModelPoint, Prior, Problem, Search, Solver, Unidentified, chance::expected_sets, site::diameter,
-};
+use crate::{Identification, ModelPoint, Problem, Search, Solver, Unidentified, chance::expected_sets, site::diameter};
 
 mod acceptance;
 mod exclusion;
@@ -29,7 +27,6 @@ const ALERT_SHARE: f64 = 0.05;
 /// rigid motion, and the tests that it must pass before it is believed.
 pub fn reference(
     problem: &Problem<'_>,
-    prior: Option<&Prior>,
     search: &dyn Search,
     solver: &dyn Solver,
     acceptance: &Acceptance,
@@ -37,14 +34,13 @@ pub fn reference(
     rng: &mut dyn Rng,
 ) -> Attempt {
     let found = search.search(problem, rng);
-    judge(problem, prior, found, solver, acceptance, rig)
+    judge(problem, found, solver, acceptance, rig)
 }
 
 /// The second half of [`reference()`], for callers that time the search by itself: from what a
 /// search said to a pose that is believed, or a refusal.
 pub fn judge(
     problem: &Problem<'_>,
-    prior: Option<&Prior>,
     found: Result<Identification, Unidentified>,
     solver: &dyn Solver,
     acceptance: &Acceptance,
@@ -56,7 +52,7 @@ pub fn judge(
     };
     let alert_limit = acceptance.alert_limit.min(ALERT_SHARE * diameter(problem.model));
     let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
-    let judge = Judge { problem, prior, solver, acceptance, alert_limit, largest, rig };
+    let judge = Judge { problem, solver, acceptance, alert_limit, largest, rig };
     let (outcome, runner_up) = match judge.size(&found.pairs).and_then(|()| judge.chance(&found.pairs)) {
         Ok(()) => judge.poses(&found),
         Err(refusal) => (Outcome::Unidentified(refusal), None),

@@ -98,8 +98,13 @@ mod tests {
             .map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at.into(), 0.005), pixels: None })
             .collect();
         let candidates = Candidates { lists: (0..12).map(|i| vec![i, 12 + i]).collect() };
-        let problem =
-            Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance: Tolerance::Fixed(0.02) };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance: Tolerance::Fixed(0.02),
+            prior: None,
+        };
         let best: Vec<Correspondence> = (0..12).map(|i| Correspondence { model: i, cloud: i }).collect();
         all_alike(&problem, &Association::of(&problem), &best, Sense::Proper, 100_000).0
     }

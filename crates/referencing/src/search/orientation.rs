@@ -218,7 +218,7 @@ mod tests {
             seen.map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at, 0.001), pixels: None }).collect();
         let candidates = Candidates::from_pairs(60, (0..60).map(|i| (i, i)));
         let tolerance = Tolerance::Fixed(0.01);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance };
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
         let pairs: Vec<Correspondence> = (0..60).map(|i| Correspondence { model: i, cloud: i }).collect();
         unmirrored(&problem, pairs, most)
     }
