@@ -25,6 +25,7 @@
 mod bed;
 mod blueprint;
 mod dive;
+pub mod families;
 mod layout;
 mod noise;
 mod paint;

@@ -26,6 +26,8 @@ pub enum Purpose {
     Points,
     /// What a search draws in a frame.
     Search,
+    /// An identification problem of a family.
+    Problem,
 }
 
 /// A stream of random numbers, a function of (seed, dive, frame, purpose) alone.

@@ -8,6 +8,7 @@ use crate::exit::Ended;
 
 mod check;
 mod cloud;
+mod draw;
 mod export;
 mod list;
 mod report;
@@ -24,6 +25,8 @@ pub(crate) enum Command {
     Solve(solve::Solve),
     /// Make the cloud of measured points of one stereo pair.
     Cloud(cloud::Cloud),
+    /// Draw identification problems with truth (coherence-problem/1).
+    Draw(draw::Draw),
     /// Say everything that is wrong with a data set, site, experiment, problem or log.
     Check {
         /// The files and folders.
@@ -49,6 +52,7 @@ impl Command {
             Self::Run(command) => command.execute(),
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),
+            Self::Draw(command) => command.execute(),
             Self::Check { paths } => check::execute(paths),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),

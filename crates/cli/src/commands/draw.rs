@@ -1,0 +1,63 @@
+//! `seafix draw`.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use seafix_simulation::families::{Drawn, Family, Presence};
+
+use crate::{
+    exit::{DONE, Ended, Failure, OUTPUT},
+    terminal::print,
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Draw {
+    /// The family: a to g.
+    family: Family,
+    /// The seed; equal seeds give equal problems.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How many problems.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    count: u64,
+    /// The number of the first in its family; what is varied cycles with the number.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
+    first: u64,
+    /// Leave the object away: the cloud is clutter.
+    #[arg(long)]
+    absent: bool,
+    /// The folder of the problems; it must not exist, or be empty.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl Draw {
+    pub(crate) fn execute(&self) -> Ended {
+        let failed = |error: &dyn std::fmt::Display| Failure::new(OUTPUT, format!("{}: {error}", self.out.display()));
+        fs::create_dir_all(&self.out).map_err(|error| failed(&error))?;
+        if fs::read_dir(&self.out).map_err(|error| failed(&error))?.next().is_some() {
+            return Err(failed(&"the folder is not empty; name another with --out"));
+        }
+        let presence = if self.absent { Presence::Absent } else { Presence::Present };
+        for number in self.first..self.first + self.count {
+            let drawn = Drawn::new(self.family, self.seed, number, presence);
+            let file = |end: &str| self.out.join(format!("{}{end}", drawn.problem.id));
+            write(&file(".json"), serde_json::to_string(&drawn.problem))?;
+            write(&file(".truth.json"), serde_json::to_string(&drawn.truth))?;
+        }
+        let problems = if self.count == 1 { "problem" } else { "problems" };
+        print(&format!("{} {problems} and their truth in {}\n", self.count, self.out.display()))?;
+        Ok(DONE)
+    }
+}
+
+/// A file is whole when it has its name.
+fn write(file: &Path, content: serde_json::Result<String>) -> Result<(), Failure> {
+    let partial = file.with_extension("json.partial");
+    let text = content.expect("a problem is plain data");
+    let written = fs::write(&partial, text).and_then(|()| fs::rename(&partial, file));
+    written.map_err(|error| Failure::new(OUTPUT, format!("{}: {error}", file.display())))
+}

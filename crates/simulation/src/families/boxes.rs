@@ -1,0 +1,188 @@
+//! Families a, b, c, f and g: points on the edges and faces of a box.
+
+use nalgebra::Vector3;
+use seafix_geometry::Point;
+
+use super::{
+    Drawn, DrawnParameters, DrawnProblem, DrawnTruth, Family, Part, Source,
+    clutter::{EDGE_JITTER, Scene, in_shells, on_edge, on_face},
+    prior::{ahead, rough},
+    problem::{micrometres, round},
+};
+use crate::stream::Stream;
+
+/// Share of the model points that lie on edges; the rest lies on faces.
+const ON_EDGES: f64 = 0.6;
+/// Half the boxes along their axes (m).
+const SMALL: [f64; 3] = [1.25, 0.75, 0.75];
+const LARGE: [f64; 3] = [2.5, 1.75, 1.5];
+const MEDIUM: [f64; 3] = [2.0, 1.5, 1.25];
+
+/// What a problem's number decides.
+struct Cell {
+    half: [f64; 3],
+    /// How far ahead of the camera the object is (m).
+    distance: f64,
+    /// The least distance of two model points (m).
+    apart: f64,
+    n: usize,
+    m: usize,
+    visible: usize,
+    /// Half-size of the shells (m); `None` without a prior.
+    shell: Option<f64>,
+    /// How far the scene goes beyond the object (m).
+    margin: f64,
+    sigma: f64,
+    /// How much noisier depth is.
+    depth: u32,
+    /// Whether all clutter lies in shells.
+    dense: bool,
+    /// How near clutter may come to a hidden model point (m).
+    clear: f64,
+}
+
+impl Cell {
+    fn of(source: &Source) -> Self {
+        let mut stream = source.stream(Part::Cell);
+        let k = usize::try_from(source.number % 1_000_000).expect("it is below a million");
+        let site = Self {
+            half: LARGE,
+            distance: 7.0,
+            apart: 0.25,
+            n: 50,
+            m: [500, 1000, 2000][k % 3],
+            visible: 0,
+            shell: Some(0.5),
+            margin: 0.5,
+            sigma: 0.01,
+            depth: 1,
+            dense: false,
+            clear: 0.0,
+        };
+        match source.family {
+            Family::A => {
+                let (n, shell) = (7 + stream.below(2), [0.2, 0.3, 0.5][k / 7 % 3]);
+                Self {
+                    half: SMALL,
+                    distance: 4.0,
+                    apart: 0.3,
+                    n,
+                    m: 89,
+                    visible: (2 + k % 7).min(n),
+                    shell: Some(shell),
+                    margin: shell,
+                    dense: k / 63 % 2 == 1,
+                    ..site
+                }
+            }
+            Family::B => Self {
+                visible: 12 + stream.below(24),
+                sigma: [0.01, 0.02, 0.03][k / 3 % 3],
+                depth: [1, 3][k / 9 % 2],
+                clear: 0.15,
+                ..site
+            },
+            Family::F => Self {
+                visible: 4 + k / 3 % 6,
+                shell: Some([0.3, 0.5][k % 2]),
+                sigma: [0.01, 0.02][k / 2 % 2],
+                clear: 0.18,
+                ..site
+            },
+            Family::G => Self { visible: [6, 8, 10, 12, 14, 20][k / 3 % 6], dense: true, ..site },
+            _ => {
+                let n = [20, 30, 50][k % 3];
+                let (m, visible) = ([100, 200, 300][k % 3], n * 3 / 5);
+                Self { half: MEDIUM, distance: 6.0, n, m, visible, shell: None, ..site }
+            }
+        }
+    }
+
+    fn parameters(&self, source: &Source, visible: usize) -> DrawnParameters {
+        let site = matches!(source.family, Family::B | Family::F | Family::G);
+        DrawnParameters {
+            n: Some(self.n),
+            m: Some(self.m),
+            visible: Some(visible),
+            shell: self.shell,
+            dense: (source.family == Family::A).then_some(self.dense),
+            sigma: site.then_some(self.sigma),
+            aniso: (source.family == Family::B).then_some(self.depth),
+            absent: source.absent().then_some(true),
+            ..DrawnParameters::default()
+        }
+    }
+}
+
+/// The model: each point at least `apart` from the others.
+fn model(cell: &Cell, stream: &mut Stream) -> Vec<Vector3<f64>> {
+    let half = Vector3::from(cell.half);
+    let mut points: Vec<Vector3<f64>> = Vec::new();
+    while points.len() < cell.n {
+        let at = if stream.unit() < ON_EDGES { on_edge(stream, &half) } else { on_face(stream, &half) };
+        let at = at + stream.normal3(EDGE_JITTER);
+        if points.iter().all(|other| (at - other).norm() >= cell.apart) {
+            points.push(at);
+        }
+    }
+    points
+}
+
+/// The indices 0..n in an order that tells nothing.
+pub(super) fn shuffled(n: usize, stream: &mut Stream) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..n).collect();
+    for k in (1..n).rev() {
+        order.swap(k, stream.below(k + 1));
+    }
+    order
+}
+
+pub(super) fn draw(source: &Source) -> Drawn {
+    let cell = Cell::of(source);
+    let model = model(&cell, &mut source.stream(Part::Model));
+    let pose = ahead(&mut source.stream(Part::Pose), cell.distance);
+    let placed: Vec<Vector3<f64>> = model.iter().map(|at| (pose * Point::from(*at)).coords).collect();
+    let mut seen = shuffled(cell.n, &mut source.stream(Part::Visible));
+    let hidden = seen.split_off(if source.absent() { 0 } else { cell.visible });
+    let noise = noise(&cell);
+    let mut stream = source.stream(Part::Noise);
+    let measured: Vec<(usize, Vector3<f64>)> =
+        seen.iter().map(|&i| (i, placed[i] + stream.normal3(1.0).component_mul(&noise))).collect();
+    let prior = cell.shell.map(|shell| {
+        let seen: Vec<_> = measured.iter().map(|&(i, at)| (model[i], at)).collect();
+        rough(&mut source.stream(Part::Prior), &pose, &model, &seen, shell, 0.6)
+    });
+
+    let mut stream = source.stream(Part::Clutter);
+    let scene = Scene { camera_from_object: &pose, half: cell.half.into(), margin: cell.margin, placed: &placed };
+    let predicted: Option<Vec<Vector3<f64>>> = prior
+        .as_ref()
+        .filter(|_| cell.dense)
+        .map(|(rough, _)| model.iter().map(|at| (*rough * Point::from(*at)).coords).collect());
+    let mut points: Vec<Vector3<f64>> = measured.iter().map(|(_, at)| *at).collect();
+    while points.len() < cell.m {
+        let at = match (&predicted, cell.shell) {
+            (Some(predicted), Some(half)) => in_shells(&mut stream, predicted, half),
+            _ => scene.clutter(&mut stream),
+        };
+        if hidden.iter().all(|&i| (placed[i] - at).norm() >= cell.clear) {
+            points.push(at);
+        }
+    }
+
+    let order = shuffled(cell.m, &mut source.stream(Part::Order));
+    let mut problem = DrawnProblem::new(source, &model, cell.sigma);
+    problem.cloud = order.iter().map(|&k| micrometres(&points[k])).collect();
+    problem.prior = prior.map(|(_, prior)| prior);
+    problem.sigma_xyz = (cell.depth > 1).then(|| vec![[round(noise.x), round(noise.y), round(noise.z)]; cell.m]);
+    let pairs = order.iter().enumerate().filter_map(|(j, &k)| Some([*seen.get(k)?, j])).collect();
+    let truth = DrawnTruth::new(&problem, &pose, pairs, cell.parameters(source, seen.len()));
+    Drawn { problem, truth }
+}
+
+/// Standard deviations along the camera's axes (m), their root mean square the cell's σ.
+fn noise(cell: &Cell) -> Vector3<f64> {
+    let depth = f64::from(cell.depth);
+    let across = cell.sigma * (3.0 / (2.0 + depth * depth)).sqrt();
+    Vector3::new(across, across, across * depth)
+}

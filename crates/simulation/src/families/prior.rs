@@ -1,0 +1,63 @@
+//! Poses and rough poses.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use seafix_geometry::{Camera, Object, Point, Transform};
+
+use super::DrawnPrior;
+use crate::stream::Stream;
+
+/// Rough poses that are tried before the last is kept whatever it hides.
+const MOST_TRIES: usize = 1000;
+
+/// A rotation uniform over all rotations. (Four normal numbers, normalised.)
+pub(super) fn rotation(stream: &mut Stream) -> UnitQuaternion<f64> {
+    let [w, i, j, k] = std::array::from_fn(|_| stream.normal());
+    UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k))
+}
+
+/// A direction uniform over the sphere.
+pub(super) fn direction(stream: &mut Stream) -> Vector3<f64> {
+    stream.normal3(1.0).normalize()
+}
+
+/// Uniform in the cube of this half-size.
+pub(super) fn cube(stream: &mut Stream, half: f64) -> Vector3<f64> {
+    let [x, y, z] = std::array::from_fn(|_| stream.between(-half, half));
+    Vector3::new(x, y, z)
+}
+
+/// An object at this distance ahead, turned anyhow, off the axis by at most half a metre each way.
+pub(super) fn ahead(stream: &mut Stream, distance: f64) -> Transform<Camera, Object> {
+    let rotation = rotation(stream);
+    let off = cube(stream, 0.5);
+    Transform::new(rotation, Vector3::new(off.x, off.y, distance))
+}
+
+/// A rough pose such that every point that was measured (`seen`: object frame, camera frame) lies in
+/// its shell: turned about the model's centre by up to 0.6 s over its radius, moved by up to `shift`·s
+/// along each camera axis, s the shell's half-size.
+pub(super) fn rough(
+    stream: &mut Stream,
+    truth: &Transform<Camera, Object>,
+    model: &[Vector3<f64>],
+    seen: &[(Vector3<f64>, Vector3<f64>)],
+    shell: f64,
+    shift: f64,
+) -> (Transform<Camera, Object>, DrawnPrior) {
+    let centre = model.iter().sum::<Vector3<f64>>() / model.len() as f64;
+    let radius = model.iter().map(|at| (at - centre).norm()).fold(0.0, f64::max);
+    let mut tries = 0;
+    loop {
+        let turn = direction(stream) * stream.between(0.0, 0.6 * shell / radius);
+        let turned = UnitQuaternion::from_scaled_axis(turn) * truth.rotation();
+        let moved = (*truth * Point::from(centre)).coords + cube(stream, shift * shell);
+        let rough = Transform::new(turned, moved - turned * centre);
+        tries += 1;
+        let inside = |(at, measured): &(Vector3<f64>, Vector3<f64>)| {
+            ((rough * Point::from(*at)).coords - measured).amax() <= shell - 1e-6
+        };
+        if tries == MOST_TRIES || seen.iter().all(inside) {
+            return (rough, DrawnPrior { t_cam_obj: rough.rows(), shell_half_m: shell });
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Family d: putative correspondences, most of them wrong.
+
+use nalgebra::Vector3;
+use seafix_geometry::{Point, Transform};
+
+use super::{
+    Drawn, DrawnParameters, DrawnProblem, DrawnTruth, Part, Source,
+    boxes::shuffled,
+    prior::{cube, direction, rotation},
+    problem::micrometres,
+};
+
+/// Pairs, and of these wrong ones (%).
+const CELLS: [(usize, usize); 13] = [
+    (100, 50),
+    (100, 80),
+    (100, 90),
+    (100, 95),
+    (1000, 50),
+    (1000, 80),
+    (1000, 90),
+    (1000, 95),
+    (1000, 99),
+    (5000, 95),
+    (5000, 99),
+    (10_000, 95),
+    (10_000, 99),
+];
+/// Problems of a cell before the next one's turn.
+const A_CELL: usize = 4;
+const SIGMA: f64 = 0.01;
+
+pub(super) fn draw(source: &Source) -> Drawn {
+    let k = usize::try_from(source.number % 1_000_000).expect("it is below a million");
+    let (n, wrong) = CELLS[k / A_CELL % CELLS.len()];
+    let radius = [5.0, 1.0][k % 2];
+    let mut stream = source.stream(Part::Model);
+    let model: Vec<Vector3<f64>> = (0..n).map(|_| cube(&mut stream, 0.5)).collect();
+    let mut stream = source.stream(Part::Pose);
+    let pose = Transform::new(rotation(&mut stream), cube(&mut stream, 1.0));
+    let mut order = shuffled(n, &mut source.stream(Part::Visible));
+    let outliers = if source.absent() { order.split_off(0) } else { order.split_off(n - n * wrong / 100) };
+
+    let mut stream = source.stream(Part::Noise);
+    let mut cloud: Vec<Vector3<f64>> =
+        model.iter().map(|at| (pose * Point::from(*at)).coords + stream.normal3(SIGMA)).collect();
+    let mut stream = source.stream(Part::Clutter);
+    for &i in &outliers {
+        cloud[i] = pose.translation() + direction(&mut stream) * (radius * libm::cbrt(stream.unit()));
+    }
+    let mut problem = DrawnProblem::new(source, &model, SIGMA);
+    problem.cloud = cloud.iter().map(micrometres).collect();
+    problem.putative = Some((0..n).map(|i| [i, i]).collect());
+    let parameters = DrawnParameters {
+        pairs: Some(n),
+        outliers: Some(wrong),
+        radius: Some(radius),
+        absent: source.absent().then_some(true),
+        ..DrawnParameters::default()
+    };
+    let truth = DrawnTruth::new(&problem, &pose, order.iter().map(|&i| [i, i]).collect(), parameters);
+    Drawn { problem, truth }
+}

@@ -1,0 +1,138 @@
+use std::path::Path;
+
+use nalgebra::{Matrix4, Vector3};
+use seafix_geometry::{Camera, Object, Point, Transform};
+use seafix_referencing::problem_file::CoherenceProblem;
+
+use super::*;
+
+/// Numbers that show every cell of the smaller sizes.
+fn numbers(family: Family) -> Vec<u64> {
+    match family {
+        Family::A => (0..28).chain(63..91).collect(),
+        Family::D => (0..36).step_by(3).collect(),
+        _ => (0..18).collect(),
+    }
+}
+
+fn all(presence: Presence) -> impl Iterator<Item = Drawn> {
+    Family::ALL
+        .into_iter()
+        .flat_map(move |family| numbers(family).into_iter().map(move |k| Drawn::new(family, 5, k, presence)))
+}
+
+fn motion(rows: &[[f64; 4]; 4]) -> Transform<Camera, Object> {
+    Transform::from_matrix(&Matrix4::from_fn(|i, k| rows[i][k])).unwrap()
+}
+
+fn placed(drawn: &Drawn, by: &[[f64; 4]; 4]) -> Vec<Vector3<f64>> {
+    let pose = motion(by);
+    drawn.problem.model.iter().map(|at| (pose * Point::from(*at)).coords).collect()
+}
+
+#[test]
+fn the_file_holds_the_problem() {
+    for drawn in all(Presence::Present).step_by(7).chain(all(Presence::Absent).step_by(11)) {
+        let text = serde_json::to_string(&drawn.problem).unwrap();
+        let mut read = CoherenceProblem::parse(&text, Path::new("drawn.json")).unwrap();
+        let mut given = drawn.problem.problem();
+        // The reader may miss the last bit of seventeen digits.
+        match (read.prior.take(), given.prior.take()) {
+            (Some(read), Some(given)) => {
+                assert_eq!(read.bound, given.bound);
+                assert!(read.object_from_camera.error_to(&given.object_from_camera).amax() < 1e-12);
+            }
+            (read, given) => assert!(read.is_none() && given.is_none()),
+        }
+        assert!(read == given, "{} is read as another problem", drawn.problem.id);
+    }
+}
+
+#[test]
+fn a_problem_is_a_function_of_seed_family_and_number() {
+    for family in Family::ALL {
+        let drawn = |seed, number| Drawn::new(family, seed, number, Presence::Present);
+        assert_eq!(drawn(1, 2), drawn(1, 2));
+        assert_ne!(drawn(1, 2).problem.cloud, drawn(2, 2).problem.cloud);
+        assert_ne!(drawn(1, 2).problem.cloud, drawn(1, 3).problem.cloud);
+    }
+}
+
+#[test]
+fn true_pairs_are_where_the_pose_places_them_within_the_noise() {
+    let (mut squares, mut terms) = (0.0, 0.0);
+    for drawn in all(Presence::Present) {
+        let at = placed(&drawn, &drawn.truth.t_cam_obj);
+        let problem = &drawn.problem;
+        for &[i, j] in &drawn.truth.pairs {
+            let sigma = problem.sigma_xyz.as_ref().map_or([problem.sigma; 3], |rows| rows[j]);
+            let off: Vector3<f64> = (Vector3::from(problem.cloud[j]) - at[i]).component_div(&Vector3::from(sigma));
+            assert!(off.amax() < 5.5, "{}: {off}", problem.id);
+            squares += off.norm_squared();
+            terms += 3.0;
+        }
+        assert_eq!(drawn.truth.pose_defined, drawn.truth.pairs.len() >= 3, "{}", problem.id);
+        assert!(drawn.truth.max_coherent_true.is_none_or(|most| most <= drawn.truth.pairs.len()));
+    }
+    let ratio: f64 = squares / terms;
+    assert!((ratio - 1.0).abs() < 0.03, "noise of {ratio} times the stated variance in {terms} terms");
+}
+
+#[test]
+fn visible_points_lie_in_their_shells() {
+    let mut nearest_edge = 0f64;
+    for drawn in all(Presence::Present) {
+        let Some(prior) = &drawn.problem.prior else { continue };
+        let at = placed(&drawn, &prior.t_cam_obj);
+        for &[i, j] in &drawn.truth.pairs {
+            let off = (Vector3::from(drawn.problem.cloud[j]) - at[i]).amax() / prior.shell_half_m;
+            assert!(off <= 1.0, "{}: {off}", drawn.problem.id);
+            nearest_edge = nearest_edge.max(off);
+        }
+    }
+    assert!(nearest_edge > 0.9, "the shells are never used: {nearest_edge}");
+}
+
+#[test]
+fn dense_clutter_lies_in_shells_and_other_clutter_keeps_off_hidden_points() {
+    for drawn in all(Presence::Present) {
+        let (problem, truth) = (&drawn.problem, &drawn.truth);
+        let true_points: Vec<usize> = truth.pairs.iter().map(|pair| pair[1]).collect();
+        let clutter = || {
+            let clutter = problem.cloud.iter().enumerate().filter(|(j, _)| !true_points.contains(j));
+            clutter.map(|(_, at)| Vector3::from(*at))
+        };
+        if problem.family == "g" || truth.params.dense == Some(true) {
+            let prior = problem.prior.as_ref().unwrap();
+            let centres = placed(&drawn, &prior.t_cam_obj);
+            let inside = |at: Vector3<f64>| centres.iter().any(|c| (at - c).amax() <= prior.shell_half_m + 1e-6);
+            assert!(clutter().all(inside), "{}", problem.id);
+        }
+        let clear = match problem.family {
+            "b" => 0.15,
+            "f" => 0.18,
+            _ => continue,
+        };
+        let at = placed(&drawn, &truth.t_cam_obj);
+        let hidden: Vec<_> = (0..at.len()).filter(|i| truth.pairs.iter().all(|pair| pair[0] != *i)).collect();
+        assert!(clutter().all(|c| hidden.iter().all(|&i| (c - at[i]).norm() >= clear - 1e-5)), "{}", problem.id);
+    }
+}
+
+#[test]
+fn an_absent_object_leaves_model_prior_and_size_as_they_are() {
+    for (there, gone) in all(Presence::Present).zip(all(Presence::Absent)) {
+        assert!(gone.truth.pairs.is_empty() && !gone.truth.pose_defined && gone.truth.params.absent == Some(true));
+        assert_eq!(gone.problem.model, there.problem.model);
+        assert_eq!(gone.problem.prior.is_some(), there.problem.prior.is_some());
+        assert_eq!(gone.truth.t_cam_obj, there.truth.t_cam_obj);
+        let lost = if there.problem.family == "e" { there.truth.pairs.len() } else { 0 };
+        assert_eq!(gone.problem.cloud.len() + lost, there.problem.cloud.len(), "{}", there.problem.id);
+    }
+}
+
+#[test]
+fn families_are_known_by_their_letters() {
+    assert!(Family::ALL.into_iter().all(|family| family.name().parse() == Ok(family)));
+    assert_eq!("h".parse::<Family>().unwrap_err(), "no family is called `h`; there are a, b, c, d, e, f and g");
+}

@@ -1,0 +1,153 @@
+//! The truth of a problem, and what the best possible method could know.
+
+use seafix_geometry::{Camera, Object, Transform};
+use seafix_referencing::{Correspondence, Kabsch, Observations, Solver, problem_file::CoherenceProblem, rms_apart};
+use serde::Serialize;
+
+use super::DrawnProblem;
+
+/// From this many true pairs on, the largest coherent set among them is not computed.
+const MANY_PAIRS: usize = 100;
+
+/// The truth of a problem, for its judge alone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DrawnTruth {
+    /// Family and number.
+    pub id: String,
+    /// camera_from_object; of an absent object, where the clutter about it stands.
+    #[serde(rename = "T_cam_obj")]
+    pub t_cam_obj: [[f64; 4]; 4],
+    /// The true pairs (model point, cloud point), by model point.
+    pub pairs: Vec<[usize; 2]>,
+    /// Whether they determine a pose.
+    pub pose_defined: bool,
+    /// Their least-squares pose.
+    #[serde(rename = "ideal_T_cam_obj")]
+    pub ideal_t_cam_obj: Option<[[f64; 4]; 4]>,
+    /// Root mean square over all model points of where it misplaces them (m).
+    pub ideal_tre_rms: Option<f64>,
+    /// The largest coherent set among the true pairs; `None` of 100 pairs or more.
+    pub max_coherent_true: Option<usize>,
+    /// What the family fixed or drew.
+    pub params: DrawnParameters,
+}
+
+/// What a family fixed or drew; a family has some of them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct DrawnParameters {
+    /// Model points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub n: Option<usize>,
+    /// Cloud points.
+    #[serde(rename = "M", skip_serializing_if = "Option::is_none")]
+    pub m: Option<usize>,
+    /// Model points that were measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub visible: Option<usize>,
+    /// Half-size of the shells (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shell: Option<f64>,
+    /// Whether all clutter lies in shells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dense: Option<bool>,
+    /// Noise (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+    /// How much noisier depth is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aniso: Option<u32>,
+    /// Points that the best wrong placement of the lattice matches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best_wrong_symmetry: Option<usize>,
+    /// Whether a prior is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<bool>,
+    /// Putative pairs.
+    #[serde(rename = "N", skip_serializing_if = "Option::is_none")]
+    pub pairs: Option<usize>,
+    /// Of these, wrong ones (%).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outliers: Option<usize>,
+    /// Radius of the ball they lie in (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+    /// Given where the object is absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub absent: Option<bool>,
+}
+
+impl DrawnTruth {
+    pub(super) fn new(
+        drawn: &DrawnProblem,
+        camera_from_object: &Transform<Camera, Object>,
+        mut pairs: Vec<[usize; 2]>,
+        params: DrawnParameters,
+    ) -> Self {
+        pairs.sort_unstable();
+        let problem = drawn.problem();
+        let correspondences: Vec<Correspondence> =
+            pairs.iter().map(|&[model, cloud]| Correspondence { model, cloud }).collect();
+        let data = Observations::of(&correspondences, &problem.model, &problem.cloud, None);
+        let ideal = Kabsch::default().solve(&data).ok();
+        let off = |ideal: &Transform<Object, Camera>| rms_apart(&problem.model, ideal, &camera_from_object.inverse());
+        Self {
+            id: drawn.id.clone(),
+            t_cam_obj: camera_from_object.rows(),
+            pose_defined: ideal.is_some(),
+            ideal_t_cam_obj: ideal.map(|pose| pose.inverse().rows()),
+            ideal_tre_rms: ideal.as_ref().map(off),
+            max_coherent_true: (pairs.len() < MANY_PAIRS).then(|| most_coherent(&problem, &correspondences)),
+            pairs,
+            params,
+        }
+    }
+}
+
+/// The size of the largest coherent set among one-to-one pairs nearly all of which agree.
+fn most_coherent(problem: &CoherenceProblem, pairs: &[Correspondence]) -> usize {
+    let agree = |a: Correspondence, b: Correspondence| {
+        let model = problem.model[a.model].at.distance(&problem.model[b.model].at);
+        let cloud = problem.cloud[a.cloud].position.at.distance(&problem.cloud[b.cloud].position.at);
+        (model - cloud).abs() <= problem.delta
+    };
+    let conflicts: Vec<Vec<usize>> = (0..pairs.len())
+        .map(|i| (0..pairs.len()).filter(|&k| k != i && !agree(pairs[i], pairs[k])).collect())
+        .collect();
+    without_conflict(&conflicts, &vec![true; pairs.len()])
+}
+
+/// The most vertices of those `left` of which no two are in conflict: one without or with a single
+/// conflict is always taken, and of the others the one with most conflicts is tried both ways.
+fn without_conflict(conflicts: &[Vec<usize>], left: &[bool]) -> usize {
+    let of = |i: usize| conflicts[i].iter().filter(|&&k| left[k]).count();
+    let with = |i: usize| {
+        let mut rest = left.to_vec();
+        rest[i] = false;
+        conflicts[i].iter().for_each(|&k| rest[k] = false);
+        1 + without_conflict(conflicts, &rest)
+    };
+    let Some(worst) = (0..left.len()).filter(|&i| left[i]).max_by_key(|&i| of(i)) else { return 0 };
+    if of(worst) == 0 {
+        return left.iter().filter(|&&left| left).count();
+    }
+    if let Some(free) = (0..left.len()).find(|&i| left[i] && of(i) == 1) {
+        return with(free);
+    }
+    let mut without = left.to_vec();
+    without[worst] = false;
+    with(worst).max(without_conflict(conflicts, &without))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_of_five_conflicts_leaves_two() {
+        let ring: Vec<Vec<usize>> = (0..5).map(|i| vec![(i + 4) % 5, (i + 1) % 5]).collect();
+        assert_eq!(without_conflict(&ring, &[true; 5]), 2);
+        let star = vec![vec![1, 2, 3], vec![0], vec![0], vec![0]];
+        assert_eq!(without_conflict(&star, &[true; 4]), 3);
+        assert_eq!(without_conflict(&[vec![], vec![]], &[true; 2]), 2);
+    }
+}
