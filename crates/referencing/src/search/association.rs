@@ -1,9 +1,11 @@
 //! The association graph: candidate pairs as vertices, structural coherence as edges.
 
-use nalgebra::Vector3;
 use seafix_geometry::Point;
 
-use super::bitset::BitMatrix;
+use super::{
+    bitset::{BitMatrix, bits},
+    edges::{LANES, Sites},
+};
 use crate::{Correspondence, Problem, Tolerance};
 
 /// A clique of this graph is a set of pairs that are all coherent with each other, each model point
@@ -27,28 +29,42 @@ impl Association {
     pub(crate) fn of(problem: &Problem<'_>) -> Self {
         let vertices = vertices(problem);
         let mut adjacency = BitMatrix::zeros(vertices.len());
-        let mut tests = 0;
-        // A cheap necessary condition first, on arrays that lie side by side; the exact test decides.
-        let model: Vec<Vector3<f64>> = vertices.iter().map(|pair| problem.model[pair.model].at.coords).collect();
-        let cloud: Vec<Vector3<f64>> =
-            vertices.iter().map(|pair| problem.cloud[pair.cloud].position.at.coords).collect();
-        let reach: Vec<f64> = vertices.iter().map(|&pair| reach(problem, pair)).collect();
-        let mut near: Vec<bool> = Vec::new();
-        for a in 0..vertices.len() {
-            near.clear();
-            near.extend((a + 1..vertices.len()).map(|b| {
-                let (known, measured) = ((model[b] - model[a]).norm(), (cloud[b] - cloud[a]).norm());
-                (known - measured).abs() <= reach[a] + reach[b]
-            }));
-            tests += near.len() as u64;
-            for (step, _) in near.iter().enumerate().filter(|(_, near)| **near) {
-                let b = a + 1 + step;
-                if problem.coherent(vertices[a], vertices[b]) {
-                    adjacency.connect(a, b);
+        // A cheap necessary condition first, and one that suffices; the exact test decides between them.
+        let extent = extent(problem);
+        let mut sites = Sites::default();
+        for &pair in &vertices {
+            let (model, cloud) = (problem.model[pair.model].at.coords, problem.cloud[pair.cloud].position.at.coords);
+            let (reach, sure) = reach(problem, pair, extent);
+            sites.push(&model, &cloud, reach, sure);
+        }
+        sites.pad();
+        let twins = twins(&vertices);
+        let (mut looks, mut next_model) = (Vec::new(), 0);
+        for (a, &pair) in vertices.iter().enumerate() {
+            while next_model < vertices.len() && vertices[next_model].model == pair.model {
+                next_model += 1;
+            }
+            let first = next_model / LANES;
+            sites.look(a, first, &mut looks);
+            // One model point, one cloud point: never two of them.
+            let same = twins[a].iter().copied().filter(|&b| b >= next_model);
+            same.for_each(|b| looks[b / LANES - first].near &= !(1 << (b % LANES)));
+            if let Some(look) = looks.first_mut() {
+                look.near &= u64::MAX << (next_model % LANES);
+            }
+            let row = adjacency.row_mut(a);
+            for (word, look) in (first..).zip(&looks) {
+                let mut edges = look.near & look.sure;
+                for k in bits(0, look.near & !look.sure) {
+                    let agree = problem.coherent(pair, vertices[word * LANES + k]);
+                    edges |= u64::from(agree) << k;
                 }
+                row[word] = edges;
             }
         }
-        Self { vertices, adjacency, tests }
+        adjacency.mirror_upper();
+        let count = vertices.len() as u64;
+        Self { vertices, adjacency, tests: count * count.saturating_sub(1) / 2 }
     }
 
     /// The graph of those vertices alone that are to be kept.
@@ -64,16 +80,37 @@ impl Association {
     }
 }
 
-/// A share of a bound of Δ: that of two pairs is at most the sum of theirs, by √(x² + y²) ≤ x + y.
-fn reach(problem: &Problem<'_>, pair: Correspondence) -> f64 {
-    let bound = match problem.tolerance {
-        Tolerance::Fixed(delta) => 0.5 * delta,
+/// The largest coordinate (m).
+fn extent(problem: &Problem<'_>) -> f64 {
+    let known = problem.model.iter().map(|point| point.at.coords.amax());
+    let measured = problem.cloud.iter().map(|point| point.position.at.coords.amax());
+    known.chain(measured).fold(0.0, f64::max)
+}
+
+/// Shares of bounds of Δ: that of two pairs is at most the sum of their first, by √(x² + y²) ≤ x + y, and at least
+/// the sum of their second.
+fn reach(problem: &Problem<'_>, pair: Correspondence, extent: f64) -> (f64, f64) {
+    // Distances themselves are rounded.
+    let rounding = 1e-13 * extent;
+    match problem.tolerance {
+        Tolerance::Fixed(delta) => (0.5 * delta * (1.0 + 1e-9) + rounding, 0.5 * delta * (1.0 - 1e-9) - rounding),
         Tolerance::Sigmas(k) => {
-            let measured = problem.cloud[pair.cloud].position.covariance.trace().max(0.0).sqrt();
-            k * (measured + problem.model[pair.model].sigma)
+            // No direction has more variance than the Frobenius norm, whatever the matrix.
+            let measured = problem.cloud[pair.cloud].position.covariance.norm().sqrt();
+            (k * (measured + problem.model[pair.model].sigma) * (1.0 + 1e-9) + rounding, -1.0)
         }
-    };
-    bound * (1.0 + 1e-9) + 1e-12
+    }
+}
+
+/// For each vertex the later ones of the same cloud point.
+fn twins(vertices: &[Correspondence]) -> Vec<Vec<usize>> {
+    let mut by_cloud: Vec<usize> = (0..vertices.len()).collect();
+    by_cloud.sort_by_key(|&v| (vertices[v].cloud, v));
+    let mut twins = vec![Vec::new(); vertices.len()];
+    for same in by_cloud.chunk_by(|&a, &b| vertices[a].cloud == vertices[b].cloud) {
+        same.iter().enumerate().for_each(|(place, &v)| twins[v] = same[place + 1..].to_vec());
+    }
+    twins
 }
 
 /// The candidate pairs in the order of their coordinates, model first.

@@ -37,6 +37,10 @@ impl BitSet {
         self.words[number / WORD] &= !(1 << (number % WORD));
     }
 
+    pub(super) fn has(&self, number: usize) -> bool {
+        self.words[number / WORD] >> (number % WORD) & 1 == 1
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.words.iter().all(|&word| word == 0)
     }
@@ -63,6 +67,20 @@ impl BitSet {
         ones(&self.words)
     }
 
+    /// Its words.
+    pub(super) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// Removes every number below `from`.
+    pub(super) fn drop_below(&mut self, from: usize) {
+        let whole = (from / WORD).min(self.words.len());
+        self.words[..whole].fill(0);
+        if let Some(word) = self.words.get_mut(whole) {
+            *word &= u64::MAX << (from % WORD);
+        }
+    }
+
     /// Keeps what is also in `row`.
     pub(crate) fn intersect(&mut self, row: &[u64]) {
         self.words.iter_mut().zip(row).for_each(|(word, other)| *word &= other);
@@ -86,10 +104,25 @@ impl BitSet {
         }
         count
     }
+}
 
-    /// The numbers that are also in `row`, ascending.
-    pub(crate) fn shared<'a>(&'a self, row: &'a [u64]) -> impl Iterator<Item = usize> + 'a {
-        self.words.iter().zip(row).enumerate().flat_map(|(index, (word, other))| bits(index, word & other))
+/// For each vertex of `of` how many of `members` are its neighbours.
+pub(super) fn degrees(adjacency: &BitMatrix, members: &BitSet, of: &[usize], degrees: &mut Vec<usize>) {
+    let first = members.words.iter().position(|&word| word != 0).unwrap_or(0);
+    let last = members.words.iter().rposition(|&word| word != 0).map_or(first, |last| last + 1);
+    degrees.clear();
+    count(&adjacency.bits, adjacency.width, first, &members.words[first..last], of, degrees);
+}
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq+avx512vpopcntdq",
+    "x86_64+avx2+bmi1+bmi2+popcnt"
+))]
+fn count(bits: &[u64], width: usize, first: usize, members: &[u64], of: &[usize], degrees: &mut Vec<usize>) {
+    for &v in of {
+        let row = &bits[v * width + first..][..members.len()];
+        let shared: u64 = members.iter().zip(row).map(|(a, b)| u64::from((a & b).count_ones())).sum();
+        degrees.push(shared as usize);
     }
 }
 
@@ -99,7 +132,7 @@ fn ones(words: &[u64]) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// The positions of the ones of the word at `index`.
-fn bits(index: usize, word: u64) -> impl Iterator<Item = usize> {
+pub(super) fn bits(index: usize, word: u64) -> impl Iterator<Item = usize> {
     std::iter::successors((word != 0).then_some(word), |rest| {
         let rest = rest & (rest - 1);
         (rest != 0).then_some(rest)
@@ -107,8 +140,24 @@ fn bits(index: usize, word: u64) -> impl Iterator<Item = usize> {
     .map(move |rest| index * WORD + rest.trailing_zeros() as usize)
 }
 
+/// Transposes 64 × 64 bits: halves, quarters and so on change places across the diagonal.
+fn transpose(block: &mut [u64; WORD]) {
+    let (mut step, mut mask) = (WORD / 2, u64::MAX >> (WORD / 2));
+    while step > 0 {
+        let mut k = 0;
+        while k < WORD {
+            let swap = ((block[k] >> step) ^ block[k + step]) & mask;
+            block[k] ^= swap << step;
+            block[k + step] ^= swap;
+            k = (k + step + 1) & !step;
+        }
+        step /= 2;
+        mask ^= mask << step;
+    }
+}
+
 /// A square matrix of bits: the adjacency of a graph.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct BitMatrix {
     width: usize,
     bits: Vec<u64>,
@@ -126,6 +175,29 @@ impl BitMatrix {
         self.bits[j * self.width + i / WORD] |= 1 << (i % WORD);
     }
 
+    /// Row `i` as words, to be written.
+    pub(super) fn row_mut(&mut self, i: usize) -> &mut [u64] {
+        &mut self.bits[i * self.width..(i + 1) * self.width]
+    }
+
+    /// Sets (j, i) wherever (i, j) is set, i < j; nothing may be set below the diagonal before.
+    pub(super) fn mirror_upper(&mut self) {
+        let size = self.bits.len() / self.width.max(1);
+        for rows in 0..self.width {
+            for columns in rows..self.width {
+                let (first, count) = (rows * WORD, WORD.min(size - rows * WORD));
+                let mut block = [0; WORD];
+                (0..count).for_each(|k| block[k] = self.bits[(first + k) * self.width + columns]);
+                if block == [0; WORD] {
+                    continue;
+                }
+                transpose(&mut block);
+                let (first, count) = (columns * WORD, WORD.min(size - columns * WORD));
+                (0..count).for_each(|k| self.bits[(first + k) * self.width + rows] |= block[k]);
+            }
+        }
+    }
+
     /// Row `i` as words.
     pub(crate) fn row(&self, i: usize) -> &[u64] {
         &self.bits[i * self.width..(i + 1) * self.width]
@@ -134,11 +206,6 @@ impl BitMatrix {
     /// The columns of the ones of row `i`, ascending.
     pub(crate) fn ones(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         ones(self.row(i))
-    }
-
-    /// How many ones row `i` has.
-    pub(crate) fn degree(&self, i: usize) -> usize {
-        self.row(i).iter().map(|word| word.count_ones() as usize).sum()
     }
 }
 
@@ -156,6 +223,21 @@ mod tests {
         assert_eq!(set.next(65), None);
         assert_eq!(BitSet::full(130).len(), 130);
         assert_eq!(BitSet::full(128).len(), 128);
+    }
+
+    #[test]
+    fn the_upper_half_is_mirrored() {
+        for size in [0, 1, 63, 64, 65, 200] {
+            let (mut half, mut whole) = (BitMatrix::zeros(size), BitMatrix::zeros(size));
+            for i in 0..size {
+                for j in (i + 1..size).filter(|j| (i * 31 + j * 17) % 7 < 2) {
+                    half.row_mut(i)[j / WORD] |= 1 << (j % WORD);
+                    whole.connect(i, j);
+                }
+            }
+            half.mirror_upper();
+            assert_eq!(half.bits, whole.bits, "{size}");
+        }
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! Exact cliques of the association graph, largest first, within a budget.
 
-use std::collections::{HashMap, HashSet};
-
 use super::{
     association::Association,
-    bitset::{BitMatrix, BitSet},
+    bitset::{BitSet, degrees},
+    local::{Local, Workshop},
     orientation::Sense,
+    volumes::Volumes,
 };
 use crate::Problem;
 
@@ -28,29 +28,35 @@ pub(super) struct Cliques {
     pub(super) complete: bool,
 }
 
-/// Branch and bound over the cliques that `admits` allows.
+/// Branch and bound over the cliques that a sense admits.
 ///
-/// Each vertex in turn, from the densest part of a degeneracy order, with its later neighbours as
-/// one small graph; there greedy colouring bounds the size (Tomita and Seki, 2003; San Segundo et al.,
-/// *An exact bit-parallel algorithm for the maximum clique problem*, 2011), and before it the n-partite
-/// bound: no more members than there are different model points, nor than different cloud points.
-/// Orientation removes vertices while the clique grows; both bounds hold without it, so the answer
+/// Each vertex in turn with its later neighbours as one small graph; there greedy colouring bounds the size
+/// (Tomita and Seki, 2003; San Segundo et al., *An exact bit-parallel algorithm for the maximum clique problem*,
+/// 2011), and before it the n-partite bound: no more members than there are different model points, nor than
+/// different cloud points. Vertices stand by model point, so that the last ones, of one model point less than
+/// are asked for, begin no clique. Vertices with too few neighbours are peeled off first (k-core).
+/// Orientation removes vertices while the clique grows; all bounds hold without it, so the answer
 /// stays exact.
 pub(super) struct Search<'a> {
-    problem: &'a Problem<'a>,
     graph: &'a Association,
+    volumes: Volumes<'a>,
     /// What fours are refused.
     sense: Sense,
     /// Tests left: a vertex coloured, or four points tested for orientation.
     left: u64,
-    order: Vec<usize>,
-    core: Vec<usize>,
+    /// Neighbours of each vertex.
+    degree: Vec<usize>,
+    /// Different model points among each vertex and those after it.
+    models_from: Vec<usize>,
+    /// Vertices that can be in a clique of interest.
+    alive: BitSet,
     /// Least size that is still of interest.
     least: usize,
     /// The largest cliques so far.
     found: Vec<Vec<usize>>,
     /// With 1 the first of the largest is kept, with more all of the size of interest.
     cap: usize,
+    work: Workshop,
 }
 
 /// The end of a search before its time.
@@ -58,8 +64,28 @@ struct Stop;
 
 impl<'a> Search<'a> {
     pub(super) fn new(problem: &'a Problem<'a>, graph: &'a Association, sense: Sense, budget: u64) -> Self {
-        let (order, core) = degeneracy(graph.vertices.len(), &graph.adjacency);
-        Self { problem, graph, sense, left: budget, order, core, least: 1, found: Vec::new(), cap: 1 }
+        let count = graph.vertices.len();
+        let (all, alive) = (Vec::from_iter(0..count), BitSet::full(count));
+        let mut degree = Vec::new();
+        degrees(&graph.adjacency, &alive, &all, &mut degree);
+        let mut models_from = vec![0; count];
+        for v in (0..count).rev() {
+            let new = graph.vertices.get(v + 1).is_none_or(|next| next.model != graph.vertices[v].model);
+            models_from[v] = models_from.get(v + 1).copied().unwrap_or(0) + usize::from(new);
+        }
+        Self {
+            graph,
+            volumes: Volumes::of(problem, &graph.vertices),
+            sense,
+            left: budget,
+            degree,
+            models_from,
+            alive,
+            least: 1,
+            found: Vec::new(),
+            cap: 1,
+            work: Workshop::of(graph),
+        }
     }
 
     /// Tests not yet spent.
@@ -79,25 +105,21 @@ impl<'a> Search<'a> {
     pub(super) fn run(&mut self, least: usize, cap: usize) -> Cliques {
         (self.least, self.cap, self.found) = (least.max(1), 1, Vec::new());
         self.greedy();
-        let mut later = BitSet::empty(self.graph.vertices.len());
+        self.peel();
         let mut open = Vec::new();
         let (mut complete, mut bound) = (true, 0);
-        for position in (0..self.order.len()).rev() {
-            let vertex = self.order[position];
+        for vertex in (0..self.degree.len()).rev() {
             let tie = self.tie();
-            // Cores do not grow towards the front of the order: nothing large is left.
-            if self.core[vertex] + 1 < tie {
-                break;
+            // What this vertex and the later ones have of model points is no more than that.
+            if self.models_from[vertex] < tie || !self.alive.has(vertex) {
+                continue;
             }
-            let mut neighbours = later.clone();
-            neighbours.intersect(self.graph.adjacency.row(vertex));
-            later.insert(vertex);
-            let local = Local::of(self.graph, neighbours, tie);
+            let local = self.later_neighbours(vertex, tie);
             if local.vertices.len() + 1 >= tie {
-                open.push(position);
+                open.push(vertex);
             }
             if self.within(vertex, &local).is_err() {
-                (complete, bound) = (false, self.core[vertex] + 1);
+                (complete, bound) = (false, self.most_possible());
                 break;
             }
         }
@@ -106,6 +128,40 @@ impl<'a> Search<'a> {
         found.sort();
         let best = found.first().map_or(0, Vec::len);
         Cliques { found, all, bound: bound.min(self.partite()).max(best), complete }
+    }
+
+    /// The neighbours after a vertex, as far as a clique of `least` members with it may need them.
+    fn later_neighbours(&mut self, vertex: usize, least: usize) -> Local {
+        let mut neighbours = self.alive.clone();
+        neighbours.intersect(self.graph.adjacency.row(vertex));
+        neighbours.drop_below(vertex + 1);
+        Local::of(self.graph, neighbours, least, &mut self.work)
+    }
+
+    /// Takes vertices away that have too few neighbours left for a clique as large as the largest.
+    fn peel(&mut self) {
+        let (tie, count) = (self.tie(), self.degree.len());
+        self.alive = BitSet::full(count);
+        let mut degree = self.degree.clone();
+        let mut poor: Vec<usize> = (0..count).filter(|&v| degree[v] + 1 < tie).collect();
+        poor.iter().for_each(|&v| self.alive.remove(v));
+        while let Some(v) = poor.pop() {
+            for w in self.graph.adjacency.ones(v) {
+                degree[w] -= 1;
+                if degree[w] + 1 < tie && self.alive.has(w) {
+                    self.alive.remove(w);
+                    poor.push(w);
+                }
+            }
+        }
+    }
+
+    /// A bound on every clique, by cores: k members have k − 1 neighbours among themselves.
+    fn most_possible(&self) -> usize {
+        let mut sorted = self.degree.clone();
+        sorted.sort_unstable_by(|a, b| b.cmp(a));
+        // The most vertices of which each has one neighbour less than they are.
+        sorted.iter().enumerate().take_while(|(place, degree)| *degree >= place).count()
     }
 
     /// The size of the largest so far, or the least that is of interest.
@@ -121,14 +177,9 @@ impl<'a> Search<'a> {
         }
         (self.least, self.cap) = (self.tie(), cap);
         let first = self.found.pop().expect("there is one");
-        let mut place = vec![0; self.order.len()];
-        self.order.iter().enumerate().for_each(|(position, &vertex)| place[vertex] = position);
         let mut all = true;
-        for &position in open {
-            let vertex = self.order[position];
-            let mut neighbours = BitSet::empty(place.len());
-            self.graph.adjacency.ones(vertex).filter(|&w| place[w] > position).for_each(|w| neighbours.insert(w));
-            let local = Local::of(self.graph, neighbours, self.least);
+        for &vertex in open {
+            let local = self.later_neighbours(vertex, self.least);
             if self.within(vertex, &local).is_err() {
                 all = false;
                 break;
@@ -142,25 +193,27 @@ impl<'a> Search<'a> {
 
     /// The n-partite bound of the whole graph.
     fn partite(&self) -> usize {
-        distinct(self.graph.vertices.iter().map(|pair| pair.model))
-            .min(distinct(self.graph.vertices.iter().map(|pair| pair.cloud)))
+        let mut clouds: Vec<usize> = self.graph.vertices.iter().map(|pair| pair.cloud).collect();
+        clouds.sort_unstable();
+        clouds.dedup();
+        self.models_from.first().copied().unwrap_or(0).min(clouds.len())
     }
 
-    /// A large clique at once, so that the bounds cut from the start: from some of the densest
+    /// A large clique at once, so that the bounds cut from the start: from some of the best connected
     /// vertices, always the neighbour with most neighbours among those that remain.
     fn greedy(&mut self) {
         const STARTS: usize = 24;
-        let mut starts: Vec<usize> = self.order.clone();
-        starts.sort_by_key(|&vertex| std::cmp::Reverse((self.core[vertex], self.graph.adjacency.degree(vertex))));
+        let mut starts: Vec<usize> = (0..self.degree.len()).collect();
+        starts.sort_by_key(|&vertex| std::cmp::Reverse(self.degree[vertex]));
         // A quarter of the budget at most: the proof needs the rest.
         let reserve = self.left - self.left / 4;
         for &start in starts.iter().take(STARTS) {
-            if self.core[start] + 1 < self.least {
-                return;
-            }
-            let mut neighbours = BitSet::full(self.graph.vertices.len());
+            let mut neighbours = BitSet::full(self.degree.len());
             neighbours.intersect(self.graph.adjacency.row(start));
-            let local = Local::of(self.graph, neighbours, self.least);
+            let local = Local::of(self.graph, neighbours, self.least, &mut self.work);
+            if local.vertices.len() + 1 < self.least {
+                continue;
+            }
             let mut clique = vec![start];
             let mut candidates = BitSet::full(local.vertices.len());
             while let Some(next) = local.best_connected(&candidates) {
@@ -185,13 +238,13 @@ impl<'a> Search<'a> {
             return false;
         }
         let members = decisive_members(clique);
-        let vertices = &self.graph.vertices;
         let mut tests = 0;
         let refused = members.iter().enumerate().any(|(i, &a)| {
             members[..i].iter().enumerate().any(|(k, &b)| {
+                let plane = self.volumes.plane([a, b, vertex]);
                 members[..k].iter().any(|&c| {
                     tests += 1;
-                    self.sense.refuses(self.problem, [vertices[a], vertices[b], vertices[c], vertices[vertex]])
+                    self.volumes.refuses(self.sense, &plane, c)
                 })
             })
         });
@@ -254,21 +307,18 @@ impl<'a> Search<'a> {
         if self.sense == Sense::Any || clique.len() < 2 {
             return Ok(());
         }
-        let vertices = &self.graph.vertices;
         let members = decisive_members(clique);
+        let mut planes = Vec::with_capacity(members.len() * members.len() / 2);
+        for (i, &a) in members.iter().enumerate() {
+            planes.extend(members[..i].iter().map(|&b| self.volumes.plane([a, b, added])));
+        }
         for candidate in candidates.iter().collect::<Vec<_>>() {
-            let (c, d) = (vertices[added], vertices[local.vertices[candidate]]);
-            let mut tests = 0;
-            let refused = members.iter().enumerate().any(|(i, &a)| {
-                members[..i].iter().any(|&b| {
-                    tests += 1;
-                    self.sense.refuses(self.problem, [vertices[a], vertices[b], c, d])
-                })
-            });
-            if refused {
+            let fourth = local.vertices[candidate];
+            let first = planes.iter().position(|plane| self.volumes.refuses(self.sense, plane, fourth));
+            if first.is_some() {
                 candidates.remove(candidate);
             }
-            self.spend(tests)?;
+            self.spend(first.map_or(planes.len(), |place| place + 1) as u64)?;
         }
         Ok(())
     }
@@ -279,130 +329,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The neighbours of one vertex as a graph of their own.
-struct Local {
-    /// Their numbers in the whole graph.
-    vertices: Vec<usize>,
-    adjacency: BitMatrix,
-    /// Their model points and cloud points, numbered from 0.
-    models: Vec<usize>,
-    clouds: Vec<usize>,
-}
-
-impl Local {
-    /// The neighbours that can be in a clique of `least` members with their centre: each needs
-    /// `least − 2` of the others as neighbours. Ordered by degree, so that colouring begins with the
-    /// well-connected.
-    fn of(graph: &Association, mut members: BitSet, least: usize) -> Self {
-        let mut vertices: Vec<(usize, usize)> = Vec::new();
-        loop {
-            vertices.clear();
-            vertices.extend(members.iter().map(|v| (members.common(graph.adjacency.row(v)), v)));
-            let poor = vertices.iter().filter(|(degree, _)| degree + 2 < least);
-            let poor: Vec<usize> = poor.map(|&(_, v)| v).collect();
-            poor.iter().for_each(|&v| members.remove(v));
-            if poor.is_empty() {
-                break;
-            }
-        }
-        vertices.sort_by_key(|&(degree, v)| (std::cmp::Reverse(degree), v));
-        let vertices: Vec<usize> = vertices.into_iter().map(|(_, v)| v).collect();
-        let place: HashMap<usize, usize> = vertices.iter().enumerate().map(|(i, &v)| (v, i)).collect();
-        let mut adjacency = BitMatrix::zeros(vertices.len());
-        for (i, &v) in vertices.iter().enumerate() {
-            members.shared(graph.adjacency.row(v)).filter_map(|w| place.get(&w)).for_each(|&k| adjacency.connect(i, k));
-        }
-        let models = numbered(vertices.iter().map(|&v| graph.vertices[v].model));
-        let clouds = numbered(vertices.iter().map(|&v| graph.vertices[v].cloud));
-        Self { vertices, adjacency, models, clouds }
-    }
-
-    /// The candidate with most neighbours among the candidates; of equals the first of the whole graph.
-    fn best_connected(&self, candidates: &BitSet) -> Option<usize> {
-        let worth = |v: usize| (candidates.common(self.adjacency.row(v)), std::cmp::Reverse(self.vertices[v]));
-        candidates.iter().max_by_key(|&v| worth(v))
-    }
-
-    /// The n-partite bound: different model points and different cloud points among the candidates.
-    fn partite(&self, candidates: &BitSet) -> usize {
-        let count = self.vertices.len();
-        let (mut models, mut clouds) = (BitSet::empty(count), BitSet::empty(count));
-        for v in candidates.iter() {
-            models.insert(self.models[v]);
-            clouds.insert(self.clouds[v]);
-        }
-        models.len().min(clouds.len())
-    }
-
-    /// Greedy colouring: vertices with their colours from `least` on, in ascending order of colour.
-    /// A clique among the vertices up to one of them has at most its colour's number of members.
-    fn colour(&self, candidates: &BitSet, least: usize) -> Vec<(usize, usize)> {
-        let mut coloured = Vec::new();
-        let mut rest = candidates.clone();
-        let mut colour = 0;
-        while !rest.is_empty() {
-            colour += 1;
-            let mut free = rest.clone();
-            let mut from = 0;
-            while let Some(vertex) = free.next(from) {
-                free.subtract(self.adjacency.row(vertex), vertex);
-                rest.remove(vertex);
-                from = vertex + 1;
-                if colour >= least {
-                    coloured.push((vertex, colour));
-                }
-            }
-        }
-        coloured
-    }
-}
-
 /// The members that a further point is tested against.
 fn decisive_members(clique: &[usize]) -> &[usize] {
     if clique.len() < MOST_ORIENTED { clique } else { &clique[..FEW_ORIENTED] }
-}
-
-/// Numbers from 0 in the place of arbitrary ones.
-fn numbered(values: impl Iterator<Item = usize>) -> Vec<usize> {
-    let mut names = HashMap::new();
-    values
-        .map(|value| {
-            let next = names.len();
-            *names.entry(value).or_insert(next)
-        })
-        .collect()
-}
-
-fn distinct(values: impl Iterator<Item = usize>) -> usize {
-    values.collect::<HashSet<_>>().len()
-}
-
-/// A degeneracy order (always the vertex of least remaining degree next; of equals the first) and
-/// the core number of each vertex. (Matula and Beck, *Smallest-last ordering*, 1983.)
-fn degeneracy(count: usize, adjacency: &BitMatrix) -> (Vec<usize>, Vec<usize>) {
-    let mut degree: Vec<usize> = (0..count).map(|v| adjacency.degree(v)).collect();
-    // Vertices sorted by degree, where each stands, and where each degree begins (Batagelj and Zaveršnik, 2003).
-    let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by_key(|&v| degree[v]);
-    let mut place = vec![0; count];
-    order.iter().enumerate().for_each(|(i, &v)| place[v] = i);
-    let most = degree.iter().copied().max().unwrap_or(0);
-    let mut start: Vec<usize> = (0..=most + 1).map(|d| order.partition_point(|&v| degree[v] < d)).collect();
-    for i in 0..count {
-        let vertex = order[i];
-        for neighbour in adjacency.ones(vertex) {
-            let d = degree[neighbour];
-            if d > degree[vertex] {
-                // To the front of its degree's range, which then begins one later.
-                let front = start[d].max(i + 1);
-                let other = order[front];
-                order.swap(front, place[neighbour]);
-                place[other] = place[neighbour];
-                place[neighbour] = front;
-                start[d] = front + 1;
-                degree[neighbour] -= 1;
-            }
-        }
-    }
-    (order, degree)
 }

@@ -9,9 +9,12 @@ mod alike;
 mod association;
 mod bitset;
 mod clique;
+mod edges;
+mod local;
 mod maximum_clique;
 mod orientation;
 mod structural_coherence;
+mod volumes;
 
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::volumes::Volumes;
 use crate::{Correspondence, Problem};
 
 /// Standard deviations by which a model volume must exceed the noise of the measured one to decide.
@@ -126,15 +127,17 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
         let all = choose(pairs.len(), 4) <= most;
         complete = complete && all;
         let core = if all { (0..pairs.len()).collect() } else { core(problem, &pairs, most) };
+        let volumes = Volumes::of(problem, &pairs);
         let mut opposed: Vec<[u32; 4]> = Vec::new();
         'fours: for (place, &d) in core.iter().enumerate() {
             for (k, &c) in core[..place].iter().enumerate() {
                 for (j, &b) in core[..k].iter().enumerate() {
                     let others = if all { &core[..j] } else { &[] };
                     let rest = if all { 0..0 } else { 0..pairs.len() };
+                    let plane = volumes.plane([b, c, d]);
                     for a in others.iter().copied().chain(rest).filter(|a| ![b, c, d].contains(a)) {
                         tests += 1;
-                        if mirrored(problem, [a, b, c, d].map(|i| pairs[i])) {
+                        if volumes.refuses(Sense::Proper, &plane, a) {
                             opposed.push([a, b, c, d].map(|i| i as u32));
                             if opposed.len() >= MOST_LISTED {
                                 break 'fours;

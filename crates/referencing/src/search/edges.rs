@@ -1,0 +1,124 @@
+//! Which pairs of vertices may be coherent, sixty-four at a time.
+
+use nalgebra::Vector3;
+
+/// Vertices that are tested at once: the bits of a word.
+pub(super) const LANES: usize = 64;
+
+/// Model place, cloud place and reach of every vertex, coordinate by coordinate, filled up to whole words with
+/// places that no distance agrees with.
+#[derive(Debug, Default)]
+pub(super) struct Sites {
+    /// Model x, y, z and cloud x, y, z.
+    at: [Vec<f64>; 6],
+    /// How far a vertex may stretch a distance at most (m).
+    reach: Vec<f64>,
+    /// How far it may stretch one and be coherent in any case (m); below zero where that cannot be said.
+    sure: Vec<f64>,
+}
+
+/// What one look at 64 pairs says, a bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Look {
+    /// The distances may agree.
+    pub(super) near: u64,
+    /// They do.
+    pub(super) sure: u64,
+}
+
+impl Sites {
+    /// One more vertex. Distances of two vertices agree only if they differ by no more than the sum of their
+    /// `reach`, and if by no more than the sum of their `sure`, they do.
+    pub(super) fn push(&mut self, model: &Vector3<f64>, cloud: &Vector3<f64>, reach: f64, sure: f64) {
+        for (column, &x) in self.at.iter_mut().zip(model.iter().chain(cloud.iter())) {
+            column.push(x);
+        }
+        self.reach.push(reach);
+        self.sure.push(sure);
+    }
+
+    /// Fills the last word.
+    pub(super) fn pad(&mut self) {
+        let whole = self.reach.len().next_multiple_of(LANES);
+        self.at.iter_mut().for_each(|column| column.resize(whole, f64::NAN));
+        self.reach.resize(whole, f64::NAN);
+        self.sure.resize(whole, f64::NAN);
+    }
+
+    /// Vertex `a` with the vertices of word `from` and all later words.
+    pub(super) fn look(&self, a: usize, from: usize, looks: &mut Vec<Look>) {
+        look(&self.at.each_ref().map(Vec::as_slice), &self.reach, &self.sure, a, from, looks);
+    }
+}
+
+/// With A and B the squared distances in model and cloud, |√A − √B| ≤ r ⇔ A + B ≤ r² or
+/// (A − B)² ≤ r² (2 (A + B) − r²): no root is drawn.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn look(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, looks: &mut Vec<Look>) {
+    let [mx, my, mz, cx, cy, cz] = at.map(|column| column[from * LANES..].as_chunks::<LANES>().0);
+    let (reach_of, sure_of) =
+        (reach[from * LANES..].as_chunks::<LANES>().0, sure[from * LANES..].as_chunks::<LANES>().0);
+    let here = at.map(|column| column[a]);
+    let (my_reach, my_sure) = (reach[a], sure[a]);
+    looks.clear();
+    for word in 0..mx.len() {
+        let (mx, my, mz, cx, cy, cz) = (&mx[word], &my[word], &mz[word], &cx[word], &cy[word], &cz[word]);
+        let (reach, sure) = (&reach_of[word], &sure_of[word]);
+        let (mut near, mut certain) = ([0u8; LANES], [0u8; LANES]);
+        for k in 0..LANES {
+            let (x, y, z) = (mx[k] - here[0], my[k] - here[1], mz[k] - here[2]);
+            let known = x * x + y * y + z * z;
+            let (x, y, z) = (cx[k] - here[3], cy[k] - here[4], cz[k] - here[5]);
+            let measured = x * x + y * y + z * z;
+            let (sum, difference) = (known + measured, known - measured);
+            let (twice, square) = (2.0 * sum, difference * difference);
+            let r = my_reach + reach[k];
+            let r2 = r * r;
+            near[k] = u8::from((sum <= r2) | (square <= r2 * (twice - r2)));
+            let s = my_sure + sure[k];
+            let s2 = s * s;
+            certain[k] = u8::from((s > 0.0) & ((sum <= s2) | (square <= s2 * (twice - s2))));
+        }
+        looks.push(Look { near: packed(&near), sure: packed(&certain) });
+    }
+}
+
+/// The bytes, each 0 or 1, as bits.
+#[inline(always)]
+fn packed(bytes: &[u8; LANES]) -> u64 {
+    // Byte i of eight is moved to bit 56 + i by the one of its factor's bits that fits; nothing else lands there.
+    const GATHER: u64 = 0x0102_0408_1020_4080;
+    let mut word = 0;
+    for (eight, bytes) in bytes.as_chunks::<8>().0.iter().enumerate() {
+        word |= (u64::from_le_bytes(*bytes).wrapping_mul(GATHER) >> 56) << (8 * eight);
+    }
+    word
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_become_bits_in_their_order() {
+        for k in 0..LANES {
+            let mut bytes = [0; LANES];
+            bytes[k] = 1;
+            assert_eq!(packed(&bytes), 1 << k);
+        }
+        assert_eq!(packed(&[1; LANES]), u64::MAX);
+    }
+
+    #[test]
+    fn distances_within_reach_are_near_and_surely_within_are_sure() {
+        // On a line: model at 0, 10, 10, 10, cloud at 0, 10.5, 11.5 and nowhere; reach 0.5, sure 0.3 each.
+        let mut sites = Sites::default();
+        for (known, measured) in [(0.0, 0.0), (10.0, 10.5), (10.0, 10.9), (10.0, 11.5), (10.0, f64::NAN)] {
+            sites.push(&Vector3::new(known, 0.0, 0.0), &Vector3::new(0.0, measured, 0.0), 0.5, 0.3);
+        }
+        sites.pad();
+        let mut looks = Vec::new();
+        sites.look(0, 0, &mut looks);
+        assert_eq!(looks, [Look { near: 0b00111, sure: 0b00011 }]);
+    }
+}

@@ -1,0 +1,153 @@
+//! The neighbours of one vertex as a small graph.
+
+use super::{
+    association::Association,
+    bitset::{BitMatrix, BitSet, bits, degrees},
+};
+
+/// The neighbours of one vertex as a graph of their own.
+#[derive(Debug, Default)]
+pub(super) struct Local {
+    /// Their numbers in the whole graph.
+    pub(super) vertices: Vec<usize>,
+    pub(super) adjacency: BitMatrix,
+    /// Their model points and cloud points, numbered from 0.
+    models: Vec<usize>,
+    clouds: Vec<usize>,
+}
+
+/// Memory for making such graphs.
+#[derive(Debug)]
+pub(super) struct Workshop {
+    /// The place of each vertex of the whole graph in the small one.
+    place: Vec<u32>,
+    /// The number that each model point and each cloud point has in the small graph.
+    models: Names,
+    clouds: Names,
+    degrees: Vec<usize>,
+}
+
+impl Workshop {
+    pub(super) fn of(graph: &Association) -> Self {
+        let most = |of: fn(&crate::Correspondence) -> usize| graph.vertices.iter().map(of).max().map_or(0, |m| m + 1);
+        Self {
+            place: vec![0; graph.vertices.len()],
+            models: Names::upto(most(|pair| pair.model)),
+            clouds: Names::upto(most(|pair| pair.cloud)),
+            degrees: Vec::new(),
+        }
+    }
+}
+
+impl Local {
+    /// Of `members`, neighbours of one vertex, those that can be in a clique of `least` members with it:
+    /// each needs `least − 2` of the others as neighbours. Ordered by degree, so that colouring begins with the
+    /// well-connected. Empty where they are too few.
+    pub(super) fn of(graph: &Association, mut members: BitSet, least: usize, work: &mut Workshop) -> Self {
+        let mut kept: Vec<usize> = members.iter().collect();
+        loop {
+            if kept.len() + 1 < least {
+                return Self::default();
+            }
+            degrees(&graph.adjacency, &members, &kept, &mut work.degrees);
+            let before = kept.len();
+            let mut degree = work.degrees.iter();
+            kept.retain(|&v| {
+                let stays = degree.next().is_some_and(|degree| degree + 2 >= least);
+                if !stays {
+                    members.remove(v);
+                }
+                stays
+            });
+            if kept.len() == before {
+                break;
+            }
+        }
+        let mut order: Vec<(usize, usize)> = work.degrees.iter().copied().zip(kept).collect();
+        order.sort_unstable_by_key(|&(degree, v)| (std::cmp::Reverse(degree), v));
+        let vertices: Vec<usize> = order.into_iter().map(|(_, v)| v).collect();
+        vertices.iter().enumerate().for_each(|(i, &v)| work.place[v] = i as u32);
+        let mut adjacency = BitMatrix::zeros(vertices.len());
+        for (i, &v) in vertices.iter().enumerate() {
+            let row = graph.adjacency.row(v);
+            let local = adjacency.row_mut(i);
+            for (index, (word, other)) in members.words().iter().zip(row).enumerate() {
+                for w in bits(index, word & other) {
+                    let place = work.place[w] as usize;
+                    local[place / 64] |= 1 << (place % 64);
+                }
+            }
+        }
+        let models = work.models.numbered(vertices.iter().map(|&v| graph.vertices[v].model));
+        let clouds = work.clouds.numbered(vertices.iter().map(|&v| graph.vertices[v].cloud));
+        Self { vertices, adjacency, models, clouds }
+    }
+
+    /// The candidate with most neighbours among the candidates; of equals the first of the whole graph.
+    pub(super) fn best_connected(&self, candidates: &BitSet) -> Option<usize> {
+        let worth = |v: usize| (candidates.common(self.adjacency.row(v)), std::cmp::Reverse(self.vertices[v]));
+        candidates.iter().max_by_key(|&v| worth(v))
+    }
+
+    /// The n-partite bound: different model points and different cloud points among the candidates.
+    pub(super) fn partite(&self, candidates: &BitSet) -> usize {
+        let count = self.vertices.len();
+        let (mut models, mut clouds) = (BitSet::empty(count), BitSet::empty(count));
+        for v in candidates.iter() {
+            models.insert(self.models[v]);
+            clouds.insert(self.clouds[v]);
+        }
+        models.len().min(clouds.len())
+    }
+
+    /// Greedy colouring: vertices with their colours from `least` on, in ascending order of colour.
+    /// A clique among the vertices up to one of them has at most its colour's number of members.
+    pub(super) fn colour(&self, candidates: &BitSet, least: usize) -> Vec<(usize, usize)> {
+        let mut coloured = Vec::new();
+        let mut rest = candidates.clone();
+        let mut colour = 0;
+        while !rest.is_empty() {
+            colour += 1;
+            let mut free = rest.clone();
+            let mut from = 0;
+            while let Some(vertex) = free.next(from) {
+                free.subtract(self.adjacency.row(vertex), vertex);
+                rest.remove(vertex);
+                from = vertex + 1;
+                if colour >= least {
+                    coloured.push((vertex, colour));
+                }
+            }
+        }
+        coloured
+    }
+}
+
+/// Numbers from 0 in the place of arbitrary ones.
+#[derive(Debug)]
+struct Names {
+    /// The number of each name, and in which round it was given.
+    given: Vec<(u32, u32)>,
+    round: u32,
+}
+
+impl Names {
+    fn upto(limit: usize) -> Self {
+        Self { given: vec![(0, 0); limit], round: 0 }
+    }
+
+    fn numbered(&mut self, names: impl Iterator<Item = usize>) -> Vec<usize> {
+        self.round += 1;
+        let mut next = 0;
+        names
+            .map(|name| {
+                let (number, round) = &mut self.given[name];
+                if *round != self.round {
+                    (*number, *round) = (next, self.round);
+                    next += 1;
+                }
+                *number as usize
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,58 @@
+//! Signs of many tetrahedra quickly.
+
+use nalgebra::Vector3;
+
+use super::orientation::Sense;
+use crate::{Correspondence, Problem};
+
+/// Where each vertex is in model and cloud, side by side, and the exact test behind it.
+///
+/// Three vertices span a plane in the model and one in the cloud; a fourth lies on the same side of both, or is
+/// looked at closely.
+#[derive(Debug)]
+pub(super) struct Volumes<'a> {
+    problem: &'a Problem<'a>,
+    vertices: &'a [Correspondence],
+    /// Places in model and cloud, from those of the first vertex.
+    at: Vec<[Vector3<f64>; 2]>,
+    /// A product of two volumes nearer to zero than this (m⁶) is not trusted to have the right sign.
+    doubt: f64,
+}
+
+/// Normals of the planes of three vertices in model and cloud, and the vertex they start from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
+    three: [usize; 3],
+    normals: [Vector3<f64>; 2],
+}
+
+impl<'a> Volumes<'a> {
+    pub(super) fn of(problem: &'a Problem<'a>, vertices: &'a [Correspondence]) -> Self {
+        let place =
+            |pair: &Correspondence| [problem.model[pair.model].at.coords, problem.cloud[pair.cloud].position.at.coords];
+        let origin = vertices.first().map_or([Vector3::zeros(); 2], place);
+        let at: Vec<_> = vertices.iter().map(place).map(|[m, c]| [m - origin[0], c - origin[1]]).collect();
+        let extent = |side: usize| at.iter().map(|place: &[Vector3<f64>; 2]| place[side].amax()).fold(0.0, f64::max);
+        // A volume is no greater than 42 extents cubed and rounded by 10⁻¹³ of one.
+        let doubt = 4e-12 * (extent(0) * extent(1)).powi(3);
+        Self { problem, vertices, at, doubt }
+    }
+
+    pub(super) fn plane(&self, three: [usize; 3]) -> Plane {
+        let [a, b, c] = three.map(|v| &self.at[v]);
+        Plane { three, normals: [0, 1].map(|side| (b[side] - a[side]).cross(&(c[side] - a[side]))) }
+    }
+
+    /// Whether the plane's three and `fourth` contradict the sense.
+    pub(super) fn refuses(&self, sense: Sense, plane: &Plane, fourth: usize) -> bool {
+        let (a, d) = (&self.at[plane.three[0]], &self.at[fourth]);
+        let product = plane.normals[0].dot(&(d[0] - a[0])) * plane.normals[1].dot(&(d[1] - a[1]));
+        let clear = match sense {
+            Sense::Any => true,
+            Sense::Proper => product > self.doubt,
+            Sense::Mirrored => product < -self.doubt,
+        };
+        let [a, b, c] = plane.three;
+        !clear && sense.refuses(self.problem, [a, b, c, fourth].map(|v| self.vertices[v]))
+    }
+}
