@@ -77,6 +77,14 @@ impl StereoRig {
         Ok(Self { left, right, right_from_left, essential })
     }
 
+    /// The same two cameras with their parts exchanged: the right one is the left one of the result.
+    pub fn exchanged(&self) -> Self {
+        let back = self.right_from_left.inverse();
+        let right_from_left = Transform::new(back.rotation(), back.translation());
+        let essential = self.essential.transpose();
+        Self { left: self.right, right: self.left, right_from_left, essential }
+    }
+
     /// The left camera.
     pub fn left(&self) -> &Pinhole {
         &self.left
@@ -294,6 +302,21 @@ mod tests {
         let mut seen = seen(&rig, &Point::new(0.0, 0.0, 3.0));
         seen.at = StereoPixels { left: seen.at.right, right: seen.at.left };
         assert!(matches!(rig.triangulate(&seen), Err(Untriangulable::Behind(_))));
+    }
+
+    #[test]
+    fn an_exchanged_rig_sees_the_same_from_the_other_side() {
+        let rotation = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.2, 0.05));
+        let camera = *rig(Vector3::x()).left();
+        let rig = StereoRig::new(camera, camera, Transform::new(rotation, Vector3::new(-0.2, 0.1, 0.05))).unwrap();
+        let (back, point) = (rig.exchanged(), Point::new(0.2, -0.1, 3.0));
+        let there = rig.project(&point).unwrap();
+        let seen = *rig.right_from_left() * point;
+        let again = back.project(&Point::from(seen.coords)).unwrap();
+        assert!(again.left.distance(&there.right) < 1e-10 && again.right.distance(&there.left) < 1e-10);
+        assert!((back.exchanged().essential() - rig.essential()).norm() < 1e-15);
+        let made = StereoRig::new(camera, camera, *back.right_from_left()).unwrap();
+        assert!((made.essential() - back.essential()).norm() < 1e-14);
     }
 
     #[test]

@@ -27,12 +27,15 @@ mod workspace;
 pub use align::{Refine, Warp, Weight};
 pub use cloud::Triangulator;
 pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Sift, Surf, Table, ZnccPatch};
-pub use detect::{DETECTORS, Detector, Dog, Fast, FastHessian, Harris, Keypoint, Selection, ShiTomasi, Window};
+pub use detect::{
+    DETECTORS, Detector, Dog, Fast, FastHessian, FittedCorners, Harris, Keypoint, LCorners, Selection, ShiTomasi,
+    Window, XCorners,
+};
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
 pub use locate::{Corner, CornerFit, Junction, LCorner, LOCATORS, Locator, Pair, Peak, Place, XCorner};
-pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View};
+pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View, ZnccBand};
 pub use swapped::Sides;
 pub use track::{Pyramid, Track, Tracker};
 pub use workspace::{Threads, Workspace};

@@ -1,6 +1,6 @@
 //! Whether the left and the right image have changed places.
 
-use seafix_geometry::{StereoRig, Transform};
+use seafix_geometry::StereoRig;
 
 use crate::{Descriptor, Detector, EpipolarBand, Harris, Image, Match, Matcher, Surf, View, Workspace};
 
@@ -24,15 +24,12 @@ impl Sides {
     /// epipolar lines besides. It takes as long as matching twice; a data set's first frames are enough, their
     /// counts added up.
     pub fn of(left: &View<'_>, right: &View<'_>, rig: &StereoRig, work: &mut Workspace) -> Self {
-        let back = rig.right_from_left().inverse();
-        let back = Transform::new(back.rotation(), back.translation());
-        let Ok(exchanged) = StereoRig::new(*rig.right(), *rig.left(), back) else { return Self::default() };
         let mut find = |rig: &StereoRig| {
             let mut found = Vec::new();
             EpipolarBand::default().match_into(left, right, rig, work, &mut found);
             found
         };
-        let (given, exchanged) = (find(rig), find(&exchanged));
+        let (given, exchanged) = (find(rig), find(&rig.exchanged()));
         // A left key point that found something in either order speaks for the one that looks more alike.
         let better = |found: &[Match], other: &[Match]| {
             let beaten = |m: &&Match| other.iter().any(|o| o.left == m.left && o.distance < m.distance);

@@ -18,6 +18,24 @@ fn patchwork(width: usize, height: usize) -> Image {
         .expect("as many as it has")
 }
 
+/// What a detector is shown: the patchwork or, for those that fit a model to corners, a board whose cells of 11 px
+/// have often changed colour, blurred as by a lens.
+fn shown(name: &str, width: usize, height: usize) -> Image {
+    if !["l-corner", "x-corner"].contains(&name) {
+        return patchwork(width, height);
+    }
+    let cell = |x: usize, y: usize| {
+        let h = hash(x, y);
+        let bright = (x + y).is_multiple_of(2) ^ h.is_multiple_of(4);
+        (if bright { 170 } else { 30 }) + h / 4 % 16
+    };
+    let sharp = |x: usize, y: usize| (cell(x / 11, y / 11) + hash(x, y) % 5) as f32;
+    let row = |x: usize, y: usize| sharp(x.saturating_sub(1), y) + 2.0 * sharp(x, y) + sharp(x + 1, y);
+    let value = |x: usize, y: usize| (row(x, y.saturating_sub(1)) + 2.0 * row(x, y) + row(x, y + 1)) / 16.0;
+    Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect())
+        .expect("as many as it has")
+}
+
 fn cut(image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Image {
     let pixels = (0..height).flat_map(|y| image.row(top + y)[left..left + width].iter().copied()).collect();
     Image::new(width, height, pixels).expect("as many as it has")
@@ -33,6 +51,9 @@ fn every(window: &str, law: impl Fn(&str, &dyn Detector)) {
         let has = |key: &str| listing.defaults.contains_key(key);
         if has("features") {
             choice = choice.with("features", 1_000_000);
+        }
+        if has("candidates") {
+            choice = choice.with("candidates", 1_000_000);
         }
         if has("quality") {
             choice = choice.with("quality", 0.0);
@@ -79,16 +100,17 @@ fn a_quarter_turn_of_the_image_turns_the_points() {
 }
 
 fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
-    let whole = patchwork(width, height);
-    // Of equals the first counts, and which is the first turns with the image: no two may be equal.
-    let unequal = |(i, p): (usize, &f32)| p + (hash(i, 1) % 1024) as f32 / 1024.0;
-    let unequal =
-        Image::new(width, height, whole.pixels().iter().enumerate().map(unequal).collect()).expect("as many as it has");
-    for (window, image) in [("gaussian", unequal), ("box", whole)] {
-        // (x, y) goes to (y, width − 1 − x): a quarter turn to the left.
-        let turned = (0..width * height).map(|i| image.row(i % height)[width - 1 - i / height]).collect();
-        let turned = Image::new(height, width, turned).expect("as many as it has");
+    for window in ["gaussian", "box"] {
         every(window, |name, detector| {
+            let mut image = shown(name, width, height);
+            if window == "gaussian" {
+                // Of equals the first counts, and which is the first turns with the image: no two may be equal.
+                let pixels = image.pixels_mut().iter_mut().enumerate();
+                pixels.for_each(|(i, pixel)| *pixel += (hash(i, 1) % 1024) as f32 / 1024.0);
+            }
+            // (x, y) goes to (y, width − 1 − x): a quarter turn to the left.
+            let turned = (0..width * height).map(|i| image.row(i % height)[width - 1 - i / height]).collect();
+            let turned = Image::new(height, width, turned).expect("as many as it has");
             let tolerance = match (window, name) {
                 ("box", "harris" | "shi-tomasi") => 1e-9,
                 ("box", _) => return,
@@ -105,10 +127,10 @@ fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
 /// P55, away from the border: a point's surroundings, ten times its scale, are in both images.
 #[test]
 fn a_shift_by_whole_pixels_shifts_the_points() {
-    let big = patchwork(209, 193);
     let (size, shift) = ([193, 161], [16, 32]);
-    let (one, other) = (cut(&big, [0, 0], size), cut(&big, shift, size));
     every("gaussian", |name, detector| {
+        let big = shown(name, 209, 193);
+        let (one, other) = (cut(&big, [0, 0], size), cut(&big, shift, size));
         let mut all = detector.detect(&one);
         all.iter_mut().for_each(|p| p.at = Pixel { u: p.at.u - shift[0] as f64, v: p.at.v - shift[1] as f64 });
         let shared = [size[0] - shift[0], size[1] - shift[1]].map(|n| n as f64);
@@ -129,10 +151,10 @@ fn a_shift_by_whole_pixels_shifts_the_points() {
 /// P56: 40 grey levels more, nothing clips.
 #[test]
 fn more_light_everywhere_changes_nothing() {
-    let image = patchwork(129, 97);
-    let brighter = image.pixels().iter().map(|p| p + 40.0).collect();
-    let brighter = Image::new(129, 97, brighter).unwrap();
     every("gaussian", |name, detector| {
+        let image = shown(name, 129, 97);
+        let brighter = image.pixels().iter().map(|p| p + 40.0).collect();
+        let brighter = Image::new(129, 97, brighter).unwrap();
         same(name, &detector.detect(&image), &detector.detect(&brighter), rounding(name, false));
     });
 }
@@ -155,7 +177,7 @@ fn any_size_and_any_finite_values_are_an_image() {
     every("gaussian", |name, detector| {
         for (width, height) in (1..24).flat_map(|n| [(n, n), (n, 40), (90, n)]) {
             for (scale, offset) in [(1.0, 0.0), (1e36, -1e38), (1e-40, 0.0)] {
-                let pixels = patchwork(width, height).pixels().iter().map(|p| p * scale + offset).collect();
+                let pixels = shown(name, width, height).pixels().iter().map(|p| p * scale + offset).collect();
                 for point in detector.detect(&Image::new(width, height, pixels).unwrap()) {
                     let inside = |x: f64, n: usize| x > -1.0 && x < n as f64;
                     assert!(inside(point.at.u, width) && inside(point.at.v, height), "{name}: {point:?}");
@@ -168,8 +190,9 @@ fn any_size_and_any_finite_values_are_an_image() {
 /// Whoever works, and whatever was looked at before.
 #[test]
 fn threads_and_memory_change_no_bit() {
-    let images = [patchwork(190, 150), patchwork(40, 90), patchwork(5, 5), patchwork(190, 150), patchwork(300, 70)];
     for listing in DETECTORS.listings() {
+        let sizes = [(190, 150), (40, 90), (5, 5), (190, 150), (300, 70)];
+        let images = sizes.map(|(width, height)| shown(listing.name, width, height));
         let detector = DETECTORS.build(&Choice::named(listing.name)).unwrap();
         for threads in [Threads::One, Threads::Pool] {
             let (mut work, mut found) = (Workspace::new(threads), Vec::new());
@@ -184,8 +207,8 @@ fn threads_and_memory_change_no_bit() {
 
 #[test]
 fn the_budget_is_kept() {
-    let image = patchwork(190, 150);
     for listing in DETECTORS.listings().iter().filter(|listing| listing.defaults.contains_key("features")) {
+        let image = shown(listing.name, 190, 150);
         for features in [1, 17, 40] {
             let detector = DETECTORS.build(&Choice::named(listing.name).with("features", features)).unwrap();
             assert_eq!(detector.detect(&image).len(), features as usize, "{}", listing.name);

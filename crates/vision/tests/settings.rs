@@ -132,21 +132,44 @@ fn zncc_patch_refuses_what_is_no_window() {
 fn epipolar_band_needs_a_band() {
     range(&MATCHERS, "epipolar-band", "epipolar-px", &[0.1, 1000.0], &[0.0, -1.0, 1001.0]);
     range(&MATCHERS, "epipolar-band", "max-hamming", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
+    range(&MATCHERS, "epipolar-band", "min-depth", &[0.0, 49.0], &[-0.1]);
+    range(&MATCHERS, "epipolar-band", "max-depth", &[0.2], &[0.1, 0.0, -1.0]);
+    assert_eq!(
+        refusal(&MATCHERS, &Choice::named("epipolar-band").with("min-depth", 60.0)).unwrap(),
+        "matcher `epipolar-band`: max-depth = 50; give a depth beyond min-depth = 60 (m)"
+    );
+    assert!(refusal(&MATCHERS, &Choice::named("epipolar-band").with("neighbours", 1001)).is_some());
+}
+
+#[test]
+fn zncc_band_refuses_what_matches_nothing() {
+    range(&MATCHERS, "zncc-band", "epipolar-px", &[0.1, 100.0], &[0.0, -1.0, 101.0]);
+    range(&MATCHERS, "zncc-band", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
+    range(&MATCHERS, "zncc-band", "least-correlation", &[-1.0, 1.0], &[-1.1, 1.1]);
+    range(&MATCHERS, "zncc-band", "min-depth", &[0.1, 49.0], &[0.0, -0.1]);
+    for window in [1, 10, 53] {
+        let said = refusal(&MATCHERS, &Choice::named("zncc-band").with("window", window)).unwrap();
+        assert!(said.contains(&format!("window = {window}; give an odd number of pixels from 3 to 51")), "{said}");
+    }
+}
+
+#[test]
+fn fitted_corners_refuse_what_finds_nothing() {
+    for name in ["l-corner", "x-corner"] {
+        range(&DETECTORS, name, "sigma", &[0.5, 100.0], &[0.0, 101.0]);
+        range(&DETECTORS, name, "quality", &[0.0, 1.0], &[-0.1, 1.1]);
+        for key in ["candidates", "features", "cells"] {
+            let said = refusal(&DETECTORS, &Choice::named(name).with(key, 0)).unwrap_or_default();
+            assert_eq!(said, format!("detector `{name}`: {key} = 0; give at least 1"));
+        }
+    }
 }
 
 #[test]
 fn mutual_ratio_refuses_what_matches_nothing() {
     range(&MATCHERS, "mutual-ratio", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
     range(&MATCHERS, "mutual-ratio", "max-distance", &[0.1, 2.0], &[0.0, -0.7, 2.1]);
-    range(&MATCHERS, "mutual-ratio", "epipolar-px", &[0.0, 1000.0], &[-1.0, 1001.0]);
-    range(&MATCHERS, "mutual-ratio", "min-depth", &[0.0, 49.0], &[-0.1]);
-    range(&MATCHERS, "mutual-ratio", "max-depth", &[0.2], &[0.1, 0.0, -1.0]);
-    assert_eq!(
-        refusal(&MATCHERS, &Choice::named("mutual-ratio").with("min-depth", 60.0)).unwrap(),
-        "matcher `mutual-ratio`: max-depth = 50; give a depth beyond min-depth = 60 (m)"
-    );
-    assert_eq!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("neighbours", 0)), None);
-    assert!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("neighbours", 1001)).is_some());
+    assert!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("epipolar-px", 1.0)).is_some(), "it has no band");
 }
 
 #[test]

@@ -201,7 +201,7 @@ impl Scene {
     fn matchers(&self) -> Vec<Stage<'_>> {
         let names = ["2-NN, 64 floats, 1000²", "2-NN, 64 floats, 3000²"];
         let stages = names.into_iter().enumerate().map(|(i, name)| {
-            let choice = Choice::named("mutual-ratio").with("epipolar-px", 0.0).with("neighbours", 0);
+            let choice = Choice::named("mutual-ratio");
             let matcher: Box<dyn Matcher> = MATCHERS.build(&choice).expect("a matcher");
             let count = CROWDS[i];
             let keypoints = [vec![self.keypoints[0][0]; count], vec![self.keypoints[1][0]; count]];
@@ -262,9 +262,7 @@ impl Scene {
             filters: Vec::new(),
             detector: listed(&DETECTORS, &Choice::named("harris").with("features", COUNT as i64)).expect("a detector"),
             descriptor: listed(&DESCRIPTORS, &Choice::named("surf")).expect("a descriptor"),
-            // The band, once it is listed, is the default.
-            matcher: listed(&MATCHERS, &Choice::named("epipolar-band"))
-                .unwrap_or_else(|| MATCHERS.build(&Choice::named("mutual-ratio")).expect("a matcher")),
+            matcher: MATCHERS.build(&Choice::named("epipolar-band")).expect("a matcher"),
             locator: LOCATORS.build(&Choice::named("corner")).expect("a locator"),
             refine: Refine::default(),
             triangulator: Triangulator::default(),

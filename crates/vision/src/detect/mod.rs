@@ -4,6 +4,7 @@ mod corners;
 mod dog;
 mod extrema;
 mod fast;
+mod fitted;
 mod harris;
 mod hessian;
 mod integral;
@@ -16,7 +17,9 @@ mod tensor;
 
 pub use dog::Dog;
 pub use fast::Fast;
+pub use fitted::{FittedCorners, LCorners, XCorners};
 pub use harris::Harris;
+pub(crate) use peaks::vertex;
 use seafix_component::{Registry, entry};
 use seafix_geometry::Pixel;
 pub use select::Selection;
@@ -51,5 +54,15 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
 }
 
 /// All detectors.
-pub static DETECTORS: Registry<dyn Detector> =
-    Registry::new("detector", &[entry!(Dog), entry!(Fast), entry!(Harris), entry!(ShiTomasi), entry!(FastHessian)]);
+pub static DETECTORS: Registry<dyn Detector> = Registry::new(
+    "detector",
+    &[
+        entry!(Dog),
+        entry!(Fast),
+        entry!(Harris),
+        entry!(LCorners),
+        entry!(ShiTomasi),
+        entry!(FastHessian),
+        entry!(XCorners),
+    ],
+);

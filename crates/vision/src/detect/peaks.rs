@@ -137,7 +137,7 @@ fn is_greatest(response: &[f32], width: usize, [x, y]: [usize; 2], chords: &[usi
 /// never more than a pixel away; the pixel itself where the nine describe no maximum.
 ///
 /// Newton's step −H⁻¹ g with the derivatives by central differences.
-pub(super) fn vertex(nine: [[f32; 3]; 3]) -> [f64; 2] {
+pub(crate) fn vertex(nine: [[f32; 3]; 3]) -> [f64; 2] {
     let [[nw, n, ne], [w, centre, e], [sw, s, se]] = nine.map(|row| row.map(f64::from));
     let gx = 0.5 * (e - w);
     let gy = 0.5 * (s - n);

@@ -10,98 +10,74 @@ use super::{
 };
 use crate::{Image, Keypoint, Threads, Workspace};
 
-/// Whichever of [`XCorner`] and [`LCorner`] explains the pixels better; texture stays where it is.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Corner(pub CornerFit);
+/// Where models of corners come from.
+pub(crate) const SOURCE: &str = "Rohr, Recognizing corners by fitting parametric models, IJCV 1992";
 
-/// The corner of a chequer-board: two blurred edges that cross, bright in two opposite parts.
-///
-/// Seven parameters (centre, two directions, blur, two grey levels) are fitted to the pixels by least squares,
-/// r = I − a − b·U; the covariance of the centre is that of JᵀJ, scaled by what remains.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct XCorner(pub CornerFit);
+/// A locator that fits the best of some shapes.
+macro_rules! locator {
+    ($(#[$doc:meta])* $name:ident, $kebab:literal, $shapes:expr, $summary:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+        #[serde(transparent)]
+        pub struct $name(pub CornerFit);
 
-/// The corner of a box: two blurred edges that end where they meet. Fitted as [`XCorner`].
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct LCorner(pub CornerFit);
+        impl Component for $name {
+            const NAME: &'static str = $kebab;
+            const SUMMARY: &'static str = $summary;
+            const SOURCE: &'static str = SOURCE;
 
-const SOURCE: &str = "Rohr, Recognizing corners by fitting parametric models, IJCV 1992";
+            fn check(&self) -> Result<(), String> {
+                self.0.check()
+            }
+        }
 
-impl Component for Corner {
-    const NAME: &'static str = "corner";
-    const SUMMARY: &'static str = "whichever of x-corner and l-corner explains the pixels better; texture stays";
-    const SOURCE: &'static str = SOURCE;
-
-    fn check(&self) -> Result<(), String> {
-        self.0.check()
-    }
+        impl Locator for $name {
+            fn locate_into(
+                &self,
+                image: &Image,
+                keypoints: &[Keypoint],
+                work: &mut Workspace,
+                places: &mut Vec<Option<Place>>,
+            ) {
+                fit_into(&self.0, &$shapes, image, keypoints, work, places);
+            }
+        }
+    };
 }
 
-impl Component for XCorner {
-    const NAME: &'static str = "x-corner";
-    const SUMMARY: &'static str = "fits two blurred edges that cross: the corner of a chequer-board";
-    const SOURCE: &'static str = SOURCE;
+locator!(
+    /// Whichever of [`XCorner`] and [`LCorner`] explains the pixels better; texture stays where it is.
+    Corner,
+    "corner",
+    [Shape::Wedge, Shape::Crossing],
+    "whichever of x-corner and l-corner explains the pixels better; texture stays"
+);
 
-    fn check(&self) -> Result<(), String> {
-        self.0.check()
-    }
-}
+locator!(
+    /// The corner of a chequer-board: two blurred edges that cross, bright in two opposite parts.
+    ///
+    /// Seven parameters (centre, two directions, blur, two grey levels) are fitted to the pixels by least squares,
+    /// r = I − a − b·U; the covariance of the centre is that of JᵀJ, scaled by what remains.
+    XCorner,
+    "x-corner",
+    [Shape::Crossing],
+    "fits two blurred edges that cross: the corner of a chequer-board"
+);
 
-impl Component for LCorner {
-    const NAME: &'static str = "l-corner";
-    const SUMMARY: &'static str = "fits two blurred edges that end where they meet: the corner of a box";
-    const SOURCE: &'static str = SOURCE;
-
-    fn check(&self) -> Result<(), String> {
-        self.0.check()
-    }
-}
-
-impl Locator for Corner {
-    fn locate_into(
-        &self,
-        image: &Image,
-        keypoints: &[Keypoint],
-        work: &mut Workspace,
-        places: &mut Vec<Option<Place>>,
-    ) {
-        fit_into(&self.0, &[Shape::Wedge, Shape::Crossing], image, keypoints, work, places);
-    }
-}
-
-impl Locator for XCorner {
-    fn locate_into(
-        &self,
-        image: &Image,
-        keypoints: &[Keypoint],
-        work: &mut Workspace,
-        places: &mut Vec<Option<Place>>,
-    ) {
-        fit_into(&self.0, &[Shape::Crossing], image, keypoints, work, places);
-    }
-}
-
-impl Locator for LCorner {
-    fn locate_into(
-        &self,
-        image: &Image,
-        keypoints: &[Keypoint],
-        work: &mut Workspace,
-        places: &mut Vec<Option<Place>>,
-    ) {
-        fit_into(&self.0, &[Shape::Wedge], image, keypoints, work, places);
-    }
-}
+locator!(
+    /// The corner of a box: two blurred edges that end where they meet. Fitted as [`XCorner`].
+    LCorner,
+    "l-corner",
+    [Shape::Wedge],
+    "fits two blurred edges that end where they meet: the corner of a box"
+);
 
 /// One fitter for each piece of the work.
 #[derive(Debug, Default)]
 struct Fitters(Vec<Fitter>);
 
 /// Fits the best of `shapes` at every key point.
-pub(super) fn fit_into(
+pub(crate) fn fit_into(
     settings: &CornerFit,
     shapes: &[Shape],
     image: &Image,

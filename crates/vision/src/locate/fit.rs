@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Place,
     model::{Model, Normal, PARAMETERS, Pixels, Shape},
-    start::Start,
+    start::{Guess, Start},
 };
 use crate::{Image, Keypoint};
 
@@ -60,16 +60,22 @@ pub(super) struct Fitter {
 
 /// Steps of the fit at most, in all its windows.
 const STEPS: usize = 20;
-/// A fit is given up when it leaves this many times what a believed one may leave unexplained, and a step
-/// lowers that by less than a fifth: most key points are texture, and the time goes to them.
-const FAR: f64 = 1.5;
-const SLOW: f64 = 0.8;
-/// Nor is a fit begun from a guess that leaves more than this share unexplained.
-const HOPELESS: f64 = 0.5;
+/// Most key points are texture, and the time would go to them. Each of these is a multiple of what a believed fit may
+/// leave unexplained; what leaves more is given up: two flat parts with a sharp border between them, the first
+/// guess; what the linear model promises of the first step; and of any later one.
+const SHARP: f64 = 9.0;
+const FIRST: f64 = 2.5;
+const LATER: f64 = 1.5;
+/// A guess at the contrast may be less than what a fit finds: blur lessens it.
+const PALE: f64 = 0.5;
 /// A shape is tried if its first guess explains at least this share of what the other's does.
 const WORSE: f64 = 0.7;
-/// A step shorter than this ends it (px).
-const SHORT: f64 = 1e-3;
+/// A step this short needs no further one: the next would be a small part of it (px).
+const SHORT: f64 = 3e-3;
+/// The window follows a corner that is nearer to another pixel than its middle, once steps are shorter than this (px),
+/// so many times at most.
+const ASIDE: f64 = 0.5;
+const MOVES: usize = 3;
 /// The blur's standard deviation must be within these (px).
 const BLUR: [f64; 2] = [0.3, 3.0];
 /// Sine of the least angle between the edges.
@@ -90,85 +96,72 @@ impl Fitter {
         let half = settings.window / 2;
         let near = [keypoint.at.u, keypoint.at.v].map(libm::round);
         let [x, y] = whole(near, half + 1, image)?;
-        let start = Start::of(image, x, y, half)?;
-        let mut guesses = [(0.0, Shape::Wedge, [0.0; 2], 0.0, 0.0); 2];
-        for (guess, &shape) in guesses.iter_mut().zip(shapes) {
-            let (explained, normals, a, b) = start.guess(shape);
-            *guess = (explained, shape, normals, a, b);
-        }
+        let start = Start::of(image, x, y, half).filter(|start| start.at.norm() <= settings.reach)?;
+        let mut guesses = [Guess::NONE; 2];
+        guesses.iter_mut().zip(shapes).for_each(|(guess, &shape)| *guess = start.guess(shape));
         let guesses = &mut guesses[..shapes.len()];
-        guesses.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let reached = start.at.norm() <= settings.reach;
-        let at = if reached { [start.at.x + near[0], start.at.y + near[1]] } else { [keypoint.at.u, keypoint.at.v] };
-        let promising = WORSE * guesses[0].0;
-        for (_, shape, normals, a, b) in guesses.iter().filter(|guess| guess.0 >= promising) {
-            // A guess at the blur that is neither sharp nor soft.
-            let model = Model { shape: *shape, at: [at[0], at[1], normals[0], normals[1], 1.0, *a, *b] };
-            let place = self.fit(settings, image, keypoint, model);
-            if place.is_some() {
-                return place;
-            }
-        }
-        None
+        guesses.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+        let least = (1.0 - SHARP * (1.0 - settings.explained)).max(WORSE * guesses[0].explained);
+        let at = [start.at.x + near[0], start.at.y + near[1]];
+        let likely = |guess: &&Guess| guess.explained >= least && guess.contrast() >= PALE * settings.contrast;
+        guesses.iter().filter(likely).find_map(|guess| self.fit(settings, image, keypoint, guess.model(at)))
     }
 
     /// Gauss and Newton's iteration, damped by Levenberg and Marquardt's rule where a step does not help; the
     /// window follows the corner. The centre of `model` counts from the image's first pixel.
     fn fit(&mut self, settings: &CornerFit, image: &Image, keypoint: &Keypoint, mut model: Model) -> Option<Place> {
         let half = settings.window / 2;
-        let mut middle = [model.at[0], model.at[1]].map(libm::round);
-        self.take(image, middle, half)?;
-        model.at[0] -= middle[0];
-        model.at[1] -= middle[1];
-        model.at[5] -= self.mean;
-        let mut damping = 0.0;
-        let mut moved_window = 0;
-        let mut best = self.pixels.normal(&model);
-        if best.squares > HOPELESS * self.variation {
-            return None;
-        }
+        let mut middle = [0.0; 2];
+        let mut best = self.look(image, &mut middle, half, &mut model)?;
+        let (mut damping, mut moved, mut most) = (0.0, 0, FIRST);
         for _ in 0..STEPS {
             let step = solve(&best, damping)?;
-            let mut trial = model;
-            for (value, step) in trial.at.iter_mut().zip(step.iter()) {
-                *value += step;
+            let promised = best.squares - step.dot(&SVector::from(best.gradient));
+            if promised > most * (1.0 - settings.explained) * self.variation {
+                return None;
             }
+            let mut trial = model;
+            trial.at.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
             let sane = trial.at[..2].iter().all(|c| c.abs() <= half as f64)
                 && (1.0 / BLUR[1]..=1.0 / BLUR[0]).contains(&trial.at[4])
                 && libm::sin(trial.at[2] - trial.at[3]).abs() >= PARALLEL;
+            let length = libm::hypot(step[0], step[1]);
+            let may_move = moved < MOVES && trial.at[..2].iter().any(|c| c.abs() > ASIDE);
+            if sane && length < SHORT && damping == 0.0 && !may_move {
+                best.squares = promised;
+                return self.judge(settings, keypoint, &trial, &best);
+            }
             let next = if sane { Some(self.pixels.normal(&trial)) } else { None };
-            let far = best.squares > FAR * (1.0 - settings.explained) * self.variation;
             let Some(next) = next.filter(|next| next.squares <= best.squares * (1.0 + 1e-5)) else {
                 damping = (damping * 8.0).max(1e-2);
-                if damping > if far { 1.0 } else { 1e4 } {
+                if damping > 1e4 {
                     return None;
                 }
                 continue;
             };
-            if far && next.squares > SLOW * best.squares {
-                return None;
-            }
-            (model, best, damping) = (trial, next, damping * 0.2);
+            (model, best, damping, most) = (trial, next, damping * 0.2, LATER);
             if damping < 1e-3 {
                 damping = 0.0;
             }
-            if libm::hypot(step[0], step[1]) < SHORT {
-                let off = [model.at[0], model.at[1]].map(libm::round);
-                if off == [0.0, 0.0] || moved_window == 2 {
-                    return self.judge(settings, keypoint, &model, &best);
-                }
-                // The corner is not in the middle: look again from where it is.
-                moved_window += 1;
-                let before = self.mean;
-                middle = [middle[0] + off[0], middle[1] + off[1]];
-                self.take(image, middle, half)?;
-                model.at[0] -= off[0];
-                model.at[1] -= off[1];
-                model.at[5] += before - self.mean;
-                best = self.pixels.normal(&model);
+            if may_move && length < ASIDE {
+                moved += 1;
+                model.at[0] += middle[0];
+                model.at[1] += middle[1];
+                model.at[5] += self.mean;
+                best = self.look(image, &mut middle, half, &mut model)?;
             }
         }
         None
+    }
+
+    /// Takes the window around the centre of `model`, which from then on counts from the window's middle and mean.
+    fn look(&mut self, image: &Image, middle: &mut [f64; 2], half: usize, model: &mut Model) -> Option<Normal> {
+        *middle = [model.at[0], model.at[1]].map(libm::round);
+        self.take(image, *middle, half)?;
+        model.at[0] -= middle[0];
+        model.at[1] -= middle[1];
+        model.at[5] -= self.mean;
+        Some(self.pixels.normal(model))
     }
 
     /// The corner, if it is believed.

@@ -14,8 +14,10 @@ mod peak;
 mod start;
 
 pub use corner::{Corner, LCorner, XCorner};
+pub(crate) use corner::{SOURCE as FITTED, fit_into};
 pub use fit::CornerFit;
 pub use junction::Junction;
+pub(crate) use model::Shape;
 use nalgebra::Matrix2;
 pub use peak::Peak;
 use seafix_component::{Registry, entry};

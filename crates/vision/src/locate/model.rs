@@ -4,7 +4,7 @@ use std::f32::consts::{LN_2, LOG2_E};
 
 /// Which parts of the plane that two straight edges cut are bright.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shape {
+pub(crate) enum Shape {
     /// One of the four: the corner of a box.
     Wedge,
     /// Two opposite ones: the corner of a chequer-board.
@@ -159,13 +159,10 @@ fn normal(pixels: &mut Pixels, model: &Model, rule: &Rule) -> Normal {
     let (scale, flat) = if crossing { (4.0, 2.0) } else { (1.0, 0.0) };
     let constant = if crossing { 1.0 } else { 0.0 };
     let Pixels { x, y, present, value, columns, .. } = pixels;
-    let blocks = value.len();
-    let [j0, j1, j2, j3, j4, j5, j6, residuals] = columns.each_mut().map(|column| &mut column[..blocks]);
-    let (x, y, present) = (&x[..blocks], &y[..blocks], &present[..blocks]);
-    for i in 0..blocks {
+    for (i, (((x, y), on), value)) in x.iter().zip(&*y).zip(&*present).zip(&*value).enumerate() {
         let (mut h1, mut h2) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            let (dx, dy) = (x[i][lane] - cx, y[i][lane] - cy);
+            let (dx, dy) = (x[lane] - cx, y[lane] - cy);
             h1[lane] = t * (c1 * dx + s1 * dy);
             h2[lane] = t * (c2 * dx + s2 * dy);
         }
@@ -176,8 +173,10 @@ fn normal(pixels: &mut Pixels, model: &Model, rule: &Rule) -> Normal {
                 beyond[lane] += weight * exp(square * (h1 * h1 + h2 * h2) + cross * (h1 * h2));
             }
         }
+        // In memory of its own, which nothing else can alias: else the loop would not be vectorised.
+        let mut out = [[0.0; LANES]; PARAMETERS + 1];
         for lane in 0..LANES {
-            let (dx, dy, h1, h2) = (x[i][lane] - cx, y[i][lane] - cy, h1[lane], h2[lane]);
+            let (dx, dy, h1, h2) = (x[lane] - cx, y[lane] - cy, h1[lane], h2[lane]);
             let ((p1, bell1), (p2, bell2)) = (phi(h1), phi(h2));
             let (q1, tail) = phi((h2 - rho * h1) * inverse);
             let (q2, _) = phi((h1 - rho * h2) * inverse);
@@ -186,17 +185,18 @@ fn normal(pixels: &mut Pixels, model: &Model, rule: &Rule) -> Normal {
             let d1 = b * ROOT * bell1 * (scale * q1 - flat);
             let d2 = b * ROOT * bell2 * (scale * q2 - flat);
             let density = b * scale * bell1 * tail * inverse * (1.0 / TAU);
-            let on = present[i][lane];
-            j0[i][lane] = -on * t * (d1 * c1 + d2 * c2);
-            j1[i][lane] = -on * t * (d1 * s1 + d2 * s2);
+            let on = on[lane];
+            out[0][lane] = -on * t * (d1 * c1 + d2 * c2);
+            out[1][lane] = -on * t * (d1 * s1 + d2 * s2);
             // ρ = cos(θ₁ − θ₂)
-            j2[i][lane] = on * (d1 * t * (c1 * dy - s1 * dx) - density * sine);
-            j3[i][lane] = on * (d2 * t * (c2 * dy - s2 * dx) + density * sine);
-            j4[i][lane] = on * (d1 * h1 + d2 * h2) * wide;
-            j5[i][lane] = on;
-            j6[i][lane] = on * u;
-            residuals[i][lane] = on * (value[i][lane] - (a + b * u));
+            out[2][lane] = on * (d1 * t * (c1 * dy - s1 * dx) - density * sine);
+            out[3][lane] = on * (d2 * t * (c2 * dy - s2 * dx) + density * sine);
+            out[4][lane] = on * (d1 * h1 + d2 * h2) * wide;
+            out[5][lane] = on;
+            out[6][lane] = on * u;
+            out[7][lane] = on * (value[lane] - (a + b * u));
         }
+        columns.iter_mut().zip(out).for_each(|(column, out)| column[i] = out);
     }
     let mut matrix = [[0.0; PARAMETERS]; PARAMETERS];
     let mut gradient = [0.0; PARAMETERS];

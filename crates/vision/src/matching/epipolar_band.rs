@@ -134,16 +134,17 @@ mod tests {
     use nalgebra::Vector3;
     use seafix_geometry::{Pixel, Point};
 
-    /// The definition, word by word.
+    /// The definition, word by word; with `banded` only what the rig allows competes.
     fn brute_force(
-        m: &MutualRatio,
+        m: &EpipolarBand,
+        banded: bool,
         left: (&[Pixel], &Descriptors),
         right: (&[Pixel], &Descriptors),
         rig: &StereoRig,
     ) -> Vec<(usize, usize)> {
         let allowed = |i: usize, j: usize| {
             let seen = seafix_geometry::StereoPixels { left: left.0[i], right: right.0[j] };
-            m.epipolar_px == 0.0
+            !banded
                 || rig.epipolar_distance(&seen).is_some_and(|d| d <= m.epipolar_px)
                     && rig
                         .triangulate(&seafix_geometry::UncertainPixels::independent(seen, 0.1))
@@ -187,15 +188,19 @@ mod tests {
         ] {
             let rig = rig(step, turn);
             let (l, r, a, b) = scene(150, &rig);
-            for matcher in [
-                MutualRatio::default(),
-                MutualRatio { epipolar_px: 1.0, ..MutualRatio::default() },
-                MutualRatio { epipolar_px: 60.0, ratio: 0.95, max_distance: 1.2, ..MutualRatio::default() },
-                MutualRatio { epipolar_px: 1.0, min_depth: 2.0, max_depth: 3.0, ..MutualRatio::default() },
-            ] {
-                let found = matched(&matcher, (&l, &a), (&r, &b), &rig);
+            let plain = EpipolarBand { neighbours: 0, ..EpipolarBand::default() };
+            let check = |matcher: &dyn Matcher, settings: &EpipolarBand, banded| {
+                let found = matched(matcher, (&l, &a), (&r, &b), &rig);
                 let pairs: Vec<_> = found.iter().map(|m| (m.left, index(&r, m))).collect();
-                assert_eq!(pairs, brute_force(&matcher, (&l, &a), (&r, &b), &rig), "{matcher:?}");
+                assert_eq!(pairs, brute_force(settings, banded, (&l, &a), (&r, &b), &rig), "{matcher:?}");
+            };
+            check(&MutualRatio::default(), &plain, false);
+            for matcher in [
+                plain.clone(),
+                EpipolarBand { epipolar_px: 60.0, ratio: 0.95, max_distance: 1.2, ..plain.clone() },
+                EpipolarBand { min_depth: 2.0, max_depth: 3.0, ..plain.clone() },
+            ] {
+                check(&matcher, &matcher, true);
             }
         }
     }

@@ -2,10 +2,10 @@
 
 use nalgebra::Vector2;
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Pixel, Point, StereoPixels, StereoRig};
+use seafix_geometry::{Pixel, StereoPixels, StereoRig};
 use serde::{Deserialize, Serialize};
 
-use super::{Match, Matcher, View};
+use super::{Match, Matcher, View, curve::epipolar_curve, distinct::Distinct};
 use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
 
 /// Left key points, followed into the right image from coarse to fine.
@@ -65,8 +65,6 @@ const SEARCHED: usize = 3;
 const MOST: f64 = 512.0;
 /// Places on a curve that correlate worse than the best by this are not followed.
 const MUCH_WORSE: f64 = 0.3;
-/// Pairs that end nearer to each other (px) are one place.
-const SAME: f64 = 1.0;
 
 /// Left key points that are sought one after the other.
 const PIECE: usize = 32;
@@ -77,8 +75,7 @@ struct Memory {
     pyramids: [Pyramid; 2],
     seekers: Vec<Seeker>,
     pairs: Vec<Option<Match>>,
-    order: Vec<usize>,
-    taken: Vec<Pixel>,
+    distinct: Distinct,
 }
 
 /// Memory for one piece of the work.
@@ -100,7 +97,7 @@ impl Matcher for LucasKanade {
         found: &mut Vec<Match>,
     ) {
         let threads = work.threads();
-        let Memory { pyramids, seekers, pairs, order, taken } = work.get();
+        let Memory { pyramids, seekers, pairs, distinct } = work.get();
         let [from, to] = pyramids;
         threads.join(|| from.build(left.image, self.tracker.levels), || to.build(right.image, self.tracker.levels));
         let levels = [from.levels(), to.levels()];
@@ -114,20 +111,7 @@ impl Matcher for LucasKanade {
                 });
             }
         });
-        // The best first; the order of the left key points decides between equals.
-        order.clear();
-        order.extend((0..pairs.len()).filter(|&i| pairs[i].is_some()));
-        let distance = |i: usize| pairs[i].map_or(f32::INFINITY, |pair| pair.distance);
-        order.sort_unstable_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
-        taken.clear();
-        found.clear();
-        for pair in order.iter().filter_map(|&i| pairs[i]) {
-            if taken.iter().all(|place| place.distance(&pair.right) >= SAME) {
-                taken.push(pair.right);
-                found.push(pair);
-            }
-        }
-        found.sort_unstable_by_key(|pair| pair.left);
+        distinct.keep_into(pairs, found);
     }
 }
 
@@ -153,7 +137,7 @@ impl LucasKanade {
         let Seeker { aligner, curve, correlations, best } = seeker;
         let levels = [levels[0].get(..=level)?, levels[1].get(..=level)?];
         let scale = (1_u32 << level) as f64;
-        self.curve(place, rig, scale, curve);
+        epipolar_curve(rig, place, [self.min_depth, self.max_depth], scale, MOST, curve);
         curve.iter_mut().for_each(|place| *place /= scale);
         let at = Vector2::new(place.u, place.v) / scale;
         aligner.survey(&levels[0][level], &levels[1][level], &at, curve, &self.tracker.rules(), correlations);
@@ -176,28 +160,6 @@ impl LucasKanade {
         let (start, track) = tracks.max_by(|a, b| a.1.correlation.total_cmp(&b.1.correlation))?;
         let returns = self.tracker.returns(levels, [place, &start], &track, aligner);
         returns.then_some((track.at, track.correlation))
-    }
-
-    /// The places of the epipolar curve of `place`, about `step` px apart, those beyond the image among them.
-    fn curve(&self, place: &Pixel, rig: &StereoRig, step: f64, curve: &mut Vec<Vector2<f64>>) {
-        curve.clear();
-        let Some(ray) = rig.left().normalize(place) else { return };
-        let seen = |inverse: f64| {
-            let right = rig.right().project(&(*rig.right_from_left() * Point::from(ray.push(1.0) / inverse)))?;
-            Some(Vector2::new(right.u, right.v))
-        };
-        let (far, mut near) = (1.0 / self.max_depth, 1.0 / self.min_depth);
-        let Some(end) = seen(far) else { return };
-        // So near that the right camera does not see it: half of that.
-        let mut begin = seen(near);
-        while begin.is_none() && near > 2.0 * far {
-            near *= 0.5;
-            begin = seen(near);
-        }
-        let Some(begin) = begin else { return };
-        let count = ((begin - end).norm() / step).ceil().min(MOST);
-        let places = (0..=count as usize).map(|i| far + (near - far) * i as f64 / count.max(1.0));
-        curve.extend(places.filter_map(seen));
     }
 }
 

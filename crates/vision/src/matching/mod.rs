@@ -1,6 +1,9 @@
 //! Matchers: which key point of the right image is which of the left.
 
 mod along;
+mod correlate;
+mod curve;
+mod distinct;
 mod epipolar;
 mod epipolar_band;
 mod exhaustive;
@@ -12,12 +15,14 @@ mod nearest;
 mod support;
 #[cfg(test)]
 mod test_scene;
+mod zncc_band;
 
 pub use epipolar_band::EpipolarBand;
 pub use lucas_kanade::LucasKanade;
 pub use mutual_ratio::MutualRatio;
 use seafix_component::{Registry, entry};
 use seafix_geometry::{Pixel, StereoRig};
+pub use zncc_band::ZnccBand;
 
 use crate::{Descriptors, Image, Keypoint, Workspace};
 
@@ -65,4 +70,4 @@ pub trait Matcher: Send + Sync + std::fmt::Debug {
 
 /// All matchers.
 pub static MATCHERS: Registry<dyn Matcher> =
-    Registry::new("matcher", &[entry!(EpipolarBand), entry!(LucasKanade), entry!(MutualRatio)]);
+    Registry::new("matcher", &[entry!(EpipolarBand), entry!(LucasKanade), entry!(MutualRatio), entry!(ZnccBand)]);

@@ -49,8 +49,9 @@ struct Link {
 
 /// No left key point has more candidates than this.
 const MOST: usize = 8;
-/// No candidate's descriptor is further than this many times the nearest one's.
-const FURTHEST: f32 = 2.0;
+/// No candidate's descriptor is further than this many times the nearest one's. In a pattern that repeats itself
+/// another place often looks a few times more alike than the right one: it is for the neighbours to decide.
+const FURTHEST: f32 = 4.0;
 /// What counts as no distance: descriptors nearer than this are equally near.
 const NEAREST: f32 = 1e-6;
 /// Rounds of mutual support.

@@ -1,0 +1,37 @@
+//! The epipolar curve of a pixel.
+
+use nalgebra::Vector2;
+use seafix_geometry::{Pixel, Point, StereoRig};
+
+/// Replaces `curve` by the places of the right image that show the ray of left pixel `place` between two depths (m),
+/// about `step` px apart, at most `most` of them; those beyond the image are among them. Where the lens model has no
+/// direction there is none.
+///
+/// They are spaced evenly in inverse depth, which for cameras beside each other is evenly in the image.
+pub(super) fn epipolar_curve(
+    rig: &StereoRig,
+    place: &Pixel,
+    [nearest, furthest]: [f64; 2],
+    step: f64,
+    most: f64,
+    curve: &mut Vec<Vector2<f64>>,
+) {
+    curve.clear();
+    let Some(ray) = rig.left().normalize(place) else { return };
+    let seen = |inverse: f64| {
+        let right = rig.right().project(&(*rig.right_from_left() * Point::from(ray.push(1.0) / inverse)))?;
+        Some(Vector2::new(right.u, right.v))
+    };
+    let (far, mut near) = (1.0 / furthest, 1.0 / nearest);
+    let Some(end) = seen(far) else { return };
+    // So near that the right camera does not see it: half of that.
+    let mut begin = seen(near);
+    while begin.is_none() && near > 2.0 * far {
+        near *= 0.5;
+        begin = seen(near);
+    }
+    let Some(begin) = begin else { return };
+    let count = ((begin - end).norm() / step).ceil().min(most);
+    let places = (0..=count as usize).map(|i| far + (near - far) * i as f64 / count.max(1.0));
+    curve.extend(places.filter_map(seen));
+}
