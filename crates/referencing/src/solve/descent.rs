@@ -1,13 +1,14 @@
 //! Least squares over SE(3) where every point speaks by an information matrix.
 
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
-use seafix_geometry::{Camera, Object, Point, Transform, so3::skew};
+use nalgebra::{Matrix3, Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
+use seafix_geometry::{Camera, Object, Transform};
 
+use super::normal::Normal;
 use crate::Observation;
 
 /// What one point says of the place where a pose puts it, camera axes.
 pub(super) struct Term {
-    /// W: the information on that place (1/m²).
+    /// W: the information on that place (1/m²), symmetric.
     pub(super) information: Matrix3<f64>,
     /// W times the step (m) by which the measurement would have it moved.
     pub(super) pull: Vector3<f64>,
@@ -26,7 +27,7 @@ impl Term {
 /// All terms at one pose: normal equations of the step ξ in `pose · Exp(ξ)`.
 pub(super) struct Linearized {
     /// Σ Jᵀ W J: the information on ξ.
-    pub(super) normal: Matrix6<f64>,
+    normal: Normal,
     /// Σ Jᵀ W r.
     pub(super) gradient: Vector6<f64>,
     /// χ².
@@ -35,48 +36,39 @@ pub(super) struct Linearized {
 
 /// The normal equations at `pose`; `None` where a term has no value (a point behind a camera).
 ///
-/// `term` is given a point and the place p = T⁻¹ P where the pose puts it. Under T · Exp(ξ) that place moves by
-/// J ξ, J = \[ \[p\]×, −I \].
+/// `term` is given the number of a point and the place p = T⁻¹ P where the pose puts it. Under T · Exp(ξ) that place
+/// moves by J ξ, J = \[ \[p\]×, −I \].
+#[inline]
 pub(super) fn linearize(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
-    term: &impl Fn(&Observation, &Point<Camera>) -> Option<Term>,
+    term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
 ) -> Option<Linearized> {
-    let (r, t) = (pose.rotation_matrix().transpose(), pose.translation());
-    let (mut turn, mut mixed, mut shift) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+    let (r, t) = (pose.rotation_matrix(), pose.translation());
+    let mut normal = Normal::default();
     let (mut torque, mut force, mut cost) = (Vector3::zeros(), Vector3::zeros(), 0.0);
-    for point in points {
-        let at: Vector3<f64> = r * (point.model.coords - t);
-        let said = term(point, &Point::from(at))?;
-        let s = skew(&at);
-        let lever = s * said.information;
-        turn -= lever * s;
-        mixed += lever;
-        shift += said.information;
+    for (k, point) in points.iter().enumerate() {
+        let at: Vector3<f64> = r.tr_mul(&(point.model.coords - t));
+        let said = term(k, &at)?;
+        normal.add(&at, &said.information);
         torque -= at.cross(&said.pull);
         force -= said.pull;
         cost += said.cost;
     }
-    let mut normal = Matrix6::zeros();
-    normal.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-    normal.fixed_view_mut::<3, 3>(0, 3).copy_from(&mixed);
-    normal.fixed_view_mut::<3, 3>(3, 0).copy_from(&mixed.transpose());
-    normal.fixed_view_mut::<3, 3>(3, 3).copy_from(&shift);
-    let mut gradient = Vector6::zeros();
-    gradient.fixed_rows_mut::<3>(0).copy_from(&torque);
-    gradient.fixed_rows_mut::<3>(3).copy_from(&force);
+    let gradient = Vector6::new(torque.x, torque.y, torque.z, force.x, force.y, force.z);
     Some(Linearized { normal, gradient, cost })
 }
 
 impl Linearized {
     /// The covariance of ξ; `None` where some motion changes nothing that was measured.
     pub(super) fn covariance(&self) -> Option<Matrix6<f64>> {
-        Some(self.normal.cholesky()?.inverse())
+        Some(self.normal.matrix().cholesky()?.inverse())
     }
 
     /// tr Σ_φφ (rad²), by the Schur complement of the translation.
     pub(super) fn attitude_variance(&self) -> Option<f64> {
-        let block = |row, column| self.normal.fixed_view::<3, 3>(row, column).into_owned();
+        let normal = self.normal.matrix();
+        let block = |row, column| normal.fixed_view::<3, 3>(row, column).into_owned();
         let (turn, mixed, shift) = (block(0, 0), block(0, 3), block(3, 3));
         let schur = turn - mixed * shift.cholesky()?.solve(&mixed.transpose());
         Some(schur.cholesky()?.inverse().trace())
@@ -84,33 +76,30 @@ impl Linearized {
 
     /// The step and its decrement gᵀ ξ: the square of its length in standard deviations.
     fn step(&self, damping: f64) -> Option<(Vector6<f64>, f64)> {
-        let mut normal = self.normal;
-        for i in 0..6 {
-            normal[(i, i)] *= 1.0 + damping;
-        }
-        let step = normal.cholesky()?.solve(&self.gradient);
+        let step = self.normal.solve(damping, &self.gradient)?;
         let decrement = self.gradient.dot(&step);
         decrement.is_finite().then_some((step, decrement))
     }
 }
 
-/// Below this decrement a step is a millionth of a standard deviation of a millionth: nothing is left to gain.
+/// Below this decrement a step is a ten-thousandth of a millionth of a standard deviation: nothing is left to gain.
 const CONVERGED: f64 = 1e-20;
 /// Below this decrement the cost has no digits left that could tell better from worse; the steps themselves
 /// must shrink then.
-const NEAR: f64 = 1e-4;
+pub(super) const NEAR: f64 = 1e-4;
 /// Steps of one descent.
 const MOST_STEPS: usize = 60;
 
-/// The least cost reached from `start` by Levenberg's and Marquardt's damped steps. The weights of `term` must
-/// not depend on the pose, or hardly: every step must lower the cost. (Marquardt, *An algorithm for
-/// least-squares estimation of nonlinear parameters*, 1963.)
+/// The least cost reached from `start` by Levenberg's and Marquardt's damped steps, to where a step is shorter than
+/// √`near` standard deviations. The weights of `term` must not depend on the pose: every step must lower the cost.
+/// (Marquardt, *An algorithm for least-squares estimation of nonlinear parameters*, 1963.) The pose and the normal
+/// equations there.
 pub(super) fn descend(
     points: &[Observation],
     start: &Transform<Object, Camera>,
     near: f64,
-    term: &impl Fn(&Observation, &Point<Camera>) -> Option<Term>,
-) -> Option<Transform<Object, Camera>> {
+    term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
+) -> Option<(Transform<Object, Camera>, Linearized)> {
     let (mut pose, mut here, mut damping) = (*start, linearize(points, start, term)?, 0.0);
     for _ in 0..MOST_STEPS {
         let (step, decrement) = here.step(damping)?;
@@ -127,44 +116,58 @@ pub(super) fn descend(
             None => damping = f64::max(1e-4, damping * 10.0),
         }
     }
-    Some(pose)
+    Some((pose, here))
 }
 
 /// The pose at which the steps vanish, from one near it: Gauss's and Newton's steps, of which each must be
 /// shorter than the last. Where the weights of `term` depend on the pose it solves the likelihood's equation
-/// Σ Jᵀ W r = 0 with the weights of its own answer, which no cost measures.
+/// Σ Jᵀ W r = 0 with the weights of its own answer, which no cost measures. `here` is `term` at `start`. The pose, and
+/// the normal equations at it or one vanishing step before.
 pub(super) fn settle(
     points: &[Observation],
-    start: &Transform<Object, Camera>,
-    term: &impl Fn(&Observation, &Point<Camera>) -> Option<Term>,
-) -> Option<Transform<Object, Camera>> {
-    let (mut pose, mut last) = (*start, f64::INFINITY);
+    start: Transform<Object, Camera>,
+    here: Linearized,
+    term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
+) -> Option<(Transform<Object, Camera>, Linearized)> {
+    let (mut pose, mut here, mut last) = (start, here, f64::INFINITY);
     for _ in 0..MOST_STEPS {
-        let (step, decrement) = linearize(points, &pose, term)?.step(0.0)?;
+        let (step, decrement) = here.step(0.0)?;
         if !(decrement < last) {
             break; // rounding is all that is left
         }
         pose = moved(&pose, &step);
-        if decrement <= CONVERGED {
+        // Steps shrink by a constant factor at least: that the next is nothing is known before it is taken.
+        let rate = if last.is_finite() { decrement / last } else { SHRINK };
+        if decrement * rate <= CONVERGED {
             break;
         }
         last = decrement;
+        here = linearize(points, &pose, term)?;
     }
-    Some(pose)
+    Some((pose, here))
 }
 
+/// By how much the first decrement is taken to fall.
+const SHRINK: f64 = 1e-2;
+
+/// `pose · Exp(step)` to second order, a rotation to the last digit.
 fn moved(pose: &Transform<Object, Camera>, step: &Vector6<f64>) -> Transform<Object, Camera> {
     // A turn of more than half a radian leaves what the normal equations know.
     let turn = step.fixed_rows::<3>(0).norm();
     let step = if turn > 0.5 { step * (0.5 / turn) } else { *step };
-    pose.perturbed(&step).renormalized()
+    let half = step.fixed_rows::<3>(0) * 0.5;
+    let shift = step.fixed_rows::<3>(3).into_owned();
+    let rotation = UnitQuaternion::new_normalize(Quaternion::new(1.0, half.x, half.y, half.z));
+    let step = Transform::<Camera, Camera>::new(rotation, shift + half.cross(&shift));
+    (*pose * step).renormalized()
 }
 
 /// [`descend`] to where the cost can no longer tell, then [`settle`].
 pub(super) fn minimize(
     points: &[Observation],
     start: &Transform<Object, Camera>,
-    term: &impl Fn(&Observation, &Point<Camera>) -> Option<Term>,
+    term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
 ) -> Option<Transform<Object, Camera>> {
-    settle(points, &descend(points, start, NEAR, term)?, term)
+    let (pose, here) = descend(points, start, NEAR, term)?;
+    Some(settle(points, pose, here, term)?.0)
 }

@@ -1,8 +1,8 @@
 //! Fast local matrix: the rotation linearised, a closed 6×6 solve, repeated.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Point, Transform, triad};
+use seafix_geometry::{Camera, Object, Transform, triad};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -11,7 +11,7 @@ use super::{
     roots::widest,
     spread::check,
 };
-use crate::{Observation, Observations};
+use crate::Observations;
 
 /// The motion of least Σ ‖P_k − C_k H‖², for motions that are small after the auxiliary frames of three widely
 /// spread points have been laid on each other: R ≈ I + \[φ\]× makes the sum a quadratic form of (φ, ρ), one 6×6 system
@@ -51,12 +51,12 @@ impl Solver for FastLocalMatrix {
         let line = |thin: seafix_geometry::Collinear| Degenerate::Collinear { ratio: thin.sine, least: thin.least };
         let camera = triad::<Camera, Object>(&a.measured.at, &b.measured.at, &c.measured.at).map_err(line)?;
         let object = triad::<Object, Object>(&a.model, &b.model, &c.model).map_err(line)?;
+        let unweighted = |k: usize, at: &Vector3<f64>| {
+            Some(Term::of(Matrix3::identity() / (UNIT * UNIT), &(data.points[k].measured.at.coords - at)))
+        };
         minimize(&data.points, &(object * camera.inverse()), &unweighted).ok_or(Degenerate::Singular)
     }
 }
 
-/// Every point with the same weight; its size only says when a step is small.
-fn unweighted(point: &Observation, at: &Point<Camera>) -> Option<Term> {
-    const UNIT: f64 = 1e-4;
-    Some(Term::of(Matrix3::identity() / (UNIT * UNIT), &(point.measured.at - *at)))
-}
+/// Every point has the same weight; its size (m) only says when a step is small.
+const UNIT: f64 = 1e-4;

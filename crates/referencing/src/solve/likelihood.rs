@@ -4,7 +4,7 @@ use seafix_geometry::{Camera, Object, Transform};
 
 use super::{
     descent::{linearize, minimize},
-    mahalanobis::as_measured,
+    mahalanobis::Measured,
 };
 use crate::Observations;
 
@@ -23,7 +23,9 @@ pub(crate) struct Likelihood {
 /// Σ r_kᵀ S_k⁻¹ r_k. Whatever the weights of the solver that gave `start`, the cost at the maximum is
 /// χ² with 3k − 6 degrees of freedom, so that it can be tested.
 pub(crate) fn maximum(data: &Observations<'_>, start: &Transform<Object, Camera>) -> Likelihood {
-    let pose = minimize(&data.points, start, &as_measured).unwrap_or(*start);
-    let cost = linearize(&data.points, &pose, &as_measured).map_or(f64::INFINITY, |all| all.cost);
+    let measured = Measured::of(&data.points);
+    let term = |k: usize, at: &_| Some(measured.term(k, at));
+    let pose = minimize(&data.points, start, &term).unwrap_or(*start);
+    let cost = linearize(&data.points, &pose, &term).map_or(f64::INFINITY, |all| all.cost);
     Likelihood { pose, cost }
 }

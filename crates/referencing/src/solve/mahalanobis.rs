@@ -1,14 +1,16 @@
 //! Mahalanobis: 3D–3D least squares, every point weighed by its whole covariance.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 
 use super::{
     Degenerate, Solver,
     descent::{Term, linearize, minimize},
     kabsch,
+    sightings::{FEW, Sightings, Target},
     spread::{check, in_front},
     starts::likeliest,
 };
@@ -21,7 +23,7 @@ use crate::{Observation, Observations};
 /// E z ≈ z (1 + σ_d²/d²). Where pixels and rig are known, both are therefore seen from the *fitted* point p: its
 /// covariance Σ(p) = (Jᵀ Σ_px⁻¹ J)⁻¹, J = ∂pixels/∂p, and the displacement C − p as the step that moves p's pixels to
 /// those of C to first order, r = Σ(p) Jᵀ Σ_px⁻¹ (π(C) − π(p)). Pixels have no bias, so r has none to second
-/// order. The answer then solves Σ ∂pᵀ (Σ(p) + σ² I)⁻¹ r = 0.
+/// order. The answer then solves Σ ∂pᵀ (Σ(p) + σ² I)⁻¹ r = 0: it is that of the pixels of the triangulated point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mahalanobis {
@@ -57,12 +59,14 @@ impl Solver for Mahalanobis {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         let Some(rig) = self.rig(data) else {
-            let start = kabsch::fit(&data.points);
-            return minimize(&data.points, &start, &as_measured).ok_or(Degenerate::NotFinite);
+            let (start, measured) = (kabsch::fit(&data.points), Measured::of(&data.points));
+            let term = |k: usize, at: &_| Some(measured.term(k, at));
+            return minimize(&data.points, &start, &term).ok_or(Degenerate::NotFinite);
         };
         in_front(data)?;
-        let fine = |point: &_, at: &_| as_fitted(rig, point, at);
-        likeliest(data, rig, self.starts, &as_measured, &fine).ok_or(Degenerate::Singular)
+        let mut sightings = Sightings::new(rig);
+        sightings.see(&data.points, Target::Triangulated).ok_or(Degenerate::Singular)?;
+        likeliest(data, rig, self.starts, &sightings).ok_or(Degenerate::Singular)
     }
 
     fn covariance(
@@ -71,8 +75,15 @@ impl Solver for Mahalanobis {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let information = match self.rig(data) {
-            Some(rig) => linearize(&data.points, at, &|point, at| as_fitted(rig, point, at)),
-            None => linearize(&data.points, at, &as_measured),
+            Some(rig) => {
+                let mut all = Sightings::new(rig);
+                let seen = all.see(&data.points, Target::Triangulated);
+                seen.and_then(|()| linearize(&data.points, at, &|k, place: &_| all.live(k, place)))
+            }
+            None => {
+                let measured = Measured::of(&data.points);
+                linearize(&data.points, at, &|k, place: &_| Some(measured.term(k, place)))
+            }
         };
         information.and_then(|all| all.covariance()).map(Covariance6::new).ok_or(Degenerate::Singular)
     }
@@ -84,28 +95,28 @@ impl Mahalanobis {
     }
 }
 
-/// Coordinates are never better than this (m): exact data would otherwise have infinite weight.
-const FLOOR: f64 = 1e-9;
-
-/// A point with the covariance it was measured with.
-pub(super) fn as_measured(point: &Observation, at: &Point<Camera>) -> Option<Term> {
-    let noise = point.noise() + Matrix3::identity() * (FLOOR * FLOOR);
-    let information = noise.try_inverse().unwrap_or_else(|| Matrix3::identity() / (noise.trace() / 3.0));
-    Some(Term::of(information, &(point.measured.at - *at)))
+/// Points with the covariance they were measured with.
+pub(super) struct Measured<'a> {
+    points: &'a [Observation],
+    information: SmallVec<[Matrix3<f64>; FEW]>,
 }
 
-/// A point with covariance and displacement as seen from where it was fitted.
-fn as_fitted(rig: &StereoRig, point: &Observation, at: &Point<Camera>) -> Option<Term> {
-    let Some(pixels) = &point.pixels else { return as_measured(point, at) };
-    let (expected, j) = rig.project_with_jacobian(at)?;
-    let moved = rig.project(&point.measured.at)?.coordinates() - expected.coordinates();
-    let weighted = pixels.covariance.try_inverse()? * j;
-    let (information, pull) = (j.transpose() * weighted, weighted.transpose() * moved);
-    let covariance = information.try_inverse()?;
-    let residual = covariance * pull;
-    let model = point.model_sigma * point.model_sigma;
-    if model > 0.0 {
-        return Some(Term::of((covariance + Matrix3::identity() * model).try_inverse()?, &residual));
+impl<'a> Measured<'a> {
+    pub(super) fn of(points: &'a [Observation]) -> Self {
+        Self { points, information: points.iter().map(information).collect() }
     }
-    Some(Term { information, pull, cost: residual.dot(&pull) })
+
+    /// What the k-th says of the place where a pose puts it.
+    #[inline]
+    pub(super) fn term(&self, k: usize, at: &Vector3<f64>) -> Term {
+        Term::of(self.information[k], &(self.points[k].measured.at.coords - at))
+    }
+}
+
+/// (Σ_measured + σ_model² I)⁻¹.
+pub(super) fn information(point: &Observation) -> Matrix3<f64> {
+    /// Coordinates are never better than this (m): exact data would otherwise have infinite weight.
+    const FLOOR: f64 = 1e-9;
+    let noise = point.noise() + Matrix3::identity() * (FLOOR * FLOOR);
+    noise.try_inverse().unwrap_or_else(|| Matrix3::identity() / (noise.trace() / 3.0))
 }

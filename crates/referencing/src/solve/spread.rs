@@ -37,16 +37,18 @@ pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> +
     if values[2] > 0.0 { (values[1].max(0.0) / values[2]).sqrt() } else { 0.0 }
 }
 
-/// Refuses too few points, numbers that are not finite, and points (measured or model) on a line:
-/// second extent below `least` of the first.
-pub(super) fn check(data: &Observations<'_>, needed: usize, least: f64) -> Result<(), Degenerate> {
+/// Refuses too few points and numbers that are not finite.
+pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
     let found = data.points.len();
     if found < needed {
         return Err(Degenerate::TooFew { found, needed });
     }
-    if !data.points.iter().all(Observation::is_finite) {
-        return Err(Degenerate::NotFinite);
-    }
+    if data.points.iter().all(Observation::is_finite) { Ok(()) } else { Err(Degenerate::NotFinite) }
+}
+
+/// Refuses what [`finite`] refuses, and points (measured or model) on a line: second extent below `least` of the first.
+pub(super) fn check(data: &Observations<'_>, needed: usize, least: f64) -> Result<(), Degenerate> {
+    finite(data, needed)?;
     let model = data.points.iter().map(|point| point.model.coords);
     let measured = data.points.iter().map(|point| point.measured.at.coords);
     if clearly_wide(model.clone(), least) && clearly_wide(measured.clone(), least) {

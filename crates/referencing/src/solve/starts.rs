@@ -1,43 +1,41 @@
 //! Several starts, one answer: the likeliest.
 
-use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
+use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use super::{
-    descent::{Linearized, Term, descend, linearize, settle},
+    descent::{Linearized, NEAR, descend, linearize, settle},
     kabsch,
     roots::roots,
+    sightings::Sightings,
 };
-use crate::{Observation, Observations};
+use crate::Observations;
 
-/// A tenth of a standard deviation: near enough for weights to be taken anew.
-const COARSE: f64 = 1e-2;
 /// An attitude less certain than this (rad, three axes together) may lie in the wrong valley.
 const WEAK: f64 = 0.01;
 
 /// The pose of least cost that is reached from the unweighted fit and, where that leaves a doubt, from the poses
-/// that three points allow the left camera alone; `starts` in all.
+/// that three points allow one camera alone; `starts` in all.
 ///
-/// `coarse` has weights that do not depend on the pose and leads near the minimum, `fine` is what is solved.
 /// The first answer is doubted when its attitude is weak or its χ² unlikely: other valleys are then looked into.
 pub(super) fn likeliest(
     data: &Observations<'_>,
     rig: &StereoRig,
     starts: usize,
-    coarse: &impl Fn(&Observation, &Point<Camera>) -> Option<Term>,
-    fine: &impl Fn(&Observation, &Point<Camera>) -> Option<Term>,
+    sightings: &Sightings<'_>,
 ) -> Option<Transform<Object, Camera>> {
     let points = &data.points;
+    let (frozen, live) = (|k: usize, at: &_| sightings.frozen(k, at), |k: usize, at: &_| sightings.live(k, at));
     let from = |start: &Transform<Object, Camera>| {
-        let near = descend(points, start, COARSE, coarse)?;
-        let pose = settle(points, &near, fine)?;
-        Some((linearize(points, &pose, fine)?, pose))
+        let (near, here) = descend(points, start, NEAR, &frozen)?;
+        let here = if sightings.weights_move { linearize(points, &near, &live)? } else { here };
+        settle(points, near, here, &live)
     };
     let first = from(&kabsch::fit(points));
-    if starts == 1 || first.as_ref().is_some_and(|(all, _)| is_clear(all, points.len())) {
-        return first.map(|(_, pose)| pose);
+    if starts == 1 || first.as_ref().is_some_and(|(_, all)| is_clear(all, points.len())) {
+        return first.map(|(pose, _)| pose);
     }
-    let mut best = first.map(|(all, pose)| (all.cost, pose));
-    for (all, pose) in roots(data, rig).as_slice().iter().take(starts - 1).filter_map(from) {
+    let mut best = first.map(|(pose, all)| (all.cost, pose));
+    for (pose, all) in roots(data, rig).as_slice().iter().take(starts - 1).filter_map(from) {
         // Two starts in one valley give one cost: of equals the first stands.
         if best.is_none_or(|(least, _)| all.cost < least * (1.0 - 1e-6)) {
             best = Some((all.cost, pose));

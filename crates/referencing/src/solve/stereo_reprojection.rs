@@ -1,17 +1,17 @@
 //! Stereo reprojection: maximum likelihood on the four pixel coordinates of every point.
 
-use nalgebra::{Matrix4, Vector4};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform, UncertainPixels};
+use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver,
-    descent::{Term, linearize},
+    descent::linearize,
+    sightings::{Sightings, Target},
     spread::{check, in_front},
     starts::likeliest,
 };
-use crate::{Observation, Observations};
+use crate::Observations;
 
 /// The most likely pose given where both images show the points: least Σ rᵀ S⁻¹ r over SE(3), r the four pixel
 /// residuals of a point and S = Σ_px + σ_model² J Jᵀ, J = ∂pixels/∂p at the fitted point (the error of the model's
@@ -58,8 +58,9 @@ impl Solver for StereoReprojection {
         check(data, self.minimum(), self.least_ratio)?;
         let rig = pixels_and_rig(data)?;
         in_front(data)?;
-        let (coarse, fine) = (|point: &_, at: &_| coarse(rig, point, at), |point: &_, at: &_| term(rig, point, at));
-        likeliest(data, rig, self.starts, &coarse, &fine).ok_or(Degenerate::Singular)
+        let mut sightings = Sightings::new(rig);
+        sightings.see(&data.points, Target::Pixels).ok_or(Degenerate::Singular)?;
+        likeliest(data, rig, self.starts, &sightings).ok_or(Degenerate::Singular)
     }
 
     fn covariance(
@@ -68,39 +69,16 @@ impl Solver for StereoReprojection {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let rig = pixels_and_rig(data)?;
-        let all = linearize(&data.points, at, &|point, at| term(rig, point, at));
-        all.and_then(|all| all.covariance()).map(Covariance6::new).ok_or(Degenerate::Singular)
+        let mut all = Sightings::new(rig);
+        all.see(&data.points, Target::Pixels)
+            .and_then(|()| linearize(&data.points, at, &|k, place: &_| all.live(k, place)))
+            .and_then(|all| all.covariance())
+            .map(Covariance6::new)
+            .ok_or(Degenerate::Singular)
     }
 }
 
 /// The rig, if it and every point's pixels are known.
 pub(super) fn pixels_and_rig<'a>(data: &Observations<'a>) -> Result<&'a StereoRig, Degenerate> {
     data.rig.filter(|_| data.points.iter().all(|point| point.pixels.is_some())).ok_or(Degenerate::NoPixels)
-}
-
-/// Pixels are never better known than this: exact ones would otherwise have infinite weight.
-const FLOOR: f64 = 1e-6;
-
-/// What a point says, S taken at the fitted point.
-pub(super) fn term(rig: &StereoRig, point: &Observation, at: &Point<Camera>) -> Option<Term> {
-    weighed(rig, point, at, at)
-}
-
-/// The same with S at the measured point, which does not depend on the pose: costs can be compared.
-fn coarse(rig: &StereoRig, point: &Observation, at: &Point<Camera>) -> Option<Term> {
-    weighed(rig, point, at, &point.measured.at)
-}
-
-fn weighed(rig: &StereoRig, point: &Observation, at: &Point<Camera>, weigh_at: &Point<Camera>) -> Option<Term> {
-    let pixels: &UncertainPixels = point.pixels.as_ref()?;
-    let (expected, j) = rig.project_with_jacobian(at)?;
-    let r: Vector4<f64> = pixels.at.coordinates() - expected.coordinates();
-    let mut s = pixels.covariance + Matrix4::identity() * (FLOOR * FLOOR);
-    if point.model_sigma > 0.0 {
-        let by_model = if weigh_at == at { j } else { rig.project_with_jacobian(weigh_at)?.1 };
-        s += by_model * by_model.transpose() * (point.model_sigma * point.model_sigma);
-    }
-    let weight = s.try_inverse()?;
-    let weighted = weight * j;
-    Some(Term { information: j.transpose() * weighted, pull: weighted.transpose() * r, cost: r.dot(&(weight * r)) })
 }

@@ -1,10 +1,11 @@
 //! Triad: the paper's pose from three identified points.
 
+use nalgebra::{Matrix3, Vector3};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Covariance6, Object, Transform, triad};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, numerical, spread::check};
+use super::{Degenerate, Solver, numerical, spread::finite};
 use crate::{Observation, Observations};
 
 /// Which three of the identified points the pose rests on ("the three most reliable", which the
@@ -78,50 +79,70 @@ impl Solver for Triad {
 impl Triad {
     /// The three points the pose rests on, ascending.
     fn three(&self, data: &Observations<'_>) -> Result<[usize; 3], Degenerate> {
-        check(data, 3, 1e-9)?;
-        let triangles = triangles(data.points.len());
+        finite(data, 3)?;
         let mut best: Option<([usize; 3], f64)> = None;
-        let mut widest: f64 = 0.0;
-        for three in triangles {
-            let points = three.map(|i| data.points[i]);
-            let sine = least_sine(&points);
-            widest = widest.max(sine);
-            if !(sine >= self.least_sine) {
-                continue;
-            }
+        for three in triangles(data.points.len()) {
+            let points = three.map(|i| &data.points[i]);
+            // The cheaper test first: a triangle that is no larger than the best needs no second look.
             let worth = match self.choose {
-                Choose::First => return Ok(three),
-                Choose::LargestArea => area(&points),
-                Choose::SmallestCovariance => match predicted_error(&points, data) {
-                    Ok(error) => -error,
-                    Err(_) => continue,
-                },
+                Choose::LargestArea => square_area(&points),
+                Choose::First | Choose::SmallestCovariance => 0.0,
             };
             // Ties are broken by the order of the model: strictly better replaces.
-            if best.is_none_or(|(_, most)| worth > most) {
-                best = Some((three, worth));
+            let better = |worth: f64| best.is_none_or(|(_, most)| worth > most);
+            let wide = |points: &[&Observation; 3]| least_sine(points) >= self.least_sine;
+            match self.choose {
+                Choose::First if wide(&points) => return Ok(three),
+                Choose::LargestArea if better(worth) && wide(&points) => best = Some((three, worth)),
+                Choose::SmallestCovariance if wide(&points) => {
+                    if let Ok(error) = predicted_error(&points.map(|point| *point), data)
+                        && better(-error)
+                    {
+                        best = Some((three, -error));
+                    }
+                }
+                _ => {}
             }
         }
-        best.map(|(three, _)| three).ok_or(Degenerate::Collinear { ratio: widest, least: self.least_sine })
+        best.map(|(three, _)| three).ok_or_else(|| self.line(data))
+    }
+
+    /// That no triangle is wide enough, with the widest.
+    fn line(&self, data: &Observations<'_>) -> Degenerate {
+        let sines = triangles(data.points.len()).map(|three| least_sine(&three.map(|i| &data.points[i])));
+        Degenerate::Collinear { ratio: sines.fold(0.0, f64::max), least: self.least_sine }
     }
 }
 
 /// All triangles of `count` points, lexicographic; of many points, those of an even sample.
 fn triangles(count: usize) -> impl Iterator<Item = [usize; 3]> {
     let kept = count.min(MOST_WEIGHED);
-    let at = move |i: usize| i * count / kept;
+    let at = move |i: usize| if kept == count { i } else { i * count / kept };
     (0..kept).flat_map(move |i| (i + 1..kept).flat_map(move |j| (j + 1..kept).map(move |k| [at(i), at(j), at(k)])))
 }
 
-/// Eq. (3)–(5).
+/// Eq. (3)–(5): the axes of both auxiliary frames laid on each other, R = M_object M_cameraᵀ, and P1 on C1.
 fn pose(points: &[Observation; 3]) -> Result<Transform<Object, Camera>, Degenerate> {
-    let line =
-        |collinear: seafix_geometry::Collinear| Degenerate::Collinear { ratio: collinear.sine, least: collinear.least };
-    let [c1, c2, c3] = points.map(|point| point.measured.at);
-    let [p1, p2, p3] = points.map(|point| point.model);
-    let camera_from_auxiliary = triad::<Camera, Object>(&c1, &c2, &c3).map_err(line)?;
-    let object_from_auxiliary = triad::<Object, Object>(&p1, &p2, &p3).map_err(line)?;
-    Ok(object_from_auxiliary * camera_from_auxiliary.inverse())
+    let [c1, c2, c3] = points.map(|point| point.measured.at.coords);
+    let [p1, p2, p3] = points.map(|point| point.model.coords);
+    let rotation = axes(&p1, &p2, &p3)? * axes(&c1, &c2, &c3)?.transpose();
+    let rotation = Transform::<Object, Camera>::from_axes(&rotation, Vector3::zeros()).rotation();
+    Ok(Transform::new(rotation, p1 - rotation * c1))
+}
+
+/// The axes of [`seafix_geometry::triad`] as the columns of a matrix.
+fn axes(p1: &Vector3<f64>, p2: &Vector3<f64>, p3: &Vector3<f64>) -> Result<Matrix3<f64>, Degenerate> {
+    const LEAST_SINE: f64 = 1e-9;
+    let (a, b) = (p2 - p1, p3 - p1);
+    let normal = a.cross(&b);
+    let (length, size) = (b.norm(), normal.norm());
+    let ratio = size / (a.norm() * length);
+    // Written so that a NaN (coincident points) is refused too.
+    if !(ratio >= LEAST_SINE) {
+        return Err(Degenerate::Collinear { ratio: if ratio.is_nan() { 0.0 } else { ratio }, least: LEAST_SINE });
+    }
+    let (x, z) = (b / length, normal / size);
+    Ok(Matrix3::from_columns(&[x, z.cross(&x), z]))
 }
 
 fn covariance_of(
@@ -135,20 +156,20 @@ fn covariance_of(
 }
 
 /// The sine of the smallest angle, in the model or as measured, whichever is smaller.
-fn least_sine(points: &[Observation; 3]) -> f64 {
-    let sine = |a: f64, b: f64, double_area: f64| double_area / (a * b);
-    let of = |p: [nalgebra::Vector3<f64>; 3]| {
+fn least_sine(points: &[&Observation; 3]) -> f64 {
+    let of = |p: [Vector3<f64>; 3]| {
         let sides = [(p[1] - p[0]), (p[2] - p[1]), (p[0] - p[2])];
-        let double_area = sides[0].cross(&sides[1]).norm();
-        let [a, b, c] = sides.map(|side| side.norm());
-        sine(a, b, double_area).min(sine(b, c, double_area)).min(sine(c, a, double_area))
+        let square = sides[0].cross(&sides[1]).norm_squared();
+        let [a, b, c] = sides.map(|side| side.norm_squared());
+        // The smallest angle lies between the two longest sides.
+        square / (a * b).max(b * c).max(c * a)
     };
-    of(points.map(|point| point.model.coords)).min(of(points.map(|point| point.measured.at.coords)))
+    of(points.map(|point| point.model.coords)).min(of(points.map(|point| point.measured.at.coords))).sqrt()
 }
 
-/// Twice the area of the model's triangle (m²).
-fn area(points: &[Observation; 3]) -> f64 {
-    (points[1].model - points[0].model).cross(&(points[2].model - points[0].model)).norm()
+/// Four times the square of the area of the model's triangle (m⁴).
+fn square_area(points: &[&Observation; 3]) -> f64 {
+    (points[1].model - points[0].model).cross(&(points[2].model - points[0].model)).norm_squared()
 }
 
 /// The variance (m²) that the pose from these three gives all identified points, summed.
@@ -161,6 +182,16 @@ fn predicted_error(points: &[Observation; 3], data: &Observations<'_>) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
+    use seafix_geometry::{Point, triad};
+
+    #[test]
+    fn the_axes_are_the_triads() {
+        let [a, b, c] = [[0.3, -1.0, 2.0], [1.4, 0.2, 2.2], [-0.5, 0.7, 3.0]].map(Vector3::from);
+        let [pa, pb, pc] = [a, b, c].map(Point::<Camera>::from);
+        let expected = triad::<Camera, Object>(&pa, &pb, &pc).unwrap().rotation_matrix();
+        assert!((axes(&a, &b, &c).unwrap() - expected).amax() < 1e-15);
+        assert!(axes(&a, &a, &c).is_err() && axes(&a, &b, &(a + (b - a) * 2.0)).is_err());
+    }
 
     #[test]
     fn settings_out_of_range_are_refused() {

@@ -1,0 +1,106 @@
+//! The normal equations of a motion from points with information matrices.
+
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+
+/// Σ Jᵀ W J over points p with J = \[ \[p\]×, −I \]: in blocks, −\[p\]× W \[p\]×, \[p\]× W and W.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Normal {
+    turn: Matrix3<f64>,
+    mixed: Matrix3<f64>,
+    shift: Matrix3<f64>,
+}
+
+impl Normal {
+    /// Adds a point and its information, which is symmetric.
+    #[inline]
+    pub(super) fn add(&mut self, at: &Vector3<f64>, information: &Matrix3<f64>) {
+        let w = information;
+        let (x, y, z) = (at.x, at.y, at.z);
+        // [p]× W, row by row.
+        let lever = Matrix3::from_rows(&[
+            w.row(2) * y - w.row(1) * z,
+            w.row(0) * z - w.row(2) * x,
+            w.row(1) * x - w.row(0) * y,
+        ]);
+        // −L [p]×: each row is the cross product p × row.
+        let (a, b, c) = (lever.column(0), lever.column(1), lever.column(2));
+        self.turn += Matrix3::from_columns(&[c * y - b * z, a * z - c * x, b * x - a * y]);
+        self.mixed += lever;
+        self.shift += w;
+    }
+
+    pub(super) fn matrix(&self) -> Matrix6<f64> {
+        let mut all = Matrix6::zeros();
+        all.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.turn);
+        all.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.mixed);
+        all.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.mixed.transpose());
+        all.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.shift);
+        all
+    }
+
+    /// The ξ of (N + damping · diag N) ξ = `gradient`; `None` where that is not positive definite.
+    pub(super) fn solve(&self, damping: f64, gradient: &Vector6<f64>) -> Option<Vector6<f64>> {
+        let n = self.matrix();
+        let mut l = [[0.0; 6]; 6];
+        let mut inverse = [0.0; 6];
+        for j in 0..6 {
+            let mut pivot = n[(j, j)] * (1.0 + damping);
+            for k in 0..j {
+                pivot -= l[j][k] * l[j][k];
+            }
+            if !(pivot > 0.0) {
+                return None;
+            }
+            inverse[j] = 1.0 / pivot.sqrt();
+            for i in j + 1..6 {
+                let mut sum = n[(i, j)];
+                for k in 0..j {
+                    sum -= l[i][k] * l[j][k];
+                }
+                l[i][j] = sum * inverse[j];
+            }
+        }
+        let mut x = *gradient;
+        for i in 0..6 {
+            for k in 0..i {
+                x[i] -= l[i][k] * x[k];
+            }
+            x[i] *= inverse[i];
+        }
+        for i in (0..6).rev() {
+            for k in i + 1..6 {
+                x[i] -= l[k][i] * x[k];
+            }
+            x[i] *= inverse[i];
+        }
+        Some(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3x6;
+    use seafix_geometry::so3::skew;
+
+    #[test]
+    fn blocks_and_solution_are_those_of_the_definition() {
+        let mut all = Normal::default();
+        let mut expected = Matrix6::zeros();
+        for k in 0..4 {
+            let at = Vector3::new(f64::from(k), f64::from(k * k) - 2.0, 3.0 + f64::from(k % 2));
+            let root = Matrix3::new(1.0, 0.2, 0.1, 0.0, 2.0, f64::from(k) * 0.3, 0.0, 0.0, 0.5);
+            let w = root * root.transpose();
+            all.add(&at, &w);
+            let mut j = Matrix3x6::zeros();
+            j.fixed_view_mut::<3, 3>(0, 0).copy_from(&skew(&at));
+            j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-Matrix3::identity());
+            expected += j.transpose() * w * j;
+        }
+        assert!((all.matrix() - expected).amax() < 1e-12 * expected.amax());
+        let g = Vector6::new(1.0, -2.0, 0.5, 3.0, -0.1, 0.7);
+        let damped = expected + Matrix6::from_diagonal(&(expected.diagonal() * 0.3));
+        assert!((damped * all.solve(0.3, &g).unwrap() - g).amax() < 1e-10);
+        assert_eq!(Normal::default().solve(0.0, &g), None);
+    }
+}

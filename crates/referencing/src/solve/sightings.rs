@@ -1,0 +1,116 @@
+//! What the images say of each point, weights made ready.
+
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use seafix_geometry::StereoRig;
+use smallvec::SmallVec;
+
+use super::{descent::Term, eyes::Eyes, mahalanobis::information};
+use crate::Observation;
+
+/// Up to so many points are kept without allocating.
+pub(super) const FEW: usize = 32;
+
+/// What of each point is compared with its projection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Target {
+    /// The pixels where it was seen.
+    Pixels,
+    /// The pixels of the point as triangulated: what 3D–3D sees, with the covariance seen from the fitted point.
+    Triangulated,
+}
+
+/// The points of one problem, as the cameras saw them.
+pub(super) struct Sightings<'a> {
+    eyes: Eyes<'a>,
+    all: SmallVec<[Sighting; FEW]>,
+    /// Whether a point of the model is uncertain, so that weights depend on the pose.
+    pub(super) weights_move: bool,
+}
+
+enum Sighting {
+    /// Pixels with the inverse of their covariance, and of that with the model's error as the measured point shows it.
+    Seen { at: Vector4<f64>, weight: Matrix4<f64>, frozen: Matrix4<f64>, model_variance: f64 },
+    /// A point without pixels, with the information on it.
+    Bare { at: Vector3<f64>, information: Matrix3<f64> },
+}
+
+/// Pixels are never better known than this (px): exact ones would otherwise have infinite weight.
+const FLOOR: f64 = 1e-6;
+
+impl<'a> Sightings<'a> {
+    /// Those of no point yet: [`see`](Self::see) fills them where they stand, for they are large.
+    #[inline]
+    pub(super) fn new(rig: &'a StereoRig) -> Self {
+        Self { eyes: Eyes::of(rig), all: SmallVec::new(), weights_move: false }
+    }
+
+    /// `None` where a covariance has no inverse or a point is behind a camera.
+    pub(super) fn see(&mut self, points: &[Observation], target: Target) -> Option<()> {
+        for point in points {
+            let sighting = self.sighting(point, target)?;
+            self.weights_move |= matches!(sighting, Sighting::Seen { model_variance, .. } if model_variance > 0.0);
+            self.all.push(sighting);
+        }
+        Some(())
+    }
+
+    fn sighting(&self, point: &Observation, target: Target) -> Option<Sighting> {
+        let Some(pixels) = &point.pixels else {
+            return Some(Sighting::Bare { at: point.measured.at.coords, information: information(point) });
+        };
+        let noise = pixels.covariance + Matrix4::identity() * (FLOOR * FLOOR);
+        let weight = noise.try_inverse()?;
+        let model_variance = point.model_sigma * point.model_sigma;
+        let (mut at, mut frozen) = (pixels.at.coordinates(), weight);
+        if target == Target::Triangulated || model_variance > 0.0 {
+            let (seen, j) = self.eyes.look(&point.measured.at.coords)?;
+            if target == Target::Triangulated {
+                at = seen;
+            }
+            if model_variance > 0.0 {
+                frozen = (noise + j * j.transpose() * model_variance).try_inverse()?;
+            }
+        }
+        Some(Sighting::Seen { at, weight, frozen, model_variance })
+    }
+
+    /// What the k-th point says, S = Σ_px + σ_model² J Jᵀ with J at the place where the pose puts it.
+    ///
+    /// With A = Jᵀ Σ_px⁻¹ J and g = Jᵀ Σ_px⁻¹ r, the model's error marginalised leaves (I + σ² A)⁻¹ A and
+    /// (I + σ² A)⁻¹ g (Woodbury).
+    #[inline]
+    pub(super) fn live(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
+        match &self.all[k] {
+            Sighting::Seen { at, weight, model_variance, .. } => {
+                let term = self.seen(at, weight, place)?;
+                if *model_variance == 0.0 {
+                    return Some(term);
+                }
+                let blur = (Matrix3::identity() + term.information * *model_variance).try_inverse()?;
+                let pull = blur * term.pull;
+                let cost = term.cost - *model_variance * term.pull.dot(&pull);
+                Some(Term { information: blur * term.information, pull, cost })
+            }
+            Sighting::Bare { at, information } => Some(Term::of(*information, &(at - place))),
+        }
+    }
+
+    /// The same with J of the model's error at the measured point: the weights do not depend on the pose, so that
+    /// costs can be compared.
+    #[inline]
+    pub(super) fn frozen(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
+        match &self.all[k] {
+            Sighting::Seen { at, frozen, .. } => self.seen(at, frozen, place),
+            Sighting::Bare { at, information } => Some(Term::of(*information, &(at - place))),
+        }
+    }
+
+    #[inline]
+    fn seen(&self, at: &Vector4<f64>, weight: &Matrix4<f64>, place: &Vector3<f64>) -> Option<Term> {
+        let (expected, j) = self.eyes.look(place)?;
+        let r = at - expected;
+        let weighted = weight * j;
+        let information = weighted.tr_mul(&j);
+        Some(Term { information, pull: weighted.tr_mul(&r), cost: r.dot(&(weight * r)) })
+    }
+}
