@@ -1,14 +1,21 @@
 //! Many draws of one layout: the errors of a solver beside the Cramér–Rao bound.
 
 use nalgebra::{Matrix4, Vector3};
-use seafix_evaluation::{Seen, attitude_error, cramer_rao, nees, position_error, transfer_bound, transfer_rms};
-use seafix_geometry::Point;
-use seafix_referencing::{Observation, Observations, Solver};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_component::Choice;
+use seafix_evaluation::{
+    Seen, attitude_error, cramer_rao, nees, nonlinearity, position_error, transfer_bound, transfer_rms,
+};
+use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform};
+use seafix_referencing::{Observation, Observations, SOLVERS, Solver};
 use seafix_simulation::{Layout, Placed};
 
 /// What the draws of one cell say of one solver.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Cell {
+    /// Layouts that were drawn from.
+    pub layouts: u32,
     /// Draws that were answered.
     pub answered: u32,
     /// Draws that were not.
@@ -38,6 +45,21 @@ pub struct Cell {
 /// # Panics
 /// When the settings describe no layout.
 pub fn cell(solver: &dyn Solver, settings: &Layout, layouts: u64, draws: u64, covariance: bool) -> Cell {
+    cell_where(solver, settings, layouts, draws, covariance, |_, _| true)
+}
+
+/// The same of those layouts alone that `keep` keeps, given the bound.
+///
+/// # Panics
+/// When the settings describe no layout.
+pub fn cell_where(
+    solver: &dyn Solver,
+    settings: &Layout,
+    layouts: u64,
+    draws: u64,
+    covariance: bool,
+    keep: impl Fn(&Placed, &Covariance6<Object, Camera>) -> bool,
+) -> Cell {
     /// χ²₆ at 95 %.
     const NINETY_FIVE: f64 = 12.591_587_243_743_977;
     let mut cell = Cell::default();
@@ -48,6 +70,10 @@ pub fn cell(solver: &dyn Solver, settings: &Layout, layouts: u64, draws: u64, co
         let seen = placed.model.iter().map(|&at| Seen { at, model_sigma: settings.model_sigma, pixels });
         let bound = cramer_rao(&placed.rig, &placed.object_from_camera, &seen.collect::<Vec<_>>())
             .expect("three points and more determine a pose");
+        if !keep(&placed, &bound) {
+            continue;
+        }
+        cell.layouts += 1;
         cell.attitude_sigma = cell.attitude_sigma.max(bound.attitude_sigma());
         let (m2_limit, m3_limit) =
             (transfer_bound(&bound, &placed.object_from_camera, &placed.model), bound.position_sigma());
@@ -89,12 +115,60 @@ pub fn cell(solver: &dyn Solver, settings: &Layout, layouts: u64, draws: u64, co
 
 /// The draw as a solver takes it.
 pub fn observations(placed: &Placed, draw: u64, model_sigma: f64) -> Option<Vec<Observation>> {
-    let cloud = placed.draw(draw)?;
-    let point = |(seen, &model): (&seafix_geometry::MeasuredPoint, _)| Observation {
+    observations_of(placed, &placed.draw(draw)?, model_sigma)
+}
+
+fn observations_of(placed: &Placed, cloud: &[MeasuredPoint], model_sigma: f64) -> Option<Vec<Observation>> {
+    let point = |(seen, &model): (&MeasuredPoint, _)| Observation {
         measured: seen.position,
         pixels: seen.pixels,
         model,
         model_sigma,
     };
     Some(cloud.iter().zip(&placed.model).map(point).collect())
+}
+
+/// Whether the Cramér–Rao bound is meaningful for a layout. It is a bound for the valley of the truth alone, and
+/// linear: [`nonlinearity`] is at most a tenth, and no pose in another valley comes so near to the exact pixels
+/// (χ² below 64) that noise would prefer it more often than Q(√64 / 2) = 3e-5. Where one does, the likeliest pose
+/// itself is now and then a wrong one, fifty bounds away.
+pub fn is_meaningful(placed: &Placed, sigma_px: f64, bound: &Covariance6<Object, Camera>) -> bool {
+    let pixels = Matrix4::identity() * sigma_px.powi(2);
+    let seen: Vec<Seen> = placed.model.iter().map(|&at| Seen { at, model_sigma: 0.0, pixels }).collect();
+    let straight = nonlinearity(&placed.rig, &placed.object_from_camera, &seen, bound).is_some_and(|bent| bent <= 0.1);
+    straight && rival(placed, sigma_px) >= 64.0
+}
+
+/// The least χ² of the exact pixels in any valley but the truth's, from 64 starts turned about the centroid; infinite
+/// where all lead to the truth.
+pub fn rival(placed: &Placed, sigma_px: f64) -> f64 {
+    let solver = SOLVERS.build(&Choice::named("stereo-reprojection").with("starts", 1)).expect("a solver");
+    let Some(mut exact) = observations_of(placed, &placed.exact(sigma_px), 0.0) else { return f64::INFINITY };
+    let truth = placed.object_from_camera;
+    let places: Vec<Vector3<f64>> = placed.model.iter().map(|&p| (truth.inverse() * p).coords).collect();
+    let centre = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+    let mut rng = ChaCha8Rng::seed_from_u64(64);
+    let mut least = f64::INFINITY;
+    for _ in 0..64 {
+        let q = nalgebra::Vector4::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let turn = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::from(q));
+        for (point, place) in exact.iter_mut().zip(&places) {
+            point.measured.at = Point::from(centre + turn * (place - centre));
+        }
+        let data = Observations { points: exact.clone(), rig: Some(&placed.rig) };
+        let Ok(pose) = solver.solve(&data) else { continue };
+        if let Some(chi2) = pixel_chi2(placed, &exact, &pose, sigma_px).filter(|chi2| *chi2 > 1e-6) {
+            least = least.min(chi2);
+        }
+    }
+    least
+}
+
+/// χ² of the pixels at a pose.
+fn pixel_chi2(placed: &Placed, points: &[Observation], pose: &Transform<Object, Camera>, sigma_px: f64) -> Option<f64> {
+    let of = |point: &Observation| {
+        let expected = placed.rig.project(&(pose.inverse() * point.model))?.coordinates();
+        Some((point.pixels?.at.coordinates() - expected).norm_squared() / sigma_px.powi(2))
+    };
+    points.iter().map(of).sum()
 }

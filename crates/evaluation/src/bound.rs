@@ -65,6 +65,40 @@ pub fn transfer_bound(
     (sum / model.len() as f64).sqrt()
 }
 
+/// How far the images leave the linear model that the bound rests on, within the bound's own uncertainty: root mean
+/// square, over poses at √6 standard deviations along twelve directions that span the bound, of the whitened pixel
+/// residual that J ξ leaves, over that of J ξ. Small (a tenth) where the bound's Gaussian describes the near poses
+/// (Bates and Watts, *Relative curvature measures of nonlinearity*, 1980); it says nothing of another valley far away.
+/// `None` where a pose so far off sees a point no more.
+pub fn nonlinearity(
+    rig: &StereoRig,
+    object_from_camera: &Transform<Object, Camera>,
+    points: &[Seen],
+    bound: &Covariance6<Object, Camera>,
+) -> Option<f64> {
+    const SMALL: f64 = 1e-4;
+    let root = bound.matrix.cholesky()?.l();
+    let (mut bent, mut straight) = (0.0, 0.0);
+    for point in points {
+        let whitened = point.pixels.cholesky()?.inverse();
+        let project = |xi: &Vector6<f64>| {
+            let pose = object_from_camera.perturbed(xi);
+            Some(rig.project(&(pose.inverse() * point.at))?.coordinates())
+        };
+        let here = project(&Vector6::zeros())?;
+        for i in 0..6 {
+            let xi = root.column(i) * 6f64.sqrt();
+            let linear = (project(&(xi * SMALL))? - project(&(xi * -SMALL))?) / (2.0 * SMALL);
+            for sign in [1.0, -1.0] {
+                let left = project(&(xi * sign))? - here - linear * sign;
+                bent += left.dot(&(whitened * left));
+                straight += linear.dot(&(whitened * linear));
+            }
+        }
+    }
+    Some((bent / straight).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,5 +136,10 @@ mod tests {
         let m2 = transfer_bound(&bound, &pose, &points.iter().map(|p| p.at).collect::<Vec<_>>());
         assert!(m2 > 0.0 && m2 < 0.01, "{m2}");
         assert!(cramer_rao(&rig, &pose, &points[..2]).is_none(), "two points leave a turn about their line");
+        // What is left is of second order: it grows as the noise.
+        let bent = nonlinearity(&rig, &pose, &points, &bound).unwrap();
+        let louder: Vec<Seen> = points.iter().map(|p| Seen { pixels: p.pixels * 4.0, ..*p }).collect();
+        let twice = nonlinearity(&rig, &pose, &louder, &Covariance6::new(bound.matrix * 4.0)).unwrap();
+        assert!(bent > 1e-5 && bent < 1e-2 && (twice / bent - 2.0).abs() < 1e-2, "{bent} {twice}");
     }
 }

@@ -39,19 +39,22 @@ pub fn attitude_error(estimate: &Transform<Object, Camera>, truth: &Transform<Ob
 /// The normalised error squared of a pose with its covariance: εᵀ Σ⁻¹ ε, χ² with six degrees of
 /// freedom for an honest covariance.
 ///
-/// ε = (φ, displacement of `centroid`), the covariance transported there: in this form it stays χ²
-/// when the rotation is weak. `centroid` is that of the used points, camera frame. `None` when the
-/// covariance is not positive definite.
+/// ε = (φ, displacement of the centroid of the used points), camera axes, the covariance transported there. The
+/// centroid is a point of the object, the one that the estimate places at `centroid` (camera frame): its
+/// displacement is from where the truth has it to there. A point at rest in the camera's frame would be turned
+/// by φ about the error of the depth besides, which is of second order and yet, for a small object far away,
+/// as large as the centroid's own error across the line of sight. In this form ε stays χ² when the rotation is weak.
+/// `None` when the covariance is not positive definite.
 pub fn nees(
     estimate: &Transform<Object, Camera>,
     truth: &Transform<Object, Camera>,
     covariance: &Covariance6<Object, Camera>,
     centroid: &Point<Camera>,
 ) -> Option<f64> {
-    // T_true = T_est·Exp(ξ): a point c of the camera frame moves to Exp(ξ)·c, by φ×c + ρ to first order.
+    // T_true = T_est·Exp(ξ): what the estimate places at c is truly at Exp(−ξ)·c, by φ×c + ρ from c to first order.
     let step = estimate.inverse() * *truth;
     let phi = so3::log(&step.rotation());
-    let moved: Vector3<f64> = (step * *centroid) - *centroid;
+    let moved: Vector3<f64> = *centroid - step.inverse() * *centroid;
     let mut error = Vector6::zeros();
     error.fixed_rows_mut::<3>(0).copy_from(&phi);
     error.fixed_rows_mut::<3>(3).copy_from(&moved);
@@ -110,6 +113,30 @@ mod tests {
         let truth = t.perturbed(&[0.0, 0.0, 0.0, 0.02, 0.0, 0.0].into());
         let n = nees(&t, &truth, &Covariance6::isotropic(0.01, 0.02), &Point::origin()).unwrap();
         assert!((n - 1.0).abs() < 1e-12);
+    }
+
+    /// A pose wrong by 3° and 5 cm in depth that sees the centroid where it is: the error is what the camera sees,
+    /// not the turn about the error of the depth.
+    #[test]
+    fn the_centroid_is_a_point_of_the_object() {
+        let estimate = pose(0.0, 0.0);
+        let seen = Point::new(0.0, 0.0, 5.0);
+        let deeper = Point::new(0.0, 0.0, 5.05);
+        // The truth has the object's point at `deeper`, turned about it.
+        let turn = so3::exp(&Vector3::new(0.05, 0.0, 0.0));
+        let moved = Transform::<Camera, Camera>::new(turn, seen.coords - turn * deeper.coords);
+        let truth = estimate * moved;
+        assert!((estimate * seen).distance(&(truth * deeper)) < 1e-12);
+        let lateral = 1e-3;
+        let mut about = Matrix6::from_diagonal(&[2.5e-3, 2.5e-3, 2.5e-3, 0.0, 0.0, 0.0].into());
+        about
+            .fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&Matrix3::from_diagonal(&[lateral * lateral, lateral * lateral, 2.5e-3].into()));
+        let mut back = Matrix6::identity();
+        back.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::skew(&seen.coords));
+        let covariance = Covariance6::new(back * about * back.transpose());
+        let n = nees(&estimate, &truth, &covariance, &seen).unwrap();
+        assert!((n - 2.0).abs() < 1e-6, "one standard deviation in attitude, one in depth: {n}");
     }
 
     #[test]

@@ -6,6 +6,6 @@ mod bound;
 mod fix;
 mod statistics;
 
-pub use bound::{Seen, cramer_rao, transfer_bound};
+pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
 pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
 pub use statistics::{clopper_pearson, quantile};

@@ -130,20 +130,32 @@ impl Placed {
     /// leaves a point untriangulable.
     pub fn draw(&self, draw: u64) -> Option<Vec<MeasuredPoint>> {
         let mut stream = Stream::new(self.seed, self.settings.number, draw, Purpose::Points);
-        let camera_from_object = self.object_from_camera.inverse();
-        let sigma = self.settings.sigma_px;
-        let mut measure = |model: &Point<Object>| {
-            let truly = *model + stream.normal3(self.settings.model_sigma);
-            let exact = self.rig.project(&(camera_from_object * truly))?;
-            let mut disturbed = |p: Pixel| Pixel { u: p.u + sigma * stream.normal(), v: p.v + sigma * stream.normal() };
-            let seen = StereoPixels { left: disturbed(exact.left), right: disturbed(exact.right) };
+        let (sigma, by_model) = (self.settings.sigma_px, self.settings.model_sigma);
+        let measure = |model: &Point<Object>| {
+            let truly = *model + stream.normal3(by_model);
             // A covariance of zero would claim what no camera can know.
-            let pixels = UncertainPixels::independent(seen, sigma.max(1e-3));
-            let found = self.rig.triangulate(&pixels).ok()?;
-            let position = UncertainPoint { at: found.point, covariance: found.covariance };
-            Some(MeasuredPoint { position, pixels: Some(pixels) })
+            self.measure(&truly, sigma.max(1e-3), || sigma * stream.normal())
         };
-        self.model.iter().map(&mut measure).collect()
+        self.model.iter().map(measure).collect()
+    }
+
+    /// The points without any noise, with the covariance of pixels that err by `sigma_px`.
+    ///
+    /// # Panics
+    /// Never: every point of the layout lies before both cameras.
+    pub fn exact(&self, sigma_px: f64) -> Vec<MeasuredPoint> {
+        let measure = |model: &Point<Object>| self.measure(model, sigma_px, || 0.0).expect("the layout is in view");
+        self.model.iter().map(measure).collect()
+    }
+
+    fn measure(&self, at: &Point<Object>, sigma: f64, mut noise: impl FnMut() -> f64) -> Option<MeasuredPoint> {
+        let exact = self.rig.project(&(self.object_from_camera.inverse() * *at))?;
+        let mut disturbed = |p: Pixel| Pixel { u: p.u + noise(), v: p.v + noise() };
+        let seen = StereoPixels { left: disturbed(exact.left), right: disturbed(exact.right) };
+        let pixels = UncertainPixels::independent(seen, sigma);
+        let found = self.rig.triangulate(&pixels).ok()?;
+        let position = UncertainPoint { at: found.point, covariance: found.covariance };
+        Some(MeasuredPoint { position, pixels: Some(pixels) })
     }
 }
 

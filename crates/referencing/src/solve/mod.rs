@@ -17,6 +17,7 @@ mod mahalanobis;
 mod normal;
 mod numerical;
 mod p3p;
+mod p3p_stereo;
 mod roots;
 mod sightings;
 mod spread;
@@ -139,6 +140,7 @@ pub static SOLVERS: Registry<dyn Solver> = Registry::new(
         entry!(irls::Irls),
         entry!(Kabsch),
         entry!(Mahalanobis),
+        entry!(p3p_stereo::P3pStereo),
         entry!(StereoReprojection),
         entry!(Triad),
         entry!(umeyama::Umeyama),

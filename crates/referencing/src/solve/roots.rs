@@ -1,4 +1,4 @@
-//! The poses that three of the points allow the left camera alone.
+//! The poses that three of the points allow one camera alone.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
@@ -6,17 +6,17 @@ use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
 use super::{kabsch, p3p};
 use crate::{Observation, Observations};
 
-/// Up to four poses, the one that explains the pixels of all points best first.
+/// Up to eight poses, the one that explains the pixels of all points best first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Roots {
-    poses: [Transform<Object, Camera>; 4],
-    costs: [f64; 4],
+    poses: [Transform<Object, Camera>; 8],
+    costs: [f64; 8],
     count: usize,
 }
 
 impl Default for Roots {
     fn default() -> Self {
-        Self { poses: [Transform::identity(); 4], costs: [f64::INFINITY; 4], count: 0 }
+        Self { poses: [Transform::identity(); 8], costs: [f64::INFINITY; 8], count: 0 }
     }
 }
 
@@ -28,44 +28,49 @@ impl Roots {
     /// Keeps the poses in the order of their costs.
     fn insert(&mut self, pose: Transform<Object, Camera>, cost: f64) {
         let place = self.costs[..self.count].partition_point(|&known| known <= cost);
-        if place < 4 {
+        if place < 8 {
             self.poses[place..].rotate_right(1);
             self.costs[place..].rotate_right(1);
             (self.poses[place], self.costs[place]) = (pose, cost);
-            self.count = (self.count + 1).min(4);
+            self.count = (self.count + 1).min(8);
         }
     }
 }
 
 /// The poses from which the left camera would see three widely spread points where it does see them.
 pub(super) fn roots(data: &Observations<'_>, rig: &StereoRig) -> Roots {
-    roots_of(data, rig, widest(data))
-}
-
-/// The same of these three.
-pub(super) fn roots_of(data: &Observations<'_>, rig: &StereoRig, three: [usize; 3]) -> Roots {
     let mut roots = Roots::default();
-    let three = three.map(|i| data.points[i]);
-    let ray = |point: &Observation| -> Option<Vector3<f64>> {
-        Some(rig.left().normalize(&point.pixels?.at.left)?.push(1.0).normalize())
-    };
-    let [Some(a), Some(b), Some(c)] = [0, 1, 2].map(|i| ray(&three[i])) else { return roots };
-    let rays = [a, b, c];
-    for lambda in p3p::distances(&rays, &three.map(|point| point.model.coords)).as_slice() {
-        let mut placed = three;
-        for ((point, ray), distance) in placed.iter_mut().zip(&rays).zip(lambda.iter()) {
-            point.measured.at = Point::from(ray * *distance);
-        }
-        let pose = kabsch::fit(&placed);
-        if let Some(cost) = squares(data, rig, &pose) {
-            roots.insert(pose, cost);
-        }
-    }
+    roots.of_camera(data, rig, widest(data), false);
     roots
 }
 
+impl Roots {
+    /// Those of these three points and the left or the right camera besides.
+    pub(super) fn of_camera(&mut self, data: &Observations<'_>, rig: &StereoRig, three: [usize; 3], right: bool) {
+        let mut three = three.map(|i| data.points[i]);
+        let ray = |point: &Observation| -> Option<Vector3<f64>> {
+            let seen = point.pixels?.at;
+            let direction = if right { rig.right().normalize(&seen.right) } else { rig.left().normalize(&seen.left) };
+            Some(direction?.push(1.0).normalize())
+        };
+        let [Some(a), Some(b), Some(c)] = [0, 1, 2].map(|i| ray(&three[i])) else { return };
+        let rays = [a, b, c];
+        let left_from_right = rig.right_from_left().inverse();
+        for lambda in p3p::distances(&rays, &three.map(|point| point.model.coords)).as_slice() {
+            for ((point, ray), distance) in three.iter_mut().zip(&rays).zip(lambda.iter()) {
+                let at = ray * *distance;
+                point.measured.at = if right { left_from_right * Point::from(at) } else { Point::from(at) };
+            }
+            let pose = kabsch::fit(&three);
+            if let Some(cost) = squares(data, rig, &pose) {
+                self.insert(pose, cost);
+            }
+        }
+    }
+}
+
 /// Σ of the squared pixel residuals, unweighted (px²); `None` where a point is behind a camera.
-fn squares(data: &Observations<'_>, rig: &StereoRig, pose: &Transform<Object, Camera>) -> Option<f64> {
+pub(super) fn squares(data: &Observations<'_>, rig: &StereoRig, pose: &Transform<Object, Camera>) -> Option<f64> {
     let camera_from_object = pose.inverse();
     let of = |point: &Observation| {
         let expected = rig.project(&(camera_from_object * point.model))?;
