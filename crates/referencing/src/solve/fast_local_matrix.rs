@@ -2,13 +2,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform, triad};
+use seafix_geometry::{Camera, Covariance6, Object, Transform, triad};
 use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver,
     descent::{Term, minimize},
     roots::widest,
+    sandwich,
     spread::check,
 };
 use crate::Observations;
@@ -55,6 +56,14 @@ impl Solver for FastLocalMatrix {
             Some(Term::of(Matrix3::identity() / (UNIT * UNIT), &(data.points[k].measured.at.coords - at)))
         };
         minimize(&data.points, &(object * camera.inverse()), &unweighted).ok_or(Degenerate::Singular)
+    }
+
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        sandwich::covariance(data, at, |_| 1.0)
     }
 }
 

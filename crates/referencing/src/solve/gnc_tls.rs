@@ -1,10 +1,10 @@
 //! Graduated non-convexity with truncated least squares: outliers count no more than the threshold.
 
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, irls::distance, kabsch::fit_weighted, numerical, spread::check};
+use super::{Degenerate, Solver, irls::distance, kabsch::fit_weighted, sandwich, spread::check};
 use crate::Observations;
 
 /// The motion of least Σ σ_k² min(d_k², c²), d_k = ‖C·H − P‖ / σ_k, σ_k² = tr(Σ_k + σ_model² I)/3, c the threshold: least
@@ -62,15 +62,14 @@ impl Solver for GncTls {
         (0..kept.len()).filter(|&k| kept[k]).collect()
     }
 
-    /// The derivatives are those of least squares over the points it keeps.
+    /// That of least squares over the points it keeps.
     fn covariance(
         &self,
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
-    ) -> Result<seafix_geometry::Covariance6<Object, Camera>, Degenerate> {
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let kept = self.used(data).into_iter().map(|k| data.points[k]).collect();
-        let kept = Observations { points: kept, rig: data.rig };
-        numerical::covariance(|moved| Ok(fit_weighted(&moved.points, |_| 1.0)), &kept, at)
+        sandwich::covariance(&Observations { points: kept, rig: data.rig }, at, |_| 1.0)
     }
 }
 

@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver,
+    Degenerate, Solver, sandwich,
     spread::{centroid, check},
 };
 use crate::Observations;
@@ -64,5 +64,13 @@ impl Solver for Horn {
         let q = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
         let rotation = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
         Ok(Transform::new(rotation, model - rotation * measured))
+    }
+
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        sandwich::covariance(data, at, |_| 1.0)
     }
 }

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, spread::check};
+use super::{Degenerate, Solver, sandwich, spread::check};
 use crate::{Observation, Observations};
 
 /// The rigid motion of least squared residuals, min Σ ‖P_k − C_k H‖² over SE(3): the paper's
@@ -47,6 +47,14 @@ impl Solver for Kabsch {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         Ok(fit(&data.points))
+    }
+
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        sandwich::covariance(data, at, |_| 1.0)
     }
 }
 

@@ -19,6 +19,7 @@ mod numerical;
 mod p3p;
 mod p3p_stereo;
 mod roots;
+mod sandwich;
 mod sightings;
 mod spread;
 mod starts;

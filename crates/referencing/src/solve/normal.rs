@@ -41,12 +41,12 @@ impl Normal {
     /// The ξ of (N + damping · diag N) ξ = `gradient`; `None` where that is not positive definite.
     pub(super) fn solve(&self, damping: f64, gradient: &Vector6<f64>) -> Option<Vector6<f64>> {
         let n = self.matrix();
-        let mut l = [[0.0; 6]; 6];
+        let mut l = Matrix6::zeros();
         let mut inverse = [0.0; 6];
         for j in 0..6 {
             let mut pivot = n[(j, j)] * (1.0 + damping);
             for k in 0..j {
-                pivot -= l[j][k] * l[j][k];
+                pivot -= l[(j, k)] * l[(j, k)];
             }
             if !(pivot > 0.0) {
                 return None;
@@ -55,21 +55,21 @@ impl Normal {
             for i in j + 1..6 {
                 let mut sum = n[(i, j)];
                 for k in 0..j {
-                    sum -= l[i][k] * l[j][k];
+                    sum -= l[(i, k)] * l[(j, k)];
                 }
-                l[i][j] = sum * inverse[j];
+                l[(i, j)] = sum * inverse[j];
             }
         }
         let mut x = *gradient;
         for i in 0..6 {
             for k in 0..i {
-                x[i] -= l[i][k] * x[k];
+                x[i] -= l[(i, k)] * x[k];
             }
             x[i] *= inverse[i];
         }
         for i in (0..6).rev() {
             for k in i + 1..6 {
-                x[i] -= l[k][i] * x[k];
+                x[i] -= l[(k, i)] * x[k];
             }
             x[i] *= inverse[i];
         }

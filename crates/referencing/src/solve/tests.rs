@@ -167,21 +167,28 @@ fn rig() -> StereoRig {
     StereoRig::new(camera, camera, right_from_left).unwrap()
 }
 
+/// Where a covariance is analytic it is the numerical one, on exact data, to 1e-6; seen to fail when the sandwich
+/// leaves the model's error out.
 #[test]
 fn analytic_covariances_are_the_numerical_ones() {
     let rig = rig();
     let (data, pose) = through_a_rig(&rig);
-    let (mahalanobis, pixels) = (Mahalanobis::default(), StereoReprojection::default());
-    let solvers: [&dyn Solver; 2] = [&mahalanobis, &pixels];
-    for solver in solvers {
-        let analytic = solver.covariance(&data, &pose).unwrap().matrix;
-        let numeric = numerical::covariance(|moved| solver.solve(moved), &data, &pose).unwrap().matrix;
-        assert!((analytic - numeric).amax() < 1e-6 * analytic.amax(), "{solver:?}: {}", analytic - numeric);
+    let mut differs = Vec::new();
+    for name in SOLVERS.names().filter(|name| !["irls", "triad"].contains(name)) {
+        let solver = SOLVERS.build(&seafix_component::Choice::named(name)).unwrap();
+        for data in [data.clone(), Observations { rig: None, ..data.clone() }] {
+            if solver.needs_pixels() && data.rig.is_none() {
+                continue;
+            }
+            let analytic = solver.covariance(&data, &pose).unwrap().matrix;
+            let numeric = numerical::covariance(|moved| solver.solve(moved), &data, &pose).unwrap().matrix;
+            let off = (analytic - numeric).amax() / analytic.amax();
+            if !(off < 1e-6) {
+                differs.push((name, off));
+            }
+        }
     }
-    let bare = Observations { rig: None, ..data };
-    let analytic = mahalanobis.covariance(&bare, &pose).unwrap().matrix;
-    let numeric = numerical::covariance(|moved| mahalanobis.solve(moved), &bare, &pose).unwrap().matrix;
-    assert!((analytic - numeric).amax() < 1e-6 * analytic.amax());
+    assert!(differs.is_empty(), "{differs:?}");
 }
 
 #[test]

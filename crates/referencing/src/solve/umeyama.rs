@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver,
+    Degenerate, Solver, sandwich,
     spread::{centroid, check},
 };
 use crate::Observations;
@@ -58,6 +58,14 @@ impl Solver for Umeyama {
         } else {
             Err(Degenerate::Scale { scale, most: self.most_scale_error })
         }
+    }
+
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        sandwich::covariance(data, at, |_| 1.0)
     }
 }
 

@@ -1,10 +1,10 @@
 //! Weighted Kabsch: one number a point says how well it is known.
 
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, kabsch::fit_weighted, spread::check};
+use super::{Degenerate, Solver, kabsch::fit_weighted, sandwich, spread::check};
 use crate::{Observation, Observations};
 
 /// The motion of least Σ w_k ‖P_k − C_k H‖² with w_k = 3 / tr(Σ_k + σ_model² I): near points count more than far ones.
@@ -39,6 +39,14 @@ impl Solver for WeightedKabsch {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         Ok(fit_weighted(&data.points, |k| 1.0 / variance(&data.points[k])))
+    }
+
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        sandwich::covariance(data, at, |k| 1.0 / variance(&data.points[k]))
     }
 }
 

@@ -1,0 +1,42 @@
+//! The covariance of least squares whose weights are not the inverse of the noise.
+
+use nalgebra::{Matrix3, Vector3};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
+
+use super::{Degenerate, eyes::Eyes, normal::Normal};
+use crate::{Observation, Observations};
+
+/// A⁻¹ B A⁻¹ with A = Σ w JᵀJ and B = Σ w² Jᵀ S J, J = \[ \[p\]×, −I \] and S the noise of a point: what the noise makes
+/// of the minimum of Σ w_k ‖C_k − p_k‖². (Huber, *The behavior of maximum likelihood estimates under nonstandard
+/// conditions*, 1967.)
+///
+/// Everything is seen from the fitted points p: the measured ones are scattered by their noise, which in depth may be
+/// as large as the object, and would pass for a better lever than the points have; and where pixels and rig are known,
+/// a point that noise brought nearer would pass for a better measured one.
+pub(super) fn covariance(
+    data: &Observations<'_>,
+    at: &Transform<Object, Camera>,
+    weight: impl Fn(usize) -> f64,
+) -> Result<Covariance6<Object, Camera>, Degenerate> {
+    let (mut a, mut b) = (Normal::default(), Normal::default());
+    let camera_from_object = at.inverse();
+    let eyes = data.rig.map(Eyes::of);
+    for (k, point) in data.points.iter().enumerate() {
+        let place = (camera_from_object * point.model).coords;
+        let w = weight(k);
+        a.add(&place, &(Matrix3::identity() * w));
+        b.add(&place, &(noise(eyes.as_ref(), point, &place) * (w * w)));
+    }
+    let bread = a.matrix().cholesky().ok_or(Degenerate::Singular)?.inverse();
+    Ok(Covariance6::new(bread * b.matrix() * bread))
+}
+
+/// The covariance (m²) of a point's residual, seen from `place`.
+fn noise(eyes: Option<&Eyes<'_>>, point: &Observation, place: &Vector3<f64>) -> Matrix3<f64> {
+    let refitted = || {
+        let (_, j) = eyes?.look(place)?;
+        (j.transpose() * point.pixels?.covariance.try_inverse()? * j).try_inverse()
+    };
+    let model = Matrix3::identity() * (point.model_sigma * point.model_sigma);
+    refitted().unwrap_or(point.measured.covariance) + model
+}
