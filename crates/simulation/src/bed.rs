@@ -2,7 +2,10 @@
 
 use nalgebra::Vector3;
 
-use crate::stream::{Purpose, Stream};
+use crate::{
+    field::Triangle,
+    stream::{Purpose, Stream},
+};
 
 /// Side of a cell of the grid (m); each is split along its rising diagonal into two triangles.
 const CELL: f64 = 0.25;
@@ -21,6 +24,26 @@ struct Wave {
 pub(crate) struct Bed {
     depth: f64,
     waves: Vec<Wave>,
+    mounds: Vec<Mound>,
+}
+
+/// Silt that has settled around a place: `height` (m) up to `radius` (m), falling to nothing at twice that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mound {
+    pub(crate) centre: [f64; 2],
+    pub(crate) radius: f64,
+    pub(crate) height: f64,
+}
+
+impl Mound {
+    /// Its height at a place, and its slopes. (Smoothstep between the two radii.)
+    fn rise(&self, north: f64, east: f64) -> (f64, [f64; 2]) {
+        let (x, y) = (north - self.centre[0], east - self.centre[1]);
+        let away = (x * x + y * y).sqrt();
+        let t = (2.0 - away / self.radius).clamp(0.0, 1.0);
+        let slope = -self.height * 6.0 * t * (1.0 - t) / self.radius / away.max(1e-9);
+        (self.height * t * t * (3.0 - 2.0 * t), [slope * x, slope * y])
+    }
 }
 
 /// A rectangle of the bed's grid, for one image.
@@ -35,18 +58,29 @@ pub(crate) struct Patch {
 impl Bed {
     /// The bed at this mean depth (m).
     pub(crate) fn new(depth: f64, seed: u64) -> Self {
+        Self::with_relief(depth, 1.0, seed)
+    }
+
+    /// The bed with waves `relief` times as high: 0 is flat.
+    pub(crate) fn with_relief(depth: f64, relief: f64, seed: u64) -> Self {
         let mut stream = Stream::new(seed, 0, 0, Purpose::Relief);
         let waves = [9.0, 6.1, 4.3, 3.1].map(|length| {
             let (sine, cosine) = libm::sincos(stream.between(0.0, std::f64::consts::TAU));
             let k = std::f64::consts::TAU / length;
             Wave {
-                amplitude: 0.003 * length,
+                amplitude: 0.003 * length * relief,
                 north: k * cosine,
                 east: k * sine,
                 phase: stream.between(0.0, std::f64::consts::TAU),
             }
         });
-        Self { depth, waves: waves.to_vec() }
+        Self { depth, waves: waves.to_vec(), mounds: Vec::new() }
+    }
+
+    /// The same bed with silt upon it.
+    pub(crate) fn silted(mut self, mounds: Vec<Mound>) -> Self {
+        self.mounds = mounds;
+        self
     }
 
     /// The mean depth (m).
@@ -56,7 +90,7 @@ impl Bed {
 
     /// How far the bed rises above its mean depth at most (m).
     pub(crate) fn crest(&self) -> f64 {
-        self.waves.iter().map(|w| w.amplitude).sum()
+        self.waves.iter().map(|w| w.amplitude).sum::<f64>() + self.mounds.iter().map(|m| m.height).fold(0.0, f64::max)
     }
 
     /// Depth of a vertex of the grid, and its slopes.
@@ -68,6 +102,12 @@ impl Bed {
             down += w.amplitude * sine;
             slope[0] += w.amplitude * w.north * cosine;
             slope[1] += w.amplitude * w.east * cosine;
+        }
+        // Silt of several objects lies as high as the highest of its mounds.
+        let rises = self.mounds.iter().map(|m| m.rise(north, east));
+        if let Some((rise, [x, y])) = rises.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            down -= rise;
+            (slope[0], slope[1]) = (slope[0] - x, slope[1] - y);
         }
         (down, slope)
     }
@@ -112,6 +152,32 @@ impl Bed {
             }
         }
         (t > 0.0).then_some(t)
+    }
+
+    /// Adds the triangles over the rectangle from `low` to `high` (north, east), shaded as a smooth surface.
+    pub(crate) fn sheet(&self, low: [f64; 2], high: [f64; 2], skin: u32, out: &mut Vec<Triangle>) {
+        let [i0, j0] = low.map(|x| (x / CELL).floor() as i64);
+        let [i1, j1] = high.map(|x| (x / CELL).ceil() as i64);
+        let corner = |i: i64, j: i64| {
+            let (down, [north, east]) = self.vertex(i, j);
+            let at = Vector3::new(i as f64 * CELL, j as f64 * CELL, down);
+            (at, Vector3::new(north, east, -1.0).normalize())
+        };
+        let mut add = |corners: [(Vector3<f64>, Vector3<f64>); 3]| {
+            let (at, normals) = (corners.map(|c| c.0), corners.map(|c| c.1));
+            let uv = at.map(|p| [p.x, p.y]);
+            out.push(Triangle { at, normals, uv, skin, edges: [false; 3], layer: 0 });
+        };
+        for i in i0..i1 {
+            let mut before = (corner(i, j0), corner(i + 1, j0));
+            for j in j0..j1 {
+                let after = (corner(i, j + 1), corner(i + 1, j + 1));
+                // The same diagonal as `surface`; seen from above (z is down) the corners turn left.
+                add([before.0, after.1, before.1]);
+                add([before.0, after.0, after.1]);
+                before = after;
+            }
+        }
     }
 
     /// The grid over the rectangle from `low` to `high` (north, east); its brightness is a function

@@ -25,9 +25,13 @@
 mod bed;
 mod blueprint;
 mod dive;
+mod draw;
 pub mod families;
+pub mod field;
 mod layout;
+mod mission;
 mod noise;
+pub mod optics;
 mod paint;
 mod points;
 mod raster;
@@ -36,10 +40,13 @@ mod scene;
 mod sensor;
 mod stream;
 mod survey;
+pub mod vehicle;
 
 pub use blueprint::{Blueprint, BoxPlan, ChequerPlan, ObjectPlan, PanelPlan, PipePlan, PointPlan};
 pub use dive::{BadDive, Dive, DiveFrame, FrameTruth, PlannedDive, RoughPose, VirtualRig, VisiblePoint};
+pub use draw::{Exposure, Imager};
 pub use layout::{Layout, Placed, Shape};
+pub use mission::{CalibrationError, FocalIn, Instant, InstantTruth, Mission, PlannedMission, RigPlan};
 pub use points::PointNoise;
 pub use sensor::Sensor;
 pub use stream::{Purpose, Stream};

@@ -28,6 +28,28 @@ pub enum Purpose {
     Search,
     /// An identification problem of a family.
     Problem,
+    /// Whereto objects moved since the survey.
+    Changes,
+    /// Things in the way.
+    Occluders,
+    /// A site drawn at random.
+    Site,
+    /// The current's fluctuations.
+    Current,
+    /// Which instants a faulty device fails at.
+    Faults,
+    /// A ping of the acoustic positioning.
+    Acoustics,
+    /// A reading of the Doppler log.
+    Doppler,
+    /// A reading of gyro and attitude.
+    Gyro,
+    /// A reading of the depth.
+    Depth,
+    /// Imperfections that a device keeps for the whole dive.
+    Device,
+    /// The particles in the water.
+    Snow,
 }
 
 /// A stream of random numbers, a function of (seed, dive, frame, purpose) alone.

@@ -47,28 +47,51 @@ fn survey_object(
     let base = plan.base.each_ref().map(|id| {
         plan.points.iter().position(|p| p.id == *id).expect("the built-in base names points; a test reads all")
     });
-    let truth: Vec<Vector3<f64>> = body.points.iter().map(|p| p.at).collect();
+    let marks: Vec<Mark<'_>> = plan
+        .points
+        .iter()
+        .zip(&body.points)
+        .map(|(plan, corner)| Mark { id: &plan.id, at: corner.at, normal: Some(corner.normal) })
+        .collect();
+    survey_marks(&plan.id, base, &marks, errors, stream)
+}
+
+/// A feature point where it truly is, in the world.
+pub(crate) struct Mark<'a> {
+    pub(crate) id: &'a str,
+    pub(crate) at: Vector3<f64>,
+    /// The side from which it is seen.
+    pub(crate) normal: Option<Vector3<f64>>,
+}
+
+/// An object as its survey describes it, and where the described points truly are.
+pub(crate) fn survey_marks(
+    id: &str,
+    base: [usize; 3],
+    marks: &[Mark<'_>],
+    errors: SurveyErrors,
+    stream: &mut Stream,
+) -> (SiteObject, Transform<World, Object>) {
+    let truth: Vec<Vector3<f64>> = marks.iter().map(|mark| mark.at).collect();
     // The model is measured on the object itself: each point with its own small error.
     let measured: Vec<Point<World>> = truth.iter().map(|p| Point::from(p + stream.normal3(errors.model))).collect();
     let [p1, p2, p3] = base.map(|k| measured[k]);
     let object_from_world =
-        triad::<World, Object>(&p1, &p2, &p3).expect("the base spans a plane; a test says so").inverse();
-    let points: Vec<ModelPoint> = plan
-        .points
+        triad::<World, Object>(&p1, &p2, &p3).expect("the base spans a plane; sites are checked").inverse();
+    let points: Vec<ModelPoint> = marks
         .iter()
         .zip(&measured)
-        .zip(&body.points)
-        .map(|((plan, at), corner)| ModelPoint {
-            id: plan.id.clone(),
+        .map(|(mark, at)| ModelPoint {
+            id: mark.id.to_owned(),
             at: Point::from((object_from_world * *at).coords.map(micrometres)),
             sigma: errors.model,
-            normal: Some((object_from_world.rotation() * corner.normal).map(micrometres).normalize()),
+            normal: mark.normal.map(|normal| (object_from_world.rotation() * normal).map(micrometres).normalize()),
         })
         .collect();
     let base_in_world = surveyed_base(base.map(|k| truth[k]), base.map(|k| points[k].at), errors, stream);
     let [s1, s2, s3] = &base_in_world;
     let object = SiteObject {
-        id: plan.id.clone(),
+        id: id.to_owned(),
         base,
         base_in_world: Some(base_in_world),
         survey_sigma: errors.survey,

@@ -49,7 +49,7 @@ impl Threads {
     /// `work(index, piece)` for every piece of `size` of `items`, with one scratch for each piece.
     ///
     /// What a piece holds does not depend on the threads, so neither does the result.
-    pub(crate) fn pieces<T: Send, S: Send + Default>(
+    pub fn pieces<T: Send, S: Send + Default>(
         self,
         items: &mut [T],
         size: usize,
@@ -80,7 +80,7 @@ impl Threads {
     }
 
     /// Both, one after the other or side by side.
-    pub(crate) fn join<A: Send, B: Send>(self, a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    pub fn join<A: Send, B: Send>(self, a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
         match self {
             Self::One => (a(), b()),
             Self::Pool => rayon::join(a, b),

@@ -8,6 +8,7 @@ use crate::exit::Ended;
 
 mod check;
 mod cloud;
+mod dive;
 mod draw;
 mod export;
 mod list;
@@ -42,6 +43,8 @@ pub(crate) enum Command {
     },
     /// Make the report of a run again, from its logs alone.
     Report(report::Report),
+    /// Make a dive: stereo pairs with truth, visibility and rough poses, as a data set.
+    Dive(dive::Dive),
     /// Write the frames of an experiment's source as a data set.
     Export(export::Export),
 }
@@ -57,6 +60,7 @@ impl Command {
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),
             Self::Report(command) => command.execute(),
+            Self::Dive(command) => command.execute(),
             Self::Export(command) => command.execute(),
         }
     }

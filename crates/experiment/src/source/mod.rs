@@ -8,11 +8,13 @@ use seafix_referencing::Site;
 use seafix_vision::Image;
 
 mod dataset;
+mod dive;
 mod virtual_dive;
 mod virtual_images;
 mod virtual_points;
 
 pub use dataset::DatasetSource;
+pub use dive::Dive;
 pub use virtual_images::VirtualImages;
 pub use virtual_points::VirtualPoints;
 
@@ -107,4 +109,4 @@ pub trait Source: Send + Sync + std::fmt::Debug {
 
 /// All sources.
 pub static SOURCES: Registry<dyn Source> =
-    Registry::new("source", &[entry!(DatasetSource), entry!(VirtualImages), entry!(VirtualPoints)]);
+    Registry::new("source", &[entry!(DatasetSource), entry!(Dive), entry!(VirtualImages), entry!(VirtualPoints)]);

@@ -1,0 +1,106 @@
+//! A simulated dive: a vehicle, lamps, water, and everything that may go wrong as a number.
+
+use std::path::Path;
+
+use seafix_component::{Component, Fault};
+use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform};
+use seafix_referencing::Site;
+use seafix_simulation::{Mission, PlannedMission};
+use seafix_vision::Threads;
+use serde::{Deserialize, Serialize};
+
+use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
+
+/// A vehicle's dive over a site given as data, under lamps in water: rendered stereo pairs, or clouds of
+/// the same views with `as-points`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Dive(pub Mission);
+
+impl Component for Dive {
+    const NAME: &'static str = "dive";
+    const SUMMARY: &'static str = "a vehicle's dive over a site under lamps in water, every disturbance a setting";
+    const SOURCE: &'static str = "water: Jaffe 1990, Song et al. 2020; vehicle: Fossen 2021; sensor: EMVA 1288";
+
+    fn check(&self) -> Result<(), String> {
+        self.0.check()
+    }
+}
+
+impl Source for Dive {
+    fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        let mission = self.0.plan(seed, 0, folder)?;
+        let settings = mission.settings();
+        let name = format!("dive over {}, seed {seed}, c = {} 1/m", settings.site, settings.water.c());
+        Ok(Box::new(Dived { mission, name }))
+    }
+}
+
+struct Dived {
+    mission: PlannedMission,
+    name: String,
+}
+
+impl Passage for Dived {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn site(&self) -> &Site {
+        self.mission.site()
+    }
+
+    fn rig(&self) -> &StereoRig {
+        self.mission.rig()
+    }
+
+    fn body_from_camera(&self) -> Transform<Body, Camera> {
+        self.mission.body_from_camera()
+    }
+
+    fn images(&self) -> bool {
+        !self.mission.settings().as_points
+    }
+
+    fn frames(&self) -> usize {
+        self.mission.len()
+    }
+
+    fn prior_sigma(&self) -> Option<(f64, f64)> {
+        let settings = self.mission.settings();
+        Some((settings.prior_position, settings.prior_attitude_deg.to_radians()))
+    }
+
+    fn pixel_sigma(&self) -> Option<f64> {
+        (!self.images()).then_some(self.mission.settings().points.sigma_px)
+    }
+
+    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+        let instant = self.mission.instant(index);
+        let eyes = if self.images() {
+            let (left, right, _) = instant.render(Threads::Pool);
+            Eyes::Pair(left, right)
+        } else {
+            Eyes::Points(instant.points())
+        };
+        let prior = WorldPrior {
+            world_from_camera: instant.prior.world_from_camera,
+            covariance: Covariance6::isotropic(instant.prior.attitude_sigma, instant.prior.position_sigma),
+        };
+        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior: Some(prior) })
+    }
+
+    fn truth(&self, index: usize) -> Option<Truth> {
+        let instant = self.mission.instant(index);
+        let truth = instant.truth();
+        Some(Truth {
+            world_from_camera: truth.world_from_camera,
+            world_from_object: self.mission.world_from_object().iter().copied().map(Some).collect(),
+            visible: Some(truth.visible.iter().map(|seen| (seen.object, seen.point)).collect()),
+        })
+    }
+
+    fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
+        Ok(Vec::new())
+    }
+}

@@ -1,0 +1,267 @@
+//! How surfaces look up close: tiles with mean 1, as pyramids.
+
+use super::math::mix;
+use crate::field::Texture;
+
+/// Side of a tile (texels); a power of two.
+const SIDE: usize = 1024;
+
+/// A tile that repeats, with coarser and coarser versions of it.
+#[derive(Debug, Clone)]
+pub(super) struct Tile {
+    /// The levels, finest first; each half the side of the one before.
+    levels: Vec<Vec<u16>>,
+    /// Texels a metre.
+    scale: f32,
+}
+
+/// A surface's look: the product of a fine and a coarse tile, whose periods have no common multiple
+/// within sight, so that nothing repeats.
+#[derive(Debug, Clone)]
+pub(super) struct Look {
+    fine: Tile,
+    coarse: Tile,
+}
+
+/// All looks.
+#[derive(Debug, Clone)]
+pub(crate) struct Looks {
+    looks: [Option<Box<Look>>; 6],
+}
+
+/// One octave of a tile: wavelengths across it, and amplitude.
+type Octave = (u32, f32);
+
+impl Tile {
+    /// The tile of `value` at every texel, `texel` metres wide.
+    fn new(texel: f64, value: impl Fn(usize, usize) -> f32) -> Self {
+        let mut finest: Vec<f32> = (0..SIDE * SIDE).map(|i| value(i % SIDE, i / SIDE)).collect();
+        let mean = finest.iter().map(|&x| f64::from(x)).sum::<f64>() / finest.len() as f64;
+        for x in &mut finest {
+            *x = (f64::from(*x) / mean) as f32;
+        }
+        let mut levels = Vec::new();
+        let (mut side, mut level) = (SIDE, finest);
+        loop {
+            levels.push(level.iter().map(|x| (x * 16384.0 + 0.5).clamp(0.0, 65535.0) as u16).collect());
+            if side == 1 {
+                break;
+            }
+            let half = side / 2;
+            let at = |x: usize, y: usize| level[(y % side) * side + x % side];
+            level = (0..half * half)
+                .map(|i| {
+                    let (x, y) = (2 * (i % half), 2 * (i / half));
+                    0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1))
+                })
+                .collect();
+            side = half;
+        }
+        Self { levels, scale: (1.0 / texel) as f32 }
+    }
+
+    /// The value at (u, v) metres for a pixel as wide as `footprint` metres: bilinear in two levels,
+    /// linear between them.
+    #[inline]
+    fn at(&self, u: f32, v: f32, footprint: f32) -> f32 {
+        let (u, v) = (u * self.scale, v * self.scale);
+        let texels = (footprint * self.scale).max(1.0);
+        // log2 of the width, from the float's own exponent, linear between powers of two.
+        let bits = texels.to_bits();
+        let level = ((bits >> 23) as usize - 127).min(self.levels.len() - 2);
+        let between = (texels * f32::from_bits((127 - level as u32) << 23) - 1.0).clamp(0.0, 1.0);
+        let fine = self.bilinear(level, u, v);
+        fine + between * (self.bilinear(level + 1, u, v) - fine)
+    }
+
+    #[inline]
+    fn bilinear(&self, level: usize, u: f32, v: f32) -> f32 {
+        let values = &self.levels[level][..];
+        let shift = (SIDE.trailing_zeros() as usize) - level;
+        let mask = (1_usize << shift) - 1;
+        let scale = f32::from_bits((127 - level as u32) << 23);
+        // Texel centres at whole numbers and a half.
+        let (x, y) = (u * scale - 0.5, v * scale - 0.5);
+        let (xi, yi) = (floor(x), floor(y));
+        let (fx, fy) = (x - xi as f32, y - yi as f32);
+        let (x0, y0) = (xi as usize & mask, yi as usize & mask);
+        let (x1, y1) = ((x0 + 1) & mask, (y0 + 1) & mask);
+        let texel = |x: usize, y: usize| f32::from(values[(y << shift) + x]);
+        let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+        let (above, below) = (a + fx * (b - a), c + fx * (d - c));
+        (above + fy * (below - above)) * (1.0 / 16384.0)
+    }
+}
+
+/// The whole number below.
+#[inline(always)]
+fn floor(x: f32) -> i32 {
+    let cut = x as i32;
+    cut - i32::from(cut as f32 > x)
+}
+
+impl Looks {
+    /// Those looks that `used` names.
+    pub(crate) fn new(used: impl Iterator<Item = Texture>, seed: u32) -> Self {
+        let mut looks: [Option<Box<Look>>; 6] = std::array::from_fn(|_| None);
+        for texture in used.chain([Texture::Growth]) {
+            let slot = &mut looks[texture as usize];
+            if slot.is_none() && texture != Texture::Plain {
+                *slot = Some(Box::new(look(texture, seed)));
+            }
+        }
+        Self { looks }
+    }
+
+    /// By what the albedo is multiplied at (u, v) of a surface (m), seen by pixels as wide as `footprint` (m).
+    #[inline]
+    pub(super) fn at(&self, texture: Texture, u: f32, v: f32, footprint: f32) -> f32 {
+        match &self.looks[texture as usize] {
+            None => 1.0,
+            // The coarse tile is turned, so that the two grids do not align.
+            Some(look) => {
+                let (p, q) = (0.8 * u - 0.6 * v, 0.6 * u + 0.8 * v);
+                look.fine.at(u, v, footprint) * look.coarse.at(p, q, footprint)
+            }
+        }
+    }
+}
+
+fn look(texture: Texture, seed: u32) -> Look {
+    let seed = mix(texture as u32, 5, seed);
+    let tile =
+        |texel: f64, octaves: &[Octave], salt: u32| Tile::new(texel, |x, y| 1.0 + sum(octaves, x, y, seed ^ salt));
+    match texture {
+        Texture::Plain | Texture::Sand => Look {
+            fine: Tile::new(0.0022, |x, y| {
+                let grain = sum(&[(14, 0.07), (31, 0.09), (67, 0.10), (139, 0.10), (283, 0.10)], x, y, seed);
+                let stones = pebbles(x, y, 11, seed ^ 0xA5A5) + 0.8 * pebbles(x, y, 27, seed ^ 0x5A5A);
+                (1.0 + grain + 0.8 * stones).max(0.15)
+            }),
+            coarse: tile(0.0131, &[(5, 0.12), (11, 0.12), (23, 0.10), (49, 0.08), (101, 0.05)], 0x3C3C),
+        },
+        Texture::Steel => Look {
+            fine: tile(0.0017, &[(5, 0.10), (11, 0.10), (24, 0.10), (59, 0.08), (131, 0.06)], 1),
+            coarse: Tile::new(0.0059, |x, y| {
+                let rust = sum(&[(7, 0.5), (17, 0.4), (41, 0.3)], x, y, seed ^ 2);
+                1.0 - 0.35 * ((rust - 0.25) * 3.0).clamp(0.0, 1.0) + sum(&[(9, 0.08)], x, y, seed ^ 3)
+            }),
+        },
+        Texture::Paint => Look {
+            fine: tile(0.0017, &[(7, 0.05), (19, 0.05), (47, 0.05), (113, 0.05), (241, 0.03)], 1),
+            coarse: Tile::new(0.0047, |x, y| {
+                let worn = sum(&[(9, 0.5), (21, 0.4), (53, 0.4), (127, 0.3)], x, y, seed ^ 2);
+                1.0 - 0.45 * ((worn - 0.48) * 4.0).clamp(0.0, 1.0) + sum(&[(5, 0.07), (13, 0.05)], x, y, seed ^ 3)
+            }),
+        },
+        Texture::Rock => Look {
+            fine: tile(0.0017, &[(9, 0.14), (21, 0.15), (53, 0.14), (127, 0.10)], 1),
+            coarse: tile(0.0053, &[(13, 0.14), (37, 0.10)], 2),
+        },
+        Texture::Growth => Look {
+            fine: Tile::new(0.0015, |x, y| {
+                let tufts = sum(&[(33, 0.35), (71, 0.35), (151, 0.25)], x, y, seed ^ 1);
+                (1.0 + tufts).max(0.2)
+            }),
+            coarse: tile(0.0061, &[(7, 0.16), (19, 0.16), (47, 0.12)], 2),
+        },
+    }
+}
+
+/// The sum of octaves of gradient noise that repeats with the tile. (Perlin 2002.)
+fn sum(octaves: &[Octave], x: usize, y: usize, seed: u32) -> f32 {
+    let mut sum = 0.0;
+    for &(waves, amplitude) in octaves {
+        let scale = waves as f32 / SIDE as f32;
+        let (u, v) = ((x as f32 + 0.5) * scale, (y as f32 + 0.5) * scale);
+        let (i, j) = (u as u32, v as u32);
+        let (fx, fy) = (u - i as f32, v - j as f32);
+        let corner = |di: u32, dj: u32| {
+            let h = mix((i + di) % waves, (j + dj) % waves, seed ^ waves.wrapping_mul(0x51ED));
+            let (gx, gy) = DIRECTIONS[(h >> 28) as usize];
+            gx * (fx - di as f32) + gy * (fy - dj as f32)
+        };
+        let fade = |t: f32| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+        let (sx, sy) = (fade(fx), fade(fy));
+        let above = corner(0, 0) + sx * (corner(1, 0) - corner(0, 0));
+        let below = corner(0, 1) + sx * (corner(1, 1) - corner(0, 1));
+        sum += amplitude * 1.5 * (above + sy * (below - above));
+    }
+    sum
+}
+
+/// Sixteen unit vectors.
+const DIRECTIONS: [(f32, f32); 16] = {
+    const A: f32 = 0.923_879_5;
+    const B: f32 = 0.382_683_43;
+    const C: f32 = std::f32::consts::FRAC_1_SQRT_2;
+    [
+        (1.0, 0.0),
+        (A, B),
+        (C, C),
+        (B, A),
+        (0.0, 1.0),
+        (-B, A),
+        (-C, C),
+        (-A, B),
+        (-1.0, 0.0),
+        (-A, -B),
+        (-C, -C),
+        (-B, -A),
+        (0.0, -1.0),
+        (B, -A),
+        (C, -C),
+        (A, -B),
+    ]
+};
+
+/// Pebbles and shells: in each of `cells`² cells at most one.
+fn pebbles(x: usize, y: usize, cells: u32, seed: u32) -> f32 {
+    let scale = cells as f32 / SIDE as f32;
+    let (u, v) = ((x as f32 + 0.5) * scale, (y as f32 + 0.5) * scale);
+    let (i, j) = (u as u32, v as u32);
+    let h = mix(i, j, seed);
+    if h & 7 > 4 {
+        return 0.0;
+    }
+    let share = |shift: u32| ((h >> shift) & 0xFF) as f32 / 255.0;
+    let radius = 0.1 + 0.3 * share(3) * share(3);
+    let room = 1.0 - 2.0 * radius;
+    let (du, dv) = (u - i as f32 - radius - room * share(8), v - j as f32 - radius - room * share(16));
+    let stretch = 1.0 + 0.7 * share(20);
+    let (along, across) = if h & 0x800_0000 == 0 { (du, dv * stretch) } else { (du * stretch, dv) };
+    let distance = (along * along + across * across).sqrt();
+    let inside = ((radius - distance) / (0.25 * radius) + 0.5).clamp(0.0, 1.0);
+    inside * (0.9 * share(24) - 0.5 + 0.15 * (du * 0.76 + dv * 0.65) / radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tile_repeats_is_continuous_and_fades_to_its_mean() {
+        let look = look(Texture::Sand, 3);
+        let period = SIDE as f32 * 0.0022;
+        let (mut sum, mut n) = (0.0, 0.0);
+        for k in 0..3000 {
+            let (u, v) = (k as f32 * 0.013, (k % 71) as f32 * 0.029);
+            let here = look.fine.at(u, v, 0.004);
+            assert!((look.fine.at(u + period, v - period, 0.004) - here).abs() < 0.02);
+            assert!((look.fine.at(u + 1e-4, v, 0.004) - here).abs() < 0.08);
+            assert!((look.fine.at(u, v, 0.00881) - look.fine.at(u, v, 0.00879)).abs() < 0.01);
+            sum += f64::from(here);
+            n += 1.0;
+        }
+        assert!((sum / n - 1.0).abs() < 0.05);
+        assert!((look.fine.at(0.3, 0.4, 1e3) - 1.0).abs() < 1e-3);
+        assert_eq!(Looks::new(std::iter::empty(), 1).at(Texture::Plain, 0.1, 0.2, 0.01), 1.0);
+    }
+
+    #[test]
+    fn negative_places_have_values_too() {
+        assert_eq!((floor(-0.25), floor(-1.0), floor(2.75)), (-1, -1, 2));
+        let look = look(Texture::Rock, 3);
+        assert!((0.1..3.0).contains(&look.fine.at(-20.3, -7.7, 0.002)));
+    }
+}

@@ -1,0 +1,171 @@
+//! One instant of a mission: what a method may see, and apart from it the truth.
+
+use nalgebra::{Vector3, Vector6};
+use seafix_geometry::{
+    Camera, MeasuredPoint, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint, World, so3,
+};
+use seafix_vision::{Image, Threads};
+
+use super::PlannedMission;
+use crate::{
+    dive::{RoughPose, VisiblePoint},
+    draw::{Exposure, Rolling, Shot},
+    field::FieldPoint,
+    stream::Purpose,
+};
+
+/// The first stamp: some time in 2023, so that stamps look like those of a real log.
+const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
+
+/// One instant.
+#[derive(Debug, Clone)]
+pub struct Instant<'a> {
+    mission: &'a PlannedMission,
+    /// Its number in the mission.
+    pub index: usize,
+    /// When it was taken (ns since 1970).
+    pub stamp_ns: u64,
+    /// The rough pose.
+    pub prior: RoughPose,
+    time: f64,
+    truth: InstantTruth,
+}
+
+/// What no method may see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InstantTruth {
+    /// The left camera in the world, at the middle of the exposure.
+    pub world_from_camera: Transform<World, Camera>,
+    /// The feature points, of any object, that lie in both images with nothing before them.
+    pub visible: Vec<VisiblePoint>,
+}
+
+impl<'a> Instant<'a> {
+    pub(super) fn new(mission: &'a PlannedMission, index: usize, time: f64) -> Self {
+        let world_from_camera = mission.camera(time);
+        let prior = rough(mission, index, &world_from_camera);
+        let stamp_ns = EPOCH_NS + (time * 1e9).round() as u64;
+        let empty = InstantTruth { world_from_camera, visible: Vec::new() };
+        let mut instant = Self { mission, index, stamp_ns, prior, time, truth: empty };
+        instant.truth.visible = instant.visible();
+        instant
+    }
+
+    /// What no method may see.
+    pub fn truth(&self) -> &InstantTruth {
+        &self.truth
+    }
+
+    /// The left and the right image: a plain function of the instant, whoever works.
+    pub fn render(&self, threads: Threads) -> (Image, Image, Exposure) {
+        let shot = self.shot();
+        self.mission.with_memory(threads, |work| self.mission.studio.render(&self.mission.field, &shot, work))
+    }
+
+    /// Where the right camera is taken from: later by the error of synchronisation.
+    fn right_time(&self) -> f64 {
+        self.time + self.mission.settings.imager.sync_ms * 1e-3
+    }
+
+    fn shot(&self) -> Shot {
+        let mission = self.mission;
+        let seed = |purpose| mission.stream(self.index, purpose).bits() as u32;
+        let right_from_left = mission.cameras.right_from_left;
+        let right = self.right_time();
+        Shot {
+            world_from_left: self.truth.world_from_camera,
+            world_from_right: mission.camera(right) * right_from_left.inverse(),
+            motion: [mission.motion(self.time), right_from_left.adjoint() * mission.motion(right)],
+            drift: Vector3::zeros(),
+            seeds: [seed(Purpose::LeftImage), seed(Purpose::RightImage)],
+        }
+    }
+
+    /// The pixels of a feature point that both cameras see in their images.
+    fn see(&self, shot: &Shot, point: &FieldPoint) -> Option<StereoPixels> {
+        let pixels = self.look(shot, &Point::from(point.at))?;
+        let field = &self.mission.field;
+        let seen = [shot.world_from_left.translation(), shot.world_from_right.translation()];
+        seen.iter().all(|from| field.sees(from, point)).then_some(pixels)
+    }
+
+    /// Where both cameras would see a place, within their images.
+    fn look(&self, shot: &Shot, place: &Point<World>) -> Option<StereoPixels> {
+        let studio = &self.mission.studio;
+        let camera = self.mission.cameras.lens.camera();
+        let readout = self.mission.settings.imager.readout_ms * 1e-3;
+        let rows = f64::from(camera.size()[1]);
+        let rolling = |motion: Vector6<f64>| (readout > 0.0).then(|| Rolling { step: motion * readout, rows });
+        let left = (shot.world_from_left.inverse() * *place).coords;
+        let left = studio.left.project(&left, rolling(shot.motion[0]).as_ref())?;
+        let right = (shot.world_from_right.inverse() * *place).coords;
+        let right = studio.right.project(&right, rolling(shot.motion[1]).as_ref())?;
+        (camera.contains(&left, 0.0) && camera.contains(&right, 0.0)).then_some(StereoPixels { left, right })
+    }
+
+    fn visible(&self) -> Vec<VisiblePoint> {
+        let shot = self.shot();
+        let mut all = Vec::new();
+        for (object, known) in self.mission.field.objects.iter().enumerate() {
+            for (point, place) in known.points.iter().enumerate() {
+                all.extend(self.see(&shot, place).map(|pixels| VisiblePoint { object, point, pixels }));
+            }
+        }
+        all
+    }
+
+    /// The same view as measured points, without an image: visible feature points with the noise of the
+    /// settings, and clutter, triangulated with the told rig, in an order that tells nothing.
+    pub fn points(&self) -> Vec<MeasuredPoint> {
+        let mission = self.mission;
+        let noise = &mission.settings.points;
+        let mut stream = mission.stream(self.index, Purpose::Points);
+        let shot = self.shot();
+        let mut pixels: Vec<StereoPixels> = Vec::new();
+        for seen in &self.truth.visible {
+            if stream.unit() < noise.found {
+                pixels.push(seen.pixels);
+            }
+        }
+        let [width, height] = mission.cameras.lens.camera().size().map(|n| f64::from(n - 1));
+        for _ in 0..noise.clutter {
+            let pixel = Pixel { u: stream.between(0.0, width), v: stream.between(0.0, height) };
+            let Some(ray) = mission.cameras.lens.ray(&pixel) else { continue };
+            let from = (shot.world_from_left * Point::<Camera>::from(ray.from)).coords;
+            let Some(place) = mission.field.seen(&from, &(shot.world_from_left.rotation() * ray.along)) else {
+                continue;
+            };
+            if mission.field.clear(&shot.world_from_right.translation(), &place.coords) {
+                pixels.extend(self.look(&shot, &place));
+            }
+        }
+        for k in (1..pixels.len()).rev() {
+            pixels.swap(k, stream.below(k + 1));
+        }
+        let measure = |exact: &StereoPixels| {
+            let mut disturbed = |p: &Pixel| Pixel {
+                u: p.u + noise.sigma_px * stream.normal(),
+                v: p.v + noise.sigma_px * stream.normal(),
+            };
+            let seen = StereoPixels { left: disturbed(&exact.left), right: disturbed(&exact.right) };
+            // A covariance of zero would claim what no camera can know.
+            let pixels = UncertainPixels::independent(seen, noise.sigma_px.max(1e-3));
+            let found = mission.cameras.told.triangulate(&pixels).ok()?;
+            let position = UncertainPoint { at: found.point, covariance: found.covariance };
+            Some(MeasuredPoint { position, pixels: Some(pixels) })
+        };
+        pixels.iter().filter_map(measure).collect()
+    }
+}
+
+/// The rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the position's
+/// along the world's.
+fn rough(mission: &PlannedMission, index: usize, truth: &Transform<World, Camera>) -> RoughPose {
+    let settings = &mission.settings;
+    let mut stream = mission.stream(index, Purpose::Prior);
+    let (position_sigma, attitude_sigma) = (settings.prior_position, settings.prior_attitude_deg.to_radians());
+    let turn = so3::exp(&-stream.normal3(attitude_sigma));
+    let step = stream.normal3(position_sigma);
+    let world_from_camera = Transform::new(truth.rotation() * turn, truth.translation() - step);
+    RoughPose { world_from_camera, position_sigma, attitude_sigma }
+}

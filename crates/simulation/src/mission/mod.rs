@@ -1,0 +1,11 @@
+//! A mission: one vehicle's passage over one site, with everything that may go wrong as a number.
+
+mod frame;
+mod plan;
+mod rig;
+mod settings;
+
+pub use frame::{Instant, InstantTruth};
+pub use plan::PlannedMission;
+pub use rig::{CalibrationError, FocalIn, RigPlan};
+pub use settings::Mission;

@@ -1,0 +1,248 @@
+//! A mission whose site is built and whose way is gone; frames are made when asked for, in any order.
+
+use std::sync::Mutex;
+
+use nalgebra::{Matrix3, Vector3, Vector6};
+use seafix_geometry::{Body, Camera, Object, StereoRig, Transform, World};
+use seafix_referencing::Site;
+use seafix_vision::{Threads, Workspace};
+
+use super::{Instant, Mission, rig::Cameras};
+use crate::{
+    draw::{Eye, Looks, Studio},
+    field::{Field, SitePlan},
+    optics::Lamp,
+    stream::{Purpose, Stream},
+    survey::SurveyErrors,
+    vehicle::{Goal, RATE, State, Track, Way},
+};
+
+/// Seconds between two looks for collisions.
+const LOOK: f64 = 0.1;
+
+/// A planned mission.
+#[derive(Debug)]
+pub struct PlannedMission {
+    pub(super) settings: Mission,
+    pub(super) seed: u64,
+    pub(super) dive: u64,
+    pub(super) field: Field,
+    pub(super) cameras: Cameras,
+    pub(super) studio: Studio,
+    pub(super) track: Track,
+    pub(super) body_from_camera: Transform<Body, Camera>,
+    times: Vec<f64>,
+    /// Memories of rendering, one for each that renders at once.
+    memories: Mutex<Vec<Workspace>>,
+}
+
+impl PlannedMission {
+    pub(super) fn new(settings: &Mission, plan: &SitePlan, seed: u64, dive: u64) -> Result<Self, String> {
+        let errors = SurveyErrors { model: settings.model_sigma, survey: settings.survey_sigma };
+        let field = Field::new(plan, &settings.changes, errors, seed);
+        let cameras = settings.rig.build()?;
+        let body_from_camera = mount(settings.rig.ahead_deg);
+        let way = Way::new(&settings.route, &field)?;
+        let last = settings.start
+            + if settings.rate > 0.0 {
+                (settings.frames - 1) as f64 / settings.rate
+            } else {
+                way.length() / settings.route.speed
+            };
+        if last > 7200.0 {
+            return Err(format!(
+                "route.speed = {}; the way takes {last:.0} s, two hours are the most",
+                settings.route.speed
+            ));
+        }
+        let n = settings.frames;
+        let span = last - settings.start;
+        let times = (0..n)
+            .map(|k| {
+                let even = if n > 1 { span * k as f64 / (n - 1) as f64 } else { 0.0 };
+                settings.start + if settings.rate > 0.0 { k as f64 / settings.rate } else { even }
+            })
+            .collect();
+        let track = travel(&way, last + 0.2, &body_from_camera);
+        let studio = build_studio(settings, &field, &cameras, seed, dive);
+        let planned = Self {
+            settings: settings.clone(),
+            seed,
+            dive,
+            field,
+            cameras,
+            studio,
+            track,
+            body_from_camera,
+            times,
+            memories: Mutex::new(Vec::new()),
+        };
+        planned.collision(last)?;
+        Ok(planned)
+    }
+
+    /// The site as a method knows it.
+    pub fn site(&self) -> &Site {
+        &self.field.told
+    }
+
+    /// The rig that a method is told.
+    pub fn rig(&self) -> &StereoRig {
+        &self.cameras.told
+    }
+
+    /// The settings it was planned with.
+    pub fn settings(&self) -> &Mission {
+        &self.settings
+    }
+
+    /// Truth: where each object of the told site is.
+    pub fn world_from_object(&self) -> &[Transform<World, Object>] {
+        &self.field.world_from_object
+    }
+
+    /// Where the left camera sits in the vehicle.
+    pub fn body_from_camera(&self) -> Transform<Body, Camera> {
+        self.body_from_camera
+    }
+
+    /// How many frames it has.
+    pub fn len(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Whether it has no frame.
+    pub fn is_empty(&self) -> bool {
+        self.times.is_empty()
+    }
+
+    /// Frame number `index`, a function of settings, seed, dive and index alone.
+    pub fn instant(&self, index: usize) -> Instant<'_> {
+        Instant::new(self, index, self.times[index])
+    }
+
+    pub(super) fn stream(&self, frame: usize, purpose: Purpose) -> Stream {
+        Stream::new(self.seed, self.dive, frame as u64, purpose)
+    }
+
+    /// The left camera in the world at a time (s).
+    pub(super) fn camera(&self, time: f64) -> Transform<World, Camera> {
+        self.track.at(time).world_from_body * self.body_from_camera
+    }
+
+    /// The motion of the left camera at a time, in its own frame (rad/s, m/s).
+    pub(super) fn motion(&self, time: f64) -> Vector6<f64> {
+        self.body_from_camera.inverse().adjoint() * self.track.at(time).motion
+    }
+
+    /// Lends a memory to `work` and takes it back.
+    pub(super) fn with_memory<T>(&self, threads: Threads, work: impl FnOnce(&mut Workspace) -> T) -> T {
+        let kept = self.memories.lock().ok().and_then(|mut all| {
+            let fits = all.iter().position(|memory| memory.threads() == threads);
+            fits.map(|index| all.swap_remove(index))
+        });
+        let mut memory = kept.unwrap_or_else(|| Workspace::new(threads));
+        let result = work(&mut memory);
+        if let Ok(mut all) = self.memories.lock() {
+            all.push(memory);
+        }
+        result
+    }
+
+    /// Whether the vehicle, its cameras or its lamps come too near to anything.
+    fn collision(&self, last: f64) -> Result<(), String> {
+        let clearance = self.settings.clearance;
+        let parts = |time: f64| {
+            let camera = self.camera(time);
+            let lamps = self.studio.left.lamps.iter().map(|lamp| Vector3::from(lamp.at));
+            let right = self.cameras.right_from_left.inverse().translation();
+            let places: Vec<Vector3<f64>> = [Vector3::zeros(), right].into_iter().chain(lamps).collect();
+            places.into_iter().map(move |p| camera.rotation() * p + camera.translation()).collect::<Vec<_>>()
+        };
+        let mut before: Option<Vec<Vector3<f64>>> = None;
+        for k in 0..=(last / LOOK).ceil() as usize {
+            let time = k as f64 * LOOK;
+            let now = parts(time);
+            for (i, place) in now.iter().enumerate() {
+                let near = self.field.distance(place, clearance.max(1e-6)).is_some();
+                // Below the bed, or through a thin body between two looks.
+                let along = before.as_ref().map(|all| place - all[i]);
+                let through = along.zip(before.as_ref()).is_some_and(|(along, all)| {
+                    along.norm() > 0.0 && self.field.bvh.hit(&self.field.mesh.triangles, &all[i], &along, 1.0).is_some()
+                });
+                if near || through {
+                    let nearest = self
+                        .field
+                        .objects
+                        .iter()
+                        .zip(&self.field.told.objects)
+                        .min_by(|a, b| {
+                            let to = |o: &crate::field::FieldObject| (o.centroid() - place).norm();
+                            to(a.0).total_cmp(&to(b.0))
+                        })
+                        .map_or("nothing", |(_, told)| told.id.as_str());
+                    return Err(format!(
+                        "route: the vehicle comes within {clearance} m of something near `{nearest}` after {time:.1} s, at \
+                         north {:.2}, east {:.2}, depth {:.2} m; raise route.altitude or lower clearance",
+                        place.x, place.y, place.z
+                    ));
+                }
+            }
+            before = Some(now);
+        }
+        Ok(())
+    }
+}
+
+/// The cameras look down and `ahead` degrees forward: right in the image is starboard, its lower edge is aft.
+fn mount(ahead: f64) -> Transform<Body, Camera> {
+    let (sine, cosine) = libm::sincos(ahead.to_radians());
+    let forward = Vector3::new(sine, 0.0, cosine);
+    let axes = Matrix3::from_columns(&[Vector3::y(), forward.cross(&Vector3::y()), forward]);
+    Transform::from_axes(&axes, Vector3::zeros())
+}
+
+/// The vehicle exactly on its way, level.
+fn travel(way: &Way, duration: f64, body_from_camera: &Transform<Body, Camera>) -> Track {
+    let count = (duration * RATE).ceil() as usize + 2;
+    let goal = |k: usize| way.at(k as f64 / RATE);
+    let pose = |goal: &Goal| {
+        let turn = seafix_geometry::so3::exp(&(Vector3::z() * goal.heading));
+        // The way is that of the cameras.
+        Transform::<World, Body>::new(turn, goal.at - turn * body_from_camera.translation())
+    };
+    let goals: Vec<Goal> = (0..count).map(goal).collect();
+    let states = goals.iter().enumerate().map(|(k, goal)| {
+        let world_from_body = pose(goal);
+        let (a, b) = (goals[k.saturating_sub(1)], goals[(k + 1).min(count - 1)]);
+        let span = ((k + 1).min(count - 1) - k.saturating_sub(1)) as f64 / RATE;
+        let turn = libm::remainder(b.heading - a.heading, std::f64::consts::TAU) / span;
+        let v = world_from_body.rotation().inverse() * goal.velocity;
+        State { world_from_body, motion: Vector6::new(0.0, 0.0, turn, v.x, v.y, v.z) }
+    });
+    Track { states: states.collect() }
+}
+
+fn build_studio(settings: &Mission, field: &Field, cameras: &Cameras, seed: u64, dive: u64) -> Studio {
+    let lamps = if settings.lamps.is_empty() { Lamp::pair(settings.rig.baseline) } else { settings.lamps.clone() };
+    let place = |p: [f64; 3]| -> [f64; 3] {
+        (cameras.right_from_left * seafix_geometry::Point::<Camera>::from(p)).coords.into()
+    };
+    let there = lamps.iter().map(|l| Lamp { at: place(l.at), aim: place(l.aim), ..l.clone() }).collect();
+    let water = settings.water.clone();
+    let left = Eye::new(cameras.lens.clone(), lamps, &water);
+    let right = Eye::new(cameras.lens.clone(), there, &water);
+    let bits = |purpose| Stream::new(seed, dive, 0, purpose).bits() as u32;
+    let texture = Stream::new(seed, 0, 0, Purpose::Texture).bits() as u32;
+    let looks = Looks::new(field.mesh.skins.iter().map(|skin| skin.texture), texture);
+    Studio::new(
+        left,
+        right,
+        water,
+        settings.imager.clone(),
+        looks,
+        settings.shadows,
+        bits(Purpose::Device),
+        bits(Purpose::Snow),
+    )
+}

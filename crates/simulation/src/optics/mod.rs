@@ -1,0 +1,13 @@
+//! Light on its way: lamps, water, ports, lenses.
+
+mod haze;
+mod lamp;
+mod lens;
+mod port;
+mod water;
+
+pub(crate) use haze::Haze;
+pub use lamp::Lamp;
+pub use lens::Lens;
+pub use port::{Port, PortKind, Ray};
+pub use water::{WATERS, Water};

@@ -1,0 +1,242 @@
+//! Where the vehicle is meant to go: waypoints, and the usual ways over a site.
+
+use nalgebra::{Vector2, Vector3};
+use seafix_component::in_range;
+use serde::{Deserialize, Serialize};
+
+use crate::field::Field;
+
+/// Half of the stretch over which corners of the way are rounded (m).
+const ROUNDING: f64 = 0.8;
+/// Samples of that stretch.
+const SAMPLES: i32 = 16;
+
+/// The kinds of way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RouteKind {
+    /// Over one object after the other and back again until `length` is reached: the paper's 200 m.
+    #[default]
+    Tour,
+    /// Parallel lines over the whole site, `spacing` apart.
+    Lawnmower,
+    /// Around `object` at `radius`, looking at it.
+    Orbit,
+    /// From `length` away over `object`, sinking from twice the altitude.
+    Approach,
+    /// Through `waypoints`.
+    Waypoints,
+}
+
+/// Where the vehicle is meant to go.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Route {
+    /// The kind of way.
+    pub kind: RouteKind,
+    /// Height of the cameras above the mean bed (m).
+    pub altitude: f64,
+    /// Speed over ground (m/s).
+    pub speed: f64,
+    /// Length of a tour, or of an approach (m).
+    pub length: f64,
+    /// Between the lines of a lawnmower (m).
+    pub spacing: f64,
+    /// Radius of an orbit (m).
+    pub radius: f64,
+    /// The object of an orbit or approach; empty is the site's own.
+    pub object: String,
+    /// North, east, height above the mean bed (m), one after the other.
+    pub waypoints: Vec<[f64; 3]>,
+}
+
+impl Default for Route {
+    fn default() -> Self {
+        Self {
+            kind: RouteKind::Tour,
+            altitude: 3.5,
+            speed: 0.4,
+            length: 200.0,
+            spacing: 3.0,
+            radius: 1.5,
+            object: String::new(),
+            waypoints: Vec::new(),
+        }
+    }
+}
+
+impl Route {
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let within = |name: &str, x: f64, low: f64, high: f64| {
+            in_range(x >= low && x <= high, &format!("route.{name}"), x, &format!("a number from {low} to {high}"))
+        };
+        within("altitude", self.altitude, 0.3, 100.0)?;
+        within("speed", self.speed, 0.0, 5.0)?;
+        within("length", self.length, 0.0, 1e5)?;
+        within("spacing", self.spacing, 0.2, 100.0)?;
+        within("radius", self.radius, 0.2, 100.0)?;
+        for (k, point) in self.waypoints.iter().enumerate() {
+            let fine = point.iter().all(|x| x.abs() < 1e5) && point[2] > 0.0;
+            let name = format!("route.waypoints[{k}]");
+            in_range(fine, &name, format!("{point:?}"), "north, east and a height above the bed")?;
+        }
+        let count = self.waypoints.len();
+        in_range(self.kind != RouteKind::Waypoints || count > 0, "route.waypoints", count, "one waypoint or more")
+    }
+}
+
+/// A way in the world: a line through places, with a place to look at or the way ahead as the heading.
+#[derive(Debug, Clone)]
+pub(crate) struct Way {
+    places: Vec<Vector3<f64>>,
+    /// Length of the way up to each place.
+    lengths: Vec<f64>,
+    look_at: Option<Vector2<f64>>,
+    speed: f64,
+}
+
+/// Where the vehicle should be, and how it should move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Goal {
+    pub(crate) at: Vector3<f64>,
+    pub(crate) velocity: Vector3<f64>,
+    pub(crate) heading: f64,
+}
+
+impl Way {
+    pub(crate) fn new(route: &Route, field: &Field) -> Result<Self, String> {
+        let depth = field.bed.depth();
+        let over = |p: Vector2<f64>, height: f64| Vector3::new(p.x, p.y, depth - height);
+        let centres: Vec<Vector2<f64>> = field.objects.iter().map(|o| o.centroid().xy()).collect();
+        let chosen = if route.object.is_empty() {
+            field.told.frame
+        } else {
+            let found = field.told.objects.iter().position(|o| o.id == route.object);
+            let names: Vec<&str> = field.told.objects.iter().map(|o| o.id.as_str()).collect();
+            found.ok_or_else(|| format!("route.object = `{}`; give one of {}", route.object, names.join(", ")))?
+        };
+        let (centre, altitude) = (centres[chosen], route.altitude);
+        let mut look_at = None;
+        let places = match route.kind {
+            RouteKind::Waypoints => route.waypoints.iter().map(|w| over(Vector2::new(w[0], w[1]), w[2])).collect(),
+            RouteKind::Tour => tour(&centres, route.length).into_iter().map(|p| over(p, altitude)).collect(),
+            RouteKind::Lawnmower => {
+                let low = centres.iter().fold(centres[0], |a, b| a.inf(b)) - Vector2::repeat(2.0);
+                let high = centres.iter().fold(centres[0], |a, b| a.sup(b)) + Vector2::repeat(2.0);
+                let lines = ((high.y - low.y) / route.spacing).floor() as usize + 1;
+                let ends = |k: usize| if k.is_multiple_of(2) { [low.x, high.x] } else { [high.x, low.x] };
+                let line =
+                    |k: usize| ends(k).map(|x| over(Vector2::new(x, low.y + route.spacing * k as f64), altitude));
+                (0..lines).flat_map(line).collect()
+            }
+            RouteKind::Orbit => {
+                look_at = Some(centre);
+                let place = |k: i32| {
+                    let (sine, cosine) = libm::sincos(std::f64::consts::TAU * f64::from(k) / 48.0);
+                    over(centre + Vector2::new(cosine, sine) * route.radius, altitude)
+                };
+                (0..=48).map(place).collect()
+            }
+            RouteKind::Approach => {
+                look_at = Some(centre);
+                let away = Vector2::new(0.8, 0.6) * route.length;
+                vec![over(centre - away, 2.0 * altitude), over(centre - away * 0.3, altitude), over(centre, altitude)]
+            }
+        };
+        Ok(Self::through(places, look_at, route.speed))
+    }
+
+    fn through(places: Vec<Vector3<f64>>, look_at: Option<Vector2<f64>>, speed: f64) -> Self {
+        let mut lengths = vec![0.0];
+        for pair in places.windows(2) {
+            lengths.push(lengths[lengths.len() - 1] + (pair[1] - pair[0]).norm());
+        }
+        Self { places, lengths, look_at, speed }
+    }
+
+    /// The place after this length of the way.
+    fn place(&self, s: f64) -> Vector3<f64> {
+        let last = self.places.len() - 1;
+        let k = self.lengths.partition_point(|l| *l <= s);
+        if k == 0 || last == 0 {
+            return self.places[0];
+        }
+        if k > last {
+            return self.places[last];
+        }
+        let (a, b) = (self.lengths[k - 1], self.lengths[k]);
+        self.places[k - 1] + (self.places[k] - self.places[k - 1]) * ((s - a) / (b - a))
+    }
+
+    /// The goal at a time (s): the mean of the way around its place, so that corners are round.
+    pub(crate) fn at(&self, time: f64) -> Goal {
+        let s = self.speed * time;
+        let step = ROUNDING / f64::from(SAMPLES);
+        let mean = |s: f64| {
+            (-SAMPLES..=SAMPLES).map(|k| self.place(s + f64::from(k) * step)).sum::<Vector3<f64>>()
+                / f64::from(2 * SAMPLES + 1)
+        };
+        let at = mean(s);
+        const H: f64 = 0.05;
+        let ahead = (mean(s + H) - mean(s - H)) / (2.0 * H);
+        // The way ahead, seen from a little farther, so that the heading stays defined at both ends.
+        let far = self.place((s + 1.5).min(self.length())) - self.place((s - 1.5).max(0.0).min(self.length() - 1e-3));
+        let look = self.look_at.map_or(far.xy(), |p| p - at.xy());
+        let heading = if look.norm() > 1e-6 { libm::atan2(look.y, look.x) } else { 0.0 };
+        Goal { at, velocity: ahead * self.speed, heading }
+    }
+
+    /// Its length (m).
+    pub(crate) fn length(&self) -> f64 {
+        self.lengths[self.lengths.len() - 1]
+    }
+}
+
+/// Over the places one after the other and back, until a length is reached.
+fn tour(centres: &[Vector2<f64>], length: f64) -> Vec<Vector2<f64>> {
+    let n = centres.len();
+    if n == 1 {
+        // One object: crosses over it.
+        let arm = |k: usize| centres[0] + [Vector2::x(), Vector2::y(), -Vector2::x(), -Vector2::y()][k % 4] * 0.8;
+        return (0..4 + (length / 1.6) as usize).map(arm).collect();
+    }
+    let mut way = vec![centres[0]];
+    let mut sum = 0.0;
+    for k in 1.. {
+        let (turn, step) = (k / (n - 1), k % (n - 1));
+        let index = if turn % 2 == 0 { step } else { n - 1 - step };
+        let next = centres[index];
+        sum += (next - way[way.len() - 1]).norm();
+        way.push(next);
+        if sum >= length {
+            break;
+        }
+    }
+    way
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tour_goes_there_and_back_to_its_length() {
+        let centres = [Vector2::new(0.0, 0.0), Vector2::new(10.0, 0.0), Vector2::new(10.0, 10.0)];
+        let way = tour(&centres, 50.0);
+        assert_eq!(way[..5], [centres[0], centres[1], centres[2], centres[1], centres[0]]);
+        assert_eq!(way.len(), 6);
+    }
+
+    #[test]
+    fn corners_are_round_and_straights_straight() {
+        let way = Way::through(vec![Vector3::zeros(), Vector3::x() * 10.0, Vector3::new(10.0, 10.0, 0.0)], None, 0.5);
+        let goal = way.at(10.0);
+        assert!((goal.at - Vector3::x() * 5.0).norm() < 1e-12 && (goal.velocity - Vector3::x() * 0.5).norm() < 1e-9);
+        assert!(goal.heading.abs() < 1e-12);
+        let corner = way.at(20.0);
+        assert!((corner.heading - std::f64::consts::FRAC_PI_4).abs() < 1e-9 && corner.at.x < 10.0);
+        let end = way.at(1000.0);
+        assert!((end.at - Vector3::new(10.0, 10.0, 0.0)).norm() < 1e-12 && end.velocity.norm() < 1e-12);
+        assert!((end.heading - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+    }
+}
