@@ -25,6 +25,7 @@ pub mod poses;
 pub mod problems;
 pub mod rigs;
 pub mod scenes;
+pub mod searches;
 pub mod variants;
 
 pub use law::{law, not_idle, within};

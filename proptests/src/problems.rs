@@ -20,6 +20,8 @@ pub struct Planted {
     pub tolerance: Tolerance,
     /// The true pairs, of the visible points.
     pub truth: Vec<Correspondence>,
+    /// Where the camera is.
+    pub pose: Transform<Object, Camera>,
 }
 
 impl Planted {
@@ -199,5 +201,6 @@ fn plant(shared: &Shared, points: &[Drawn], clutter: &[Vector3<f64>]) -> Planted
         model,
         tolerance: shared.tolerance,
         truth,
+        pose: shared.camera_from_object.inverse(),
     }
 }

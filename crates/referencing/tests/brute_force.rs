@@ -209,7 +209,7 @@ fn check_clique(case: &Case, orientation: bool, seed: u64) {
             assert_eq!(coherent, best, "case {seed}");
             assert!(larger.iter().any(|set| fours(set).iter().any(|four| opposed(&problem, four))), "case {seed}");
         }
-        Err(Unidentified::Budget { .. }) => panic!("case {seed}: seven points exhaust no budget"),
+        Err(unproved) => panic!("case {seed}: {unproved}: seven points exhaust no budget"),
     }
 }
 

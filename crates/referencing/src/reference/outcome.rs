@@ -131,12 +131,13 @@ impl Attempt {
             _ => None,
         };
         let size_bound = match why {
-            Unidentified::Budget { bound, .. } => Some(bound),
+            Unidentified::Budget { bound, .. } | Unidentified::NotFound { bound, .. } => Some(bound),
+            Unidentified::NoPrior => None,
             Unidentified::NoConsensus { best, .. } | Unidentified::Mirrored { best } => Some(best),
             Unidentified::TooFew { with_candidates, .. } => Some(with_candidates),
         };
         Self {
-            optimal: !matches!(why, Unidentified::Budget { .. }),
+            optimal: why.is_proved(),
             outcome: Outcome::Unidentified(why.into()),
             identified: Vec::new(),
             runner_up: None,

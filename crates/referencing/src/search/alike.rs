@@ -46,7 +46,7 @@ pub(super) fn all_alike(
 }
 
 /// How far a true pair may be from where the motion puts it (m).
-fn slack(problem: &Problem<'_>, pair: Correspondence) -> f64 {
+pub(super) fn slack(problem: &Problem<'_>, pair: Correspondence) -> f64 {
     match problem.tolerance {
         Tolerance::Fixed(delta) => delta,
         Tolerance::Sigmas(k) => {

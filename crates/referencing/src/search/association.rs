@@ -113,29 +113,39 @@ fn twins(vertices: &[Correspondence]) -> Vec<Vec<usize>> {
     twins
 }
 
-/// The candidate pairs in the order of their coordinates, model first.
-fn vertices(problem: &Problem<'_>) -> Vec<Correspondence> {
+/// Points by their coordinates; of equals the first.
+pub(super) fn by_coordinates<F>(points: impl Iterator<Item = Point<F>>) -> Vec<usize> {
+    let points: Vec<_> = points.map(|point| point.coords).collect();
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|&i, &j| {
+        let (a, b) = (points[i], points[j]);
+        a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)).then(i.cmp(&j))
+    });
+    order
+}
+
+/// The candidate pairs in the order of their coordinates, model first; those with a coordinate that is not finite
+/// agree with nothing and are left out.
+pub(super) fn vertices(problem: &Problem<'_>) -> Vec<Correspondence> {
     fn ranks<F>(points: impl Iterator<Item = Point<F>>) -> Vec<usize> {
-        let points: Vec<_> = points.map(|point| point.coords).collect();
-        let mut order: Vec<usize> = (0..points.len()).collect();
-        let key = |i: usize| points[i];
-        order.sort_by(|&i, &j| {
-            let (a, b) = (key(i), key(j));
-            a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)).then(i.cmp(&j))
-        });
-        let mut ranks = vec![0; points.len()];
+        let order = by_coordinates(points);
+        let mut ranks = vec![0; order.len()];
         order.into_iter().enumerate().for_each(|(rank, i)| ranks[i] = rank);
         ranks
     }
     let model = ranks(problem.model.iter().map(|point| point.at));
     let cloud = ranks(problem.cloud.iter().map(|point| point.position.at));
+    let finite = |pair: &Correspondence| {
+        problem.model[pair.model].at.is_finite() && problem.cloud[pair.cloud].position.at.is_finite()
+    };
     let mut vertices: Vec<_> = problem
         .candidates
         .lists
         .iter()
         .enumerate()
         .flat_map(|(i, list)| list.iter().map(move |&j| Correspondence { model: i, cloud: j }))
+        .filter(finite)
         .collect();
-    vertices.sort_by_key(|pair| (model[pair.model], cloud[pair.cloud]));
+    vertices.sort_unstable_by_key(|pair| (model[pair.model], cloud[pair.cloud]));
     vertices
 }

@@ -330,6 +330,6 @@ impl<'a> Search<'a> {
 }
 
 /// The members that a further point is tested against.
-fn decisive_members(clique: &[usize]) -> &[usize] {
+pub(super) fn decisive_members(clique: &[usize]) -> &[usize] {
     if clique.len() < MOST_ORIENTED { clique } else { &clique[..FEW_ORIENTED] }
 }

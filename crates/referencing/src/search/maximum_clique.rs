@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, Search, Unidentified,
+    BUDGET, Identification, MOST_TIES, NEEDED, Search, Unidentified,
     alike::all_alike,
     association::Association,
     clique::{self, MOST_ORIENTED},
@@ -49,11 +49,6 @@ impl Component for MaximumClique {
     }
 }
 
-/// Sets of the largest size that are looked at before the best of them is chosen.
-const MOST_TIES: usize = 4096;
-/// The least set that a pose can come from.
-const NEEDED: usize = 3;
-
 impl Search for MaximumClique {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
         let with_candidates = problem.candidates.with_candidates();
@@ -83,7 +78,7 @@ impl Search for MaximumClique {
         }
         let larger_image = self.larger_image(size, &mut cliques);
         let mut ties = largest.found;
-        let best = least_residual(problem, &graph, &ties);
+        let best = least_residual(problem, &graph.vertices, &ties);
         let clique = ties.swap_remove(best);
         let mut pairs = pairs_of(&graph, &clique);
         let mut rivals: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
@@ -164,10 +159,11 @@ fn pairs_of(graph: &Association, clique: &[usize]) -> Vec<Correspondence> {
 /// The place of the set with the least residual of a rigid fit. Residuals that differ by rounding
 /// only are equal, and then the coordinates decide, in whose order the vertices stand: the answer does
 /// not depend on the order of the cloud.
-fn least_residual(problem: &Problem<'_>, graph: &Association, cliques: &[Vec<usize>]) -> usize {
+pub(super) fn least_residual(problem: &Problem<'_>, vertices: &[Correspondence], cliques: &[Vec<usize>]) -> usize {
     let quantum = 1e-9 * problem.model.iter().map(|point| point.at.coords.amax()).fold(f64::MIN_POSITIVE, f64::max);
     let rank = |clique: &[usize]| {
-        let data = Observations::of(&pairs_of(graph, clique), problem.model, problem.cloud, None);
+        let pairs: Vec<Correspondence> = clique.iter().map(|&vertex| vertices[vertex]).collect();
+        let data = Observations::of(&pairs, problem.model, problem.cloud, None);
         (data.residual_rms(&least_squares(&data.points)) / quantum).round()
     };
     let ranks: Vec<f64> = cliques.iter().map(|clique| rank(clique)).collect();

@@ -5,16 +5,31 @@ use seafix_component::{Registry, entry};
 
 use crate::{Correspondence, Problem};
 
+mod affinity;
 mod alike;
 mod association;
+mod backtracking;
 mod bitset;
 mod clique;
+mod closest;
+mod complete_enumeration;
 mod edges;
+mod gicp;
+mod gnc_tls;
+mod grow;
+mod icp;
+mod interpretation_tree;
+mod joint_compatibility;
 mod local;
 mod maximum_clique;
 mod orientation;
+mod pose;
+mod pose_vote;
+mod ransac;
+mod spectral;
 mod structural_coherence;
 mod volumes;
+mod weighted_clique;
 
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]
@@ -54,6 +69,21 @@ pub struct Identification {
     pub undecided: Option<Unidentified>,
 }
 
+impl Identification {
+    /// A set of which nothing is proved but that no admissible set has more than `bound` pairs.
+    pub(crate) fn unproved(pairs: Vec<Correspondence>, bound: usize, tests: u64) -> Self {
+        Self {
+            pairs,
+            rivals: Vec::new(),
+            rivals_complete: false,
+            optimal: false,
+            size_bound: bound,
+            tests,
+            undecided: None,
+        }
+    }
+}
+
 /// Why nothing was identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unidentified {
@@ -85,6 +115,17 @@ pub enum Unidentified {
         /// Pair tests spent, those that built the graph included.
         tests: u64,
     },
+    /// A search that proves nothing found too small a set, or none.
+    #[error("no coherent set of {needed} points was found; at most {bound} are possible")]
+    NotFound {
+        /// No set is larger than this.
+        bound: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// The search begins at a prior, and there is none.
+    #[error("there is no prior, and this search begins at one")]
+    NoPrior,
     /// Only mirror images of the model were found.
     #[error("the largest coherent set, {best} points, is a mirror image of the model")]
     Mirrored {
@@ -94,11 +135,18 @@ pub enum Unidentified {
 }
 
 impl Unidentified {
+    /// Whether it says that there is nothing, and not only that nothing was found.
+    pub fn is_proved(&self) -> bool {
+        matches!(self, Self::TooFew { .. } | Self::NoConsensus { .. } | Self::Mirrored { .. })
+    }
+
     /// The reason as logs and tables have it, in kebab-case.
     pub fn reason(&self) -> &'static str {
         match self {
             Self::TooFew { .. } => "too-few",
             Self::NoConsensus { .. } => "no-consensus",
+            Self::NoPrior => "no-prior",
+            Self::NotFound { .. } => "not-found",
             Self::Budget { .. } => "budget",
             Self::Mirrored { .. } => "mirrored",
         }
@@ -106,8 +154,28 @@ impl Unidentified {
 }
 
 /// All searches.
-pub static SEARCHES: Registry<dyn Search> =
-    Registry::new("search", &[entry!(MaximumClique), entry!(StructuralCoherence)]);
+pub static SEARCHES: Registry<dyn Search> = Registry::new(
+    "search",
+    &[
+        entry!(backtracking::Backtracking),
+        entry!(complete_enumeration::CompleteEnumeration),
+        entry!(gicp::Gicp),
+        entry!(gnc_tls::GncTls),
+        entry!(icp::Icp),
+        entry!(interpretation_tree::InterpretationTree),
+        entry!(joint_compatibility::JointCompatibility),
+        entry!(MaximumClique),
+        entry!(pose_vote::PoseVote),
+        entry!(ransac::Ransac),
+        entry!(spectral::Spectral),
+        entry!(StructuralCoherence),
+        entry!(weighted_clique::WeightedClique),
+    ],
+);
 
 /// The default budget of a search: pair tests beyond those that build its graph.
 pub(crate) const BUDGET: u64 = 10_000_000;
+/// The least set that a pose can come from.
+pub(crate) const NEEDED: usize = 3;
+/// Sets of the largest size that are looked at before the best of them is chosen.
+const MOST_TIES: usize = 4096;

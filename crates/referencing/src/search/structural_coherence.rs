@@ -5,7 +5,8 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, Search, Unidentified,
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    association::vertices,
     orientation::{fours, mirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Problem};
@@ -55,53 +56,38 @@ impl Component for StructuralCoherence {
     }
 }
 
-/// The shortest sample that a pose can come from.
-const NEEDED: usize = 3;
-
 impl Search for StructuralCoherence {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        let with_candidates = problem.candidates.with_candidates();
+        if with_candidates < NEEDED {
+            return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
+        }
+        // Points are numbered by their coordinates: the answer does not depend on the order they came in.
         // A model point without candidates is in no sample's product: leaving it out changes no answer.
-        let with: Vec<usize> = (0..problem.model.len()).filter(|&i| !problem.candidates.lists[i].is_empty()).collect();
-        if with.len() < NEEDED {
-            return Err(Unidentified::TooFew { with_candidates: with.len(), needed: NEEDED });
+        let vertices = vertices(problem);
+        let choices: Vec<usize> = vertices.iter().map(|pair| pair.cloud).collect();
+        let mut lists = Vec::new();
+        let mut rest = choices.as_slice();
+        for same in vertices.chunk_by(|a, b| a.model == b.model) {
+            let (list, later) = rest.split_at(same.len());
+            lists.push((same[0].model, list));
+            rest = later;
         }
-        let mut run = Run { problem, settings: self, tests: 0, best: 0, mirrored: None };
-        for q in (NEEDED..=with.len()).rev() {
-            match run.samples_of(&with, q) {
-                // Three points have no orientation: these are what is left of a mirror image.
-                Ok(Some(_)) if q == NEEDED && run.mirrored.is_some() => {
-                    return Err(Unidentified::Mirrored { best: run.mirrored.unwrap_or(q) });
-                }
-                Ok(Some(mut pairs)) => {
-                    pairs.sort_unstable();
-                    return Ok(Identification {
-                        pairs,
-                        rivals: Vec::new(),
-                        rivals_complete: false,
-                        optimal: true,
-                        size_bound: q,
-                        tests: run.tests,
-                        // A longer sample was a mirror image: what is left of it is no fix.
-                        undecided: run.mirrored.map(|best| Unidentified::Mirrored { best }),
-                    });
-                }
-                Ok(None) => {}
-                Err(Spent) => {
-                    let (budget, best) = (self.budget, run.best);
-                    return Err(Unidentified::Budget { budget, best, bound: q, tests: run.tests });
-                }
-            }
-        }
-        Err(Unidentified::NoConsensus { best: run.best, needed: NEEDED })
+        Enumeration::of(problem, lists, self.samples, self.orientation, self.budget).run(with_candidates)
     }
 }
 
 /// The budget is spent.
 struct Spent;
 
-struct Run<'a> {
+/// Samples of model points, longest first, and the choices of one candidate each.
+pub(super) struct Enumeration<'a> {
     problem: &'a Problem<'a>,
-    settings: &'a StructuralCoherence,
+    /// Model points and their candidates.
+    lists: Vec<(usize, &'a [usize])>,
+    samples: Samples,
+    orientation: bool,
+    budget: u64,
     tests: u64,
     /// Size of the largest coherent set met so far, as the beginning of a longer sample.
     best: usize,
@@ -109,18 +95,55 @@ struct Run<'a> {
     mirrored: Option<usize>,
 }
 
-impl Run<'_> {
+impl<'a> Enumeration<'a> {
+    pub(super) fn of(
+        problem: &'a Problem<'a>,
+        lists: Vec<(usize, &'a [usize])>,
+        samples: Samples,
+        orientation: bool,
+        budget: u64,
+    ) -> Self {
+        Self { problem, lists, samples, orientation, budget, tests: 0, best: 0, mirrored: None }
+    }
+
+    /// The first coherent sample, of at most `longest` points.
+    pub(super) fn run(mut self, longest: usize) -> Result<Identification, Unidentified> {
+        for q in (NEEDED..=self.lists.len().min(longest)).rev() {
+            match self.samples_of(q) {
+                // Three points have no orientation: these are what is left of a mirror image.
+                Ok(Some(_)) if q == NEEDED && self.mirrored.is_some() => {
+                    return Err(Unidentified::Mirrored { best: self.mirrored.unwrap_or(q) });
+                }
+                Ok(Some(mut pairs)) => {
+                    pairs.sort_unstable();
+                    // A longer sample was a mirror image: what is left of it is no fix.
+                    let undecided = self.mirrored.map(|best| Unidentified::Mirrored { best });
+                    return Ok(Identification {
+                        optimal: true,
+                        undecided,
+                        ..Identification::unproved(pairs, q, self.tests)
+                    });
+                }
+                Ok(None) => {}
+                Err(Spent) => {
+                    let (budget, best) = (self.budget, self.best);
+                    return Err(Unidentified::Budget { budget, best, bound: q, tests: self.tests });
+                }
+            }
+        }
+        Err(Unidentified::NoConsensus { best: self.best, needed: NEEDED })
+    }
+
     /// The first coherent choice of candidates among the samples of length `q`.
-    fn samples_of(&mut self, with: &[usize], q: usize) -> Result<Option<Vec<Correspondence>>, Spent> {
+    fn samples_of(&mut self, q: usize) -> Result<Option<Vec<Correspondence>>, Spent> {
         let mut sample: Vec<usize> = (0..q).collect();
         loop {
-            let points: Vec<usize> = sample.iter().map(|&place| with[place]).collect();
-            if let Some(found) = self.product_of(&points)? {
+            if let Some(found) = self.product_of(&sample)? {
                 return Ok(Some(found));
             }
-            let more = match self.settings.samples {
-                Samples::Combinations => next_combination(&mut sample, with.len()),
-                Samples::Permutations => next_arrangement(&mut sample, with.len()),
+            let more = match self.samples {
+                Samples::Combinations => next_combination(&mut sample, self.lists.len()),
+                Samples::Permutations => next_arrangement(&mut sample, self.lists.len()),
             };
             if !more {
                 return Ok(None);
@@ -129,18 +152,18 @@ impl Run<'_> {
     }
 
     /// The first coherent choice of one candidate for each of these model points.
-    fn product_of(&mut self, points: &[usize]) -> Result<Option<Vec<Correspondence>>, Spent> {
-        let lists: Vec<&[usize]> = points.iter().map(|&i| self.problem.candidates.lists[i].as_slice()).collect();
-        let mut choice = vec![0; points.len()];
+    fn product_of(&mut self, sample: &[usize]) -> Result<Option<Vec<Correspondence>>, Spent> {
+        let lists: Vec<(usize, &[usize])> = sample.iter().map(|&place| self.lists[place]).collect();
+        let mut choice = vec![0; lists.len()];
         loop {
-            let pairs: Vec<Correspondence> = (0..points.len())
-                .map(|place| Correspondence { model: points[place], cloud: lists[place][choice[place]] })
-                .collect();
+            let pair =
+                |(&(model, list), &place): (&(usize, &[usize]), &usize)| Correspondence { model, cloud: list[place] };
+            let pairs: Vec<Correspondence> = lists.iter().zip(&choice).map(pair).collect();
             if self.agrees(&pairs)? {
                 return Ok(Some(pairs));
             }
             // The last point's candidate changes fastest.
-            let Some(place) = (0..points.len()).rev().find(|&place| choice[place] + 1 < lists[place].len()) else {
+            let Some(place) = (0..lists.len()).rev().find(|&place| choice[place] + 1 < lists[place].1.len()) else {
                 return Ok(None);
             };
             choice[place] += 1;
@@ -152,7 +175,7 @@ impl Run<'_> {
     fn agrees(&mut self, pairs: &[Correspondence]) -> Result<bool, Spent> {
         for (place, &a) in pairs.iter().enumerate() {
             for &b in &pairs[..place] {
-                if self.tests >= self.settings.budget {
+                if self.tests >= self.budget {
                     return Err(Spent);
                 }
                 self.tests += 1;
@@ -162,9 +185,9 @@ impl Run<'_> {
             }
             self.best = self.best.max(place + 1);
         }
-        if self.settings.orientation {
+        if self.orientation {
             for four in fours(pairs) {
-                if self.tests >= self.settings.budget {
+                if self.tests >= self.budget {
                     return Err(Spent);
                 }
                 self.tests += 1;

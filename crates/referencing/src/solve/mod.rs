@@ -30,6 +30,7 @@ mod triad;
 mod umeyama;
 mod weighted_kabsch;
 
+pub(crate) use gnc_tls::GncTls;
 pub use kabsch::Kabsch;
 pub(crate) use kabsch::fit as least_squares;
 pub use mahalanobis::Mahalanobis;

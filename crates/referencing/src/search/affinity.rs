@@ -1,0 +1,80 @@
+//! The association graph with weights: how well each coherent pair of pairs agrees.
+
+use super::association::Association;
+use crate::Problem;
+
+/// A symmetric matrix over the vertices, zero where they are not coherent; its upper half by rows.
+#[derive(Debug)]
+pub(super) struct Affinity {
+    /// Where each row begins.
+    starts: Vec<usize>,
+    columns: Vec<u32>,
+    weights: Vec<f32>,
+}
+
+impl Affinity {
+    /// Edges weighed by `weight` of their difference over Δ, 0 to 1; none where they are more than `most`.
+    pub(super) fn of(
+        problem: &Problem<'_>,
+        graph: &Association,
+        most: usize,
+        weight: impl Fn(f64) -> f64,
+    ) -> Option<Self> {
+        let count = graph.vertices.len();
+        let mut all = Self { starts: vec![0], columns: Vec::new(), weights: Vec::new() };
+        for v in 0..count {
+            for w in graph.adjacency.ones(v).filter(|&w| w > v) {
+                let (a, b) = (graph.vertices[v], graph.vertices[w]);
+                let known = problem.model[a.model].at.distance(&problem.model[b.model].at);
+                let measured = problem.cloud[a.cloud].position.at.distance(&problem.cloud[b.cloud].position.at);
+                let (off, delta) = ((known - measured).abs(), problem.delta(a, b));
+                all.columns.push(w as u32);
+                all.weights.push(weight(if off > 0.0 { off / delta } else { 0.0 }) as f32);
+            }
+            if all.columns.len() > most {
+                return None;
+            }
+            all.starts.push(all.columns.len());
+        }
+        Some(all)
+    }
+
+    pub(super) fn edges(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// M x, and A x with A the graph without its weights.
+    pub(super) fn products(&self, x: &[f64], weighted: &mut [f64], plain: &mut [f64]) {
+        weighted.fill(0.0);
+        plain.fill(0.0);
+        for (v, ends) in self.starts.windows(2).enumerate() {
+            let (mut row, mut ones) = (0.0, 0.0);
+            for (&w, &weight) in self.columns[ends[0]..ends[1]].iter().zip(&self.weights[ends[0]..ends[1]]) {
+                let (w, weight) = (w as usize, f64::from(weight));
+                row += weight * x[w];
+                ones += x[w];
+                weighted[w] += weight * x[v];
+                plain[w] += x[v];
+            }
+            weighted[v] += row;
+            plain[v] += ones;
+        }
+    }
+}
+
+/// Makes the length of a vector one; false where it has none.
+pub(super) fn normalized(x: &mut [f64]) -> bool {
+    let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let some = length > 0.0 && length.is_finite();
+    if some {
+        x.iter_mut().for_each(|x| *x /= length);
+    }
+    some
+}
+
+/// Vertices by falling weight, those of no weight left out; of equals the first.
+pub(super) fn by_weight(x: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..x.len()).filter(|&v| x[v] > 0.0).collect();
+    order.sort_by(|&v, &w| x[w].total_cmp(&x[v]));
+    order
+}

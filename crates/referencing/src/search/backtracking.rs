@@ -1,0 +1,219 @@
+//! Backtracking: subsets with pruning.
+
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, MOST_TIES, NEEDED, Search, Unidentified,
+    association::vertices,
+    grow::{feasible, most_possible},
+    maximum_clique::least_residual,
+    orientation::{Sense, wholly_mirrored},
+    volumes::Volumes,
+};
+use crate::{Correspondence, Problem};
+
+/// The largest admissible set, as `maximum-clique`, without a graph: each subset of model points once, in place of the
+/// paper's ordered samples, one candidate after the other, and nothing below a pair that contradicts one chosen. What is
+/// chosen strikes what contradicts it from the lists of the points to come (forward checking); a branch ends when the
+/// points that still have candidates are too few to beat the best (bound).
+///
+/// Exact within the budget; of sets of one size the least residual of a rigid fit decides, then the coordinates. Exponential
+/// in the worst case: Π (m_i + 1) for lists of m_i.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Backtracking {
+    /// Whether mirror images are refused; `false` is the paper's distances alone.
+    pub(crate) orientation: bool,
+    /// Whether branches too small for the best are left; `false` only to show that nothing is lost by it.
+    pub(crate) bound: bool,
+    /// Pair tests.
+    pub(crate) budget: u64,
+    /// More candidate pairs than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for Backtracking {
+    fn default() -> Self {
+        Self { orientation: true, bound: true, budget: BUDGET, most_pairs: 40_000 }
+    }
+}
+
+impl Component for Backtracking {
+    const NAME: &'static str = "backtracking";
+    const SUMMARY: &'static str = "the largest admissible set by subsets of the model points, with forward checking";
+    const SOURCE: &'static str = "Haralick, Elliott, Increasing tree search efficiency for constraint satisfaction \
+                                  problems, 1980";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
+}
+
+impl Search for Backtracking {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, self.budget)?;
+        let vertices = vertices(problem);
+        let volumes = Volumes::of(problem, &vertices);
+        let mut run = Run {
+            problem,
+            vertices: &vertices,
+            volumes: &volumes,
+            bound: self.bound,
+            sense: if self.orientation { Sense::Proper } else { Sense::Any },
+            left: self.budget,
+            best: 0,
+            found: Vec::new(),
+            cap: 1,
+        };
+        let (budget, possible) = (self.budget, most_possible(problem));
+        let complete = run.largest(1, MOST_TIES);
+        let mut ties = std::mem::take(&mut run.found);
+        let size = ties.first().map_or(0, Vec::len);
+        if size < NEEDED {
+            return Err(match complete {
+                true => Unidentified::NoConsensus { best: size, needed: NEEDED },
+                false => Unidentified::Budget { budget, best: size, bound: possible, tests: self.budget - run.left },
+            });
+        }
+        let mut undecided = None;
+        if self.orientation {
+            // Three points have no orientation: they may be what is left of a mirror image of more.
+            run.sense = if size == NEEDED { Sense::Any } else { Sense::Mirrored };
+            run.largest(size + 1, 1);
+            if let Some(image) = run.found.first().map(|set| run.pairs(set)) {
+                let mirrored = Unidentified::Mirrored { best: image.len() };
+                match (size == NEEDED, wholly_mirrored(problem, &image)) {
+                    (true, true) => return Err(mirrored),
+                    (_, true) => undecided = Some(mirrored),
+                    _ => {}
+                }
+            }
+        }
+        let tests = self.budget - run.left;
+        ties.sort();
+        let rivals_complete = complete && ties.len() < MOST_TIES;
+        let best = ties.swap_remove(least_residual(problem, &vertices, &ties));
+        let bound = if complete { size } else { possible };
+        if !rivals_complete && undecided.is_none() {
+            undecided = Some(Unidentified::Budget { budget, best: size, bound, tests });
+        }
+        Ok(Identification {
+            rivals: ties.iter().map(|set| run.pairs(set)).collect(),
+            rivals_complete,
+            optimal: complete,
+            undecided,
+            ..Identification::unproved(run.pairs(&best), bound, tests)
+        })
+    }
+}
+
+/// The budget is spent.
+struct Spent;
+
+struct Run<'a> {
+    problem: &'a Problem<'a>,
+    vertices: &'a [Correspondence],
+    volumes: &'a Volumes<'a>,
+    bound: bool,
+    sense: Sense,
+    left: u64,
+    /// The least size of interest.
+    best: usize,
+    /// Sets of that size, vertices ascending.
+    found: Vec<Vec<usize>>,
+    cap: usize,
+}
+
+impl Run<'_> {
+    /// The largest sets of at least `least` members, up to `cap`; whether it came to its end.
+    fn largest(&mut self, least: usize, cap: usize) -> bool {
+        (self.best, self.cap, self.found) = (least, cap, Vec::new());
+        let all: Vec<usize> = (0..self.vertices.len()).collect();
+        // Points with few candidates first: what they contradict is struck early.
+        let mut lists: Vec<Vec<usize>> =
+            all.chunk_by(|&a, &b| self.vertices[a].model == self.vertices[b].model).map(<[usize]>::to_vec).collect();
+        lists.sort_by_key(Vec::len);
+        self.extend(&mut Vec::new(), &lists).is_ok()
+    }
+
+    /// Sets that begin with `set` and go on with some of these lists, in their order.
+    fn extend(&mut self, set: &mut Vec<usize>, lists: &[Vec<usize>]) -> Result<(), Spent> {
+        for (place, list) in lists.iter().enumerate() {
+            if self.bound && set.len() + lists.len() - place < self.best {
+                return Ok(());
+            }
+            for &vertex in list {
+                let rest = self.checked(set, vertex, &lists[place + 1..])?;
+                set.push(vertex);
+                self.keep(set);
+                let done = self.extend(set, &rest);
+                set.pop();
+                done?;
+            }
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, set: &[usize]) {
+        if set.len() > self.best {
+            (self.best, self.found) = (set.len(), Vec::new());
+        }
+        if set.len() == self.best && self.found.len() < self.cap {
+            let mut set = set.to_vec();
+            set.sort_unstable();
+            self.found.push(set);
+        }
+    }
+
+    /// What of the lists does not contradict `set` with `vertex`; lists that are left empty are dropped.
+    fn checked(&mut self, set: &[usize], vertex: usize, lists: &[Vec<usize>]) -> Result<Vec<Vec<usize>>, Spent> {
+        let mut planes = Vec::new();
+        if self.sense != Sense::Any {
+            for (i, &a) in set.iter().enumerate() {
+                planes.extend(set[..i].iter().map(|&b| self.volumes.plane([a, b, vertex])));
+            }
+        }
+        let mut rest = Vec::with_capacity(lists.len());
+        for list in lists {
+            let mut tests = 0;
+            let stays = |other: &usize| {
+                tests += 1;
+                self.problem.coherent(self.vertices[vertex], self.vertices[*other]) && {
+                    tests += planes.len() as u64;
+                    !planes.iter().any(|plane| self.volumes.refuses(self.sense, plane, *other))
+                }
+            };
+            let kept: Vec<usize> = list.iter().copied().filter(stays).collect();
+            self.left = self.left.saturating_sub(tests);
+            if self.left == 0 {
+                return Err(Spent);
+            }
+            if !kept.is_empty() {
+                rest.push(kept);
+            }
+        }
+        Ok(rest)
+    }
+
+    /// The pairs of some vertices, in the order of the model points.
+    fn pairs(&self, set: &[usize]) -> Vec<Correspondence> {
+        let mut pairs: Vec<Correspondence> = set.iter().map(|&vertex| self.vertices[vertex]).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Backtracking::default().check(), Ok(()));
+        assert!(Backtracking { budget: 0, ..Backtracking::default() }.check().is_err());
+        assert!(Backtracking { most_pairs: 2, ..Backtracking::default() }.check().is_err());
+    }
+}

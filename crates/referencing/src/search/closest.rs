@@ -1,0 +1,62 @@
+//! The loop of the closest-point searches.
+
+use seafix_geometry::{Camera, Object, Transform};
+
+use super::association::vertices;
+use crate::{Correspondence, Problem};
+
+/// What tells one closest-point search from another, and how long it may run.
+pub(super) struct Closest<D, F> {
+    /// How far a pair is from where a pose puts it; a NaN is no candidate.
+    pub(super) distance: D,
+    /// The pose of some pairs.
+    pub(super) fit: F,
+    /// Share of the nearest pairs that is fitted.
+    pub(super) keep: f64,
+    pub(super) iterations: usize,
+    pub(super) budget: u64,
+}
+
+impl<D, F> Closest<D, F>
+where
+    D: Fn(&Transform<Object, Camera>, Correspondence) -> f64,
+    F: Fn(&[Correspondence]) -> Option<Transform<Object, Camera>>,
+{
+    /// From `start`: each model point's nearest candidate, the pose of the nearest of these pairs, and again until
+    /// the pairs do not change. The last pose, all candidate pairs, and the distances computed.
+    pub(super) fn run(
+        &self,
+        problem: &Problem<'_>,
+        start: Transform<Object, Camera>,
+    ) -> (Transform<Object, Camera>, Vec<Correspondence>, u64) {
+        let vertices = vertices(problem);
+        let (mut pose, mut last, mut tests) = (start, Vec::new(), 0);
+        for _ in 0..self.iterations {
+            tests += vertices.len() as u64;
+            if tests > self.budget {
+                break;
+            }
+            let groups = vertices.chunk_by(|a, b| a.model == b.model);
+            let nearest = |same: &[Correspondence]| {
+                let off = same.iter().map(|&pair| ((self.distance)(&pose, pair), pair));
+                off.filter(|(off, _)| !off.is_nan()).min_by(|(a, _), (b, _)| a.total_cmp(b))
+            };
+            let mut pairs: Vec<(f64, Correspondence)> = groups.filter_map(nearest).collect();
+            pairs.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+            let kept = (self.keep * pairs.len() as f64).ceil() as usize;
+            let mut pairs: Vec<Correspondence> = pairs.into_iter().take(kept).map(|(_, pair)| pair).collect();
+            pairs.sort_unstable();
+            if pairs == last {
+                break;
+            }
+            // In the order of the vertices, so that sums do not depend on the order of the points.
+            let chosen: Vec<Correspondence> =
+                vertices.iter().copied().filter(|pair| pairs.binary_search(pair).is_ok()).collect();
+            match (self.fit)(&chosen).filter(Transform::is_finite) {
+                Some(next) => (pose, last) = (next, pairs),
+                None => break,
+            }
+        }
+        (pose, vertices, tests)
+    }
+}

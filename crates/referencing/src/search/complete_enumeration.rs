@@ -1,0 +1,78 @@
+//! Complete enumeration: the paper's search without its shells.
+
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    association::by_coordinates,
+    structural_coherence::{Enumeration, Samples},
+};
+use crate::Problem;
+
+/// The baseline that shells are held against: every cloud point may be every model point, whatever the prior says, so that
+/// M^q choices stand behind every sample of q model points. Longest samples first, the first coherent one is the answer,
+/// as in `structural-coherence`.
+///
+/// What it says is exact within the budget; Σ_q C(n, q) M^q choices, q! times as many with the paper's ordered samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct CompleteEnumeration {
+    /// Which samples are tried.
+    pub(crate) samples: Samples,
+    /// Whether mirror images are refused; `false` is distances alone.
+    pub(crate) orientation: bool,
+    /// Pair tests before it gives up.
+    pub(crate) budget: u64,
+    /// More pairs of a model and a cloud point than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for CompleteEnumeration {
+    fn default() -> Self {
+        Self { samples: Samples::Combinations, orientation: true, budget: BUDGET, most_pairs: 4_000_000 }
+    }
+}
+
+impl Component for CompleteEnumeration {
+    const NAME: &'static str = "complete-enumeration";
+    const SUMMARY: &'static str = "all cloud points for all model points, longest samples first: no shells";
+    const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
+                                  autonomous underwater vehicles to man-made objects using stereo images, 2021, ref. 35";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more pairs")
+    }
+}
+
+impl Search for CompleteEnumeration {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        let (points, cloud) = (problem.model.len(), problem.cloud.len());
+        let with_candidates = if cloud > 0 { points } else { 0 };
+        if with_candidates < NEEDED {
+            return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
+        }
+        if points.saturating_mul(cloud) > self.most_pairs {
+            let bound = points.min(cloud);
+            return Err(Unidentified::Budget { budget: self.budget, best: 0, bound, tests: 0 });
+        }
+        let all = by_coordinates(problem.cloud.iter().map(|point| point.position.at));
+        let points = by_coordinates(problem.model.iter().map(|point| point.at));
+        let lists = points.into_iter().map(|i| (i, all.as_slice())).collect();
+        Enumeration::of(problem, lists, self.samples, self.orientation, self.budget).run(cloud)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(CompleteEnumeration::default().check(), Ok(()));
+        assert!(CompleteEnumeration { budget: 0, ..CompleteEnumeration::default() }.check().is_err());
+        assert!(CompleteEnumeration { most_pairs: 2, ..CompleteEnumeration::default() }.check().is_err());
+    }
+}

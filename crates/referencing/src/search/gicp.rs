@@ -1,0 +1,94 @@
+//! Generalised iterative closest points, from the prior.
+
+use nalgebra::Matrix3;
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Object, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    closest::Closest,
+    grow::{conclude, feasible},
+    pose::refined,
+};
+use crate::{Correspondence, Mahalanobis, Observations, Problem, Solver};
+
+/// Minimises Σ rᵀ S⁻¹ r over poses and over the choice of each model point's nearest candidate, by turns from the prior on;
+/// r the residual of a pair, S = Σ_measured + σ_model² I: depth, which stereo measures worst, counts least. The covariances
+/// are those of the points, not of surfaces about them: features have none.
+///
+/// Not exact: it ends in the minimum next to the prior. N distances an iteration for N candidate pairs, and a
+/// weighted fit. Needs a prior, and covariances that are positive definite: a point without is no candidate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Gicp {
+    /// Whether mirror images are refused; `false` is the pose alone.
+    pub(crate) orientation: bool,
+    /// Share of the nearest pairs that is fitted: points out of view have none.
+    pub(crate) keep: f64,
+    /// Iterations at most.
+    pub(crate) iterations: usize,
+    /// Distances before it ends.
+    pub(crate) budget: u64,
+    /// More candidate pairs than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for Gicp {
+    fn default() -> Self {
+        Self { orientation: true, keep: 0.6, iterations: 50, budget: BUDGET, most_pairs: 4_000_000 }
+    }
+}
+
+impl Component for Gicp {
+    const NAME: &'static str = "gicp";
+    const SUMMARY: &'static str = "as icp, with distances and fit weighed by the covariances";
+    const SOURCE: &'static str = "Segal, Haehnel, Thrun, Generalized-ICP, 2009";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.keep > 0.0 && self.keep <= 1.0;
+        in_range(share, "keep", self.keep, "a share above 0, at most 1")?;
+        in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
+}
+
+/// Nothing is measured better than this (m).
+const FLOOR: f64 = 1e-6;
+
+impl Search for Gicp {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, self.budget)?;
+        let prior = problem.prior.ok_or(Unidentified::NoPrior)?;
+        let &Self { keep, iterations, budget, .. } = self;
+        let distance = |pose: &Transform<Object, Camera>, pair: Correspondence| {
+            let (known, seen) = (&problem.model[pair.model], &problem.cloud[pair.cloud].position);
+            let noise = seen.covariance + Matrix3::identity() * (known.sigma * known.sigma + FLOOR * FLOOR);
+            let off = pose.inverse() * known.at - seen.at;
+            noise.cholesky().map_or(f64::NAN, |s| off.dot(&s.solve(&off)).sqrt())
+        };
+        let solver = Mahalanobis::default();
+        let fit =
+            |pairs: &[Correspondence]| solver.solve(&Observations::of(pairs, problem.model, problem.cloud, None)).ok();
+        let (pose, vertices, mut tests) =
+            Closest { distance, fit, keep, iterations, budget }.run(problem, prior.object_from_camera);
+        let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
+        conclude(problem, &ranked, self.orientation, tests)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Gicp::default().check(), Ok(()));
+        assert!(Gicp { keep: 0.0, ..Gicp::default() }.check().is_err());
+        assert!(Gicp { keep: f64::NAN, ..Gicp::default() }.check().is_err());
+        assert!(Gicp { iterations: 0, ..Gicp::default() }.check().is_err());
+    }
+}

@@ -1,0 +1,82 @@
+//! GNC-TLS: one robust fit to all candidate pairs.
+
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    alike::slack,
+    association::vertices,
+    grow::{conclude, feasible},
+    pose::refined,
+};
+use crate::{Observations, Problem, Solver, solve};
+
+/// Minimises Σ min(r², c²) over poses by graduated non-convexity, all candidate pairs being correspondences, c what the
+/// tolerance allows each; what the pose explains, one-to-one, is the answer.
+///
+/// Not exact: it follows one minimum from the convex problem on. O(N) a step, some fifty steps for N pairs. Made for
+/// putative correspondences of which a good part is true; where each model point has many candidates it fits their
+/// mean.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct GncTls {
+    /// Whether mirror images are refused; `false` is the pose alone.
+    pub(crate) orientation: bool,
+    /// By how much μ grows a step.
+    pub(crate) growth: f64,
+    /// More candidate pairs than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for GncTls {
+    fn default() -> Self {
+        Self { orientation: true, growth: 1.4, most_pairs: 1_000_000 }
+    }
+}
+
+impl Component for GncTls {
+    const NAME: &'static str = "gnc-tls";
+    const SUMMARY: &'static str = "one robust fit to all candidate pairs, by graduated non-convexity";
+    const SOURCE: &'static str = "Yang, Antonante, Tzoumas, Carlone, Graduated non-convexity for robust spatial \
+                                  perception, 2020";
+
+    fn check(&self) -> Result<(), String> {
+        let grows = self.growth > 1.0 && self.growth <= 10.0;
+        in_range(grows, "growth", self.growth, "a number above 1, at most 10")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
+}
+
+impl Search for GncTls {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, BUDGET)?;
+        let vertices = vertices(problem);
+        let solver = solve::GncTls { growth: self.growth, ..solve::GncTls::default() };
+        let mut data = Observations::of(&vertices, problem.model, problem.cloud, None);
+        for (point, &pair) in data.points.iter_mut().zip(&vertices) {
+            // The solver leaves out what is off by `threshold` standard deviations.
+            let sigma = slack(problem, pair) / solver.threshold;
+            point.measured.covariance = nalgebra::Matrix3::identity() * (sigma * sigma);
+            point.model_sigma = 0.0;
+        }
+        let finite = data.points.iter().all(|point| point.measured.covariance[(0, 0)].is_finite());
+        let mut tests = vertices.len() as u64;
+        let pose = finite.then(|| solver.solve(&data).ok()).flatten().filter(|pose| pose.is_finite());
+        let ranked = pose.map(|pose| refined(problem, &vertices, pose, &mut tests).1).unwrap_or_default();
+        conclude(problem, &ranked, self.orientation, tests)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(GncTls::default().check(), Ok(()));
+        assert!(GncTls { growth: 1.0, ..GncTls::default() }.check().is_err());
+        assert!(GncTls { most_pairs: 2, ..GncTls::default() }.check().is_err());
+    }
+}

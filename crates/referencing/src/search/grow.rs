@@ -1,0 +1,125 @@
+//! From pairs in order of preference to an admissible set: the last step of every strategy that ranks.
+
+use super::{
+    Identification, NEEDED, Unidentified,
+    association::vertices,
+    clique::{MOST_ORIENTED, decisive_members},
+    orientation::{Sense, unmirrored, wholly_mirrored},
+    volumes::Volumes,
+};
+use crate::{Correspondence, Problem};
+
+/// Fours that are tested of a set too large for all of them.
+const MOST_FOURS: u64 = 1_000_000;
+
+/// Takes each pair in turn that is coherent with all that were taken and makes no refused four with three of
+/// them; in the order taken.
+pub(super) fn grow(
+    problem: &Problem<'_>,
+    ranked: &[Correspondence],
+    sense: Sense,
+    tests: &mut u64,
+) -> Vec<Correspondence> {
+    let volumes = Volumes::of(problem, ranked);
+    let mut taken: Vec<usize> = Vec::new();
+    for next in 0..ranked.len() {
+        if admits(problem, ranked, &volumes, sense, &taken, next, tests) {
+            taken.push(next);
+        }
+    }
+    taken.into_iter().map(|place| ranked[place]).collect()
+}
+
+/// Whether a pair is coherent with every one taken and makes no refused four with three of them.
+pub(super) fn admits(
+    problem: &Problem<'_>,
+    pairs: &[Correspondence],
+    volumes: &Volumes<'_>,
+    sense: Sense,
+    taken: &[usize],
+    next: usize,
+    tests: &mut u64,
+) -> bool {
+    for &other in taken {
+        *tests += 1;
+        if !problem.coherent(pairs[other], pairs[next]) {
+            return false;
+        }
+    }
+    if sense == Sense::Any {
+        return true;
+    }
+    let members = decisive_members(taken);
+    for (i, &a) in members.iter().enumerate() {
+        for (k, &b) in members[..i].iter().enumerate() {
+            let plane = volumes.plane([a, b, next]);
+            *tests += k as u64;
+            if members[..k].iter().any(|&c| volumes.refuses(sense, &plane, c)) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+/// The answer of a strategy that prefers these pairs in this order: the admissible set they grow into.
+///
+/// Where the same beginning grows into more pairs as a mirror image, the set is what is left of that image:
+/// three are no answer, more are not to be believed by themselves.
+///
+/// # Errors
+/// [`Unidentified::NotFound`] with fewer than three, [`Unidentified::Mirrored`].
+pub(super) fn conclude(
+    problem: &Problem<'_>,
+    ranked: &[Correspondence],
+    orientation: bool,
+    mut tests: u64,
+) -> Result<Identification, Unidentified> {
+    let sense = if orientation { Sense::Proper } else { Sense::Any };
+    let mut pairs = grow(problem, ranked, sense, &mut tests);
+    if pairs.len() < NEEDED {
+        return Err(Unidentified::NotFound { bound: most_possible(problem), needed: NEEDED });
+    }
+    let mut undecided = None;
+    if orientation {
+        if pairs.len() > MOST_ORIENTED {
+            let kept = unmirrored(problem, pairs, MOST_FOURS);
+            tests += kept.tests;
+            pairs = kept.pairs;
+        }
+        let all: Vec<_> = pairs.iter().copied().chain(vertices(problem)).collect();
+        let image = grow(problem, &all, Sense::Mirrored, &mut tests);
+        if image.len() > pairs.len() && wholly_mirrored(problem, &image[..image.len().min(MOST_ORIENTED)]) {
+            let mirrored = Unidentified::Mirrored { best: image.len() };
+            if pairs.len() <= NEEDED {
+                return Err(mirrored);
+            }
+            undecided = Some(mirrored);
+        }
+    }
+    pairs.sort_unstable();
+    Ok(Identification { undecided, ..Identification::unproved(pairs, most_possible(problem), tests) })
+}
+
+/// No set has more pairs than there are model points with candidates, nor than there are candidates.
+pub(super) fn most_possible(problem: &Problem<'_>) -> usize {
+    let mut clouds: Vec<usize> = problem.candidates.lists.iter().flatten().copied().collect();
+    clouds.sort_unstable();
+    clouds.dedup();
+    problem.candidates.with_candidates().min(clouds.len())
+}
+
+/// What every search asks first: three model points with candidates, and no more pairs than it can hold.
+///
+/// # Errors
+/// [`Unidentified::TooFew`], [`Unidentified::Budget`].
+pub(super) fn feasible(problem: &Problem<'_>, most_pairs: usize, budget: u64) -> Result<(), Unidentified> {
+    let with_candidates = problem.candidates.with_candidates();
+    if with_candidates < NEEDED {
+        return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
+    }
+    if problem.candidates.pairs() > most_pairs {
+        return Err(Unidentified::Budget { budget, best: 0, bound: with_candidates, tests: 0 });
+    }
+    Ok(())
+}

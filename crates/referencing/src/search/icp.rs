@@ -1,0 +1,86 @@
+//! Iterative closest points, from the prior.
+
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Object, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    closest::Closest,
+    grow::{conclude, feasible},
+    pose::{fitted, refined},
+};
+use crate::{Correspondence, Problem};
+
+/// Minimises Σ |H c − p|² over poses H and over the choice of the nearest candidate c of each model point p, by turns: the
+/// nearest `keep` of all pairs are fitted, from the prior on, until they do not change. What the last pose explains is
+/// the answer.
+///
+/// Not exact: it ends in the minimum next to the prior, and clutter in the shells holds it back. N distances an
+/// iteration for N candidate pairs. Needs a prior.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Icp {
+    /// Whether mirror images are refused; `false` is the pose alone.
+    pub(crate) orientation: bool,
+    /// Share of the nearest pairs that is fitted: points out of view have none.
+    pub(crate) keep: f64,
+    /// Iterations at most.
+    pub(crate) iterations: usize,
+    /// Distances before it ends.
+    pub(crate) budget: u64,
+    /// More candidate pairs than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for Icp {
+    fn default() -> Self {
+        Self { orientation: true, keep: 0.6, iterations: 50, budget: BUDGET, most_pairs: 4_000_000 }
+    }
+}
+
+impl Component for Icp {
+    const NAME: &'static str = "icp";
+    const SUMMARY: &'static str = "nearest candidates and their least-squares pose in turn, from the prior";
+    const SOURCE: &'static str = "Besl, McKay, A method for registration of 3-D shapes, 1992; the share kept: Chetverikov et al., The trimmed \
+                                  iterative closest point algorithm, 2002";
+
+    fn check(&self) -> Result<(), String> {
+        // Written so that a NaN is refused too.
+        let share = self.keep > 0.0 && self.keep <= 1.0;
+        in_range(share, "keep", self.keep, "a share above 0, at most 1")?;
+        in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
+}
+
+impl Search for Icp {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, self.budget)?;
+        let prior = problem.prior.ok_or(Unidentified::NoPrior)?;
+        let &Self { keep, iterations, budget, .. } = self;
+        let distance = |pose: &Transform<Object, Camera>, pair: Correspondence| {
+            (*pose * problem.cloud[pair.cloud].position.at).distance(&problem.model[pair.model].at)
+        };
+        let fit = |pairs: &[Correspondence]| fitted(problem, pairs);
+        let (pose, vertices, mut tests) =
+            Closest { distance, fit, keep, iterations, budget }.run(problem, prior.object_from_camera);
+        let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
+        conclude(problem, &ranked, self.orientation, tests)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Icp::default().check(), Ok(()));
+        assert!(Icp { keep: 0.0, ..Icp::default() }.check().is_err());
+        assert!(Icp { keep: f64::NAN, ..Icp::default() }.check().is_err());
+        assert!(Icp { iterations: 0, ..Icp::default() }.check().is_err());
+    }
+}

@@ -1,0 +1,135 @@
+//! The interpretation tree: a level a model point, a branch a candidate, and one for none.
+
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    association::vertices,
+    grow::{admits, conclude, feasible, most_possible},
+    orientation::Sense,
+    pose::{fitted, share},
+    volumes::Volumes,
+};
+use crate::{Correspondence, Problem};
+
+/// The longest interpretation that a rigid motion explains: every pair of its pairs coherent, and each within the tolerance
+/// of where their least-squares pose puts it (the model test). Depth first, model points as they lie, each candidate in turn
+/// and last the wild card, that the point is not seen.
+///
+/// It visits every interpretation longer than the best, unless `enough` lets it stop at the first that is long enough, as its
+/// authors do; with `enough` = 1 nothing longer passes the model test, but longer sets that are only coherent
+/// may exist. Exponential: Π (m_i + 1) for lists of m_i.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct InterpretationTree {
+    /// Whether mirror images are refused; `false` leaves them to the model test.
+    pub(crate) orientation: bool,
+    /// Share of the model points with candidates at which an interpretation is accepted at once.
+    pub(crate) enough: f64,
+    /// Pair tests.
+    pub(crate) budget: u64,
+    /// More candidate pairs than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for InterpretationTree {
+    fn default() -> Self {
+        Self { orientation: true, enough: 1.0, budget: BUDGET, most_pairs: 40_000 }
+    }
+}
+
+impl Component for InterpretationTree {
+    const NAME: &'static str = "interpretation-tree";
+    const SUMMARY: &'static str = "the longest interpretation that is coherent and passes a rigid fit, depth first";
+    const SOURCE: &'static str = "Grimson, Lozano-Pérez, Localizing overlapping parts by searching the interpretation \
+                                  tree, 1987";
+
+    fn check(&self) -> Result<(), String> {
+        let share = self.enough > 0.0 && self.enough <= 1.0;
+        in_range(share, "enough", self.enough, "a share above 0, at most 1")?;
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
+}
+
+impl Search for InterpretationTree {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, self.budget)?;
+        let vertices = vertices(problem);
+        let volumes = Volumes::of(problem, &vertices);
+        let numbers: Vec<usize> = (0..vertices.len()).collect();
+        let levels: Vec<&[usize]> = numbers.chunk_by(|&a, &b| vertices[a].model == vertices[b].model).collect();
+        let enough = ((self.enough * levels.len() as f64).ceil() as usize).max(NEEDED);
+        let mut tree = Tree {
+            problem,
+            vertices: &vertices,
+            volumes: &volumes,
+            levels: &levels,
+            settings: self,
+            enough,
+            best: Vec::new(),
+            tests: 0,
+        };
+        tree.descend(0, &mut Vec::new());
+        if tree.best.is_empty() && tree.tests >= self.budget {
+            let (budget, tests) = (self.budget, tree.tests);
+            return Err(Unidentified::Budget { budget, best: 0, bound: most_possible(problem), tests });
+        }
+        let ranked: Vec<Correspondence> = tree.best.iter().map(|&v| vertices[v]).collect();
+        conclude(problem, &ranked, self.orientation, tree.tests)
+    }
+}
+
+struct Tree<'a> {
+    problem: &'a Problem<'a>,
+    vertices: &'a [Correspondence],
+    volumes: &'a Volumes<'a>,
+    levels: &'a [&'a [usize]],
+    settings: &'a InterpretationTree,
+    enough: usize,
+    best: Vec<usize>,
+    tests: u64,
+}
+
+impl Tree<'_> {
+    fn descend(&mut self, level: usize, taken: &mut Vec<usize>) {
+        // The model test is dear: only what would be the longest is put to it.
+        if taken.len() >= NEEDED && taken.len() > self.best.len() && self.explained(taken) {
+            self.best.clone_from(taken);
+        }
+        let over = self.tests >= self.settings.budget || self.best.len() >= self.enough;
+        if over || taken.len() + self.levels.len() - level <= self.best.len() || level == self.levels.len() {
+            return;
+        }
+        let sense = if self.settings.orientation { Sense::Proper } else { Sense::Any };
+        for &vertex in self.levels[level] {
+            if admits(self.problem, self.vertices, self.volumes, sense, taken, vertex, &mut self.tests) {
+                taken.push(vertex);
+                self.descend(level + 1, taken);
+                taken.pop();
+            }
+        }
+        self.descend(level + 1, taken);
+    }
+
+    fn explained(&mut self, taken: &[usize]) -> bool {
+        let pairs: Vec<Correspondence> = taken.iter().map(|&v| self.vertices[v]).collect();
+        self.tests += pairs.len() as u64;
+        let pose = fitted(self.problem, &pairs);
+        pose.is_some_and(|pose| pairs.iter().all(|&pair| share(self.problem, &pose, pair) <= 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(InterpretationTree::default().check(), Ok(()));
+        assert!(InterpretationTree { enough: 0.0, ..InterpretationTree::default() }.check().is_err());
+        assert!(InterpretationTree { budget: 0, ..InterpretationTree::default() }.check().is_err());
+    }
+}

@@ -1,0 +1,62 @@
+//! What a pose explains.
+
+use seafix_geometry::{Camera, Object, Transform};
+
+use super::{alike::slack, bitset::BitSet};
+use crate::{Correspondence, Kabsch, Observations, Problem, Solver};
+
+/// The least-squares pose of some pairs; none where they are too few, on a line or not finite.
+pub(super) fn fitted(problem: &Problem<'_>, pairs: &[Correspondence]) -> Option<Transform<Object, Camera>> {
+    Kabsch::default().solve(&Observations::of(pairs, problem.model, problem.cloud, None)).ok()
+}
+
+/// How far a pair is from where the pose puts it, as a share of what it may be off.
+pub(super) fn share(problem: &Problem<'_>, pose: &Transform<Object, Camera>, pair: Correspondence) -> f64 {
+    let off = (*pose * problem.cloud[pair.cloud].position.at).distance(&problem.model[pair.model].at);
+    off / slack(problem, pair)
+}
+
+/// The pairs that a pose puts where they were measured, one-to-one, the nearest first; of equals the first.
+pub(super) fn explained(
+    problem: &Problem<'_>,
+    vertices: &[Correspondence],
+    pose: &Transform<Object, Camera>,
+) -> Vec<(f64, Correspondence)> {
+    let mut near: Vec<(f64, Correspondence)> =
+        vertices.iter().map(|&pair| (share(problem, pose, pair), pair)).filter(|(share, _)| *share <= 1.0).collect();
+    near.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let (mut models, mut clouds) = (BitSet::empty(problem.model.len()), BitSet::empty(problem.cloud.len()));
+    near.retain(|(_, pair)| {
+        let free = !models.has(pair.model) && !clouds.has(pair.cloud);
+        if free {
+            models.insert(pair.model);
+            clouds.insert(pair.cloud);
+        }
+        free
+    });
+    near
+}
+
+/// A pose fitted again to what it explains until that does not grow; what it then explains, and how well:
+/// Σ (1 − share²).
+pub(super) fn refined(
+    problem: &Problem<'_>,
+    vertices: &[Correspondence],
+    start: Transform<Object, Camera>,
+    tests: &mut u64,
+) -> (f64, Vec<Correspondence>) {
+    const MOST_ROUNDS: usize = 10;
+    let (mut best, mut pairs, mut pose) = (f64::NEG_INFINITY, Vec::new(), start);
+    for _ in 0..MOST_ROUNDS {
+        *tests += vertices.len() as u64;
+        let near = explained(problem, vertices, &pose);
+        let worth: f64 = near.iter().map(|(share, _)| 1.0 - share * share).sum();
+        if !(worth > best) {
+            break;
+        }
+        (best, pairs) = (worth, near.into_iter().map(|(_, pair)| pair).collect());
+        let Some(next) = fitted(problem, &pairs) else { break };
+        pose = next;
+    }
+    (best, pairs)
+}

@@ -1,0 +1,156 @@
+//! Pose vote: all predictions are off by the same step.
+
+use nalgebra::Vector3;
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    association::vertices,
+    grow::{conclude, feasible},
+    pose::{fitted, refined},
+};
+use crate::{Correspondence, Problem};
+
+/// Maximises the number of model points whose candidates are displaced alike: the error of the prior is shared by
+/// all predictions p_i, so the offsets c_j − p_i of true pairs (i, j) lie together and those of others do not. From the
+/// offsets with most votes poses are fitted, and fitted again to what they explain; the best explanation is the answer.
+///
+/// Not exact: a rotation of the prior spreads the offsets, by its angle times the model's extent, and beyond `radius`
+/// votes are lost. N log N for N candidate pairs spread evenly, at most the budget. Needs a prior.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct PoseVote {
+    /// Whether mirror images are refused; `false` is the pose alone.
+    pub(crate) orientation: bool,
+    /// Offsets nearer than this (m) vote for each other.
+    pub(crate) radius: f64,
+    /// Offsets from which poses are fitted.
+    pub(crate) tries: usize,
+    /// Pairs of offsets compared and residuals before it ends.
+    pub(crate) budget: u64,
+    /// More candidate pairs than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for PoseVote {
+    fn default() -> Self {
+        Self { orientation: true, radius: 0.1, tries: 50, budget: BUDGET, most_pairs: 4_000_000 }
+    }
+}
+
+impl Component for PoseVote {
+    const NAME: &'static str = "pose-vote";
+    const SUMMARY: &'static str = "the displacement of the prior that most model points share";
+    const SOURCE: &'static str = "Ballard, Generalizing the Hough transform to detect arbitrary shapes, 1981; \
+                                  the votes: offsets from the predicted places";
+
+    fn check(&self) -> Result<(), String> {
+        let positive = self.radius > 0.0 && self.radius.is_finite();
+        in_range(positive, "radius", self.radius, "a positive number of metres")?;
+        in_range(self.tries > 0, "tries", self.tries, "1 or more")?;
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
+}
+
+impl Search for PoseVote {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, self.budget)?;
+        let prior = problem.prior.ok_or(Unidentified::NoPrior)?;
+        let camera_from_object = prior.object_from_camera.inverse();
+        let vertices = vertices(problem);
+        let offset = |pair: &Correspondence| {
+            problem.cloud[pair.cloud].position.at - camera_from_object * problem.model[pair.model].at
+        };
+        let votes = Votes::of(vertices.iter().map(offset).collect(), self.radius);
+        let mut tests = 0;
+        let mut support: Vec<(usize, usize)> = Vec::new();
+        for v in 0..vertices.len() {
+            let near = votes.near(v, &mut tests);
+            // Vertices stand by model point.
+            support.push((near.chunk_by(|&a, &b| vertices[a].model == vertices[b].model).count(), v));
+            if tests >= self.budget {
+                break;
+            }
+        }
+        support.sort_by_key(|&(count, v)| (std::cmp::Reverse(count), v));
+        let mut best = (f64::NEG_INFINITY, Vec::new());
+        for &(_, v) in support.iter().take(self.tries) {
+            let near = votes.near(v, &mut tests);
+            let off = |w: usize| (votes.offsets[w] - votes.offsets[v]).norm_squared();
+            let groups = near.chunk_by(|&a, &b| vertices[a].model == vertices[b].model);
+            let nearest = groups.filter_map(|same| same.iter().copied().min_by(|&a, &b| off(a).total_cmp(&off(b))));
+            let pairs: Vec<Correspondence> = nearest.map(|w| vertices[w]).collect();
+            let Some(pose) = fitted(problem, &pairs) else { continue };
+            let (worth, explained) = refined(problem, &vertices, pose, &mut tests);
+            if worth > best.0 {
+                best = (worth, explained);
+            }
+            if tests >= self.budget {
+                break;
+            }
+        }
+        conclude(problem, &best.1, self.orientation, tests)
+    }
+}
+
+/// Offsets sorted into cubes.
+struct Votes {
+    offsets: Vec<Vector3<f64>>,
+    radius: f64,
+    /// Cube and offset, in the order of the cubes.
+    cubes: Vec<([i64; 3], usize)>,
+}
+
+impl Votes {
+    fn of(offsets: Vec<Vector3<f64>>, radius: f64) -> Self {
+        let mut cubes: Vec<([i64; 3], usize)> =
+            offsets.iter().enumerate().map(|(v, at)| (Self::cube(at, radius), v)).collect();
+        cubes.sort_unstable();
+        Self { offsets, radius, cubes }
+    }
+
+    fn cube(at: &Vector3<f64>, radius: f64) -> [i64; 3] {
+        // Far beyond any sea the cubes are one.
+        [0, 1, 2].map(|axis| (at[axis] / radius).floor().clamp(-1e15, 1e15) as i64)
+    }
+
+    /// The offsets within the radius of one, ascending; itself among them.
+    fn near(&self, v: usize, tests: &mut u64) -> Vec<usize> {
+        let [x, y, z] = Self::cube(&self.offsets[v], self.radius);
+        let mut near = Vec::new();
+        for (i, j) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))) {
+            let from = self.cubes.partition_point(|(cube, _)| *cube < [x + i, y + j, z - 1]);
+            let cubes = self.cubes[from..].iter().take_while(|(cube, _)| *cube <= [x + i, y + j, z + 1]);
+            near.extend(cubes.map(|&(_, w)| w).inspect(|_| *tests += 1).filter(|&w| {
+                let step = self.offsets[w] - self.offsets[v];
+                step.norm_squared() <= self.radius * self.radius
+            }));
+        }
+        near.sort_unstable();
+        near
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(PoseVote::default().check(), Ok(()));
+        assert!(PoseVote { radius: 0.0, ..PoseVote::default() }.check().is_err());
+        assert!(PoseVote { tries: 0, ..PoseVote::default() }.check().is_err());
+    }
+
+    #[test]
+    fn offsets_near_each_other_are_found_across_cubes() {
+        let at = |x: f64| Vector3::new(x, -x, 0.0);
+        let votes = Votes::of(vec![at(0.049), at(0.051), at(0.2), at(-0.01), at(f64::NAN)], 0.05 * 2f64.sqrt());
+        assert_eq!(votes.near(0, &mut 0), [0, 1]);
+        assert_eq!(votes.near(3, &mut 0), [3]);
+        assert_eq!(votes.near(2, &mut 0), [2]);
+    }
+}

@@ -1,0 +1,110 @@
+//! RANSAC: poses of random triples.
+
+use rand::{Rng, RngExt};
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    association::vertices,
+    grow::{conclude, feasible, most_possible},
+    pose::{fitted, refined, share},
+};
+use crate::{Correspondence, Problem};
+
+/// Maximises Σ (1 − r²)₊ over poses, r the residual of each model point's best candidate as a share of what the tolerance
+/// allows (the truncated score of MSAC), over the poses of random triples of candidate pairs; a triple must be coherent
+/// (the edge-length check) before its pose is computed.
+///
+/// Not exact. Triples are drawn until one of true pairs has been among them with `confidence`, as far as the best
+/// share of inliers tells, or the budget ends: O(w⁻³) triples for a share w of true pairs, N residuals for each coherent
+/// one. The best pose is fitted again to what it explains.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Ransac {
+    /// Whether mirror images are refused; `false` is distances and pose alone.
+    pub(crate) orientation: bool,
+    /// With what probability a triple of true pairs has been drawn when it ends.
+    pub(crate) confidence: f64,
+    /// Pair tests and residuals before it ends.
+    pub(crate) budget: u64,
+    /// More candidate pairs than this are not searched.
+    pub(crate) most_pairs: usize,
+}
+
+impl Default for Ransac {
+    fn default() -> Self {
+        Self { orientation: true, confidence: 0.999, budget: BUDGET, most_pairs: 4_000_000 }
+    }
+}
+
+impl Component for Ransac {
+    const NAME: &'static str = "ransac";
+    const SUMMARY: &'static str = "poses of random coherent triples, the one that explains most";
+    const SOURCE: &'static str = "Fischler, Bolles, Random sample consensus, 1981; the score: Torr, Zisserman, MLESAC, \
+                                  2000; the edge-length check: Zhou, Park, Koltun, Open3D, 2018";
+
+    fn check(&self) -> Result<(), String> {
+        let confident = self.confidence > 0.0 && self.confidence < 1.0;
+        in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
+        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+    }
+}
+
+impl Search for Ransac {
+    fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, self.budget)?;
+        let vertices = vertices(problem);
+        let count = vertices.len();
+        let (mut tests, mut trials, mut needed) = (0, 0u64, f64::INFINITY);
+        let mut best = (0.0, None);
+        while count >= NEEDED && tests < self.budget && (trials as f64) < needed {
+            trials += 1;
+            let [a, b, c] = [(); 3].map(|()| vertices[rng.random_range(0..count)]);
+            tests += 1;
+            if !problem.coherent(a, b) {
+                continue;
+            }
+            tests += 2;
+            if !problem.coherent(a, c) || !problem.coherent(b, c) {
+                continue;
+            }
+            let Some(pose) = fitted(problem, &[a, b, c]) else { continue };
+            tests += count as u64;
+            // Vertices stand by model point: the best candidate of each counts.
+            let of = |same: &[Correspondence]| {
+                let least = same.iter().map(|&pair| share(problem, &pose, pair)).fold(1.0, f64::min);
+                (1.0 - least * least, u64::from(least < 1.0))
+            };
+            let groups = vertices.chunk_by(|a, b| a.model == b.model).map(of);
+            let (score, inliers) = groups.fold((0.0, 0), |(score, all), (worth, one)| (score + worth, all + one));
+            if score > best.0 {
+                best = (score, Some(pose));
+                let share = inliers as f64 / count as f64;
+                needed = libm::log(1.0 - self.confidence) / libm::log1p(-share.powi(3).min(1.0 - 1e-12));
+            }
+        }
+        let Some(pose) = best.1 else {
+            let bound = most_possible(problem);
+            return Err(match tests < self.budget {
+                true => Unidentified::NotFound { bound, needed: NEEDED },
+                false => Unidentified::Budget { budget: self.budget, best: 0, bound, tests },
+            });
+        };
+        let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
+        conclude(problem, &ranked, self.orientation, tests)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Ransac::default().check(), Ok(()));
+        assert!(Ransac { confidence: 1.0, ..Ransac::default() }.check().is_err());
+        assert!(Ransac { budget: 0, ..Ransac::default() }.check().is_err());
+    }
+}

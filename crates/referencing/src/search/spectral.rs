@@ -1,0 +1,94 @@
+//! Spectral matching: the principal eigenvector of the agreements.
+
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    affinity::{Affinity, by_weight, normalized},
+    association::Association,
+    grow::{conclude, feasible},
+};
+use crate::{Correspondence, Problem};
+
+/// Maximises xᵀ M x over |x| = 1, M_ab = 1 − (| |P_a P_b| − |C_a C_b| | / Δ_ab)² for coherent pairs a, b: the principal
+/// eigenvector, by power iteration. Pairs are then taken by falling weight, each that is admissible with those taken.
+///
+/// Exact for the relaxed problem only: nothing is proved of the set. E operations an iteration, E the edges of
+/// the graph, after N²/2 pair tests for N candidate pairs. Where true pairs are few among many accidental agreements
+/// the eigenvector spreads over those.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Spectral {
+    /// Whether mirror images are refused; `false` is distances alone.
+    pub(crate) orientation: bool,
+    /// Power iterations at most.
+    pub(crate) iterations: usize,
+    /// More candidate pairs than this are not searched (40 000 take 200 MB).
+    pub(crate) most_pairs: usize,
+    /// Nor more edges than this (8 bytes each).
+    pub(crate) most_edges: usize,
+}
+
+impl Default for Spectral {
+    fn default() -> Self {
+        Self { orientation: true, iterations: 100, most_pairs: 40_000, most_edges: 30_000_000 }
+    }
+}
+
+impl Component for Spectral {
+    const NAME: &'static str = "spectral";
+    const SUMMARY: &'static str = "pairs by their weight in the principal eigenvector of the agreements";
+    const SOURCE: &'static str = "Leordeanu, Hebert, A spectral technique for correspondence problems using pairwise \
+                                  constraints, 2005";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")?;
+        in_range(self.most_edges > 0, "most-edges", self.most_edges, "1 or more")
+    }
+}
+
+impl Search for Spectral {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, BUDGET)?;
+        let graph = Association::of(problem);
+        let Some(affinity) = Affinity::of(problem, &graph, self.most_edges, |off| 1.0 - off * off) else {
+            let bound = problem.candidates.with_candidates();
+            return Err(Unidentified::Budget { budget: self.most_edges as u64, best: 0, bound, tests: graph.tests });
+        };
+        let mut x = vec![1.0; graph.vertices.len()];
+        let (mut next, mut plain) = (x.clone(), x.clone());
+        let mut tests = graph.tests;
+        for _ in 0..self.iterations {
+            affinity.products(&x, &mut next, &mut plain);
+            tests += affinity.edges() as u64;
+            // Half of the last vector keeps eigenvalues of opposite sign from taking turns.
+            let scale = next.iter().copied().fold(0.0, f64::max);
+            next.iter_mut().zip(&x).for_each(|(next, x)| *next += 0.5 * scale * x);
+            if !normalized(&mut next) {
+                break;
+            }
+            let step = next.iter().zip(&x).map(|(next, x)| (next - x).abs()).fold(0.0, f64::max);
+            std::mem::swap(&mut x, &mut next);
+            if step < 1e-9 {
+                break;
+            }
+        }
+        let ranked: Vec<Correspondence> = by_weight(&x).into_iter().map(|v| graph.vertices[v]).collect();
+        conclude(problem, &ranked, self.orientation, tests)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Spectral::default().check(), Ok(()));
+        assert!(Spectral { iterations: 0, ..Spectral::default() }.check().is_err());
+        assert!(Spectral { most_edges: 0, ..Spectral::default() }.check().is_err());
+    }
+}

@@ -1,0 +1,166 @@
+//! Weighted clique: the densest consistent set.
+
+use rand::Rng;
+use seafix_component::{Component, in_range};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BUDGET, Identification, NEEDED, Search, Unidentified,
+    affinity::{Affinity, by_weight, normalized},
+    association::Association,
+    grow::{conclude, feasible},
+};
+use crate::{Correspondence, Problem};
+
+/// Maximises the density uᵀ M u / uᵀ u of a set of candidate pairs over u ≥ 0 with u_a u_b = 0 wherever a and b are not
+/// coherent; M_ab = exp(−½ (3 d/Δ)²), d the difference of the two distances, M_aa = 1. Not the largest set but the one
+/// that agrees best, size counting through the sum.
+///
+/// Projected gradient ascent on uᵀ M u − d Σ u_a u_b over the incoherent pairs, the penalty d growing until
+/// none of them is left in the support, which is the answer. A local maximum: nothing is proved. E operations a step, E the edges, after
+/// N²/2 pair tests for N candidate pairs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct WeightedClique {
+    /// Whether mirror images are refused; `false` is distances alone.
+    pub(crate) orientation: bool,
+    /// Gradient steps at most.
+    pub(crate) iterations: usize,
+    /// More candidate pairs than this are not searched (40 000 take 200 MB).
+    pub(crate) most_pairs: usize,
+    /// Nor more edges than this (8 bytes each).
+    pub(crate) most_edges: usize,
+}
+
+impl Default for WeightedClique {
+    fn default() -> Self {
+        Self { orientation: true, iterations: 500, most_pairs: 40_000, most_edges: 30_000_000 }
+    }
+}
+
+impl Component for WeightedClique {
+    const NAME: &'static str = "weighted-clique";
+    const SUMMARY: &'static str = "the densest consistent set, by projected gradient ascent with a growing penalty";
+    const SOURCE: &'static str = "Lusk, Fathian, How, CLIPPER: a graph-theoretic framework for robust data \
+                                  association, 2021";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
+        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")?;
+        in_range(self.most_edges > 0, "most-edges", self.most_edges, "1 or more")
+    }
+}
+
+impl Search for WeightedClique {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        feasible(problem, self.most_pairs, BUDGET)?;
+        let graph = Association::of(problem);
+        let weight = |off: f64| libm::exp(-4.5 * off * off);
+        let Some(affinity) = Affinity::of(problem, &graph, self.most_edges, weight) else {
+            let bound = problem.candidates.with_candidates();
+            return Err(Unidentified::Budget { budget: self.most_edges as u64, best: 0, bound, tests: graph.tests });
+        };
+        let mut ascent = Ascent::of(&affinity, graph.vertices.len());
+        for _ in 0..self.iterations {
+            if !ascent.climb() && !ascent.penalize() {
+                break;
+            }
+        }
+        let ranked: Vec<Correspondence> = by_weight(&ascent.u).into_iter().map(|v| graph.vertices[v]).collect();
+        conclude(problem, &ranked, self.orientation, graph.tests + ascent.products * affinity.edges() as u64)
+    }
+}
+
+/// A point u on the sphere, u ≥ 0, and the penalty.
+struct Ascent<'a> {
+    affinity: &'a Affinity,
+    u: Vec<f64>,
+    /// M u and C̄ u, C̄ the graph of incoherent pairs.
+    weighted: Vec<f64>,
+    apart: Vec<f64>,
+    penalty: f64,
+    /// uᵀ M u.
+    density: f64,
+    products: u64,
+}
+
+/// Weights below this share of the whole count as none.
+const NONE: f64 = 1e-6;
+
+impl<'a> Ascent<'a> {
+    /// From the numbers of neighbours; the penalty as large as what is gained on average.
+    fn of(affinity: &'a Affinity, count: usize) -> Self {
+        let mut plain = vec![0.0; count];
+        let mut weighted = vec![0.0; count];
+        affinity.products(&vec![1.0; count], &mut weighted, &mut plain);
+        let mut u: Vec<f64> = weighted.iter().map(|x| x + 1.0).collect();
+        normalized(&mut u);
+        let mut ascent = Self { affinity, u, weighted, apart: plain, penalty: 0.0, density: 0.0, products: 1 };
+        ascent.evaluate();
+        ascent.penalty = ascent.balance().unwrap_or(0.0);
+        ascent
+    }
+
+    fn evaluate(&mut self) {
+        self.affinity.products(&self.u, &mut self.weighted, &mut self.apart);
+        self.products += 1;
+        let sum: f64 = self.u.iter().sum();
+        for ((weighted, apart), u) in self.weighted.iter_mut().zip(&mut self.apart).zip(&self.u) {
+            *weighted += u;
+            *apart = (sum - u - *apart).max(0.0);
+        }
+        self.density = self.u.iter().zip(&self.weighted).map(|(u, m)| u * m).sum();
+    }
+
+    /// Mean of (M u)_a / (C̄ u)_a over the support where there is something incoherent.
+    fn balance(&self) -> Option<f64> {
+        let ratios = self.u.iter().zip(&self.weighted).zip(&self.apart);
+        let ratios: Vec<f64> =
+            ratios.filter(|((u, _), apart)| **u > NONE && **apart > NONE).map(|((_, m), apart)| m / apart).collect();
+        (!ratios.is_empty()).then(|| ratios.iter().sum::<f64>() / ratios.len() as f64)
+    }
+
+    fn value(&self) -> f64 {
+        self.density - self.penalty * self.u.iter().zip(&self.apart).map(|(u, apart)| u * apart).sum::<f64>()
+    }
+
+    /// One step uphill; false where it gains nothing.
+    fn climb(&mut self) -> bool {
+        let (before, from) = (self.value(), self.u.clone());
+        let gradient: Vec<f64> =
+            self.weighted.iter().zip(&self.apart).map(|(m, apart)| m - self.penalty * apart).collect();
+        let mut step = 1.0;
+        for _ in 0..20 {
+            self.u = from.iter().zip(&gradient).map(|(u, g)| (u + step * g).max(0.0)).collect();
+            if normalized(&mut self.u) {
+                self.evaluate();
+                if self.value() > before + 1e-9 * before.abs() {
+                    return true;
+                }
+            }
+            step *= 0.25;
+        }
+        self.u = from;
+        self.evaluate();
+        false
+    }
+
+    /// A greater penalty; false where nothing incoherent is left.
+    fn penalize(&mut self) -> bool {
+        let more = self.balance();
+        self.penalty += more.unwrap_or(0.0).max(0.5 * self.penalty);
+        more.is_some() && self.penalty.is_finite()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(WeightedClique::default().check(), Ok(()));
+        assert!(WeightedClique { iterations: 0, ..WeightedClique::default() }.check().is_err());
+        assert!(WeightedClique { most_pairs: 2, ..WeightedClique::default() }.check().is_err());
+    }
+}
