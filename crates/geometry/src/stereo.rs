@@ -173,8 +173,8 @@ impl StereoRig {
     pub fn triangulate(&self, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable> {
         let information = seen.covariance.cholesky().ok_or(Untriangulable::Singular)?.inverse();
         let mut point = self.midpoint(&seen.at)?;
-        // The measured pixels hardly disagree, so three steps reach rounding error; the rest is reserve.
-        for _ in 0..10 {
+        // Where the pixels hardly disagree three steps reach rounding error; rows that are pixels apart take more.
+        for _ in 0..50 {
             let (normal, gradient, _) =
                 self.linearize(&point, &seen.at, &information).ok_or(Untriangulable::Behind(point.coords.z))?;
             let step = normal.try_inverse().ok_or(Untriangulable::Parallel)? * gradient;
