@@ -18,7 +18,7 @@ pub struct FrontEnd {
     pub detector: Box<dyn Detector>,
     /// Says where exactly the corners are.
     pub locator: Box<dyn Locator>,
-    /// Describes their surroundings.
+    /// Describes their surroundings, if the matcher compares that.
     pub descriptor: Box<dyn Descriptor>,
     /// Pairs left with right.
     pub matcher: Box<dyn Matcher>,
@@ -42,7 +42,7 @@ pub struct Look {
     pub matches: Vec<Match>,
     /// The same, with how well each place is known.
     pub pairs: Vec<Pair>,
-    /// The same, aligned, with their covariance.
+    /// Those of them that are kept, aligned, with their covariance.
     pub pixels: Vec<UncertainPixels>,
     /// The cloud.
     pub cloud: Vec<MeasuredPoint>,
@@ -131,7 +131,9 @@ impl FrontEnd {
         });
         times.describe_ms = timed(|| {
             let describe = |image, eye: &mut Eye| {
-                self.descriptor.describe_into(image, &eye.keypoints, &mut eye.work, &mut eye.descriptors);
+                if self.matcher.compares_descriptors() {
+                    self.descriptor.describe_into(image, &eye.keypoints, &mut eye.work, &mut eye.descriptors);
+                }
             };
             threads.join(|| describe(left, l), || describe(right, r));
         });

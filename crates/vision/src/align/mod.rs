@@ -34,7 +34,8 @@ pub use window::Weight;
 /// follows from the gradients and the residual, comes between them ([`UncertainPixels`]).
 ///
 /// Where it does not converge, or ends far from where it began, or the windows remain unlike, or the
-/// place would be known no better than `reach`, the detectors' places stay, with independent errors.
+/// place would be known no better than `reach`, the pair is most often a false match: it is left out, or the detectors'
+/// places stay, with independent errors ([`Unaligned`]).
 ///
 /// Source: Baker and Matthews, *Lucas–Kanade 20 years on*, IJCV 2004; interpolation: Unser, *Splines: a
 /// perfect fit for signal and image processing*, 1999.
@@ -55,6 +56,19 @@ pub struct Refine {
     pub least_correlation: f64,
     /// The greatest number of iterations.
     pub iterations: usize,
+    /// What becomes of a pair that could not be aligned.
+    pub unaligned: Unaligned,
+}
+
+/// What becomes of a pair that could not be aligned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unaligned {
+    /// The detectors' places stay.
+    Keep,
+    /// It is left out.
+    #[default]
+    Drop,
 }
 
 impl Default for Refine {
@@ -67,6 +81,7 @@ impl Default for Refine {
             reach: 1.5,
             least_correlation: 0.8,
             iterations: 20,
+            unaligned: Unaligned::Drop,
         }
     }
 }
@@ -77,7 +92,7 @@ impl Refine {
     /// # Errors
     /// The setting that is out of its range, its value, and the range.
     pub fn check(&self) -> Result<(), String> {
-        let Self { refine: _, window, weight: _, warp: _, reach, least_correlation, iterations } = *self;
+        let Self { refine: _, window, weight: _, warp: _, reach, least_correlation, iterations, unaligned: _ } = *self;
         let odd = window % 2 == 1 && (3..=201).contains(&window);
         in_range(odd, "window", window, "an odd number of pixels from 3 to 201")?;
         in_range(reach > 0.0 && reach <= 100.0, "reach", reach, "more than 0, at most 100 (px)")?;
@@ -86,7 +101,8 @@ impl Refine {
         in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
     }
 
-    /// Replaces `pixels` by the places of `pairs`, in their order, aligned as these settings say.
+    /// Replaces `pixels` by the places of `pairs`, in their order, aligned as these settings say; those that are left
+    /// out are missing.
     pub fn align_into(
         &self,
         pairs: &[Pair],
@@ -97,18 +113,22 @@ impl Refine {
         pixels: &mut Vec<UncertainPixels>,
     ) {
         pixels.clear();
-        pixels.extend(pairs.iter().map(apart));
-        if self.refine {
-            let threads = work.threads();
-            let aligners = work.get::<Vec<Aligner>>();
-            threads.pieces(pixels, PIECE, aligners, |index, piece, aligner| {
-                for (pixels, pair) in piece.iter_mut().zip(&pairs[index * PIECE..]) {
-                    if let Some(aligned) = self.align_pair(left, right, rig, &pixels.at, aligner) {
-                        *pixels = together(&pair.left, &aligned);
-                    }
-                }
-            });
+        if !self.refine {
+            return pixels.extend(pairs.iter().map(apart));
         }
+        let threads = work.threads();
+        let Memory { aligners, aligned } = work.get();
+        aligned.clear();
+        aligned.resize(pairs.len(), None);
+        threads.pieces(aligned, PIECE, aligners, |index, piece, aligner| {
+            for (aligned, pair) in piece.iter_mut().zip(&pairs[index * PIECE..]) {
+                let at = StereoPixels { left: pair.left.at, right: pair.right.at };
+                let found = self.align_pair(left, right, rig, &at, aligner);
+                *aligned = found.map(|found| together(&pair.left, &found));
+            }
+        });
+        let stays = |pair| (self.unaligned == Unaligned::Keep).then(|| apart(pair));
+        pixels.extend(aligned.iter().zip(pairs).filter_map(|(aligned, pair)| aligned.or_else(|| stays(pair))));
     }
 
     /// The places of `pairs`, aligned, in their order.
@@ -126,7 +146,7 @@ impl Refine {
         pair: &StereoPixels,
         aligner: &mut Aligner,
     ) -> Option<Aligned> {
-        let Self { refine: _, window, weight, warp, reach, least_correlation, iterations } = *self;
+        let Self { refine: _, window, weight, warp, reach, least_correlation, iterations, unaligned: _ } = *self;
         let rules = Rules {
             half: window / 2,
             weight,
@@ -149,6 +169,12 @@ impl Refine {
 
 /// Matches that are aligned one after the other.
 const PIECE: usize = 64;
+
+#[derive(Debug, Default)]
+struct Memory {
+    aligners: Vec<Aligner>,
+    aligned: Vec<Option<UncertainPixels>>,
+}
 
 /// Two places found each for itself.
 fn apart(pair: &Pair) -> UncertainPixels {
@@ -269,19 +295,26 @@ mod tests {
     }
 
     #[test]
-    fn where_it_cannot_align_the_places_stay() {
+    fn where_it_cannot_align_the_places_stay_or_the_pair_is_left_out() {
         let at = Pixel { u: 30.0, v: 30.0 };
         let start = Pixel { u: 30.4, v: 30.1 };
         let right = waves(0.62, 20.0, 80.0);
         let off = Refine { refine: false, ..Refine::default() };
         assert_eq!(aligned(&right, at, start, &off).right, start);
         let flat = Image::new(60, 60, vec![90.0; 3600]).unwrap();
-        assert_eq!(aligned(&flat, at, start, &Refine::default()).right, start, "nothing to align to");
         let tiny = Image::new(1, 1, vec![90.0]).unwrap();
-        assert_eq!(aligned(&tiny, at, start, &Refine::default()).right, start, "an image too small");
-        let border = Pixel { u: 2.0, v: 30.0 };
-        assert_eq!(aligned(&right, border, start, &Refine::default()).right, start, "a window cut off");
-        let far = Pixel { u: 34.0, v: 30.0 };
-        assert_eq!(aligned(&right, at, far, &Refine::default()).right, far, "too far to reach");
+        let (border, far) = (Pixel { u: 2.0, v: 30.0 }, Pixel { u: 34.0, v: 30.0 });
+        for (why, image, at, start) in [
+            ("nothing to align to", &flat, at, start),
+            ("an image too small", &tiny, at, start),
+            ("a window cut off", &right, border, start),
+            ("too far to reach", &right, at, far),
+        ] {
+            let keep = Refine { unaligned: Unaligned::Keep, ..Refine::default() };
+            assert_eq!(aligned(image, at, start, &keep).right, start, "{why}");
+            let pair = Pair { left: Place::independent(at, 0.15), right: Place::independent(start, 0.15) };
+            let left = waves(0.0, 30.0, 120.0);
+            assert_eq!(Refine::default().align(&[pair], &left, image, &rig()), [], "{why}");
+        }
     }
 }

@@ -202,7 +202,7 @@ impl Fitter {
 }
 
 /// The pixel, if the square of `half` around it lies in the image.
-fn whole(at: [f64; 2], half: usize, image: &Image) -> Option<[usize; 2]> {
+pub(super) fn whole(at: [f64; 2], half: usize, image: &Image) -> Option<[usize; 2]> {
     let inside = |x: f64, n: usize| x >= half as f64 && x + half as f64 <= (n - 1) as f64;
     (inside(at[0], image.width()) && inside(at[1], image.height())).then(|| at.map(|x| x as usize))
 }

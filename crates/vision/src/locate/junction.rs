@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
-use super::{Locator, Place};
+use super::{Locator, Place, fit::whole};
 use crate::{Image, Keypoint, Workspace};
 
 /// Places corners where the edges around them meet: the point p to whose surroundings' gradients
@@ -92,12 +92,8 @@ impl Window {
     /// The junction near `start`; `None` when there is none within reach, when the edges are parallel,
     /// or when the window leaves the image.
     fn near(&self, image: &Image, start: &Pixel, gradients: &mut Gradients) -> Option<Place> {
-        let (x0, y0) = (libm::round(start.u) as usize, libm::round(start.v) as usize);
         let reach = self.half + SLACK;
-        let inside = |x: usize, n: usize| x > reach && x + reach + 1 < n;
-        if !(inside(x0, image.width()) && inside(y0, image.height())) {
-            return None;
-        }
+        let [x0, y0] = whole([start.u, start.v].map(libm::round), reach + 1, image)?;
         let (left, top) = (x0 - reach, y0 - reach);
         gradients.take(image, left, top, 2 * reach + 1);
         let origin = Vector2::new(left as f64, top as f64);

@@ -10,8 +10,8 @@ use crate::{Table, Threads};
 
 /// Right descriptors compared at once.
 const COLUMNS: usize = 16;
-/// Left descriptors compared at once.
-const ROWS: usize = 4;
+/// Left descriptors compared at once: so many sums stay in registers and none waits for the one before.
+const ROWS: usize = 6;
 /// Right descriptors in one piece of work.
 const PIECE: usize = 512;
 
@@ -171,17 +171,18 @@ fn euclid_panel(
     let mut kept = *lanes;
     for start in (0..n).step_by(ROWS) {
         let row = |r: usize| &left[(start + r).min(n - 1) * length..][..panel.len()];
-        let (a0, a1, a2, a3) = (row(0), row(1), row(2), row(3));
-        let (mut s0, mut s1, mut s2, mut s3) =
-            ([0.0_f32; COLUMNS], [0.0_f32; COLUMNS], [0.0_f32; COLUMNS], [0.0_f32; COLUMNS]);
+        let [a0, a1, a2, a3, a4, a5] = [row(0), row(1), row(2), row(3), row(4), row(5)];
+        let [mut s0, mut s1, mut s2, mut s3, mut s4, mut s5] = [[0.0_f32; COLUMNS]; ROWS];
         for (k, column) in panel.iter().enumerate() {
-            let (x0, x1, x2, x3) = (a0[k], a1[k], a2[k], a3[k]);
+            let [x0, x1, x2, x3, x4, x5] = [a0[k], a1[k], a2[k], a3[k], a4[k], a5[k]];
             s0.iter_mut().zip(column).for_each(|(sum, y)| *sum += x0 * y);
             s1.iter_mut().zip(column).for_each(|(sum, y)| *sum += x1 * y);
             s2.iter_mut().zip(column).for_each(|(sum, y)| *sum += x2 * y);
             s3.iter_mut().zip(column).for_each(|(sum, y)| *sum += x3 * y);
+            s4.iter_mut().zip(column).for_each(|(sum, y)| *sum += x4 * y);
+            s5.iter_mut().zip(column).for_each(|(sum, y)| *sum += x5 * y);
         }
-        for (i, products) in (start..n).zip([s0, s1, s2, s3]) {
+        for (i, products) in (start..n).zip([s0, s1, s2, s3, s4, s5]) {
             let mut values = products;
             for (value, length) in values.iter_mut().zip(right_lengths) {
                 *value = (lengths[i] + length) - 2.0 * *value;

@@ -88,6 +88,10 @@ struct Seeker {
 }
 
 impl Matcher for LucasKanade {
+    fn compares_descriptors(&self) -> bool {
+        false
+    }
+
     fn match_into(
         &self,
         left: &View<'_>,

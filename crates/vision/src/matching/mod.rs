@@ -60,6 +60,11 @@ pub trait Matcher: Send + Sync + std::fmt::Debug {
         found: &mut Vec<Match>,
     );
 
+    /// Whether it compares descriptors; a matcher that looks at the images alone needs none to be made.
+    fn compares_descriptors(&self) -> bool {
+        true
+    }
+
     /// The pairs of two views, in the order of the left key points.
     fn matches(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Vec<Match> {
         let mut found = Vec::new();

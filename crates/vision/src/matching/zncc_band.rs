@@ -105,6 +105,10 @@ struct Best {
 }
 
 impl Matcher for ZnccBand {
+    fn compares_descriptors(&self) -> bool {
+        false
+    }
+
     fn match_into(
         &self,
         left: &View<'_>,
