@@ -172,3 +172,30 @@ fn pixel_chi2(placed: &Placed, points: &[Observation], pose: &Transform<Object, 
     };
     points.iter().map(of).sum()
 }
+
+/// Mean over standard error of the paired differences of squared m2, and of squared m3: above nought where `solver` errs
+/// more than `other` on the same draws.
+///
+/// # Panics
+/// When the settings describe no layout.
+pub fn paired(solver: &dyn Solver, other: &dyn Solver, settings: &Layout, layouts: u64, draws: u64) -> [f64; 2] {
+    let mut differences: [Vec<f64>; 2] = Default::default();
+    for number in 0..layouts {
+        let placed = Layout { number, ..settings.clone() }.place(1).expect("the layout can be placed");
+        for draw in 0..draws / layouts {
+            let Some(points) = observations(&placed, draw, settings.model_sigma) else { continue };
+            let data = Observations { points, rig: Some(&placed.rig) };
+            let (Ok(a), Ok(b)) = (solver.solve(&data), other.solve(&data)) else { continue };
+            let truth = &placed.object_from_camera;
+            let m2 = |pose| transfer_rms(pose, truth, &placed.model).expect("there are points").powi(2);
+            differences[0].push(m2(&a) - m2(&b));
+            differences[1].push(position_error(&a, truth).powi(2) - position_error(&b, truth).powi(2));
+        }
+    }
+    differences.map(|all| {
+        let n = all.len() as f64;
+        let mean = all.iter().sum::<f64>() / n;
+        let variance = all.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean / (variance / n).sqrt()
+    })
+}

@@ -1,0 +1,209 @@
+//! P71. Protection levels: radii that errors exceed with no more than the stated risk, wrong matches included.
+
+use std::fmt::Write as _;
+
+use nalgebra::Vector3;
+use seafix_evaluation::{attitude_error, position_error};
+use seafix_geometry::{MeasuredPoint, Object, Pixel, Point, StereoPixels, UncertainPixels, UncertainPoint};
+use seafix_referencing::{
+    Acceptance, Candidates, Correspondence, Identification, ModelPoint, Outcome, Problem, Protection,
+    StereoReprojection, Tolerance, judge,
+};
+use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
+
+/// Half-size (m) of the shell in which a wrong match lies.
+const SHELL: f64 = 0.25;
+/// Draws of one layout.
+const DRAWS: u64 = 500;
+
+/// One believed fix.
+struct Fix {
+    points: usize,
+    position: f64,
+    attitude: f64,
+    protection: Option<Protection>,
+}
+
+/// What came of all fixes.
+#[derive(Default)]
+struct Count {
+    drawn: u64,
+    referenced: u64,
+    available: u64,
+    within_alert: u64,
+    position: u64,
+    attitude: u64,
+    /// Fixes of three points that were given a level.
+    unmonitored: u64,
+    /// Of the position: error (mm) and level (mm), each a tenth of a decade.
+    stanford: Vec<[u32; 40]>,
+}
+
+impl Count {
+    fn add(&mut self, fix: &Fix, alert: f64) {
+        self.referenced += 1;
+        let Some(level) = fix.protection else { return };
+        self.available += 1;
+        self.within_alert += u64::from(level.position <= alert);
+        self.position += u64::from(fix.position > level.position);
+        self.attitude += u64::from(fix.attitude > level.attitude);
+        self.unmonitored += u64::from(fix.points == 3);
+        if self.stanford.is_empty() {
+            self.stanford = vec![[0; 40]; 40];
+        }
+        let bin = |metres: f64| (10.0 * (metres * 1e3).max(0.1).log10() + 10.0).clamp(0.0, 39.0) as usize;
+        self.stanford[bin(fix.position)][bin(level.position)] += 1;
+    }
+
+    fn merge(&mut self, other: &Self) {
+        let of = |count: &mut u64, more: u64| *count += more;
+        of(&mut self.drawn, other.drawn);
+        of(&mut self.referenced, other.referenced);
+        of(&mut self.available, other.available);
+        of(&mut self.within_alert, other.within_alert);
+        of(&mut self.position, other.position);
+        of(&mut self.attitude, other.attitude);
+        of(&mut self.unmonitored, other.unmonitored);
+        self.stanford.resize(40, [0; 40]);
+        for (row, more) in self.stanford.iter_mut().zip(&other.stanford) {
+            row.iter_mut().zip(more).for_each(|(count, more)| *count += more);
+        }
+    }
+}
+
+/// Fixes of the `number`-th layout: three to twelve points, 1.5 to 5 m, spread or compact; in one of ten draws one
+/// point is replaced by one that is uniform in its shell.
+fn fixes(number: u64, acceptance: &Acceptance) -> Count {
+    let mut choose = Stream::new(71, number, 0, Purpose::Survey);
+    let rigs = [VirtualRig::default(), VirtualRig { size: [1600, 1200], focal: 1348.3, baseline: 0.25 }];
+    let layout = Layout {
+        shape: [Shape::Spread, Shape::Compact][choose.below(2)],
+        points: 3 + choose.below(10),
+        number,
+        distance: choose.between(1.5, 5.0),
+        sigma_px: 0.2,
+        model_sigma: 0.0,
+        rig: rigs[choose.below(2)].clone(),
+    };
+    let mut count = Count { drawn: DRAWS, ..Count::default() };
+    let Ok(placed) = layout.place(71) else { return count };
+    for draw in 0..DRAWS {
+        let mut stream = Stream::new(71, number, draw, Purpose::Survey);
+        let wrong = (stream.unit() < acceptance.wrong_match_rate).then(|| stream.below(layout.points));
+        let Some(mut cloud) = placed.draw(draw) else { continue };
+        if let Some(wrong) = wrong {
+            let Some(other) = elsewhere(&placed, &placed.model[wrong], &mut stream) else { continue };
+            cloud[wrong] = other;
+        }
+        if let Some(fix) = fix(&placed, &cloud, acceptance) {
+            count.add(&fix, acceptance.alert_limit);
+        }
+    }
+    count
+}
+
+/// A point uniform in the shell about the true place of a model point, seen with the noise of all others.
+fn elsewhere(placed: &Placed, model: &Point<Object>, stream: &mut Stream) -> Option<MeasuredPoint> {
+    let off = Vector3::from_fn(|_, _| stream.between(-SHELL, SHELL));
+    let exact = placed.rig.project(&(placed.object_from_camera.inverse() * *model + off))?;
+    let mut noisy = |p: Pixel| Pixel { u: p.u + 0.2 * stream.normal(), v: p.v + 0.2 * stream.normal() };
+    let at = StereoPixels { left: noisy(exact.left), right: noisy(exact.right) };
+    let pixels = UncertainPixels::independent(at, 0.2);
+    let found = placed.rig.triangulate(&pixels).ok()?;
+    let position = UncertainPoint { at: found.point, covariance: found.covariance };
+    Some(MeasuredPoint { position, pixels: Some(pixels) })
+}
+
+/// The fix that the tests of the method let pass, every point identified as drawn.
+fn fix(placed: &Placed, cloud: &[MeasuredPoint], acceptance: &Acceptance) -> Option<Fix> {
+    let model: Vec<ModelPoint> = placed.model.iter().map(|&at| ModelPoint::exact("", at)).collect();
+    let pairs: Vec<Correspondence> = (0..model.len()).map(|i| Correspondence { model: i, cloud: i }).collect();
+    let candidates = Candidates { lists: (0..model.len()).map(|i| vec![i]).collect() };
+    let problem =
+        Problem { model: &model, cloud, candidates: &candidates, tolerance: Tolerance::Sigmas(3.0), prior: None };
+    let found = Identification {
+        size_bound: pairs.len(),
+        pairs,
+        rivals: Vec::new(),
+        rivals_complete: true,
+        optimal: true,
+        tests: 0,
+        undecided: None,
+    };
+    let attempt = judge(&problem, Ok(found), &StereoReprojection::default(), acceptance, Some(&placed.rig));
+    let Outcome::Referenced(reference) = attempt.outcome else { return None };
+    let truth = &placed.object_from_camera;
+    Some(Fix {
+        points: reference.pairs.len(),
+        position: position_error(&reference.object_from_camera, truth),
+        attitude: attitude_error(&reference.object_from_camera, truth),
+        protection: reference.integrity.protection,
+    })
+}
+
+/// `layouts` layouts on two threads; the same counts on any number.
+fn trial(layouts: u64, acceptance: &Acceptance) -> Count {
+    let half = |first: u64| {
+        let mut all = Count::default();
+        (first..layouts).step_by(2).for_each(|number| all.merge(&fixes(number, acceptance)));
+        all
+    };
+    let mut all = Count::default();
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| half(1));
+        all.merge(&half(0));
+        all.merge(&other.join().expect("it does not panic"));
+    });
+    all
+}
+
+/// What no draw leaves more than once in a thousand trials where the risk is just met: n·p + 3.09 √(n·p).
+fn most(drawn: u64, risk: f64) -> u64 {
+    let expected = drawn as f64 * risk;
+    (expected + 3.09 * expected.sqrt()).floor() as u64
+}
+
+/// P71 over 1 000 000 draws at risk 1e-4: at most 130 violations, each of position and of attitude. Writes the counts of
+/// a Stanford diagram where `STANFORD` names a file:
+/// `cargo test --release -p seafix-proptests --test integrity -- --ignored --nocapture`.
+#[test]
+#[ignore = "minutes"]
+fn a_million_fixes_keep_their_levels() {
+    let acceptance = Acceptance { chance_budget: f64::MAX, ..Acceptance::default() };
+    let all = trial(1_000_000 / DRAWS, &acceptance);
+    let share = |n: u64| 100.0 * n as f64 / all.drawn as f64;
+    println!(
+        "{} draws: referenced {:.2} %, with a level {:.2} %, level within the alert limit {:.2} %; beyond the level: \
+         position {}, attitude {}",
+        all.drawn,
+        share(all.referenced),
+        share(all.available),
+        share(all.within_alert),
+        all.position,
+        all.attitude
+    );
+    if let Ok(file) = std::env::var("STANFORD") {
+        let mut text = String::from("error_mm,level_mm,fixes\n");
+        for (e, row) in all.stanford.iter().enumerate() {
+            for (l, fixes) in row.iter().enumerate().filter(|(_, fixes)| **fixes > 0) {
+                let edge = |bin: usize| 10f64.powf((bin as f64 - 10.0) / 10.0);
+                writeln!(text, "{:.3},{:.3},{fixes}", edge(e), edge(l)).expect("a string takes it");
+            }
+        }
+        std::fs::write(file, text).expect("the file can be written");
+    }
+    assert_eq!(all.unmonitored, 0, "three points are unavailable");
+    assert!(all.position <= 130 && all.attitude <= 130, "position {}, attitude {}", all.position, all.attitude);
+}
+
+/// P71, short: 20 000 draws at risk 1e-3, and no level for three points. Seen to fail when the level leaves the wrong
+/// match out.
+#[test]
+fn levels_hold() {
+    let acceptance = Acceptance { chance_budget: f64::MAX, risk: 1e-3, ..Acceptance::default() };
+    let all = trial(40, &acceptance);
+    assert_eq!(all.unmonitored, 0, "three points are unavailable");
+    assert!(all.available * 2 > all.drawn, "{} of {} have a level", all.available, all.drawn);
+    let most = most(all.drawn, acceptance.risk);
+    assert!(all.position <= most && all.attitude <= most, "{} {} of {most}", all.position, all.attitude);
+}
