@@ -44,6 +44,11 @@ impl Asked {
     fn name(&self) -> &str {
         &self.solver.name
     }
+
+    /// What is asked of solvers that answer to rounding error; of others a hundred thousandth (rad, m).
+    fn limit(&self, exact: f64) -> f64 {
+        if self.solver.component.to_rounding() { exact } else { exact.max(1e-5) }
+    }
 }
 
 /// Every solver with every value of its switches.
@@ -109,8 +114,8 @@ fn exact_pixels_give_the_exact_pose() {
         for solver in solvers.iter().filter(|solver| solver.has_enough(&scene)) {
             let Ok(found) = solver.solve(&scene) else { continue };
             let (angle, distance) = apart(&found, &scene.object_from_camera);
-            within(&format!("{}: rotation", solver.name()), angle, 1e-8)?;
-            within(&format!("{}: translation", solver.name()), distance, 1e-7)?;
+            within(&format!("{}: rotation", solver.name()), angle, solver.limit(1e-8))?;
+            within(&format!("{}: translation", solver.name()), distance, solver.limit(1e-7))?;
         }
         Ok(())
     });
@@ -135,8 +140,8 @@ fn moves_with_the_camera() {
             match (solver.solve(&scene), solver.solve(&moved)) {
                 (Ok(before), Ok(after)) => {
                     let (angle, distance) = apart(&after, &(before * motion.inverse()));
-                    within(&format!("{}: rotation", solver.name()), angle, 1e-10)?;
-                    within(&format!("{}: translation", solver.name()), distance, 1e-10)?;
+                    within(&format!("{}: rotation", solver.name()), angle, solver.limit(1e-10))?;
+                    within(&format!("{}: translation", solver.name()), distance, solver.limit(1e-10))?;
                 }
                 (before, after) => {
                     prop_assert!(
@@ -170,8 +175,8 @@ fn moves_with_the_object() {
             match (solver.solve(&scene), solver.solve(&moved)) {
                 (Ok(before), Ok(after)) => {
                     let (angle, distance) = apart(&after, &(motion * before));
-                    within(&format!("{}: rotation", solver.name()), angle, 1e-10)?;
-                    within(&format!("{}: translation", solver.name()), distance, 1e-10)?;
+                    within(&format!("{}: rotation", solver.name()), angle, solver.limit(1e-10))?;
+                    within(&format!("{}: translation", solver.name()), distance, solver.limit(1e-10))?;
                 }
                 (before, after) => {
                     prop_assert!(
@@ -296,8 +301,8 @@ fn the_order_of_points_does_not_matter() {
         for solver in solvers.iter().filter(|solver| solver.has_enough(&scene)).filter(rests_on_all) {
             let (Ok(before), Ok(after)) = (solver.solve(&scene), solver.solve(&reversed)) else { continue };
             let (angle, distance) = apart(&before, &after);
-            within(&format!("{}: rotation", solver.name()), angle, 1e-10)?;
-            within(&format!("{}: translation", solver.name()), distance, 1e-10)?;
+            within(&format!("{}: rotation", solver.name()), angle, solver.limit(1e-10))?;
+            within(&format!("{}: translation", solver.name()), distance, solver.limit(1e-10))?;
         }
         Ok(())
     });
@@ -323,4 +328,111 @@ fn the_inverse_problem_has_the_inverse_answer() {
         }
         Ok(())
     });
+}
+
+/// P42. A weight of nought is a point removed: a point whose noise is a million times the others' moves no solver that
+/// weighs by covariance by more than 1e-9 from where it is without the point; noise twice as large for all moves it by
+/// no more than 1e-9.
+///
+/// Seen to fail for Kabsch, when it is not left out.
+#[test]
+fn a_point_without_weight_is_no_point() {
+    let solvers = solvers();
+    let cases = law(128, bare(5.0, 5e-3), |scene| {
+        prop_assume!(scene.points.len() >= 5);
+        let mut louder = scene.clone();
+        louder.points.iter_mut().for_each(|point| point.measured.covariance *= 4.0);
+        let mut deaf = scene.clone();
+        let mut fewer = scene.clone();
+        deaf.points.last_mut().expect("five points").measured.covariance *= 1e12;
+        fewer.points.pop();
+        let places: Vec<Vector3<f64>> = fewer.points.iter().map(|point| point.model.coords).collect();
+        let [_, second, first] = extents(&places);
+        prop_assume!(second > 0.01 * first);
+        for solver in solvers.iter().filter(|asked| asked.name().starts_with("mahalanobis")) {
+            let Ok(without) = solver.solve(&fewer) else { continue };
+            let Ok(with) = solver.solve(&deaf) else { continue };
+            let (angle, distance) = apart(&with, &without);
+            within(&format!("{}: rotation, no weight", solver.name()), angle, 1e-9)?;
+            within(&format!("{}: translation, no weight", solver.name()), distance, 1e-9)?;
+            let (Ok(before), Ok(after)) = (solver.solve(&scene), solver.solve(&louder)) else { continue };
+            let (angle, distance) = apart(&before, &after);
+            within(&format!("{}: rotation, twice the noise", solver.name()), angle, 1e-9)?;
+            within(&format!("{}: translation, twice the noise", solver.name()), distance, 1e-9)?;
+        }
+        Ok(())
+    });
+    assert!(cases > 0);
+}
+
+/// P44. Three exact points: every solver that claims least squares agrees with the triad, ≤ 1e-11 (1 + L).
+#[test]
+fn three_points_leave_one_answer() {
+    let solvers = solvers();
+    law(256, bare(5.0, 0.0), |mut scene| {
+        scene.points.truncate(3);
+        let places: Vec<Vector3<f64>> = scene.points.iter().map(|point| point.model.coords).collect();
+        let [_, second, first] = extents(&places);
+        prop_assume!(second > 0.01 * first);
+        let triad = solvers.iter().find(|asked| asked.name().starts_with("triad")).expect("it is listed");
+        let Ok(expected) = triad.solve(&scene) else { return Ok(()) };
+        for solver in claimants(&solvers) {
+            let Ok(found) = solver.solve(&scene) else { continue };
+            let (angle, distance) = apart(&found, &expected);
+            let limit = 1e-11 * (1.0 + expected.translation().norm());
+            within(&format!("{}: rotation", solver.name()), angle, limit)?;
+            within(&format!("{}: translation", solver.name()), distance, limit)?;
+        }
+        Ok(())
+    });
+}
+
+/// P45. With all residuals below the threshold truncated squares are least squares, and so is Huber's loss: ≤ 1e-9.
+///
+/// Seen to fail at a threshold of one standard deviation.
+#[test]
+fn robust_solvers_trust_what_is_near() {
+    let robust = [
+        SOLVERS.build(&seafix_component::Choice::named("gnc-tls").with("threshold", 1e3)),
+        SOLVERS.build(&seafix_component::Choice::named("irls").with("loss", "huber").with("threshold", 1e3)),
+    ];
+    let kabsch = SOLVERS.build(&seafix_component::Choice::named("kabsch")).expect("it is listed");
+    law(128, bare(5.0, 5e-3), |scene| {
+        let Ok(expected) = kabsch.solve(&scene.observations()) else { return Ok(()) };
+        for solver in robust.iter().flatten() {
+            let found = solver.solve(&scene.observations()).expect("what Kabsch answers, they answer");
+            let (angle, distance) = apart(&found, &expected);
+            within(&format!("{solver:?}: rotation"), angle, 1e-9)?;
+            within(&format!("{solver:?}: translation"), distance, 1e-9)?;
+        }
+        Ok(())
+    });
+    assert!(robust.iter().all(Result::is_ok));
+}
+
+/// Agreement. Optimisers that know nothing of poses and of our derivatives find no better place than
+/// `stereo-reprojection`, and the same one: its own covariance puts theirs within a thousandth of a standard deviation.
+///
+/// Seen to fail when the derivative of the right camera leaves its rotation out.
+#[test]
+fn independent_judges_agree() {
+    let build = |name: &str| SOLVERS.build(&seafix_component::Choice::named(name)).expect("it is listed");
+    let (ours, judges) = (build("stereo-reprojection"), ["l-bfgs", "nelder-mead"].map(|name| (name, build(name))));
+    let compared = Cell::new(0);
+    let cases = law(64, seen(0.5), |mut scene| {
+        prop_assume!(scene.points.len() >= 5);
+        scene.points.iter_mut().for_each(|point| point.model_sigma = 0.0);
+        let data = scene.observations();
+        let (Ok(pose), true) = (ours.solve(&data), scene.rig.is_some()) else { return Ok(()) };
+        let covariance = ours.covariance(&data, &pose).expect("it answered");
+        for (name, judge) in &judges {
+            let Ok(found) = judge.solve(&data) else { continue };
+            let xi = pose.error_to(&found);
+            let off = covariance.matrix.cholesky().map_or(f64::NAN, |c| xi.dot(&c.solve(&xi)));
+            within(&format!("{name}: squared standard deviations"), off, 1e-6)?;
+            compared.set(compared.get() + 1);
+        }
+        Ok(())
+    });
+    not_idle("compared", compared.get(), cases, 2);
 }

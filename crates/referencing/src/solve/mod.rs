@@ -12,12 +12,15 @@ mod gnc_tls;
 mod horn;
 mod irls;
 mod kabsch;
+mod l_bfgs;
 pub(crate) mod likelihood;
 mod mahalanobis;
+mod nelder_mead;
 mod normal;
 mod numerical;
 mod p3p;
 mod p3p_stereo;
+mod pixel_cost;
 mod roots;
 mod sandwich;
 mod sightings;
@@ -105,6 +108,12 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         false
     }
 
+    /// Whether it answers to rounding error, so that the same problem written otherwise has the same answer. A
+    /// general-purpose optimiser that looks at costs alone ends a ten-thousandth of a standard deviation off.
+    fn to_rounding(&self) -> bool {
+        true
+    }
+
     /// The pose `object_from_camera`.
     ///
     /// # Errors
@@ -141,7 +150,9 @@ pub static SOLVERS: Registry<dyn Solver> = Registry::new(
         entry!(horn::Horn),
         entry!(irls::Irls),
         entry!(Kabsch),
+        entry!(l_bfgs::LBfgs),
         entry!(Mahalanobis),
+        entry!(nelder_mead::NelderMead),
         entry!(p3p_stereo::P3pStereo),
         entry!(StereoReprojection),
         entry!(Triad),

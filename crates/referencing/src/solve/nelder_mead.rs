@@ -1,0 +1,96 @@
+//! Nelder–Mead: the likelihood of the pixels, maximised without any derivative.
+
+use argmin::core::Executor;
+use argmin::solver::neldermead;
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Degenerate, Solver, StereoReprojection,
+    pixel_cost::{PixelCost, nothing},
+    spread::{check, in_front},
+    stereo_reprojection::pixels_and_rig,
+};
+use crate::Observations;
+
+/// The pose of least Σ rᵀ S⁻¹ r over the pixels of both images, the cost of `stereo-reprojection`, by a simplex of seven
+/// poses, begun anew from its own answer until that gains nothing: an independent judge that no error of a
+/// derivative can mislead. It ends where the cost has no digits left.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct NelderMead {
+    /// Iterations at most.
+    pub(crate) iterations: u64,
+    /// Second extent of the points over the first below which they count as a line.
+    pub(crate) least_ratio: f64,
+}
+
+impl Default for NelderMead {
+    fn default() -> Self {
+        Self { iterations: 4000, least_ratio: 1e-3 }
+    }
+}
+
+impl Component for NelderMead {
+    const NAME: &'static str = "nelder-mead";
+    const SUMMARY: &'static str = "maximum likelihood on the pixels by a simplex, without derivatives";
+    const SOURCE: &'static str = "Nelder, Mead, A simplex method for function minimization, 1965; the crate argmin";
+
+    fn check(&self) -> Result<(), String> {
+        let some = (1..=1_000_000).contains(&self.iterations);
+        in_range(some, "iterations", self.iterations, "1 to 1000000")?;
+        // Written so that a NaN is refused too.
+        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
+        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+    }
+}
+
+/// Simplices begun at most.
+const MOST_ROUNDS: usize = 20;
+
+impl Solver for NelderMead {
+    fn needs_pixels(&self) -> bool {
+        true
+    }
+
+    fn to_rounding(&self) -> bool {
+        false
+    }
+
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        check(data, self.minimum(), self.least_ratio)?;
+        let rig = pixels_and_rig(data)?;
+        in_front(data)?;
+        let best = nothing();
+        let mut size = 5.0;
+        for _ in 0..MOST_ROUNDS {
+            let (before, centre) = best.borrow().clone();
+            let corner = |i: usize| {
+                let mut x = centre.clone();
+                if i > 0 {
+                    x[i - 1] += size;
+                }
+                x
+            };
+            let method = neldermead::NelderMead::new((0..7).map(corner).collect()).with_sd_tolerance(1e-15);
+            let method = method.map_err(|_| Degenerate::Singular)?;
+            let cost = PixelCost::of(data, rig, &best)?;
+            let _ = Executor::new(cost, method).configure(|state| state.max_iters(self.iterations)).timer(false).run();
+            if before - best.borrow().0 < 1e-10 {
+                break;
+            }
+            size = f64::max(0.1, 0.5 * size);
+        }
+        Ok(PixelCost::of(data, rig, &best)?.pose(&best.borrow().1))
+    }
+
+    /// That of the likelihood whose maximum this is.
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        StereoReprojection::default().covariance(data, at)
+    }
+}

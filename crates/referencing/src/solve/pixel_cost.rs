@@ -1,0 +1,117 @@
+//! χ² of the pixels as a plain function of six numbers: what general-purpose optimisers are given.
+
+use std::cell::RefCell;
+
+use argmin::core::{CostFunction, Error, Gradient};
+use nalgebra::{Matrix4, Matrix6, Vector6};
+use seafix_geometry::{Camera, Object, StereoRig, Transform};
+
+use super::{Degenerate, kabsch};
+use crate::{Observation, Observations};
+
+/// The best place seen: its cost and its six numbers.
+pub(super) type Best = RefCell<(f64, Vec<f64>)>;
+
+/// Σ rᵀ S⁻¹ r at `start · Exp(L x)`, r the pixel residuals and S = Σ_px + σ_model² J Jᵀ with J at the measured point.
+///
+/// L Lᵀ is the covariance that the start has by its own small steps, so that x is in standard deviations and no direction
+/// is steeper than another. Nothing is shared with the solvers that it judges: projections are the rig's, the gradient
+/// is by central differences.
+pub(super) struct PixelCost<'a> {
+    rig: &'a StereoRig,
+    points: &'a [Observation],
+    weights: Vec<Matrix4<f64>>,
+    start: Transform<Object, Camera>,
+    scale: Matrix6<f64>,
+    best: &'a Best,
+}
+
+/// What a pose costs that leaves a point behind a camera.
+const UNSEEN: f64 = 1e30;
+/// The step (standard deviations) of the gradient's differences, and of the scale's (rad, m).
+const STEP: f64 = 1e-4;
+
+impl<'a> PixelCost<'a> {
+    /// From the unweighted fit.
+    pub(super) fn of(data: &'a Observations<'_>, rig: &'a StereoRig, best: &'a Best) -> Result<Self, Degenerate> {
+        let start = kabsch::fit(&data.points);
+        let weight = |point: &Observation| {
+            let model = point.model_sigma * point.model_sigma;
+            let j = rig.project_with_jacobian(&point.measured.at)?.1;
+            (point.pixels?.covariance + j * j.transpose() * model + Matrix4::identity() * 1e-12).try_inverse()
+        };
+        let weights = data.points.iter().map(weight).collect::<Option<_>>().ok_or(Degenerate::Singular)?;
+        let mut cost = Self { rig, points: &data.points, weights, start, scale: Matrix6::identity(), best };
+        cost.scale = cost.spread().ok_or(Degenerate::Singular)?;
+        Ok(cost)
+    }
+
+    /// L of (Σ (∂r)ᵀ S⁻¹ ∂r)⁻¹ = L Lᵀ, by central differences of the projections.
+    fn spread(&self) -> Option<Matrix6<f64>> {
+        let mut information = Matrix6::zeros();
+        for (point, weight) in self.points.iter().zip(&self.weights) {
+            let at = |xi: Vector6<f64>| {
+                Some(self.rig.project(&(self.start.perturbed(&xi).inverse() * point.model))?.coordinates())
+            };
+            let mut j = nalgebra::Matrix4x6::zeros();
+            for i in 0..6 {
+                let xi = Vector6::ith(i, STEP);
+                j.set_column(i, &((at(xi)? - at(-xi)?) / (2.0 * STEP)));
+            }
+            information += j.transpose() * weight * j;
+        }
+        Some(information.cholesky()?.inverse().cholesky()?.l())
+    }
+
+    /// The pose of six numbers.
+    pub(super) fn pose(&self, x: &[f64]) -> Transform<Object, Camera> {
+        self.start.perturbed(&(self.scale * Vector6::from_column_slice(x))).renormalized()
+    }
+
+    fn chi2(&self, x: &[f64]) -> f64 {
+        let camera_from_object = self.pose(x).inverse();
+        let of = |(point, weight): (&Observation, &Matrix4<f64>)| {
+            let expected = self.rig.project(&(camera_from_object * point.model))?;
+            let r = point.pixels?.at.coordinates() - expected.coordinates();
+            Some(r.dot(&(weight * r)))
+        };
+        self.points.iter().zip(&self.weights).map(of).sum::<Option<f64>>().filter(|c| c.is_finite()).unwrap_or(UNSEEN)
+    }
+}
+
+impl CostFunction for PixelCost<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, x: &Self::Param) -> Result<f64, Error> {
+        let cost = self.chi2(x);
+        let mut best = self.best.borrow_mut();
+        if cost < best.0 {
+            *best = (cost, x.clone());
+        }
+        Ok(cost)
+    }
+}
+
+impl Gradient for PixelCost<'_> {
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, x: &Self::Param) -> Result<Self::Gradient, Error> {
+        let mut moved = x.clone();
+        let mut by = |i: usize| {
+            moved[i] = x[i] + STEP;
+            let plus = self.chi2(&moved);
+            moved[i] = x[i] - STEP;
+            let minus = self.chi2(&moved);
+            moved[i] = x[i];
+            (plus - minus) / (2.0 * STEP)
+        };
+        Ok((0..6).map(&mut by).collect())
+    }
+}
+
+/// Nothing seen yet.
+pub(super) fn nothing() -> Best {
+    RefCell::new((f64::INFINITY, vec![0.0; 6]))
+}
