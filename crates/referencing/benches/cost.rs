@@ -4,6 +4,8 @@
 //! Instructions are counted where `valgrind` is installed. `umeyama` is compiled with `c++ -O3` where Eigen's headers
 //! are found: in `EIGEN_INCLUDE`, or in `/usr/include/eigen3`.
 
+#![allow(clippy::print_stdout)]
+
 mod common;
 
 use std::{
@@ -52,7 +54,7 @@ fn main() {
     }
     let of = |name: &str| choices.iter().position(|(known, _)| known == name).expect("it is listed");
     let kabsch = of("kabsch");
-    let instructions: Vec<Option<f64>> = (0..solvers.len()).map(|which| instructions(which)).collect();
+    let instructions: Vec<Option<f64>> = (0..solvers.len()).map(instructions).collect();
     println!(
         "{:32} {:>9} {:>7} {:>12} {:>7} {:>11}",
         "solver", "ns", "kabsch", "instructions", "kabsch", "allocations"

@@ -11,11 +11,13 @@ mod dataset;
 mod dive;
 mod virtual_dive;
 mod virtual_images;
+mod virtual_layouts;
 mod virtual_points;
 
 pub use dataset::DatasetSource;
 pub use dive::Dive;
 pub use virtual_images::VirtualImages;
+pub use virtual_layouts::VirtualLayouts;
 pub use virtual_points::VirtualPoints;
 
 /// What a method may see of one instant.
@@ -108,5 +110,7 @@ pub trait Source: Send + Sync + std::fmt::Debug {
 }
 
 /// All sources.
-pub static SOURCES: Registry<dyn Source> =
-    Registry::new("source", &[entry!(DatasetSource), entry!(Dive), entry!(VirtualImages), entry!(VirtualPoints)]);
+pub static SOURCES: Registry<dyn Source> = Registry::new(
+    "source",
+    &[entry!(DatasetSource), entry!(Dive), entry!(VirtualImages), entry!(VirtualLayouts), entry!(VirtualPoints)],
+);

@@ -9,14 +9,14 @@ use seafix_geometry::{
 use seafix_referencing::Observation;
 
 /// 1600×1200, f 1348.3 px, baseline 0.25 m.
-pub fn rig() -> StereoRig {
+pub(crate) fn rig() -> StereoRig {
     let camera = Pinhole::new([1600, 1200], [1348.3; 2], [799.5, 599.5], &[]).expect("a camera");
     let right_from_left = Transform::exp(&[0.0, 0.0, 0.0, -0.25, 0.0, 0.0].into());
     StereoRig::new(camera, camera, right_from_left).expect("a rig")
 }
 
 /// Points over the common field at 3.25 m ± 10 %, each pixel coordinate disturbed by up to ± 0.35 px (σ 0.2).
-pub fn points(rig: &StereoRig, count: usize) -> Vec<Observation> {
+pub(crate) fn points(rig: &StereoRig, count: usize) -> Vec<Observation> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let pose = Transform::<Object, Camera>::exp(&[0.4, -1.1, 0.7, 1.5, -2.0, 3.0].into());
     let mut point = || {
@@ -37,7 +37,7 @@ pub fn points(rig: &StereoRig, count: usize) -> Vec<Observation> {
 }
 
 /// Every solver at its defaults, and those the figures name.
-pub fn choices() -> Vec<(String, Choice)> {
+pub(crate) fn choices() -> Vec<(String, Choice)> {
     let plain = seafix_referencing::SOLVERS.names().map(|name| (name.to_owned(), Choice::named(name)));
     plain
         .chain([

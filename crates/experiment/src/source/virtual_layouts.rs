@@ -1,0 +1,215 @@
+//! Layouts of points before two cameras: the Monte Carlo of METHOD §3.
+
+use std::path::Path;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use seafix_component::{Component, Fault, in_range};
+use seafix_geometry::{Body, Camera, Covariance6, Object, Point, StereoRig, Transform, World, triad};
+use seafix_referencing::{ModelPoint, Site, SiteObject};
+use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
+use serde::{Deserialize, Serialize};
+
+use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
+
+/// Many draws of many layouts, as clouds of noisy points: every layout is an object of one site, a kilometre from the
+/// next, and frame k is draw k / `layouts` of layout k mod `layouts`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct VirtualLayouts {
+    /// How the points lie: `spread` or `compact`.
+    pub shape: Shape,
+    /// Points of a layout.
+    pub points: usize,
+    /// How many layouts.
+    pub layouts: usize,
+    /// How many draws, over all layouts.
+    pub frames: usize,
+    /// Mean depth (m).
+    pub distance: f64,
+    /// Standard deviation of each pixel coordinate, in each image (px).
+    pub sigma_px: f64,
+    /// Standard deviation of each coordinate of a model point (m), drawn afresh each draw.
+    pub model_sigma: f64,
+    /// The cameras.
+    pub rig: VirtualRig,
+}
+
+impl Default for VirtualLayouts {
+    fn default() -> Self {
+        let Layout { shape, points, distance, sigma_px, model_sigma, rig, .. } = Layout::default();
+        Self { shape, points, layouts: 20, frames: 10_000, distance, sigma_px, model_sigma, rig }
+    }
+}
+
+/// The prior of every draw: position (m) and attitude (rad) a axis. It only tells the layouts' points apart.
+const PRIOR: (f64, f64) = (0.05, 0.01);
+/// How far layouts lie from each other (m).
+const APART: f64 = 1000.0;
+
+impl Component for VirtualLayouts {
+    const NAME: &'static str = "virtual-layouts";
+    const SUMMARY: &'static str = "Monte Carlo of points before two cameras: many draws of many layouts";
+    const SOURCE: &'static str = "ours";
+
+    fn check(&self) -> Result<(), String> {
+        in_range((3..=1000).contains(&self.points), "points", self.points, "3 to 1000")?;
+        in_range((1..=1000).contains(&self.layouts), "layouts", self.layouts, "1 to 1000")?;
+        in_range(self.frames >= 1, "frames", self.frames, "1 or more")?;
+        // Written so that a NaN is refused too.
+        let far = self.distance > 0.0 && self.distance <= 100.0;
+        in_range(far, "distance", self.distance, "a positive number of metres, at most 100")?;
+        let noise = |value: f64, most: f64| value >= 0.0 && value <= most;
+        in_range(noise(self.sigma_px, 100.0), "sigma-px", self.sigma_px, "0 to 100")?;
+        in_range(noise(self.model_sigma, 1.0), "model-sigma", self.model_sigma, "0 to 1")?;
+        self.rig.build().map(|_| ()).map_err(|error| error.to_string())
+    }
+}
+
+impl Source for VirtualLayouts {
+    fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        let place = |number: usize| {
+            let Self { shape, points, distance, sigma_px, model_sigma, rig, .. } = self.clone();
+            let layout = Layout { shape, points, number: number as u64, distance, sigma_px, model_sigma, rig };
+            layout.place(seed)
+        };
+        let refused =
+            |error: seafix_simulation::BadDive| vec![Fault::new(error.to_string(), Path::new("the source's settings"))];
+        let placed: Vec<Placed> = (0..self.layouts).map(place).collect::<Result<_, _>>().map_err(refused)?;
+        let objects = placed.iter().enumerate().map(|(k, placed)| object(k, placed, self.model_sigma)).collect();
+        let name = format!("layouts, seed {seed}, {} m, {} px", self.distance, self.sigma_px);
+        let site = Site { name: "layouts".to_owned(), frame: 0, objects, warnings: Vec::new() };
+        Ok(Box::new(Layouts { settings: self.clone(), seed, name, site, placed }))
+    }
+}
+
+/// Where a layout's own frame lies in the world.
+fn world_from_layout(k: usize) -> Transform<World, Object> {
+    Transform::new(UnitQuaternion::identity(), Vector3::new(APART * k as f64, 0.0, 0.0))
+}
+
+/// The layout as an object with a frame by the rule of Fig. 2 on its largest triangle.
+fn object(k: usize, placed: &Placed, sigma: f64) -> SiteObject {
+    let points: Vec<Point<World>> = placed.model.iter().map(|&at| world_from_layout(k) * at).collect();
+    let n = points.len();
+    let square = |[a, b, c]: [usize; 3]| (points[b] - points[a]).cross(&(points[c] - points[a])).norm_squared();
+    let all = (0..n).flat_map(|a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])));
+    let base = all.max_by(|a, b| square(*a).total_cmp(&square(*b))).expect("three points at least");
+    let base_in_world = base.map(|i| points[i]);
+    let [a, b, c] = &base_in_world;
+    let world_from_object = triad(a, b, c).expect("a layout is no line");
+    let own = |(i, at): (usize, &Point<World>)| ModelPoint {
+        sigma,
+        ..ModelPoint::exact(format!("P{i}"), world_from_object.inverse() * *at)
+    };
+    SiteObject {
+        id: format!("layout{k:02}"),
+        base,
+        base_in_world: Some(base_in_world),
+        survey_sigma: 0.0,
+        world_from_object: Some(world_from_object),
+        points: points.iter().enumerate().map(own).collect(),
+        interest: Vec::new(),
+    }
+}
+
+struct Layouts {
+    settings: VirtualLayouts,
+    seed: u64,
+    name: String,
+    site: Site,
+    placed: Vec<Placed>,
+}
+
+impl Layouts {
+    /// The layout and the draw of a frame.
+    fn of(&self, index: usize) -> (usize, u64) {
+        (index % self.placed.len(), (index / self.placed.len()) as u64)
+    }
+
+    fn world_from_camera(&self, layout: usize) -> Transform<World, Camera> {
+        world_from_layout(layout) * self.placed[layout].object_from_camera
+    }
+}
+
+impl Passage for Layouts {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+
+    fn rig(&self) -> &StereoRig {
+        &self.placed[0].rig
+    }
+
+    fn body_from_camera(&self) -> Transform<Body, Camera> {
+        Transform::identity()
+    }
+
+    fn images(&self) -> bool {
+        false
+    }
+
+    fn frames(&self) -> usize {
+        self.settings.frames
+    }
+
+    fn prior_sigma(&self) -> Option<(f64, f64)> {
+        Some(PRIOR)
+    }
+
+    fn pixel_sigma(&self) -> Option<f64> {
+        Some(self.settings.sigma_px)
+    }
+
+    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+        let (layout, draw) = self.of(index);
+        let (position, attitude) = PRIOR;
+        let mut stream = Stream::new(self.seed, layout as u64, draw, Purpose::Prior);
+        let (turn, step) = (stream.normal3(attitude), stream.normal3(position));
+        let xi = [turn.x, turn.y, turn.z, step.x, step.y, step.z].into();
+        let prior = WorldPrior {
+            world_from_camera: self.world_from_camera(layout).perturbed(&xi),
+            covariance: Covariance6::isotropic(attitude, position),
+        };
+        // A draw that noise leaves untriangulable is a frame without points, and counts as one.
+        let eyes = Eyes::Points(self.placed[layout].draw(draw).unwrap_or_default());
+        Ok(Sight { stamp_ns: index as u64 * 100_000_000, eyes, prior: Some(prior) })
+    }
+
+    fn truth(&self, index: usize) -> Option<Truth> {
+        let (layout, _) = self.of(index);
+        Some(Truth {
+            world_from_camera: self.world_from_camera(layout),
+            world_from_object: self.site.objects.iter().map(|object| object.world_from_object).collect(),
+            visible: Some((0..self.settings.points).map(|point| (layout, point)).collect()),
+        })
+    }
+
+    fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
+        Ok(Vec::new())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_a_draw_of_a_layout_seen_from_its_true_pose() {
+        let settings = VirtualLayouts { layouts: 3, frames: 7, sigma_px: 0.0, ..VirtualLayouts::default() };
+        let passage = settings.open(1, Path::new(".")).unwrap();
+        assert_eq!((passage.frames(), passage.site().objects.len()), (7, 3));
+        for index in 0..7 {
+            let (sight, truth) = (passage.sight(index).unwrap(), passage.truth(index).unwrap());
+            let Eyes::Points(cloud) = sight.eyes else { panic!("points") };
+            let object = &passage.site().objects[index % 3];
+            let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[index % 3].unwrap();
+            for (seen, known) in cloud.iter().zip(&object.points) {
+                assert!((camera_from_object * known.at).distance(&seen.position.at) < 1e-9);
+            }
+        }
+    }
+}
