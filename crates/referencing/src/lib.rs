@@ -18,6 +18,7 @@ mod site;
 mod solve;
 
 pub use candidates::{Candidates, Gate, candidates};
+pub use chance::{expected_chance_sets, expected_sets_as_good};
 pub use observations::{Observation, Observations};
 pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
 pub use reference::{

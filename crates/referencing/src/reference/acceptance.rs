@@ -27,7 +27,7 @@ impl Default for Acceptance {
     fn default() -> Self {
         Self {
             least_points: 3,
-            chance_budget: 0.01,
+            chance_budget: 1e-3,
             confidence: 0.999,
             alert_limit: 0.10,
             risk: 1e-4,

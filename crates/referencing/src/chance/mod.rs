@@ -1,0 +1,174 @@
+//! How many sets as good as the one found chance alone would give.
+//!
+//! # Null model
+//!
+//! No candidate is true: each candidate of a model point lies anywhere in its shell; without a prior
+//! anywhere in the cloud's box; the partners of putative pairs are shuffled; all independent
+//! ([`Null`]). Then
+//!
+//! E = Σ_{j ≥ k} Σ over j-subsets S of model points of Π_{i∈S} m_i · P(S),
+//!
+//! m_i candidates of model point i, P(S) the probability that one candidate of each makes a set that
+//! is coherent, not mirrored, and no worse: χ² per degree of freedom at most that of the set found.
+//!
+//! # The probability that j points fit
+//!
+//! The clouds that a rigid motion makes of S exactly are a surface of dimension 6 in the 3j coordinates
+//! of j points; those that fit within χ² ≤ R² are its tube of radius R in whitened coordinates, and to
+//! first order in R over the set's extent
+//!
+//! P(S) = ∫ √det H · Π_i ρ_i(T p_i) dT · |{e ⟂ surface: ‖e‖ ≤ R, every distance within its tolerance}|,
+//!
+//! H = Σ_i J_iᵀ W J_i the information matrix of the motion, ρ_i the density of the candidates of i. The
+//! surface has proper motions only, so that mirror images are not counted; where S is nearly a line,
+//! the turn about it is bounded below by the noise ([`shape`]). The integral over translations is
+//! exact: the overlap of the shells moved to where the rotation takes them. Rotations, subsets and
+//! directions of e are sampled from fixed sequences: the answer is a function of the problem.
+//!
+//! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid
+//! point matches*, 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
+
+mod null;
+mod sequence;
+mod shape;
+mod subsets;
+
+use seafix_geometry::MeasuredPoint;
+
+use crate::{Correspondence, Kabsch, Observations, Problem, Solver, candidates::chi_square, solve::likelihood};
+use null::Null;
+use sequence::Sequence;
+use shape::{Noise, Shape};
+use subsets::Subsets;
+
+/// Larger sets are counted until they add less than this share.
+const NEGLIGIBLE: f64 = 0.03;
+/// At most so many sizes beyond that of the set found.
+const MOST_SIZES: usize = 16;
+/// Samples a model point, their greatest number, and how many pairs of points they may hold in all.
+const SAMPLES_A_POINT: usize = 4;
+const MOST_SAMPLES: usize = 250;
+const LEAST_SAMPLES: usize = 16;
+const MOST_WORK: usize = 8_000;
+/// Expectations below this are not refined.
+const IMPOSSIBLE: f64 = 1e-7;
+
+/// The confidence of the χ² test that sets must pass.
+const CONFIDENCE: f64 = 0.999;
+
+/// The expected number of one-to-one sets of `found.len()` pairs or more that would pass as `found` does,
+/// if no candidate were true: with any residual that the χ² test admits. Infinite below three pairs; NaN
+/// where a covariance is.
+pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
+    if found.len() < 3 {
+        return f64::INFINITY;
+    }
+    expected_chance_sets(problem, found.len(), chi_square(3 * found.len() - 6, CONFIDENCE))
+}
+
+/// The expected number of such sets that are as good as `found`: with at most its residual. Of frames
+/// without the object a share ε shows a set below ε of each size.
+pub fn expected_sets_as_good(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
+    if found.len() < 3 {
+        return f64::INFINITY;
+    }
+    expected_chance_sets(problem, found.len(), least_chi2(problem, found))
+}
+
+/// The expected number of admissible one-to-one sets that are no worse than one given, if no candidate of
+/// the problem were true: sets of `size` pairs or more whose χ² per degree of freedom is at most
+/// `chi2`/(3·size − 6).
+pub fn expected_chance_sets(problem: &Problem<'_>, size: usize, chi2: f64) -> f64 {
+    if size < 3 {
+        return f64::INFINITY;
+    }
+    let noise = Noise::of(problem);
+    if chi2.is_nan() || noise.is_nan() {
+        return f64::NAN;
+    }
+    let null = Null::of(problem);
+    let available = problem.candidates.with_candidates();
+    let shared = shared(problem);
+    let (mut sum, mut last) = (0.0, 0.0_f64);
+    for j in (size..=available).take(MOST_SIZES) {
+        let halved = (j - size).min(3);
+        let term = expected_of_size(problem, &null, &noise, j, chi2 * freedom(j) / freedom(size), halved, shared);
+        sum += term;
+        // Not before the terms fall: among many candidates the larger sets may be the more.
+        if term.is_nan() || (term <= NEGLIGIBLE * sum && term <= last.max(f64::MIN_POSITIVE)) {
+            break;
+        }
+        if j == size && term == 0.0 {
+            break;
+        }
+        last = term;
+    }
+    sum
+}
+
+fn freedom(size: usize) -> f64 {
+    (3 * size - 6) as f64
+}
+
+/// The expected number of such sets of exactly `size` pairs.
+fn expected_of_size(
+    problem: &Problem<'_>,
+    null: &Null<'_>,
+    noise: &Noise,
+    size: usize,
+    chi2: f64,
+    halved: usize,
+    shared: f64,
+) -> f64 {
+    let lengths = problem.candidates.lists.iter().map(Vec::len);
+    let mut subsets = Subsets::new(lengths, size);
+    let pairs = size * (size - 1) / 2;
+    let wanted = (SAMPLES_A_POINT * problem.candidates.with_candidates()).min(MOST_SAMPLES) >> halved;
+    let samples = wanted.min(MOST_WORK / pairs).max(LEAST_SAMPLES);
+    let mut sequence = Sequence::new(samples);
+    let mut shape = Shape::new(problem, null, noise, size, chi2);
+    // Candidates that two model points share can serve one of them only.
+    let apart = pairs as f64 * libm::log1p(-shared);
+    let ln_scale = subsets.ln_tuples() + shape.ln_scale() + apart;
+    let (mut sum, mut taken) = (0.0, 0);
+    while taken < samples {
+        sum += shape.fit_probability(subsets.next(&mut sequence), &mut sequence);
+        taken += 1;
+        // How impossible the impossible is need not be known well.
+        if taken == LEAST_SAMPLES && libm::exp(ln_scale) * sum < IMPOSSIBLE {
+            break;
+        }
+    }
+    libm::exp(ln_scale + libm::log(sum / taken as f64))
+}
+
+/// The probability that the candidates of two different model points are the same cloud point.
+fn shared(problem: &Problem<'_>) -> f64 {
+    let lists = &problem.candidates.lists;
+    let mut lists_of = vec![0.0_f64; problem.cloud.len()];
+    lists.iter().flatten().for_each(|&j| lists_of[j] += 1.0);
+    let same: f64 = lists_of.iter().map(|count| count * (count - 1.0)).sum();
+    let (all, own) = lists.iter().map(|list| list.len() as f64).fold((0.0, 0.0), |(a, o), m| (a + m, o + m * m));
+    let different = all * all - own;
+    if different > 0.0 { (same / different).min(0.999) } else { 0.0 }
+}
+
+/// The least χ² of the pairs over rigid motions; of those that define none, what their size allows.
+fn least_chi2(problem: &Problem<'_>, pairs: &[Correspondence]) -> f64 {
+    let data = Observations::of(pairs, problem.model, problem.cloud, None);
+    if data.points.iter().any(|point| !point.is_finite()) {
+        return f64::NAN;
+    }
+    match (Kabsch { least_ratio: 0.0 }).solve(&data) {
+        Ok(start) => likelihood::maximum(&data, &start).cost,
+        Err(_) => f64::INFINITY,
+    }
+}
+
+/// Where a point was measured, in the camera.
+fn coordinates(point: &MeasuredPoint) -> nalgebra::Vector3<f64> {
+    point.position.at.coords
+}
+
+#[cfg(test)]
+mod tests;

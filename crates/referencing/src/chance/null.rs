@@ -1,0 +1,125 @@
+//! The null model: where candidates lie if none of them is true.
+
+use nalgebra::Vector3;
+use seafix_geometry::MeasuredPoint;
+
+use super::{coordinates, sequence::Sequence};
+use crate::{Prior, PriorBound, Problem, candidates::chi_square};
+
+/// The confidence of the shells that a Gaussian prior draws, as [`crate::Gate`] has it by default.
+const CONFIDENCE: f64 = 0.99;
+/// The cloud's density about a place is that of its nearest so many points, among at most so many.
+const NEAREST: usize = 4;
+const MOST_LOOKED_AT: usize = 200;
+/// Nothing is smaller (m).
+const LEAST: f64 = 1e-9;
+
+/// Where the candidates of a model point lie by chance.
+pub(super) enum Null<'a> {
+    /// Anywhere in its shell: the centre of each in the camera and its half-sizes.
+    Shells(Vec<Shell>),
+    /// Anywhere in the box of the cloud, of these lengths.
+    Box(Vector3<f64>),
+    /// Where any partner lies.
+    Shuffled(Vec<&'a MeasuredPoint>),
+}
+
+/// A box about the predicted place of a model point.
+#[derive(Clone, Copy)]
+pub(super) struct Shell {
+    pub(super) centre: Vector3<f64>,
+    pub(super) half: Vector3<f64>,
+    ln_volume: f64,
+    /// The density of its candidates over that which [`Null::ln_scale`] has.
+    pub(super) relative_density: f64,
+}
+
+impl<'a> Null<'a> {
+    pub(super) fn of(problem: &Problem<'a>) -> Self {
+        let lists = &problem.candidates.lists;
+        if let Some(prior) = problem.prior {
+            return Self::Shells(shells(problem, prior));
+        }
+        if lists.iter().all(|list| list.is_empty() || list.len() == problem.cloud.len()) {
+            let bounds = problem.cloud.iter().map(coordinates).fold(None, |bounds, at| match bounds {
+                None => Some((at, at)),
+                Some((low, high)) => Some((at.inf(&low), at.sup(&high))),
+            });
+            return Self::Box(bounds.map_or(Vector3::zeros(), |(low, high)| high - low).add_scalar(LEAST));
+        }
+        let all: usize = lists.iter().map(Vec::len).sum();
+        let step = all.div_ceil(MOST_LOOKED_AT).max(1);
+        Self::Shuffled(lists.iter().flatten().step_by(step).map(|&j| &problem.cloud[j]).collect())
+    }
+
+    /// ln of the density of a candidate that is left out of the sampled densities.
+    pub(super) fn ln_scale(&self) -> f64 {
+        match self {
+            Self::Shells(shells) => {
+                -shells.first().map_or(0.0, |first| first.ln_volume + libm::log(first.relative_density))
+            }
+            Self::Box(lengths) => -libm::log(lengths.product()),
+            Self::Shuffled(_) => 0.0,
+        }
+    }
+}
+
+/// The box of each model point. Of a Gaussian prior's ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ² it is the one
+/// of the same volume and proportions.
+fn shells(problem: &Problem<'_>, prior: &Prior) -> Vec<Shell> {
+    let camera_from_object = prior.object_from_camera.inverse();
+    let shell = |(point, list): (&crate::ModelPoint, &Vec<usize>)| {
+        let centre = camera_from_object * point.at;
+        let half = match &prior.bound {
+            PriorBound::Box(half) => Vector3::repeat(*half),
+            PriorBound::Gaussian(covariance) => {
+                let own = point.sigma * point.sigma;
+                let noise = list.first().map_or(nalgebra::Matrix3::zeros(), |&j| problem.cloud[j].position.covariance);
+                let s = covariance.of_point(&centre) + noise + nalgebra::Matrix3::identity() * own;
+                let axes = s.diagonal().map(|variance| variance.max(0.0).sqrt());
+                let volume = 4.0 / 3.0 * std::f64::consts::PI * chi_square(3, CONFIDENCE).powf(1.5);
+                let ellipsoid = volume * s.determinant().max(0.0).sqrt();
+                axes * libm::cbrt(ellipsoid / (8.0 * axes.product()).max(f64::MIN_POSITIVE))
+            }
+        };
+        let half = half.add_scalar(LEAST);
+        Shell { centre: centre.coords, half, ln_volume: libm::log(8.0 * half.product()), relative_density: 1.0 }
+    };
+    let mut shells: Vec<Shell> = problem.model.iter().zip(&problem.candidates.lists).map(shell).collect();
+    let scale = mean_ln_volume(&shells);
+    for shell in shells.iter_mut().filter(|shell| shell.ln_volume != scale) {
+        shell.relative_density = libm::exp(scale - shell.ln_volume);
+    }
+    shells
+}
+
+fn mean_ln_volume(shells: &[Shell]) -> f64 {
+    match shells.iter().map(|shell| shell.ln_volume).reduce(f64::max) {
+        Some(most) if shells.iter().all(|shell| shell.ln_volume == most) => most,
+        _ => shells.iter().map(|shell| shell.ln_volume).sum::<f64>() / shells.len().max(1) as f64,
+    }
+}
+
+/// The density (1/m³) of `cloud` about a place, of one point: (q − 1)/(N · volume to the q-th nearest).
+pub(super) fn density(cloud: &[&MeasuredPoint], at: &Vector3<f64>) -> f64 {
+    let q = NEAREST.min(cloud.len());
+    if q < 2 {
+        return 0.0;
+    }
+    let mut nearest = [f64::INFINITY; NEAREST];
+    for point in cloud {
+        let square = (coordinates(point) - at).norm_squared();
+        if square < nearest[q - 1] {
+            let place = nearest[..q - 1].iter().position(|&near| square < near).unwrap_or(q - 1);
+            nearest[place..q].rotate_right(1);
+            nearest[place] = square;
+        }
+    }
+    let radius = nearest[q - 1].sqrt().max(LEAST);
+    (q - 1) as f64 / (cloud.len() as f64 * 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3))
+}
+
+/// One of the cloud points.
+pub(super) fn any(cloud: &[&MeasuredPoint], sequence: &mut Sequence) -> Vector3<f64> {
+    coordinates(cloud[sequence.below(cloud.len())])
+}

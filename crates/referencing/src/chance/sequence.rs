@@ -1,0 +1,109 @@
+//! Fixed sequences in place of random numbers: the same problem has the same answer.
+
+use std::sync::LazyLock;
+
+use nalgebra::Vector3;
+
+/// How many points and normal numbers are prepared.
+const POINTS: usize = 1 << 10;
+const NORMALS: usize = 1 << 13;
+/// The positive root of x⁵ = x + 1: its powers fill a cube of four dimensions evenly (Roberts, 2018).
+const ROOT: f64 = 1.167_303_978_261_418_7;
+
+struct Tables {
+    /// In [0, 1).
+    even: Vec<f64>,
+    /// Over the unit sphere.
+    directions: Vec<Vector3<f64>>,
+    /// Over all rotations: unit quaternions, scalar last.
+    turns: Vec<[f64; 4]>,
+    normals: Vec<f64>,
+}
+
+static TABLES: LazyLock<Tables> = LazyLock::new(|| {
+    let steps: [f64; 4] = std::array::from_fn(|k| (0..=k).fold(1.0, |power, _| power / ROOT));
+    let cube = |k: usize| steps.map(|step| (0.5 + step * (k + 1) as f64).fract());
+    let circle = |u: f64| libm::sincos(std::f64::consts::TAU * u);
+    let direction = |k: usize| {
+        let [_, u, v, _] = cube(k);
+        let (z, (sine, cosine)) = (2.0 * u - 1.0, circle(v));
+        let across = (1.0 - z * z).max(0.0).sqrt();
+        Vector3::new(across * cosine, across * sine, z)
+    };
+    // Shoemake, Uniform random rotations, 1992.
+    let turn = |k: usize| {
+        let [_, u, v, w] = cube(k);
+        let ((a, b), (c, d)) = (circle(v), circle(w));
+        let (near, far) = ((1.0 - u).sqrt(), u.sqrt());
+        [near * a, near * b, far * c, far * d]
+    };
+    let mut bits = Bits(0x5eaf_1c5e);
+    let mut normal = || (-2.0 * libm::log(1.0 - bits.unit())).sqrt() * circle(bits.unit()).1;
+    Tables {
+        even: (0..POINTS).map(|k| cube(k)[0]).collect(),
+        directions: (0..POINTS).map(direction).collect(),
+        turns: (0..POINTS).map(turn).collect(),
+        normals: (0..NORMALS).map(|_| normal()).collect(),
+    }
+});
+
+/// Numbers that look random. (Steele, Lea and Flood, SplitMix, 2014.)
+struct Bits(u64);
+
+impl Bits {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+}
+
+/// The numbers of one estimate.
+pub(super) struct Sequence {
+    tables: &'static Tables,
+    taken: usize,
+    normals: usize,
+    bits: Bits,
+}
+
+impl Sequence {
+    /// For this many samples.
+    pub(super) fn new(samples: usize) -> Self {
+        Self { tables: &TABLES, taken: 0, normals: 0, bits: Bits(samples as u64) }
+    }
+
+    /// In [0, 1), evenly over a sequence of calls, one a sample.
+    pub(super) fn even(&mut self) -> f64 {
+        self.taken = (self.taken + 1) % POINTS;
+        self.tables.even[self.taken]
+    }
+
+    /// In [0, 1).
+    pub(super) fn unit(&mut self) -> f64 {
+        self.bits.unit()
+    }
+
+    /// In 0..n.
+    pub(super) fn below(&mut self, n: usize) -> usize {
+        ((self.bits.unit() * n as f64) as usize).min(n - 1)
+    }
+
+    /// A direction, one a sample.
+    pub(super) fn direction(&self) -> Vector3<f64> {
+        self.tables.directions[self.taken]
+    }
+
+    /// A rotation, one a sample: a unit quaternion, scalar last.
+    pub(super) fn turn(&self) -> [f64; 4] {
+        self.tables.turns[self.taken]
+    }
+
+    /// Three independent normal numbers.
+    pub(super) fn normal3(&mut self) -> Vector3<f64> {
+        self.normals = (self.normals + 3) % (NORMALS - 3);
+        let n = &self.tables.normals[self.normals..self.normals + 3];
+        Vector3::new(n[0], n[1], n[2])
+    }
+}

@@ -1,0 +1,165 @@
+use nalgebra::{Matrix3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{Point, Transform, UncertainPoint};
+
+use super::*;
+use crate::{Candidates, ModelPoint, Prior, PriorBound, Tolerance, search::mirrored};
+
+const PLACES: [[f64; 3]; 7] = [
+    [0.0, 0.0, 0.0],
+    [1.3, 0.0, 0.0],
+    [0.3, -0.9, 0.0],
+    [0.8, 0.6, 0.5],
+    [-0.4, 0.7, 0.9],
+    [0.1, -0.3, 1.2],
+    [0.65, 0.01, 0.01], // nearly on a line with the first two
+];
+
+/// A frame without its object.
+struct Frame {
+    model: Vec<ModelPoint>,
+    cloud: Vec<MeasuredPoint>,
+    candidates: Candidates,
+    prior: Option<Prior>,
+}
+
+fn model() -> Vec<ModelPoint> {
+    PLACES.iter().map(|at| ModelPoint::exact("", Point::from(*at))).collect()
+}
+
+fn measured(at: Vector3<f64>, sigmas: [f64; 3]) -> MeasuredPoint {
+    let covariance = Matrix3::from_diagonal(&Vector3::from(sigmas.map(|s| s * s)));
+    MeasuredPoint { position: UncertainPoint { at: at.into(), covariance }, pixels: None }
+}
+
+fn within(half: f64, rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| rng.random_range(-half..half))
+}
+
+/// Independent points in a box about each prediction.
+fn shells(half: f64, each: usize, sigmas: [f64; 3], rng: &mut ChaCha8Rng) -> Frame {
+    let cloud = (0..PLACES.len() * each)
+        .map(|j| measured(Vector3::from(PLACES[j / each]) + within(half, rng), sigmas))
+        .collect();
+    let candidates = Candidates { lists: (0..PLACES.len()).map(|i| (each * i..each * (i + 1)).collect()).collect() };
+    let prior = Prior { object_from_camera: Transform::identity(), bound: PriorBound::Box(half) };
+    Frame { model: model(), cloud, candidates, prior: Some(prior) }
+}
+
+/// Points anywhere in a box, and every pair a candidate.
+fn anywhere(half: f64, m: usize, rng: &mut ChaCha8Rng) -> Frame {
+    let cloud = (0..m).map(|_| measured(within(half, rng), [0.01; 3])).collect();
+    Frame { model: model(), cloud, candidates: Candidates::all(PLACES.len(), m), prior: None }
+}
+
+/// Putative pairs whose partners are shuffled: half of them in a corner.
+fn putative(n: usize, rng: &mut ChaCha8Rng) -> Frame {
+    let model = (0..n).map(|_| ModelPoint::exact("", within(0.6, rng).into())).collect();
+    let cloud = (0..n).map(|j| measured(within(if j % 2 == 0 { 0.6 } else { 2.0 }, rng), [0.01; 3])).collect();
+    let candidates = Candidates { lists: (0..n).map(|i| vec![i]).collect() };
+    Frame { model, cloud, candidates, prior: None }
+}
+
+impl Frame {
+    fn problem(&self, tolerance: f64) -> Problem<'_> {
+        Problem {
+            model: &self.model,
+            cloud: &self.cloud,
+            candidates: &self.candidates,
+            tolerance: Tolerance::Fixed(tolerance),
+            prior: self.prior.as_ref(),
+        }
+    }
+}
+
+/// The admissible sets of `size` pairs or more with at most this χ² per degree of freedom, one by one.
+fn count(problem: &Problem<'_>, size: usize, each: f64) -> usize {
+    fn grow(problem: &Problem<'_>, size: usize, each: f64, from: usize, set: &mut Vec<Correspondence>) -> usize {
+        let good = |set: &[Correspondence]| set.len() >= size && least_chi2(problem, set) <= each * freedom(set.len());
+        let mut found = usize::from(good(set));
+        for model in from..problem.model.len() {
+            for &cloud in &problem.candidates.lists[model] {
+                let pair = Correspondence { model, cloud };
+                let fits = set.iter().all(|&other| problem.coherent(pair, other));
+                let proper = |three: &[Correspondence; 3]| !mirrored(problem, [three[0], three[1], three[2], pair]);
+                if fits && threes(set).iter().all(proper) {
+                    set.push(pair);
+                    found += grow(problem, size, each, model + 1, set);
+                    set.pop();
+                }
+            }
+        }
+        found
+    }
+    grow(problem, size, each, 0, &mut Vec::new())
+}
+
+fn threes(set: &[Correspondence]) -> Vec<[Correspondence; 3]> {
+    let n = set.len();
+    let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
+    pairs.flat_map(|(i, j)| (j + 1..n).map(move |k| [set[i], set[j], set[k]])).collect()
+}
+
+/// Observed over predicted in `frames` frames.
+fn ratio(size: usize, each: f64, tolerance: f64, frames: usize, mut frame: impl FnMut() -> Frame) -> f64 {
+    let (mut expected, mut counted) = (0.0, 0);
+    for _ in 0..frames {
+        let frame = frame();
+        let problem = frame.problem(tolerance);
+        expected += expected_chance_sets(&problem, size, each * freedom(size));
+        counted += count(&problem, size, each);
+    }
+    counted as f64 / expected
+}
+
+#[test]
+fn candidates_in_shells() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for (size, each, frames) in [(3, 0.3, 200), (3, 1.5, 50), (3, 5.0, 50), (4, 3.0, 1000)] {
+        let ratio = ratio(size, each, 0.0424, frames, || shells(0.3, 8, [0.01; 3], &mut rng));
+        assert!((0.7..1.4).contains(&ratio), "size {size}, chi2/dof {each}: {ratio} times");
+    }
+}
+
+#[test]
+fn depth_known_less_well() {
+    let mut rng = ChaCha8Rng::seed_from_u64(10);
+    for (size, each, frames) in [(3, 1.0, 50), (4, 2.0, 500)] {
+        let ratio = ratio(size, each, 0.06, frames, || shells(0.3, 8, [0.008, 0.008, 0.024], &mut rng));
+        assert!((0.7..1.4).contains(&ratio), "size {size}, chi2/dof {each}: {ratio} times");
+    }
+}
+
+#[test]
+fn candidates_anywhere() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    for (size, each, frames) in [(3, 1.0, 15), (3, 5.0, 5)] {
+        let ratio = ratio(size, each, 0.0424, frames, || anywhere(1.0, 40, &mut rng));
+        assert!((0.7..1.4).contains(&ratio), "size {size}, chi2/dof {each}: {ratio} times");
+    }
+}
+
+#[test]
+fn partners_shuffled() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    for (size, each, frames) in [(3, 3.0, 200)] {
+        let ratio = ratio(size, each, 0.0424, frames, || putative(60, &mut rng));
+        assert!((0.7..1.4).contains(&ratio), "size {size}, chi2/dof {each}: {ratio} times");
+    }
+}
+
+#[test]
+fn few_pairs_and_impossible_noise() {
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let mut frame = shells(0.3, 2, [0.01; 3], &mut rng);
+    let pairs: Vec<Correspondence> = (0..3).map(|i| Correspondence { model: i, cloud: 2 * i }).collect();
+    assert_eq!(expected_sets(&frame.problem(0.05), &pairs[..2]), f64::INFINITY);
+    assert!(expected_sets(&frame.problem(0.05), &pairs).is_finite());
+    // A better residual is rarer by chance.
+    let better = expected_chance_sets(&frame.problem(0.05), 3, 0.1);
+    assert!(better < 0.2 * expected_chance_sets(&frame.problem(0.05), 3, 1.0));
+    frame.cloud[0].position.covariance[(0, 0)] = f64::NAN;
+    assert!(expected_sets(&frame.problem(0.05), &pairs).is_nan());
+    assert!(expected_sets_as_good(&frame.problem(0.05), &pairs).is_nan());
+}
