@@ -64,6 +64,8 @@ pub struct Size {
 
 /// What brute force can enumerate: 7 points, 4 candidates each.
 pub const SMALL: Size = Size { points: 7, list: 4, clutter: 6 };
+/// What exact searches can settle, all alike.
+pub const MEDIUM: Size = Size { points: 11, list: 5, clutter: 20 };
 /// What it cannot: more vertices than a machine word has bits.
 pub const LARGE: Size = Size { points: 24, list: 6, clutter: 60 };
 

@@ -69,7 +69,7 @@ pub fn searches(budget: i64) -> Vec<Tried> {
     };
     let mut all: Vec<Tried> = variants(&SEARCHES, &[("budget", budget)]).into_iter().map(tried).collect();
     // Without shells everything takes so long that a small budget shows as much.
-    let short = variants(&SEARCHES, &[("budget", budget / 20)]).into_iter().map(tried);
+    let short = variants(&SEARCHES, &[("budget", (budget / 20).max(1))]).into_iter().map(tried);
     all.iter_mut().zip(short).filter(|(one, _)| !one.claims.lists).for_each(|(one, short)| *one = short);
     all
 }

@@ -85,7 +85,7 @@ fn measured(at: Vector3<f64>) -> MeasuredPoint {
     MeasuredPoint { position: UncertainPoint { at: Point::from(at), covariance: Matrix3::zeros() }, pixels: None }
 }
 
-/// P22. Size optimality against brute force for n ≤ 7 and lists ≤ 4, over admissible sets: coherent,
+/// P22, P34. Size optimality against brute force for n ≤ 7 and lists ≤ 4, over admissible sets: coherent,
 /// one-to-one and, where the search refuses mirror images, every four points whose model volume
 /// exceeds 3 σ of the measured volume with the same sign.
 ///
@@ -139,6 +139,9 @@ fn no_admissible_set_is_larger() {
                         found.rivals.iter().all(|rival| rival.len() == size && *rival != found.pairs),
                         "{name}"
                     );
+                    // P34: all that tie are named, as long as they are few.
+                    let few = best.sets.len() <= 64 && found.optimal;
+                    prop_assert!(!search.claims.ties || !few || found.rivals_complete, "{name}: ties");
                     prop_assert!(search.claims.exact || !found.optimal && !found.rivals_complete, "{name}: no proof");
                     if found.optimal {
                         prop_assert_eq!((size, found.size_bound), (best.size, best.size), "{}", name);

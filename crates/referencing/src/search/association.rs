@@ -30,7 +30,7 @@ impl Association {
         let vertices = vertices(problem);
         let mut adjacency = BitMatrix::zeros(vertices.len());
         // A cheap necessary condition first, and one that suffices; the exact test decides between them.
-        let extent = extent(problem);
+        let extent = extent(problem, &vertices);
         let mut sites = Sites::default();
         for &pair in &vertices {
             let (model, cloud) = (problem.model[pair.model].at.coords, problem.cloud[pair.cloud].position.at.coords);
@@ -81,9 +81,9 @@ impl Association {
 }
 
 /// The largest coordinate (m).
-fn extent(problem: &Problem<'_>) -> f64 {
-    let known = problem.model.iter().map(|point| point.at.coords.amax());
-    let measured = problem.cloud.iter().map(|point| point.position.at.coords.amax());
+fn extent(problem: &Problem<'_>, vertices: &[Correspondence]) -> f64 {
+    let known = vertices.iter().map(|pair| problem.model[pair.model].at.coords.amax());
+    let measured = vertices.iter().map(|pair| problem.cloud[pair.cloud].position.at.coords.amax());
     known.chain(measured).fold(0.0, f64::max)
 }
 
