@@ -134,7 +134,8 @@ fn fours(set: &[Correspondence]) -> Vec<[Correspondence; 4]> {
     all
 }
 
-/// The model's volume exceeds 3 σ of the measured one and their signs differ; σ by differences.
+/// The model's volume exceeds 3 σ of the measured one and that has not its sign, none when it is zero but for rounding;
+/// σ by differences.
 fn opposed(problem: &Problem<'_>, four: &[Correspondence; 4]) -> bool {
     let known = six_volumes(four.map(|pair| problem.model[pair.model].at.coords));
     let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
@@ -148,7 +149,7 @@ fn opposed(problem: &Problem<'_>, four: &[Correspondence; 4]) -> bool {
         });
         variance += gradient.dot(&(problem.cloud[four[k].cloud].position.covariance * gradient));
     }
-    known.abs() > 3.0 * variance.sqrt() + 1e-11 && known.signum() * six_volumes(cloud) <= 0.0
+    known.abs() > 3.0 * variance.sqrt() + 1e-11 && known.signum() * six_volumes(cloud) <= 1e-11
 }
 
 /// The largest admissible sets, by trying every choice.
@@ -188,9 +189,10 @@ fn check_clique(case: &Case, orientation: bool, seed: u64) {
     let problem = case.problem();
     let (size, mut sets) = brute_force(&problem, orientation);
     let clique = MaximumClique { orientation, rivals: 10_000, ..MaximumClique::default() };
-    let backtracking = SEARCHES.build(&Choice::named("backtracking").with("orientation", orientation));
+    let backtracking = Choice::named("backtracking").with("orientation", orientation);
+    let backtracking = SEARCHES.build(&backtracking).expect("a listed search");
     check_exact(case, &clique, orientation, (size, &mut sets), seed);
-    check_exact(case, &*backtracking.unwrap(), orientation, (size, &mut sets), seed);
+    check_exact(case, &*backtracking, orientation, (size, &mut sets), seed);
 }
 
 fn check_exact(

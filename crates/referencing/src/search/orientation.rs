@@ -20,10 +20,15 @@ pub(crate) fn mirrored(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool
     let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
     let (known, measured) = (volume(&model), volume(&cloud));
     // Almost every question ends here: the noise is looked at only where the signs differ.
-    if known * measured > 0.0 {
+    if agree(known, measured, &cloud) {
         return false;
     }
     decisive(problem, &four, &model, &cloud, known)
+}
+
+/// Whether the measured volume has the sign of the known one; that of a flat four is rounding, and none.
+fn agree(known: f64, measured: f64, cloud: &[Vector3<f64>; 4]) -> bool {
+    known * measured > 0.0 && measured.abs() > ROUNDING * edges(cloud)
 }
 
 /// What a set's fours must be.
@@ -53,7 +58,7 @@ fn upright(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
     let model = four.map(|pair| problem.model[pair.model].at.coords);
     let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
     let known = volume(&model);
-    known * volume(&cloud) > 0.0 && decisive(problem, &four, &model, &cloud, known)
+    agree(known, volume(&cloud), &cloud) && decisive(problem, &four, &model, &cloud, known)
 }
 
 /// Whether the model's volume is large enough to tell an image from its reflection.
@@ -72,8 +77,12 @@ fn decisive(
         .zip(gradients)
         .map(|(pair, g)| g.dot(&(problem.cloud[pair.cloud].position.covariance * g)) / 36.0)
         .sum();
-    let edges = (model[1] - model[0]).norm() * (model[2] - model[0]).norm() * (model[3] - model[0]).norm();
-    known.abs() > DECISIVE * variance.max(0.0).sqrt() + ROUNDING * edges
+    known.abs() > DECISIVE * variance.max(0.0).sqrt() + ROUNDING * edges(model)
+}
+
+/// The product of the three edges from the first point.
+fn edges([a, b, c, d]: &[Vector3<f64>; 4]) -> f64 {
+    (b - a).norm() * (c - a).norm() * (d - a).norm()
 }
 
 fn volume([a, b, c, d]: &[Vector3<f64>; 4]) -> f64 {
@@ -88,7 +97,7 @@ pub(crate) fn wholly_mirrored(problem: &Problem<'_>, set: &[Correspondence]) -> 
         let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
         let known = volume(&model);
         if decisive(problem, &four, &model, &cloud, known) {
-            if known * volume(&cloud) > 0.0 {
+            if agree(known, volume(&cloud), &cloud) {
                 return false;
             }
             some = true;
