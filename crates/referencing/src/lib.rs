@@ -26,5 +26,5 @@ pub use reference::{
     rms_apart,
 };
 pub use search::{Identification, MaximumClique, SEARCHES, Samples, Search, StructuralCoherence, Unidentified};
-pub use site::{Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};
+pub use site::{Congruence, Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};
 pub use solve::{Choose, Degenerate, Kabsch, Mahalanobis, SOLVERS, Solver, StereoReprojection, Triad};

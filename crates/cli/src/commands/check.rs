@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 
 use seafix_component::Fault;
 use seafix_experiment::{Plan, dataset, read_text};
-use seafix_referencing::{Site, problem_file};
+use seafix_referencing::{Site, TargetKind, problem_file};
 
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, INPUT},
     terminal::print,
 };
+
+/// Of the motions of a target, and of the points that exclude one, so many are named.
+const MOST_NOTED: usize = 5;
 
 pub(crate) fn execute(paths: &[PathBuf]) -> Ended {
     if let Some(missing) = paths.iter().find(|path| !path.exists()) {
@@ -20,6 +23,7 @@ pub(crate) fn execute(paths: &[PathBuf]) -> Ended {
         let (faults, warnings) = examine(path);
         let mut text: String = faults.iter().map(|fault| format!("fault: {fault}\n")).collect();
         text += &warnings.iter().map(|warning| format!("warning: {warning}\n")).collect::<String>();
+        text += &congruences(path);
         if faults.is_empty() {
             text += &format!("{}: in order\n", path.display());
         }
@@ -69,6 +73,30 @@ fn read(path: &Path) -> (Vec<Fault>, Vec<Fault>) {
             },
         },
     }
+}
+
+/// What of a site's targets is mapped onto itself, and which points would tell: notes, no faults.
+fn congruences(path: &Path) -> String {
+    let site =
+        read_text(path).ok().filter(|text| format(text).is_some_and(|format| format.starts_with("seafix-site/")));
+    let targets = site.and_then(|text| Site::parse(&text, path).ok()?.targets(TargetKind::Object).ok());
+    let mut notes = String::new();
+    for target in targets.unwrap_or_default() {
+        let all = target.congruences();
+        for congruence in all.iter().take(MOST_NOTED) {
+            let ids: Vec<String> =
+                congruence.broken_by.iter().take(MOST_NOTED).map(|&i| format!("`{}`", target.points[i].id)).collect();
+            let told = match ids.as_slice() {
+                [] => "no point excludes it; add one that it does not map onto another".to_owned(),
+                ids => format!("identifying one of {} excludes it", ids.join(", ")),
+            };
+            notes += &format!("note: `{}`: {}; {told}\n", target.name, congruence.describe(&target.points));
+        }
+        if all.len() > MOST_NOTED {
+            notes += &format!("note: `{}`: and {} more such motions\n", target.name, all.len() - MOST_NOTED);
+        }
+    }
+    notes
 }
 
 /// The `format` that a TOML text says it has.

@@ -4,6 +4,7 @@
 //! frame by the Fig. 2 rule, and the site's frame is that of one chosen object.
 
 mod check;
+mod congruence;
 mod file;
 mod shell;
 mod target;
@@ -14,6 +15,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use seafix_component::Fault;
 use seafix_geometry::{Covariance6, Object, Point, Transform, World, triad};
 
+pub use congruence::Congruence;
 pub use shell::Shell;
 pub(crate) use target::diameter;
 pub use target::{NoWorld, Target, TargetKind};

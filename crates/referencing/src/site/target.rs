@@ -1,10 +1,12 @@
 //! What one search looks for.
 
+use std::sync::OnceLock;
+
 use nalgebra::Matrix6;
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, World};
 use serde::{Deserialize, Serialize};
 
-use super::{ModelPoint, Shell, Site, SiteObject};
+use super::{Congruence, ModelPoint, Shell, Site, SiteObject, congruence};
 use crate::{Prior, PriorBound};
 
 /// What is searched for.
@@ -39,12 +41,19 @@ pub struct Target {
     pub world_from_object: Option<Transform<World, Object>>,
     /// How well that place is known; `None` where no world is known.
     pub survey: Option<Covariance6<World, Object>>,
+    /// Computed when they are first asked for.
+    congruences: OnceLock<Vec<Congruence>>,
 }
 
 impl Target {
     /// The greatest distance between two of its points (m).
     pub fn diameter(&self) -> f64 {
         diameter(&self.points)
+    }
+
+    /// The motions that map much of its points onto each other; found once a target.
+    pub fn congruences(&self) -> &[Congruence] {
+        self.congruences.get_or_init(|| congruence::congruences(&self.points))
     }
 
     /// The rough pose relative to the target, from the rough pose in the world: what is unsure of
@@ -74,6 +83,7 @@ impl Target {
             points: object.points.clone(),
             world_from_object: object.world_from_object,
             survey: object.survey_covariance(),
+            congruences: OnceLock::new(),
         }
     }
 }
@@ -125,5 +135,6 @@ fn whole(site: &Site) -> Result<Target, NoWorld> {
         points,
         world_from_object: frame.world_from_object,
         survey: frame.survey_covariance(),
+        congruences: OnceLock::new(),
     })
 }

@@ -1,0 +1,319 @@
+//! Partial self-congruences: motions that map much of a model onto itself.
+
+use nalgebra::Vector3;
+use seafix_geometry::{Object, Point, Transform, UncertainPoint};
+
+use super::{ModelPoint, target::diameter};
+use crate::{Kabsch, Observation, Observations, Solver};
+
+/// A motion must map at least this share of the points, and at least four.
+const LEAST_SHARE: f64 = 0.6;
+const LEAST_POINTS: usize = 4;
+/// Poses no further apart (m, root mean square over the points), or than this share of the diameter, are
+/// one answer; half of it is what a point may be off its image.
+const ALERT_LIMIT: f64 = 0.10;
+const ALERT_SHARE: f64 = 0.05;
+/// Second side of a triangle over its longest, and its height over that, below which it fixes no motion well.
+const LEAST_RATIO: f64 = 0.2;
+/// Comparisons of two points that the search may take; of models too large for all triangles these are
+/// taken evenly until it is spent.
+const MOST_WORK: usize = 300_000_000;
+/// More motions than this are not listed.
+const MOST_MOTIONS: usize = 200;
+/// Of larger models a motion is tried on so many points first, of which it must map so many.
+const TRIED: usize = 16;
+const TRIED_MAPPED: usize = 5;
+
+/// A motion that maps many points of a model onto points of the model, and is not the identity.
+///
+/// Where no other points are identified, the pose and this motion after it explain the data as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Congruence {
+    /// Where it moves the model: p ↦ `motion` · p.
+    pub motion: Transform<Object, Object>,
+    /// The points mapped and those they are mapped onto: indices, ascending.
+    pub pairs: Vec<(usize, usize)>,
+    /// The points that it maps onto none: one of them, identified, excludes it.
+    pub broken_by: Vec<usize>,
+}
+
+/// All of them, those that map most first.
+///
+/// Of every triangle of points, all triangles of the model that are congruent to it within the tolerance
+/// give a motion each; it is fitted to all points that it maps. Complete up to some fifty points. Of larger
+/// models triangles are taken evenly as far as the work allows: each is mapped whole with a probability of
+/// at least a fifth, so that a motion is missed after ten with one of a tenth, after forty with 10⁻⁴.
+/// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
+pub(super) fn congruences(points: &[ModelPoint]) -> Vec<Congruence> {
+    let n = points.len();
+    if n < LEAST_POINTS {
+        return Vec::new();
+    }
+    let alert = ALERT_LIMIT.min(ALERT_SHARE * diameter(points));
+    let search = Finder { at: points.iter().map(|p| p.at).collect(), tolerance: alert / 2.0, alert, least: least(n) };
+    let mut found = search.all();
+    found.sort_by(|a, b| b.pairs.len().cmp(&a.pairs.len()).then_with(|| a.pairs.cmp(&b.pairs)));
+    found
+}
+
+fn least(n: usize) -> usize {
+    ((LEAST_SHARE * n as f64).ceil() as usize).max(LEAST_POINTS)
+}
+
+struct Finder {
+    at: Vec<Point<Object>>,
+    tolerance: f64,
+    alert: f64,
+    least: usize,
+}
+
+impl Finder {
+    fn all(&self) -> Vec<Congruence> {
+        let n = self.at.len();
+        let distance: Vec<Vec<f64>> = self.at.iter().map(|a| self.at.iter().map(|b| a.distance(b)).collect()).collect();
+        let mut found: Vec<Congruence> = Vec::new();
+        // Of a large model a number of triangles that are far apart: the stride is odd, no multiple of a row.
+        let triangles = n * (n - 1) * (n - 2) / 6;
+        let stride = (triangles.saturating_mul(n * n) / (MOST_WORK / 4)).max(1) | 1;
+        let (mut number, mut work) = (0, 0);
+        for a in 0..n {
+            for b in a + 1..n {
+                for c in b + 1..n {
+                    number += 1;
+                    if number % stride == 0 && !flat([distance[a][b], distance[b][c], distance[a][c]]) {
+                        self.images([a, b, c], &distance, &mut found, &mut work);
+                    }
+                    if found.len() >= MOST_MOTIONS || work >= MOST_WORK {
+                        return found;
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// Adds the motions that map this triangle onto another.
+    fn images(&self, [a, b, c]: [usize; 3], distance: &[Vec<f64>], found: &mut Vec<Congruence>, work: &mut usize) {
+        let alike = |x: f64, y: f64| (x - y).abs() <= 2.0 * self.tolerance;
+        let n = self.at.len();
+        for i in 0..n {
+            let at = |side: f64| (0..n).filter(move |&j| j != i && alike(distance[i][j], side));
+            let third: Vec<usize> = at(distance[a][c]).collect();
+            *work += 2 * n;
+            for j in at(distance[a][b]) {
+                *work += third.len();
+                for &k in third.iter().filter(|&&k| k != j && alike(distance[j][k], distance[b][c])) {
+                    let pairs = [(a, i), (b, j), (c, k)];
+                    *work += 4 * found.len();
+                    if [a, b, c] != [i, j, k] && !known(found, &pairs) {
+                        self.add(&pairs, found, work);
+                    }
+                    if *work >= MOST_WORK || found.len() >= MOST_MOTIONS {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the motion of these three pairs, if it maps enough points and is not known.
+    fn add(&self, pairs: &[(usize, usize); 3], found: &mut Vec<Congruence>, work: &mut usize) {
+        let n = self.at.len();
+        let Some(mut motion) = self.fit(pairs) else { return };
+        if n > 4 * TRIED {
+            *work += TRIED * n;
+            if !self.promises(&motion) {
+                return;
+            }
+        }
+        // A motion that fails does so after less than half the points.
+        *work += n * n / 2;
+        // Three points alone fit worse than all: a wider search, then the tolerance itself.
+        let mut mapped = self.map(&motion, 2.0 * self.tolerance);
+        for _ in 0..2 {
+            if mapped.len() < self.least {
+                return;
+            }
+            *work += n * n;
+            let Some(better) = self.fit(&mapped) else { return };
+            motion = better;
+            mapped = self.map(&motion, self.tolerance);
+        }
+        if mapped.len() < self.least || self.apart(&motion, &Transform::identity()) <= self.alert {
+            return;
+        }
+        let same = found.iter().position(|known| self.apart(&known.motion, &motion) <= self.alert);
+        let broken_by = (0..self.at.len()).filter(|i| mapped.iter().all(|(from, _)| from != i)).collect();
+        let congruence = Congruence { motion, pairs: mapped, broken_by };
+        match same {
+            Some(at) if congruence.pairs.len() > found[at].pairs.len() => found[at] = congruence,
+            Some(_) => {}
+            None => found.push(congruence),
+        }
+    }
+
+    /// Whether the motion maps some of a few points, taken evenly.
+    fn promises(&self, motion: &Transform<Object, Object>) -> bool {
+        let limit = 4.0 * self.tolerance * self.tolerance;
+        let tried = (0..TRIED).map(|k| *motion * self.at[k * self.at.len() / TRIED]);
+        let mapped = |image: &Point<Object>| self.at.iter().any(|p| (p.coords - image.coords).norm_squared() <= limit);
+        tried.filter(mapped).count() >= TRIED_MAPPED
+    }
+
+    /// The points within `tolerance` of a point after the motion, one to one, nearest first.
+    fn map(&self, motion: &Transform<Object, Object>, tolerance: f64) -> Vec<(usize, usize)> {
+        let n = self.at.len();
+        let mut onto: Vec<Option<(usize, f64)>> = vec![None; n];
+        let mut missed = 0;
+        for (i, at) in self.at.iter().enumerate() {
+            let image = *motion * *at;
+            let nearest = self.at.iter().map(|p| (p.coords - image.coords).norm_squared()).enumerate();
+            let Some((j, square)) = nearest.min_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+            if square > tolerance * tolerance {
+                missed += 1;
+                if n - missed < self.least {
+                    return Vec::new();
+                }
+            } else if onto[j].is_none_or(|(_, other)| square < other) {
+                onto[j] = Some((i, square));
+            }
+        }
+        let mut pairs: Vec<(usize, usize)> =
+            onto.iter().enumerate().filter_map(|(j, from)| from.map(|(i, _)| (i, j))).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// The motion of least squares that takes each first point of the pairs to the second.
+    fn fit(&self, pairs: &[(usize, usize)]) -> Option<Transform<Object, Object>> {
+        let observation = |&(from, onto): &(usize, usize)| Observation {
+            measured: UncertainPoint::isotropic(Point::from(self.at[from].coords), self.tolerance),
+            pixels: None,
+            model: self.at[onto],
+            model_sigma: 0.0,
+        };
+        let data = Observations { points: pairs.iter().map(observation).collect(), rig: None };
+        Kabsch::default().solve(&data).ok().map(|motion| motion.relabel())
+    }
+
+    /// How far two motions place the points apart: root mean square (m).
+    fn apart(&self, a: &Transform<Object, Object>, b: &Transform<Object, Object>) -> f64 {
+        let sum: f64 = self.at.iter().map(|p| ((*a * *p).coords - (*b * *p).coords).norm_squared()).sum();
+        (sum / self.at.len() as f64).sqrt()
+    }
+}
+
+/// Whether a motion that maps these pairs is known.
+fn known(found: &[Congruence], pairs: &[(usize, usize); 3]) -> bool {
+    found.iter().any(|congruence| pairs.iter().all(|pair| congruence.pairs.binary_search(pair).is_ok()))
+}
+
+/// Whether a triangle of these sides is too near a line, or two of its corners too near each other.
+fn flat(mut sides: [f64; 3]) -> bool {
+    sides.sort_by(f64::total_cmp);
+    let [a, b, c] = sides;
+    // Heron: 16 area² = (a + b + c)(−a + b + c)(a − b + c)(a + b − c); the height over c is 2 area/c.
+    let square = (a + b + c) * (b + c - a) * (a + c - b) * (a + b - c);
+    let height = 0.5 * square.max(0.0).sqrt() / c;
+    !(b >= LEAST_RATIO * c && height >= LEAST_RATIO * c)
+}
+
+impl Congruence {
+    /// What the motion does, for people: how far it turns and shifts the points.
+    pub fn describe(&self, points: &[ModelPoint]) -> String {
+        let degrees = self.motion.rotation().angle().to_degrees();
+        let centre = points.iter().map(|p| p.at.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        let shift = ((self.motion * Point::from(centre)).coords - centre).norm();
+        let what = match (degrees > 1.0, shift > 1e-3) {
+            (true, false) => format!("a turn by {degrees:.0} degrees"),
+            (false, _) => format!("a shift by {shift:.2} m"),
+            (true, true) => format!("a turn by {degrees:.0} degrees with a shift by {shift:.2} m"),
+        };
+        format!("{what} maps {} of {} points onto others", self.pairs.len(), points.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+
+    fn model(at: impl IntoIterator<Item = [f64; 3]>) -> Vec<ModelPoint> {
+        at.into_iter().enumerate().map(|(i, at)| ModelPoint::exact(i.to_string(), Point::from(at))).collect()
+    }
+
+    fn corners(size: [f64; 3]) -> Vec<ModelPoint> {
+        model((0..8).map(|c| [0, 1, 2].map(|k| if c >> k & 1 == 1 { size[k] } else { 0.0 })))
+    }
+
+    fn lattice() -> Vec<ModelPoint> {
+        let sites = (0..6).flat_map(|i| (0..5).map(move |k| [0.25 * f64::from(i), 0.25 * f64::from(k), 0.0]));
+        model(sites.chain([[0.735, 0.66, 0.18], [0.105, 0.56, 0.09], [0.955, 0.09, 0.07], [0.425, 0.15, 0.22]]))
+    }
+
+    fn sizes(points: &[ModelPoint]) -> Vec<usize> {
+        congruences(points).iter().map(|congruence| congruence.pairs.len()).collect()
+    }
+
+    #[test]
+    fn a_cube_has_23_rotations_and_a_cuboid_three() {
+        assert_eq!(sizes(&corners([1.0, 1.0, 1.0])), [8; 23]);
+        assert_eq!(sizes(&corners([1.0, 1.5, 2.2])), [8; 3]);
+        let all = congruences(&corners([1.0, 1.5, 2.2]));
+        assert!(all.iter().all(|congruence| congruence.broken_by.is_empty()));
+        assert_eq!(all[0].describe(&corners([1.0, 1.5, 2.2])), "a turn by 180 degrees maps 8 of 8 points onto others");
+    }
+
+    #[test]
+    fn a_corner_off_its_place_breaks_the_cuboid() {
+        let mut points = corners([1.0, 1.5, 2.2]);
+        points.push(ModelPoint::exact("mark", Point::new(0.3, 0.4, 2.2)));
+        let found = congruences(&points);
+        assert_eq!(found.len(), 3);
+        assert!(found.iter().all(|congruence| congruence.pairs.len() == 8 && congruence.broken_by == [8]));
+    }
+
+    #[test]
+    fn a_lattice_is_flipped_shifted_and_turned_by_a_quarter() {
+        // Flips: 30 points. Shifts by a column and quarter turns about four places: 25, each flipped or not
+        // (8 + 16). Shifts by a row: 24 (8). Others map 20, and by chance a point off the lattice.
+        let found = sizes(&lattice());
+        let of = |size: usize| found.iter().filter(|&&found| found == size).count();
+        assert_eq!((of(30), of(25), of(24)), (3, 24, 8), "{found:?}");
+        assert!(found[35..].iter().all(|&size| size == 21), "{found:?}");
+    }
+
+    #[test]
+    fn an_asymmetric_object_has_none() {
+        let places =
+            [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, -2.0, 0.0], [0.5, 0.0, 1.5], [1.0, 2.2, 0.3], [-1.6, 0.4, 1.0]];
+        assert_eq!(congruences(&model(places)), []);
+        assert_eq!(congruences(&model(places[..3].iter().copied())), []);
+    }
+
+    #[test]
+    fn moving_the_model_changes_nothing() {
+        let motion = Transform::<Object, Object>::new(
+            UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.1, 0.7)),
+            Vector3::new(3.0, -8.0, 0.5),
+        );
+        for points in [corners([1.0, 1.5, 1.5]), lattice()] {
+            let moved: Vec<ModelPoint> =
+                points.iter().map(|point| ModelPoint { at: motion * point.at, ..point.clone() }).collect();
+            let (here, there) = (congruences(&points), congruences(&moved));
+            let pairs = |all: &[Congruence]| all.iter().map(|found| found.pairs.clone()).collect::<Vec<_>>();
+            assert_eq!(pairs(&here), pairs(&there));
+            for (a, b) in here.iter().zip(&there) {
+                let carried = motion * a.motion * motion.inverse();
+                assert!(carried.error_to(&b.motion).amax() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn five_hundred_points_are_bounded() {
+        let grid = (0..500).map(|i| [0.3 * f64::from(i % 25), 0.3 * f64::from(i / 25), 0.05 * f64::from((i * i) % 7)]);
+        assert!(congruences(&model(grid)).len() <= MOST_MOTIONS);
+    }
+}
