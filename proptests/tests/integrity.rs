@@ -196,8 +196,7 @@ fn a_million_fixes_keep_their_levels() {
     assert!(all.position <= 130 && all.attitude <= 130, "position {}, attitude {}", all.position, all.attitude);
 }
 
-/// P71, short: 20 000 draws at risk 1e-3, and no level for three points. Seen to fail when the level leaves the wrong
-/// match out.
+/// P71, short: 20 000 draws at risk 1e-3, and no level for three points.
 #[test]
 fn levels_hold() {
     let acceptance = Acceptance { chance_budget: f64::MAX, risk: 1e-3, ..Acceptance::default() };

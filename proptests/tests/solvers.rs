@@ -333,8 +333,6 @@ fn the_inverse_problem_has_the_inverse_answer() {
 /// P42. A weight of nought is a point removed: a point whose noise is a million times the others' moves no solver that
 /// weighs by covariance by more than 1e-9 from where it is without the point; noise twice as large for all moves it by
 /// no more than 1e-9.
-///
-/// Seen to fail for Kabsch, when it is not left out.
 #[test]
 fn a_point_without_weight_is_no_point() {
     let solvers = solvers();
@@ -388,8 +386,6 @@ fn three_points_leave_one_answer() {
 }
 
 /// P45. With all residuals below the threshold truncated squares are least squares, and so is Huber's loss: ≤ 1e-9.
-///
-/// Seen to fail at a threshold of one standard deviation.
 #[test]
 fn robust_solvers_trust_what_is_near() {
     let robust = [
@@ -412,8 +408,6 @@ fn robust_solvers_trust_what_is_near() {
 
 /// Agreement. Optimisers that know nothing of poses and of our derivatives find no better place than
 /// `stereo-reprojection`, and the same one: its own covariance puts theirs within a thousandth of a standard deviation.
-///
-/// Seen to fail when the derivative of the right camera leaves its rotation out.
 #[test]
 fn independent_judges_agree() {
     let build = |name: &str| SOLVERS.build(&seafix_component::Choice::named(name)).expect("it is listed");

@@ -167,8 +167,7 @@ fn rig() -> StereoRig {
     StereoRig::new(camera, camera, right_from_left).unwrap()
 }
 
-/// Where a covariance is analytic it is the numerical one, on exact data, to 1e-6; seen to fail when the sandwich
-/// leaves the model's error out.
+/// Where a covariance is analytic it is the numerical one, on exact data, to 1e-6.
 #[test]
 fn analytic_covariances_are_the_numerical_ones() {
     let rig = rig();
