@@ -1,9 +1,9 @@
 //! From two images to a cloud of measured points.
 //!
 //! [`Filter`]s prepare the images, where that is asked for. A [`Detector`] finds corners in each
-//! image, a [`Descriptor`] describes their surroundings, a [`Matcher`] pairs left with right, a
-//! [`Locator`] says where exactly the left corners are, [`Refine`] finds the same places in the right
-//! image, and a [`Triangulator`] turns the pairs that pass the epipolar test into
+//! image, a [`Locator`] says where exactly they are, a [`Descriptor`] describes their surroundings, a
+//! [`Matcher`] pairs left with right, [`Refine`] aligns each pair between the views and leaves out those that do not
+//! align, and a [`Triangulator`] turns the pairs that pass the epipolar test into
 //! [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
 //!
 //! The centre of the first pixel is (0, 0); brightness is linear in the stored values, 0 is black

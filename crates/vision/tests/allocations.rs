@@ -14,7 +14,7 @@ static ALLOCATIONS: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 /// Every listed detector, locator, descriptor and matcher in a pipeline of defaults: the third look at a pair of
 /// images, whose memory the first two have made, allocates nothing.
 ///
-/// Seen to fail when the matcher's candidates are collected into a new vector.
+/// Seen to fail when the band's pairs are collected into a new vector.
 #[test]
 fn a_warm_pair_allocates_nothing() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);

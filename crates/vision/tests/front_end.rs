@@ -66,7 +66,7 @@ fn the_cloud_lies_on_the_plane() {
 /// Alignment finds where the right image shows a left place within a few hundredths of a pixel, for every rig and warp,
 /// from a start half a pixel beside it.
 ///
-/// Seen to fail when the window is laid over the other image as it is, whatever the rig.
+/// Seen to fail when the window is laid over the right image as it is, whatever the rig.
 #[test]
 fn alignment_finds_the_place_for_every_rig() {
     for (name, rig) in rigs() {

@@ -60,8 +60,7 @@ const ROUNDING: f64 = 1e-3;
 
 /// Light that is added and contrast that is changed move nothing.
 ///
-/// Seen to fail when the junction's covariance and when a fit's least contrast is compared with the bright level instead
-/// of the difference.
+/// Seen to fail when the fit's derivative by the row changes its sign.
 #[test]
 fn light_and_contrast_move_nothing() {
     let image = board(SIDE, SIDE);
@@ -72,7 +71,7 @@ fn light_and_contrast_move_nothing() {
 
 /// An image shifted by whole pixels has its corners there.
 ///
-/// Seen to fail when the middle of the window is taken half a pixel aside.
+/// Seen to fail when a fit's place depends on where its window lies in the image.
 #[test]
 fn a_shift_by_whole_pixels_shifts_the_places() {
     let image = board(SIDE, SIDE);
@@ -91,7 +90,7 @@ fn a_shift_by_whole_pixels_shifts_the_places() {
 
 /// An image turned by a quarter has its corners there, and their covariances turned.
 ///
-/// Seen to fail when one of the two derivatives by the place changes its sign.
+/// Seen to fail when the junction weighs the gradient down the image otherwise than that across.
 #[test]
 fn a_quarter_turn_turns_the_places() {
     let image = board(SIDE, SIDE);

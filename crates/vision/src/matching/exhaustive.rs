@@ -46,6 +46,10 @@ impl Three {
     /// Of equals the first offered stays.
     fn offer(&mut self, index: u32, value: f32) {
         let [first, second, third] = self.value;
+        // Most are further than all three.
+        if value >= third {
+            return;
+        }
         if value < first {
             *self = Self { index: [index, self.index[0]], value: [value, first, second] };
         } else if value < second {
@@ -237,9 +241,12 @@ fn hamming_panel(
 /// Left descriptor `i` is this far from the right ones from `first` on.
 #[inline(always)]
 fn offer(i: usize, values: &[f32; COLUMNS], first: usize, found: &mut Three, lanes: &mut Lanes) {
-    lanes.offer(i as u32, values);
+    // Seldom true, for either side, once some have been seen.
+    let pairs = values.iter().zip(&lanes.value[2]);
+    if pairs.fold(0, |any, (value, furthest)| any | u32::from(value < furthest)) != 0 {
+        lanes.offer(i as u32, values);
+    }
     let furthest = found.value[2];
-    // Seldom true once some have been seen.
     if values.iter().fold(0, |any, &value| any | u32::from(value < furthest)) != 0 {
         values.iter().enumerate().for_each(|(c, &value)| found.offer((first + c) as u32, value));
     }

@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Pixel, StereoPixels, StereoRig};
 use serde::{Deserialize, Serialize};
 
-use super::{Match, Matcher, View, curve::epipolar_curve, distinct::Distinct};
+use super::{Match, Matcher, View, curve::epipolar_curve, sought::Sought};
 use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
 
 /// Left key points, followed into the right image from coarse to fine.
@@ -66,16 +66,11 @@ const MOST: f64 = 512.0;
 /// Places on a curve that correlate worse than the best by this are not followed.
 const MUCH_WORSE: f64 = 0.3;
 
-/// Left key points that are sought one after the other.
-const PIECE: usize = 32;
-
 /// Memory from frame to frame.
 #[derive(Debug, Default)]
 struct Memory {
     pyramids: [Pyramid; 2],
-    seekers: Vec<Seeker>,
-    pairs: Vec<Option<Match>>,
-    distinct: Distinct,
+    sought: Sought<Seeker>,
 }
 
 /// Memory for one piece of the work.
@@ -101,21 +96,14 @@ impl Matcher for LucasKanade {
         found: &mut Vec<Match>,
     ) {
         let threads = work.threads();
-        let Memory { pyramids, seekers, pairs, distinct } = work.get();
+        let Memory { pyramids, sought } = work.get();
         let [from, to] = pyramids;
         threads.join(|| from.build(left.image, self.tracker.levels), || to.build(right.image, self.tracker.levels));
         let levels = [from.levels(), to.levels()];
-        pairs.clear();
-        pairs.resize(left.keypoints.len(), None);
-        threads.pieces(pairs, PIECE, seekers, |index, piece, seeker| {
-            for (k, pair) in piece.iter_mut().enumerate() {
-                let left_index = index * PIECE + k;
-                *pair = self.seek(levels, &left.keypoints[left_index].at, rig, seeker).map(|(right, correlation)| {
-                    Match { left: left_index, right, distance: (1.0 - correlation) as f32 }
-                });
-            }
+        sought.each(threads, left.keypoints, found, |place, seeker| {
+            let (right, correlation) = self.seek(levels, place, rig, seeker)?;
+            Some((right, (1.0 - correlation) as f32))
         });
-        distinct.keep_into(pairs, found);
     }
 }
 

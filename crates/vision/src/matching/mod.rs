@@ -3,7 +3,6 @@
 mod along;
 mod correlate;
 mod curve;
-mod distinct;
 mod epipolar;
 mod epipolar_band;
 mod exhaustive;
@@ -12,6 +11,7 @@ mod lucas_kanade;
 mod metric;
 mod mutual_ratio;
 mod nearest;
+mod sought;
 mod support;
 #[cfg(test)]
 mod test_scene;

@@ -9,7 +9,7 @@ use super::{
     Match, Matcher, View,
     correlate::{LANES, Template, WIDEST},
     curve::epipolar_curve,
-    distinct::Distinct,
+    sought::Sought,
 };
 use crate::{Image, Workspace, detect::vertex};
 
@@ -72,19 +72,10 @@ impl Component for ZnccBand {
     }
 }
 
-/// Left key points that are sought one after the other.
-const PIECE: usize = 32;
 /// Places on a curve, at most.
 const MOST: f64 = 8192.0;
 /// The way back ends where the way there began if it ends within this (px, along either axis).
 const RETURN: usize = 1;
-
-#[derive(Debug, Default)]
-struct Memory {
-    seekers: Vec<Seeker>,
-    pairs: Vec<Option<Match>>,
-    distinct: Distinct,
-}
 
 /// Memory for one piece of the work.
 #[derive(Debug, Default)]
@@ -117,20 +108,10 @@ impl Matcher for ZnccBand {
         work: &mut Workspace,
         found: &mut Vec<Match>,
     ) {
-        let threads = work.threads();
-        let Memory { seekers, pairs, distinct } = work.get();
-        let rigs = [*rig, rig.exchanged()];
-        pairs.clear();
-        pairs.resize(left.keypoints.len(), None);
-        threads.pieces(pairs, PIECE, seekers, |index, piece, seeker| {
-            for (k, pair) in piece.iter_mut().enumerate() {
-                let left_index = index * PIECE + k;
-                let place = &left.keypoints[left_index].at;
-                let sought = self.there_and_back([left.image, right.image], &rigs, place, seeker);
-                *pair = sought.map(|(right, distance)| Match { left: left_index, right, distance });
-            }
+        let (threads, rigs) = (work.threads(), [*rig, rig.exchanged()]);
+        work.get::<Sought<Seeker>>().each(threads, left.keypoints, found, |place, seeker| {
+            self.there_and_back([left.image, right.image], &rigs, place, seeker)
         });
-        distinct.keep_into(pairs, found);
     }
 }
 
