@@ -70,7 +70,7 @@ fn too_few_points_are_no_pose() {
 /// P35. Δ = 1e-9 of the extent: with exact coordinates every visible point is identified; with noise fewer are, and nothing
 /// worse happens.
 ///
-/// Seen to fail when the first filter of the association graph allows for no rounding, and is strict by a part in 10⁷.
+/// Seen to fail when the first filter of the association graph compares (A + B − r²)² with 4AB, which cancels.
 #[test]
 fn a_tolerance_of_rounding_is_enough_for_exact_points() {
     let searches = searches(BUDGET);
@@ -164,9 +164,7 @@ fn a_blow_up_ends_at_the_budget() {
 }
 
 /// Covariances that are none (NaN, infinite, not positive definite) and coordinates that are no numbers: no panic, and what
-/// is returned is admissible by the numbers that there are.
-///
-/// Seen to fail, with a panic, when vertices with coordinates that are not finite are kept.
+/// is returned has finite places. Not seen to fail yet.
 #[test]
 fn numbers_that_are_none_are_survived() {
     let searches = searches(BUDGET);
