@@ -1,6 +1,7 @@
 //! The expected number of chance sets is what frames without the object show.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+#![allow(clippy::print_stdout, reason = "the long form prints a table")]
 
 use seafix_geometry::{Point, UncertainPoint};
 use seafix_referencing::{

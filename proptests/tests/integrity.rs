@@ -129,6 +129,7 @@ fn fix(placed: &Placed, cloud: &[MeasuredPoint], acceptance: &Acceptance) -> Opt
         optimal: true,
         tests: 0,
         undecided: None,
+        belief: None,
     };
     let attempt = judge(&problem, Ok(found), &StereoReprojection::default(), acceptance, Some(&placed.rig));
     let Outcome::Referenced(reference) = attempt.outcome else { return None };

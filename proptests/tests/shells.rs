@@ -32,8 +32,11 @@ fn predicted(pose: &Transform<Object, Camera>, p: Vector3<f64>) -> Vector3<f64> 
     (pose.inverse() * Point::from(p)).coords
 }
 
+/// Model, cloud, predicted pose and half-size of the shells (m).
+type Scene = (Vec<Vector3<f64>>, Vec<Vector3<f64>>, Transform<Object, Camera>, f64);
+
 /// A model, a cloud about its predictions and a prior.
-fn scenes() -> impl Strategy<Value = (Vec<Vector3<f64>>, Vec<Vector3<f64>>, Transform<Object, Camera>, f64)> {
+fn scenes() -> impl Strategy<Value = Scene> {
     let points = prop::collection::vec(vector(2.0), 1..8);
     let cloud = prop::collection::vec((any::<prop::sample::Index>(), vector(0.6)), 0..40);
     (points, cloud, pose(20.0), 0.05..0.5).prop_map(|(model, cloud, pose, half): (Vec<_>, Vec<_>, _, f64)| {

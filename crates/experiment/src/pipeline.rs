@@ -65,7 +65,7 @@ impl Default for Pipeline {
             triangulation: Triangulator::default(),
             gate: Gate::default(),
             tolerance: Tolerance::Sigmas(3.0),
-            search: Choice::named("maximum-clique"),
+            search: Choice::named("rigid-consensus"),
             solver: Choice::named("stereo-reprojection"),
             acceptance: Acceptance::default(),
         }

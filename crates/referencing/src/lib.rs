@@ -25,6 +25,9 @@ pub use reference::{
     Acceptance, Alternative, Attempt, Integrity, Outcome, Protection, Redundancy, Reference, Refusal, judge, reference,
     rms_apart,
 };
-pub use search::{Identification, MaximumClique, SEARCHES, Samples, Search, StructuralCoherence, Unidentified};
+pub use search::{
+    Belief, Explanation, Identification, MaximumClique, RigidConsensus, SEARCHES, Samples, Search, Shares,
+    StructuralCoherence, Unidentified,
+};
 pub use site::{Congruence, Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};
 pub use solve::{Choose, Degenerate, Kabsch, Mahalanobis, SOLVERS, Solver, StereoReprojection, Triad};

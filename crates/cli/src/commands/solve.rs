@@ -22,7 +22,7 @@ pub(crate) struct Solve {
     #[arg(required = true)]
     problems: Vec<PathBuf>,
     /// The search.
-    #[arg(long, default_value = "maximum-clique")]
+    #[arg(long, default_value = "rigid-consensus")]
     search: String,
     /// The solver. These problems have no pixels, so it must take bare points.
     #[arg(long, default_value = "mahalanobis")]

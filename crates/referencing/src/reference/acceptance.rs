@@ -9,8 +9,13 @@ use serde::{Deserialize, Serialize};
 pub struct Acceptance {
     /// Least number of identified points.
     pub least_points: usize,
-    /// Largest expected number of chance sets of the found size (a-contrario acceptance).
+    /// Largest expected number of chance sets of the found size (a-contrario acceptance), for searches that
+    /// count.
     pub chance_budget: f64,
+    /// Largest probability, by a search that weighs evidence, that the object is not there at all.
+    pub absence: f64,
+    /// Largest probability, by a search that weighs evidence, that a present object is elsewhere.
+    pub doubt: f64,
     /// Confidence of the χ² tests of residuals and prior: a true set fails with one minus this.
     pub confidence: f64,
     /// Poses further apart than this (m, RMS over the model points), or than 5 % of the model's
@@ -28,6 +33,8 @@ impl Default for Acceptance {
         Self {
             least_points: 3,
             chance_budget: 1e-3,
+            absence: 1e-4,
+            doubt: 0.05,
             confidence: 0.999,
             alert_limit: 0.10,
             risk: 1e-4,
@@ -47,6 +54,9 @@ impl Acceptance {
             // Written so that a NaN is refused too.
             let budget = self.chance_budget > 0.0 && self.chance_budget.is_finite();
             in_range(budget, "chance-budget", self.chance_budget, "a positive number")?;
+            for (name, value) in [("absence", self.absence), ("doubt", self.doubt)] {
+                in_range(value > 0.0 && value < 1.0, name, value, "a probability between 0 and 1")?;
+            }
             let confident = self.confidence > 0.0 && self.confidence < 1.0;
             in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
             let alert = self.alert_limit > 0.0 && self.alert_limit.is_finite();

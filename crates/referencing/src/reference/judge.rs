@@ -9,7 +9,7 @@ use super::{
     rms_apart,
 };
 use crate::{
-    Correspondence, Degenerate, Identification, Observations, Prior, PriorBound, Problem, Solver,
+    Belief, Correspondence, Degenerate, Explanation, Identification, Observations, Prior, PriorBound, Problem, Solver,
     candidates::chi_square, chance::expected_sets, solve::likelihood,
 };
 
@@ -38,6 +38,28 @@ impl Judge<'_> {
         let (expected, budget) = (expected_sets(self.problem, pairs), self.acceptance.chance_budget);
         // Written so that a NaN is refused too.
         if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size: pairs.len(), expected, budget }) }
+    }
+
+    /// The pose of a search that weighs evidence: believed when little speaks for no object at all, and
+    /// little for a pose elsewhere.
+    pub(super) fn weighed(&self, found: &Identification, belief: &Belief) -> (Outcome, Option<Alternative>) {
+        let shares = belief.shares(self.problem.model, self.alert_limit);
+        let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
+        let runner_up = elsewhere.first().map(|other| other.alternative());
+        let limit = self.acceptance.absence;
+        // Written so that a NaN is refused too.
+        if !(shares.absent <= limit) {
+            return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
+        }
+        if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
+            let all = belief.explanations.first().into_iter().chain(elsewhere);
+            return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
+        }
+        let (mut outcome, _) = self.poses(found);
+        if let (Outcome::Referenced(reference), Some(best)) = (&mut outcome, belief.explanations.first()) {
+            reference.score = best.ln_evidence;
+        }
+        (outcome, runner_up)
     }
 
     /// The pose of the set and of its rivals: the only one that passes, several, or none.

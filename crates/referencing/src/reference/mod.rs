@@ -53,9 +53,14 @@ pub fn judge(
     let alert_limit = acceptance.alert_limit.min(ALERT_SHARE * diameter(problem.model));
     let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
     let judge = Judge { problem, solver, acceptance, alert_limit, largest, rig };
-    let (outcome, runner_up) = match judge.size(&found.pairs).and_then(|()| judge.chance(&found.pairs)) {
-        Ok(()) => judge.poses(&found),
-        Err(refusal) => (Outcome::Unidentified(refusal), None),
+    let likely = judge.size(&found.pairs).and_then(|()| match found.belief {
+        Some(_) => Ok(()),
+        None => judge.chance(&found.pairs),
+    });
+    let (outcome, runner_up) = match (likely, &found.belief) {
+        (Ok(()), Some(belief)) => judge.weighed(&found, belief),
+        (Ok(()), None) => judge.poses(&found),
+        (Err(refusal), _) => (Outcome::Unidentified(refusal), None),
     };
     let outcome = match &found.undecided {
         Some(why @ Unidentified::Mirrored { .. }) => Outcome::Unidentified(why.clone().into()),
@@ -83,7 +88,7 @@ pub fn judge(
 fn settled(outcome: &Outcome, optimal: bool) -> bool {
     match outcome {
         Outcome::Ambiguous(_) => true,
-        Outcome::Unidentified(Refusal::TooFew { .. } | Refusal::Chance { .. }) => optimal,
+        Outcome::Unidentified(Refusal::TooFew { .. } | Refusal::Chance { .. } | Refusal::Absent { .. }) => optimal,
         _ => false,
     }
 }

@@ -19,9 +19,9 @@ pub struct Reference {
     pub used: Vec<usize>,
     /// Root mean square of the residuals C·H − P over the pairs (m).
     pub residual_rms: f64,
-    /// How well it explains the data: minus half of the χ² of its residuals and of the prior, and
-    /// χ²₃(confidence) for each pair fewer than the largest set has (a truncated χ²: sets of
-    /// different size compare); larger is better.
+    /// How well it explains the data; larger is better. Of a search that counts: minus half of the χ² of its
+    /// residuals and of the prior, and χ²₃(confidence) for each pair fewer than the largest set has (a
+    /// truncated χ²: sets of different size compare). Of one that weighs evidence: its logarithm (nats).
     pub score: f64,
     /// What supports it beyond its covariance.
     pub integrity: Integrity,
@@ -41,9 +41,9 @@ pub struct Alternative {
     pub object_from_camera: Transform<Object, Camera>,
     /// Its pairs.
     pub pairs: Vec<Correspondence>,
-    /// How well it explains the data: minus half of the χ² of its residuals and of the prior, and
-    /// χ²₃(confidence) for each pair fewer than the largest set has (a truncated χ²: sets of
-    /// different size compare); larger is better.
+    /// How well it explains the data; larger is better. Of a search that counts: minus half of the χ² of its
+    /// residuals and of the prior, and χ²₃(confidence) for each pair fewer than the largest set has (a
+    /// truncated χ²: sets of different size compare). Of one that weighs evidence: its logarithm (nats).
     pub score: f64,
 }
 

@@ -26,6 +26,14 @@ pub enum Refusal {
         /// [`Acceptance::chance_budget`](crate::Acceptance::chance_budget).
         budget: f64,
     },
+    /// The cloud may well be clutter alone.
+    #[error("without the object the cloud has a probability of {probability:.2e}; at most {limit:.1e} is accepted")]
+    Absent {
+        /// Posterior probability that the object is not there.
+        probability: f64,
+        /// [`Acceptance::absence`](crate::Acceptance::absence).
+        limit: f64,
+    },
     /// No rigid motion explains the set within its noise.
     #[error("the residuals have χ² = {chi2:.1}; at most {limit:.1} is likely of a true set")]
     Residuals {
@@ -58,7 +66,7 @@ impl Refusal {
         match self {
             Self::Search(why) => why.reason(),
             Self::TooFew { .. } => "too-few",
-            Self::Chance { .. } => "chance",
+            Self::Chance { .. } | Self::Absent { .. } => "chance",
             Self::Residuals { .. } | Self::Prior { .. } => "gate",
             Self::Imprecise { .. } => "imprecise",
         }

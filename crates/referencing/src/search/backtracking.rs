@@ -105,6 +105,7 @@ impl Search for Backtracking {
             rivals_complete,
             optimal: complete,
             undecided,
+            belief: None,
             ..Identification::unproved(run.pairs(&best), bound, tests)
         })
     }

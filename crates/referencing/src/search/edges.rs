@@ -85,7 +85,7 @@ fn look(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, lo
 
 /// The bytes, each 0 or 1, as bits.
 #[inline(always)]
-fn packed(bytes: &[u8; LANES]) -> u64 {
+pub(super) fn packed(bytes: &[u8; LANES]) -> u64 {
     // Byte i of eight is moved to bit 56 + i by the one of its factor's bits that fits; nothing else lands there.
     const GATHER: u64 = 0x0102_0408_1020_4080;
     let mut word = 0;

@@ -107,7 +107,16 @@ impl Search for MaximumClique {
         let undecided = larger_image.or_else(|| {
             (!decided).then_some(Unidentified::Budget { budget, best: pairs.len(), bound: largest.bound, tests })
         });
-        Ok(Identification { pairs, rivals, rivals_complete: all, optimal, size_bound: largest.bound, tests, undecided })
+        Ok(Identification {
+            pairs,
+            rivals,
+            rivals_complete: all,
+            optimal,
+            size_bound: largest.bound,
+            tests,
+            undecided,
+            belief: None,
+        })
     }
 }
 

@@ -9,10 +9,12 @@ mod affinity;
 mod alike;
 mod association;
 mod backtracking;
+mod belief;
 mod bitset;
 mod clique;
 mod closest;
 mod complete_enumeration;
+mod consensus;
 mod edges;
 mod gicp;
 mod gnc_tls;
@@ -26,14 +28,17 @@ mod orientation;
 mod pose;
 mod pose_vote;
 mod ransac;
+mod rigid_consensus;
 mod spectral;
 mod structural_coherence;
 mod volumes;
 mod weighted_clique;
 
+pub use belief::{Belief, Explanation, Shares};
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]
 pub(crate) use orientation::mirrored;
+pub use rigid_consensus::RigidConsensus;
 pub use structural_coherence::{Samples, StructuralCoherence};
 
 /// Decides which cloud points are which model points.
@@ -57,7 +62,8 @@ pub struct Identification {
     pub rivals: Vec<Vec<Correspondence>>,
     /// Whether `rivals` holds every other set of the same size.
     pub rivals_complete: bool,
-    /// Whether it is proved that no admissible set is larger.
+    /// Whether it is proved that no admissible set is larger; of a search that weighs evidence, that no pose is
+    /// likelier.
     pub optimal: bool,
     /// No admissible set has more pairs than this.
     pub size_bound: usize,
@@ -67,6 +73,8 @@ pub struct Identification {
     /// before it had seen, or ruled out, every set as large that is unlike it. `None` also of a search
     /// that looks for no rivals.
     pub undecided: Option<Unidentified>,
+    /// How likely this pose and others are; `None` of a search that counts.
+    pub belief: Option<Belief>,
 }
 
 impl Identification {
@@ -80,6 +88,7 @@ impl Identification {
             size_bound: bound,
             tests,
             undecided: None,
+            belief: None,
         }
     }
 }
@@ -167,6 +176,7 @@ pub static SEARCHES: Registry<dyn Search> = Registry::new(
         entry!(MaximumClique),
         entry!(pose_vote::PoseVote),
         entry!(ransac::Ransac),
+        entry!(RigidConsensus),
         entry!(spectral::Spectral),
         entry!(StructuralCoherence),
         entry!(weighted_clique::WeightedClique),

@@ -121,6 +121,7 @@ impl<'a> Enumeration<'a> {
                     return Ok(Identification {
                         optimal: true,
                         undecided,
+                        belief: None,
                         ..Identification::unproved(pairs, q, self.tests)
                     });
                 }

@@ -1,0 +1,83 @@
+//! What a search by likelihood believes.
+
+use seafix_geometry::{Camera, Object, Transform};
+
+use crate::{Alternative, Correspondence, ModelPoint, rms_apart};
+
+/// Explanations less likely than the best by this much (nats) are not listed: a share of 0.05 %.
+const NEGLIGIBLE: f64 = 7.6;
+
+/// A pose that explains the data, with the weight of its evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// The pairs, in the order of the model points.
+    pub pairs: Vec<Correspondence>,
+    /// The most likely pose.
+    pub object_from_camera: Transform<Object, Camera>,
+    /// ln of the probability of the data given a pose about here, over that given no object at all (nats).
+    pub ln_evidence: f64,
+}
+
+impl Explanation {
+    /// The same as an alternative, its evidence as the score.
+    pub(crate) fn alternative(&self) -> Alternative {
+        Alternative { object_from_camera: self.object_from_camera, pairs: self.pairs.clone(), score: self.ln_evidence }
+    }
+}
+
+/// The poses that may explain the data, the likeliest first.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Belief {
+    /// The poses; what is less likely than the best by many orders of magnitude is left out.
+    pub explanations: Vec<Explanation>,
+}
+
+/// How the belief is shared out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shares {
+    /// That the pose is within the alert limit of the likeliest explanation.
+    pub likeliest: f64,
+    /// That it is elsewhere.
+    pub elsewhere: f64,
+    /// That the object is not there.
+    pub absent: f64,
+}
+
+impl Belief {
+    /// The explanations with a share beside the likeliest that place the object elsewhere, one a place.
+    pub fn elsewhere(&self, model: &[ModelPoint], limit: f64) -> Vec<&Explanation> {
+        let mut different: Vec<&Explanation> = self.explanations.iter().take(1).collect();
+        for other in &self.explanations {
+            let apart = |known: &&Explanation| {
+                !(rms_apart(model, &known.object_from_camera, &other.object_from_camera) <= limit)
+            };
+            if other.ln_evidence >= self.explanations[0].ln_evidence - NEGLIGIBLE && different.iter().all(apart) {
+                different.push(other);
+            }
+        }
+        different.drain(..different.len().min(1));
+        different
+    }
+
+    /// The posterior probabilities: P_m = Λ_m/(1 + Σ Λ), Λ the evidence, presence and absence being
+    /// equally likely beforehand; poses within `limit` (m, RMS over the model points) of the likeliest count
+    /// as one with it.
+    pub fn shares(&self, model: &[ModelPoint], limit: f64) -> Shares {
+        let Some(best) = self.explanations.first() else {
+            return Shares { likeliest: 0.0, elsewhere: 0.0, absent: 1.0 };
+        };
+        let most = best.ln_evidence.max(0.0);
+        let (mut likeliest, mut elsewhere) = (0.0, 0.0);
+        for other in &self.explanations {
+            let share = libm::exp(other.ln_evidence - most);
+            if rms_apart(model, &best.object_from_camera, &other.object_from_camera) <= limit {
+                likeliest += share;
+            } else {
+                elsewhere += share;
+            }
+        }
+        let absent = libm::exp(-most);
+        let all = likeliest + elsewhere + absent;
+        Shares { likeliest: likeliest / all, elsewhere: elsewhere / all, absent: absent / all }
+    }
+}

@@ -1,0 +1,186 @@
+//! Which pairs may belong to one pose: distances agree, and the prior allows the rotation between them.
+
+use nalgebra::Vector3;
+
+use super::{
+    super::edges::{LANES, packed},
+    rough::Rough,
+};
+use crate::{Correspondence, Problem, Tolerance};
+
+/// So many standard deviations of the prior's rotation may lie between two pairs.
+const TURN_SIGMAS: f64 = 4.5;
+/// What rounding to single precision may cost a distance (m per metre of the cloud's extent).
+const ROUNDING: f32 = 4e-7;
+
+/// The candidate pairs with their compatibility.
+///
+/// Stands in an order that depends on coordinates alone: model points with few candidates first, of equals by
+/// coordinates, so that a search from the front meets each set at the points that are ambiguous least.
+pub(in crate::search) struct Graph {
+    pub(in crate::search) vertices: Vec<Correspondence>,
+    /// Where the pairs of each model point begin; one more than there are.
+    pub(in crate::search) starts: Vec<usize>,
+    /// Place of each vertex' model point in this order.
+    pub(in crate::search) rank: Vec<u32>,
+    /// Words a row.
+    words: usize,
+    bits: Vec<u64>,
+    /// Pair tests spent.
+    pub(in crate::search) tests: u64,
+}
+
+/// Coordinates side by side, single precision, about the cloud's centre.
+#[derive(Default)]
+struct Columns {
+    /// Measured place, model place, and measured minus predicted place.
+    at: [Vec<f32>; 9],
+    reach: Vec<f32>,
+}
+
+impl Graph {
+    pub(in crate::search) fn of(problem: &Problem<'_>, rough: &Rough) -> Self {
+        let (vertices, starts) = vertices(problem);
+        let count = vertices.len();
+        let rank = (0..starts.len() - 1).flat_map(|i| vec![i as u32; starts[i + 1] - starts[i]]).collect();
+        let columns = Columns::of(problem, rough, &vertices);
+        let words = count.div_ceil(64);
+        let mut graph = Self { vertices, starts, rank, words, bits: vec![0; words * count], tests: 0 };
+        let turn = rough.known.as_ref().map_or(f64::MAX, |known| {
+            // Beyond the first order a turn by ω moves a point by ω²/2 of its lever.
+            let turn = TURN_SIGMAS * known.attitude;
+            turn + 0.5 * turn * turn
+        });
+        let extent = columns.at[..6].iter().flatten().fold(0.0f32, |most, x| most.max(x.abs()));
+        // Without a prior any turn is allowed; far beyond 2 it stays a finite number.
+        let gate = Gate { turn: turn.min(1e6) as f32, rounding: ROUNDING * extent + 1e-7 };
+        let mut row = vec![0; words];
+        for a in 0..count {
+            let from = graph.starts[graph.rank[a] as usize + 1];
+            compatible(&columns, a, from / 64, gate, &mut row);
+            graph.tests += (count - from) as u64;
+            graph.fill(problem, a, from, &row);
+        }
+        graph
+    }
+
+    /// The later pairs that are compatible with a pair, one bit each.
+    pub(in crate::search) fn row(&self, a: usize) -> &[u64] {
+        &self.bits[a * self.words..(a + 1) * self.words]
+    }
+
+    /// Takes over what passed the gate, less what shares a cloud point or fails the exact test.
+    fn fill(&mut self, problem: &Problem<'_>, a: usize, from: usize, near: &[u64]) {
+        let exact = matches!(problem.tolerance, Tolerance::Sigmas(_));
+        let (pair, words) = (self.vertices[a], self.words);
+        for (word, &near) in near.iter().enumerate().skip(from / 64) {
+            let mut bits = near;
+            if word == from / 64 {
+                bits &= !0 << (from % 64);
+            }
+            let mut rest = bits;
+            while rest != 0 {
+                let bit = rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                let other = self.vertices[word * 64 + bit];
+                if other.cloud == pair.cloud || (exact && !problem.coherent(pair, other)) {
+                    bits &= !(1 << bit);
+                }
+            }
+            self.bits[a * words + word] = bits;
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Gate {
+    /// The greatest angle between two pairs (rad).
+    turn: f32,
+    /// What rounding may cost a distance (m).
+    rounding: f32,
+}
+
+/// Marks the vertices that pass the gate with vertex `a`, from word `from` on.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn compatible(columns: &Columns, a: usize, from: usize, gate: Gate, row: &mut [u64]) {
+    let chunks = |column: usize| columns.at[column][from * LANES..].as_chunks::<LANES>().0;
+    let [cx, cy, cz, mx, my, mz, ox, oy, oz] = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(chunks);
+    let reaches = columns.reach[from * LANES..].as_chunks::<LANES>().0;
+    let here: [f32; 9] = std::array::from_fn(|column| columns.at[column][a]);
+    let reach = columns.reach[a] + gate.rounding;
+    for (word, out) in row[from..].iter_mut().enumerate() {
+        let mut near = [0u8; LANES];
+        let (cx, cy, cz) = (&cx[word], &cy[word], &cz[word]);
+        let (mx, my, mz) = (&mx[word], &my[word], &mz[word]);
+        let (ox, oy, oz) = (&ox[word], &oy[word], &oz[word]);
+        let reaches = &reaches[word];
+        for k in 0..LANES {
+            let (x, y, z) = (cx[k] - here[0], cy[k] - here[1], cz[k] - here[2]);
+            let measured = (x * x + y * y + z * z).sqrt();
+            let (x, y, z) = (mx[k] - here[3], my[k] - here[4], mz[k] - here[5]);
+            let known = (x * x + y * y + z * z).sqrt();
+            let (x, y, z) = (ox[k] - here[6], oy[k] - here[7], oz[k] - here[8]);
+            let moved = (x * x + y * y + z * z).sqrt();
+            let tolerance = reach + reaches[k];
+            let turned = moved <= gate.turn * known + 2.0 * tolerance;
+            near[k] = u8::from(((known - measured).abs() <= tolerance) & turned);
+        }
+        *out = packed(&near);
+    }
+}
+
+impl Columns {
+    fn of(problem: &Problem<'_>, rough: &Rough, vertices: &[Correspondence]) -> Self {
+        let mut columns = Self::default();
+        let used = vertices.len().max(1) as f64;
+        let cloud = |pair: &Correspondence| problem.cloud[pair.cloud].position.at.coords;
+        let centre = vertices.iter().map(cloud).sum::<Vector3<f64>>() / used;
+        for pair in vertices {
+            let (at, model) = (cloud(pair), problem.model[pair.model].at.coords);
+            let offset = rough.known.as_ref().map_or(Vector3::zeros(), |known| at - known.places[pair.model].0);
+            for axis in 0..3 {
+                columns.at[axis].push((at[axis] - centre[axis]) as f32);
+                columns.at[3 + axis].push((model[axis] - rough.centroid[axis]) as f32);
+                columns.at[6 + axis].push(offset[axis] as f32);
+            }
+            columns.reach.push(reach(problem, *pair) as f32);
+        }
+        // Nothing is compatible with what fills up the last word.
+        let whole = vertices.len().next_multiple_of(LANES);
+        columns.at.iter_mut().for_each(|column| column.resize(whole, f32::NAN));
+        columns.reach.resize(whole, f32::NAN);
+        columns
+    }
+}
+
+/// A share of a bound of Δ: that of two pairs is at most the sum of theirs.
+fn reach(problem: &Problem<'_>, pair: Correspondence) -> f64 {
+    match problem.tolerance {
+        Tolerance::Fixed(delta) => 0.5 * delta,
+        Tolerance::Sigmas(k) => {
+            let measured = problem.cloud[pair.cloud].position.covariance.trace().max(0.0).sqrt();
+            k * (measured + problem.model[pair.model].sigma)
+        }
+    }
+}
+
+/// The candidate pairs by model point, and where each model point's begin.
+fn vertices(problem: &Problem<'_>) -> (Vec<Correspondence>, Vec<usize>) {
+    let by =
+        |a: &Vector3<f64>, b: &Vector3<f64>| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
+    let lists = &problem.candidates.lists;
+    let mut order: Vec<usize> = (0..lists.len()).filter(|&i| !lists[i].is_empty()).collect();
+    order.sort_by(|&i, &k| {
+        let at = |i: usize| &problem.model[i].at.coords;
+        lists[i].len().cmp(&lists[k].len()).then_with(|| by(at(i), at(k))).then(i.cmp(&k))
+    });
+    let (mut vertices, mut starts) = (Vec::with_capacity(problem.candidates.pairs()), vec![0]);
+    for model in order {
+        let begin = vertices.len();
+        vertices.extend(lists[model].iter().map(|&cloud| Correspondence { model, cloud }));
+        let at = |pair: &Correspondence| &problem.cloud[pair.cloud].position.at.coords;
+        vertices[begin..].sort_by(|a, b| by(at(a), at(b)).then(a.cloud.cmp(&b.cloud)));
+        starts.push(vertices.len());
+    }
+    (vertices, starts)
+}

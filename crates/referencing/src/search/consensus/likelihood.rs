@@ -1,0 +1,224 @@
+//! How much better a pose explains the cloud than clutter alone.
+
+use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3, Vector6};
+use seafix_geometry::so3::skew;
+
+use super::{
+    Motion,
+    graph::Graph,
+    rough::{Rough, box_volume},
+};
+use crate::{Correspondence, Problem, Tolerance};
+
+/// A pair further from where the pose puts it than this is no part of it (χ²₃).
+const FAR: f64 = 25.0;
+
+/// What the pairs of a problem say when they are true.
+///
+/// A true pair contributes ln N(c − p; 0, Σ) − ln ρ to the log-likelihood ratio against clutter, ρ (1/m³) the
+/// density of cloud points about the model point's predicted place. How many of the n points are visible
+/// is not known: all numbers are equally likely beforehand, and one set of k then has the share
+/// B(k) = k! (n − k)! / (n + 1)!.
+pub(in crate::search) struct Terms {
+    /// Of each vertex: where it was measured, where the model has it, what the measurement's error weighs.
+    pub(in crate::search) cloud: Vec<Vector3<f64>>,
+    pub(in crate::search) model: Vec<Vector3<f64>>,
+    pub(in crate::search) weight: Vec<Matrix3<f64>>,
+    /// ln of the likelihood ratio of a pair without residual.
+    pub(in crate::search) gain: Vec<f64>,
+    /// What one pair says of the motion on average: Jᵀ W J (about the centroid).
+    pub(in crate::search) average: Matrix6<f64>,
+    /// ln B(k), k = 0…n.
+    pub(in crate::search) ln_share: Vec<f64>,
+}
+
+impl Terms {
+    pub(in crate::search) fn of(problem: &Problem<'_>, rough: &Rough, graph: &Graph) -> Self {
+        let n = problem.candidates.lists.len();
+        let ln_density = densities(problem, rough);
+        let count = graph.vertices.len();
+        let mut terms = Self {
+            cloud: Vec::with_capacity(count),
+            model: Vec::with_capacity(count),
+            weight: Vec::with_capacity(count),
+            gain: Vec::with_capacity(count),
+            average: Matrix6::zeros(),
+            ln_share: shares(n),
+        };
+        let turned = rough.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
+        // Points that are called exact are taken to be as good as a tenth of what the tolerance allows each.
+        let least = match problem.tolerance {
+            Tolerance::Fixed(delta) => (0.05 * delta).powi(2),
+            Tolerance::Sigmas(_) => 1e-12,
+        };
+        // Many pairs share a covariance: the last inverse is kept.
+        let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64)> = None;
+        for pair in &graph.vertices {
+            let (seen, known) = (&problem.cloud[pair.cloud].position, &problem.model[pair.model]);
+            let own = known.sigma * known.sigma + least;
+            let noise = seen.covariance + Matrix3::identity() * own;
+            let (weight, ln_peak) = match last {
+                Some((of, weight, ln_peak)) if of == noise => (weight, ln_peak),
+                _ => peak(&noise),
+            };
+            last = Some((noise, weight, ln_peak));
+            terms.cloud.push(seen.at.coords);
+            terms.model.push(known.at.coords);
+            terms.weight.push(weight);
+            terms.gain.push(ln_peak - ln_density[pair.model]);
+            terms.average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
+        }
+        terms.average /= count.max(1) as f64;
+        terms
+    }
+
+    /// The log-likelihood ratio of one pair under a pose, however far it is from it.
+    pub(in crate::search) fn residual_gain(&self, v: usize, motion: &Motion) -> f64 {
+        let r = self.cloud[v] - motion.apply(&self.model[v]);
+        self.gain[v] - 0.5 * r.dot(&(self.weight[v] * r))
+    }
+
+    /// The log-likelihood ratio of one pair under a pose; `None` when it is too far from it.
+    pub(in crate::search) fn of_pair(&self, v: usize, motion: &Motion) -> Option<f64> {
+        let r = self.cloud[v] - motion.apply(&self.model[v]);
+        let d2 = r.dot(&(self.weight[v] * r));
+        (d2 <= FAR).then(|| self.gain[v] - 0.5 * d2)
+    }
+}
+
+/// The information of a measurement's error and ln of its density at zero; one without a covariance says nothing.
+fn peak(noise: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
+    match noise.cholesky() {
+        Some(chol) => {
+            let half: f64 = (0..3).map(|i| libm::log(chol.l_dirty()[(i, i)])).sum();
+            (chol.inverse(), -half - 1.5 * libm::log(2.0 * std::f64::consts::PI))
+        }
+        None => (Matrix3::zeros(), f64::NEG_INFINITY),
+    }
+}
+
+/// ln ρ about each model point.
+fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
+    let lists = &problem.candidates.lists;
+    let Some(known) = &rough.known else {
+        let ln_volume = libm::log(box_volume(problem));
+        return lists.iter().map(|list| libm::log(list.len().max(1) as f64) - ln_volume).collect();
+    };
+    known
+        .places
+        .iter()
+        .map(|(place, spread)| {
+            let half = spread * super::rough::BOUND_SIGMAS;
+            let inside = |at: &Vector3<f64>| (0..3).all(|axis| (at[axis] - place[axis]).abs() <= half[axis]);
+            let count = problem.cloud.iter().filter(|point| inside(&point.position.at.coords)).count();
+            libm::log(count.max(1) as f64) - (half * 2.0).iter().map(|side| libm::log(side.max(1e-6))).sum::<f64>()
+        })
+        .collect()
+}
+
+fn shares(n: usize) -> Vec<f64> {
+    // B(0) = 1/(n + 1); B(k) = B(k − 1) · k/(n − k + 1).
+    let mut shares = vec![-libm::log((n + 1) as f64)];
+    for k in 1..=n {
+        let last = shares[k - 1];
+        shares.push(last + libm::log(k as f64 / (n - k + 1) as f64));
+    }
+    shares
+}
+
+/// A pose with its pairs: a maximum of the posterior density.
+#[derive(Debug, Clone)]
+pub(in crate::search) struct Mode {
+    /// Vertices, ascending.
+    pub(in crate::search) members: Vec<usize>,
+    pub(in crate::search) motion: Motion,
+    /// ln of its evidence against "no object here", by Laplace: the likelihood ratio and the prior density at
+    /// the maximum, times the volume (2π)³/√det H that the posterior fills.
+    pub(in crate::search) ln_evidence: f64,
+}
+
+impl Mode {
+    /// The pairs, in the order of the model points.
+    pub(in crate::search) fn pairs(&self, graph: &Graph) -> Vec<Correspondence> {
+        let mut pairs: Vec<Correspondence> = self.members.iter().map(|&v| graph.vertices[v]).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// The pairs, those that fit the motion best first.
+    pub(in crate::search) fn closest_first(&self, terms: &Terms, graph: &Graph) -> Vec<Correspondence> {
+        let mut members: Vec<(f64, usize)> =
+            self.members.iter().map(|&v| (terms.gain[v] - terms.residual_gain(v, &self.motion), v)).collect();
+        members.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        members.into_iter().map(|(_, v)| graph.vertices[v]).collect()
+    }
+
+    /// Whether a vertex belongs to it.
+    pub(in crate::search) fn holds(&self, v: usize) -> bool {
+        self.members.binary_search(&v).is_ok()
+    }
+}
+
+/// Jᵀ W J of a point with this lever about the centroid.
+fn information(lever: &Vector3<f64>, w: &Matrix3<f64>) -> Matrix6<f64> {
+    let s = skew(lever);
+    let sw = s * w;
+    let mut h = Matrix6::zeros();
+    h.fixed_view_mut::<3, 3>(0, 0).copy_from(&(sw * s.transpose()));
+    h.fixed_view_mut::<3, 3>(0, 3).copy_from(&sw);
+    h.fixed_view_mut::<3, 3>(3, 0).copy_from(&sw.transpose());
+    h.fixed_view_mut::<3, 3>(3, 3).copy_from(w);
+    h
+}
+
+/// The most likely motion of these pairs near one, and the factor of its information.
+pub(in crate::search) fn fit(
+    terms: &Terms,
+    rough: &Rough,
+    members: &[usize],
+    start: &Motion,
+    rounds: usize,
+) -> Option<(Motion, Cholesky<f64, U6>)> {
+    let mut motion = *start;
+    let mut factor = None;
+    for _ in 0..rounds {
+        let about = motion.apply(&rough.centroid);
+        let (mut turn, mut mixed, mut shift) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+        let (mut torque, mut force) = (Vector3::zeros(), Vector3::zeros());
+        for &v in members {
+            let place = motion.apply(&terms.model[v]);
+            let (lever, w) = (place - about, terms.weight[v]);
+            let pull = w * (terms.cloud[v] - place);
+            let s = skew(&lever);
+            let sw = s * w;
+            turn -= sw * s;
+            mixed += sw;
+            shift += w;
+            torque += lever.cross(&pull);
+            force += pull;
+        }
+        let mut h = Matrix6::zeros();
+        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        h.fixed_view_mut::<3, 3>(0, 3).copy_from(&mixed);
+        h.fixed_view_mut::<3, 3>(3, 0).copy_from(&mixed.transpose());
+        h.fixed_view_mut::<3, 3>(3, 3).copy_from(&shift);
+        let mut g = Vector6::new(torque.x, torque.y, torque.z, force.x, force.y, force.z);
+        if let Some(known) = &rough.known {
+            h += known.information;
+            g -= known.information * rough.step_to(known, &motion);
+        }
+        let chol = h.cholesky()?;
+        let step = chol.solve(&g);
+        motion = motion.moved(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into(), &about);
+        factor = Some(chol);
+        if step.norm_squared() < 1e-12 {
+            break;
+        }
+    }
+    factor.map(|chol| (motion, chol))
+}
+
+/// ½ ln det of an information.
+pub(in crate::search) fn half_ln_det(chol: &Cholesky<f64, U6>) -> f64 {
+    (0..6).map(|i| libm::log(chol.l_dirty()[(i, i)])).sum()
+}

@@ -1,0 +1,18 @@
+//! The parts of [`RigidConsensus`](super::RigidConsensus).
+
+mod bits;
+mod bound;
+mod graph;
+mod likelihood;
+mod mirror;
+mod modes;
+mod motion;
+mod rough;
+mod seeds;
+
+pub(super) use graph::Graph;
+pub(super) use likelihood::Terms;
+pub(super) use mirror::mirror_image;
+pub(super) use motion::Motion;
+pub(super) use rough::Rough;
+pub(super) use seeds::Seeds;

@@ -1,0 +1,102 @@
+//! From a rough motion to the maximum of the posterior near it.
+
+use std::collections::HashSet;
+
+use nalgebra::{Cholesky, U6};
+
+use super::{
+    Motion,
+    graph::Graph,
+    likelihood::{Mode, Terms, fit, half_ln_det},
+    rough::Rough,
+};
+
+/// Rounds of choosing pairs and fitting.
+const ROUNDS: usize = 8;
+/// What pairs may bring that join a set only when its motion is fitted (nats).
+const JOINING: f64 = 8.0;
+/// The least set that a pose can come from.
+pub(in crate::search) const LEAST: usize = 3;
+
+type Factor = Cholesky<f64, U6>;
+
+/// Finds the modes of one problem.
+pub(in crate::search) struct Climb<'a> {
+    pub(in crate::search) terms: &'a Terms,
+    pub(in crate::search) rough: &'a Rough,
+    pub(in crate::search) graph: &'a Graph,
+}
+
+impl Climb<'_> {
+    /// Chooses pairs and fits in turn until the choice stands.
+    ///
+    /// `None` as soon as no evidence of `least` (nats) is in sight.
+    pub(in crate::search) fn from(&self, members: Vec<usize>, start: &Motion, least: f64) -> Option<Mode> {
+        let mut members = members;
+        let mut motion = *start;
+        for round in 0..ROUNDS {
+            let (fitted, factor) = fit(self.terms, self.rough, &members, &motion, 2)?;
+            motion = fitted;
+            // What fitted three noisy points roughly often fits no motion: that is seen at once.
+            if round == 0 && self.promise(&members, &motion, &factor) < least {
+                return None;
+            }
+            let chosen = self.choose(&motion);
+            if chosen.len() < LEAST {
+                return None;
+            }
+            if chosen == members {
+                break;
+            }
+            members = chosen;
+        }
+        let (motion, factor) = fit(self.terms, self.rough, &members, &motion, 4)?;
+        let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();
+        let score = gains + self.terms.ln_share[members.len()] + self.rough.ln_density(&motion);
+        let ln_evidence = score + 3.0 * libm::log(2.0 * std::f64::consts::PI) - half_ln_det(&factor);
+        ln_evidence.is_finite().then_some(Mode { members, motion, ln_evidence })
+    }
+
+    /// About the evidence of those members that stay, and of one or two pairs that may join them.
+    fn promise(&self, members: &[usize], motion: &Motion, factor: &Factor) -> f64 {
+        let gains: Vec<f64> = members.iter().filter_map(|&v| self.terms.of_pair(v, motion)).collect();
+        let k = gains.len();
+        if k < LEAST - 1 {
+            return f64::NEG_INFINITY;
+        }
+        let volume = 3.0 * libm::log(2.0 * std::f64::consts::PI) - half_ln_det(factor);
+        gains.iter().sum::<f64>() + self.terms.ln_share[k] + self.rough.ln_density(motion) + volume + JOINING
+    }
+
+    /// The likeliest one-to-one set under a motion: of each model point its best pair, of pairs that share a
+    /// cloud point the better, and of these as many as the likelihood gains by.
+    fn choose(&self, motion: &Motion) -> Vec<usize> {
+        let starts = &self.graph.starts;
+        let mut best: Vec<(f64, usize)> = Vec::new();
+        for i in 0..starts.len() - 1 {
+            let mut top: Option<(f64, usize)> = None;
+            for v in starts[i]..starts[i + 1] {
+                if let Some(gain) = self.terms.of_pair(v, motion)
+                    && top.is_none_or(|(known, _)| gain > known)
+                {
+                    top = Some((gain, v));
+                }
+            }
+            best.extend(top);
+        }
+        best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut used = HashSet::with_capacity(best.len());
+        best.retain(|&(_, v)| used.insert(self.graph.vertices[v].cloud));
+        let (mut sum, mut most, mut keep) = (0.0, f64::NEG_INFINITY, LEAST.min(best.len()));
+        for (k, (gain, _)) in best.iter().enumerate() {
+            sum += gain;
+            let total = sum + self.terms.ln_share[k + 1];
+            if k + 1 >= LEAST && total > most {
+                (most, keep) = (total, k + 1);
+            }
+        }
+        let mut members: Vec<usize> = best[..keep].iter().map(|&(_, v)| v).collect();
+        members.sort_unstable();
+        members
+    }
+}

@@ -1,0 +1,121 @@
+//! The rough pose as a density over rigid motions.
+
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use seafix_geometry::so3::skew;
+
+use super::Motion;
+use crate::{Prior, PriorBound, Problem};
+
+/// A bound of the prior is taken for so many standard deviations: bounds are given so that they hold.
+pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
+
+/// What is known of the pose before any pair is.
+///
+/// Motions are compared by η = (φ, τ): the rotation from the rough attitude (rad, camera axes) and the step of
+/// the model's centroid (m). dφ dτ is the measure of every density here.
+pub(in crate::search) struct Rough {
+    /// The motion that the prior predicts; `None` without a prior.
+    pub(in crate::search) known: Option<Known>,
+    /// Centroid of the model.
+    pub(in crate::search) centroid: Vector3<f64>,
+    /// ln of the density at its maximum.
+    pub(in crate::search) ln_peak: f64,
+}
+
+/// A prior in these coordinates.
+pub(in crate::search) struct Known {
+    pub(in crate::search) motion: Motion,
+    /// Information on η.
+    pub(in crate::search) information: Matrix6<f64>,
+    /// Greatest standard deviation of the rotation (rad).
+    pub(in crate::search) attitude: f64,
+    /// Each model point as predicted, and how far it may be from there along each axis (m, one sigma).
+    pub(in crate::search) places: Vec<(Vector3<f64>, Vector3<f64>)>,
+}
+
+impl Rough {
+    pub(in crate::search) fn of(problem: &Problem<'_>) -> Option<Self> {
+        let n = problem.model.len().max(1) as f64;
+        let centroid = problem.model.iter().map(|point| point.at.coords).sum::<Vector3<f64>>() / n;
+        let Some(prior) = problem.prior else {
+            // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the cloud's box.
+            let ln_peak = -libm::log(box_volume(problem) * 8.0 * std::f64::consts::PI.powi(2));
+            return Some(Self { known: None, centroid, ln_peak });
+        };
+        let motion = Motion::of(&prior.object_from_camera.inverse());
+        let at = motion.apply(&centroid);
+        let covariance = covariance(problem, prior, &motion, &at);
+        let chol = covariance.cholesky()?;
+        let information = chol.inverse();
+        let half_ln_det: f64 = (0..6).map(|i| libm::log(chol.l_dirty()[(i, i)])).sum();
+        let ln_peak = -half_ln_det - 3.0 * libm::log(2.0 * std::f64::consts::PI);
+        let attitude = covariance.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues().max().max(0.0).sqrt();
+        let places = problem
+            .model
+            .iter()
+            .map(|point| {
+                let place = motion.apply(&point.at.coords);
+                let lever = skew(&(place - at));
+                let (turn, mixed) = (covariance.fixed_view::<3, 3>(0, 0), covariance.fixed_view::<3, 3>(0, 3));
+                let shift = covariance.fixed_view::<3, 3>(3, 3);
+                let cross = lever * mixed;
+                let spread = lever * turn * lever.transpose() + shift - cross - cross.transpose();
+                (place, spread.diagonal().map(|variance| (variance + point.sigma * point.sigma).max(0.0).sqrt()))
+            })
+            .collect();
+        Some(Self { known: Some(Known { motion, information, attitude, places }), centroid, ln_peak })
+    }
+
+    /// η of a motion.
+    pub(in crate::search) fn step_to(&self, known: &Known, motion: &Motion) -> Vector6<f64> {
+        let phi = rotation_vector(&(motion.rotation * known.motion.rotation.transpose()));
+        let tau = motion.apply(&self.centroid) - known.motion.apply(&self.centroid);
+        Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
+    }
+
+    /// ln of the density at a motion.
+    pub(in crate::search) fn ln_density(&self, motion: &Motion) -> f64 {
+        self.known.as_ref().map_or(self.ln_peak, |known| {
+            let eta = self.step_to(known, motion);
+            self.ln_peak - 0.5 * eta.dot(&(known.information * eta))
+        })
+    }
+}
+
+/// Covariance of η.
+fn covariance(problem: &Problem<'_>, prior: &Prior, motion: &Motion, at: &Vector3<f64>) -> Matrix6<f64> {
+    match &prior.bound {
+        PriorBound::Gaussian(xi) => {
+            // Exp(−ξ) moves camera coordinates: φ = −φ_ξ, τ = −ρ − φ_ξ × p̄ to first order; signs cancel in Σ.
+            let mut j = Matrix6::identity();
+            j.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(at));
+            j * xi.matrix * j.transpose()
+        }
+        PriorBound::Box(half) => {
+            let reach = problem.model.iter().map(|point| (motion.apply(&point.at.coords) - at).norm());
+            let reach = reach.fold(0.0, f64::max).max(1e-9);
+            let (tau, phi) = (half / BOUND_SIGMAS, half / (BOUND_SIGMAS * reach));
+            Matrix6::from_diagonal(&Vector6::new(phi * phi, phi * phi, phi * phi, tau * tau, tau * tau, tau * tau))
+        }
+    }
+}
+
+/// Volume of the cloud's box (m³), each side at least as long as the tolerance.
+pub(in crate::search) fn box_volume(problem: &Problem<'_>) -> f64 {
+    let (mut low, mut high) = (Vector3::from_element(f64::INFINITY), Vector3::from_element(f64::NEG_INFINITY));
+    for point in problem.cloud {
+        (low, high) = (low.inf(&point.position.at.coords), high.sup(&point.position.at.coords));
+    }
+    (high - low).iter().map(|side| side.max(0.1)).product()
+}
+
+/// The rotation vector of a rotation matrix.
+pub(in crate::search) fn rotation_vector(r: &Matrix3<f64>) -> Vector3<f64> {
+    let axis = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]) * 0.5;
+    let (sine, cosine) = (axis.norm(), (r.trace() - 1.0) * 0.5);
+    if sine < 1e-12 {
+        // The identity, or half a turn, where any axis of the symmetric part is as good: far off either way.
+        return if cosine > 0.0 { axis } else { Vector3::new(std::f64::consts::PI, 0.0, 0.0) };
+    }
+    axis * (libm::atan2(sine, cosine) / sine)
+}

@@ -1,0 +1,251 @@
+//! Every coherent three that could lead to a pose worth knowing.
+
+use nalgebra::Vector3;
+
+use super::{
+    Motion,
+    bits::{intersect, ones},
+    bound::Bounds,
+    graph::Graph,
+    likelihood::{Mode, Terms},
+    modes::Climb,
+    rough::Rough,
+};
+
+/// Poses less likely than the best by this much (nats) are not looked for.
+const MARGIN: f64 = 10.0;
+/// Poses less likely than no object at all by this much (nats) are not looked for.
+const FLOOR: f64 = 3.0;
+/// A pair may be so many of its own standard deviations from a pose that three noisy points give.
+const LOOSE: f64 = 3.5;
+/// Modes that a new three is compared with before it is followed.
+const COMPARED: usize = 16;
+/// Modes kept.
+const KEPT: usize = 256;
+/// Pairs kept to be followed: 12 bytes each.
+const MOST_PAIRS: usize = 8_000_000;
+/// What a pose from three points and the climb to its mode cost, in words read.
+const COST_OF_A_POSE: u64 = 16;
+const COST_OF_A_MODE: u64 = 64;
+
+/// Bound and vertices of two pairs.
+type Pair = (f32, u32, u32);
+
+/// The greatest bound first; of equals the first in the order of the graph.
+fn first(x: &Pair, y: &Pair) -> std::cmp::Ordering {
+    y.0.total_cmp(&x.0).then((x.1, x.2).cmp(&(y.1, y.2)))
+}
+
+/// What came of the search for modes.
+pub(in crate::search) struct Swept {
+    /// The likeliest first.
+    pub(in crate::search) modes: Vec<Mode>,
+    /// Whether every three that could lead to a pose of interest was followed.
+    pub(in crate::search) complete: bool,
+    /// Work done.
+    pub(in crate::search) tests: u64,
+}
+
+/// Best-first branch and bound over the coherent threes (a, b, c).
+///
+/// Any set is met at its first three members in the order of the graph. All others of it are common neighbours
+/// of these, so that the model points among the later common neighbours bound its evidence ([`Bounds`]). Pairs
+/// (a, b) are followed in the order of their bound, until it is below what is of interest.
+pub(in crate::search) struct Seeds<'a> {
+    climb: Climb<'a>,
+    bounds: Bounds<'a>,
+    budget: u64,
+    /// Words read, and as much other work.
+    spent: u64,
+    /// The likeliest first.
+    modes: Vec<Mode>,
+    /// Greatest bound of a pair followed early.
+    scouted: f64,
+    /// What two pairs and three have in common.
+    common: Vec<u64>,
+    third: Vec<u64>,
+}
+
+impl<'a> Seeds<'a> {
+    pub(in crate::search) fn new(terms: &'a Terms, rough: &'a Rough, graph: &'a Graph, budget: u64) -> Self {
+        let words = graph.vertices.len().div_ceil(64);
+        Self {
+            climb: Climb { terms, rough, graph },
+            bounds: Bounds::of(terms, rough, graph),
+            budget,
+            spent: 0,
+            modes: Vec::new(),
+            scouted: f64::NEG_INFINITY,
+            common: vec![0; words],
+            third: vec![0; words],
+        }
+    }
+
+    /// The evidence that is of interest.
+    fn threshold(&self) -> f64 {
+        let best = self.modes.first().map_or(f64::NEG_INFINITY, |mode| mode.ln_evidence);
+        (best - MARGIN).max(-FLOOR)
+    }
+
+    pub(in crate::search) fn sweep(mut self) -> Swept {
+        let (pairs, mut complete) = self.pairs();
+        for (bound, a, b) in pairs {
+            if f64::from(bound) < self.threshold() {
+                break;
+            }
+            if self.spent > self.budget {
+                complete = false;
+                break;
+            }
+            self.follow_pair(a as usize, b as usize);
+        }
+        Swept { modes: self.modes, complete, tests: self.spent }
+    }
+
+    /// The compatible pairs (a, b) that may begin a set of interest, the greatest bound first, and whether these
+    /// are all.
+    fn pairs(&mut self) -> (Vec<Pair>, bool) {
+        let graph = self.climb.graph;
+        let ranks = graph.starts.len() - 1;
+        let mut pairs: Vec<Pair> = Vec::new();
+        let (mut begin, mut complete) = (0, true);
+        for a in 0..graph.vertices.len() {
+            if a > 0 && graph.rank[a] != graph.rank[a - 1] {
+                self.scout(&pairs[begin..]);
+                begin = pairs.len();
+            }
+            let (row, rank, own) = (graph.row(a), graph.rank[a] as usize, self.bounds.gain(a));
+            self.spent += row.len() as u64;
+            let count = row.iter().map(|word| word.count_ones() as usize).sum();
+            if self.bounds.with_common((1, own), row, count, rank + 1, self.threshold()) < self.threshold() {
+                continue;
+            }
+            for b in ones(row, graph.starts[rank + 1]) {
+                let next = graph.rank[b] as usize + 1;
+                let gains = own + self.bounds.gain(b);
+                if self.bounds.reach(2, gains, ranks - next) < self.threshold() {
+                    continue;
+                }
+                let count = self.meet(row, b, next);
+                let bound = self.bounds.with_common((2, gains), &self.common, count, next, self.threshold());
+                if bound >= self.threshold() {
+                    // Rounded up, so that it stays a bound.
+                    pairs.push(((bound as f32).next_up(), a as u32, b as u32));
+                }
+            }
+            if self.spent > self.budget || pairs.len() > MOST_PAIRS {
+                complete = false;
+                break;
+            }
+        }
+        pairs.sort_unstable_by(first);
+        (pairs, complete)
+    }
+
+    /// What a row and that of `b` have in common from a rank on.
+    fn meet(&mut self, row: &[u64], b: usize, from: usize) -> usize {
+        let start = self.climb.graph.starts[from];
+        self.spent += (row.len().saturating_sub(start / 64) + 1) as u64;
+        intersect(row, self.climb.graph.row(b), start, &mut self.common)
+    }
+
+    /// Follows the most promising pair of one model point at once: a good pose known early spares the rest.
+    fn scout(&mut self, pairs: &[Pair]) {
+        let Some(&(bound, a, b)) = pairs.iter().min_by(|x, y| first(x, y)) else { return };
+        if f64::from(bound) > self.scouted {
+            self.scouted = f64::from(bound);
+            self.follow_pair(a as usize, b as usize);
+        }
+    }
+
+    fn follow_pair(&mut self, a: usize, b: usize) {
+        let graph = self.climb.graph;
+        let next = graph.rank[b] as usize + 1;
+        self.meet(graph.row(a), b, next);
+        // Three members of a mode lead to it again.
+        let likely = self.modes.iter().take(COMPARED);
+        let holding: Vec<&Mode> = likely.filter(|mode| mode.holds(a) && mode.holds(b)).collect();
+        let new = |c: &usize| !holding.iter().any(|mode| mode.holds(*c));
+        let thirds: Vec<usize> = ones(&self.common, graph.starts[next]).filter(new).collect();
+        for c in thirds {
+            let after = graph.rank[c] as usize + 1;
+            let gains = self.bounds.gain(a) + self.bounds.gain(b) + self.bounds.gain(c);
+            let start = graph.starts[after];
+            self.spent += (self.common.len().saturating_sub(start / 64) + 1) as u64;
+            let count = intersect(&self.common, graph.row(c), start, &mut self.third);
+            let bound = self.bounds.with_common((3, gains), &self.third, count, after, self.threshold());
+            if bound >= self.threshold() && !self.known([a, b, c]) {
+                self.follow([a, b, c], after);
+            }
+        }
+    }
+
+    /// Whether a likely mode holds all three.
+    fn known(&self, three: [usize; 3]) -> bool {
+        self.modes.iter().take(COMPARED).any(|mode| three.iter().all(|&v| mode.holds(v)))
+    }
+
+    /// The pose of a three, what else fits it roughly, and the mode that this leads to.
+    fn follow(&mut self, three: [usize; 3], after: usize) {
+        self.spent += COST_OF_A_POSE;
+        let Climb { terms, graph, .. } = self.climb;
+        let model = three.map(|v| &terms.model[v]);
+        let Some(motion) = Motion::of_three(model, three.map(|v| &terms.cloud[v])) else { return };
+        let centre: Vector3<f64> = (model[0] + model[1] + model[2]) / 3.0;
+        let altitude = altitude(model);
+        let mut members = three.to_vec();
+        let mut gains: f64 = three.iter().map(|&v| self.bounds.gain(v)).sum();
+        // Rank and distance of the last member.
+        let mut last = (usize::MAX, 0.0);
+        for v in ones(&self.third, graph.starts[after]) {
+            // The three points' errors grow with the lever.
+            let lever = 1.0 + (terms.model[v] - centre).norm() / altitude;
+            let r = terms.cloud[v] - motion.apply(&terms.model[v]);
+            let d2 = r.dot(&(terms.weight[v] * r)) / (lever * lever);
+            let rank = graph.rank[v] as usize;
+            let again = last.0 == rank;
+            if d2 > LOOSE * LOOSE || (again && last.1 <= d2) {
+                continue;
+            }
+            if again {
+                members.pop();
+            } else {
+                gains += self.bounds.gain_of_rank(rank);
+            }
+            members.push(v);
+            last = (rank, d2);
+        }
+        self.spent += 4 * members.len() as u64;
+        if self.bounds.of_set(members.len(), gains) < self.threshold() {
+            return;
+        }
+        self.spent += COST_OF_A_MODE;
+        if let Some(mode) = self.climb.from(members, &motion, self.threshold()) {
+            self.keep(mode);
+        }
+    }
+
+    fn keep(&mut self, mode: Mode) {
+        if mode.ln_evidence < self.threshold() || self.modes.iter().any(|known| known.members == mode.members) {
+            return;
+        }
+        let before = |known: &Mode| {
+            known
+                .ln_evidence
+                .total_cmp(&mode.ln_evidence)
+                .reverse()
+                .then_with(|| known.members.cmp(&mode.members))
+                .is_lt()
+        };
+        let place = self.modes.partition_point(before);
+        self.modes.insert(place, mode);
+        self.modes.truncate(KEPT);
+    }
+}
+
+/// The least altitude of a triangle (m).
+fn altitude([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
+    let area = (b - a).cross(&(c - a)).norm();
+    let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
+    (area / longest).max(1e-9)
+}
