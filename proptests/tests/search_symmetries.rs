@@ -236,17 +236,13 @@ fn a_point_that_comes_twice_is_the_first() {
             list.extend(again);
         }
         for search in searches.iter().filter(|search| search.claims.exact && search.claims.lists) {
-            if let (Ok(once), Ok(twice)) = (search.answer(&planted), search.answer(&twice)) {
-                if once.optimal && twice.optimal {
-                    held.set(held.get() + 1);
-                    prop_assert_eq!(once.pairs.len(), twice.pairs.len(), "{}", &search.name);
-                    prop_assert!(
-                        twice.pairs.iter().all(|pair| pair.cloud < count),
-                        "{}: {:?}",
-                        search.name,
-                        twice.pairs
-                    );
-                }
+            if let (Ok(once), Ok(twice)) = (search.answer(&planted), search.answer(&twice))
+                && once.optimal
+                && twice.optimal
+            {
+                held.set(held.get() + 1);
+                prop_assert_eq!(once.pairs.len(), twice.pairs.len(), "{}", &search.name);
+                prop_assert!(twice.pairs.iter().all(|pair| pair.cloud < count), "{}: {:?}", search.name, twice.pairs);
             }
         }
         Ok(())

@@ -3,7 +3,9 @@
 use rand::Rng;
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
-use crate::{Identification, ModelPoint, Problem, Search, Solver, Unidentified, chance::expected_sets, site::diameter};
+use crate::{
+    Identification, ModelPoint, Problem, Search, Solver, Unidentified, chance::expected_sets_as_good, site::diameter,
+};
 
 mod acceptance;
 mod exclusion;
@@ -72,7 +74,7 @@ pub fn judge(
         _ => &found.pairs,
     };
     Attempt {
-        expected_chance_sets: Some(expected_sets(problem, believed)),
+        expected_chance_sets: Some(expected_sets_as_good(problem, believed)),
         outcome,
         runner_up,
         optimal: found.optimal,
