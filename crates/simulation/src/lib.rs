@@ -38,6 +38,7 @@ mod raster;
 mod render;
 mod scene;
 mod sensor;
+pub mod sensors;
 mod stream;
 mod survey;
 pub mod vehicle;
@@ -46,7 +47,7 @@ pub use blueprint::{Blueprint, BoxPlan, ChequerPlan, ObjectPlan, PanelPlan, Pipe
 pub use dive::{BadDive, Dive, DiveFrame, FrameTruth, PlannedDive, RoughPose, VirtualRig, VisiblePoint};
 pub use draw::{Exposure, Imager};
 pub use layout::{Layout, Placed, Shape};
-pub use mission::{CalibrationError, FocalIn, Instant, InstantTruth, Mission, PlannedMission, RigPlan};
+pub use mission::{CalibrationError, FocalIn, Instant, InstantTruth, Mission, PlannedMission, PriorKind, RigPlan};
 pub use points::PointNoise;
 pub use sensor::Sensor;
 pub use stream::{Purpose, Stream};

@@ -7,7 +7,7 @@ use std::{
 };
 
 use seafix_component::Fault;
-use seafix_geometry::{Camera, Transform, World};
+use seafix_geometry::{Camera, Covariance6, Transform, World};
 
 use super::{
     check::input_hashes,
@@ -52,6 +52,7 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
     let mut objects = None;
     let mut truths: Vec<tum::Stamped<World, Camera>> = Vec::new();
     let mut priors: Vec<tum::Stamped<World, Camera>> = Vec::new();
+    let mut covariances = Vec::new();
     for index in 0..passage.frames() {
         let sight = passage.sight(index)?;
         if let Eyes::Pair(left, right) = &sight.eyes {
@@ -61,6 +62,7 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
             frames += &format!("{},{left_name},{right_name}\n", sight.stamp_ns);
         }
         priors.extend(sight.prior.map(|prior| (sight.stamp_ns, prior.world_from_camera)));
+        covariances.extend(sight.prior.map(|prior| (sight.stamp_ns, prior.covariance)));
         let Some(truth) = passage.truth(index) else { continue };
         truths.push((sight.stamp_ns, truth.world_from_camera));
         for (o, p) in truth.visible.iter().flatten() {
@@ -81,6 +83,11 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
     if !priors.is_empty() {
         put("prior.tum", &tum::print(&priors))?;
     }
+    // One covariance for all is told by its standard deviations.
+    let varied = covariances.windows(2).any(|pair| pair[0].1 != pair[1].1);
+    if varied {
+        put("prior_covariance.csv", &table_of_covariances(&covariances))?;
+    }
     let objects = objects.map(|objects| table_of_objects(passage, &objects));
     if let Some(table) = &objects {
         put("objects.csv", table)?;
@@ -98,7 +105,7 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
         prior_sigma: passage
             .prior_sigma()
             .map(|(position, attitude)| PriorSigma { position, attitude_deg: attitude.to_degrees() }),
-        prior_covariance: None,
+        prior_covariance: known("prior_covariance.csv", varied),
         visibility: known("visibility.csv", visibility.is_some()),
         objects: known("objects.csv", objects.is_some()),
         body_from_camera: Some(passage.body_from_camera().rows()),
@@ -107,6 +114,17 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
         hashes: input_hashes(folder)?.into_iter().collect::<BTreeMap<_, _>>(),
     };
     put("dataset.toml", &toml::to_string(&description).expect("a description is plain values"))
+}
+
+/// `stamp_ns,c00,…`: the covariance of each prior.
+fn table_of_covariances(all: &[(u64, Covariance6<World, Camera>)]) -> String {
+    let columns: Vec<String> = (0..36).map(|i| format!("c{}{}", i / 6, i % 6)).collect();
+    let mut text = format!("stamp_ns,{}\n", columns.join(","));
+    for (stamp, covariance) in all {
+        let numbers: Vec<String> = covariance.matrix.transpose().iter().map(f64::to_string).collect();
+        text += &format!("{stamp},{}\n", numbers.join(","));
+    }
+    text
 }
 
 /// `object,m00,…`: where each object truly is.

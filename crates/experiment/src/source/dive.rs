@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use seafix_component::{Component, Fault};
-use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform};
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
 use seafix_simulation::{Mission, PlannedMission};
 use seafix_vision::Threads;
@@ -67,8 +67,8 @@ impl Passage for Dived {
     }
 
     fn prior_sigma(&self) -> Option<(f64, f64)> {
-        let settings = self.mission.settings();
-        Some((settings.prior_position, settings.prior_attitude_deg.to_radians()))
+        let (_, covariance) = (0..self.frames()).find_map(|index| self.mission.instant(index).prior)?;
+        Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
     }
 
     fn pixel_sigma(&self) -> Option<f64> {
@@ -83,11 +83,8 @@ impl Passage for Dived {
         } else {
             Eyes::Points(instant.points())
         };
-        let prior = WorldPrior {
-            world_from_camera: instant.prior.world_from_camera,
-            covariance: Covariance6::isotropic(instant.prior.attitude_sigma, instant.prior.position_sigma),
-        };
-        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior: Some(prior) })
+        let prior = instant.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
+        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

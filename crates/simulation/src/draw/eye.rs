@@ -1,5 +1,7 @@
 //! One camera as the renderer needs it: its rays at every pixel, its lamps and haze, its rows in time.
 
+use std::sync::OnceLock;
+
 use nalgebra::{Matrix3, Vector3, Vector6};
 use seafix_geometry::{Camera, Pixel, Transform};
 
@@ -14,7 +16,8 @@ pub(crate) struct Eye {
     pub(crate) lens: Lens,
     /// The lamps in its frame.
     pub(crate) lamps: Vec<Lamp>,
-    pub(crate) haze: Haze,
+    haze: OnceLock<Haze>,
+    water: Water,
     /// Rays of every pixel (direction x, y with z = 1; origin); empty for an ideal pinhole.
     rays: Vec<[f32; 5]>,
     /// Tangent of the greatest angle to the axis at which it sees.
@@ -45,7 +48,6 @@ pub(super) struct Line {
 
 impl Eye {
     pub(crate) fn new(lens: Lens, lamps: Vec<Lamp>, water: &Water) -> Self {
-        let haze = Haze::new(water, &lamps, &lens);
         let [width, height] = lens.camera().size();
         let mut rays = Vec::new();
         if !lens.is_straight() {
@@ -66,7 +68,12 @@ impl Eye {
             .flat_map(|u| border(height).map(|v| Pixel { u, v }))
             .filter_map(|pixel| Some(lens.ray(&pixel)?.along.xy().norm()))
             .fold(0.0, f64::max);
-        Self { lens, lamps, haze, rays, reach }
+        Self { lens, lamps, haze: OnceLock::new(), water: water.clone(), rays, reach }
+    }
+
+    /// The light that the water throws back; tabulated when it is first asked for.
+    pub(super) fn haze(&self) -> &Haze {
+        self.haze.get_or_init(|| Haze::new(&self.water, &self.lamps, &self.lens))
     }
 
     /// Where a point of the camera's frame (at the middle of the readout) is seen.

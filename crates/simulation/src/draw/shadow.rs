@@ -5,6 +5,7 @@ use seafix_geometry::{Camera, Transform};
 
 use super::{
     eye::Eye,
+    light::Spots,
     outline::{Origin, Outline, outline},
 };
 use crate::optics::{Lamp, Lens, Port, Water};
@@ -86,32 +87,55 @@ impl ShadowMap {
         }
     }
 
-    /// Share of the lamp's light that reaches a place, 0 to 1: bilinear over four pixels of the map.
-    #[inline]
-    pub(super) fn reaches(&self, view: &ShadowView, at: [f32; 3], normal: [f32; 3]) -> f32 {
-        let p: [f32; 3] = std::array::from_fn(|i| at[i] + LIFT * normal[i]);
-        let there: [f32; 3] = std::array::from_fn(|i| {
-            let row = &view.turn[i];
-            row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + view.step[i]
-        });
-        if there[2] < 0.05 {
+    /// Share of the lamp's light that reaches place `i`, 0 to 1: bilinear over four pixels of the map.
+    #[inline(always)]
+    pub(super) fn reaches(&self, places: &MapPlaces, i: usize) -> f32 {
+        let (u, v, own) = (places.u[i], places.v[i], places.inverse[i]);
+        const LAST: f32 = SIDE as f32 - 1.0;
+        if !(u >= 0.0 && v >= 0.0 && u < LAST && v < LAST) {
             return 1.0;
         }
-        let inverse = 1.0 / there[2];
-        let middle = 0.5 * (SIDE as f32 - 1.0);
-        let (u, v) = (there[0] * inverse * FOCAL as f32 + middle, there[1] * inverse * FOCAL as f32 + middle);
-        let last = SIDE as f32 - 1.0;
-        if !(u >= 0.0 && v >= 0.0 && u < last && v < last) {
-            return 1.0;
-        }
-        let (i, j) = (u as usize, v as usize);
-        let (fu, fv) = (u - i as f32, v - j as f32);
-        let own = inverse * BIAS;
+        let (column, row) = (u as i32, v as i32);
+        let (fu, fv) = (u - column as f32, v - row as f32);
         let side = SIDE as usize;
-        let lit = |k: usize| if self.depths[k] <= own { 1.0 } else { 0.0 };
-        let k = j * side + i;
-        let (a, b, c, d): (f32, f32, f32, f32) = (lit(k), lit(k + 1), lit(k + side), lit(k + side + 1));
+        let four = &self.depths[row as usize * side + column as usize..][..side + 2];
+        let lit = |depth: f32| if depth <= own { 1.0_f32 } else { 0.0 };
+        let (a, b, c, d) = (lit(four[0]), lit(four[1]), lit(four[side]), lit(four[side + 1]));
         let (above, below) = (a + fu * (b - a), c + fu * (d - c));
         above + fv * (below - above)
+    }
+}
+
+/// Places of a row in a lamp's map, and their 1/Z there.
+#[derive(Debug, Default)]
+pub(super) struct MapPlaces {
+    u: Vec<f32>,
+    v: Vec<f32>,
+    inverse: Vec<f32>,
+}
+
+/// Looks up where spots lie in a map.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+pub(super) fn map_places(spots: &Spots, view: &ShadowView, out: &mut MapPlaces) {
+    let n = spots.x.len();
+    for list in [&mut out.u, &mut out.v, &mut out.inverse] {
+        list.resize(n, 0.0);
+    }
+    let (x, y, z) = (&spots.x[..n], &spots.y[..n], &spots.z[..n]);
+    let (nx, ny, nz) = (&spots.nx[..n], &spots.ny[..n], &spots.nz[..n]);
+    let (u, v, inverse) = (&mut out.u[..n], &mut out.v[..n], &mut out.inverse[..n]);
+    let middle = 0.5 * (SIDE as f32 - 1.0);
+    for i in 0..n {
+        let p = [x[i] + LIFT * nx[i], y[i] + LIFT * ny[i], z[i] + LIFT * nz[i]];
+        let row = |k: usize| {
+            let turn = &view.turn[k];
+            turn[0] * p[0] + turn[1] * p[1] + turn[2] * p[2] + view.step[k]
+        };
+        let depth = row(2);
+        // Behind the lamp: a place outside the map, which counts as lit; its cosine is none anyway.
+        let scale = if depth > 0.05 { 1.0 / depth } else { -1e9 };
+        u[i] = if depth > 0.05 { row(0) * scale * FOCAL as f32 + middle } else { -1.0 };
+        v[i] = row(1) * scale * FOCAL as f32 + middle;
+        inverse[i] = scale * BIAS;
     }
 }

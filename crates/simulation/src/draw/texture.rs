@@ -1,5 +1,7 @@
 //! How surfaces look up close: tiles with mean 1, as pyramids.
 
+use std::sync::OnceLock;
+
 use super::math::mix;
 use crate::field::Texture;
 
@@ -9,8 +11,9 @@ const SIDE: usize = 1024;
 /// A tile that repeats, with coarser and coarser versions of it.
 #[derive(Debug, Clone)]
 pub(super) struct Tile {
-    /// The levels, finest first; each half the side of the one before.
-    levels: Vec<Vec<u16>>,
+    /// The levels, finest first; each half the side of the one before. A texel comes with its neighbours
+    /// to the right, below, and both: one look-up instead of four.
+    levels: Vec<Vec<[u16; 4]>>,
     /// Texels a metre.
     scale: f32,
 }
@@ -23,10 +26,11 @@ pub(super) struct Look {
     coarse: Tile,
 }
 
-/// All looks.
+/// All looks, each made when it is first seen.
 #[derive(Debug, Clone)]
 pub(crate) struct Looks {
-    looks: [Option<Box<Look>>; 6],
+    looks: [OnceLock<Box<Look>>; 6],
+    seed: u32,
 }
 
 /// One octave of a tile: wavelengths across it, and amplitude.
@@ -43,12 +47,14 @@ impl Tile {
         let mut levels = Vec::new();
         let (mut side, mut level) = (SIDE, finest);
         loop {
-            levels.push(level.iter().map(|x| (x * 16384.0 + 0.5).clamp(0.0, 65535.0) as u16).collect());
+            let at = |x: usize, y: usize| level[(y % side) * side + x % side];
+            let short = |x: usize, y: usize| (at(x, y) * 16384.0 + 0.5).clamp(0.0, 65535.0) as u16;
+            let quad = |x, y| [short(x, y), short(x + 1, y), short(x, y + 1), short(x + 1, y + 1)];
+            levels.push((0..side * side).map(|i| quad(i % side, i / side)).collect());
             if side == 1 {
                 break;
             }
             let half = side / 2;
-            let at = |x: usize, y: usize| level[(y % side) * side + x % side];
             level = (0..half * half)
                 .map(|i| {
                     let (x, y) = (2 * (i % half), 2 * (i / half));
@@ -62,7 +68,7 @@ impl Tile {
 
     /// The value at (u, v) metres for a pixel as wide as `footprint` metres: bilinear in two levels,
     /// linear between them.
-    #[inline]
+    #[inline(always)]
     fn at(&self, u: f32, v: f32, footprint: f32) -> f32 {
         let (u, v) = (u * self.scale, v * self.scale);
         let texels = (footprint * self.scale).max(1.0);
@@ -71,10 +77,11 @@ impl Tile {
         let level = ((bits >> 23) as usize - 127).min(self.levels.len() - 2);
         let between = (texels * f32::from_bits((127 - level as u32) << 23) - 1.0).clamp(0.0, 1.0);
         let fine = self.bilinear(level, u, v);
-        fine + between * (self.bilinear(level + 1, u, v) - fine)
+        // Near by, the finest level is all there is.
+        if between == 0.0 { fine } else { fine + between * (self.bilinear(level + 1, u, v) - fine) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn bilinear(&self, level: usize, u: f32, v: f32) -> f32 {
         let values = &self.levels[level][..];
         let shift = (SIDE.trailing_zeros() as usize) - level;
@@ -84,10 +91,8 @@ impl Tile {
         let (x, y) = (u * scale - 0.5, v * scale - 0.5);
         let (xi, yi) = (floor(x), floor(y));
         let (fx, fy) = (x - xi as f32, y - yi as f32);
-        let (x0, y0) = (xi as usize & mask, yi as usize & mask);
-        let (x1, y1) = ((x0 + 1) & mask, (y0 + 1) & mask);
-        let texel = |x: usize, y: usize| f32::from(values[(y << shift) + x]);
-        let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+        let place = ((yi as usize & mask) << shift) + (xi as usize & mask);
+        let [a, b, c, d] = values[place].map(f32::from);
         let (above, below) = (a + fx * (b - a), c + fx * (d - c));
         (above + fy * (below - above)) * (1.0 / 16384.0)
     }
@@ -101,29 +106,20 @@ fn floor(x: f32) -> i32 {
 }
 
 impl Looks {
-    /// Those looks that `used` names.
-    pub(crate) fn new(used: impl Iterator<Item = Texture>, seed: u32) -> Self {
-        let mut looks: [Option<Box<Look>>; 6] = std::array::from_fn(|_| None);
-        for texture in used.chain([Texture::Growth]) {
-            let slot = &mut looks[texture as usize];
-            if slot.is_none() && texture != Texture::Plain {
-                *slot = Some(Box::new(look(texture, seed)));
-            }
-        }
-        Self { looks }
+    pub(crate) fn new(seed: u32) -> Self {
+        Self { looks: Default::default(), seed }
     }
 
     /// By what the albedo is multiplied at (u, v) of a surface (m), seen by pixels as wide as `footprint` (m).
     #[inline]
     pub(super) fn at(&self, texture: Texture, u: f32, v: f32, footprint: f32) -> f32 {
-        match &self.looks[texture as usize] {
-            None => 1.0,
-            // The coarse tile is turned, so that the two grids do not align.
-            Some(look) => {
-                let (p, q) = (0.8 * u - 0.6 * v, 0.6 * u + 0.8 * v);
-                look.fine.at(u, v, footprint) * look.coarse.at(p, q, footprint)
-            }
+        if texture == Texture::Plain {
+            return 1.0;
         }
+        let look = self.looks[texture as usize].get_or_init(|| Box::new(look(texture, self.seed)));
+        // The coarse tile is turned, so that the two grids do not align.
+        let (p, q) = (0.8 * u - 0.6 * v, 0.6 * u + 0.8 * v);
+        look.fine.at(u, v, footprint) * look.coarse.at(p, q, footprint)
     }
 }
 
@@ -255,7 +251,7 @@ mod tests {
         }
         assert!((sum / n - 1.0).abs() < 0.05);
         assert!((look.fine.at(0.3, 0.4, 1e3) - 1.0).abs() < 1e-3);
-        assert_eq!(Looks::new(std::iter::empty(), 1).at(Texture::Plain, 0.1, 0.2, 0.01), 1.0);
+        assert_eq!(Looks::new(1).at(Texture::Plain, 0.1, 0.2, 0.01), 1.0);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::{
     facet::Facet,
     light::{Beam, Spots, irradiance, through},
     outline::{Origin, Outline, outline},
-    shadow::{ShadowMap, ShadowView},
+    shadow::{MapPlaces, ShadowMap, ShadowView, map_places},
     texture::Looks,
     visibility::{NONE, SAMPLES, Strip, places},
 };
@@ -64,6 +64,8 @@ struct Band {
     through: Vec<f32>,
     light: Vec<f32>,
     lamp: Vec<f32>,
+    haze: Vec<f32>,
+    places: MapPlaces,
     groups: Vec<(u32, f32, [f32; 2])>,
 }
 
@@ -225,9 +227,9 @@ impl Band {
         for (k, beam) in light.beams.iter().enumerate() {
             irradiance(&self.spots, beam, light.c, &mut self.lamp);
             if let (Some(map), Some(view)) = (light.lit.maps.get(k), light.lit.views.get(k)) {
-                let s = &self.spots;
+                map_places(&self.spots, view, &mut self.places);
                 for (i, e) in self.lamp.iter_mut().enumerate().filter(|(_, e)| **e > 0.0) {
-                    *e *= map.reaches(view, [s.x[i], s.y[i], s.z[i]], [s.nx[i], s.ny[i], s.nz[i]]);
+                    *e *= map.reaches(&self.places, i);
                 }
             }
             self.light.iter_mut().zip(&self.lamp).for_each(|(sum, e)| *sum += e);
@@ -241,13 +243,16 @@ impl Band {
             }
         }
         through(&self.range, light.c, &mut self.through);
-        let v = row.number as f32;
+        let mut haze = std::mem::take(&mut self.haze);
+        let table = light.eye.haze();
+        table.along_row(row.number as f32, &mut haze);
         for (i, part) in self.parts.iter().enumerate() {
             let pixel = &mut pixels[part.column as usize];
             let surface = self.albedo[i] * std::f32::consts::FRAC_1_PI * self.light[i] * self.through[i];
             pixel[0] += part.share * surface;
-            pixel[1] += part.share * light.eye.haze.at(part.u, v, self.range[i], self.through[i]);
+            pixel[1] += part.share * table.at(&haze, part.u, self.range[i], self.through[i]);
         }
+        self.haze = haze;
     }
 
     /// The parts of a row's pixels and where they lie.

@@ -1,16 +1,18 @@
 //! One instant of a mission: what a method may see, and apart from it the truth.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix6, Vector6};
 use seafix_geometry::{
-    Camera, MeasuredPoint, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint, World, so3,
+    Camera, Covariance6, MeasuredPoint, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint, World,
+    so3,
 };
 use seafix_vision::{Image, Threads};
 
 use super::PlannedMission;
 use crate::{
-    dive::{RoughPose, VisiblePoint},
+    dive::VisiblePoint,
     draw::{Exposure, Rolling, Shot},
     field::FieldPoint,
+    sensors::{Device, DeviceFault, FaultKind, Rough},
     stream::Purpose,
 };
 
@@ -25,8 +27,8 @@ pub struct Instant<'a> {
     pub index: usize,
     /// When it was taken (ns since 1970).
     pub stamp_ns: u64,
-    /// The rough pose.
-    pub prior: RoughPose,
+    /// The rough pose, where one is known, and its covariance.
+    pub prior: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
     time: f64,
     truth: InstantTruth,
 }
@@ -43,7 +45,10 @@ pub struct InstantTruth {
 impl<'a> Instant<'a> {
     pub(super) fn new(mission: &'a PlannedMission, index: usize, time: f64) -> Self {
         let world_from_camera = mission.camera(time);
-        let prior = rough(mission, index, &world_from_camera);
+        let prior = match &mission.navigation {
+            None => Some(rough(mission, index, &world_from_camera)),
+            Some(navigation) => navigation.at(time).map(|rough| from_sensors(mission, &rough)),
+        };
         let stamp_ns = EPOCH_NS + (time * 1e9).round() as u64;
         let empty = InstantTruth { world_from_camera, visible: Vec::new() };
         let mut instant = Self { mission, index, stamp_ns, prior, time, truth: empty };
@@ -58,8 +63,50 @@ impl<'a> Instant<'a> {
 
     /// The left and the right image: a plain function of the instant, whoever works.
     pub fn render(&self, threads: Threads) -> (Image, Image, Exposure) {
+        let faults = self.mission.settings.faults.iter();
+        let acting = faults.filter(|f| f.device == Device::Images && f.acts(self.time));
+        acting.fold(None, |_, fault| Some(self.failed(fault, threads))).unwrap_or_else(|| self.sound(threads))
+    }
+
+    /// The images of cameras that work.
+    fn sound(&self, threads: Threads) -> (Image, Image, Exposure) {
         let shot = self.shot();
         self.mission.with_memory(threads, |work| self.mission.studio.render(&self.mission.field, &shot, work))
+    }
+
+    /// The images of cameras that fail.
+    fn failed(&self, fault: &DeviceFault, threads: Threads) -> (Image, Image, Exposure) {
+        let mission = self.mission;
+        let earlier = |time: f64, index: usize| Self::new(mission, index, time.max(0.0)).sound(threads);
+        let blank = |level: &mut dyn FnMut() -> f32| {
+            let [width, height] = mission.cameras.lens.camera().size().map(|n| n as usize);
+            let pixels = (0..width * height).map(|_| level()).collect();
+            Image::new(width, height, pixels).expect("a pixel for each place")
+        };
+        let none = Exposure { ms: 0.0, gain: 0.0 };
+        let mut stream = mission.stream(self.index, Purpose::Faults);
+        match fault.kind {
+            FaultKind::Off => (blank(&mut || 0.0), blank(&mut || 0.0), none),
+            FaultKind::Garbage => {
+                let mut any = || (stream.bits() >> 56) as f32;
+                (blank(&mut any), blank(&mut any), none)
+            }
+            FaultKind::Intermittent if stream.unit() < fault.amount => (blank(&mut || 0.0), blank(&mut || 0.0), none),
+            FaultKind::Intermittent => self.sound(threads),
+            FaultKind::Wrong => {
+                let (left, right, exposure) = self.sound(threads);
+                (right, left, exposure)
+            }
+            FaultKind::Stuck => {
+                let first = mission.first_after(fault.from).min(self.index);
+                earlier(mission.time(first), first)
+            }
+            FaultKind::Slow => {
+                let kept = self.index - self.index % 5;
+                earlier(mission.time(kept), kept)
+            }
+            FaultKind::Delayed => earlier(self.time - fault.amount, self.index),
+        }
     }
 
     /// Where the right camera is taken from: later by the error of synchronisation.
@@ -76,7 +123,7 @@ impl<'a> Instant<'a> {
             world_from_left: self.truth.world_from_camera,
             world_from_right: mission.camera(right) * right_from_left.inverse(),
             motion: [mission.motion(self.time), right_from_left.adjoint() * mission.motion(right)],
-            drift: Vector3::zeros(),
+            drift: mission.drift(self.time),
             seeds: [seed(Purpose::LeftImage), seed(Purpose::RightImage)],
         }
     }
@@ -158,14 +205,29 @@ impl<'a> Instant<'a> {
     }
 }
 
-/// The rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the position's
+/// A drawn rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the position's
 /// along the world's.
-fn rough(mission: &PlannedMission, index: usize, truth: &Transform<World, Camera>) -> RoughPose {
+fn rough(
+    mission: &PlannedMission,
+    index: usize,
+    truth: &Transform<World, Camera>,
+) -> (Transform<World, Camera>, Covariance6<World, Camera>) {
     let settings = &mission.settings;
     let mut stream = mission.stream(index, Purpose::Prior);
-    let (position_sigma, attitude_sigma) = (settings.prior_position, settings.prior_attitude_deg.to_radians());
-    let turn = so3::exp(&-stream.normal3(attitude_sigma));
-    let step = stream.normal3(position_sigma);
+    let (position, attitude) = (settings.prior_position, settings.prior_attitude_deg.to_radians());
+    let turn = so3::exp(&-stream.normal3(attitude));
+    let step = stream.normal3(position);
     let world_from_camera = Transform::new(truth.rotation() * turn, truth.translation() - step);
-    RoughPose { world_from_camera, position_sigma, attitude_sigma }
+    // A covariance of zero would claim what no sensor can know.
+    (world_from_camera, Covariance6::isotropic(attitude.max(1e-6), position.max(1e-6)))
+}
+
+/// The rough pose of the camera from that of the vehicle.
+fn from_sensors(mission: &PlannedMission, rough: &Rough) -> (Transform<World, Camera>, Covariance6<World, Camera>) {
+    let world_from_camera = rough.world_from_body * mission.body_from_camera;
+    // ρ lives in the camera's frame.
+    let turn = world_from_camera.rotation_matrix();
+    let mut covariance = Matrix6::from_diagonal_element(rough.attitude * rough.attitude);
+    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&(turn.transpose() * rough.position * turn));
+    (world_from_camera, Covariance6::new(covariance))
 }

@@ -8,4 +8,7 @@ mod settings;
 pub use frame::{Instant, InstantTruth};
 pub use plan::PlannedMission;
 pub use rig::{CalibrationError, FocalIn, RigPlan};
-pub use settings::Mission;
+pub use settings::{Mission, PriorKind};
+
+#[cfg(test)]
+mod tests;

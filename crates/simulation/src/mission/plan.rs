@@ -7,14 +7,15 @@ use seafix_geometry::{Body, Camera, Object, StereoRig, Transform, World};
 use seafix_referencing::Site;
 use seafix_vision::{Threads, Workspace};
 
-use super::{Instant, Mission, rig::Cameras};
+use super::{Instant, Mission, PriorKind, rig::Cameras};
 use crate::{
     draw::{Eye, Looks, Studio},
     field::{Field, SitePlan},
     optics::Lamp,
+    sensors::Navigation,
     stream::{Purpose, Stream},
     survey::SurveyErrors,
-    vehicle::{Goal, RATE, State, Track, Way},
+    vehicle::{Track, Way},
 };
 
 /// Seconds between two looks for collisions.
@@ -30,7 +31,11 @@ pub struct PlannedMission {
     pub(super) cameras: Cameras,
     pub(super) studio: Studio,
     pub(super) track: Track,
+    /// How far the water has carried what floats in it, at the track's times (m).
+    drifts: Vec<Vector3<f64>>,
     pub(super) body_from_camera: Transform<Body, Camera>,
+    /// What the sensors say, where the rough pose comes from them.
+    pub(super) navigation: Option<Navigation>,
     times: Vec<f64>,
     /// Memories of rendering, one for each that renders at once.
     memories: Mutex<Vec<Workspace>>,
@@ -63,8 +68,12 @@ impl PlannedMission {
                 settings.start + if settings.rate > 0.0 { k as f64 / settings.rate } else { even }
             })
             .collect();
-        let track = travel(&way, last + 0.2, &body_from_camera);
-        let studio = build_studio(settings, &field, &cameras, seed, dive);
+        let place = body_from_camera.translation();
+        let (track, drifts) =
+            settings.vehicle.travel(&way, last + 0.2, &place, &field.bed, &settings.current, (seed, dive));
+        let navigation = (settings.prior == PriorKind::Sensors)
+            .then(|| Navigation::new(&settings.sensors, &settings.faults, &track, &field, last + 0.1, (seed, dive)));
+        let studio = build_studio(settings, &cameras, seed, dive);
         let planned = Self {
             settings: settings.clone(),
             seed,
@@ -73,7 +82,9 @@ impl PlannedMission {
             cameras,
             studio,
             track,
+            drifts,
             body_from_camera,
+            navigation,
             times,
             memories: Mutex::new(Vec::new()),
         };
@@ -121,6 +132,16 @@ impl PlannedMission {
         Instant::new(self, index, self.times[index])
     }
 
+    /// The time of a frame (s).
+    pub(super) fn time(&self, index: usize) -> f64 {
+        self.times[index]
+    }
+
+    /// The first frame at or after a time (s).
+    pub(super) fn first_after(&self, time: f64) -> usize {
+        self.times.partition_point(|t| *t < time).min(self.times.len() - 1)
+    }
+
     pub(super) fn stream(&self, frame: usize, purpose: Purpose) -> Stream {
         Stream::new(self.seed, self.dive, frame as u64, purpose)
     }
@@ -133,6 +154,12 @@ impl PlannedMission {
     /// The motion of the left camera at a time, in its own frame (rad/s, m/s).
     pub(super) fn motion(&self, time: f64) -> Vector6<f64> {
         self.body_from_camera.inverse().adjoint() * self.track.at(time).motion
+    }
+
+    /// How far the water has carried what floats in it by a time (s).
+    pub(super) fn drift(&self, time: f64) -> Vector3<f64> {
+        let index = (time * Track::RATE).round().max(0.0) as usize;
+        self.drifts[index.min(self.drifts.len() - 1)]
     }
 
     /// Lends a memory to `work` and takes it back.
@@ -202,28 +229,7 @@ fn mount(ahead: f64) -> Transform<Body, Camera> {
     Transform::from_axes(&axes, Vector3::zeros())
 }
 
-/// The vehicle exactly on its way, level.
-fn travel(way: &Way, duration: f64, body_from_camera: &Transform<Body, Camera>) -> Track {
-    let count = (duration * RATE).ceil() as usize + 2;
-    let goal = |k: usize| way.at(k as f64 / RATE);
-    let pose = |goal: &Goal| {
-        let turn = seafix_geometry::so3::exp(&(Vector3::z() * goal.heading));
-        // The way is that of the cameras.
-        Transform::<World, Body>::new(turn, goal.at - turn * body_from_camera.translation())
-    };
-    let goals: Vec<Goal> = (0..count).map(goal).collect();
-    let states = goals.iter().enumerate().map(|(k, goal)| {
-        let world_from_body = pose(goal);
-        let (a, b) = (goals[k.saturating_sub(1)], goals[(k + 1).min(count - 1)]);
-        let span = ((k + 1).min(count - 1) - k.saturating_sub(1)) as f64 / RATE;
-        let turn = libm::remainder(b.heading - a.heading, std::f64::consts::TAU) / span;
-        let v = world_from_body.rotation().inverse() * goal.velocity;
-        State { world_from_body, motion: Vector6::new(0.0, 0.0, turn, v.x, v.y, v.z) }
-    });
-    Track { states: states.collect() }
-}
-
-fn build_studio(settings: &Mission, field: &Field, cameras: &Cameras, seed: u64, dive: u64) -> Studio {
+fn build_studio(settings: &Mission, cameras: &Cameras, seed: u64, dive: u64) -> Studio {
     let lamps = if settings.lamps.is_empty() { Lamp::pair(settings.rig.baseline) } else { settings.lamps.clone() };
     let place = |p: [f64; 3]| -> [f64; 3] {
         (cameras.right_from_left * seafix_geometry::Point::<Camera>::from(p)).coords.into()
@@ -234,7 +240,7 @@ fn build_studio(settings: &Mission, field: &Field, cameras: &Cameras, seed: u64,
     let right = Eye::new(cameras.lens.clone(), there, &water);
     let bits = |purpose| Stream::new(seed, dive, 0, purpose).bits() as u32;
     let texture = Stream::new(seed, 0, 0, Purpose::Texture).bits() as u32;
-    let looks = Looks::new(field.mesh.skins.iter().map(|skin| skin.texture), texture);
+    let looks = Looks::new(texture);
     Studio::new(
         left,
         right,

@@ -11,11 +11,23 @@ use crate::{
     field::{BUILT_IN, Changes, RandomSite, SitePlan, built_in},
     optics::{Lamp, Water},
     points::PointNoise,
-    vehicle::Route,
+    sensors::{DeviceFault, Sensors},
+    vehicle::{Current, Route, Vehicle},
 };
 
 /// The longest mission (s).
 const LONGEST: f64 = 7200.0;
+
+/// Where the rough pose of a frame comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PriorKind {
+    /// The truth with an error of the given standard deviations.
+    #[default]
+    Drawn,
+    /// The navigation sensors: acoustic fixes, Doppler log, attitude, depth.
+    Sensors,
+}
 
 /// A mission's settings. Every factor at magnitude 0 is the same, bit for bit, as the factor left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,7 +43,9 @@ pub struct Mission {
     pub rate: f64,
     /// When the first is taken (s).
     pub start: f64,
-    /// Standard deviation of the rough pose's position, each world axis (m).
+    /// Where the rough pose comes from.
+    pub prior: PriorKind,
+    /// Standard deviation of the drawn rough pose's position, each world axis (m).
     pub prior_position: f64,
     /// Standard deviation of the rough pose's attitude, each camera axis (degrees).
     pub prior_attitude_deg: f64,
@@ -57,6 +71,14 @@ pub struct Mission {
     pub lamps: Vec<Lamp>,
     /// The way.
     pub route: Route,
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// The current.
+    pub current: Current,
+    /// The navigation sensors.
+    pub sensors: Sensors,
+    /// Devices that fail.
+    pub faults: Vec<DeviceFault>,
     /// The same mission as points.
     pub points: PointNoise,
 }
@@ -69,6 +91,7 @@ impl Default for Mission {
             frames: 70,
             rate: 10.0,
             start: 0.0,
+            prior: PriorKind::Drawn,
             prior_position: 0.1,
             prior_attitude_deg: 0.5,
             model_sigma: 0.001,
@@ -82,6 +105,10 @@ impl Default for Mission {
             water: Water::default(),
             lamps: Vec::new(),
             route: Route::default(),
+            vehicle: Vehicle::default(),
+            current: Current::default(),
+            sensors: Sensors::default(),
+            faults: Vec::new(),
             points: PointNoise::default(),
         }
     }
@@ -116,7 +143,11 @@ impl Mission {
         self.water.check()?;
         in_range(self.lamps.len() <= 16, "lamps", self.lamps.len(), "16 at most")?;
         self.lamps.iter().enumerate().try_for_each(|(k, lamp)| lamp.check(k))?;
-        self.route.check()
+        self.route.check()?;
+        self.vehicle.check()?;
+        self.current.check()?;
+        self.sensors.check()?;
+        self.faults.iter().enumerate().try_for_each(|(k, fault)| fault.check(k))
     }
 
     /// The site; a relative path starts from `folder`.

@@ -100,30 +100,39 @@ impl Haze {
         Self { columns, rows, nodes: 1.0 / step as f32, values, veil, none }
     }
 
-    /// The light from the water up to the range `r` (m) in the direction of a pixel; `through` is exp(−c r).
-    #[inline]
-    pub(crate) fn at(&self, u: f32, v: f32, r: f32, through: f32) -> f32 {
+    /// The table along one row of the image, into the memory of `row`.
+    pub(crate) fn along_row(&self, v: f32, row: &mut Vec<f32>) {
+        row.clear();
+        if self.none {
+            return;
+        }
+        let y = (v * self.nodes).max(0.0);
+        let j = (y as usize).min(self.rows - 2);
+        let f = y - j as f32;
+        let length = self.columns * RANGES;
+        let (above, below) = (&self.values[j * length..][..length], &self.values[(j + 1) * length..][..length]);
+        row.extend(above.iter().zip(below).map(|(a, b)| a + f * (b - a)));
+    }
+
+    /// The light from the water up to the range `r` (m) at a column of the row that
+    /// [`along_row`](Self::along_row) has prepared; `through` is exp(−c r).
+    #[inline(always)]
+    pub(crate) fn at(&self, row: &[f32], u: f32, r: f32, through: f32) -> f32 {
         if self.none {
             return 0.0;
         }
-        let cell = |x: f32, n: usize| {
-            let x = (x * self.nodes).max(0.0);
-            let k = (x as usize).min(n - 2);
-            (k, x - k as f32)
-        };
-        let ((i, fu), (j, fv)) = (cell(u, self.columns), cell(v, self.rows));
+        let x = (u * self.nodes).max(0.0);
+        let i = (x as usize).min(self.columns - 2);
+        let fu = x - i as f32;
         let t = (r * (1.0 / REACH as f32)).min(1.0).sqrt() * (RANGES - 1) as f32;
         let k = (t as usize).min(RANGES - 2);
         // Linear in the range itself: between its two nodes.
-        let (low, high) = (k as f32 * k as f32, (k + 1) as f32 * (k + 1) as f32);
-        let fr = ((t * t - low) / (high - low)).min(1.0);
-        let node = |row: usize, column: usize| {
-            let values = &self.values[(row * self.columns + column) * RANGES + k..][..2];
-            values[0] + fr * (values[1] - values[0])
-        };
-        let above = node(j, i) + fu * (node(j, i + 1) - node(j, i));
-        let below = node(j + 1, i) + fu * (node(j + 1, i + 1) - node(j + 1, i));
-        above + fv * (below - above) + self.veil * (1.0 - through)
+        let low = k as f32 * k as f32;
+        let fr = ((t * t - low) / (2 * k + 1) as f32).min(1.0);
+        let values = &row[i * RANGES + k..][..RANGES + 2];
+        let near = values[0] + fr * (values[1] - values[0]);
+        let next = values[RANGES] + fr * (values[RANGES + 1] - values[RANGES]);
+        near + fu * (next - near) + self.veil * (1.0 - through)
     }
 }
 
@@ -169,11 +178,13 @@ mod tests {
         let water = Water { attenuation: 0.6, ..Water::default() };
         let lamps = Lamp::pair(0.25);
         let haze = Haze::new(&water, &lamps, &lens());
+        let mut row = Vec::new();
         for (u, v) in [(0.0, 0.0), (127.5, 95.5), (31.0, 150.0), (250.0, 20.0), (77.0, 103.0)] {
             for r in [0.7, 1.3, 2.0, 3.3, 5.0] {
                 let exact = direct(&water, &lamps, &Pixel { u, v }, r);
                 let through = libm::exp(-0.6 * r) as f32;
-                let table = f64::from(haze.at(u as f32, v as f32, r as f32, through));
+                haze.along_row(v as f32, &mut row);
+                let table = f64::from(haze.at(&row, u as f32, r as f32, through));
                 assert!((table / exact - 1.0).abs() < 0.01, "{u} {v} {r}: {table} for {exact}");
             }
         }
@@ -206,7 +217,7 @@ mod tests {
         assert!(sums.windows(2).all(|w| w[1] >= w[0]));
         assert!(sums[RANGES - 1] / sums[RANGES - 10] < 1.001);
         for none in [Water { attenuation: 0.0, ..Water::default() }, Water { albedo: 0.0, ..Water::default() }] {
-            assert_eq!(Haze::new(&none, &lamps, &lens()).at(3.0, 4.0, 2.0, 1.0), 0.0);
+            assert_eq!(Haze::new(&none, &lamps, &lens()).at(&[], 3.0, 2.0, 1.0), 0.0);
         }
     }
 }

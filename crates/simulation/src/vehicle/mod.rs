@@ -1,8 +1,15 @@
-//! The vehicle: where it is meant to go, and where it goes.
+//! The vehicle: where it is meant to go, what moves it, and where it goes.
 
+mod controller;
+mod current;
+mod model;
 mod route;
 mod track;
 
-pub(crate) use route::{Goal, Way};
+pub use controller::{Vehicle, VehicleKind};
+pub use current::Current;
+pub(crate) use route::Way;
 pub use route::{Route, RouteKind};
-pub(crate) use track::{RATE, State, Track};
+#[cfg(test)]
+pub(crate) use track::State;
+pub(crate) use track::Track;

@@ -146,7 +146,7 @@ impl Way {
         Ok(Self::through(places, look_at, route.speed))
     }
 
-    fn through(places: Vec<Vector3<f64>>, look_at: Option<Vector2<f64>>, speed: f64) -> Self {
+    pub(super) fn through(places: Vec<Vector3<f64>>, look_at: Option<Vector2<f64>>, speed: f64) -> Self {
         let mut lengths = vec![0.0];
         for pair in places.windows(2) {
             lengths.push(lengths[lengths.len() - 1] + (pair[1] - pair[0]).norm());

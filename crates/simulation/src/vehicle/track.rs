@@ -4,7 +4,7 @@ use nalgebra::{Vector3, Vector6};
 use seafix_geometry::{Body, Transform, World, so3};
 
 /// States a second.
-pub(crate) const RATE: f64 = 100.0;
+pub(super) const RATE: f64 = 100.0;
 
 /// The vehicle at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +21,9 @@ pub(crate) struct Track {
 }
 
 impl Track {
+    /// States a second.
+    pub(crate) const RATE: f64 = RATE;
+
     /// The state at a time (s): a cubic through the neighbouring states' places and velocities, the turn
     /// between their attitudes at an even rate.
     pub(crate) fn at(&self, time: f64) -> State {

@@ -1,0 +1,159 @@
+use std::path::Path;
+
+use seafix_geometry::Point;
+use seafix_vision::Threads;
+
+use super::*;
+use crate::{
+    field::Changes,
+    optics::{Port, PortKind, Water},
+    sensors::{Acoustic, Device, DeviceFault, FaultKind, Sensors},
+    vehicle::{Current, Route, RouteKind, Vehicle, VehicleKind},
+};
+
+/// A small, quick mission that still sees objects.
+fn small() -> Mission {
+    let rig = RigPlan { size: [256, 192], focal: 125.0, ..RigPlan::default() };
+    Mission { frames: 6, rate: 0.5, rig, ..Mission::default() }
+}
+
+fn planned(mission: &Mission) -> PlannedMission {
+    mission.plan(5, 0, Path::new("")).unwrap()
+}
+
+#[test]
+fn epipolar_geometry_is_exact_in_the_ideal_rig() {
+    let mission = Mission { survey_sigma: 0.0, model_sigma: 0.0, ..small() };
+    let plan = planned(&mission);
+    let mut seen = 0;
+    for index in 0..plan.len() {
+        let instant = plan.instant(index);
+        let truth = instant.truth();
+        for v in &truth.visible {
+            let at = truth.world_from_camera.inverse() * Point::from(plan.field.objects[v.object].points[v.point].at);
+            assert!((v.pixels.left.v - v.pixels.right.v).abs() < 1e-9);
+            let disparity = v.pixels.left.u - v.pixels.right.u;
+            assert!((disparity - 125.0 * 0.25 / at.coords.z).abs() < 1e-9);
+            seen += 1;
+        }
+    }
+    assert!(seen > 10, "{seen}");
+}
+
+#[test]
+fn a_frame_is_a_function_of_seed_dive_and_index() {
+    let (first, longer) = (planned(&small()), planned(&Mission { frames: 20, ..small() }));
+    for index in [5, 0, 2] {
+        let (a, b) = (first.instant(index), longer.instant(index));
+        assert_eq!((a.truth(), a.prior, a.stamp_ns), (b.truth(), b.prior, b.stamp_ns));
+        assert_eq!(a.render(Threads::One), b.render(Threads::Pool));
+        assert_eq!(a.points(), b.points());
+    }
+    let other = small().plan(5, 1, Path::new("")).unwrap();
+    assert_eq!(first.site(), other.site());
+    assert_ne!(first.instant(1).render(Threads::One), other.instant(1).render(Threads::One));
+}
+
+#[test]
+fn what_is_switched_on_at_nothing_changes_nothing() {
+    let plain = planned(&small());
+    let base = plain.instant(3);
+    let expected = (base.render(Threads::One), base.points());
+    let fault = |kind, amount, to| DeviceFault { device: Device::Images, kind, from: 1.0, to, amount };
+    let mission = Mission {
+        changes: Changes { objects: vec!["plet".into()], ..Changes::default() },
+        current: Current { speed: 0.0, towards_deg: 10.0, ..Current::default() },
+        faults: vec![
+            fault(FaultKind::Off, 0.5, 1.0),
+            fault(FaultKind::Intermittent, 0.0, 99.0),
+            fault(FaultKind::Delayed, 0.0, 99.0),
+        ],
+        imager: crate::Imager { sync_ms: 0.0, readout_ms: 0.0, ..small().imager },
+        ..small()
+    };
+    let plan = planned(&mission);
+    let instant = plan.instant(3);
+    assert_eq!((instant.render(Threads::One), instant.points()), expected);
+}
+
+#[test]
+fn a_right_image_taken_late_shifts_by_speed_times_delay() {
+    // Sideways along the baseline: depth errs by Z v dt / b, disparity by f v dt / Z.
+    let along = Route {
+        kind: RouteKind::Waypoints,
+        speed: 0.5,
+        waypoints: vec![[-6.0, -3.0, 4.0], [6.0, -3.0, 4.0]],
+        ..Route::default()
+    };
+    let rail = Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() };
+    let still = Mission { route: along, vehicle: rail, frames: 3, rate: 0.2, start: 8.0, ..small() };
+    let late = Mission { imager: crate::Imager { sync_ms: 20.0, ..still.imager.clone() }, ..still.clone() };
+    let (on_time, delayed) = (planned(&still), planned(&late));
+    let (a, b) = (on_time.instant(0), delayed.instant(0));
+    let mut n = 0;
+    for seen in &a.truth().visible {
+        let Some(other) = b.truth().visible.iter().find(|v| (v.object, v.point) == (seen.object, seen.point)) else {
+            continue;
+        };
+        assert_eq!(seen.pixels.left, other.pixels.left);
+        // The vehicle flies north, ahead in the image is up: what is seen later lies lower.
+        let at = a.truth().world_from_camera.inverse()
+            * Point::from(on_time.field.objects[seen.object].points[seen.point].at);
+        let expected = 125.0 * 0.5 * 0.02 / at.coords.z;
+        assert!((other.pixels.right.v - seen.pixels.right.v - expected).abs() < 0.3 * expected);
+        n += 1;
+    }
+    assert!(n > 2);
+}
+
+#[test]
+fn rough_poses_come_from_the_sensors_when_asked() {
+    let quiet = Acoustic { outliers: 0.0, dropouts: 0.0, ..Acoustic::default() };
+    let sensors = Sensors { acoustic: quiet, ..Sensors::default() };
+    let mission = Mission { prior: PriorKind::Sensors, sensors, start: 4.0, ..small() };
+    let plan = planned(&mission);
+    for index in 0..plan.len() {
+        let instant = plan.instant(index);
+        let (pose, covariance) = instant.prior.unwrap();
+        let miss = (pose.translation() - instant.truth().world_from_camera.translation()).norm();
+        assert!(miss < 4.0 * covariance.position_sigma(), "{miss} of {}", covariance.position_sigma());
+        assert!((0.05..1.0).contains(&covariance.position_sigma()));
+    }
+    let deaf = DeviceFault { device: Device::Acoustic, kind: FaultKind::Off, from: 0.0, to: 1e6, amount: 0.0 };
+    assert!(planned(&Mission { faults: vec![deaf], ..mission }).instant(0).prior.is_none());
+}
+
+#[test]
+fn a_way_through_an_object_is_refused_with_place_and_time() {
+    let low = Route { kind: RouteKind::Orbit, altitude: 0.6, radius: 0.8, ..Route::default() };
+    let faults = Mission { route: low, vehicle: Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() }, ..small() }
+        .plan(1, 0, Path::new(""))
+        .unwrap_err();
+    let line = faults[0].to_string();
+    assert!(line.contains("near `manifold` after 0.0 s, at north"), "{line}");
+    assert!(!line.contains('\n'));
+}
+
+#[test]
+fn numbers_that_make_no_mission_are_refused() {
+    let message = |mission: Mission| mission.plan(1, 0, Path::new("")).unwrap_err()[0].to_string();
+    let water = |attenuation| Water { attenuation, ..Water::default() };
+    assert!(message(Mission { water: water(-1.0), ..small() }).starts_with("water.attenuation = -1; give a number"));
+    assert!(message(Mission { frames: 0, ..small() }).starts_with("frames = 0; give"));
+    assert!(message(Mission { rate: f64::NAN, ..small() }).starts_with("rate = NaN; give"));
+    assert!(message(Mission { site: "atlantis".into(), ..small() }).starts_with("no site is called `atlantis`"));
+    let route = Route { object: "tree-z".into(), kind: RouteKind::Orbit, ..Route::default() };
+    assert!(message(Mission { route, ..small() }).starts_with("route.object = `tree-z`; give one of "));
+    let flat = Port { kind: PortKind::Flat, water: 0.5, ..Port::default() };
+    assert!(
+        message(Mission { rig: RigPlan { port: flat, ..RigPlan::default() }, ..small() })
+            .starts_with("rig.port.water = 0.5")
+    );
+}
+
+#[test]
+fn settings_without_a_number_are_the_defaults() {
+    assert_eq!(toml::from_str::<Mission>("").unwrap(), Mission::default());
+    let unknown = toml::from_str::<Mission>("[watr]\nattenuation = 1.0").unwrap_err();
+    assert!(unknown.message().contains("unknown field"));
+}

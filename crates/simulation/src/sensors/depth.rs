@@ -1,0 +1,51 @@
+//! The pressure sensor.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Reading, within};
+use crate::{
+    stream::{Purpose, Stream},
+    vehicle::Track,
+};
+
+/// Depth from pressure: a bias of the dive (tide, density), and white noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct DepthGauge {
+    /// Standard deviation of the bias (m).
+    pub bias: f64,
+    /// Standard deviation of the noise (m).
+    pub sigma: f64,
+    /// Readings a second.
+    pub rate: f64,
+    /// How late a reading comes (s).
+    pub latency: f64,
+}
+
+impl Default for DepthGauge {
+    fn default() -> Self {
+        Self { bias: 0.1, sigma: 0.02, rate: 5.0, latency: 0.02 }
+    }
+}
+
+impl DepthGauge {
+    pub(super) fn check(&self) -> Result<(), String> {
+        let within = |name, x, low, high| within("depth", name, x, low, high);
+        within("bias", self.bias, 0.0, 100.0)?;
+        within("sigma", self.sigma, 0.0, 100.0)?;
+        within("rate", self.rate, 1e-3, 1e3)?;
+        within("latency", self.latency, 0.0, 60.0)
+    }
+
+    /// The readings up to `until` (s): depth (m).
+    pub(crate) fn readings(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<Reading<f64>> {
+        let bias = self.bias * Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Depth).normal();
+        let reading = |k: u64| {
+            let time = k as f64 / self.rate;
+            let noise = self.sigma * Stream::new(seeds.0, seeds.1, k, Purpose::Depth).normal();
+            let value = track.at(time).world_from_body.translation().z + bias + noise;
+            Reading { time, arrival: time + self.latency, value }
+        };
+        (0..=(until * self.rate) as u64).map(reading).collect()
+    }
+}

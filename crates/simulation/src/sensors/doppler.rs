@@ -1,0 +1,82 @@
+//! The Doppler velocity log.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::{Reading, within};
+use crate::{
+    field::Field,
+    stream::{Purpose, Stream},
+    vehicle::Track,
+};
+
+/// Angle of the four beams to the vertical (degrees).
+const BEAM_DEG: f64 = 30.0;
+/// Share of beams on a structure that give a velocity.
+const ON_STRUCTURE: f64 = 0.5;
+
+/// Velocity over ground in the body frame: a scale error of the dive, and white noise. It needs three of
+/// four beams; those that meet a structure fail half of the time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Doppler {
+    /// Standard deviation of the scale error (relative).
+    pub scale: f64,
+    /// Standard deviation of the noise, each axis (m/s).
+    pub sigma: f64,
+    /// Pings a second.
+    pub rate: f64,
+    /// Least and greatest length of a beam (m).
+    pub reach: [f64; 2],
+    /// How late a reading comes (s).
+    pub latency: f64,
+}
+
+impl Default for Doppler {
+    fn default() -> Self {
+        Self { scale: 0.002, sigma: 0.004, rate: 5.0, reach: [0.4, 100.0], latency: 0.05 }
+    }
+}
+
+impl Doppler {
+    pub(super) fn check(&self) -> Result<(), String> {
+        let within = |name, x, low, high| within("doppler", name, x, low, high);
+        within("scale", self.scale, 0.0, 0.5)?;
+        within("sigma", self.sigma, 0.0, 10.0)?;
+        within("rate", self.rate, 1e-3, 100.0)?;
+        within("reach[0]", self.reach[0], 0.0, 100.0)?;
+        within("reach[1]", self.reach[1], self.reach[0], 1e4)?;
+        within("latency", self.latency, 0.0, 60.0)
+    }
+
+    /// The readings up to `until` (s): velocity over ground, body frame (m/s).
+    pub(crate) fn readings(
+        &self,
+        track: &Track,
+        field: &Field,
+        until: f64,
+        seeds: (u64, u64),
+    ) -> Vec<Reading<Vector3<f64>>> {
+        let scale = 1.0 + self.scale * Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Doppler).normal();
+        let reading = |k: u64| {
+            let time = k as f64 / self.rate;
+            let mut stream = Stream::new(seeds.0, seeds.1, k, Purpose::Doppler);
+            let state = track.at(time);
+            let noise = stream.normal3(self.sigma);
+            let (sine, cosine) = libm::sincos(BEAM_DEG.to_radians());
+            let from = state.world_from_body.translation();
+            let beams = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|[x, y]: [f64; 2]| {
+                let slant = sine * std::f64::consts::FRAC_1_SQRT_2;
+                let along = state.world_from_body.rotation() * Vector3::new(x * slant, y * slant, cosine);
+                let luck = stream.unit() < ON_STRUCTURE;
+                let Some(length) = field.hit(&from, &along) else { return false };
+                let on_bed = field.bed.hit(&from, &along).is_some_and(|t| t <= length);
+                length >= self.reach[0] && length <= self.reach[1] && (on_bed || luck)
+            });
+            let locked = beams.iter().filter(|b| **b).count() >= 3;
+            let value = state.motion.fixed_rows::<3>(3).into_owned() * scale + noise;
+            locked.then_some(Reading { time, arrival: time + self.latency, value })
+        };
+        (0..=(until * self.rate) as u64).filter_map(reading).collect()
+    }
+}

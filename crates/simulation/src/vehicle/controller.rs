@@ -1,0 +1,234 @@
+//! The vehicle under control: a PID controller that follows the way.
+
+use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
+use seafix_component::in_range;
+use seafix_geometry::{Body, Transform, so3};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    current::{Current, Fluctuation},
+    model::{Model, Motion},
+    route::{Goal, Way},
+    track::{RATE, State, Track},
+};
+use crate::bed::Bed;
+
+/// The vehicles there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VehicleKind {
+    /// No vehicle: the cameras go exactly the way.
+    Rail,
+    /// A hovering vehicle of 200 kg with five thrusters.
+    #[default]
+    Hover200,
+    /// BlueROV2 Heavy.
+    Bluerov2Heavy,
+}
+
+/// The vehicle and its controller: forces are proportional to the error of place and velocity and to the
+/// error's integral, each scaled by the vehicle's mass.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Vehicle {
+    /// Which vehicle.
+    pub kind: VehicleKind,
+    /// Force for a metre of error, for each kilogram (1/s²).
+    pub proportional: f64,
+    /// Force for a metre per second of error, for each kilogram (1/s).
+    pub derivative: f64,
+    /// Force for a metre·second of error, for each kilogram (1/s³).
+    pub integral: f64,
+}
+
+impl Default for Vehicle {
+    fn default() -> Self {
+        Self { kind: VehicleKind::Hover200, proportional: 0.6, derivative: 1.4, integral: 0.06 }
+    }
+}
+
+impl Vehicle {
+    pub(crate) fn check(&self) -> Result<(), String> {
+        for (name, x) in
+            [("proportional", self.proportional), ("derivative", self.derivative), ("integral", self.integral)]
+        {
+            in_range((0.0..=10.0).contains(&x), &format!("vehicle.{name}"), x, "a number from 0 to 10")?;
+        }
+        Ok(())
+    }
+
+    /// Where it goes, and how far the water has carried what floats in it, both at the states' times.
+    pub(crate) fn travel(
+        &self,
+        way: &Way,
+        duration: f64,
+        body_from_camera: &Vector3<f64>,
+        bed: &Bed,
+        current: &Current,
+        seeds: (u64, u64),
+    ) -> (Track, Vec<Vector3<f64>>) {
+        let count = (duration * RATE).ceil() as usize + 2;
+        let goals: Vec<Goal> = (0..count).map(|k| way.at(k as f64 / RATE)).collect();
+        let mut fluctuation = Fluctuation::new(current, seeds.0, seeds.1);
+        let dt = 1.0 / RATE;
+        let model = match self.kind {
+            VehicleKind::Rail => None,
+            VehicleKind::Hover200 => Some(Model::hover_200()),
+            VehicleKind::Bluerov2Heavy => Some(Model::bluerov2_heavy()),
+        };
+        let mut pilot = model.map(|model| Pilot::new(self, model, &goals[0], body_from_camera));
+        let mut drift = Vector3::zeros();
+        let (mut states, mut drifts) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for k in 0..count {
+            let goal = &goals[k];
+            let height = bed.depth() - goal.at.z;
+            let flow = current.velocity(height, &fluctuation.now);
+            drifts.push(drift);
+            match &mut pilot {
+                None => states.push(on_rails(&goals, k, body_from_camera)),
+                Some(pilot) => {
+                    states.push(pilot.state(&flow));
+                    let before = &goals[k.saturating_sub(1)];
+                    pilot.step(before, goal, &flow, dt);
+                }
+            }
+            drift += flow * dt;
+            fluctuation.step(dt);
+        }
+        (Track { states }, drifts)
+    }
+}
+
+fn upright(heading: f64) -> UnitQuaternion<f64> {
+    so3::exp(&(Vector3::z() * heading))
+}
+
+/// Exactly on the way, level.
+fn on_rails(goals: &[Goal], k: usize, camera: &Vector3<f64>) -> State {
+    let goal = &goals[k];
+    let turn = upright(goal.heading);
+    let (first, last) = (k.saturating_sub(1), (k + 1).min(goals.len() - 1));
+    let span = (last - first) as f64 / RATE;
+    let rate = libm::remainder(goals[last].heading - goals[first].heading, std::f64::consts::TAU) / span;
+    let v = turn.inverse() * goal.velocity;
+    let world_from_body = Transform::new(turn, goal.at - turn * camera);
+    State { world_from_body, motion: Vector6::new(0.0, 0.0, rate, v.x, v.y, v.z) }
+}
+
+/// The vehicle with what its controller remembers.
+struct Pilot {
+    model: Model,
+    allocation: nalgebra::DMatrix<f64>,
+    gains: [f64; 3],
+    motion: Motion,
+    /// Integral of the error of place (world) and of heading.
+    sum: Vector3<f64>,
+    turned: f64,
+    camera: Vector3<f64>,
+}
+
+impl Pilot {
+    fn new(settings: &Vehicle, model: Model, goal: &Goal, camera: &Vector3<f64>) -> Self {
+        let turn = upright(goal.heading);
+        let v = turn.inverse() * goal.velocity;
+        let motion = Motion {
+            at: goal.at - turn * camera,
+            turn,
+            nu: Vector6::new(v.x, v.y, v.z, 0.0, 0.0, 0.0),
+            thrusts: vec![0.0; model.thrusters.len()],
+        };
+        let gains = [settings.proportional, settings.derivative, settings.integral];
+        Self {
+            allocation: model.allocation(),
+            model,
+            gains,
+            motion,
+            sum: Vector3::zeros(),
+            turned: 0.0,
+            camera: *camera,
+        }
+    }
+
+    /// The state over ground; (ω, v) in the order of this crate.
+    fn state(&self, flow: &Vector3<f64>) -> State {
+        let Motion { at, turn, nu, .. } = &self.motion;
+        let v = nu.fixed_rows::<3>(0).into_owned() + turn.inverse() * flow;
+        let motion = Vector6::new(nu[3], nu[4], nu[5], v.x, v.y, v.z);
+        State { world_from_body: Transform::<_, Body>::new(*turn, *at), motion }
+    }
+
+    fn step(&mut self, before: &Goal, goal: &Goal, flow: &Vector3<f64>, dt: f64) {
+        let [p, d, i] = self.gains;
+        let now = self.state(flow);
+        let turn = self.motion.turn;
+        let heading = libm::atan2((turn * Vector3::x()).y, (turn * Vector3::x()).x);
+        let error = goal.at - upright(goal.heading) * self.camera - self.motion.at;
+        let slip = goal.velocity - turn * now.motion.fixed_rows::<3>(3).into_owned();
+        // The integral waits while the error is large: it is for what is steady.
+        if error.norm() < 1.0 {
+            self.sum += error * dt;
+        }
+        let astray = libm::remainder(goal.heading - heading, std::f64::consts::TAU);
+        let rate = libm::remainder(goal.heading - before.heading, std::f64::consts::TAU) / dt;
+        self.turned += if astray.abs() < 0.5 { astray * dt } else { 0.0 };
+        let m = self.model.inertia_matrix().diagonal();
+        let along = turn.inverse() * (error * p + slip * d + self.sum * i);
+        // What the drag of the wanted speed takes is given in advance.
+        let through = turn.inverse() * (goal.velocity - flow);
+        let ahead = |k: usize| (self.model.linear[k] + self.model.quadratic[k] * through[k].abs()) * through[k];
+        let force = |k: usize| m[k] * along[k] + ahead(k);
+        let yaw = m[5] * (2.0 * p * astray + 1.6 * d * (rate - now.motion[2]) + i * self.turned);
+        // Pitch is held at zero; roll rights itself.
+        let pitch = libm::asin((-(turn * Vector3::x()).z).clamp(-1.0, 1.0));
+        let level = m[4] * (-2.0 * p * pitch - 1.6 * d * now.motion[1]);
+        let wanted = DVector::from_column_slice(&[force(0), force(1), force(2), 0.0, level, yaw]);
+        let commands = self.model.saturated(&(&self.allocation * wanted));
+        self.motion = self.model.step(&self.motion, &commands, flow, dt);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn travel(kind: VehicleKind, current: &Current, speed: f64) -> (Track, Way) {
+        let places = vec![Vector3::new(0.0, 0.0, 36.0), Vector3::new(8.0, 0.0, 36.0), Vector3::new(8.0, 6.0, 36.0)];
+        let way = Way::through(places, None, speed);
+        let bed = Bed::with_relief(40.0, 0.0, 1);
+        let vehicle = Vehicle { kind, ..Vehicle::default() };
+        let duration = way.length() / speed + 5.0;
+        (vehicle.travel(&way, duration, &Vector3::zeros(), &bed, current, (1, 0)).0, way)
+    }
+
+    fn astray(track: &Track, way: &Way) -> f64 {
+        let after = (3.0 * RATE) as usize;
+        let error = |(k, s): (usize, &State)| (s.world_from_body.translation() - way.at(k as f64 / RATE).at).norm();
+        track.states.iter().enumerate().skip(after).map(error).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn vehicles_keep_to_their_way_also_in_a_current() {
+        let calm = Current::default();
+        let flow = Current { speed: 0.2, sigma: 0.03, ..Current::default() };
+        for (kind, speed) in [(VehicleKind::Hover200, 0.5), (VehicleKind::Bluerov2Heavy, 0.3)] {
+            for current in [&calm, &flow] {
+                let (track, way) = travel(kind, current, speed);
+                let most = astray(&track, &way);
+                assert!(most < 0.35, "{kind:?} {current:?}: {most}");
+            }
+        }
+        let (track, way) = travel(VehicleKind::Rail, &flow, 0.5);
+        assert!(astray(&track, &way) < 1e-12);
+    }
+
+    #[test]
+    fn motion_is_the_derivative_of_the_pose() {
+        let (track, _) = travel(VehicleKind::Hover200, &Current { speed: 0.1, ..Current::default() }, 0.5);
+        for k in (200..2000).step_by(150) {
+            let (a, b) = (&track.states[k], &track.states[k + 1]);
+            let step = a.world_from_body.inverse() * b.world_from_body;
+            let mean = (a.motion + b.motion) * 0.5;
+            assert!((step.log() * RATE - mean).norm() < 2e-3, "{k}");
+        }
+    }
+}
