@@ -53,7 +53,7 @@ impl Graph {
         });
         let extent = columns.at[..6].iter().flatten().fold(0.0f32, |most, x| most.max(x.abs()));
         // Without a prior any turn is allowed; far beyond 2 it stays a finite number.
-        let gate = Gate { turn: turn.min(1e6) as f32, rounding: ROUNDING * extent + 1e-7 };
+        let gate = Gate { turn: turn.min(1e6) as f32, rounding: ROUNDING * extent };
         let mut row = vec![0; words];
         for a in 0..count {
             let from = graph.starts[graph.rank[a] as usize + 1];
@@ -154,7 +154,7 @@ impl Columns {
 }
 
 /// A share of a bound of Δ: that of two pairs is at most the sum of theirs.
-fn reach(problem: &Problem<'_>, pair: Correspondence) -> f64 {
+pub(in crate::search) fn reach(problem: &Problem<'_>, pair: Correspondence) -> f64 {
     match problem.tolerance {
         Tolerance::Fixed(delta) => 0.5 * delta,
         Tolerance::Sigmas(k) => {

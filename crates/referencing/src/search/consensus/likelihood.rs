@@ -13,6 +13,11 @@ use crate::{Correspondence, Problem, Tolerance};
 /// A pair further from where the pose puts it than this is no part of it (χ²₃).
 const FAR: f64 = 25.0;
 
+/// A fit whose step is shorter than this (squared, in standard deviations) has converged.
+const CONVERGED: f64 = 1e-12;
+/// What rounding may cost a coordinate, as a share of the greatest.
+const ROUNDING: f64 = 1e-9;
+
 /// What the pairs of a problem say when they are true.
 ///
 /// A true pair contributes ln N(c − p; 0, Σ) − ln ρ to the log-likelihood ratio against clutter, ρ (1/m³) the
@@ -49,7 +54,7 @@ impl Terms {
         // Points that are called exact are taken to be as good as a tenth of what the tolerance allows each.
         let least = match problem.tolerance {
             Tolerance::Fixed(delta) => (0.05 * delta).powi(2),
-            Tolerance::Sigmas(_) => 1e-12,
+            Tolerance::Sigmas(_) => (ROUNDING * extent(problem)).powi(2),
         };
         // Many pairs share a covariance: the last inverse is kept.
         let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64)> = None;
@@ -86,6 +91,11 @@ impl Terms {
     }
 }
 
+/// The greatest coordinate of the model (m).
+fn extent(problem: &Problem<'_>) -> f64 {
+    problem.model.iter().map(|point| point.at.coords.amax()).fold(f64::MIN_POSITIVE, f64::max)
+}
+
 /// The information of a measurement's error and ln of its density at zero; one without a covariance says nothing.
 fn peak(noise: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
     match noise.cholesky() {
@@ -111,7 +121,8 @@ fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
             let half = spread * super::rough::BOUND_SIGMAS;
             let inside = |at: &Vector3<f64>| (0..3).all(|axis| (at[axis] - place[axis]).abs() <= half[axis]);
             let count = problem.cloud.iter().filter(|point| inside(&point.position.at.coords)).count();
-            libm::log(count.max(1) as f64) - (half * 2.0).iter().map(|side| libm::log(side.max(1e-6))).sum::<f64>()
+            libm::log(count.max(1) as f64)
+                - (half * 2.0).iter().map(|side| libm::log(side.max(f64::MIN_POSITIVE))).sum::<f64>()
         })
         .collect()
 }
@@ -211,7 +222,8 @@ pub(in crate::search) fn fit(
         let step = chol.solve(&g);
         motion = motion.moved(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into(), &about);
         factor = Some(chol);
-        if step.norm_squared() < 1e-12 {
+        // The Newton decrement: the square of the step in standard deviations.
+        if step.dot(&g) < CONVERGED {
             break;
         }
     }

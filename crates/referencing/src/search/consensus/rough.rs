@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use seafix_geometry::so3::skew;
 
-use super::Motion;
-use crate::{Prior, PriorBound, Problem};
+use super::{Motion, graph::reach};
+use crate::{Correspondence, Prior, PriorBound, Problem};
 
 /// A bound of the prior is taken for so many standard deviations: bounds are given so that they hold.
 pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
@@ -100,13 +100,22 @@ fn covariance(problem: &Problem<'_>, prior: &Prior, motion: &Motion, at: &Vector
     }
 }
 
-/// Volume of the cloud's box (m³), each side at least as long as the tolerance.
+/// All candidate pairs.
+fn candidates(problem: &Problem<'_>) -> impl Iterator<Item = Correspondence> {
+    let lists = problem.candidates.lists.iter().enumerate();
+    lists.flat_map(|(model, list)| list.iter().map(move |&cloud| Correspondence { model, cloud }))
+}
+
+/// Volume of the box (m³) of all cloud points that are candidates, each side at least as long as the greatest
+/// tolerance of one of them.
 pub(in crate::search) fn box_volume(problem: &Problem<'_>) -> f64 {
     let (mut low, mut high) = (Vector3::from_element(f64::INFINITY), Vector3::from_element(f64::NEG_INFINITY));
-    for point in problem.cloud {
-        (low, high) = (low.inf(&point.position.at.coords), high.sup(&point.position.at.coords));
+    for pair in candidates(problem) {
+        let at = &problem.cloud[pair.cloud].position.at.coords;
+        (low, high) = (low.inf(at), high.sup(at));
     }
-    (high - low).iter().map(|side| side.max(0.1)).product()
+    let least = candidates(problem).map(|pair| reach(problem, pair)).fold(f64::MIN_POSITIVE, f64::max);
+    (high - low).iter().map(|side| side.max(least)).product()
 }
 
 /// The rotation vector of a rotation matrix.
