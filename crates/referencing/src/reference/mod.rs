@@ -4,7 +4,8 @@ use rand::Rng;
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use crate::{
-    Identification, ModelPoint, Problem, Search, Solver, Unidentified, chance::expected_sets_as_good, site::diameter,
+    Identification, ModelPoint, Problem, Search, Shell, Solver, Unidentified, chance::expected_sets_as_good,
+    site::diameter,
 };
 
 mod acceptance;
@@ -52,7 +53,7 @@ pub fn judge(
         Ok(found) => found,
         Err(why) => return Attempt::without(why),
     };
-    let alert_limit = acceptance.alert_limit.min(ALERT_SHARE * diameter(problem.model));
+    let alert_limit = alert_limit(problem.model, acceptance.alert_limit);
     let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
     let judge = Judge { problem, solver, acceptance, alert_limit, largest, rig };
     let likely = judge.size(&found.pairs).and_then(|()| match found.belief {
@@ -82,6 +83,13 @@ pub fn judge(
         tests: Some(found.tests),
         identified: found.pairs,
     }
+}
+
+/// Poses further apart than this (m) are different answers: `most`, or [`ALERT_SHARE`] of the model's diameter.
+fn alert_limit(model: &[ModelPoint], most: f64) -> f64 {
+    // The diameter is no less than the longest side of the shell, which is found at once.
+    let side = Shell::around(model.iter().map(|point| point.at)).map_or(0.0, |shell| (shell.max - shell.min).amax());
+    if ALERT_SHARE * side >= most { most } else { most.min(ALERT_SHARE * diameter(model)) }
 }
 
 /// Whether the outcome stands whatever sets the search did not look at. These may contradict a fix, and

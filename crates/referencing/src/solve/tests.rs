@@ -167,7 +167,7 @@ fn rig() -> StereoRig {
     StereoRig::new(camera, camera, right_from_left).unwrap()
 }
 
-/// Where a covariance is analytic it is the numerical one, on exact data, to 1e-6.
+/// Where a covariance is analytic it is the numerical one, on exact data, to 1e-6; to 1e-4 of solvers that do not solve to rounding.
 #[test]
 fn analytic_covariances_are_the_numerical_ones() {
     let rig = rig();
@@ -182,7 +182,8 @@ fn analytic_covariances_are_the_numerical_ones() {
             let analytic = solver.covariance(&data, &pose).unwrap().matrix;
             let numeric = numerical::covariance(|moved| solver.solve(moved), &data, &pose).unwrap().matrix;
             let off = (analytic - numeric).amax() / analytic.amax();
-            if !(off < 1e-6) {
+            // Differences of minima that are found to 1e-5 only are no better.
+            if !(off < if solver.to_rounding() { 1e-6 } else { 1e-4 }) {
                 differs.push((name, off));
             }
         }

@@ -51,9 +51,9 @@ impl Terms {
             ln_share: shares(n),
         };
         let turned = rough.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
-        // Points that are called exact are taken to be as good as a tenth of what the tolerance allows each.
+        // Points that are called exact are taken to be as good as a twenty-fifth of what the tolerance allows each.
         let least = match problem.tolerance {
-            Tolerance::Fixed(delta) => (0.05 * delta).powi(2),
+            Tolerance::Fixed(delta) => (0.02 * delta).powi(2),
             Tolerance::Sigmas(_) => (ROUNDING * extent(problem)).powi(2),
         };
         // Many pairs share a covariance: the last inverse is kept.
