@@ -90,8 +90,16 @@ impl Target {
 
 /// The greatest distance between two of the points (m); 0 of fewer than two.
 pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
-    let pairs = points.iter().enumerate().flat_map(|(i, a)| points[..i].iter().map(move |b| a.at.distance(&b.at)));
-    pairs.fold(0.0, f64::max)
+    // Side by side, and no root but the last: a model may have ten thousand points.
+    let column = |axis: usize| points.iter().map(|point| point.at.coords[axis]).collect::<Vec<f64>>();
+    let [x, y, z] = [0, 1, 2].map(column);
+    let mut most = 0.0f64;
+    for i in 0..points.len() {
+        let others = x[..i].iter().zip(&y[..i]).zip(&z[..i]);
+        let squares = others.map(|((a, b), c)| (a - x[i]).powi(2) + (b - y[i]).powi(2) + (c - z[i]).powi(2));
+        most = squares.fold(most, |most, square| if square > most { square } else { most });
+    }
+    most.sqrt()
 }
 
 /// The targets of a kind; see [`Site::targets`].
