@@ -33,7 +33,7 @@ impl Default for Acceptance {
         Self {
             least_points: 3,
             chance_budget: 1e-3,
-            absence: 1e-4,
+            absence: 2e-5,
             doubt: 0.05,
             confidence: 0.999,
             alert_limit: 0.10,
