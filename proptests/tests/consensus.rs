@@ -62,6 +62,17 @@ fn no_object_no_pose() {
 #[ignore = "30 000 frames; a minute"]
 fn clutter_alone_is_never_referenced() {
     let frames = std::env::var("CONSENSUS_FRAMES").map_or(30_000, |n| n.parse().expect("a number"));
+    // What stricter and looser settings would accept, before the tests of the residuals.
+    let believed: Vec<Shares> = (0..frames)
+        .filter_map(|number| believed(Family::A, 5, number, Presence::Absent))
+        .map(|(shares, _)| shares)
+        .collect();
+    for absence in [1e-2, 1e-3, 1e-4, 5e-5, 2e-5, 1e-5] {
+        let doubt = Acceptance::default().doubt;
+        let accepted =
+            believed.iter().filter(|s| s.absent <= absence && s.elsewhere <= doubt * (1.0 - s.absent)).count();
+        println!("absence {absence:e}: {accepted} of {frames} frames without the object would be accepted");
+    }
     let wrong: Vec<u64> = (0..frames).filter(|&number| referenced(Family::A, 5, number, Presence::Absent)).collect();
     let rate = clopper_pearson(wrong.len(), frames as usize, 0.95);
     println!("{} of {frames} frames without the object were referenced, {rate:?}: {wrong:?}", wrong.len());
