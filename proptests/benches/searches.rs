@@ -1,0 +1,65 @@
+//! How long each search takes on a medium problem of each family, by the registry: a new one is timed the day it is
+//! listed.
+//!
+//! One thread, candidates already listed, defaults of every search: `cargo bench -p seafix-proptests --bench searches`;
+//! one family: `… --bench searches -- search/a`; in a hurry `… -- --quick`. A search that needs more than half a second is
+//! run once, and its time printed.
+
+#![allow(clippy::print_stdout, reason = "a bench prints")]
+
+use std::{
+    hint::black_box,
+    time::{Duration, Instant},
+};
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use seafix_component::Choice;
+use seafix_referencing::{Problem, SEARCHES, Tolerance};
+use seafix_simulation::families::{Drawn, Family, Presence};
+
+/// The problem of each family that stands for it: its number, seed 1.
+const MEDIUM: [(Family, u64); 7] =
+    [(Family::A, 10), (Family::B, 4), (Family::C, 4), (Family::D, 25), (Family::E, 1), (Family::F, 4), (Family::G, 7)];
+
+/// What takes longer is run once.
+const LONG: Duration = Duration::from_millis(500);
+
+fn searches(criterion: &mut Criterion) {
+    for (family, number) in MEDIUM {
+        let given = Drawn::new(family, 1, number, Presence::Present).problem.problem();
+        let candidates = given.candidates().expect("they can be listed");
+        let problem = Problem {
+            model: &given.model,
+            cloud: &given.cloud,
+            candidates: &candidates,
+            tolerance: Tolerance::Fixed(given.delta),
+            prior: given.prior.as_ref(),
+        };
+        let mut group = criterion.benchmark_group(format!("search/{}", family.name()));
+        for name in SEARCHES.names() {
+            let search = SEARCHES.build(&Choice::named(name)).expect("the defaults are in range");
+            // Every call has the same stream: what is timed is one run, not a mixture.
+            let run = || search.search(black_box(&problem), &mut ChaCha8Rng::seed_from_u64(1));
+            let started = Instant::now();
+            let _ = black_box(run());
+            let took = started.elapsed();
+            if took > LONG {
+                println!("search/{}/{name}: {:.1} s, run once", family.name(), took.as_secs_f64());
+                continue;
+            }
+            group.bench_function(name, |bench| bench.iter(|| black_box(run())));
+        }
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_secs(1));
+    targets = searches
+}
+criterion_main!(benches);
