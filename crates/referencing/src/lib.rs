@@ -9,6 +9,7 @@
 
 mod candidates;
 mod chance;
+mod joint;
 mod observations;
 mod problem;
 pub mod problem_file;
@@ -19,6 +20,7 @@ mod solve;
 
 pub use candidates::{Candidates, Gate, candidates};
 pub use chance::{expected_chance_sets, expected_sets_as_good};
+pub use joint::{Glimpse, JointFix, Member, Standing, joint_fix};
 pub use observations::{Observation, Observations};
 pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
 pub use reference::{

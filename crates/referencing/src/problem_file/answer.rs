@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use serde::Serialize;
 
 use super::{CoherenceProblem, read};
-use crate::{Acceptance, Alternative, Correspondence, Outcome, Search, Solver};
+use crate::{Acceptance, Alternative, Correspondence, Integrity, Outcome, Redundancy, Search, Solver};
 
 /// The method that answers: what is used, and under which name it is reported.
 #[derive(Debug, Clone, Copy)]
@@ -33,6 +33,49 @@ pub struct OtherPose {
     pub score: f64,
 }
 
+/// What supports a fix beyond its covariance, as it is printed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Support {
+    /// `unmonitored` (three points), `detectable` (four) or `excludable`.
+    pub redundancy: &'static str,
+    /// χ² of the residuals at the most likely pose.
+    pub chi2: f64,
+    /// Its degrees of freedom.
+    pub freedom: usize,
+    /// What a true set exceeds with one minus the confidence.
+    pub chi2_limit: f64,
+    /// The farthest that the position moves (m) when one point is left out.
+    pub separation: Option<f64>,
+    /// Radii that the errors of position (m) and attitude (rad) exceed with no more than the stated risk.
+    pub protection: Option<Levels>,
+}
+
+/// Protection levels, as they are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Levels {
+    /// Of the position (m).
+    pub position: f64,
+    /// Of the attitude (rad).
+    pub attitude: f64,
+}
+
+impl From<&Integrity> for Support {
+    fn from(integrity: &Integrity) -> Self {
+        Self {
+            redundancy: match integrity.redundancy {
+                Redundancy::Unmonitored => "unmonitored",
+                Redundancy::Detectable => "detectable",
+                Redundancy::Excludable => "excludable",
+            },
+            chi2: integrity.chi2,
+            freedom: integrity.freedom,
+            chi2_limit: integrity.chi2_limit,
+            separation: integrity.separation,
+            protection: integrity.protection.map(|level| Levels { position: level.position, attitude: level.attitude }),
+        }
+    }
+}
+
 /// The answer to one problem, with the keys of FORMATS.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
@@ -53,6 +96,8 @@ pub struct Answer {
     pub covariance: Option<[[f64; 6]; 6]>,
     /// The identified pairs (model, cloud), if referenced.
     pub pairs: Option<Vec<[usize; 2]>>,
+    /// What supports the fix beyond its covariance, if referenced.
+    pub integrity: Option<Support>,
     /// The poses among which the data do not decide.
     pub alternatives: Vec<OtherPose>,
     /// The best pose that was not believed.
@@ -110,6 +155,7 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
             std::array::from_fn(|row| std::array::from_fn(|column| reference.covariance.matrix[(row, column)]))
         }),
         pairs: reference.map(|reference| indices(&reference.pairs)),
+        integrity: reference.map(|reference| Support::from(&reference.integrity)),
         alternatives: match &attempt.outcome {
             Outcome::Ambiguous(all) => all.iter().map(OtherPose::from).collect(),
             _ => Vec::new(),

@@ -7,13 +7,13 @@ use super::normal::Normal;
 use crate::Observation;
 
 /// What one point says of the place where a pose puts it, camera axes.
-pub(super) struct Term {
+pub(crate) struct Term {
     /// W: the information on that place (1/m²), symmetric.
-    pub(super) information: Matrix3<f64>,
+    pub(crate) information: Matrix3<f64>,
     /// W times the step (m) by which the measurement would have it moved.
-    pub(super) pull: Vector3<f64>,
+    pub(crate) pull: Vector3<f64>,
     /// The point's share of χ².
-    pub(super) cost: f64,
+    pub(crate) cost: f64,
 }
 
 impl Term {

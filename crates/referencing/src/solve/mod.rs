@@ -33,10 +33,12 @@ mod triad;
 mod umeyama;
 mod weighted_kabsch;
 
+pub(crate) use descent::Term;
 pub(crate) use gnc_tls::GncTls;
 pub use kabsch::Kabsch;
 pub(crate) use kabsch::fit as least_squares;
 pub use mahalanobis::Mahalanobis;
+pub(crate) use sightings::{Sightings, Target as PixelTarget};
 pub use stereo_reprojection::StereoReprojection;
 pub use triad::{Choose, Triad};
 
@@ -89,6 +91,13 @@ pub enum Degenerate {
     /// A number is not finite.
     #[error("a coordinate is not finite")]
     NotFinite,
+}
+
+/// Refuses what determines no pose: fewer than three points, numbers that are not finite, points on a line or behind
+/// the camera.
+pub(crate) fn wide_enough(data: &Observations<'_>) -> Result<(), Degenerate> {
+    spread::check(data, 3, 1e-3)?;
+    spread::in_front(data)
 }
 
 /// Computes the rigid motion that carries observed points onto model points.

@@ -12,7 +12,7 @@ pub(super) const FEW: usize = 32;
 
 /// What of each point is compared with its projection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Target {
+pub(crate) enum Target {
     /// The pixels where it was seen.
     Pixels,
     /// The pixels of the point as triangulated: what 3D–3D sees, with the covariance seen from the fitted point.
@@ -20,7 +20,7 @@ pub(super) enum Target {
 }
 
 /// The points of one problem, as the cameras saw them.
-pub(super) struct Sightings<'a> {
+pub(crate) struct Sightings<'a> {
     eyes: Eyes<'a>,
     all: SmallVec<[Sighting; FEW]>,
     /// Whether a point of the model is uncertain, so that weights depend on the pose.
@@ -40,12 +40,12 @@ const FLOOR: f64 = 1e-6;
 impl<'a> Sightings<'a> {
     /// Those of no point yet: [`see`](Self::see) fills them where they stand, for they are large.
     #[inline]
-    pub(super) fn new(rig: &'a StereoRig) -> Self {
+    pub(crate) fn new(rig: &'a StereoRig) -> Self {
         Self { eyes: Eyes::of(rig), all: SmallVec::new(), weights_move: false }
     }
 
     /// `None` where a covariance has no inverse or a point is behind a camera.
-    pub(super) fn see(&mut self, points: &[Observation], target: Target) -> Option<()> {
+    pub(crate) fn see(&mut self, points: &[Observation], target: Target) -> Option<()> {
         for point in points {
             let sighting = self.sighting(point, target)?;
             self.weights_move |= matches!(sighting, Sighting::Seen { model_variance, .. } if model_variance > 0.0);
@@ -79,7 +79,7 @@ impl<'a> Sightings<'a> {
     /// With A = Jᵀ Σ_px⁻¹ J and g = Jᵀ Σ_px⁻¹ r, the model's error marginalised leaves (I + σ² A)⁻¹ A and
     /// (I + σ² A)⁻¹ g (Woodbury).
     #[inline]
-    pub(super) fn live(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
+    pub(crate) fn live(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
         match &self.all[k] {
             Sighting::Seen { at, weight, model_variance, .. } => {
                 let term = self.seen(at, weight, place)?;
@@ -98,7 +98,7 @@ impl<'a> Sightings<'a> {
     /// The same with J of the model's error at the measured point: the weights do not depend on the pose, so that
     /// costs can be compared.
     #[inline]
-    pub(super) fn frozen(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
+    pub(crate) fn frozen(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
         match &self.all[k] {
             Sighting::Seen { at, frozen, .. } => self.seen(at, frozen, place),
             Sighting::Bare { at, information } => Some(Term::of(*information, &(at - place))),

@@ -1,0 +1,58 @@
+//! `seafix solve`: what stands beside a fix, and what is refused.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
+use assert_cmd::Command;
+use serde_json::{Value, json};
+
+/// A problem of seven points, exact, and where it lies.
+fn problem(folder: &tempfile::TempDir) -> String {
+    let model = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.1, 0.0],
+        [0.2, 1.3, 0.1],
+        [0.4, 0.3, 0.9],
+        [-0.7, 0.5, 0.4],
+        [0.6, -0.8, 0.3],
+        [-0.3, -0.9, 0.2],
+    ];
+    let cloud: Vec<[f64; 3]> = model.iter().map(|[x, y, z]| [x + 0.1, y - 0.2, z + 4.0]).collect();
+    let text = json!({
+        "format": "coherence-problem/1", "id": "seven", "family": "test", "seed_set": "test", "seed": 1,
+        "model": model, "cloud": cloud, "sigma": 0.002, "delta": 0.01, "prior": null, "putative": null,
+    });
+    let file = folder.path().join("seven.json");
+    std::fs::write(&file, text.to_string()).unwrap();
+    file.display().to_string()
+}
+
+fn solve(arguments: &[&str]) -> std::process::Output {
+    Command::cargo_bin("seafix").unwrap().arg("solve").args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_fix_says_what_supports_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = solve(&[&problem(&folder), "--json"]);
+    assert_eq!(output.status.code(), Some(0));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["outcome"], "referenced");
+    let integrity = &answer["integrity"];
+    assert_eq!((&integrity["redundancy"], &integrity["freedom"]), (&json!("excludable"), &json!(15)));
+    assert!(integrity["chi2"].as_f64().unwrap() < 1e-9 && integrity["chi2_limit"].as_f64().unwrap() > 15.0);
+    let level = integrity["protection"]["position"].as_f64().unwrap();
+    assert!(level > 0.002 && level < 0.1, "{level}");
+    assert!(integrity["protection"]["attitude"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn a_solver_of_pixels_is_refused_on_points_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = problem(&folder);
+    for name in ["l-bfgs", "nelder-mead", "p3p-stereo", "stereo-reprojection"] {
+        let output = solve(&[&file, "--solver", name]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
+        assert!(said.contains(name) && said.contains("`mahalanobis`") && output.stdout.is_empty(), "{said}");
+    }
+}

@@ -1,0 +1,99 @@
+//! One fix over everything in view: several objects, several instants, one rig.
+//!
+//! A site's objects are known each by itself, and where they stand to each other by a survey. Its error is the same for all
+//! points of an object and for all instants: six numbers an object, shared, not noise of every point. Poses and those
+//! six are therefore estimated together, and the survey is an observation like the pixels.
+
+mod system;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::Matrix6;
+use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+
+use crate::{
+    Degenerate, Observation, Observations,
+    solve::{least_squares, wide_enough},
+};
+use system::{State, System};
+
+/// What is known of where an object stands in the site's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Standing {
+    /// It stands where it is said to: of the object whose frame is the site's, by definition.
+    Exact,
+    /// It stands there with this covariance of η in `site_from_object_true = site_from_object · Exp(η)`.
+    Surveyed(Covariance6<Object, Object>),
+    /// It may have been displaced: nothing but the images say where it stands.
+    Displaced,
+}
+
+/// An object of the site.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Member {
+    /// Where it is said to stand: its frame in the site's.
+    pub site_from_object: Transform<Object, Object>,
+    /// How well that is known.
+    pub standing: Standing,
+}
+
+/// What one instant saw: points with the index of their object, model places in that object's frame.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Glimpse {
+    /// The points.
+    pub points: Vec<(usize, Observation)>,
+}
+
+/// The fix of all instants.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointFix {
+    /// The pose of each instant: the camera in the site's frame, and its covariance.
+    pub site_from_camera: Vec<(Transform<Object, Camera>, Covariance6<Object, Camera>)>,
+    /// Where each object stands, and how well that is now known; a covariance of nought where it is exact.
+    pub site_from_object: Vec<(Transform<Object, Object>, Covariance6<Object, Object>)>,
+    /// χ² of pixels and surveys together.
+    pub chi2: f64,
+    /// Its degrees of freedom.
+    pub freedom: usize,
+}
+
+/// The most likely poses of all instants and places of all objects, from the pixels that `rig` saw and the surveys:
+/// least Σ rᵀ S⁻¹ r + Σ ηᵀ Σ_survey⁻¹ η, by Levenberg's and Marquardt's steps on the dense normal equations.
+///
+/// Each instant starts from the unweighted fit of its points, their objects standing where they are said to; an object
+/// displaced by much is found from there as long as others, or most points, stand still.
+///
+/// # Errors
+/// [`Degenerate`]: an instant with fewer than three points or with points on a line, points without pixels, a point behind
+/// the camera, or a motion that nothing determines (a displaced object that nobody else's place relates to the site).
+///
+/// # Panics
+/// When the index of an object is out of range.
+pub fn joint_fix(rig: &StereoRig, members: &[Member], glimpses: &[Glimpse]) -> Result<JointFix, Degenerate> {
+    let mut poses = Vec::with_capacity(glimpses.len());
+    for glimpse in glimpses {
+        if glimpse.points.iter().any(|(_, point)| point.pixels.is_none()) {
+            return Err(Degenerate::NoPixels);
+        }
+        let in_site = |(object, point): &(usize, Observation)| Observation {
+            model: members[*object].site_from_object * point.model,
+            ..*point
+        };
+        let data = Observations { points: glimpse.points.iter().map(in_site).collect(), rig: Some(rig) };
+        wide_enough(&data)?;
+        poses.push(least_squares(&data.points));
+    }
+    let start = State { poses, places: members.iter().map(|member| member.site_from_object).collect() };
+    let system = System::new(rig, members, glimpses).ok_or(Degenerate::Singular)?;
+    let (state, chi2) = system.minimize(start).ok_or(Degenerate::Singular)?;
+    let blocks = system.covariances(&state).ok_or(Degenerate::Singular)?;
+    let block = |at: Option<usize>| at.map_or_else(Matrix6::zeros, |at| blocks[at]);
+    Ok(JointFix {
+        site_from_camera: (0..glimpses.len()).map(|f| (state.poses[f], Covariance6::new(blocks[f]))).collect(),
+        site_from_object: (0..members.len())
+            .map(|o| (state.places[o], Covariance6::new(block(system.unknown(o)))))
+            .collect(),
+        chi2,
+        freedom: system.freedom(),
+    })
+}

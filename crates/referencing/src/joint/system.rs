@@ -1,0 +1,208 @@
+//! The normal equations of a joint fix.
+
+use faer::{Mat, Side, linalg::solvers::Solve};
+use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
+use seafix_geometry::{Camera, Object, StereoRig, Transform, so3::skew};
+
+use super::{Glimpse, Member, Standing};
+use crate::{
+    Observation,
+    solve::{PixelTarget, Sightings, Term},
+};
+
+/// All unknowns: the pose of each instant and the place of each object.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    pub(super) poses: Vec<Transform<Object, Camera>>,
+    pub(super) places: Vec<Transform<Object, Object>>,
+}
+
+/// The problem, its weights made ready.
+pub(super) struct System<'a> {
+    members: &'a [Member],
+    glimpses: &'a [Glimpse],
+    sightings: Vec<Sightings<'a>>,
+    /// For each object the block of its six unknowns; `None` where it stands exactly.
+    unknowns: Vec<Option<usize>>,
+    /// The inverse of each survey's covariance.
+    surveys: Vec<Option<Matrix6<f64>>>,
+    blocks: usize,
+}
+
+struct Linearized {
+    normal: Mat<f64>,
+    gradient: Mat<f64>,
+    cost: f64,
+}
+
+/// Steps of one descent.
+const MOST_STEPS: usize = 100;
+/// Below this decrement the cost has no digits left to tell better from worse.
+const NEAR: f64 = 1e-4;
+/// Below this decrement nothing is left to gain.
+const CONVERGED: f64 = 1e-18;
+
+impl<'a> System<'a> {
+    pub(super) fn new(rig: &'a StereoRig, members: &'a [Member], glimpses: &'a [Glimpse]) -> Option<Self> {
+        let mut sightings = Vec::with_capacity(glimpses.len());
+        for glimpse in glimpses {
+            let points: Vec<Observation> = glimpse.points.iter().map(|(_, point)| *point).collect();
+            let mut seen = Sightings::new(rig);
+            seen.see(&points, PixelTarget::Pixels)?;
+            sightings.push(seen);
+        }
+        let seen = |object: usize| glimpses.iter().any(|glimpse| glimpse.points.iter().any(|(o, _)| *o == object));
+        let mut blocks = glimpses.len();
+        let mut unknowns = Vec::with_capacity(members.len());
+        let mut surveys = Vec::with_capacity(members.len());
+        for (object, member) in members.iter().enumerate() {
+            // What nobody sees is neither estimated nor a motion that nothing determines.
+            let open = member.standing != Standing::Exact && seen(object);
+            unknowns.push(open.then_some(blocks));
+            blocks += usize::from(open);
+            surveys.push(match member.standing {
+                Standing::Surveyed(covariance) if open => Some(covariance.matrix.cholesky()?.inverse()),
+                _ => None,
+            });
+        }
+        Some(Self { members, glimpses, sightings, unknowns, surveys, blocks })
+    }
+
+    /// The block of an object's six unknowns.
+    pub(super) fn unknown(&self, object: usize) -> Option<usize> {
+        self.unknowns[object]
+    }
+
+    /// Pixel coordinates and survey numbers, less the unknowns.
+    pub(super) fn freedom(&self) -> usize {
+        let pixels: usize = self.glimpses.iter().map(|glimpse| 4 * glimpse.points.len()).sum();
+        (pixels + 6 * self.surveys.iter().flatten().count()).saturating_sub(6 * self.blocks)
+    }
+
+    /// `live`: weights at the fitted points; else at the measured ones, so that costs can be compared.
+    fn linearize(&self, state: &State, live: bool) -> Option<Linearized> {
+        let size = 6 * self.blocks;
+        let mut all = Linearized { normal: Mat::zeros(size, size), gradient: Mat::zeros(size, 1), cost: 0.0 };
+        for (f, (glimpse, sightings)) in self.glimpses.iter().zip(&self.sightings).enumerate() {
+            let (r, t) = (state.poses[f].rotation_matrix(), state.poses[f].translation());
+            for (k, (object, point)) in glimpse.points.iter().enumerate() {
+                let place = &state.places[*object];
+                let at: Vector3<f64> = r.tr_mul(&((*place * point.model).coords - t));
+                let term = if live { sightings.live(k, &at) } else { sightings.frozen(k, &at) }?;
+                all.cost += term.cost;
+                // Under T Exp(ξ) the place moves by [p]× φ − ρ, under S Exp(η) by R (ρ − [P]× φ).
+                let mut by_pose = Matrix3x6::zeros();
+                by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&skew(&at));
+                by_pose.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+                by_pose.fixed_view_mut::<3, 3>(0, 3).neg_mut();
+                all.add(f, f, &by_pose, &by_pose, &term);
+                all.pull(f, &by_pose, &term);
+                if let Some(o) = self.unknowns[*object] {
+                    let turn = r.transpose() * place.rotation_matrix();
+                    let mut by_place = Matrix3x6::zeros();
+                    by_place.fixed_view_mut::<3, 3>(0, 0).copy_from(&(-turn * skew(&point.model.coords)));
+                    by_place.fixed_view_mut::<3, 3>(0, 3).copy_from(&turn);
+                    all.add(o, o, &by_place, &by_place, &term);
+                    all.add(o, f, &by_place, &by_pose, &term);
+                    all.pull(o, &by_place, &term);
+                }
+            }
+        }
+        for (object, survey) in self.surveys.iter().enumerate() {
+            let (Some(information), Some(o)) = (survey, self.unknowns[object]) else { continue };
+            let eta = self.members[object].site_from_object.error_to(&state.places[object]);
+            let pull = information * eta;
+            all.cost += eta.dot(&pull);
+            for i in 0..6 {
+                all.gradient[(6 * o + i, 0)] -= pull[i];
+                for j in 0..6 {
+                    all.normal[(6 * o + i, 6 * o + j)] += information[(i, j)];
+                }
+            }
+        }
+        all.cost.is_finite().then_some(all)
+    }
+
+    fn moved(&self, state: &State, step: &Mat<f64>) -> State {
+        let six = |block: usize| Vector6::from_fn(|i, _| step[(6 * block + i, 0)]);
+        let poses = state.poses.iter().enumerate().map(|(f, pose)| pose.perturbed(&six(f)).renormalized());
+        let places = state.places.iter().zip(&self.unknowns).map(|(place, unknown)| match unknown {
+            Some(block) => place.perturbed(&six(*block)).renormalized(),
+            None => *place,
+        });
+        State { poses: poses.collect(), places: places.collect() }
+    }
+
+    /// The least cost near a state, and that cost.
+    pub(super) fn minimize(&self, mut state: State) -> Option<(State, f64)> {
+        let (mut here, mut damping) = (self.linearize(&state, false)?, 0.0);
+        for _ in 0..MOST_STEPS {
+            let (step, decrement) = here.step(damping)?;
+            if damping == 0.0 && decrement <= NEAR {
+                break;
+            }
+            let next = self.moved(&state, &step);
+            match self.linearize(&next, false).filter(|next| next.cost < here.cost) {
+                Some(better) => {
+                    (state, here) = (next, better);
+                    damping = if damping > 1e-5 { damping * 0.1 } else { 0.0 };
+                }
+                None if damping > 1e8 => break,
+                None => damping = f64::max(1e-4, damping * 10.0),
+            }
+        }
+        let (mut here, mut last) = (self.linearize(&state, true)?, f64::INFINITY);
+        for _ in 0..MOST_STEPS {
+            let (step, decrement) = here.step(0.0)?;
+            if !(decrement < last) {
+                break;
+            }
+            state = self.moved(&state, &step);
+            here = self.linearize(&state, true)?;
+            if decrement <= CONVERGED {
+                break;
+            }
+            last = decrement;
+        }
+        Some((state, here.cost))
+    }
+
+    /// The diagonal blocks of the inverse of the normal equations at a state.
+    pub(super) fn covariances(&self, state: &State) -> Option<Vec<Matrix6<f64>>> {
+        let all = self.linearize(state, true)?;
+        let factor = all.normal.llt(Side::Lower).ok()?;
+        let inverse = factor.solve(Mat::<f64>::identity(6 * self.blocks, 6 * self.blocks));
+        let block = |b: usize| Matrix6::from_fn(|i, j| inverse[(6 * b + i, 6 * b + j)]);
+        Some((0..self.blocks).map(block).collect())
+    }
+}
+
+impl Linearized {
+    /// Adds JₐᵀW J_b to the block (a, b), a ≥ b: the lower half is what is factorised.
+    fn add(&mut self, a: usize, b: usize, by_a: &Matrix3x6<f64>, by_b: &Matrix3x6<f64>, term: &Term) {
+        let block = by_a.transpose() * term.information * by_b;
+        for i in 0..6 {
+            for j in 0..6 {
+                self.normal[(6 * a + i, 6 * b + j)] += block[(i, j)];
+            }
+        }
+    }
+
+    fn pull(&mut self, a: usize, by_a: &Matrix3x6<f64>, term: &Term) {
+        let pull = by_a.transpose() * term.pull;
+        for i in 0..6 {
+            self.gradient[(6 * a + i, 0)] += pull[i];
+        }
+    }
+
+    /// The step and its decrement.
+    fn step(&self, damping: f64) -> Option<(Mat<f64>, f64)> {
+        let mut normal = self.normal.clone();
+        for i in 0..normal.nrows() {
+            normal[(i, i)] *= 1.0 + damping;
+        }
+        let step = normal.llt(Side::Lower).ok()?.solve(&self.gradient);
+        let decrement: f64 = (0..step.nrows()).map(|i| step[(i, 0)] * self.gradient[(i, 0)]).sum();
+        decrement.is_finite().then_some((step, decrement))
+    }
+}

@@ -1,0 +1,136 @@
+use nalgebra::{Matrix6, Vector6};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{
+    Camera, Covariance6, Object, Pinhole, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels,
+    UncertainPoint,
+};
+
+use super::*;
+use crate::{Solver, StereoReprojection};
+
+const MODEL: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.1, 0.6, 0.1], [0.2, 0.2, 0.4], [-0.4, 0.3, 0.2]];
+const SIGMA: f64 = 0.2;
+
+fn rig() -> StereoRig {
+    let camera = Pinhole::new([1600, 1200], [1348.3; 2], [799.5, 599.5], &[]).unwrap();
+    StereoRig::new(camera, camera, Transform::exp(&[0.0, 0.0, 0.0, -0.25, 0.0, 0.0].into())).unwrap()
+}
+
+fn standing(x: f64, turn: f64) -> Transform<Object, Object> {
+    Transform::exp(&[0.0, turn, 0.0, x, 0.2 * x, 0.0].into())
+}
+
+fn instant(k: usize) -> Transform<Object, Camera> {
+    Transform::exp(&[0.05 * k as f64, -0.03, 0.1, 0.2 * k as f64, 0.1, -3.0].into())
+}
+
+/// Nearly normal, of variance one: the sum of twelve uniform numbers.
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()
+}
+
+/// What an instant sees of the objects standing truly there, with `noise` times σ of pixel noise.
+fn glimpse(
+    rig: &StereoRig,
+    places: &[Transform<Object, Object>],
+    k: usize,
+    noise: f64,
+    rng: &mut ChaCha8Rng,
+) -> Glimpse {
+    let mut points = Vec::new();
+    for (object, place) in places.iter().enumerate() {
+        for at in MODEL {
+            let model = Point::from(at);
+            let exact = rig.project(&(instant(k).inverse() * (*place * model))).unwrap();
+            let mut off =
+                |p: Pixel| Pixel { u: p.u + noise * SIGMA * normal(rng), v: p.v + noise * SIGMA * normal(rng) };
+            let seen = StereoPixels { left: off(exact.left), right: off(exact.right) };
+            let pixels = UncertainPixels::independent(seen, SIGMA);
+            let found = rig.triangulate(&pixels).unwrap();
+            let measured = UncertainPoint { at: found.point, covariance: found.covariance };
+            points.push((object, Observation { measured, pixels: Some(pixels), model, model_sigma: 0.0 }));
+        }
+    }
+    Glimpse { points }
+}
+
+#[test]
+fn one_object_alone_is_the_fix_of_one_object() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(1));
+    let seen = glimpse(&rig, &[standing(0.0, 0.0)], 1, 1.0, &mut rng);
+    let data = Observations { points: seen.points.iter().map(|(_, p)| *p).collect(), rig: Some(&rig) };
+    let expected = StereoReprojection::default().solve(&data).unwrap();
+    let covariance = StereoReprojection::default().covariance(&data, &expected).unwrap();
+    let member = Member { site_from_object: standing(0.0, 0.0), standing: Standing::Exact };
+    let fix = joint_fix(&rig, &[member], &[seen]).unwrap();
+    let (pose, own) = &fix.site_from_camera[0];
+    assert!(expected.error_to(pose).amax() < 1e-10);
+    assert!((own.matrix - covariance.matrix).amax() < 1e-8 * covariance.matrix.amax());
+    assert_eq!(fix.freedom, 14);
+}
+
+#[test]
+fn a_displaced_object_is_found_where_it_is() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(2));
+    let (said, truly) = (standing(0.8, 0.0), standing(0.86, 0.05));
+    let seen = [0, 1].map(|k| glimpse(&rig, &[standing(0.0, 0.0), truly], k, 0.0, &mut rng));
+    let members = |standing_of_second| {
+        [
+            Member { site_from_object: standing(0.0, 0.0), standing: Standing::Exact },
+            Member { site_from_object: said, standing: standing_of_second },
+        ]
+    };
+    let fix = joint_fix(&rig, &members(Standing::Displaced), &seen).unwrap();
+    assert!(fix.chi2 < 1e-8, "{}", fix.chi2);
+    assert!(truly.error_to(&fix.site_from_object[1].0).amax() < 1e-8);
+    for k in [0, 1] {
+        assert!(instant(k).error_to(&fix.site_from_camera[k].0).amax() < 1e-8);
+    }
+    // Believed to stand where it was surveyed, it spoils the fix, and χ² says so.
+    let misled = joint_fix(&rig, &members(Standing::Exact), &seen).unwrap();
+    assert!(misled.chi2 > 100.0 * misled.freedom as f64, "{}", misled.chi2);
+    // Alone in view and displaced, it says nothing of the site.
+    let alone = Glimpse { points: seen[0].points.iter().filter(|(object, _)| *object == 1).copied().collect() };
+    assert_eq!(joint_fix(&rig, &members(Standing::Displaced), &[alone]), Err(Degenerate::Singular));
+    let few = Glimpse { points: seen[0].points[..2].to_vec() };
+    let refused = joint_fix(&rig, &members(Standing::Exact), &[few]);
+    assert_eq!(refused, Err(Degenerate::TooFew { found: 2, needed: 3 }));
+}
+
+/// A survey that errs by its covariance, one error an object for all points and both instants: the poses' normalised
+/// error is that of χ²₆, and the objects' surveys are bettered.
+#[test]
+fn a_survey_is_one_error_an_object() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(3));
+    let survey =
+        Covariance6::<Object, Object>::new(Matrix6::from_diagonal(&[1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4].into()));
+    let draws = 400;
+    let (mut nees, mut chi2, mut freedom) = (0.0, 0.0, 0);
+    for _ in 0..draws {
+        let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+        let mut truly = said;
+        for place in &mut truly[1..] {
+            *place = place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 1e-2));
+        }
+        let seen = [0, 1].map(|k| glimpse(&rig, &truly, k, 1.0, &mut rng));
+        let members: Vec<Member> = said
+            .iter()
+            .enumerate()
+            .map(|(o, &site_from_object)| Member {
+                site_from_object,
+                standing: if o == 0 { Standing::Exact } else { Standing::Surveyed(survey) },
+            })
+            .collect();
+        let fix = joint_fix(&rig, &members, &seen).unwrap();
+        let (pose, covariance) = &fix.site_from_camera[1];
+        let xi = pose.error_to(&instant(1));
+        nees += xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)) / f64::from(draws);
+        (chi2, freedom) = (chi2 + fix.chi2 / f64::from(draws), fix.freedom);
+        assert!(fix.site_from_object[1].1.matrix.trace() < survey.matrix.trace());
+    }
+    // Four standard deviations of the mean.
+    assert!((nees - 6.0).abs() < 4.0 * (12.0 / f64::from(draws)).sqrt(), "{nees}");
+    let spread = 4.0 * (2.0 * freedom as f64 / f64::from(draws)).sqrt();
+    assert!((chi2 - freedom as f64).abs() < spread, "{chi2} of {freedom}");
+}
