@@ -19,6 +19,10 @@ use system::{State, System};
 
 /// What is known of where an object stands in the site's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one an object: a survey's thirty-six numbers are little beside its points"
+)]
 pub enum Standing {
     /// It stands where it is said to: of the object whose frame is the site's, by definition.
     Exact,
