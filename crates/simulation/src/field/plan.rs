@@ -175,7 +175,7 @@ impl Geometry {
     ///
     /// # Errors
     /// What the TOML reader finds, or another format. What the numbers say is
-    /// [checked](super::check) against a site.
+    /// checked against a site.
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
         let read: Self = toml::from_str(text).map_err(|error| Fault::in_toml(file, text, &error))?;
         if read.format != GEOMETRY_FORMAT {
