@@ -1,10 +1,11 @@
-//! Errors of poses and rates of outcomes: pure functions of estimates and truth.
+//! Errors of poses and trajectories, rates of outcomes: pure functions of estimates and truth.
 //!
 //! Nothing here can see which algorithm made a number.
 
 mod bound;
 mod fix;
 mod statistics;
+pub mod trajectory;
 
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
 pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};

@@ -14,6 +14,7 @@ mod record;
 mod results;
 mod run;
 pub mod source;
+pub mod trajectory;
 mod vary;
 
 pub use experiment::{Experiment, Plan, Trial};

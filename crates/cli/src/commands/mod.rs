@@ -10,6 +10,7 @@ mod check;
 mod cloud;
 mod dive;
 mod draw;
+mod eval;
 mod export;
 mod list;
 mod report;
@@ -28,6 +29,8 @@ pub(crate) enum Command {
     Cloud(cloud::Cloud),
     /// Draw identification problems with truth (coherence-problem/1).
     Draw(draw::Draw),
+    /// Judge a trajectory against a reference: absolute and relative errors, drift (evo's definitions).
+    Eval(eval::Eval),
     /// Say everything that is wrong with a data set, site, experiment, problem or log.
     Check {
         /// The files and folders.
@@ -56,6 +59,7 @@ impl Command {
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),
             Self::Draw(command) => command.execute(),
+            Self::Eval(command) => command.execute(),
             Self::Check { paths } => check::execute(paths),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),

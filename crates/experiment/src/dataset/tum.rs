@@ -18,12 +18,15 @@ pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<
     let mut poses: Vec<Stamped<A, B>> = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
         let fault = |what: &str, value: &str, remedy: &str| {
             Fault::new(what, file).on_line(index + 1).value(value).remedy(remedy)
         };
+        if line.starts_with('#') && matches!((line.find("qw"), line.find("qx")), (Some(w), Some(x)) if w < x) {
+            return Err(fault("quaternions with w first", line, "TUM has qx qy qz qw: reorder the columns"));
+        }
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
         let words: Vec<&str> = line.split_whitespace().collect();
         if words.len() != 8 {
             let remedy = if line.contains(',') {

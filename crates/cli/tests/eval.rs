@@ -1,0 +1,98 @@
+//! `seafix eval`: trajectories in, errors out.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot read what it made has failed")]
+
+use std::{fs, path::Path};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn eval(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let out = Command::cargo_bin("seafix").unwrap().current_dir(folder).arg("eval").args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (out.status.code().unwrap(), text(out.stdout), text(out.stderr))
+}
+
+fn walk(folder: &Path, name: &str, line: impl Fn(f64) -> String) {
+    fs::write(folder.join(name), (0..50).map(|i| line(f64::from(i))).collect::<String>()).unwrap();
+}
+
+/// A walk on a helix, and the same stretched by one per cent.
+fn walks() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let helix = |stretch: f64| {
+        move |t: f64| {
+            let (x, y, z) = (stretch * 3.0 * (0.2 * t).cos(), stretch * 3.0 * (0.2 * t).sin(), stretch * 0.3 * t);
+            format!("{t} {x} {y} {z} 0 0 0 1\n")
+        }
+    };
+    walk(folder.path(), "truth.tum", helix(1.0));
+    walk(folder.path(), "odometry.tum", helix(1.01));
+    folder
+}
+
+#[test]
+fn a_stretched_walk_has_the_drift_of_its_stretch() {
+    let folder = walks();
+    let (code, out, _) = eval(folder.path(), &["truth.tum", "odometry.tum", "--json"]);
+    let value: Value = serde_json::from_str(&out).unwrap();
+    let number = |pointer: &str| value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer}"));
+    assert_eq!((code, number("/ape/pairs"), number("/rpe/pairs"), number("/matched/share")), (0, 50.0, 49.0, 1.0));
+    let chord = (2.0 * 3.0 * 0.1_f64.sin()).hypot(0.3);
+    assert!((number("/rpe/mean") - 0.01 * chord).abs() < 1e-12);
+    assert!((number("/end_m") / number("/path_m")) < 0.01);
+    let (_, out, _) = eval(folder.path(), &["truth.tum", "odometry.tum", "-a", "-s", "--json"]);
+    let value: Value = serde_json::from_str(&out).unwrap();
+    assert!(value["ape"]["rmse"].as_f64().unwrap() < 1e-12);
+    assert!((value["alignment"]["scale"].as_f64().unwrap() * 1.01 - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn people_see_what_matched() {
+    let folder = walks();
+    walk(folder.path(), "short.tum", |t| format!("{} 0 0 0 0 0 0 1\n", if t < 30.0 { t } else { t + 0.4 }));
+    let (code, out, warned) = eval(folder.path(), &["truth.tum", "short.tum"]);
+    assert_eq!(code, 0);
+    assert!(out.contains("30 poses: 60.0 % of 50 in truth.tum") && out.contains("drift over"), "{out}");
+    assert!(warned.starts_with("warning: only 30 poses matched"), "{warned}");
+}
+
+#[test]
+fn an_aligned_estimate_is_written_and_read_again() {
+    let folder = walks();
+    for file in ["aligned.tum", "aligned.kitti", "aligned.csv"] {
+        let (code, ..) = eval(folder.path(), &["truth.tum", "odometry.tum", "-a", "-s", "--out", file]);
+        let (again, out, _) = eval(folder.path(), &["truth.tum", file, "--json"]);
+        let value: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!((code, again), (0, 0), "{file}");
+        assert!(value["ape"]["max"].as_f64().unwrap() < 1e-12, "{file}");
+    }
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused_in_one_line() {
+    let folder = walks();
+    walk(folder.path(), "later.tum", |t| format!("{} 0 0 0 0 0 0 1\n", t + 1e6));
+    walk(folder.path(), "line.tum", |t| format!("{t} {t} 0 0 0 0 0 1\n"));
+    walk(folder.path(), "short.tum", |t| if t < 2.0 { format!("{t} {t} 0 0 0 0 0 1\n") } else { String::new() });
+    walk(folder.path(), "few.kitti", |t| if t < 9.0 { "1 0 0 0 0 1 0 0 0 0 1 0\n".into() } else { String::new() });
+    walk(folder.path(), "seven.tum", |t| format!("{t} 0 0 0 0 0 1\n"));
+    fs::write(folder.path().join("empty.tum"), "# nothing\n").unwrap();
+    for (arguments, code, words) in [
+        (&["truth.tum", "later.tum"][..], 3, "only 0 of 50 and 50 poses belong together"),
+        (&["truth.tum", "line.tum", "-a"], 3, "one point, or one line"),
+        (&["truth.tum", "short.tum", "-a"], 3, "2 poses; an alignment takes 3"),
+        (&["truth.tum", "few.kitti"], 3, "without stamps"),
+        (&["truth.tum", "seven.tum"], 3, "7 columns in seven.tum:1"),
+        (&["truth.tum", "empty.tum"], 3, "without poses in empty.tum"),
+        (&["truth.tum", "nowhere.tum"], 3, "nowhere.tum"),
+        (&["truth.tum", "odometry.tum", "-d", "1.5"], 2, "whole numbers"),
+        (&["truth.tum", "odometry.tum", "-d", "200", "-u", "d"], 2, "at most 180"),
+        (&["truth.tum", "odometry.tum", "--out", "no/where.tum"], 4, "no/where.tum"),
+    ] {
+        let (found, out, error) = eval(folder.path(), arguments);
+        assert_eq!(found, code, "{arguments:?}: {error}");
+        assert!(error.starts_with("error: ") && error.contains(words) && error.lines().count() == 1, "{error}");
+        assert!(out.is_empty(), "{arguments:?}");
+    }
+}

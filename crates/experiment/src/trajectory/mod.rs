@@ -1,0 +1,171 @@
+//! Trajectory files: TUM, KITTI and EuRoC, told apart by what they contain.
+
+mod euroc;
+mod kitti;
+mod tum;
+
+use std::path::Path;
+
+use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
+use seafix_component::{Fault, read_text};
+use seafix_evaluation::trajectory::Pose;
+
+/// The poses of a body along its way, as a file holds them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// The instant of each pose (ns), strictly increasing; `None` in a KITTI file, which has none.
+    pub stamps: Option<Vec<u64>>,
+    /// The poses: reference from body.
+    pub poses: Vec<Pose>,
+}
+
+/// How a trajectory is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// `seconds tx ty tz qx qy qz qw`, separated by blanks.
+    Tum,
+    /// The upper three rows of the 4×4 matrix in one line: 12 numbers, no stamp.
+    Kitti,
+    /// `nanoseconds, px, py, pz, qw, qx, qy, qz` and whatever follows, separated by commas.
+    Euroc,
+}
+
+impl Format {
+    /// The format that a file's name asks for: `.csv` EuRoC, `.kitti` KITTI, any other TUM.
+    pub fn of_name(file: &Path) -> Self {
+        match file.extension().and_then(|ending| ending.to_str()) {
+            Some("csv") => Self::Euroc,
+            Some("kitti") => Self::Kitti,
+            _ => Self::Tum,
+        }
+    }
+
+    /// The format of a text, by the separator and the number of columns of its first line with numbers.
+    fn of_text(text: &str) -> Option<Self> {
+        let line = lines(text).next()?.1;
+        match (line.contains(','), line.split_whitespace().count()) {
+            (true, _) if line.split(',').next().is_some_and(|stamp| stamp.trim().parse::<u64>().is_ok()) => {
+                Some(Self::Euroc)
+            }
+            (false, 12) => Some(Self::Kitti),
+            _ => Some(Self::Tum),
+        }
+    }
+}
+
+impl Trajectory {
+    /// Reads a trajectory file of any format.
+    ///
+    /// # Errors
+    /// The first line that is wrong, or that there is none.
+    pub fn read(file: &Path) -> Result<Self, Fault> {
+        Self::parse(&read_text(file)?, file)
+    }
+
+    /// The trajectory of a text; `file` is named in faults.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
+        let Some(format) = Format::of_text(text) else {
+            return Err(Fault::new("a trajectory without poses", file).remedy("give TUM, KITTI or EuRoC lines"));
+        };
+        match format {
+            Format::Tum => tum::parse(text, file),
+            Format::Kitti => kitti::parse(text, file),
+            Format::Euroc => euroc::parse(text, file),
+        }
+    }
+
+    /// The text of this trajectory in a format; poses without stamps are numbered by whole seconds.
+    pub fn print(&self, format: Format) -> String {
+        match format {
+            Format::Tum => tum::print(self),
+            Format::Kitti => kitti::print(self),
+            Format::Euroc => euroc::print(self),
+        }
+    }
+
+    fn stamp(&self, i: usize) -> u64 {
+        self.stamps.as_ref().map_or(i as u64 * 1_000_000_000, |stamps| stamps[i])
+    }
+}
+
+/// The lines with numbers, and their numbers from 1.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// A number of a line, or the fault.
+fn number(word: &str, file: &Path, line: usize) -> Result<f64, Fault> {
+    word.trim()
+        .parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite())
+        .ok_or_else(|| Fault::new("not a finite number", file).on_line(line).value(word).remedy("give a number"))
+}
+
+/// The pose with this position and attitude (w, x, y, z), or by how much the quaternion is off.
+fn pose(position: [f64; 3], [w, x, y, z]: [f64; 4]) -> Result<Pose, f64> {
+    let quaternion = Quaternion::new(w, x, y, z);
+    if (quaternion.norm() - 1.0).abs() > 1e-3 {
+        return Err(quaternion.norm());
+    }
+    let rotation = UnitQuaternion::new_normalize(quaternion).to_rotation_matrix().into_inner();
+    Ok(Pose { rotation, position: Vector3::from(position) })
+}
+
+/// The quaternion (w, x, y, z) of a pose, w not negative.
+fn quaternion(pose: &Pose) -> [f64; 4] {
+    let mut rotation = Rotation3::from_matrix_unchecked(pose.rotation);
+    rotation.renormalize();
+    let q = UnitQuaternion::from_rotation_matrix(&rotation).into_inner();
+    let q = if q.w < 0.0 { -q } else { q };
+    [q.w, q.i, q.j, q.k]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Trajectory, String> {
+        Trajectory::parse(text, Path::new("walk")).map_err(|fault| fault.to_string())
+    }
+
+    #[test]
+    fn each_format_reads_back_what_it_wrote() {
+        let walk = read("1.000000001 1 2 3 0.1 -0.2 0.3 0.9273618495495704\n2.5 4 5 6 0 0 0 1\n").unwrap();
+        for format in [Format::Tum, Format::Euroc, Format::Kitti] {
+            let again = read(&walk.print(format)).unwrap();
+            assert_eq!(again.stamps, (format != Format::Kitti).then(|| walk.stamps.clone().unwrap()), "{format:?}");
+            for (a, b) in again.poses.iter().zip(&walk.poses) {
+                assert_eq!(a.position, b.position, "{format:?}");
+                assert!((a.rotation - b.rotation).amax() < 1e-15, "{format:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_format_is_told_by_content() {
+        assert_eq!(Format::of_text("# x\n1 0 0 0 0 0 0 1\n"), Some(Format::Tum));
+        assert_eq!(Format::of_text("1 0 0 0 0 1 0 0 0 0 1 0\n"), Some(Format::Kitti));
+        assert_eq!(
+            Format::of_text("#timestamp, p_x\n1403636580838555648,4.6,-1.7,0.7,1,0,0,0,9\n"),
+            Some(Format::Euroc)
+        );
+        assert_eq!(Format::of_text("# nothing\n\n"), None);
+    }
+
+    #[test]
+    fn faults_name_their_line() {
+        assert!(read("").unwrap_err().starts_with("a trajectory without poses in walk"));
+        assert!(read("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n").unwrap_err().starts_with("7 columns in walk:2"));
+        assert!(read("1,0,0,0,0,0,0\n").unwrap_err().starts_with("7 columns in walk:1"));
+        assert!(read("1.5,0,0,0,0,0,0,1\n").unwrap_err().contains("not commas"));
+        assert!(read("5,0,0,0,1,0,0,0\n5,0,0,0,1,0,0,0\n").unwrap_err().contains("in walk:2: 5; sort the lines"));
+        assert!(read("1 0 0 0 0 1 0 0 0 0 -1 0\n").unwrap_err().contains("no rotation in walk:1"));
+        let wxyz = "# timestamp tx ty tz qw qx qy qz\n1 0 0 0 1 0 0 0\n";
+        assert!(read(wxyz).unwrap_err().starts_with("quaternions with w first in walk:1"), "{wxyz}");
+    }
+}

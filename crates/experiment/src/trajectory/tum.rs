@@ -1,0 +1,28 @@
+//! TUM lines: `seconds tx ty tz qx qy qz qw`.
+
+use std::path::Path;
+
+use seafix_component::Fault;
+use seafix_geometry::{Camera, Transform, World};
+
+use super::{Pose, Trajectory, quaternion};
+use crate::dataset::tum;
+
+pub(super) fn parse(text: &str, file: &Path) -> Result<Trajectory, Fault> {
+    let rows: Vec<(u64, Transform<World, Camera>)> = tum::parse(text, file)?;
+    let pose =
+        |pose: &Transform<World, Camera>| Pose { rotation: pose.rotation_matrix(), position: pose.translation() };
+    Ok(Trajectory {
+        stamps: Some(rows.iter().map(|(stamp, _)| *stamp).collect()),
+        poses: rows.iter().map(|(_, transform)| pose(transform)).collect(),
+    })
+}
+
+pub(super) fn print(trajectory: &Trajectory) -> String {
+    let line = |(i, pose): (usize, &Pose)| {
+        let (stamp, p, [w, x, y, z]) = (trajectory.stamp(i), pose.position, quaternion(pose));
+        let (seconds, nanos) = (stamp / 1_000_000_000, stamp % 1_000_000_000);
+        format!("{seconds}.{nanos:09} {} {} {} {x} {y} {z} {w}\n", p.x, p.y, p.z)
+    };
+    trajectory.poses.iter().enumerate().map(line).collect()
+}
