@@ -6,6 +6,7 @@
 //! in one file, `judge.rs`, after the method has answered.
 
 pub mod dataset;
+mod diff;
 mod experiment;
 mod judge;
 mod manifest;
@@ -17,6 +18,7 @@ pub mod source;
 pub mod trajectory;
 mod vary;
 
+pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
 pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
 pub use results::COLUMNS;

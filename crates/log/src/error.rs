@@ -44,7 +44,7 @@ pub enum LogError {
     /// The file ends before its footer.
     #[error(
         "{} has no footer: it was cut off or is still being written; {messages} messages up to stamp {last_ns} ns \
-         are readable; run the trial again, or salvage them with `mcap recover`",
+         are readable; run the trial again, or save them with `seafix recover`",
         .path.display()
     )]
     Truncated {
@@ -56,7 +56,7 @@ pub enum LogError {
         last_ns: u64,
     },
     /// The bytes are not those that were written.
-    #[error("{} is damaged: {what}; copy it again from its source or run the trial again", .path.display())]
+    #[error("{} is damaged: {what}; copy it again from its source, or save the rest with `seafix recover`", .path.display())]
     Damaged {
         /// The file.
         path: PathBuf,

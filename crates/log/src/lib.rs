@@ -56,6 +56,7 @@ mod png;
 mod proto;
 mod read;
 mod record;
+mod recover;
 mod topic;
 mod view;
 mod write;
@@ -68,4 +69,5 @@ pub use record::{
     Matrix4, Matrix6, ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord,
     TargetTimes, TrialHeader, TruthRecord, VisiblePoint,
 };
+pub use recover::{Recovered, recover};
 pub use write::Writer;

@@ -8,11 +8,13 @@ use crate::exit::Ended;
 
 mod check;
 mod cloud;
+mod diff;
 mod dive;
 mod draw;
 mod eval;
 mod export;
 mod list;
+mod recover;
 mod report;
 mod run;
 mod show;
@@ -29,6 +31,8 @@ pub(crate) enum Command {
     Cloud(cloud::Cloud),
     /// Draw identification problems with truth (coherence-problem/1).
     Draw(draw::Draw),
+    /// Say what differs between two runs: configuration, inputs, results.
+    Diff(diff::Diff),
     /// Judge a trajectory against a reference: absolute and relative errors, drift (evo's definitions).
     Eval(eval::Eval),
     /// Say everything that is wrong with a data set, site, experiment, problem or log.
@@ -44,6 +48,8 @@ pub(crate) enum Command {
         /// The component's name.
         name: String,
     },
+    /// Save what is sound of a log that was cut off or damaged.
+    Recover(recover::Recover),
     /// Make the report of a run again, from its logs alone.
     Report(report::Report),
     /// Make a dive: stereo pairs with truth, visibility and rough poses, as a data set.
@@ -59,10 +65,12 @@ impl Command {
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),
             Self::Draw(command) => command.execute(),
+            Self::Diff(command) => command.execute(),
             Self::Eval(command) => command.execute(),
             Self::Check { paths } => check::execute(paths),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),
+            Self::Recover(command) => command.execute(),
             Self::Report(command) => command.execute(),
             Self::Dive(command) => command.execute(),
             Self::Export(command) => command.execute(),

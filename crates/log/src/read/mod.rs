@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{FrameRecord, LogError, TrialHeader, convert, topic};
 use pending::Pending;
+pub(crate) use source::looks_like;
 use source::{Message, Source};
 
 /// A whole trial, as its log has it.

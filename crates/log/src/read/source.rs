@@ -170,7 +170,7 @@ impl Source {
 }
 
 /// What a file that does not begin like an MCAP file looks like.
-fn looks_like(start: &[u8]) -> String {
+pub(crate) fn looks_like(start: &[u8]) -> String {
     let known: [(&[u8], &str); 5] = [
         (b"#ROSBAG", "it looks like a ROS 1 bag; convert it with `mcap convert IN.bag OUT.mcap`"),
         (

@@ -1,0 +1,52 @@
+//! What can be done with runs: comparing two, and saving a log that was cut off.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot read what it made has failed")]
+
+use std::{fs, path::Path};
+
+use assert_cmd::Command;
+
+const EXPERIMENT: &str = "question = 'Which?'\nseed = 3\n[source]\nname = 'virtual-points'\nframes = 2\n\
+                          [[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'triad']\n";
+
+fn seafix(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let out = Command::cargo_bin("seafix").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (out.status.code().unwrap(), text(out.stdout), text(out.stderr))
+}
+
+#[test]
+fn two_runs_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    for (out, settings) in [("a", &[][..]), ("b", &["--threads", "2"]), ("c", &["--set", "seed=4"])] {
+        let (code, _, error) = seafix(folder, &[&["run", "e.toml", "--out", out], settings].concat());
+        assert_eq!(code, 0, "{error}");
+    }
+    let (code, out, _) = seafix(folder, &["diff", "a", "b"]);
+    assert!(code == 0 && out.starts_with("no difference"), "{out}");
+    let (code, out, _) = seafix(folder, &["diff", "a", "c"]);
+    assert_eq!(code, 1);
+    assert!(out.starts_with("configuration\n  seed: 3 | 4\n") && out.contains("m2_rms:"), "{out}");
+    let (code, _, error) = seafix(folder, &["diff", "a", "nowhere"]);
+    assert!(code == 3 && error.contains("name the folder of a finished run"), "{error}");
+}
+
+#[test]
+fn a_log_that_was_cut_off_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    assert_eq!(seafix(folder, &["run", "e.toml", "--out", "a"]).0, 0);
+    let log = folder.join("a/001-solver-kabsch.mcap");
+    let bytes = fs::read(&log).unwrap();
+    fs::write(folder.join("cut.mcap.partial"), &bytes[..bytes.len() - 30]).unwrap();
+    let (code, out, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
+    assert!(code == 0 && out.contains("2 whole frames"), "{out}{error}");
+    assert_eq!(seafix(folder, &["check", "cut-recovered.mcap"]).0, 0);
+    let (code, _, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
+    assert!(code == 4 && error.contains("name another file with --out"), "{error}");
+    let (code, _, error) = seafix(folder, &["recover", "e.toml"]);
+    assert!(code == 3 && error.contains("not an MCAP file"), "{error}");
+}
