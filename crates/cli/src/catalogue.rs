@@ -2,6 +2,7 @@
 
 use seafix_component::{Listing, Registry};
 use seafix_experiment::source::SOURCES;
+use seafix_navigation::ODOMETRIES;
 use seafix_referencing::{SEARCHES, SOLVERS};
 use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS};
 
@@ -23,6 +24,7 @@ pub(crate) fn kinds() -> Vec<Kind> {
         kind("matchers", &MATCHERS),
         kind("searches", &SEARCHES),
         kind("solvers", &SOLVERS),
+        kind("odometries", &ODOMETRIES),
     ]
 }
 

@@ -39,6 +39,28 @@ impl Progress {
         Self { bar: ProgressBar::hidden().with_style(style), watched: stderr().is_terminal() }
     }
 
+    /// So many steps are to come.
+    pub(crate) fn expect(&self, frames: usize) {
+        self.bar.set_length(frames as u64);
+        if self.watched {
+            self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+        }
+    }
+
+    /// One of them is done.
+    pub(crate) fn step(&self, message: &str) {
+        self.bar.inc(1);
+        if self.watched {
+            self.bar.set_message(message.to_owned());
+        } else {
+            // A log file gets a line at every tenth of the way.
+            let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(1).max(1));
+            if done * 10 / all != (done - 1) * 10 / all {
+                tell(&format!("{done}/{all} frames"));
+            }
+        }
+    }
+
     pub(crate) fn end(&self) {
         self.bar.finish_and_clear();
     }
@@ -47,10 +69,7 @@ impl Progress {
 impl Observer for Progress {
     fn begins(&self, frames: usize, bytes: u64, folder: &Path) {
         tell(&format!("{frames} frames, about {} MB of log, into {}", bytes.div_ceil(1_000_000), folder.display()));
-        self.bar.set_length(frames as u64);
-        if self.watched {
-            self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
-        }
+        self.expect(frames);
     }
 
     fn warns(&self, warning: &Fault) {
@@ -58,15 +77,6 @@ impl Observer for Progress {
     }
 
     fn frame(&self, trial: &str) {
-        self.bar.inc(1);
-        if self.watched {
-            self.bar.set_message(trial.to_owned());
-        } else {
-            // A log file gets a line at every tenth of the way.
-            let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(1).max(1));
-            if done * 10 / all != (done - 1) * 10 / all {
-                tell(&format!("{done}/{all} frames"));
-            }
-        }
+        self.step(trial);
     }
 }

@@ -24,4 +24,4 @@ pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
 pub use results::COLUMNS;
 pub use run::{Finished, Observer, RunError, Silent, run};
 pub use seafix_component::read_text;
-pub use vary::Axis;
+pub use vary::{Axis, changed};

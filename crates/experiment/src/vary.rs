@@ -38,7 +38,7 @@ pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
 ///
 /// # Errors
 /// The setting that cannot be, with `example` as one that could.
-pub(crate) fn changed<T: Serialize + DeserializeOwned>(
+pub fn changed<T: Serialize + DeserializeOwned>(
     whole: &T,
     settings: &[String],
     example: &str,

@@ -105,6 +105,16 @@ impl Look {
     pub fn keypoints(&self) -> [&[Keypoint]; 2] {
         [&self.eyes[0].keypoints, &self.eyes[1].keypoints]
     }
+
+    /// Their descriptors, in the same order; of no meaning where the matcher compares none.
+    pub fn descriptors(&self) -> [&Descriptors; 2] {
+        [&self.eyes[0].descriptors, &self.eyes[1].descriptors]
+    }
+
+    /// The images as the filters leave them; `None` where there is no filter.
+    pub fn filtered(&self) -> [Option<&Image>; 2] {
+        [self.filtered[0].as_ref(), self.filtered[1].as_ref()]
+    }
 }
 
 impl FrontEnd {

@@ -24,7 +24,7 @@ mod swapped;
 mod track;
 mod workspace;
 
-pub use align::{Refine, Unaligned, Warp, Weight};
+pub use align::{Expected, Refine, Unaligned, Warp, Weight};
 pub use cloud::Triangulator;
 pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Sift, Surf, Table, ZnccPatch};
 pub use detect::{

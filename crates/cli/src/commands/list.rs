@@ -11,7 +11,7 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct List {
-    /// Only this kind: sources, filters, detectors, descriptors, matchers, searches or solvers.
+    /// Only this kind: sources, filters, detectors, descriptors, matchers, searches, solvers or odometries.
     kind: Option<String>,
     /// As the tables of the README.
     #[arg(long, conflicts_with = "kind")]

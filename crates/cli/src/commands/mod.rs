@@ -14,6 +14,7 @@ mod draw;
 mod eval;
 mod export;
 mod list;
+mod odometry;
 mod recover;
 mod report;
 mod run;
@@ -29,6 +30,8 @@ pub(crate) enum Command {
     Solve(solve::Solve),
     /// Make the cloud of measured points of one stereo pair.
     Cloud(cloud::Cloud),
+    /// Follow a stereo rig through a data set: poses relative to the first.
+    Odometry(odometry::Odometer),
     /// Draw identification problems with truth (coherence-problem/1).
     Draw(draw::Draw),
     /// Say what differs between two runs: configuration, inputs, results.
@@ -64,6 +67,7 @@ impl Command {
             Self::Run(command) => command.execute(),
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),
+            Self::Odometry(command) => command.execute(),
             Self::Draw(command) => command.execute(),
             Self::Diff(command) => command.execute(),
             Self::Eval(command) => command.execute(),

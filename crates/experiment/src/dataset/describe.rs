@@ -75,6 +75,12 @@ pub(super) struct CameraNumbers {
 }
 
 impl Description {
+    /// Forgets all that is not about the rig and its images.
+    pub(super) fn keep_pairs_only(&mut self) {
+        (self.site, self.truth, self.prior, self.visibility, self.objects) = (None, None, None, None, None);
+        (self.prior_sigma, self.prior_covariance) = (None, None);
+    }
+
     /// The rig, or what is wrong with it in `file`, whose text is `source`.
     pub(super) fn build_rig(&self, file: &Path, source: &str) -> Result<StereoRig, Fault> {
         self.rig.build().map_err(|(path, what)| {

@@ -4,6 +4,15 @@ use std::path::{Component as Part, Path, PathBuf};
 
 use seafix_component::Fault;
 
+/// Whether `name` is a sound path to a file that does not exist in `folder`.
+pub(super) fn is_absent(folder: &Path, name: &str) -> bool {
+    let sound = !name.is_empty()
+        && !name.contains(['\\', '\0'])
+        && Path::new(name).components().all(|part| matches!(part, Part::Normal(_) | Part::CurDir));
+    // A link that leads nowhere is there, and may lead out.
+    sound && folder.join(name).symlink_metadata().is_err()
+}
+
 /// The file that `name`, written in `mentioned_in`, stands for; it exists and lies inside `folder`.
 pub(super) fn inside(folder: &Path, name: &str, mentioned_in: &Path) -> Result<PathBuf, Fault> {
     let fault = |what: &str, remedy: &str| Fault::new(what, mentioned_in).value(format!("`{name}`")).remedy(remedy);

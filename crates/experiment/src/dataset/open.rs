@@ -12,7 +12,7 @@ use seafix_vision::Image;
 
 use super::{
     describe::{Description, FORMATS},
-    folder::inside,
+    folder::{inside, is_absent},
     picture::read_image,
     tables, tum,
 };
@@ -70,14 +70,30 @@ impl Dataset {
     /// # Errors
     /// Everything that is wrong with it, at once.
     pub fn open(folder: &Path) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, false)
+    }
+
+    /// Reads what odometry may know of the data set in `folder`: the rig and the stereo pairs. Site, truth and prior are
+    /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair).
+    ///
+    /// # Errors
+    /// Everything else that is wrong with it, at once.
+    pub fn open_pairs(folder: &Path) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, true)
+    }
+
+    fn read(folder: &Path, pairs_only: bool) -> Result<Self, Vec<Fault>> {
         let file = folder.join("dataset.toml");
         if !folder.is_dir() {
             return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
         }
         let source = read_text(&file).map_err(|fault| vec![fault])?;
-        let described: Description =
+        let mut described: Description =
             toml::from_str(&source).map_err(|error| vec![Fault::in_toml(&file, &source, &error)])?;
-        Reader { folder, file: &file, source: &source, described: &described, faults: Vec::new() }.read()
+        if pairs_only {
+            described.keep_pairs_only();
+        }
+        Reader { folder, file: &file, source: &source, described: &described, pairs_only, faults: Vec::new() }.read()
     }
 }
 
@@ -110,6 +126,7 @@ struct Reader<'a> {
     file: &'a Path,
     source: &'a str,
     described: &'a Description,
+    pairs_only: bool,
     faults: Vec<Fault>,
 }
 
@@ -236,6 +253,9 @@ impl Reader<'_> {
 
     fn image(&mut self, line: &tables::FrameLine, name: &str) -> Option<PathBuf> {
         let table = self.folder.join(&self.described.frames);
+        if self.pairs_only && is_absent(self.folder, name) {
+            return Some(self.folder.join(name));
+        }
         inside(self.folder, name, &table).map_err(|fault| self.faults.push(fault.on_line(line.line))).ok()
     }
 

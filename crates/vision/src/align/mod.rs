@@ -1,6 +1,7 @@
 //! Alignment of matched places between the two images.
 
 mod covariance;
+mod follow;
 mod inverse_compositional;
 mod lanes;
 mod local;
@@ -14,6 +15,7 @@ use seafix_geometry::{Pixel, StereoPixels, StereoRig, UncertainPixels};
 use serde::{Deserialize, Serialize};
 
 use crate::{Image, Pair, Place, Workspace};
+pub use follow::Expected;
 pub(crate) use inverse_compositional::{Aligned, Aligner, Rules};
 use local::Local;
 pub(crate) use warp::Translation;
@@ -146,20 +148,11 @@ impl Refine {
         pair: &StereoPixels,
         aligner: &mut Aligner,
     ) -> Option<Aligned> {
-        let Self { refine: _, window, weight, warp, reach, least_correlation, iterations, unaligned: _ } = *self;
-        let rules = Rules {
-            half: window / 2,
-            weight,
-            reach,
-            least_correlation,
-            iterations,
-            precision: Rules::FINE,
-            beyond: false,
-        };
-        let local = Local::new(rig, pair, window as f64 / 2.0);
+        let rules = self.rules();
+        let local = Local::new(rig, pair, self.window as f64 / 2.0);
         let centre = Vector2::new(pair.left.u, pair.left.v);
         let start = (&Vector2::new(pair.right.u, pair.right.v), &local.shape);
-        match warp {
+        match self.warp {
             Warp::Translation => aligner.align(left, right, &centre, start, &rules, &Translation),
             Warp::Slanted => aligner.align(left, right, &centre, start, &rules, &warp::Slanted(local.epipolar)),
             Warp::Affine => aligner.align(left, right, &centre, start, &rules, &warp::Affine),

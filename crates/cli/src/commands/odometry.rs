@@ -1,0 +1,246 @@
+//! `seafix odometry`.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use clap::Args;
+use rayon::ThreadPoolBuilder;
+use seafix_component::{Choice, Fault};
+use seafix_experiment::{
+    changed,
+    dataset::{Dataset, tum},
+};
+use seafix_navigation::{Journey, ODOMETRIES, Odometry, Outcome, Segment, StereoPair};
+use seafix_vision::Threads;
+use serde_json::{Value, json};
+
+use crate::{
+    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
+    terminal::{Progress, print, tell},
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Odometer {
+    /// The folder of a data set; neither its site nor its truth is looked at.
+    dataset: PathBuf,
+    /// Write the poses here, in TUM's format: world_from_camera, the world being the first left camera.
+    #[arg(long, value_name = "FILE.tum")]
+    out: Option<PathBuf>,
+    /// The odometry.
+    #[arg(long, default_value = "stereo", value_name = "NAME")]
+    odometry: String,
+    /// Change a setting of the odometry: a dotted key and a TOML value, `detector.features=2000`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// How many threads work; the poses do not depend on it.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// One JSON object, for programs: every pose, every pair that was left out, and the times.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What came of all pairs.
+struct Trip {
+    journey: Journey,
+    /// Stamp of each pair that the odometry was given.
+    given: Vec<u64>,
+    /// Stamp of each pair whose images could not be read, and why.
+    unread: Vec<(u64, Fault)>,
+    /// Milliseconds of the odometry, reading left out.
+    odometry_ms: f64,
+}
+
+impl Odometer {
+    pub(crate) fn execute(&self) -> Ended {
+        let (odometry, settings) = self.build()?;
+        let dataset = Dataset::open_pairs(&self.dataset).map_err(|faults| Failure::faults(INPUT, &faults))?;
+        dataset.warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(usize::from(self.threads))
+            .build()
+            .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
+        let trip = pool.install(|| self.travel(&*odometry, &dataset))?;
+        if let Some(out) = &self.out {
+            write(out, &poses(&trip.journey))?;
+        }
+        print(&if self.json { machines(&trip, &settings) } else { people(&trip) })?;
+        Ok(DONE)
+    }
+
+    /// The odometry and its settings, all written out.
+    fn build(&self) -> Result<(Box<dyn Odometry>, Choice), Failure> {
+        let usage = |error| Failure::new(USAGE, error);
+        let choice = ODOMETRIES.resolve(&Choice::named(&self.odometry)).map_err(usage)?;
+        let settings = changed(&choice.settings, &self.set, "detector.features=2000")
+            .map_err(|faults| Failure::faults(USAGE, &faults))?;
+        let choice = ODOMETRIES.resolve(&Choice { settings, ..choice }).map_err(usage)?;
+        Ok((ODOMETRIES.build(&choice).map_err(usage)?, choice))
+    }
+
+    /// Leads every pair that can be read through the odometry.
+    fn travel(&self, odometry: &dyn Odometry, dataset: &Dataset) -> Result<Trip, Failure> {
+        let threads = if self.threads > 1 { Threads::Pool } else { Threads::One };
+        let mut reckoning = odometry.begin(&dataset.rig, threads);
+        let progress = Progress::new();
+        progress.expect(dataset.frames.len());
+        let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
+        for frame in &dataset.frames {
+            match dataset.pair(frame) {
+                Err(fault) => {
+                    tell(&format!("warning: {fault}"));
+                    unread.push((frame.stamp_ns, fault));
+                }
+                Ok((left, right)) => {
+                    let pair = StereoPair { stamp_ns: frame.stamp_ns, left: &left, right: &right };
+                    let start = Instant::now();
+                    reckoning.advance(&pair).map_err(|error| Failure::new(INPUT, error))?;
+                    odometry_ms += start.elapsed().as_secs_f64() * 1e3;
+                    given.push(frame.stamp_ns);
+                }
+            }
+            progress.step("");
+        }
+        progress.end();
+        // Half a passage is none.
+        if given.len() < unread.len() {
+            let faults: Vec<Fault> = unread.into_iter().map(|(_, fault)| fault).collect();
+            return Err(Failure::faults(INPUT, &faults));
+        }
+        Ok(Trip { journey: reckoning.journey(), given, unread, odometry_ms })
+    }
+}
+
+impl Trip {
+    /// Stamps of the pairs that were left out, and why, in order of time.
+    fn left_out(&self) -> Vec<(u64, String)> {
+        let skipped = self.given.iter().zip(&self.journey.outcomes).filter_map(|(stamp, outcome)| match outcome {
+            Outcome::Skipped(lost) => Some((*stamp, lost.to_string())),
+            Outcome::Began | Outcome::Followed { .. } => None,
+        });
+        let unread = self.unread.iter().map(|(stamp, fault)| (*stamp, fault.to_string()));
+        let mut all: Vec<_> = skipped.chain(unread).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Landmarks found in a pair, of those sought: the least, and the means.
+    fn landmarks(&self) -> Option<[f64; 3]> {
+        let followed: Vec<(usize, usize)> = self.journey.outcomes.iter().filter_map(of_followed).collect();
+        let count = followed.len() as f64;
+        let least = followed.iter().map(|(_, found)| *found).min()?;
+        let mean = |pick: fn(&(usize, usize)) -> usize| followed.iter().map(pick).sum::<usize>() as f64 / count;
+        Some([least as f64, mean(|one| one.1), mean(|one| one.0)])
+    }
+
+    fn pairs_a_second(&self) -> f64 {
+        1e3 * self.given.len() as f64 / self.odometry_ms
+    }
+}
+
+fn of_followed(outcome: &Outcome) -> Option<(usize, usize)> {
+    match outcome {
+        Outcome::Followed { sought, found } => Some((*sought, *found)),
+        Outcome::Began | Outcome::Skipped(_) => None,
+    }
+}
+
+/// TUM's text: every pose, in order of time; a comment where a segment begins that is not joined to the one before.
+fn poses(journey: &Journey) -> String {
+    let mut text = "# world_from_camera, the world is the first left camera: seconds tx ty tz qx qy qz qw\n".to_owned();
+    for segment in &journey.segments {
+        if let Some(why) = &segment.broken {
+            text += &format!("# broken: the motion to here is unknown and left out ({why})\n");
+        }
+        let stamped: Vec<_> = segment.poses.iter().map(|pose| (pose.stamp_ns, pose.world_from_camera)).collect();
+        text += &tum::print(&stamped);
+    }
+    text
+}
+
+/// Writes a file that has its name only when it is whole.
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    let done = fs::write(&partial, text).and_then(|()| fs::rename(&partial, path));
+    done.map_err(|error| {
+        let _ = fs::remove_file(&partial);
+        let fault = Fault::new(format!("cannot write ({error})"), path).remedy("check the folder and the space left");
+        Failure::new(OUTPUT, fault)
+    })
+}
+
+/// For people: how far, how fast, and where not.
+fn people(trip: &Trip) -> String {
+    let journey = &trip.journey;
+    let poses = journey.waypoints().count();
+    let pairs = trip.given.len() + trip.unread.len();
+    let mut text = format!("{poses} poses of {pairs} stereo pairs over {:.2} m", journey.length());
+    text += &format!(", {:.1} pairs a second\n", trip.pairs_a_second());
+    if let Some([least, found, sought]) = trip.landmarks() {
+        text += &format!("{found:.0} of {sought:.0} landmarks found in a pair, at least {least:.0}\n");
+    }
+    for segment in journey.segments.iter().filter(|segment| segment.broken.is_some()) {
+        text += &format!("broken before {}: {}\n", seconds(segment.poses[0].stamp_ns), why(segment));
+    }
+    let left_out = trip.left_out();
+    if !left_out.is_empty() {
+        text += &format!("{} pairs left out\n", left_out.len());
+    }
+    for (stamp, why) in &left_out {
+        text += &format!("  {}: {why}\n", seconds(*stamp));
+    }
+    let count = trip.given.len() as f64;
+    let stages: Vec<String> = journey.times.iter().map(|(stage, ms)| format!("{stage} {:.1}", ms / count)).collect();
+    text + &format!("ms a pair: {}\n", stages.join(", "))
+}
+
+/// For programs: everything.
+fn machines(trip: &Trip, settings: &Choice) -> String {
+    let journey = &trip.journey;
+    let count = trip.given.len() as f64;
+    let segments: Vec<Value> = journey.segments.iter().map(segment).collect();
+    let left_out: Vec<Value> =
+        trip.left_out().into_iter().map(|(stamp_ns, why)| json!({ "stamp_ns": stamp_ns, "why": why })).collect();
+    let times: serde_json::Map<String, Value> =
+        journey.times.iter().map(|(stage, ms)| ((*stage).to_owned(), json!(ms / count))).collect();
+    let value = json!({
+        "pairs": trip.given.len() + trip.unread.len(),
+        "poses": journey.waypoints().count(),
+        "length": journey.length(),
+        "segments": segments,
+        "left_out": left_out,
+        "landmarks": trip.landmarks().map(|[least, found, sought]| json!({ "least": least, "found": found, "sought": sought })),
+        "pairs_a_second": trip.pairs_a_second(),
+        "times_ms": times,
+        "odometry": settings,
+    });
+    value.to_string() + "\n"
+}
+
+fn segment(segment: &Segment) -> Value {
+    let poses = segment.poses.iter().map(|pose| {
+        let covariance = pose.local.map(|local| {
+            local.covariance.matrix.row_iter().map(|row| row.iter().copied().collect()).collect::<Vec<Vec<f64>>>()
+        });
+        json!({
+            "stamp_ns": pose.stamp_ns,
+            "world_from_camera": pose.world_from_camera.rows(),
+            "earlier_from_later": pose.local.map(|local| local.motion.rows()),
+            "covariance": covariance,
+        })
+    });
+    json!({ "broken": segment.broken.as_ref().map(ToString::to_string), "poses": poses.collect::<Vec<_>>() })
+}
+
+fn why(segment: &Segment) -> String {
+    segment.broken.as_ref().map_or_else(String::new, ToString::to_string)
+}
+
+fn seconds(stamp_ns: u64) -> String {
+    format!("{}.{:09} s", stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000)
+}

@@ -1,0 +1,177 @@
+//! Odometry over a small made-up passage, as a person and as a program asks for it.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at once")]
+
+use std::{fs, path::PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+const SIZE: [usize; 2] = [320, 240];
+const FOCAL: f64 = 250.0;
+const BASELINE: f64 = 0.1;
+/// The way between two pairs, along x (m).
+const STEP: f64 = 0.04;
+const PAIRS: usize = 8;
+
+/// Two walls that stand in a corner, textured with waves and random tiles; the rig moves along x.
+struct Passage {
+    folder: TempDir,
+}
+
+/// The brightness of a place of the wall (m).
+fn texture(x: f64, y: f64) -> f64 {
+    let tile = |scale: f64| {
+        let (i, j) = ((x * scale).floor() as i64 as u32, (y * scale).floor() as i64 as u32);
+        let mut hash = i.wrapping_mul(0x9E37_79B1) ^ j.wrapping_mul(0x85EB_CA77);
+        hash ^= hash >> 15;
+        hash = hash.wrapping_mul(0x2C1B_3C6D);
+        f64::from((hash ^ (hash >> 13)) % 256)
+    };
+    0.5 * tile(23.0) + 0.3 * tile(9.0) + 0.2 * tile(3.0)
+}
+
+/// What a camera at (x, 0, 0) that looks along z sees, each pixel the mean of 3×3 rays.
+fn view(x: f64) -> Vec<u8> {
+    let [width, height] = SIZE;
+    let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
+    for v in 0..height {
+        for u in 0..width {
+            let rays = (0..9).map(|k| {
+                let (a, b) = (f64::from(k % 3) / 3.0 - 1.0 / 3.0, f64::from(k / 3) / 3.0 - 1.0 / 3.0);
+                let (dx, dy) = ((u as f64 + a - 159.5) / FOCAL, (v as f64 + b - 119.5) / FOCAL);
+                // z = 2 − 0.5 |X|: nearer at both sides.
+                let reach = [1.0, -1.0].map(|sign: f64| (2.0 - 0.5 * sign * x) / (1.0 + 0.5 * sign * dx));
+                let z = reach[0].min(reach[1]);
+                texture(x + dx * z, dy * z)
+            });
+            bytes.push((rays.sum::<f64>() / 9.0) as u8);
+        }
+    }
+    bytes
+}
+
+impl Passage {
+    fn new() -> Self {
+        let passage = Self { folder: TempDir::new().unwrap() };
+        let [width, height] = SIZE;
+        let camera = format!("size = [{width}, {height}]\nfx = {FOCAL}\nfy = {FOCAL}\ncx = 159.5\ncy = 119.5\n");
+        let rows = format!("[[1.0,0.0,0.0,-{BASELINE}],[0.0,1.0,0.0,0.0],[0.0,0.0,1.0,0.0],[0.0,0.0,0.0,1.0]]");
+        let head = "format = \"seafix-dataset/1\"\nname = \"walls\"\nlicence = \"CC0-1.0\"\nframes = \"frames.csv\"\n";
+        let rig = format!("[rig]\nright_from_left = {rows}\n[rig.left]\n{camera}[rig.right]\n{camera}");
+        passage.put("dataset.toml", format!("{head}{rig}"));
+        for pair in 0..PAIRS {
+            let x = STEP * pair as f64;
+            passage.put(&format!("l{pair}.pgm"), view(x));
+            passage.put(&format!("r{pair}.pgm"), view(x + BASELINE));
+        }
+        passage.frames(&(0..PAIRS).map(|pair| (pair as u64, pair)).collect::<Vec<_>>());
+        passage
+    }
+
+    /// Writes frames.csv: (tenths of a second, which pair of images).
+    fn frames(&self, pairs: &[(u64, usize)]) {
+        let line = |(tenths, pair): &(u64, usize)| {
+            format!("{},l{pair}.pgm,r{pair}.pgm\n", 1_000_000_000 + tenths * 100_000_000)
+        };
+        self.put("frames.csv", "stamp_ns,left,right\n".to_owned() + &pairs.iter().map(line).collect::<String>());
+    }
+
+    fn put(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).unwrap();
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn odometry(&self, more: &[&str]) -> assert_cmd::assert::Assert {
+        let mut command = Command::cargo_bin("seafix").unwrap();
+        command.arg("odometry").arg(self.folder.path()).args(more).assert()
+    }
+
+    fn json(&self, more: &[&str]) -> Value {
+        serde_json::from_slice(&self.odometry(&[&["--json"], more].concat()).success().get_output().stdout).unwrap()
+    }
+
+    /// The x of every pose.
+    fn ways(all: &Value) -> Vec<f64> {
+        let segments = all["segments"].as_array().unwrap();
+        let poses = segments.iter().flat_map(|segment| segment["poses"].as_array().unwrap());
+        poses.map(|pose| pose["world_from_camera"][0][3].as_f64().unwrap()).collect()
+    }
+}
+
+#[test]
+fn the_way_is_found_written_and_told() {
+    let passage = Passage::new();
+    let all = passage.json(&[]);
+    let ways = Passage::ways(&all);
+    assert_eq!((ways.len(), ways[0]), (PAIRS, 0.0), "{all}");
+    for (pair, x) in ways.iter().enumerate() {
+        assert!((x - STEP * pair as f64).abs() < 0.01 * STEP * PAIRS as f64, "{pair}: {ways:?}");
+    }
+    // Threads change nothing, and the file has the same poses.
+    assert_eq!(passage.json(&["--threads", "3"])["segments"], all["segments"]);
+    let file = passage.path("way.tum");
+    let said = passage.odometry(&["--out", file.to_str().unwrap()]).success();
+    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    assert!(said.starts_with(&format!("{PAIRS} poses of {PAIRS} stereo pairs over 0.28 m")), "{said}");
+    let text = fs::read_to_string(&file).unwrap();
+    let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(lines.len(), PAIRS);
+    assert!(lines[1].starts_with("1.100000000 "), "{text}");
+    assert!(!passage.path("way.tum.partial").exists());
+}
+
+#[test]
+fn what_cannot_be_used_is_left_out_and_told() {
+    let passage = Passage::new();
+    let black = format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes();
+    passage.put("r2.pgm", [black, vec![0; SIZE[0] * SIZE[1]]].concat());
+    fs::remove_file(passage.path("l4.pgm")).unwrap();
+    // Pair 6 again, as from a frozen camera.
+    passage.frames(&[(0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (7, 6), (8, 7)]);
+    let all = passage.json(&[]);
+    let why: Vec<&str> = all["left_out"].as_array().unwrap().iter().map(|one| one["why"].as_str().unwrap()).collect();
+    assert_eq!(why.len(), 3, "{why:?}");
+    assert!(why[0].contains("right image shows nothing"), "{why:?}");
+    assert!(why[1].contains("l4.pgm"), "{why:?}");
+    assert!(why[2].contains("left image is the one before"), "{why:?}");
+    assert_eq!(all["segments"].as_array().unwrap().len(), 1);
+    let ways = Passage::ways(&all);
+    assert_eq!(ways.len(), 6);
+    assert!((ways[5] - 7.0 * STEP).abs() < 0.01 * 7.0 * STEP, "{ways:?}");
+}
+
+#[test]
+fn a_gap_and_a_leap_break_the_way() {
+    let passage = Passage::new();
+    passage.frames(&[(0, 0), (1, 1), (80, 2), (81, 3)]);
+    let all = passage.json(&[]);
+    let segments = all["segments"].as_array().unwrap();
+    assert_eq!(segments.len(), 2, "{all}");
+    assert!(segments[1]["broken"].as_str().unwrap().contains("7.900 s"), "{all}");
+    let ways = Passage::ways(&all);
+    assert_eq!(ways[1], ways[2], "the motion between is left out, not guessed");
+    let fast = passage.json(&["--set", "most-speed=0.1"]);
+    assert!(fast.to_string().contains("0.1 m/s"), "{fast}");
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_one_line() {
+    let passage = Passage::new();
+    let refusal = |more: &[&str], code: i32| {
+        let ended = passage.odometry(more).code(code);
+        assert!(ended.get_output().stdout.is_empty());
+        String::from_utf8(ended.get_output().stderr.clone()).unwrap()
+    };
+    assert!(refusal(&["--odometry", "sterio"], 2).contains("did you mean `stereo`?"));
+    assert!(refusal(&["--set", "windou=3"], 2).contains("did you mean `window`?"));
+    assert!(refusal(&["--set", "follow.window=4"], 2).contains("odd number"));
+    assert!(refusal(&["--out", "/nowhere/way.tum"], 4).contains("/nowhere/way.tum"));
+    passage.frames(&[(0, 0), (1, 1), (1, 2)]);
+    let said = refusal(&[], 3);
+    assert!(said.contains("frames.csv:4") && said.contains("not after the one before"), "{said}");
+}

@@ -1,0 +1,53 @@
+//! What every odometry does.
+
+use seafix_component::{Registry, entry};
+use seafix_geometry::StereoRig;
+use seafix_vision::{Image, Threads};
+
+use crate::{Journey, Stereo};
+
+/// The two images of one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct StereoPair<'a> {
+    /// When they were taken (ns).
+    pub stamp_ns: u64,
+    /// The left image.
+    pub left: &'a Image,
+    /// The right image.
+    pub right: &'a Image,
+}
+
+/// A stamp that is not after the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "pair {pair}: stamp {stamp_ns} ns is not after the one before, {before_ns} ns; give the pairs in order of time"
+)]
+pub struct NotAfter {
+    /// Which pair, from 0.
+    pub pair: usize,
+    /// Its stamp (ns).
+    pub stamp_ns: u64,
+    /// The stamp before (ns).
+    pub before_ns: u64,
+}
+
+/// Computes the motion of a stereo rig from the images it took.
+pub trait Odometry: Send + Sync + std::fmt::Debug {
+    /// Begins with nothing seen yet, for this rig. The result does not depend on who works.
+    fn begin<'a>(&'a self, rig: &'a StereoRig, threads: Threads) -> Box<dyn Reckoning + 'a>;
+}
+
+/// An odometry at work: pairs go in, in order of time, poses come out.
+pub trait Reckoning {
+    /// Takes the next pair.
+    ///
+    /// # Errors
+    /// [`NotAfter`] when it is not the next; nothing changes then.
+    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<(), NotAfter>;
+
+    /// All that is known by now: later pairs may still improve poses and explain outcomes.
+    fn journey(&self) -> Journey;
+}
+
+/// All odometries.
+pub static ODOMETRIES: Registry<dyn Odometry> = Registry::new("odometry", &[entry!(Stereo)]);

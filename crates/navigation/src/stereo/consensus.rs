@@ -1,0 +1,109 @@
+//! The motion that most points agree on.
+
+use rand::{Rng, RngExt};
+use seafix_geometry::{Camera, Object, StereoPixels, StereoRig, Transform};
+use seafix_referencing::{Observation, Observations, Solver};
+
+/// When points agree, and how long it is sought.
+pub(super) struct Rules {
+    /// The root mean square of the distances in both images up to which they do (px).
+    pub(super) px: f64,
+    /// With what probability three right points have been drawn.
+    pub(super) confidence: f64,
+    /// Draws at most.
+    pub(super) draws: usize,
+}
+
+/// A motion, `earlier_from_later`, and the points that agree with it.
+pub(super) struct Consensus {
+    pub(super) motion: Transform<Object, Camera>,
+    pub(super) inliers: Vec<usize>,
+    score: f64,
+}
+
+/// Maximises Σ (1 − r²/t²)₊ over motions, r the distance of a point from where it is expected in both new images: over
+/// the motions of random minimal sets and the `guesses`. Each new best is solved again from all that agree with it.
+pub(super) fn consensus(
+    data: &Observations<'_>,
+    rig: &StereoRig,
+    rules: &Rules,
+    (minimal, solver): (&dyn Solver, &dyn Solver),
+    guesses: &[Transform<Object, Camera>],
+    rng: &mut dyn Rng,
+) -> Option<Consensus> {
+    let count = data.points.len();
+    let size = minimal.minimum();
+    if count < size {
+        return None;
+    }
+    let mut best: Option<Consensus> = None;
+    let offer = |motion: Transform<Object, Camera>, best: &mut Option<Consensus>| {
+        let mut tried = judge(data, rig, rules, motion);
+        if best.as_ref().is_some_and(|best| tried.score <= best.score) {
+            return;
+        }
+        // What agrees with three points is solved from all that do, twice.
+        for _ in 0..2 {
+            if tried.inliers.len() < 2 * size {
+                break;
+            }
+            let some = subset(data, &tried.inliers);
+            match solver.solve(&some).map(|motion| judge(data, rig, rules, motion)) {
+                Ok(better) if better.score > tried.score => tried = better,
+                _ => break,
+            }
+        }
+        *best = Some(tried);
+    };
+    guesses.iter().for_each(|guess| offer(*guess, &mut best));
+    let mut drawn = 0;
+    while drawn < rules.draws {
+        let share = best.as_ref().map_or(0.0, |best| best.inliers.len() as f64 / count as f64);
+        let missed = 1.0 - share.powi(size as i32);
+        let needed = libm::log(1.0 - rules.confidence) / libm::log(missed.clamp(1e-12, 1.0 - 1e-12));
+        if drawn as f64 >= needed {
+            break;
+        }
+        drawn += 1;
+        let mut three = Vec::with_capacity(size);
+        while three.len() < size {
+            let index = rng.random_range(0..count);
+            if !three.contains(&index) {
+                three.push(index);
+            }
+        }
+        if let Ok(motion) = minimal.solve(&subset(data, &three)) {
+            offer(motion, &mut best);
+        }
+    }
+    best
+}
+
+/// Some of the points.
+pub(super) fn subset<'a>(data: &Observations<'a>, indices: &[usize]) -> Observations<'a> {
+    Observations { points: indices.iter().map(|&index| data.points[index]).collect(), rig: data.rig }
+}
+
+fn judge(data: &Observations<'_>, rig: &StereoRig, rules: &Rules, motion: Transform<Object, Camera>) -> Consensus {
+    let later_from_earlier = motion.inverse();
+    let (mut inliers, mut score) = (Vec::new(), 0.0);
+    for (index, point) in data.points.iter().enumerate() {
+        let Some(squared) = squared_distance(point, rig, &later_from_earlier) else { continue };
+        let share = squared / (rules.px * rules.px);
+        if share < 1.0 {
+            score += 1.0 - share;
+            inliers.push(index);
+        }
+    }
+    Consensus { motion, inliers, score }
+}
+
+/// The mean over both images of the squared distance from the expected place (px²).
+fn squared_distance(point: &Observation, rig: &StereoRig, motion: &Transform<Camera, Object>) -> Option<f64> {
+    let StereoPixels { left, right } = rig.project(&(*motion * point.model))?;
+    let seen = point.pixels?.at;
+    let square = |x: f64| x * x;
+    let l = square(left.u - seen.left.u) + square(left.v - seen.left.v);
+    let r = square(right.u - seen.right.u) + square(right.v - seen.right.v);
+    Some(0.5 * (l + r))
+}

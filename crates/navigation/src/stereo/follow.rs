@@ -1,0 +1,146 @@
+//! Landmarks found again in a new pair of images.
+
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use seafix_geometry::{Camera, Pixel, StereoRig, Transform, World};
+use seafix_vision::{Expected, Image, Refine, Track, Workspace};
+
+use super::{
+    landmark::{LEAST, Landmark, project},
+    pose::Found,
+};
+
+/// A key frame: its pose, and the image that its landmarks' patches are taken from.
+#[derive(Debug)]
+pub(super) struct KeyFrame {
+    pub(super) world_from_camera: Transform<World, Camera>,
+    /// Its left image, as long as it is in the window.
+    pub(super) image: Option<Image>,
+}
+
+/// What came of the search.
+#[derive(Debug, Default)]
+pub(super) struct Followed {
+    /// Landmarks that should be seen.
+    pub(super) sought: usize,
+    /// Index of each landmark that was found, and where.
+    pub(super) found: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
+}
+
+/// A patch that is shown this many times larger or smaller than it was has other detail: along its most stretched
+/// direction, and as an area.
+const MOST_STRETCH: f64 = 3.0;
+
+/// Seeks landmarks where `world_from_camera` expects them.
+#[expect(clippy::too_many_arguments, reason = "one call site; each is a different thing")]
+pub(super) fn follow(
+    refine: &Refine,
+    rig: &StereoRig,
+    frames: &[KeyFrame],
+    landmarks: &[Landmark],
+    images: [&Image; 2],
+    world_from_camera: &Transform<World, Camera>,
+    (most, calibration): (usize, f64),
+    work: &mut Workspace,
+) -> Followed {
+    let camera_from_world = world_from_camera.inverse();
+    let margin = (refine.window / 2 + 2) as f64;
+    // The landmarks of the last key frames first: their patches have changed least.
+    let mut expected: Vec<(usize, [Expected; 2])> = Vec::new();
+    for (index, landmark) in landmarks.iter().enumerate().rev() {
+        if expected.len() == most {
+            break;
+        }
+        let frame = &frames[landmark.anchor];
+        if frame.image.is_none() {
+            continue;
+        }
+        let here_from_anchor = camera_from_world * frame.world_from_camera;
+        if let Some(both) = expect(rig, landmark, &here_from_anchor, margin) {
+            expected.push((index, both));
+        }
+    }
+    let mut followed = Followed { sought: expected.len(), found: Vec::new() };
+    let mut tracks: Vec<Option<Track>> = Vec::new();
+    // One anchor's after the other's: their patches come from one image.
+    expected.sort_by_key(|(index, _)| (landmarks[*index].anchor, *index));
+    for same in expected.chunk_by(|a, b| landmarks[a.0].anchor == landmarks[b.0].anchor) {
+        let Some(image) = &frames[landmarks[same[0].0].anchor].image else { continue };
+        let left: Vec<Expected> = same.iter().map(|(_, both)| both[0]).collect();
+        refine.follow_into(image, images[0], &left, work, &mut tracks);
+        // How far the left place was off tells where the right one begins.
+        let begun: Vec<(usize, Track, Expected)> = same
+            .iter()
+            .zip(&tracks)
+            .filter_map(|((index, both), track)| {
+                let track = (*track)?;
+                let (off_u, off_v) = (track.at.u - both[0].start.u, track.at.v - both[0].start.v);
+                let start = Pixel { u: both[1].start.u + off_u, v: both[1].start.v + off_v };
+                Some((*index, track, Expected { start, ..both[1] }))
+            })
+            .collect();
+        let right: Vec<Expected> = begun.iter().map(|(_, _, right)| *right).collect();
+        refine.follow_into(image, images[1], &right, work, &mut tracks);
+        followed.found.extend(begun.iter().zip(&tracks).filter_map(|((index, left, _), right)| {
+            let right = (*right)?;
+            let pixels = Vector4::new(left.at.u, left.at.v, right.at.u, right.at.v);
+            let mut noise = Matrix4::identity() * (calibration * calibration).max(LEAST * LEAST);
+            for (k, track) in [(0, left), (2, &right)] {
+                let mut block = noise.fixed_view_mut::<2, 2>(k, k);
+                block += track.covariance;
+            }
+            Some((*index, pixels, noise))
+        }));
+    }
+    followed.found.sort_by_key(|(index, ..)| *index);
+    followed
+}
+
+impl Followed {
+    /// For the pose.
+    pub(super) fn for_pose(&self, frames: &[KeyFrame], landmarks: &[Landmark]) -> Vec<Found> {
+        let found = self.found.iter().map(|(index, pixels, noise)| {
+            let landmark = &landmarks[*index];
+            Found {
+                world_from_anchor: frames[landmark.anchor].world_from_camera,
+                at: landmark.at,
+                covariance: landmark.covariance,
+                pixels: *pixels,
+                noise: *noise,
+            }
+        });
+        found.collect()
+    }
+}
+
+/// Where both images should show a landmark and how deformed; `None` where they should not.
+fn expect(
+    rig: &StereoRig,
+    landmark: &Landmark,
+    here_from_anchor: &Transform<Camera, Camera>,
+    margin: f64,
+) -> Option<[Expected; 2]> {
+    let seen = project(rig, here_from_anchor, &landmark.at)?;
+    let places = [Pixel { u: seen.pixels[0], v: seen.pixels[1] }, Pixel { u: seen.pixels[2], v: seen.pixels[3] }];
+    if !(rig.left().contains(&places[0], margin) && rig.right().contains(&places[1], margin)) {
+        return None;
+    }
+    let shapes = seen.shapes(here_from_anchor, &landmark.slant, &landmark.by_pixel(rig)?);
+    let by_depth = seen.by_landmark(here_from_anchor).column(2).into_owned();
+    let deeper = [Vector2::new(by_depth[0], by_depth[1]), Vector2::new(by_depth[2], by_depth[3])];
+    let one = |side: usize| {
+        let shape = shapes[side];
+        let stretched = shape.norm();
+        let area = shape.determinant();
+        let likely = stretched < MOST_STRETCH && area > 1.0 / MOST_STRETCH && area < MOST_STRETCH;
+        let along = likely.then(|| shape.try_inverse()).flatten()? * deeper[side];
+        let along = along.try_normalize(1e-12).unwrap_or_else(Vector2::x);
+        let shape = if nearly_still(&shape) { Matrix2::identity() } else { shape };
+        Some(Expected { place: landmark.place, start: places[side], shape, along })
+    };
+    Some([one(0)?, one(1)?])
+}
+
+/// A window whose border moves by less than a fiftieth of a pixel is not worth deforming.
+fn nearly_still(shape: &Matrix2<f64>) -> bool {
+    (shape - Matrix2::identity()).abs().max() * 8.0 < 0.02
+}

@@ -1,0 +1,186 @@
+//! Stereo visual odometry.
+
+mod consensus;
+mod follow;
+mod landmark;
+mod look;
+mod pose;
+mod reckoning;
+mod unusable;
+mod window;
+
+use seafix_component::{Choice, Component, in_range};
+use seafix_geometry::StereoRig;
+use seafix_referencing::{SOLVERS, Solver};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, Descriptor, FILTERS, FrontEnd, LOCATORS, MATCHERS, Matcher, Refine, Threads, Triangulator,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{Odometry, Reckoning};
+use reckoning::StereoReckoning;
+
+/// Visual odometry of a calibrated stereo rig.
+///
+/// Each pair becomes a cloud of measured points. Points are paired with those of the pair before by their descriptors;
+/// the motion that most pairs agree on (sample consensus over minimal sets, the truncated score of MSAC) is refined by a
+/// [`Solver`]. With it every landmark of the last key frames is expected in both new images, and the patch around the
+/// place where it was first seen is aligned to them directly: a landmark *is* the centre of its patch, so that the error
+/// of the corner detector drops out. The pose is the robust maximum likelihood over all landmarks found, with their
+/// covariances. Pairs that see too little of what the last key frame saw become key frames: they bring new landmarks, and
+/// the poses and landmarks of the last `window` key frames are adjusted together (bundle adjustment).
+///
+/// Points are projected through the lens model; images are neither rectified nor undistorted.
+///
+/// Source: Nistér, Naroditsky and Bergen, *Visual odometry*, CVPR 2004; Torr and Zisserman, *MLESAC*, 2000; Forster et
+/// al., *SVO: semidirect visual odometry*, 2017; Triggs et al., *Bundle adjustment: a modern synthesis*, 2000.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Stereo {
+    /// Prepare each image, one after the other.
+    pub filters: Vec<Choice>,
+    /// Finds key points in each image.
+    pub detector: Choice,
+    /// Says where exactly they are. Natural texture has no corners to fit: `peak`.
+    pub locator: Choice,
+    /// Describes their surroundings, for the matcher between the two cameras and the one between pairs.
+    pub descriptor: Choice,
+    /// Pairs left with right.
+    pub matcher: Choice,
+    /// Aligns each pair between the cameras.
+    pub refine: Refine,
+    /// Turns pairs into points.
+    pub triangulation: Triangulator,
+    /// Pairs points with those of the pair before; the rig plays no part.
+    pub between: Choice,
+    /// The motion of three points, for the consensus.
+    pub minimal: Choice,
+    /// The motion of all that agree.
+    pub solver: Choice,
+    /// How far from its expected place, in the mean of both images, a point may be seen and still agree (px).
+    pub consensus_px: f64,
+    /// With what probability three right points have been drawn when the consensus ends.
+    pub confidence: f64,
+    /// Draws at most.
+    pub draws: usize,
+    /// Fewer points that agree are no consensus.
+    pub least_points: usize,
+    /// How landmarks are found again in new images.
+    pub follow: Refine,
+    /// At most so many landmarks are sought in a pair.
+    pub landmarks: usize,
+    /// A landmark begins no nearer to another (px).
+    pub apart_px: f64,
+    /// A pair becomes a key frame when it sees less than this share of the landmarks of the last key frame.
+    pub keyframe_share: f64,
+    /// Key frames that are adjusted together; below 2 none are.
+    pub window: usize,
+    /// A motion known worse than this is no answer: one standard deviation over the three axes together (m).
+    pub most_sigma: f64,
+    /// A longer time without a pair that can be followed breaks the segment (s).
+    pub most_gap: f64,
+    /// A faster motion is not believed (m/s).
+    pub most_speed: f64,
+    /// What is drawn at random follows from this.
+    pub seed: u64,
+}
+
+impl Default for Stereo {
+    fn default() -> Self {
+        let deep = 1e4;
+        Self {
+            filters: Vec::new(),
+            detector: Choice::named("harris").with("features", 1000),
+            locator: Choice::named("peak"),
+            descriptor: Choice::named("surf"),
+            matcher: Choice::named("epipolar-band").with("max-depth", deep),
+            refine: Refine::default(),
+            triangulation: Triangulator { max_depth: deep, ..Triangulator::default() },
+            between: Choice::named("mutual-ratio"),
+            minimal: Choice::named("p3p-stereo"),
+            solver: Choice::named("stereo-reprojection"),
+            consensus_px: 2.0,
+            confidence: 0.999,
+            draws: 300,
+            least_points: 15,
+            follow: Refine { window: 15, reach: 4.0, ..Refine::default() },
+            landmarks: 600,
+            apart_px: 8.0,
+            keyframe_share: 0.7,
+            window: 8,
+            most_sigma: 1.0,
+            most_gap: 5.0,
+            most_speed: 50.0,
+            seed: 0,
+        }
+    }
+}
+
+impl Component for Stereo {
+    const NAME: &'static str = "stereo";
+    const SUMMARY: &'static str = "landmarks followed through both cameras' images, adjusted over key frames";
+    const SOURCE: &'static str = "Nistér, Naroditsky, Bergen, Visual odometry, CVPR 2004; Forster et al., SVO, 2017; \
+                                  Triggs et al., Bundle adjustment: a modern synthesis, 2000";
+
+    fn check(&self) -> Result<(), String> {
+        self.stages()?;
+        self.refine.check().map_err(|said| format!("refine.{said}"))?;
+        self.follow.check().map_err(|said| format!("follow.{said}"))?;
+        self.triangulation.check().map_err(|said| format!("triangulation.{said}"))?;
+        let positive = |name, x: f64, what| in_range(x > 0.0 && x.is_finite(), name, x, what);
+        positive("consensus-px", self.consensus_px, "a positive number of pixels")?;
+        let confident = self.confidence > 0.0 && self.confidence < 1.0;
+        in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
+        in_range(self.draws > 0, "draws", self.draws, "at least 1")?;
+        in_range(self.least_points >= 6, "least-points", self.least_points, "at least 6")?;
+        let enough = self.landmarks >= self.least_points;
+        in_range(enough, "landmarks", self.landmarks, "at least least-points")?;
+        positive("apart-px", self.apart_px, "a positive number of pixels")?;
+        let share = (0.0..=1.0).contains(&self.keyframe_share);
+        in_range(share, "keyframe-share", self.keyframe_share, "a share from 0 to 1")?;
+        in_range(self.window <= 100, "window", self.window, "at most 100 key frames")?;
+        positive("most-sigma", self.most_sigma, "a positive length (m)")?;
+        positive("most-gap", self.most_gap, "a positive time (s)")?;
+        positive("most-speed", self.most_speed, "a positive speed (m/s)")
+    }
+}
+
+/// The stages, built.
+#[derive(Debug)]
+struct Stages {
+    front_end: FrontEnd,
+    descriptor: Box<dyn Descriptor>,
+    between: Box<dyn Matcher>,
+    minimal: Box<dyn Solver>,
+    solver: Box<dyn Solver>,
+}
+
+impl Stereo {
+    fn stages(&self) -> Result<Stages, String> {
+        let said = |error: seafix_component::BuildError| error.to_string();
+        let filters =
+            self.filters.iter().map(|filter| FILTERS.build(filter)).collect::<Result<_, _>>().map_err(said)?;
+        Ok(Stages {
+            front_end: FrontEnd {
+                filters,
+                detector: DETECTORS.build(&self.detector).map_err(said)?,
+                locator: LOCATORS.build(&self.locator).map_err(said)?,
+                descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
+                matcher: MATCHERS.build(&self.matcher).map_err(said)?,
+                refine: self.refine.clone(),
+                triangulator: self.triangulation.clone(),
+            },
+            descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
+            between: MATCHERS.build(&self.between).map_err(said)?,
+            minimal: SOLVERS.build(&self.minimal).map_err(said)?,
+            solver: SOLVERS.build(&self.solver).map_err(said)?,
+        })
+    }
+}
+
+impl Odometry for Stereo {
+    fn begin<'a>(&'a self, rig: &'a StereoRig, threads: Threads) -> Box<dyn Reckoning + 'a> {
+        let stages = self.stages().expect("a component's settings were checked");
+        Box::new(StereoReckoning::new(self, stages, rig, threads))
+    }
+}

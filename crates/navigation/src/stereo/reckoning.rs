@@ -1,0 +1,412 @@
+//! The odometry at work.
+
+use std::{collections::HashMap, time::Instant};
+
+use nalgebra::{Matrix4, Vector4};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform, World};
+use seafix_referencing::{Observation, Observations};
+use seafix_vision::{Image, Look, Threads, Workspace};
+
+use super::{
+    Stages, Stereo,
+    consensus::{Consensus, Rules, consensus},
+    follow::{Followed, KeyFrame, follow},
+    landmark::{Landmark, Sighting},
+    look::Seen,
+    pose::refine,
+    unusable::unusable,
+    window::adjust,
+};
+use crate::{Journey, Local, Lost, NotAfter, Outcome, Reckoning, Segment, StereoPair, Waypoint};
+
+/// The memory of one journey.
+pub(super) struct StereoReckoning<'a> {
+    settings: &'a Stereo,
+    stages: Stages,
+    rig: &'a StereoRig,
+    look: Look,
+    work: Workspace,
+    before_ns: Option<u64>,
+    /// The last images that showed anything, as they came: what a frozen camera repeats.
+    raw: Option<[Image; 2]>,
+    /// The last pair that was followed.
+    last: Option<Last>,
+    /// A pair that could not be followed, its place among the outcomes, and why.
+    pending: Option<(Seen, usize, Lost)>,
+    frames: Vec<KeyFrame>,
+    /// The first key frame of the segment.
+    first: usize,
+    /// How many landmarks the last key frame saw.
+    seen_by_keyframe: usize,
+    landmarks: Vec<Landmark>,
+    segments: Vec<Stretch>,
+    outcomes: Vec<Outcome>,
+    times: Times,
+}
+
+/// The last pair that was followed.
+struct Last {
+    seen: Seen,
+    world_from_camera: Transform<World, Camera>,
+    /// The motion to it and how long that took (s).
+    motion: Option<(Transform<Camera, Camera>, f64)>,
+}
+
+/// A segment in the making.
+struct Stretch {
+    broken: Option<Lost>,
+    poses: Vec<Relative>,
+}
+
+/// A pose relative to a key frame, which may still move.
+struct Relative {
+    stamp_ns: u64,
+    frame: usize,
+    frame_from_camera: Transform<Camera, Camera>,
+    local: Option<Local>,
+}
+
+/// The way from the last pair to a new one.
+struct Step {
+    world_from_camera: Transform<World, Camera>,
+    local: Local,
+    seconds: f64,
+    sought: usize,
+    /// Landmarks that agree, and where they are.
+    sightings: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
+}
+
+/// Milliseconds of each stage.
+#[derive(Debug, Default)]
+struct Times(Vec<(&'static str, f64)>);
+
+impl Times {
+    fn add(&mut self, stage: &'static str, ms: f64) {
+        match self.0.iter_mut().find(|(name, _)| *name == stage) {
+            Some((_, sum)) => *sum += ms,
+            None => self.0.push((stage, ms)),
+        }
+    }
+
+    fn since(&mut self, stage: &'static str, start: Instant) {
+        self.add(stage, start.elapsed().as_secs_f64() * 1e3);
+    }
+}
+
+impl Reckoning for StereoReckoning<'_> {
+    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<(), NotAfter> {
+        if let Some(before_ns) = self.before_ns.filter(|before| *before >= pair.stamp_ns) {
+            return Err(NotAfter { pair: self.outcomes.len(), stamp_ns: pair.stamp_ns, before_ns });
+        }
+        self.before_ns = Some(pair.stamp_ns);
+        let start = Instant::now();
+        let images = [pair.left, pair.right];
+        let before = self.raw.as_ref().map(|[left, right]| [left, right]);
+        if let Some(lost) = unusable(images, before) {
+            self.outcomes.push(Outcome::Skipped(lost));
+            return Ok(());
+        }
+        match &mut self.raw {
+            Some(raw) => raw.iter_mut().zip(images).for_each(|(raw, image)| raw.copy_from(image)),
+            raw => *raw = Some(images.map(Image::clone)),
+        }
+        self.times.since("check", start);
+        let start = Instant::now();
+        let seen = Seen::new(pair, &self.stages, self.rig, &mut self.look, &mut self.work);
+        let stages = self.look.times.stages();
+        let known: f64 = stages.iter().map(|(_, ms)| ms).sum();
+        stages.into_iter().for_each(|(stage, ms)| self.times.add(stage, ms));
+        self.times.add("keep", start.elapsed().as_secs_f64() * 1e3 - known);
+        self.take(seen);
+        Ok(())
+    }
+
+    fn journey(&self) -> Journey {
+        let segments = self.segments.iter().map(|stretch| {
+            let poses = stretch.poses.iter().map(|pose| Waypoint {
+                stamp_ns: pose.stamp_ns,
+                world_from_camera: self.frames[pose.frame].world_from_camera * pose.frame_from_camera,
+                local: pose.local,
+            });
+            Segment { broken: stretch.broken.clone(), poses: poses.collect() }
+        });
+        Journey { segments: segments.collect(), outcomes: self.outcomes.clone(), times: self.times.0.clone() }
+    }
+}
+
+impl<'a> StereoReckoning<'a> {
+    pub(super) fn new(settings: &'a Stereo, stages: Stages, rig: &'a StereoRig, threads: Threads) -> Self {
+        Self {
+            settings,
+            stages,
+            rig,
+            look: Look::new(threads),
+            work: Workspace::new(threads),
+            before_ns: None,
+            raw: None,
+            last: None,
+            pending: None,
+            frames: Vec::new(),
+            first: 0,
+            seen_by_keyframe: 0,
+            landmarks: Vec::new(),
+            segments: Vec::new(),
+            outcomes: Vec::new(),
+            times: Times::default(),
+        }
+    }
+
+    /// Follows what was seen, or begins with it.
+    fn take(&mut self, seen: Seen) {
+        let Some(last) = self.last.take() else {
+            let outcome = self.begin(seen, None);
+            return self.outcomes.push(outcome);
+        };
+        match self.follow(&seen, &last) {
+            Ok(step) => {
+                // A pair between that could not be followed was the exception.
+                self.pending = None;
+                self.outcomes.push(Outcome::Followed { sought: step.sought, found: step.sightings.len() });
+                self.accept(seen, step);
+            }
+            Err(lost) => match (self.pending.take(), lost) {
+                // Two pairs say that there is no way on: a segment begins with the first of them.
+                (Some((first, index, why)), _) => {
+                    self.outcomes[index] = self.begin(first, Some(why));
+                    self.take(seen);
+                }
+                (None, lost @ Lost::Gap { .. }) => {
+                    let outcome = self.begin(seen, Some(lost));
+                    self.outcomes.push(outcome);
+                }
+                (None, lost) => {
+                    self.pending = Some((seen, self.outcomes.len(), lost.clone()));
+                    self.outcomes.push(Outcome::Skipped(lost));
+                    self.last = Some(last);
+                }
+            },
+        }
+    }
+
+    /// Begins a segment where the one before ended.
+    fn begin(&mut self, seen: Seen, broken: Option<Lost>) -> Outcome {
+        let (found, needed) = (seen.cloud.len(), self.settings.least_points);
+        if found < needed {
+            return Outcome::Skipped(Lost::FewPoints { found, needed });
+        }
+        let world_from_camera = self.world_from_last();
+        self.landmarks.clear();
+        self.frames.iter_mut().for_each(|frame| frame.image = None);
+        self.first = self.frames.len();
+        self.keyframe(&seen, world_from_camera, &[]);
+        let pose = Relative {
+            stamp_ns: seen.stamp_ns,
+            frame: self.first,
+            frame_from_camera: Transform::identity(),
+            local: None,
+        };
+        self.segments.push(Stretch { broken, poses: vec![pose] });
+        self.last = Some(Last { seen, world_from_camera, motion: None });
+        Outcome::Began
+    }
+
+    /// Where the last waypoint is; the first is where the world begins.
+    fn world_from_last(&self) -> Transform<World, Camera> {
+        let last = self.segments.last().and_then(|segment| segment.poses.last());
+        last.map_or_else(Transform::identity, |pose| self.frames[pose.frame].world_from_camera * pose.frame_from_camera)
+    }
+
+    /// The way from `last` to `seen`.
+    fn follow(&mut self, seen: &Seen, last: &Last) -> Result<Step, Lost> {
+        let settings = self.settings;
+        let seconds = (seen.stamp_ns - last.seen.stamp_ns) as f64 * 1e-9;
+        if seconds > settings.most_gap {
+            return Err(Lost::Gap { seconds, most: settings.most_gap });
+        }
+        let rough = self.rough(seen, last, seconds)?;
+        let start = Instant::now();
+        let mut guess = last.world_from_camera * rough;
+        let calibration = settings.triangulation.calibration_px;
+        let images = [&seen.images[0], &seen.images[1]];
+        let followed = follow(
+            &settings.follow,
+            self.rig,
+            &self.frames,
+            &self.landmarks,
+            images,
+            &guess,
+            (settings.landmarks, calibration),
+            &mut self.work,
+        );
+        self.times.since("follow", start);
+        let start = Instant::now();
+        let needed = settings.least_points;
+        let few = |found| Lost::NoConsensus { found, matches: followed.sought, needed };
+        let found = followed.for_pose(&self.frames, &self.landmarks);
+        let pose = refine(self.rig, &found, &guess).ok_or(few(0))?;
+        self.times.since("pose", start);
+        guess = pose.world_from_camera;
+        let Followed { sought, found } = followed;
+        let sightings: Vec<_> =
+            found.into_iter().zip(&pose.agrees).filter_map(|(one, agrees)| agrees.then_some(one)).collect();
+        if sightings.len() < needed {
+            return Err(Lost::NoConsensus { found: sightings.len(), matches: sought, needed });
+        }
+        let covariance = Covariance6::new(pose.covariance);
+        if covariance.position_sigma() > settings.most_sigma {
+            return Err(Lost::Weak(covariance.position_sigma()));
+        }
+        let motion = last.world_from_camera.inverse() * guess;
+        let speed = motion.translation().norm() / seconds;
+        if speed > settings.most_speed {
+            return Err(Lost::Jump { speed, most: settings.most_speed });
+        }
+        Ok(Step { world_from_camera: guess, local: Local { motion, covariance }, seconds, sought, sightings })
+    }
+
+    /// The motion that the points in common agree on, `earlier_from_later`.
+    fn rough(&mut self, seen: &Seen, last: &Last, seconds: f64) -> Result<Transform<Camera, Camera>, Lost> {
+        let settings = self.settings;
+        let start = Instant::now();
+        let pairs = seen.in_common(&last.seen, &self.stages, self.rig, &mut self.work);
+        self.times.since("between", start);
+        let needed = settings.least_points;
+        if pairs.len() < needed {
+            return Err(Lost::FewMatches { found: pairs.len(), needed });
+        }
+        let start = Instant::now();
+        // The earlier cloud takes the model's place.
+        let points = pairs.iter().map(|&(earlier, later)| {
+            let (model, measured) = (&last.seen.cloud[earlier].position, &seen.cloud[later]);
+            Observation {
+                measured: measured.position,
+                pixels: measured.pixels,
+                model: seafix_geometry::Point::<Object>::from(model.at.coords),
+                // Across the line of sight: along it the error is larger, and the same for every motion.
+                model_sigma: model.covariance.symmetric_eigenvalues().min().max(0.0).sqrt(),
+            }
+        });
+        let data = Observations { points: points.collect(), rig: Some(self.rig) };
+        let rules = Rules { px: settings.consensus_px, confidence: settings.confidence, draws: settings.draws };
+        let mut guesses = vec![Transform::identity()];
+        if let Some((motion, before)) = &last.motion {
+            guesses.push(Transform::exp(&(motion.log() * (seconds / before))));
+        }
+        // The stamp tells one pair from another, however many were left out before.
+        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed ^ seen.stamp_ns);
+        let solvers = (&*self.stages.minimal, &*self.stages.solver);
+        let best = consensus(&data, self.rig, &rules, solvers, &guesses, &mut rng);
+        self.times.since("consensus", start);
+        let found = best.as_ref().map_or(0, |best| best.inliers.len());
+        match best {
+            Some(Consensus { motion, .. }) if found >= needed => Ok(motion.relabel()),
+            _ => Err(Lost::NoConsensus { found, matches: pairs.len(), needed }),
+        }
+    }
+
+    /// Makes `seen` part of the journey.
+    fn accept(&mut self, seen: Seen, step: Step) {
+        let Step { world_from_camera, local, seconds, sought: _, sightings } = step;
+        let share = sightings.len() as f64 / self.seen_by_keyframe.max(1) as f64;
+        if share < self.settings.keyframe_share {
+            self.keyframe(&seen, world_from_camera, &sightings);
+            let start = Instant::now();
+            self.adjust();
+            self.times.since("adjust", start);
+        }
+        let frame = self.frames.len() - 1;
+        // A key frame is its own reference, wherever the adjustment moved it.
+        let own = share < self.settings.keyframe_share;
+        let frame_from_camera = match own {
+            true => Transform::identity(),
+            false => self.frames[frame].world_from_camera.inverse() * world_from_camera,
+        };
+        let pose = Relative { stamp_ns: seen.stamp_ns, frame, frame_from_camera, local: Some(local) };
+        self.segments.last_mut().expect("a segment was begun").poses.push(pose);
+        let motion = Some((local.motion, seconds));
+        self.last = Some(Last { seen, world_from_camera: self.world_from_last(), motion });
+    }
+
+    /// Makes `seen` a key frame: what it saw of the landmarks, and new ones where it saw none.
+    fn keyframe(
+        &mut self,
+        seen: &Seen,
+        world_from_camera: Transform<World, Camera>,
+        sightings: &[(usize, Vector4<f64>, Matrix4<f64>)],
+    ) {
+        let start = Instant::now();
+        let settings = self.settings;
+        let id = self.frames.len();
+        self.frames.push(KeyFrame { world_from_camera, image: Some(seen.images[0].clone()) });
+        let mut taken = Taken::new(settings.apart_px);
+        for (index, pixels, noise) in sightings {
+            taken.insert([pixels[0], pixels[1]]);
+            if let Some(factor) = noise.cholesky() {
+                let view = Sighting { frame: id, pixels: *pixels, information: factor.inverse() };
+                self.landmarks[*index].views.push(view);
+            }
+        }
+        let mut count = sightings.len();
+        for point in &seen.cloud {
+            let Some(pixels) = point.pixels else { continue };
+            let left = pixels.at.left;
+            if count >= settings.landmarks || !taken.free([left.u, left.v]) {
+                continue;
+            }
+            if let Some(landmark) = Landmark::begin(id, &pixels, settings.triangulation.calibration_px, self.rig) {
+                taken.insert([left.u, left.v]);
+                self.landmarks.push(landmark);
+                count += 1;
+            }
+        }
+        self.seen_by_keyframe = count;
+        self.times.since("key frame", start);
+    }
+
+    /// Adjusts the window and forgets what has left it.
+    fn adjust(&mut self) {
+        let end = self.frames.len();
+        let window = self.settings.window;
+        let oldest = end.saturating_sub(window.max(1)).max(self.first);
+        if window > 1 {
+            adjust(self.rig, &mut self.frames, &mut self.landmarks, oldest + 1);
+        }
+        self.frames[..oldest].iter_mut().for_each(|frame| frame.image = None);
+        let frames = &self.frames;
+        self.landmarks.retain(|landmark| {
+            let linked = landmark.views.len() > 1 && landmark.views.last().is_some_and(|view| view.frame > oldest);
+            landmark.at.z > 0.0 && (frames[landmark.anchor].image.is_some() || linked)
+        });
+    }
+}
+
+/// Places that are taken.
+struct Taken {
+    apart: f64,
+    cells: HashMap<[i64; 2], Vec<[f64; 2]>>,
+}
+
+impl Taken {
+    fn new(apart: f64) -> Self {
+        Self { apart, cells: HashMap::new() }
+    }
+
+    fn cell(&self, at: [f64; 2]) -> [i64; 2] {
+        at.map(|x| (x / self.apart).floor() as i64)
+    }
+
+    fn insert(&mut self, at: [f64; 2]) {
+        self.cells.entry(self.cell(at)).or_default().push(at);
+    }
+
+    fn free(&self, at: [f64; 2]) -> bool {
+        let [column, row] = self.cell(at);
+        let near = |other: &[f64; 2]| {
+            let (u, v) = (other[0] - at[0], other[1] - at[1]);
+            u * u + v * v < self.apart * self.apart
+        };
+        let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| [column + x, row + y]));
+        !around.filter_map(|cell| self.cells.get(&cell)).flatten().any(near)
+    }
+}

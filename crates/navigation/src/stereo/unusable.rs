@@ -1,0 +1,69 @@
+//! Images that show no motion.
+
+use seafix_vision::Image;
+
+use crate::{Lost, Side};
+
+/// Brightness that varies by less (grey levels) shows nothing: it is noise and rounding.
+const LEAST_VARIATION: f64 = 1.0;
+/// A pixel this bright is at the end of its range.
+const WHITE: f32 = 254.5;
+/// The largest share of such pixels.
+const MOST_WHITE: f64 = 0.5;
+
+/// Why a motion cannot be seen in these images, if so; `before`: the pair before.
+pub(super) fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
+    for (side, image) in [Side::Left, Side::Right].into_iter().zip(images) {
+        let pixels = image.pixels();
+        let count = pixels.len() as f64;
+        let (mut sum, mut squares, mut white) = (0.0, 0.0, 0_usize);
+        for row in pixels.chunks(image.width()) {
+            let (mut s, mut q) = (0.0_f32, 0.0_f32);
+            for &pixel in row {
+                // About mid grey, so that squares keep their digits.
+                let off = pixel - 128.0;
+                s += off;
+                q += off * off;
+                white += usize::from(pixel >= WHITE);
+            }
+            sum += f64::from(s);
+            squares += f64::from(q);
+        }
+        let share = white as f64 / count;
+        if share > MOST_WHITE {
+            return Some(Lost::Saturated(side, 100.0 * share));
+        }
+        let deviation = (squares / count - (sum / count).powi(2)).max(0.0).sqrt();
+        if deviation < LEAST_VARIATION {
+            return Some(Lost::Blank(side, deviation));
+        }
+    }
+    let before = before?;
+    for (index, side) in [Side::Left, Side::Right].into_iter().enumerate() {
+        if images[index] == before[index] {
+            return Some(Lost::Frozen(side));
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(value: impl Fn(usize) -> f32) -> Image {
+        Image::new(16, 16, (0..256).map(value).collect()).unwrap()
+    }
+
+    #[test]
+    fn each_fault_has_its_name() {
+        let good = image(|i| (i * 37 % 200) as f32);
+        let other = image(|i| (i * 53 % 200) as f32);
+        let black = image(|i| (i % 2) as f32);
+        let white = image(|i| if i % 3 == 0 { (i % 200) as f32 } else { 255.0 });
+        assert_eq!(unusable([&good, &other], Some([&other, &good])), None);
+        assert!(matches!(unusable([&good, &black], None), Some(Lost::Blank(Side::Right, _))));
+        assert!(matches!(unusable([&white, &good], None), Some(Lost::Saturated(Side::Left, _))));
+        assert_eq!(unusable([&good, &other], Some([&black, &other])), Some(Lost::Frozen(Side::Right)));
+    }
+}
