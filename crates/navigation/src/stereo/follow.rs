@@ -21,11 +21,13 @@ pub(super) struct KeyFrame {
 #[derive(Debug, Default)]
 pub(super) struct Followed {
     /// Landmarks that should be seen.
-    pub(super) sought: usize,
+    pub(super) sought: Vec<usize>,
     /// Index of each landmark that was found, and where.
     pub(super) found: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
 }
 
+/// A landmark that was missed so many times in succession is hidden, or was none.
+const GIVEN_UP: u32 = 2;
 /// A patch that is shown this many times larger or smaller than it was has other detail: along its most stretched
 /// direction, and as an area.
 const MOST_STRETCH: f64 = 3.0;
@@ -51,7 +53,7 @@ pub(super) fn follow(
             break;
         }
         let frame = &frames[landmark.anchor];
-        if frame.image.is_none() {
+        if frame.image.is_none() || landmark.misses >= GIVEN_UP {
             continue;
         }
         let here_from_anchor = camera_from_world * frame.world_from_camera;
@@ -59,7 +61,7 @@ pub(super) fn follow(
             expected.push((index, both));
         }
     }
-    let mut followed = Followed { sought: expected.len(), found: Vec::new() };
+    let mut followed = Followed { sought: expected.iter().map(|(index, _)| *index).collect(), found: Vec::new() };
     let mut tracks: Vec<Option<Track>> = Vec::new();
     // One anchor's after the other's: their patches come from one image.
     expected.sort_by_key(|(index, _)| (landmarks[*index].anchor, *index));

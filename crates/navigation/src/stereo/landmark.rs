@@ -17,6 +17,8 @@ pub(super) struct Landmark {
     pub(super) covariance: Matrix3<f64>,
     /// Where key frames saw it, in order of time, the first of them its own.
     pub(super) views: Vec<Sighting>,
+    /// How many pairs in succession should have shown it and did not.
+    pub(super) misses: u32,
     /// Derivative of w by x and y over its neighbourhood: how its surface slants.
     pub(super) slant: Vector2<f64>,
 }
@@ -133,7 +135,15 @@ impl Landmark {
         let covariance = (by.transpose() * information * by).cholesky()?.inverse();
         let view = Sighting { frame: anchor, pixels: seen, information };
         let place = pixels.at.left;
-        (at.z > 0.0).then_some(Self { anchor, place, at, covariance, views: vec![view], slant: Vector2::zeros() })
+        (at.z > 0.0).then_some(Self {
+            anchor,
+            place,
+            at,
+            covariance,
+            views: vec![view],
+            misses: 0,
+            slant: Vector2::zeros(),
+        })
     }
 
     /// The derivative of (x, y) by the pixel of its own left image.

@@ -103,7 +103,7 @@ impl Default for Stereo {
             confidence: 0.999,
             draws: 300,
             least_points: 15,
-            follow: Refine { window: 15, reach: 4.0, ..Refine::default() },
+            follow: Refine { reach: 4.0, ..Refine::default() },
             landmarks: 600,
             apart_px: 8.0,
             keyframe_share: 0.7,

@@ -72,7 +72,7 @@ struct Step {
     world_from_camera: Transform<World, Camera>,
     local: Local,
     seconds: f64,
-    sought: usize,
+    sought: Vec<usize>,
     /// Landmarks that agree, and where they are.
     sightings: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
 }
@@ -167,7 +167,7 @@ impl<'a> StereoReckoning<'a> {
             Ok(step) => {
                 // A pair between that could not be followed was the exception.
                 self.pending = None;
-                self.outcomes.push(Outcome::Followed { sought: step.sought, found: step.sightings.len() });
+                self.outcomes.push(Outcome::Followed { sought: step.sought.len(), found: step.sightings.len() });
                 self.accept(seen, step);
             }
             Err(lost) => match (self.pending.take(), lost) {
@@ -242,7 +242,7 @@ impl<'a> StereoReckoning<'a> {
         self.times.since("follow", start);
         let start = Instant::now();
         let needed = settings.least_points;
-        let few = |found| Lost::NoConsensus { found, matches: followed.sought, needed };
+        let few = |found| Lost::NoConsensus { found, matches: followed.sought.len(), needed };
         let found = followed.for_pose(&self.frames, &self.landmarks);
         let pose = refine(self.rig, &found, &guess).ok_or(few(0))?;
         self.times.since("pose", start);
@@ -251,7 +251,7 @@ impl<'a> StereoReckoning<'a> {
         let sightings: Vec<_> =
             found.into_iter().zip(&pose.agrees).filter_map(|(one, agrees)| agrees.then_some(one)).collect();
         if sightings.len() < needed {
-            return Err(Lost::NoConsensus { found: sightings.len(), matches: sought, needed });
+            return Err(Lost::NoConsensus { found: sightings.len(), matches: sought.len(), needed });
         }
         let covariance = Covariance6::new(pose.covariance);
         if covariance.position_sigma() > settings.most_sigma {
@@ -307,7 +307,13 @@ impl<'a> StereoReckoning<'a> {
 
     /// Makes `seen` part of the journey.
     fn accept(&mut self, seen: Seen, step: Step) {
-        let Step { world_from_camera, local, seconds, sought: _, sightings } = step;
+        let Step { world_from_camera, local, seconds, sought, sightings } = step;
+        for index in sought {
+            self.landmarks[index].misses += 1;
+        }
+        for (index, ..) in &sightings {
+            self.landmarks[*index].misses = 0;
+        }
         let share = sightings.len() as f64 / self.seen_by_keyframe.max(1) as f64;
         if share < self.settings.keyframe_share {
             self.keyframe(&seen, world_from_camera, &sightings);
