@@ -27,5 +27,6 @@ pub mod rigs;
 pub mod scenes;
 pub mod searches;
 pub mod variants;
+pub mod voyage;
 
 pub use law::{law, not_idle, within};

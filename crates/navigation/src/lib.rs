@@ -2,14 +2,23 @@
 //!
 //! [`Odometry`] follows a stereo rig from pair to pair; what it finds is a [`Journey`]: segments of poses relative to
 //! the first camera, and what became of every pair. Where it cannot say how the rig moved it says so ([`Lost`]) instead
-//! of inventing a motion. A [`Standing`] carries a fix along its steps. This crate knows no truth.
+//! of inventing a motion. A [`Standing`] carries a fix along its steps; a [`Navigator`] goes
+//! from fix to fix and from object to object. This crate knows no truth.
 
 mod chain;
+mod fusion;
 mod journey;
+mod navigated;
+mod navigator;
 mod odometry;
+mod policy;
 mod stereo;
 
 pub use chain::{Standing, by_world};
+pub use fusion::{Contradiction, FUSIONS, Fuse, Fusion, Replace};
 pub use journey::{Journey, Local, Lost, Outcome, Segment, Side, Waypoint};
+pub use navigated::{Navigated, Place};
+pub use navigator::{Change, Displacement, Event, Navigator, State};
 pub use odometry::{NotAfter, ODOMETRIES, Odometry, Reckoning, StereoPair};
+pub use policy::{EveryFrame, InView, Interval, POLICIES, Policy, ProtectionLevel, Situation, Travelled};
 pub use stereo::Stereo;

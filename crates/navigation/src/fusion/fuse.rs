@@ -1,0 +1,140 @@
+//! Fix and odometry, each by its information.
+
+use nalgebra::{Matrix3, Matrix6, Vector6};
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Covariance6, so3::skew};
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::{Contradiction, Fusion};
+use crate::Standing;
+
+/// Gates a fix by its innovation, then joins both by their information.
+///
+/// With r = log(T_known⁻¹ T_fix) the fix says ξ = r + J_r(r)⁻¹ η about the error ξ of what was known. A fix
+/// with rᵀ (Σ_known + Σ_fix)⁻¹ r beyond χ²₆(`confidence`) is rejected; else the error is estimated by
+/// (Σ_known⁻¹ + Σ_fix⁻¹)⁻¹ Σ_fix⁻¹ r, repeated about the new pose.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Fuse {
+    /// The share of right fixes that passes the gate.
+    pub confidence: f64,
+}
+
+impl Default for Fuse {
+    fn default() -> Self {
+        Self { confidence: 0.9999 }
+    }
+}
+
+impl Component for Fuse {
+    const NAME: &'static str = "fuse";
+    const SUMMARY: &'static str = "a fix that agrees is joined with what was known, by their information";
+    const SOURCE: &'static str = "Bar-Shalom, Li, Kirubarajan, Estimation with applications to tracking and \
+                                  navigation, 2001; on SE(3): Barfoot, Furgale, Associating uncertainty with \
+                                  three-dimensional poses, 2014";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "between zero and one")
+    }
+}
+
+impl Fusion for Fuse {
+    fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
+        let six = ChiSquared::new(6.0).expect("six degrees of freedom");
+        let limit = six.inverse_cdf(self.confidence);
+        let innovation = known.object_from_camera.error_to(&fix.object_from_camera);
+        let fix_here = carried_back(&fix.covariance.matrix, &innovation);
+        let nis = (known.covariance.matrix + fix_here)
+            .cholesky()
+            .map_or(f64::INFINITY, |sum| innovation.dot(&sum.solve(&innovation)));
+        if !(nis <= limit) {
+            return Err(Contradiction { nis, limit });
+        }
+        Ok(joined(known, fix).unwrap_or(*fix))
+    }
+}
+
+/// Two rounds settle it: an innovation within the gate is a few standard deviations.
+const ROUNDS: usize = 3;
+
+/// The pose with the least ‖log(T_known⁻¹ T)‖² + ‖log(T_fix⁻¹ T)‖², each in its own metric; `None` where a
+/// covariance is singular.
+fn joined(known: &Standing, fix: &Standing) -> Option<Standing> {
+    let (known_information, fix_information) =
+        (known.covariance.matrix.try_inverse()?, fix.covariance.matrix.try_inverse()?);
+    let mut pose = known.object_from_camera;
+    let mut information = known_information;
+    for _ in 0..ROUNDS {
+        let mut gradient = Vector6::zeros();
+        information = Matrix6::zeros();
+        for (from, weight) in
+            [(&known.object_from_camera, &known_information), (&fix.object_from_camera, &fix_information)]
+        {
+            let residual = from.error_to(&pose);
+            let jacobian = right_jacobian_inverse(&residual);
+            gradient += jacobian.transpose() * weight * residual;
+            information += jacobian.transpose() * weight * jacobian;
+        }
+        pose = pose.perturbed(&-(information.cholesky()?.solve(&gradient))).renormalized();
+    }
+    let covariance = Covariance6::new(information.cholesky()?.inverse());
+    Some(Standing { object_from_camera: pose, covariance })
+}
+
+/// The covariance of η in Exp(r) Exp(η) = Exp(r + J_r(r)⁻¹ η), as one of the sum.
+fn carried_back(covariance: &Matrix6<f64>, r: &Vector6<f64>) -> Matrix6<f64> {
+    let jacobian = right_jacobian_inverse(r);
+    jacobian * covariance * jacobian.transpose()
+}
+
+/// J_r(ξ)⁻¹ = I + ad/2 + ad²/12 − ad⁴/720 + …, ad = \[\[φ\]×, 0; \[ρ\]×, \[φ\]×\].
+fn right_jacobian_inverse(xi: &Vector6<f64>) -> Matrix6<f64> {
+    let turn: Matrix3<f64> = skew(&xi.fixed_rows::<3>(0).into_owned());
+    let shift: Matrix3<f64> = skew(&xi.fixed_rows::<3>(3).into_owned());
+    let mut ad = Matrix6::zeros();
+    ad.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+    ad.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+    ad.fixed_view_mut::<3, 3>(3, 0).copy_from(&shift);
+    let square = ad * ad;
+    Matrix6::identity() + ad * 0.5 + square * (1.0 / 12.0) - square * square * (1.0 / 720.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_geometry::{Camera, Object, Transform};
+
+    fn at(xi: [f64; 6], sigma: f64) -> Standing {
+        let object_from_camera = Transform::<Object, Camera>::exp(&xi.into());
+        Standing { object_from_camera, covariance: Covariance6::isotropic(sigma, sigma) }
+    }
+
+    #[test]
+    fn equal_knowledge_meets_half_way() {
+        let (a, b) = (at([0.0; 6], 0.1), at([0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 0.1));
+        let both = Fuse::default().take(&a, &b).expect("it agrees");
+        assert!((both.object_from_camera.translation().x - 0.05).abs() < 1e-12);
+        assert!((both.covariance.matrix[(3, 3)] - 0.005).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_fix_far_off_is_rejected_with_its_number() {
+        let (a, b) = (at([0.0; 6], 0.01), at([0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 0.01));
+        let Contradiction { nis, limit } = Fuse::default().take(&a, &b).expect_err("it is off by 7 sigma");
+        assert!((nis - 50.0).abs() < 1e-9 && limit < 30.0);
+    }
+
+    #[test]
+    fn the_jacobian_meets_differences() {
+        let xi = Vector6::from([0.3, -0.2, 0.4, 0.5, -0.6, 0.7]);
+        let start = Transform::<Camera, Camera>::exp(&xi);
+        let jacobian = right_jacobian_inverse(&xi);
+        for i in 0..6 {
+            let mut step = Vector6::zeros();
+            step[i] = 1e-6;
+            let slope = (start.perturbed(&step).log() - start.perturbed(&-step).log()) / 2e-6;
+            assert!((slope - jacobian.column(i)).norm() < 1e-4, "{i}");
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! What becomes of the navigated pose when a fix comes.
+
+mod fuse;
+mod replace;
+
+use seafix_component::{Registry, entry};
+
+use crate::Standing;
+
+pub use fuse::Fuse;
+pub use replace::Replace;
+
+/// A fix that contradicts what was known.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("normalised innovation squared {nis:.1}; at most {limit:.1}")]
+pub struct Contradiction {
+    /// The normalised innovation squared, six degrees of freedom.
+    pub nis: f64,
+    /// What it may be.
+    pub limit: f64,
+}
+
+/// Joins what was known with a fix of the same object.
+pub trait Fusion: Send + Sync + std::fmt::Debug {
+    /// The pose after a fix, `known` being the pose before it, relative to the same object.
+    ///
+    /// # Errors
+    /// [`Contradiction`] when the fix is not to be believed.
+    fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction>;
+}
+
+/// All fusions.
+pub static FUSIONS: Registry<dyn Fusion> = Registry::new("fusion", &[entry!(Fuse), entry!(Replace)]);

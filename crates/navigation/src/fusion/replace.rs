@@ -1,0 +1,25 @@
+//! The fix takes the place of what was known.
+
+use seafix_component::Component;
+use serde::{Deserialize, Serialize};
+
+use super::{Contradiction, Fusion};
+use crate::Standing;
+
+/// Believes every fix, and nothing else from then on.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Replace {}
+
+impl Component for Replace {
+    const NAME: &'static str = "replace";
+    const SUMMARY: &'static str = "every fix takes the place of what was known";
+    const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
+                                  autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 2.4";
+}
+
+impl Fusion for Replace {
+    fn take(&self, _: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
+        Ok(*fix)
+    }
+}

@@ -1,0 +1,52 @@
+//! The camera relative to an object of a site, passed from one to the next.
+
+use seafix_geometry::{Covariance6, Object, Transform, World};
+
+use crate::{Local, Standing, by_world};
+
+/// The camera's pose relative to one object of the site.
+///
+/// A vehicle works at an object, so its pose relative to *that* object counts: the survey, which is
+/// far worse than a fix, enters only when the pose passes from one object to another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Navigated {
+    /// The object, as its place in the site.
+    pub object: usize,
+    /// Where the camera is relative to it.
+    pub standing: Standing,
+}
+
+/// Where an object stands, by the survey or by what was found of it since.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The pose.
+    pub world_from_object: Transform<World, Object>,
+    /// Its covariance.
+    pub covariance: Covariance6<World, Object>,
+}
+
+impl Navigated {
+    /// The pose after the motion `step`, Eq. (6).
+    #[must_use]
+    pub fn after(&self, step: &Local) -> Self {
+        Self { standing: self.standing.after(step), ..*self }
+    }
+
+    /// The same camera relative to `other`, by the world: Eq. (2).
+    ///
+    /// object_m_from_camera = W_m⁻¹ W_r T. With W_true = W Exp(ω) it errs by
+    /// ξ + Ad(T⁻¹) ω_r − Ad(T_m⁻¹) ω_m; the survey of the object it stays with does not matter.
+    #[must_use]
+    pub fn passed_to(&self, other: usize, places: &[Place]) -> Self {
+        if other == self.object {
+            return *self;
+        }
+        let (from, to) = (&places[self.object], &places[other]);
+        let here = self.standing.object_from_camera;
+        let pose = by_world(&to.world_from_object, &(from.world_from_object * here));
+        let (near, far) = (here.inverse().adjoint(), pose.inverse().adjoint());
+        let survey = near * from.covariance.matrix * near.transpose() + far * to.covariance.matrix * far.transpose();
+        let covariance = Covariance6::new(self.standing.covariance.matrix + survey);
+        Self { object: other, standing: Standing { object_from_camera: pose.renormalized(), covariance } }
+    }
+}

@@ -1,0 +1,23 @@
+//! A fix whenever an object is in view.
+
+use seafix_component::Component;
+use serde::{Deserialize, Serialize};
+
+use super::{Policy, Situation};
+
+/// Tries when the pose that is known puts an object in view.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InView {}
+
+impl Component for InView {
+    const NAME: &'static str = "in-view";
+    const SUMMARY: &'static str = "a fix is tried when an object should be in view";
+    const SOURCE: &'static str = "none";
+}
+
+impl Policy for InView {
+    fn due(&self, situation: &Situation) -> bool {
+        situation.in_view
+    }
+}

@@ -1,0 +1,125 @@
+//! A vehicle that goes from object to object: true poses, odometry and fixes with errors as stated.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+use seafix_geometry::{Camera, Covariance6, Object, Transform, World, so3};
+use seafix_navigation::{Local, Navigated, Place, Standing};
+use seafix_simulation::{Purpose, Stream};
+
+/// What a voyage is made of.
+#[derive(Debug, Clone)]
+pub struct Voyage {
+    /// Objects, each 10 m from the one before.
+    pub objects: usize,
+    /// Standard deviations of a step of odometry: attitude (rad) and position (m), an axis.
+    pub odometry: (f64, f64),
+    /// The same of a fix.
+    pub fix: (f64, f64),
+    /// The same of an object's surveyed place.
+    pub survey: (f64, f64),
+    /// The way of one step (m).
+    pub step: f64,
+    /// Standard deviation of the change of heading in a step (rad); 0 goes straight on.
+    pub meander: f64,
+}
+
+impl Default for Voyage {
+    fn default() -> Self {
+        Self { objects: 5, odometry: (1e-4, 1e-3), fix: (1e-3, 5e-3), survey: (2e-3, 5e-3), step: 0.3, meander: 0.02 }
+    }
+}
+
+/// A voyage on its way: one of many with the same settings.
+#[derive(Debug)]
+pub struct Sailing<'a> {
+    settings: &'a Voyage,
+    stream: Stream,
+    /// Where the objects truly stand.
+    pub world_from_object: Vec<Transform<World, Object>>,
+    /// Where the survey says they stand.
+    pub surveyed: Vec<Place>,
+    /// Where the camera truly is.
+    pub world_from_camera: Transform<World, Camera>,
+    heading: f64,
+}
+
+impl Voyage {
+    /// The voyage number `number`.
+    pub fn set_out(&self, number: u64) -> Sailing<'_> {
+        let mut stream = Stream::new(1, number, 0, Purpose::Points);
+        let (mut world_from_object, mut surveyed) = (Vec::new(), Vec::new());
+        for i in 0..self.objects {
+            let turn = so3::exp(&(Vector3::new(0.0, 0.0, stream.between(-3.0, 3.0))));
+            let at = Vector3::new(10.0 * i as f64, stream.between(-3.0, 3.0), 40.0);
+            let truth = Transform::<World, Object>::new(turn, at);
+            let covariance = Covariance6::isotropic(self.survey.0, self.survey.1);
+            // T_true = T_survey Exp(ω).
+            let error = Transform::<Object, Object>::exp(&normal6(&mut stream, self.survey));
+            surveyed.push(Place { world_from_object: truth * error.inverse(), covariance });
+            world_from_object.push(truth);
+        }
+        let down = so3::exp(&Vector3::new(0.0, 0.0, 0.3));
+        let world_from_camera = Transform::new(down, Vector3::new(0.0, 0.0, 37.0));
+        Sailing { settings: self, stream, world_from_object, surveyed, world_from_camera, heading: 0.0 }
+    }
+}
+
+fn normal6(stream: &mut Stream, (attitude, position): (f64, f64)) -> Vector6<f64> {
+    let (phi, rho) = (stream.normal3(attitude), stream.normal3(position));
+    Vector6::new(phi.x, phi.y, phi.z, rho.x, rho.y, rho.z)
+}
+
+impl Sailing<'_> {
+    /// One step along a meandering way, and what odometry says of it.
+    pub fn step(&mut self) -> Local {
+        self.heading = 0.9 * self.heading + self.settings.meander * self.stream.normal();
+        let xi = Vector6::new(0.0, 0.0, self.heading, self.settings.step, 0.0, 0.0);
+        let motion = Transform::<Camera, Camera>::exp(&xi);
+        self.world_from_camera = (self.world_from_camera * motion).renormalized();
+        let error = Transform::<Camera, Camera>::exp(&normal6(&mut self.stream, self.settings.odometry));
+        let (attitude, position) = self.settings.odometry;
+        Local { motion: motion * error.inverse(), covariance: Covariance6::isotropic(attitude, position) }
+    }
+
+    /// A fix at an object.
+    pub fn fix(&mut self, object: usize) -> Navigated {
+        let (attitude, position) = self.settings.fix;
+        let error = Transform::<Camera, Camera>::exp(&normal6(&mut self.stream, self.settings.fix));
+        let object_from_camera = self.truth(object) * error.inverse();
+        let covariance = Covariance6::isotropic(attitude, position);
+        Navigated { object, standing: Standing { object_from_camera, covariance } }
+    }
+
+    /// A fix that is wrong by a turn of up to half a turn and a shift of up to `reach` (m).
+    pub fn wrong_fix(&mut self, object: usize, reach: f64) -> Navigated {
+        let turn = self.stream.normal3(1.0).normalize() * self.stream.between(0.2, 3.1);
+        let shift = self.stream.normal3(1.0).normalize() * self.stream.between(0.1 * reach, reach);
+        let xi = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
+        let right = self.fix(object).standing;
+        let object_from_camera = right.object_from_camera.perturbed(&xi);
+        Navigated { object, standing: Standing { object_from_camera, ..right } }
+    }
+
+    /// Moves an object by `metres` in a direction of its own, without telling the survey.
+    pub fn displace(&mut self, object: usize, metres: f64) {
+        let shift = self.stream.normal3(1.0).normalize() * metres;
+        let moved = Transform::<Object, Object>::new(so3::exp(&self.stream.normal3(0.02)), shift);
+        self.world_from_object[object] = self.world_from_object[object] * moved;
+    }
+
+    /// The camera relative to an object.
+    pub fn truth(&self, object: usize) -> Transform<Object, Camera> {
+        self.world_from_object[object].inverse() * self.world_from_camera
+    }
+
+    /// The normalised error squared of a pose.
+    pub fn nees(&self, pose: &Navigated) -> f64 {
+        let error = pose.standing.object_from_camera.error_to(&self.truth(pose.object));
+        let matrix: Matrix6<f64> = pose.standing.covariance.matrix;
+        matrix.cholesky().map_or(f64::INFINITY, |c| error.dot(&c.solve(&error)))
+    }
+
+    /// The distance between the believed and the true place of the camera (m).
+    pub fn off(&self, pose: &Navigated) -> f64 {
+        (pose.standing.object_from_camera.translation() - self.truth(pose.object).translation()).norm()
+    }
+}
