@@ -14,6 +14,7 @@ use seafix_geometry::StereoRig;
 use seafix_referencing::{SOLVERS, Solver};
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, Descriptor, FILTERS, FrontEnd, LOCATORS, MATCHERS, Matcher, Refine, Threads, Triangulator,
+    Warp,
 };
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +27,8 @@ use reckoning::StereoReckoning;
 /// the motion that most pairs agree on (sample consensus over minimal sets, the truncated score of MSAC) is refined by a
 /// [`Solver`]. With it every landmark of the last key frames is expected in both new images, and the patch around the
 /// place where it was first seen is aligned to them directly: a landmark *is* the centre of its patch, so that the error
-/// of the corner detector drops out. The pose is the robust maximum likelihood over all landmarks found, with their
+/// of the corner detector drops out. Patches are laid over as their surface slants: the ground ahead of a vehicle is seen
+/// at a grazing angle. The pose is the robust maximum likelihood over all landmarks found, with their
 /// covariances. Pairs that see too little of what the last key frame saw become key frames: they bring new landmarks, and
 /// the poses and landmarks of the last `window` key frames are adjusted together (bundle adjustment).
 ///
@@ -94,7 +96,7 @@ impl Default for Stereo {
             locator: Choice::named("peak"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band").with("max-depth", deep),
-            refine: Refine::default(),
+            refine: Refine { warp: Warp::Slanted, ..Refine::default() },
             triangulation: Triangulator { max_depth: deep, ..Triangulator::default() },
             between: Choice::named("mutual-ratio"),
             minimal: Choice::named("p3p-stereo"),
@@ -103,11 +105,11 @@ impl Default for Stereo {
             confidence: 0.999,
             draws: 300,
             least_points: 15,
-            follow: Refine { reach: 4.0, ..Refine::default() },
-            landmarks: 600,
+            follow: Refine { reach: 4.0, warp: Warp::Slanted, ..Refine::default() },
+            landmarks: 500,
             apart_px: 8.0,
             keyframe_share: 0.7,
-            window: 8,
+            window: 6,
             most_sigma: 1.0,
             most_gap: 5.0,
             most_speed: 50.0,
