@@ -97,7 +97,7 @@ def fast(request):
 def describe(request):
     """SURF at given key points; OpenCV keeps their order."""
     image, points = KEPT[request["image"]], keypoints(decode(request["keypoints"]))
-    method = cv2.xfeatures2d.SURF_create(upright=request["upright"])
+    method = cv2.xfeatures2d.SURF_create(upright=request["upright"], extended=request.get("extended", False))
     return lambda: method.compute(image, points), described
 
 

@@ -3,6 +3,7 @@
 mod brief;
 mod cells;
 mod comparisons;
+mod gradients;
 mod halves;
 mod orb;
 mod sample;
