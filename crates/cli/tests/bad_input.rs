@@ -192,16 +192,105 @@ fn a_path_that_leads_out() {
     Sample::new().change("frames.csv", "a.pgm,a.pgm", "../a.pgm,a.pgm").refused(3, &["frames.csv:2", "leads out"]);
 }
 
+/// Each of these changes of the description is refused with its own words.
+fn each_refused(changes: &[(&str, &str, &[&str])]) {
+    for (from, to, parts) in changes {
+        Sample::new().change("dataset.toml", from, to).refused(3, &[&["dataset.toml:"], *parts].concat());
+    }
+}
+
 #[test]
 fn cameras_in_one_place() {
-    Sample::new().change("dataset.toml", "-0.25", "0.0").refused(3, &["dataset.toml:", "baseline"]);
+    each_refused(&[
+        ("-0.25]", "0.0]", &["baseline is 0.0e0 m"]),
+        ("-0.25]", "-9e-7]", &["baseline is 9.0e-7 m"]),
+        ("-0.25]", "nan]", &[]),
+    ]);
+}
+
+#[test]
+fn cameras_that_cannot_be() {
+    let left = |numbers: &str| format!("[rig.left]\nsize = [64, 48]\n{numbers}\n\n[rig.right]");
+    let sound = left("fx = 50.0\nfy = 50.0\ncx = 31.5\ncy = 23.5");
+    for (numbers, parts) in [
+        ("fx = 0.0\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["fx = 0", "positive number of pixels"]),
+        ("fx = 50.0\nfy = -50.0\ncx = 31.5\ncy = 23.5", ["fy = -50", "positive number of pixels"]),
+        ("fx = nan\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["fx = NaN", "positive number of pixels"]),
+        ("fx = 50.0\nfy = 50.0\ncx = 64.5\ncy = 23.5", ["cx = 64.5", "must lie in the image"]),
+        ("fx = 50.0\nfy = 50.0\ncx = 31.5\ncy = -1.0", ["cy = -1", "must lie in the image"]),
+    ] {
+        each_refused(&[(&sound, &left(numbers), &parts)]);
+    }
+    each_refused(&[("[rig.left]\nsize = [64, 48]", "[rig.left]\nsize = [0, 48]", &["size = [0, 48]"])]);
 }
 
 #[test]
 fn a_rig_that_is_no_rotation() {
-    Sample::new()
-        .change("dataset.toml", "[[1.0, 0.0, 0.0, -0.25]", "[[1.1, 0.0, 0.0, -0.25]")
-        .refused(3, &["dataset.toml:", "orthonormal"]);
+    each_refused(&[
+        ("[[1.0, 0.0, 0.0, -0.25]", "[[1.1, 0.0, 0.0, -0.25]", &["orthonormal"]),
+        ("[[1.0, 0.0, 0.0, -0.25]", "[[1.00001, 0.0, 0.0, -0.25]", &["orthonormal"]),
+        ("[[1.0, 0.0, 0.0, -0.25]", "[[-1.0, 0.0, 0.0, -0.25]", &[]),
+        ("[0.0, 0.0, 0.0, 1.0]]", "[0.0, 0.0, 0.5, 1.0]]", &[]),
+    ]);
+}
+
+#[test]
+fn a_quaternion_off_unit_length() {
+    for q in ["0 0 0 0", "0 0 0 1.0011", "0 0 0 0.9989", "0 0 0 nan"] {
+        Sample::new().put("prior.tum", &format!("1.0 0 0 -3 {q}\n")).refused(3, &["prior.tum:1"]);
+    }
+    let sample = Sample::new();
+    sample.put("prior.tum", "1.0 0 0 -3 0 0 0 1.0009\n");
+    let check = Command::cargo_bin("seafix").unwrap().arg("check").arg(sample.folder.path()).output().unwrap();
+    let text = String::from_utf8(check.stdout).unwrap();
+    assert_eq!(text.matches("it was normalised").count(), 1, "{text}");
+}
+
+/// One image of the sample replaced by these bytes.
+fn with_image(bytes: &[u8]) -> Sample {
+    let sample = Sample::new();
+    sample.change("frames.csv", "a.pgm,a.pgm", "a.pgm,b.pgm").put("b.pgm", &pgm(64, 48));
+    fs::write(sample.path("a.pgm"), bytes).unwrap();
+    sample
+}
+
+/// A PNG's first 41 bytes, declaring this size.
+fn png_header(width: u32, height: u32) -> Vec<u8> {
+    let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
+    bytes.extend(width.to_be_bytes());
+    bytes.extend(height.to_be_bytes());
+    bytes.extend(b"\x08\0\0\0\0\0\0\0\0\0\0\0\0IDAT");
+    bytes.truncate(41);
+    bytes
+}
+
+#[test]
+fn images_of_no_size_and_of_any() {
+    with_image(b"P5 60000 60000 255\n1").refused(3, &["a.pgm", "60000×60000", "at most 67108864 pixels", "max-pixels"]);
+    with_image(b"P5 0 0 255\n").refused(3, &["a.pgm"]);
+    with_image(&png_header(8_000_000, 4_000_000_000)).refused(3, &["a.pgm"]);
+    with_image(&png_header(0, 48)).refused(3, &["a.pgm"]);
+    with_image(b"").refused(3, &["a.pgm"]);
+}
+
+#[test]
+fn the_limits_of_images_are_settings() {
+    let sample = Sample::new();
+    let (folder, out) = (sample.folder.path().to_str().unwrap(), sample.path("out"));
+    let run = |set: &str, code, parts: &[&str]| {
+        refused(&["run", folder, "--set", set, "--out", out.to_str().unwrap()], code, parts);
+        assert!(!out.exists(), "something was written");
+    };
+    run("source.max-pixels=3071", 3, &["a.pgm", "64×48; at most 3071 pixels are read"]);
+    run("source.max-bytes=100", 3, &["a.pgm", "at most 100 bytes are read"]);
+    run("source.max-pixels=0", 2, &["max-pixels = 0"]);
+    let check = |more: &[&str]| {
+        Command::cargo_bin("seafix").unwrap().args(["check", folder]).args(more).output().unwrap().status.code()
+    };
+    assert_eq!(
+        (check(&[]), check(&["--max-pixels", "3072"]), check(&["--max-pixels", "3071"])),
+        (Some(0), Some(0), Some(1))
+    );
 }
 
 fn experiment(text: &str) -> (TempDir, String) {

@@ -251,8 +251,10 @@ impl Stages {
         self.front_end.look(left, right, rig, &mut look);
         let times = FrameTimes {
             detect_ms: Some(look.times.filter_ms + look.times.detect_ms),
+            locate_ms: Some(look.times.locate_ms),
             describe_ms: Some(look.times.describe_ms),
-            match_ms: Some(look.times.match_ms + look.times.locate_ms + look.times.refine_ms),
+            match_ms: Some(look.times.match_ms),
+            refine_ms: Some(look.times.refine_ms),
             triangulate_ms: Some(look.times.triangulate_ms),
         };
         (look.keypoints()[0].to_vec(), look.cloud, times)

@@ -99,15 +99,19 @@ impl Spread {
     }
 }
 
-/// Median times (ms): of the first four a frame, of the others an attempt; `None` where a stage did not run.
+/// Median times (ms): of the first six a frame, of the others an attempt; `None` where a stage did not run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StageTimes {
     /// Detection, both images.
     pub detect_ms: Option<f64>,
+    /// Location of the exact corners, both images.
+    pub locate_ms: Option<f64>,
     /// Description, both images.
     pub describe_ms: Option<f64>,
     /// Matching.
     pub match_ms: Option<f64>,
+    /// Alignment between the views.
+    pub refine_ms: Option<f64>,
     /// Triangulation.
     pub triangulate_ms: Option<f64>,
     /// Choosing candidates.
@@ -122,11 +126,13 @@ pub struct StageTimes {
 
 impl StageTimes {
     /// The stages and their times, in the order of the method.
-    pub fn stages(&self) -> [(&'static str, Option<f64>); 8] {
+    pub fn stages(&self) -> [(&'static str, Option<f64>); 10] {
         [
             ("detect", self.detect_ms),
+            ("locate", self.locate_ms),
             ("describe", self.describe_ms),
             ("match", self.match_ms),
+            ("refine", self.refine_ms),
             ("triangulate", self.triangulate_ms),
             ("candidates", self.candidates_ms),
             ("search", self.search_ms),
@@ -236,8 +242,10 @@ fn times(trial: &Trial) -> StageTimes {
     };
     StageTimes {
         detect_ms: frames(|frame| frame.times.detect_ms),
+        locate_ms: frames(|frame| frame.times.locate_ms),
         describe_ms: frames(|frame| frame.times.describe_ms),
         match_ms: frames(|frame| frame.times.match_ms),
+        refine_ms: frames(|frame| frame.times.refine_ms),
         triangulate_ms: frames(|frame| frame.times.triangulate_ms),
         candidates_ms: attempts(|times| times.candidates_ms),
         search_ms: attempts(|times| times.search_ms),

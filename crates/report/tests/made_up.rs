@@ -175,8 +175,10 @@ fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
         targets: vec![row],
         times: FrameTimes {
             detect_ms: Some(60.0),
+            locate_ms: Some(9.0),
             describe_ms: Some(31.0),
             match_ms: Some(6.0),
+            refine_ms: Some(4.0),
             triangulate_ms: Some(0.3),
         },
     }

@@ -3,7 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use seafix_component::Fault;
-use seafix_experiment::{Plan, dataset, read_text};
+use seafix_experiment::{
+    Plan,
+    dataset::{self, ImageLimits},
+    read_text,
+};
 use seafix_referencing::{Site, TargetKind, problem_file};
 
 use crate::{
@@ -14,13 +18,13 @@ use crate::{
 /// Of the motions of a target, and of the points that exclude one, so many are named.
 const MOST_NOTED: usize = 5;
 
-pub(crate) fn execute(paths: &[PathBuf]) -> Ended {
+pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
     if let Some(missing) = paths.iter().find(|path| !path.exists()) {
         return Err(Failure::new(INPUT, format!("no such file or folder: {}", missing.display())));
     }
     let mut found = false;
     for path in paths {
-        let (faults, warnings) = examine(path);
+        let (faults, warnings) = examine(path, limits);
         let mut text: String = faults.iter().map(|fault| format!("fault: {fault}\n")).collect();
         text += &warnings.iter().map(|warning| format!("warning: {warning}\n")).collect::<String>();
         text += &congruences(path);
@@ -34,12 +38,12 @@ pub(crate) fn execute(paths: &[PathBuf]) -> Ended {
 }
 
 /// The faults and warnings of one file or folder, by what it is.
-fn examine(path: &Path) -> (Vec<String>, Vec<Fault>) {
+fn examine(path: &Path, limits: ImageLimits) -> (Vec<String>, Vec<Fault>) {
     let lines = |faults: Vec<Fault>| faults.iter().map(ToString::to_string).collect();
     if path.extension().is_some_and(|extension| extension == "mcap") {
         return (log(path).err().map(|error| error.to_string()).into_iter().collect(), Vec::new());
     }
-    let (faults, warnings) = read(path);
+    let (faults, warnings) = read(path, limits);
     (lines(faults), warnings)
 }
 
@@ -48,14 +52,14 @@ fn log(path: &Path) -> Result<(), seafix_log::LogError> {
     seafix_log::Reader::open(path)?.try_for_each(|frame| frame.map(|_| ()))
 }
 
-fn read(path: &Path) -> (Vec<Fault>, Vec<Fault>) {
+fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     let faults = |result: Result<(), Vec<Fault>>| (result.err().unwrap_or_default(), Vec::new());
     if path.is_dir() && !path.join("dataset.toml").exists() {
         let what = Fault::new("a folder without a dataset.toml", path);
         return (vec![what.remedy("name a data set, or the files of the folder one by one")], Vec::new());
     }
     if path.is_dir() {
-        return dataset::check(path);
+        return dataset::check(path, limits);
     }
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("json") => faults(problem_file::read(path).map(|_| ()).map_err(|fault| vec![fault])),
@@ -67,7 +71,7 @@ fn read(path: &Path) -> (Vec<Fault>, Vec<Fault>) {
                     Err(faults) => (faults, Vec::new()),
                 },
                 Some(format) if format.starts_with("seafix-dataset/") => {
-                    dataset::check(path.parent().unwrap_or(Path::new(".")))
+                    dataset::check(path.parent().unwrap_or(Path::new(".")), limits)
                 }
                 _ => faults(Plan::read(path, &[]).map(|_| ())),
             },

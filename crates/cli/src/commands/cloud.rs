@@ -13,6 +13,7 @@ use seafix_geometry::StereoRig;
 use seafix_vision::{FrontEnd, Image, Look, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
+use super::limits::Limits;
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
     ply,
@@ -49,6 +50,8 @@ pub(crate) struct Cloud {
     /// How many threads work; the cloud does not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
+    #[command(flatten)]
+    limits: Limits,
     /// One JSON object, for programs: every point, and the times of the stages.
     #[arg(long)]
     json: bool,
@@ -63,8 +66,9 @@ impl Cloud {
         let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
         let input = |fault: Fault| Failure::new(INPUT, fault);
         let (rig, bits) = read_rig(&self.rig).map_err(input)?;
-        let left = read_image(&self.left, rig.left().size(), bits).map_err(input)?;
-        let right = read_image(&self.right, rig.right().size(), bits).map_err(input)?;
+        let limits = self.limits.of_images();
+        let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
+        let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
         if let Some(fault) = swapped_fault(Sides::of_images(&left, &right, &rig), &self.left) {
             return Err(Failure::new(INPUT, fault));
         }

@@ -13,6 +13,7 @@ mod dive;
 mod draw;
 mod eval;
 mod export;
+mod limits;
 mod list;
 mod odometry;
 mod recover;
@@ -43,6 +44,8 @@ pub(crate) enum Command {
         /// The files and folders.
         #[arg(required = true)]
         paths: Vec<PathBuf>,
+        #[command(flatten)]
+        limits: limits::Limits,
     },
     /// List the components that experiment files can name.
     List(list::List),
@@ -71,7 +74,7 @@ impl Command {
             Self::Draw(command) => command.execute(),
             Self::Diff(command) => command.execute(),
             Self::Eval(command) => command.execute(),
-            Self::Check { paths } => check::execute(paths),
+            Self::Check { paths, limits } => check::execute(paths, limits.of_images()),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),
             Self::Recover(command) => command.execute(),

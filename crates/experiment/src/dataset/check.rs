@@ -9,15 +9,15 @@ use seafix_component::Fault;
 use seafix_vision::Sides;
 use sha2::{Digest, Sha256};
 
-use super::{Dataset, folder::inside};
+use super::{Dataset, ImageLimits, folder::inside};
 
 /// Reads the data set in `folder` and every file it names: decodes the images, compares their sizes
 /// with the calibration and, where hashes are given, every file with its hash.
 ///
 /// Returns the faults and the warnings.
-pub fn check(folder: &Path) -> (Vec<Fault>, Vec<Fault>) {
+pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     let dataset = match Dataset::open(folder) {
-        Ok(dataset) => dataset,
+        Ok(dataset) => Dataset { limits, ..dataset },
         Err(faults) => return (faults, Vec::new()),
     };
     let mut faults: Vec<Fault> = dataset.frames.iter().filter_map(|frame| dataset.pair(frame).err()).collect();

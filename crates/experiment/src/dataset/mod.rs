@@ -13,5 +13,5 @@ mod write;
 pub use check::{check, swapped_fault};
 pub(crate) use check::{hash_faults, input_hashes, sha256, swapped};
 pub use open::{Dataset, DatasetFrame, read_rig};
-pub use picture::{read_image, write_png};
+pub use picture::{ImageLimits, read_image, write_png};
 pub use write::write;

@@ -13,7 +13,7 @@ use seafix_vision::Image;
 use super::{
     describe::{Description, FORMATS},
     folder::{inside, is_absent},
-    picture::read_image,
+    picture::{ImageLimits, read_image},
     tables, tum,
 };
 use crate::read_text;
@@ -40,6 +40,8 @@ pub struct Dataset {
     pub has_visibility: bool,
     /// Depth of the pixels in images of 16 bits.
     pub bits: u8,
+    /// How large an image may be; the reader's, not the data set's, to say.
+    pub limits: ImageLimits,
     /// The table of the frames, relative to the folder.
     pub(super) table: String,
     pub(super) hashes: Vec<(String, String)>,
@@ -93,7 +95,8 @@ impl Dataset {
         if pairs_only {
             described.keep_pairs_only();
         }
-        Reader { folder, file: &file, source: &source, described: &described, pairs_only, faults: Vec::new() }.read()
+        let (faults, warnings) = (Vec::new(), Vec::new());
+        Reader { folder, file: &file, source: &source, described: &described, pairs_only, faults, warnings }.read()
     }
 }
 
@@ -115,8 +118,8 @@ impl Dataset {
     /// # Errors
     /// As [`read_image`].
     pub fn pair(&self, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
-        let left = read_image(&frame.left, self.rig.left().size(), self.bits)?;
-        Ok((left, read_image(&frame.right, self.rig.right().size(), self.bits)?))
+        let left = read_image(&frame.left, self.rig.left().size(), self.bits, self.limits)?;
+        Ok((left, read_image(&frame.right, self.rig.right().size(), self.bits, self.limits)?))
     }
 }
 
@@ -128,6 +131,7 @@ struct Reader<'a> {
     described: &'a Description,
     pairs_only: bool,
     faults: Vec<Fault>,
+    warnings: Vec<Fault>,
 }
 
 impl Reader<'_> {
@@ -149,8 +153,8 @@ impl Reader<'_> {
         };
         let frame_lines = self.table(&d.frames, tables::frames).unwrap_or_default();
         let site = d.site.as_deref().and_then(|name| self.site(name));
-        let truth = d.truth.as_deref().and_then(|name| self.table(name, tum::parse)).unwrap_or_default();
-        let prior = d.prior.as_deref().and_then(|name| self.table(name, tum::parse)).unwrap_or_default();
+        let truth = d.truth.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
+        let prior = d.prior.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
         let covariances = d.prior_covariance.as_deref().and_then(|name| self.table(name, tables::covariances));
         let visibility = d.visibility.as_deref().and_then(|name| self.table(name, tables::visibility));
         let objects = d.objects.as_deref().and_then(|name| self.table(name, tables::objects)).unwrap_or_default();
@@ -183,7 +187,8 @@ impl Reader<'_> {
                     .collect(),
             });
         }
-        let mut warnings = site.as_ref().map_or_else(Vec::new, |site| site.warnings.clone());
+        let mut warnings = std::mem::take(&mut self.warnings);
+        warnings.extend(site.iter().flat_map(|site| site.warnings.clone()));
         if let Ok(rig) = &rig
             && d.rig.rectified
             && !rig.is_rectified()
@@ -219,6 +224,7 @@ impl Reader<'_> {
                 objects,
                 has_visibility: visibility.is_some(),
                 bits,
+                limits: ImageLimits::default(),
                 hashes: d.hashes.clone().into_iter().collect(),
                 warnings,
             }),
@@ -244,6 +250,17 @@ impl Reader<'_> {
     fn table<T>(&mut self, name: &str, parse: impl FnOnce(&str, &Path) -> Result<T, Fault>) -> Option<T> {
         let (path, content) = self.content(name)?;
         parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()
+    }
+
+    /// A trajectory; a quaternion that had to be normalised is a warning, one a table.
+    fn poses(&mut self, name: &str) -> Option<Vec<tum::Stamped<World, Camera>>> {
+        let (path, content) = self.content(name)?;
+        let poses = tum::parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()?;
+        if let Some((line, length)) = tum::normalised(&content) {
+            let what = Fault::new("a quaternion that is not of unit length", &path).on_line(line);
+            self.warnings.push(what.value(format!("{length:.6}")).remedy("it was normalised; give more decimals"));
+        }
+        Some(poses)
     }
 
     fn site(&mut self, name: &str) -> Option<Site> {

@@ -10,13 +10,21 @@ use seafix_vision::Image;
 use super::encoded::objection;
 use crate::record::grey;
 
-/// The most pixels an image may declare.
-const MOST_PIXELS: u64 = 64 << 20;
-/// The most memory its decoder may take (bytes).
-const MOST_MEMORY: u64 = 512 << 20;
+/// How large an image may be before it is refused: checked before anything of that size is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageLimits {
+    /// The most pixels that a header may declare.
+    pub pixels: u64,
+    /// The most memory that the decoder may take, and the largest file that is read (bytes).
+    pub bytes: u64,
+}
 
-/// The largest file worth reading (bytes): what its decoded image may take.
-const MOST_BYTES: u64 = MOST_MEMORY;
+impl Default for ImageLimits {
+    /// 64 Mi pixels, 512 MiB.
+    fn default() -> Self {
+        Self { pixels: 64 << 20, bytes: 512 << 20 }
+    }
+}
 
 /// Reads a PNG, JPEG or PNM image as grey, 0 to 255 for black to white, as finely as its file has it;
 /// colour becomes luma (Rec. 709 weights). `expected` is the size that the calibration has, `bits` the
@@ -24,38 +32,38 @@ const MOST_BYTES: u64 = MOST_MEMORY;
 ///
 /// # Errors
 /// An unreadable, truncated or foreign file, a moving image, four inks, transparent pixels, pixels
-/// beyond the depth, a size other than expected or beyond 64 Mpx (checked from the header, before
+/// beyond the depth, a size other than expected or beyond `limits` (checked from the header, before
 /// anything is decoded).
-pub fn read_image(path: &Path, expected: [u32; 2], bits: u8) -> Result<Image, Fault> {
+pub fn read_image(path: &Path, expected: [u32; 2], bits: u8, limits: ImageLimits) -> Result<Image, Fault> {
     let unreadable =
         |error| Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions");
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    if size > MOST_BYTES {
-        let remedy = format!("at most {MOST_BYTES} bytes are read");
+    if size > limits.bytes {
+        let remedy = format!("at most {} bytes are read; `max-bytes` allows more", limits.bytes);
         return Err(Fault::new("an image file too large", path).value(format!("{size} bytes")).remedy(remedy));
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     let reader = || ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(unreadable);
     let (width, height) = reader()?.into_dimensions().map_err(|error| damaged(path, &error))?;
-    check_size(path, [width, height], expected)?;
+    check_size(path, [width, height], expected, limits)?;
     if let Some((what, remedy)) = objection(&bytes) {
         return Err(Fault::new(what, path).remedy(remedy));
     }
     let mut reader = reader()?;
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(MOST_MEMORY);
-    reader.limits(limits);
+    let mut memory = Limits::default();
+    memory.max_alloc = Some(limits.bytes);
+    reader.limits(memory);
     let decoded = reader.decode().map_err(|error| damaged(path, &error))?;
     let pixels = grey_levels(&decoded, bits).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
 }
 
 /// `expected` is the size that the calibration has.
-fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2]) -> Result<(), Fault> {
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits: ImageLimits) -> Result<(), Fault> {
+    if u64::from(width) * u64::from(height) > limits.pixels {
         return Err(Fault::new("an image too large", path)
             .value(format!("{width}×{height}"))
-            .remedy(format!("at most {MOST_PIXELS} pixels are read")));
+            .remedy(format!("at most {} pixels are read; `max-pixels` allows more", limits.pixels)));
     }
     let [w, h] = expected;
     if (width, height) != (w, h) {
@@ -131,10 +139,14 @@ mod tests {
 
     /// An image file of these bytes, read back.
     fn read(name: &str, bytes: &[u8], size: [u32; 2], bits: u8) -> Result<Image, String> {
+        within(ImageLimits::default(), name, bytes, size, bits)
+    }
+
+    fn within(limits: ImageLimits, name: &str, bytes: &[u8], size: [u32; 2], bits: u8) -> Result<Image, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        read_image(&path, size, bits).map_err(|fault| fault.to_string())
+        read_image(&path, size, bits, limits).map_err(|fault| fault.to_string())
     }
 
     fn refused(name: &str, bytes: &[u8], parts: &[&str]) {
@@ -216,6 +228,22 @@ mod tests {
         }
         // The wrong extension does not matter: the content says what it is.
         assert!(read("a.jpg", &encoded(&samples, ExtendedColorType::L8, ImageFormat::Png), [8, 6], 16).is_ok());
+    }
+
+    #[test]
+    fn the_limits_are_the_caller_s() {
+        let samples: Vec<u8> = (0..48).collect();
+        let png = encoded(&samples, ExtendedColorType::L8, ImageFormat::Png);
+        let limited = |pixels, bytes| within(ImageLimits { pixels, bytes }, "a.png", &png, [8, 6], 16);
+        let enough = png.len() as u64 + 48;
+        assert!(limited(48, enough).is_ok());
+        let said = limited(47, enough).unwrap_err();
+        assert!(said.contains("8×6; at most 47 pixels are read; `max-pixels` allows more"), "{said}");
+        let said = limited(48, png.len() as u64 - 1).unwrap_err();
+        assert!(said.contains("bytes are read; `max-bytes` allows more"), "{said}");
+        // A small file that decodes to much more than it takes.
+        let flat = encoded(&[0; 48], ExtendedColorType::L8, ImageFormat::Png);
+        assert!(within(ImageLimits { pixels: 48, bytes: 40 }, "a.png", &flat, [8, 6], 16).is_err());
     }
 
     #[test]

@@ -64,6 +64,17 @@ pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<
     Ok(poses)
 }
 
+/// The first line of a TUM text that [`parse`] reads whose quaternion is off unit length by more than the rounding of
+/// six decimals, and that length: it is normalised, and someone may want to know.
+pub(super) fn normalised(text: &str) -> Option<(usize, f64)> {
+    const ROUNDING: f64 = 1e-5;
+    text.lines().enumerate().find_map(|(index, line)| {
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let length = numbers.get(4..8)?.iter().map(|q| q * q).sum::<f64>().sqrt();
+        ((length - 1.0).abs() > ROUNDING).then_some((index + 1, length))
+    })
+}
+
 /// The TUM text of these poses; reading it back gives the same poses to the last bit but rounding.
 pub fn print<A: Frame, B: Frame>(poses: &[Stamped<A, B>]) -> String {
     poses
@@ -138,6 +149,14 @@ mod tests {
         assert!(message("1 0 0 0 0 0 0 0\n").contains("unit length"));
         assert!(message("1 NaN 0 0 0 0 0 1\n").contains("not a finite number"));
         assert!(message("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").contains("sort the lines"));
+    }
+
+    #[test]
+    fn a_quaternion_that_is_normalised_is_named_once() {
+        let text = "# seconds\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1.0005\n3 0 0 0 0 0 0 0.9995\n";
+        assert_eq!(read(text).unwrap()[1].1.rotation().w, 1.0);
+        assert_eq!(normalised(text), Some((3, 1.0005)));
+        assert_eq!(normalised("1 0 0 0 0.707107 0 0 0.707107\n"), None);
     }
 
     #[test]

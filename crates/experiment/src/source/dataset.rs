@@ -9,14 +9,25 @@ use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
 use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
-use crate::dataset::{Dataset, hash_faults, input_hashes, swapped};
+use crate::dataset::{Dataset, ImageLimits, hash_faults, input_hashes, swapped};
 
 /// Reads a `seafix-dataset/1` folder.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DatasetSource {
     /// The folder; relative to the experiment file.
     pub path: String,
+    /// The most pixels that an image's header may declare.
+    pub max_pixels: u64,
+    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    pub max_bytes: u64,
+}
+
+impl Default for DatasetSource {
+    fn default() -> Self {
+        let ImageLimits { pixels, bytes } = ImageLimits::default();
+        Self { path: String::new(), max_pixels: pixels, max_bytes: bytes }
+    }
 }
 
 impl Component for DatasetSource {
@@ -25,14 +36,19 @@ impl Component for DatasetSource {
     const SOURCE: &'static str = "docs/formats.md";
 
     fn check(&self) -> Result<(), String> {
-        in_range(!self.path.is_empty(), "path", "''", "the folder of a data set, relative to the experiment file")
+        in_range(!self.path.is_empty(), "path", "''", "the folder of a data set, relative to the experiment file")?;
+        // What TOML can say.
+        let most = i64::MAX as u64;
+        in_range((1..=most).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
+        in_range((1..=most).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
     }
 }
 
 impl Source for DatasetSource {
     fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
         let path = folder.join(&self.path);
-        let dataset = Dataset::open(&path)?;
+        let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
+        let dataset = Dataset { limits, ..Dataset::open(&path)? };
         let Some(site) = dataset.site.clone() else {
             return Err(vec![
                 Fault::new("no site", &path.join("dataset.toml"))

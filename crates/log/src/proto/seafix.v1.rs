@@ -300,6 +300,10 @@ pub struct Timing {
     /// One a result of the frame, in the same order.
     #[prost(message, repeated, tag = "7")]
     pub targets: ::prost::alloc::vec::Vec<TargetTiming>,
+    #[prost(double, optional, tag = "8")]
+    pub locate_ms: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "9")]
+    pub refine_ms: ::core::option::Option<f64>,
 }
 /// Times of the stages that serve one target (ms).
 #[derive(Clone, PartialEq, ::prost::Message)]

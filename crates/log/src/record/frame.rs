@@ -87,12 +87,16 @@ pub struct VisiblePoint {
 /// Times of the stages that serve all targets (ms); `None` where a stage did not run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameTimes {
-    /// Detection, both images.
+    /// Filters and detection, both images.
     pub detect_ms: Option<f64>,
+    /// Location of the exact corners, both images.
+    pub locate_ms: Option<f64>,
     /// Description, both images.
     pub describe_ms: Option<f64>,
     /// Matching.
     pub match_ms: Option<f64>,
+    /// Alignment between the views.
+    pub refine_ms: Option<f64>,
     /// Triangulation.
     pub triangulate_ms: Option<f64>,
 }

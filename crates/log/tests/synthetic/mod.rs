@@ -128,7 +128,14 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         } else {
             vec![fixed, refused]
         },
-        times: FrameTimes { detect_ms: Some(3.0), describe_ms: None, match_ms: Some(0.0), triangulate_ms: Some(1.0) },
+        times: FrameTimes {
+            detect_ms: Some(3.0),
+            locate_ms: Some(0.5),
+            describe_ms: None,
+            match_ms: Some(0.0),
+            refine_ms: Some(2.5),
+            triangulate_ms: Some(1.0),
+        },
     }
 }
 
