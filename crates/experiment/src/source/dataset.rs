@@ -47,8 +47,8 @@ impl Component for DatasetSource {
 impl Source for DatasetSource {
     fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
         let path = folder.join(&self.path);
-        let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
-        let dataset = Dataset { limits, ..Dataset::open(&path)? };
+        let mut dataset = Dataset::open(&path)?;
+        dataset.limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
         let Some(site) = dataset.site.clone() else {
             return Err(vec![
                 Fault::new("no site", &path.join("dataset.toml"))

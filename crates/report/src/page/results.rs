@@ -181,7 +181,7 @@ fn times(summary: &Summary) -> Markup {
     html! {
         figure.table {
             figcaption {
-                "Time (ms), medians: of the first four stages a frame, of the others an attempted target; "
+                "Time (ms), medians: of the first six stages a frame, of the others an attempted target; "
                 i { "total" } " is from the images, or the points where there are none, to the answer about one target."
             }
             table {
