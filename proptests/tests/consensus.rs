@@ -5,9 +5,10 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_evaluation::clopper_pearson;
-use seafix_geometry::Transform;
+use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, so3};
 use seafix_referencing::{
-    Acceptance, Candidates, Mahalanobis, Outcome, Problem, RigidConsensus, Search, Shares, Tolerance, rms_apart,
+    Acceptance, Candidates, Correspondence, Mahalanobis, Outcome, Problem, RigidConsensus, Search, Shares, Tolerance,
+    problem_file::CoherenceProblem, rms_apart,
 };
 use seafix_simulation::families::{Drawn, Family, Presence};
 
@@ -45,8 +46,6 @@ fn referenced(family: Family, seed: u64, number: u64, presence: Presence) -> boo
 }
 
 /// Where the object is not there, no pose is given: 300 frames at the paper's scale and some at a site's.
-///
-/// Seen to fail when `absence` is 0.2, and when the density of the clutter is a tenth of what it is.
 #[test]
 fn no_object_no_pose() {
     for (family, frames) in [(Family::A, 300), (Family::F, 12)] {
@@ -105,6 +104,17 @@ fn beliefs_are_calibrated() {
             let rate = happened as f64 / bin.len() as f64;
             println!("  {mean:.5}  {rate:.5}  {}", bin.len());
         }
+        // Of those called at most as likely as `sure`, so many may happen at most: absence is underestimated, since
+        // clutter is not spread as evenly as the model takes it, and the default acceptance asks for much less.
+        let (sure, most) = (1e-2, 0.1);
+        let said: Vec<bool> = beliefs
+            .iter()
+            .filter(|(belief, _)| if what == "absent" { *belief <= sure } else { 1.0 - belief <= sure })
+            .map(|(_, happened)| *happened == (what == "absent"))
+            .collect();
+        let missed = said.iter().filter(|&&missed| missed).count();
+        assert!(said.len() >= 100, "{what}: {} beliefs are no test", said.len());
+        assert!(missed as f64 <= most * said.len() as f64, "{what}: {missed} of {} were wrong", said.len());
     }
 }
 
@@ -116,8 +126,6 @@ fn decade(p: f64) -> i32 {
 
 /// What is believed of few drawn frames is right: the true pose is the likeliest in nine of ten where five points or
 /// more are visible, and the answers that the default acceptance gives are right.
-///
-/// Seen to fail when pairs are charged with the density of another model point, and when the prior is left out.
 #[test]
 fn the_true_pose_is_the_likeliest() {
     let (mut defined, mut right) = (0, 0);
@@ -135,6 +143,58 @@ fn the_true_pose_is_the_likeliest() {
         }
     }
     assert!(right * 10 >= defined * 9, "{right} of {defined}");
+}
+
+/// The cloud points of a copy of the object: each visible point once more, where another pose has it.
+fn with_copy(drawn: &Drawn, by: [f64; 3], turned: [f64; 3]) -> CoherenceProblem {
+    let mut file = drawn.problem.problem();
+    let truth: Transform<Camera, Object> = Transform::from_rows(&drawn.truth.t_cam_obj).expect("it is a rigid motion");
+    let centre = truth * Point::from([0.0; 3]);
+    let turn = so3::exp(&turned.into());
+    // The noise of the copy is that of the object, turned with it.
+    let copy = |&[_, cloud]: &[usize; 2]| {
+        let mut point = file.cloud[cloud];
+        let lever = point.position.at - centre;
+        point.position.at = Point::from(centre.coords + turn * lever + nalgebra::Vector3::from(by));
+        point
+    };
+    let copies: Vec<MeasuredPoint> = drawn.truth.pairs.iter().map(copy).collect();
+    file.cloud.extend(copies);
+    file
+}
+
+/// Where the cloud holds the object twice, equally visible, and the prior allows both, no pose is given; and never that of
+/// the copy.
+#[test]
+fn two_copies_are_ambiguous() {
+    let (mut alone, mut ambiguous, mut tried) = (0, 0, 0);
+    for number in 0..126 {
+        let drawn = Drawn::new(Family::A, 13, number, Presence::Present);
+        if drawn.truth.pairs.len() < 6 {
+            continue;
+        }
+        tried += 1;
+        let outcome = |problem: &CoherenceProblem| {
+            let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
+            let mut rng = ChaCha8Rng::seed_from_u64(0);
+            problem.attempt(&search, &solver, &Acceptance::default(), &mut rng).outcome
+        };
+        alone += u32::from(matches!(outcome(&drawn.problem.problem()), Outcome::Referenced(_)));
+        // Into the shells, and 9 cm or more off.
+        let half = drawn.truth.params.shell.expect("family a has shells");
+        let by = [0.2 * half + 0.05, -0.2 * half - 0.05, 0.1 * half];
+        let twice = outcome(&with_copy(&drawn, by, [0.02, 0.03, -0.02]));
+        // Where the copy reaches out of its shells the object may still be told from it.
+        if let Outcome::Referenced(reference) = &twice {
+            let is_true = |pair: &&Correspondence| drawn.truth.pairs.contains(&[pair.model, pair.cloud]);
+            let right = reference.pairs.iter().filter(is_true).count();
+            assert!(2 * right > reference.pairs.len(), "number {number}: a copy was taken for the object");
+        }
+        ambiguous += u32::from(matches!(twice, Outcome::Ambiguous(_)));
+    }
+    println!("{ambiguous} of {tried} ambiguous; without the copy {alone} referenced");
+    assert!(3 * ambiguous > 2 * alone, "{ambiguous} of {alone} that would be referenced without the copy");
+    assert!(2 * alone > tried, "{alone} of {tried} would be referenced without the copy");
 }
 
 /// Candidates beyond the shells and points that are no candidates change nothing.

@@ -119,7 +119,11 @@ fn absurd_tolerances_end() {
             if delta == 10.0 && search.claims.lists {
                 let bound = match &answer {
                     Ok(found) => found.size_bound,
-                    Err(Unidentified::Budget { bound, .. } | Unidentified::NotFound { bound, .. }) => *bound,
+                    Err(
+                        Unidentified::Budget { bound, .. }
+                        | Unidentified::TooLarge { bound, .. }
+                        | Unidentified::NotFound { bound, .. },
+                    ) => *bound,
                     Err(Unidentified::Mirrored { .. }) => 20,
                     Err(other) => panic!("{}: {other}", search.name),
                 };
@@ -137,7 +141,11 @@ fn a_huge_cloud_ends() {
     for search in each(BUDGET) {
         match search.answer(&problem) {
             Ok(found) => assert!(found.size_bound >= found.pairs.len(), "{}", search.name),
-            Err(Unidentified::Budget { bound, .. } | Unidentified::NotFound { bound, .. }) => {
+            Err(
+                Unidentified::Budget { bound, .. }
+                | Unidentified::TooLarge { bound, .. }
+                | Unidentified::NotFound { bound, .. },
+            ) => {
                 assert!(bound >= 3, "{}", search.name);
             }
             Err(Unidentified::Mirrored { best }) => assert_eq!(best, 4, "{}", search.name),

@@ -164,9 +164,10 @@ impl CoherenceProblem {
         rng: &mut dyn Rng,
     ) -> Attempt {
         let Some(candidates) = self.candidates() else {
-            let bound = self.model.len().min(self.cloud.len());
-            let why = Unidentified::Budget { budget: MOST_CANDIDATES as u64, best: 0, bound, tests: 0 };
-            return Attempt::without(why);
+            let (size, bound) =
+                (self.model.len().saturating_mul(self.cloud.len()), self.model.len().min(self.cloud.len()));
+            let what = "candidate pairs";
+            return Attempt::without(Unidentified::TooLarge { size, what, most: MOST_CANDIDATES, bound });
         };
         let problem = Problem {
             model: &self.model,

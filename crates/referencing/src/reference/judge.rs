@@ -9,7 +9,7 @@ use super::{
     rms_apart,
 };
 use crate::{
-    Belief, Correspondence, Degenerate, Explanation, Identification, Observations, Prior, PriorBound, Problem, Solver,
+    Correspondence, Degenerate, Identification, Observations, Prior, PriorBound, Problem, Solver,
     candidates::chi_square, chance::expected_sets, solve::likelihood,
 };
 
@@ -38,37 +38,6 @@ impl Judge<'_> {
         let (expected, budget) = (expected_sets(self.problem, pairs), self.acceptance.chance_budget);
         // Written so that a NaN is refused too.
         if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size: pairs.len(), expected, budget }) }
-    }
-
-    /// The pose of a search that weighs evidence: believed when little speaks for no object at all, and
-    /// little for a pose elsewhere.
-    pub(super) fn weighed(&self, found: &Identification, belief: &Belief) -> (Outcome, Option<Alternative>) {
-        let shares = belief.shares(self.problem.model, self.alert_limit);
-        let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
-        let runner_up = elsewhere.first().map(|other| other.alternative());
-        let limit = self.acceptance.absence;
-        // Written so that a NaN is refused too.
-        if !(shares.absent <= limit) {
-            return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
-        }
-        if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
-            let all = belief.explanations.first().into_iter().chain(elsewhere);
-            return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
-        }
-        let (mut outcome, _) = self.poses(found);
-        if let (Outcome::Referenced(reference), Some(best)) = (&mut outcome, belief.explanations.first()) {
-            // The solver has the pairs alone: what it makes of them must be the pose that was weighed.
-            if self.apart(&reference.object_from_camera, &best.object_from_camera) {
-                let solved = Alternative {
-                    object_from_camera: reference.object_from_camera,
-                    pairs: reference.pairs.clone(),
-                    score: reference.score,
-                };
-                return (Outcome::Ambiguous(vec![best.alternative(), solved]), None);
-            }
-            reference.score = best.ln_evidence;
-        }
-        (outcome, runner_up)
     }
 
     /// The pose of the set and of its rivals: the only one that passes, several, or none.
@@ -228,7 +197,7 @@ impl Judge<'_> {
     }
 
     /// Whether two poses are different answers.
-    fn apart(&self, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> bool {
+    pub(super) fn apart(&self, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> bool {
         !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
     }
 

@@ -15,6 +15,7 @@ mod integrity;
 mod judge;
 mod outcome;
 mod refusal;
+mod weighed;
 
 pub use acceptance::Acceptance;
 pub use integrity::{Integrity, Protection, Redundancy};

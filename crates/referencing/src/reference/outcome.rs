@@ -131,7 +131,9 @@ impl Attempt {
             _ => None,
         };
         let size_bound = match why {
-            Unidentified::Budget { bound, .. } | Unidentified::NotFound { bound, .. } => Some(bound),
+            Unidentified::Budget { bound, .. }
+            | Unidentified::TooLarge { bound, .. }
+            | Unidentified::NotFound { bound, .. } => Some(bound),
             Unidentified::NoPrior => None,
             Unidentified::NoConsensus { best, .. } | Unidentified::Mirrored { best } => Some(best),
             Unidentified::TooFew { with_candidates, .. } => Some(with_candidates),

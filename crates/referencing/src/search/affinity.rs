@@ -1,6 +1,6 @@
 //! The association graph with weights: how well each coherent pair of pairs agrees.
 
-use super::association::Association;
+use super::{Unidentified, association::Association, grow::most_possible};
 use crate::Problem;
 
 /// A symmetric matrix over the vertices, zero where they are not coherent; its upper half by rows.
@@ -13,13 +13,16 @@ pub(super) struct Affinity {
 }
 
 impl Affinity {
-    /// Edges weighed by `weight` of their difference over Δ, 0 to 1; none where they are more than `most`.
+    /// Edges weighed by `weight` of their difference over Δ, 0 to 1.
+    ///
+    /// # Errors
+    /// [`Unidentified::TooLarge`]: they are more than `most`.
     pub(super) fn of(
         problem: &Problem<'_>,
         graph: &Association,
         most: usize,
         weight: impl Fn(f64) -> f64,
-    ) -> Option<Self> {
+    ) -> Result<Self, Unidentified> {
         let count = graph.vertices.len();
         let mut all = Self { starts: vec![0], columns: Vec::new(), weights: Vec::new() };
         for v in 0..count {
@@ -32,11 +35,17 @@ impl Affinity {
                 all.weights.push(weight(if off > 0.0 { off / delta } else { 0.0 }) as f32);
             }
             if all.columns.len() > most {
-                return None;
+                let size = (0..count).map(|v| graph.adjacency.ones(v).filter(|&w| w > v).count()).sum();
+                return Err(Unidentified::TooLarge {
+                    size,
+                    what: "coherent pairs",
+                    most,
+                    bound: most_possible(problem),
+                });
             }
             all.starts.push(all.columns.len());
         }
-        Some(all)
+        Ok(all)
     }
 
     pub(super) fn edges(&self) -> usize {

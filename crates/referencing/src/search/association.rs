@@ -88,8 +88,8 @@ fn extent(problem: &Problem<'_>, vertices: &[Correspondence]) -> f64 {
 }
 
 /// Shares of bounds of Δ: that of two pairs is at most the sum of their first, by √(x² + y²) ≤ x + y, and at least
-/// the sum of their second.
-fn reach(problem: &Problem<'_>, pair: Correspondence, extent: f64) -> (f64, f64) {
+/// the sum of their second; `extent` is the largest coordinate (m), which rounding is a share of.
+pub(super) fn reach(problem: &Problem<'_>, pair: Correspondence, extent: f64) -> (f64, f64) {
     // Distances themselves are rounded.
     let rounding = 1e-13 * extent;
     match problem.tolerance {

@@ -1,12 +1,13 @@
 //! Backtracking: subsets with pruning.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
     BUDGET, Identification, MOST_TIES, NEEDED, Search, Unidentified,
     association::vertices,
+    bounded,
     grow::{feasible, most_possible},
     maximum_clique::least_residual,
     orientation::{Sense, wholly_mirrored},
@@ -47,14 +48,13 @@ impl Component for Backtracking {
                                   problems, 1980";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
 impl Search for Backtracking {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, self.budget)?;
+        feasible(problem, self.most_pairs)?;
         let vertices = vertices(problem);
         let volumes = Volumes::of(problem, &vertices);
         let mut run = Run {

@@ -30,6 +30,9 @@ impl Explanation {
 pub struct Belief {
     /// The poses; what is less likely than the best by many orders of magnitude is left out.
     pub explanations: Vec<Explanation>,
+    /// What the cloud shows beside the likeliest: poses that explain nearly as many of the points which it leaves, the
+    /// likeliest first.
+    pub beside: Vec<Explanation>,
 }
 
 /// How the belief is shared out.
@@ -57,6 +60,19 @@ impl Belief {
         }
         different.drain(..different.len().min(1));
         different
+    }
+
+    /// A second copy of the object, elsewhere: a pose that explains other cloud points than the likeliest does, nearly as
+    /// many, and that alone would be believed: no object at all has at most the probability `absence`.
+    ///
+    /// Where two poses are each beyond chance, clutter explains neither: it is not the evidence that decides between
+    /// them, but which of two things is the object. Of that the cloud says only how much of each is seen.
+    pub fn copy(&self, model: &[ModelPoint], limit: f64, absence: f64) -> Option<&Explanation> {
+        let best = self.explanations.first()?;
+        self.beside.iter().find(|other| {
+            other.ln_evidence >= libm::log((1.0 - absence) / absence)
+                && !(rms_apart(model, &best.object_from_camera, &other.object_from_camera) <= limit)
+        })
     }
 
     /// The posterior probabilities: P_m = Λ_m/(1 + Σ Λ), Λ the evidence, presence and absence being

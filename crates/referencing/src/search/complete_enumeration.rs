@@ -1,12 +1,13 @@
 //! Complete enumeration: the paper's search without its shells.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::by_coordinates,
+    bounded,
     structural_coherence::{Enumeration, Samples},
 };
 use crate::Problem;
@@ -42,8 +43,7 @@ impl Component for CompleteEnumeration {
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, ref. 35";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
@@ -54,9 +54,10 @@ impl Search for CompleteEnumeration {
         if with_candidates < NEEDED {
             return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
         }
-        if points.saturating_mul(cloud) > self.most_pairs {
-            let bound = points.min(cloud);
-            return Err(Unidentified::Budget { budget: self.budget, best: 0, bound, tests: 0 });
+        let size = points.saturating_mul(cloud);
+        if size > self.most_pairs {
+            let (most, bound) = (self.most_pairs, points.min(cloud));
+            return Err(Unidentified::TooLarge { size, what: "candidate pairs", most, bound });
         }
         let all = by_coordinates(problem.cloud.iter().map(|point| point.position.at));
         let points = by_coordinates(problem.model.iter().map(|point| point.at));

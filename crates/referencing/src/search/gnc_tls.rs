@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    Identification, NEEDED, Search, Unidentified,
     alike::slack,
     association::vertices,
     grow::{conclude, feasible},
@@ -51,7 +51,7 @@ impl Component for GncTls {
 
 impl Search for GncTls {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, BUDGET)?;
+        feasible(problem, self.most_pairs)?;
         let vertices = vertices(problem);
         let solver = solve::GncTls { growth: self.growth, ..solve::GncTls::default() };
         let mut data = Observations::of(&vertices, problem.model, problem.cloud, None);

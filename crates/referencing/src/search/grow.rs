@@ -112,14 +112,16 @@ pub(super) fn most_possible(problem: &Problem<'_>) -> usize {
 /// What every search asks first: three model points with candidates, and no more pairs than it can hold.
 ///
 /// # Errors
-/// [`Unidentified::TooFew`], [`Unidentified::Budget`].
-pub(super) fn feasible(problem: &Problem<'_>, most_pairs: usize, budget: u64) -> Result<(), Unidentified> {
+/// [`Unidentified::TooFew`], [`Unidentified::TooLarge`].
+pub(super) fn feasible(problem: &Problem<'_>, most_pairs: usize) -> Result<(), Unidentified> {
     let with_candidates = problem.candidates.with_candidates();
     if with_candidates < NEEDED {
         return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
     }
-    if problem.candidates.pairs() > most_pairs {
-        return Err(Unidentified::Budget { budget, best: 0, bound: with_candidates, tests: 0 });
+    let size = problem.candidates.pairs();
+    if size > most_pairs {
+        let bound = most_possible(problem);
+        return Err(Unidentified::TooLarge { size, what: "candidate pairs", most: most_pairs, bound });
     }
     Ok(())
 }

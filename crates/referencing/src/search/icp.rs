@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    BUDGET, Identification, Search, Unidentified, bounded,
     closest::Closest,
     grow::{conclude, feasible},
     pose::{fitted, refined},
@@ -51,14 +51,13 @@ impl Component for Icp {
         let share = self.keep > 0.0 && self.keep <= 1.0;
         in_range(share, "keep", self.keep, "a share above 0, at most 1")?;
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
 impl Search for Icp {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, self.budget)?;
+        feasible(problem, self.most_pairs)?;
         let prior = problem.prior.ok_or(Unidentified::NoPrior)?;
         let &Self { keep, iterations, budget, .. } = self;
         let distance = |pose: &Transform<Object, Camera>, pair: Correspondence| {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
+    bounded,
     grow::{admits, conclude, feasible, most_possible},
     orientation::Sense,
     pose::{fitted, share},
@@ -49,14 +50,13 @@ impl Component for InterpretationTree {
     fn check(&self) -> Result<(), String> {
         let share = self.enough > 0.0 && self.enough <= 1.0;
         in_range(share, "enough", self.enough, "a share above 0, at most 1")?;
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
 impl Search for InterpretationTree {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, self.budget)?;
+        feasible(problem, self.most_pairs)?;
         let vertices = vertices(problem);
         let volumes = Volumes::of(problem, &vertices);
         let numbers: Vec<usize> = (0..vertices.len()).collect();

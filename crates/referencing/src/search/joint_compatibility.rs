@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
+    bounded,
     grow::{admits, conclude, feasible, most_possible},
     orientation::Sense,
     volumes::Volumes,
@@ -52,14 +53,13 @@ impl Component for JointCompatibility {
     fn check(&self) -> Result<(), String> {
         let confident = self.confidence > 0.0 && self.confidence < 1.0;
         in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
 impl Search for JointCompatibility {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, self.budget)?;
+        feasible(problem, self.most_pairs)?;
         let vertices = vertices(problem);
         let volumes = Volumes::of(problem, &vertices);
         let numbers: Vec<usize> = (0..vertices.len()).collect();

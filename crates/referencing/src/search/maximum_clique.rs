@@ -1,14 +1,16 @@
 //! Maximum clique: the largest admissible set, proved.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
     BUDGET, Identification, MOST_TIES, NEEDED, Search, Unidentified,
     alike::all_alike,
     association::Association,
+    bounded,
     clique::{self, MOST_ORIENTED},
+    grow::feasible,
     orientation::{Sense, unmirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Observations, Problem, solve::least_squares};
@@ -44,21 +46,14 @@ impl Component for MaximumClique {
                                   maximum clique problem, 2011; the graph: Bailey et al., 2000";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
 impl Search for MaximumClique {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        let with_candidates = problem.candidates.with_candidates();
-        if with_candidates < NEEDED {
-            return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
-        }
+        feasible(problem, self.most_pairs)?;
         let budget = self.budget;
-        if problem.candidates.pairs() > self.most_pairs {
-            return Err(Unidentified::Budget { budget, best: 0, bound: with_candidates, tests: 0 });
-        }
         let graph = Association::of(problem);
         // The rest is for the proof that what ties is alike.
         let share = budget - budget / 4;

@@ -1,7 +1,7 @@
 //! Searches: which cloud points are which model points.
 
 use rand::Rng;
-use seafix_component::{Registry, entry};
+use seafix_component::{Registry, entry, in_range};
 
 use crate::{Correspondence, Problem};
 
@@ -62,8 +62,7 @@ pub struct Identification {
     pub rivals: Vec<Vec<Correspondence>>,
     /// Whether `rivals` holds every other set of the same size.
     pub rivals_complete: bool,
-    /// Whether it is proved that no admissible set is larger; of a search that weighs evidence, that no pose is
-    /// likelier.
+    /// Whether it is proved that no admissible set is larger.
     pub optimal: bool,
     /// No admissible set has more pairs than this.
     pub size_bound: usize,
@@ -124,6 +123,18 @@ pub enum Unidentified {
         /// Pair tests spent, those that built the graph included.
         tests: u64,
     },
+    /// More than the search holds in memory: it did not begin.
+    #[error("{size} {what} are more than the {most} that the search takes")]
+    TooLarge {
+        /// How many there are.
+        size: usize,
+        /// What there is too much of.
+        what: &'static str,
+        /// How many may be.
+        most: usize,
+        /// No set is larger than this.
+        bound: usize,
+    },
     /// A search that proves nothing found too small a set, or none.
     #[error("no coherent set of {needed} points was found; at most {bound} are possible")]
     NotFound {
@@ -157,6 +168,7 @@ impl Unidentified {
             Self::NoPrior => "no-prior",
             Self::NotFound { .. } => "not-found",
             Self::Budget { .. } => "budget",
+            Self::TooLarge { .. } => "too-large",
             Self::Mirrored { .. } => "mirrored",
         }
     }
@@ -185,6 +197,12 @@ pub static SEARCHES: Registry<dyn Search> = Registry::new(
 
 /// The default budget of a search: pair tests beyond those that build its graph.
 pub(crate) const BUDGET: u64 = 10_000_000;
+/// What is wrong with the two limits that most searches have.
+fn bounded(budget: u64, most_pairs: usize) -> Result<(), String> {
+    in_range(budget > 0, "budget", budget, "1 or more pair tests")?;
+    in_range(most_pairs >= NEEDED, "most-pairs", most_pairs, "3 or more candidate pairs")
+}
+
 /// The least set that a pose can come from.
 pub(crate) const NEEDED: usize = 3;
 /// Sets of the largest size that are looked at before the best of them is chosen.

@@ -6,8 +6,9 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    BUDGET, Identification, Search, Unidentified,
     association::vertices,
+    bounded,
     grow::{conclude, feasible},
     pose::{fitted, refined},
 };
@@ -50,14 +51,13 @@ impl Component for PoseVote {
         let positive = self.radius > 0.0 && self.radius.is_finite();
         in_range(positive, "radius", self.radius, "a positive number of metres")?;
         in_range(self.tries > 0, "tries", self.tries, "1 or more")?;
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
 impl Search for PoseVote {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, self.budget)?;
+        feasible(problem, self.most_pairs)?;
         let prior = problem.prior.ok_or(Unidentified::NoPrior)?;
         let camera_from_object = prior.object_from_camera.inverse();
         let vertices = vertices(problem);

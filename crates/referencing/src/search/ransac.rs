@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
+    bounded,
     grow::{conclude, feasible, most_possible},
     pose::{fitted, refined, share},
 };
@@ -47,14 +48,13 @@ impl Component for Ransac {
     fn check(&self) -> Result<(), String> {
         let confident = self.confidence > 0.0 && self.confidence < 1.0;
         in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
-        in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
 impl Search for Ransac {
     fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, self.budget)?;
+        feasible(problem, self.most_pairs)?;
         let vertices = vertices(problem);
         let count = vertices.len();
         let (mut tests, mut trials, mut needed) = (0, 0u64, f64::INFINITY);

@@ -1,12 +1,14 @@
 //! Rigid consensus: the likeliest pose, with what else is likely.
 
+use std::collections::BTreeSet;
+
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Belief, Explanation, Identification, NEEDED, Search, Unidentified,
-    consensus::{Graph, Rough, Seeds, Terms, mirror_image},
+    Belief, Explanation, Identification, NEEDED, Search, Unidentified, bounded,
+    consensus::{Graph, Mode, Rough, Seeds, Swept, Terms, mirror_image},
     grow::{feasible, grow, most_possible},
     orientation::Sense,
 };
@@ -25,11 +27,12 @@ use crate::Problem;
 /// fewer but closer points, or nearer to the prior, can outweigh one with more.
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
-/// the pose is fitted again until the set stands. Complete up to a margin: no pose that begins with three
-/// coherent pairs and whose evidence is within e¹⁰ of the best, and not below that of absence by e³, is
-/// left out, given that its points lie about as well as the model's do on average. Time O(K²) for the graph
-/// of K candidate pairs, then what the bounds leave: seldom more than for the graph, and never more than the
-/// budget. The tolerance and the prior's greatest rotation prune the graph; they do not judge the
+/// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
+/// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. The bounds that
+/// prune take the points of a set to lie about as well as the model's do on average, so that nothing is
+/// proved: no answer is called optimal. Time O(K²) for the graph of K candidate pairs, then what the
+/// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends
+/// the search. The tolerance and the prior's greatest rotation prune the graph; they do not judge the
 /// pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
@@ -54,20 +57,28 @@ impl Component for RigidConsensus {
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.budget > 0, "budget", self.budget, "1 or more")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        bounded(self.budget, self.most_pairs)
     }
 }
 
+/// Poses less likely than no object at all by this much (nats) are not looked for.
+const FLOOR: f64 = 3.0;
+/// A pose that is more likely than no object by this much (nats) may be believed: only then a second copy is looked
+/// for, as likely at least.
+const STRONG: f64 = 5.0;
+/// What explains so many points fewer than the likeliest pose is no copy of the object but looks like a part of it.
+const LEAD: usize = 4;
+
 impl Search for RigidConsensus {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, self.budget)?;
+        feasible(problem, self.most_pairs)?;
         let bound = most_possible(problem);
         let nothing = Unidentified::NotFound { bound, needed: NEEDED };
         let Some(rough) = Rough::of(problem) else { return Err(nothing) };
         let graph = Graph::of(problem, &rough);
         let terms = Terms::of(problem, &rough, &graph);
-        let swept = Seeds::new(&terms, &rough, &graph, self.budget).sweep();
+        let parts = (&terms, &rough, &graph);
+        let swept = Seeds::new(parts, &BTreeSet::new(), (NEEDED, -FLOOR), self.budget).sweep();
         let mut tests = graph.tests + swept.tests;
         let ended = |best: usize, tests| Unidentified::Budget { budget: self.budget, best, bound, tests };
         let Some(best) = swept.modes.first() else {
@@ -76,6 +87,16 @@ impl Search for RigidConsensus {
         if let Some(image) = mirror_image(&terms, &rough, &graph, best) {
             return Err(Unidentified::Mirrored { best: image.members.len() });
         }
+        // A second copy of the object in what is left of the cloud.
+        let mut beside = Swept { modes: Vec::new(), complete: true, tests: 0 };
+        if best.ln_evidence >= STRONG {
+            let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
+            let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
+            let left = self.budget.saturating_sub(swept.tests);
+            beside = Seeds::new(parts, &taken, (least, STRONG), left).sweep();
+            tests += beside.tests;
+        }
+        let complete = swept.complete && beside.complete;
         // What is returned is coherent throughout: of twenty true points some two are usually further from each
         // other than the tolerance, and the worst fitting give way. The belief keeps them.
         let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut tests);
@@ -83,19 +104,21 @@ impl Search for RigidConsensus {
             return Err(nothing);
         }
         pairs.sort_unstable();
-        let explanations = swept.modes.iter().map(|mode| Explanation {
+        let explanation = |mode: &Mode| Explanation {
             pairs: mode.pairs(&graph),
             object_from_camera: mode.motion.transform().inverse(),
             ln_evidence: mode.ln_evidence,
-        });
+        };
+        let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
         Ok(Identification {
             rivals: Vec::new(),
             rivals_complete: false,
-            optimal: swept.complete,
+            // Neither is the largest set looked for, nor do the bounds prove a likelihood.
+            optimal: false,
             size_bound: bound,
             tests,
-            undecided: (!swept.complete).then(|| ended(pairs.len(), tests)),
-            belief: Some(Belief { explanations: explanations.collect() }),
+            undecided: (!complete).then(|| ended(pairs.len(), tests)),
+            belief: Some(Belief { explanations: explain(&swept), beside: explain(&beside) }),
             pairs,
         })
     }
@@ -128,11 +151,12 @@ mod tests {
 
     #[test]
     fn a_point_that_agrees_in_distances_but_not_in_place_is_left_out() {
-        // The last point moved by 2.8 cm along its own depth: less than Δ, more than five σ of a fit.
+        // The last point is off by 3 cm across and 7 cm in depth: its distances to the others differ by less than
+        // Δ = 4 cm, but it lies eight σ from where their pose puts it.
         let found = answered(None, |i| if i == 5 { Vector3::new(0.03, 0.03, 0.07) } else { Vector3::zeros() }).unwrap();
         let models: Vec<usize> = found.pairs.iter().map(|pair| pair.model).collect();
         assert_eq!(models, [0, 1, 2, 3, 4]);
-        assert!(found.optimal && found.belief.is_some());
+        assert!(found.undecided.is_none() && found.belief.is_some());
     }
 
     #[test]

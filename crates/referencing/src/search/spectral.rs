@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    Identification, NEEDED, Search, Unidentified,
     affinity::{Affinity, by_weight, normalized},
     association::Association,
     grow::{conclude, feasible},
@@ -52,12 +52,9 @@ impl Component for Spectral {
 
 impl Search for Spectral {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, BUDGET)?;
+        feasible(problem, self.most_pairs)?;
         let graph = Association::of(problem);
-        let Some(affinity) = Affinity::of(problem, &graph, self.most_edges, |off| 1.0 - off * off) else {
-            let bound = problem.candidates.with_candidates();
-            return Err(Unidentified::Budget { budget: self.most_edges as u64, best: 0, bound, tests: graph.tests });
-        };
+        let affinity = Affinity::of(problem, &graph, self.most_edges, |off| 1.0 - off * off)?;
         let mut x = vec![1.0; graph.vertices.len()];
         let (mut next, mut plain) = (x.clone(), x.clone());
         let mut tests = graph.tests;

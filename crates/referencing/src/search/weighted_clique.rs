@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    Identification, NEEDED, Search, Unidentified,
     affinity::{Affinity, by_weight, normalized},
     association::Association,
     grow::{conclude, feasible},
@@ -53,13 +53,10 @@ impl Component for WeightedClique {
 
 impl Search for WeightedClique {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs, BUDGET)?;
+        feasible(problem, self.most_pairs)?;
         let graph = Association::of(problem);
         let weight = |off: f64| libm::exp(-4.5 * off * off);
-        let Some(affinity) = Affinity::of(problem, &graph, self.most_edges, weight) else {
-            let bound = problem.candidates.with_candidates();
-            return Err(Unidentified::Budget { budget: self.most_edges as u64, best: 0, bound, tests: graph.tests });
-        };
+        let affinity = Affinity::of(problem, &graph, self.most_edges, weight)?;
         let mut ascent = Ascent::of(&affinity, graph.vertices.len());
         for _ in 0..self.iterations {
             if !ascent.climb() && !ascent.penalize() {

@@ -5,8 +5,7 @@ use nalgebra::Matrix6;
 use super::{
     bits::{any, ones},
     graph::Graph,
-    likelihood::{Terms, half_ln_det},
-    modes::LEAST,
+    likelihood::{Terms, ln_volume},
     rough::Rough,
 };
 
@@ -31,10 +30,12 @@ pub(in crate::search) struct Bounds<'a> {
     single: bool,
     /// What is added to the gains of k pairs.
     of_number: Vec<f64>,
+    /// Smaller sets are of no interest.
+    pub(in crate::search) least: usize,
 }
 
 impl<'a> Bounds<'a> {
-    pub(in crate::search) fn of(terms: &'a Terms, rough: &Rough, graph: &'a Graph) -> Self {
+    pub(in crate::search) fn of((terms, rough, graph): (&'a Terms, &Rough, &'a Graph), least: usize) -> Self {
         let ranks = graph.starts.len() - 1;
         let grows = libm::log(terms.ln_share.len() as f64) + 1.0;
         let gains = |i: usize| &terms.gain[graph.starts[i]..graph.starts[i + 1]];
@@ -48,6 +49,7 @@ impl<'a> Bounds<'a> {
             greatest: top.iter().copied().fold(grows, f64::max),
             single: graph.vertices.len() == ranks,
             top,
+            least,
             of_number: (0..=ranks).map(|k| share[k] + rough.ln_peak + volume[k] + SLACK).collect(),
         }
     }
@@ -84,7 +86,7 @@ impl<'a> Bounds<'a> {
     ) -> f64 {
         let starts = &self.graph.starts;
         let most = count.min(starts.len() - 1 - from);
-        if own + most < LEAST {
+        if own + most < self.least {
             return f64::NEG_INFINITY;
         }
         let reach = self.reach(own, gains, most);
@@ -105,15 +107,14 @@ impl<'a> Bounds<'a> {
                 (k, sum) = (k + 1, sum + self.top[rank]);
             }
         }
-        if k < LEAST { f64::NEG_INFINITY } else { self.of_set(k, sum) }
+        if k < self.least { f64::NEG_INFINITY } else { self.of_set(k, sum) }
     }
 }
 
 /// ln of the volumes that the posterior of 0…n points fills, taken for points that lie and are known as the
 /// candidates are on average: 3 ln 2π − ½ ln det (P + k H₁).
 fn volumes(terms: &Terms, rough: &Rough, n: usize) -> Vec<f64> {
-    let whole = 3.0 * libm::log(2.0 * std::f64::consts::PI);
-    let of = |h: Matrix6<f64>| h.cholesky().map_or(f64::INFINITY, |chol| whole - half_ln_det(&chol));
+    let of = |h: Matrix6<f64>| h.cholesky().map_or(f64::INFINITY, |chol| ln_volume(&chol));
     match &rough.known {
         Some(known) => (0..=n).map(|k| of(known.information + terms.average * k as f64)).collect(),
         None => {

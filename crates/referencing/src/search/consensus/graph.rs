@@ -3,7 +3,10 @@
 use nalgebra::Vector3;
 
 use super::{
-    super::edges::{LANES, packed},
+    super::{
+        association::reach,
+        edges::{LANES, packed},
+    },
     rough::Rough,
 };
 use crate::{Correspondence, Problem, Tolerance};
@@ -143,24 +146,13 @@ impl Columns {
                 columns.at[3 + axis].push((model[axis] - rough.centroid[axis]) as f32);
                 columns.at[6 + axis].push(offset[axis] as f32);
             }
-            columns.reach.push(reach(problem, *pair) as f32);
+            columns.reach.push(reach(problem, *pair, 0.0).0 as f32);
         }
         // Nothing is compatible with what fills up the last word.
         let whole = vertices.len().next_multiple_of(LANES);
         columns.at.iter_mut().for_each(|column| column.resize(whole, f32::NAN));
         columns.reach.resize(whole, f32::NAN);
         columns
-    }
-}
-
-/// A share of a bound of Δ: that of two pairs is at most the sum of theirs.
-pub(in crate::search) fn reach(problem: &Problem<'_>, pair: Correspondence) -> f64 {
-    match problem.tolerance {
-        Tolerance::Fixed(delta) => 0.5 * delta,
-        Tolerance::Sigmas(k) => {
-            let measured = problem.cloud[pair.cloud].position.covariance.trace().max(0.0).sqrt();
-            k * (measured + problem.model[pair.model].sigma)
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! How much better a pose explains the cloud than clutter alone.
 
-use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3, Vector6};
+use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3, Vector6};
 use seafix_geometry::so3::skew;
 
 use super::{
@@ -9,6 +9,10 @@ use super::{
     rough::{Rough, box_volume},
 };
 use crate::{Correspondence, Problem, Tolerance};
+
+/// ½ ln 2π: a Gaussian of d dimensions is exp(−d·½ ln 2π − ½ ln det Σ) at its maximum, and a maximum of a density with the
+/// information H fills exp(d·½ ln 2π − ½ ln det H).
+pub(in crate::search) const HALF_LN_2PI: f64 = 0.918_938_533_204_672_7;
 
 /// A pair further from where the pose puts it than this is no part of it (χ²₃).
 const FAR: f64 = 25.0;
@@ -100,8 +104,8 @@ fn extent(problem: &Problem<'_>) -> f64 {
 fn peak(noise: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
     match noise.cholesky() {
         Some(chol) => {
-            let half: f64 = (0..3).map(|i| libm::log(chol.l_dirty()[(i, i)])).sum();
-            (chol.inverse(), -half - 1.5 * libm::log(2.0 * std::f64::consts::PI))
+            let ln_peak = -half_ln_det(&chol) - 3.0 * HALF_LN_2PI;
+            (chol.inverse(), ln_peak)
         }
         None => (Matrix3::zeros(), f64::NEG_INFINITY),
     }
@@ -230,7 +234,12 @@ pub(in crate::search) fn fit(
     factor.map(|chol| (motion, chol))
 }
 
-/// ½ ln det of an information.
-pub(in crate::search) fn half_ln_det(chol: &Cholesky<f64, U6>) -> f64 {
-    (0..6).map(|i| libm::log(chol.l_dirty()[(i, i)])).sum()
+/// ½ ln det of a matrix.
+pub(in crate::search) fn half_ln_det<const N: usize>(chol: &Cholesky<f64, Const<N>>) -> f64 {
+    chol.l_dirty().diagonal().iter().map(|&x| libm::log(x)).sum()
+}
+
+/// ln of the volume that a posterior of this information fills: (2π)³/√det H.
+pub(in crate::search) fn ln_volume(information: &Cholesky<f64, U6>) -> f64 {
+    6.0 * HALF_LN_2PI - half_ln_det(information)
 }

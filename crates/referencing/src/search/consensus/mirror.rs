@@ -1,5 +1,7 @@
 //! Whether the object's mirror image explains more than a pose does.
 
+use std::{cell::Cell, collections::BTreeSet};
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
@@ -20,7 +22,8 @@ const MARGIN: f64 = 3.0;
 /// motion is fitted as for any pose. The prior says nothing of images: both are weighed without.
 pub(in crate::search) fn mirror_image(terms: &Terms, rough: &Rough, graph: &Graph, mode: &Mode) -> Option<Mode> {
     let rough = Rough { known: None, centroid: rough.centroid, ln_peak: rough.ln_peak };
-    let climb = Climb { terms, rough: &rough, graph };
+    let taken = BTreeSet::new();
+    let climb = Climb { terms, rough: &rough, graph, taken: &taken, compared: Cell::new(0) };
     let count = mode.members.len() as f64;
     let centre = mode.members.iter().map(|&v| terms.model[v]).sum::<Vector3<f64>>() / count;
     let step = |v: &usize| terms.model[*v] - centre;

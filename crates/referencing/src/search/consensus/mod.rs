@@ -11,8 +11,8 @@ mod rough;
 mod seeds;
 
 pub(super) use graph::Graph;
-pub(super) use likelihood::Terms;
+pub(super) use likelihood::{Mode, Terms};
 pub(super) use mirror::mirror_image;
 pub(super) use motion::Motion;
 pub(super) use rough::Rough;
-pub(super) use seeds::Seeds;
+pub(super) use seeds::{Seeds, Swept};

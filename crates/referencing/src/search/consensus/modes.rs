@@ -1,13 +1,16 @@
 //! From a rough motion to the maximum of the posterior near it.
 
-use std::collections::HashSet;
+use std::{
+    cell::Cell,
+    collections::{BTreeSet, HashSet},
+};
 
 use nalgebra::{Cholesky, U6};
 
 use super::{
     Motion,
     graph::Graph,
-    likelihood::{Mode, Terms, fit, half_ln_det},
+    likelihood::{Mode, Terms, fit, ln_volume},
     rough::Rough,
 };
 
@@ -16,7 +19,7 @@ const ROUNDS: usize = 8;
 /// What pairs may bring that join a set only when its motion is fitted (nats).
 const JOINING: f64 = 8.0;
 /// The least set that a pose can come from.
-pub(in crate::search) const LEAST: usize = 3;
+const LEAST: usize = 3;
 
 type Factor = Cholesky<f64, U6>;
 
@@ -25,6 +28,10 @@ pub(in crate::search) struct Climb<'a> {
     pub(in crate::search) terms: &'a Terms,
     pub(in crate::search) rough: &'a Rough,
     pub(in crate::search) graph: &'a Graph,
+    /// Cloud points that no mode may use.
+    pub(in crate::search) taken: &'a BTreeSet<usize>,
+    /// Pairs compared with a motion so far.
+    pub(in crate::search) compared: Cell<u64>,
 }
 
 impl Climb<'_> {
@@ -53,7 +60,7 @@ impl Climb<'_> {
         let (motion, factor) = fit(self.terms, self.rough, &members, &motion, 4)?;
         let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();
         let score = gains + self.terms.ln_share[members.len()] + self.rough.ln_density(&motion);
-        let ln_evidence = score + 3.0 * libm::log(2.0 * std::f64::consts::PI) - half_ln_det(&factor);
+        let ln_evidence = score + ln_volume(&factor);
         ln_evidence.is_finite().then_some(Mode { members, motion, ln_evidence })
     }
 
@@ -64,13 +71,14 @@ impl Climb<'_> {
         if k < LEAST - 1 {
             return f64::NEG_INFINITY;
         }
-        let volume = 3.0 * libm::log(2.0 * std::f64::consts::PI) - half_ln_det(factor);
-        gains.iter().sum::<f64>() + self.terms.ln_share[k] + self.rough.ln_density(motion) + volume + JOINING
+        let gains: f64 = gains.iter().sum();
+        gains + self.terms.ln_share[k] + self.rough.ln_density(motion) + ln_volume(factor) + JOINING
     }
 
     /// The likeliest one-to-one set under a motion: of each model point its best pair, of pairs that share a
     /// cloud point the better, and of these as many as the likelihood gains by.
     fn choose(&self, motion: &Motion) -> Vec<usize> {
+        self.compared.set(self.compared.get() + self.graph.vertices.len() as u64);
         let starts = &self.graph.starts;
         let mut best: Vec<(f64, usize)> = Vec::new();
         for i in 0..starts.len() - 1 {
@@ -78,6 +86,7 @@ impl Climb<'_> {
             for v in starts[i]..starts[i + 1] {
                 if let Some(gain) = self.terms.of_pair(v, motion)
                     && top.is_none_or(|(known, _)| gain > known)
+                    && !self.taken.contains(&self.graph.vertices[v].cloud)
                 {
                     top = Some((gain, v));
                 }

@@ -1,9 +1,13 @@
 //! The rough pose as a density over rigid motions.
 
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
-use seafix_geometry::so3::skew;
+use nalgebra::{Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
+use seafix_geometry::so3::{log, skew};
 
-use super::{Motion, graph::reach};
+use super::{
+    super::association::reach,
+    Motion,
+    likelihood::{HALF_LN_2PI, half_ln_det},
+};
 use crate::{Correspondence, Prior, PriorBound, Problem};
 
 /// A bound of the prior is taken for so many standard deviations: bounds are given so that they hold.
@@ -47,8 +51,7 @@ impl Rough {
         let covariance = covariance(problem, prior, &motion, &at);
         let chol = covariance.cholesky()?;
         let information = chol.inverse();
-        let half_ln_det: f64 = (0..6).map(|i| libm::log(chol.l_dirty()[(i, i)])).sum();
-        let ln_peak = -half_ln_det - 3.0 * libm::log(2.0 * std::f64::consts::PI);
+        let ln_peak = -half_ln_det(&chol) - 6.0 * HALF_LN_2PI;
         let attitude = covariance.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues().max().max(0.0).sqrt();
         let places = problem
             .model
@@ -68,7 +71,8 @@ impl Rough {
 
     /// η of a motion.
     pub(in crate::search) fn step_to(&self, known: &Known, motion: &Motion) -> Vector6<f64> {
-        let phi = rotation_vector(&(motion.rotation * known.motion.rotation.transpose()));
+        let turn = Rotation3::from_matrix_unchecked(motion.rotation * known.motion.rotation.transpose());
+        let phi = log(&UnitQuaternion::from_rotation_matrix(&turn));
         let tau = motion.apply(&self.centroid) - known.motion.apply(&self.centroid);
         Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
     }
@@ -114,17 +118,6 @@ pub(in crate::search) fn box_volume(problem: &Problem<'_>) -> f64 {
         let at = &problem.cloud[pair.cloud].position.at.coords;
         (low, high) = (low.inf(at), high.sup(at));
     }
-    let least = candidates(problem).map(|pair| reach(problem, pair)).fold(f64::MIN_POSITIVE, f64::max);
+    let least = candidates(problem).map(|pair| reach(problem, pair, 0.0).0).fold(f64::MIN_POSITIVE, f64::max);
     (high - low).iter().map(|side| side.max(least)).product()
-}
-
-/// The rotation vector of a rotation matrix.
-pub(in crate::search) fn rotation_vector(r: &Matrix3<f64>) -> Vector3<f64> {
-    let axis = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]) * 0.5;
-    let (sine, cosine) = (axis.norm(), (r.trace() - 1.0) * 0.5);
-    if sine < 1e-12 {
-        // The identity, or half a turn, where any axis of the symmetric part is as good: far off either way.
-        return if cosine > 0.0 { axis } else { Vector3::new(std::f64::consts::PI, 0.0, 0.0) };
-    }
-    axis * (libm::atan2(sine, cosine) / sine)
 }

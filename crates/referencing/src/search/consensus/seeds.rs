@@ -1,5 +1,7 @@
 //! Every coherent three that could lead to a pose worth knowing.
 
+use std::{cell::Cell, collections::BTreeSet};
+
 use nalgebra::Vector3;
 
 use super::{
@@ -14,8 +16,6 @@ use super::{
 
 /// Poses less likely than the best by this much (nats) are not looked for.
 const MARGIN: f64 = 10.0;
-/// Poses less likely than no object at all by this much (nats) are not looked for.
-const FLOOR: f64 = 3.0;
 /// A pair may be so many of its own standard deviations from a pose that three noisy points give.
 const LOOSE: f64 = 3.5;
 /// Modes that a new three is compared with before it is followed.
@@ -24,9 +24,11 @@ const COMPARED: usize = 16;
 const KEPT: usize = 256;
 /// Pairs kept to be followed: 12 bytes each.
 const MOST_PAIRS: usize = 8_000_000;
-/// What a pose from three points and the climb to its mode cost, in words read.
+/// What a pose from three points, the climb to its mode and each pair compared with a motion on the way cost, in
+/// words read.
 const COST_OF_A_POSE: u64 = 16;
 const COST_OF_A_MODE: u64 = 64;
+const COST_OF_A_PAIR: u64 = 4;
 
 /// Bound and vertices of two pairs.
 type Pair = (f32, u32, u32);
@@ -59,23 +61,42 @@ pub(in crate::search) struct Seeds<'a> {
     spent: u64,
     /// The likeliest first.
     modes: Vec<Mode>,
+    /// Poses whose evidence is less (nats) are not looked for.
+    floor: f64,
     /// Greatest bound of a pair followed early.
     scouted: f64,
+    /// The vertices to look at, one bit each.
+    free: Vec<u64>,
+    /// The free neighbours of one vertex.
+    row: Vec<u64>,
     /// What two pairs and three have in common.
     common: Vec<u64>,
     third: Vec<u64>,
 }
 
 impl<'a> Seeds<'a> {
-    pub(in crate::search) fn new(terms: &'a Terms, rough: &'a Rough, graph: &'a Graph, budget: u64) -> Self {
+    /// Over the vertices whose cloud point is not `taken`, for sets of so many pairs with so much evidence (nats) at
+    /// least.
+    pub(in crate::search) fn new(
+        (terms, rough, graph): (&'a Terms, &'a Rough, &'a Graph),
+        taken: &'a BTreeSet<usize>,
+        (least, floor): (usize, f64),
+        budget: u64,
+    ) -> Self {
         let words = graph.vertices.len().div_ceil(64);
+        let mut free = vec![0; words];
+        let untaken = |v: &usize| !taken.contains(&graph.vertices[*v].cloud);
+        (0..graph.vertices.len()).filter(untaken).for_each(|v| free[v / 64] |= 1 << (v % 64));
         Self {
-            climb: Climb { terms, rough, graph },
-            bounds: Bounds::of(terms, rough, graph),
+            climb: Climb { terms, rough, graph, taken, compared: Cell::new(0) },
+            bounds: Bounds::of((terms, rough, graph), least),
             budget,
             spent: 0,
             modes: Vec::new(),
+            floor,
             scouted: f64::NEG_INFINITY,
+            free,
+            row: vec![0; words],
             common: vec![0; words],
             third: vec![0; words],
         }
@@ -84,7 +105,7 @@ impl<'a> Seeds<'a> {
     /// The evidence that is of interest.
     fn threshold(&self) -> f64 {
         let best = self.modes.first().map_or(f64::NEG_INFINITY, |mode| mode.ln_evidence);
-        (best - MARGIN).max(-FLOOR)
+        (best - MARGIN).max(self.floor)
     }
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
@@ -114,25 +135,31 @@ impl<'a> Seeds<'a> {
                 self.scout(&pairs[begin..]);
                 begin = pairs.len();
             }
-            let (row, rank, own) = (graph.row(a), graph.rank[a] as usize, self.bounds.gain(a));
-            self.spent += row.len() as u64;
-            let count = row.iter().map(|word| word.count_ones() as usize).sum();
-            if self.bounds.with_common((1, own), row, count, rank + 1, self.threshold()) < self.threshold() {
+            if self.free[a / 64] >> (a % 64) & 1 == 0 {
                 continue;
             }
-            for b in ones(row, graph.starts[rank + 1]) {
+            let (rank, own) = (graph.rank[a] as usize, self.bounds.gain(a));
+            let mut row = std::mem::take(&mut self.row);
+            self.spent += row.len() as u64;
+            let count = intersect(graph.row(a), &self.free, 0, &mut row);
+            if self.bounds.with_common((1, own), &row, count, rank + 1, self.threshold()) < self.threshold() {
+                self.row = row;
+                continue;
+            }
+            for b in ones(&row, graph.starts[rank + 1]) {
                 let next = graph.rank[b] as usize + 1;
                 let gains = own + self.bounds.gain(b);
                 if self.bounds.reach(2, gains, ranks - next) < self.threshold() {
                     continue;
                 }
-                let count = self.meet(row, b, next);
+                let count = self.meet(&row, b, next);
                 let bound = self.bounds.with_common((2, gains), &self.common, count, next, self.threshold());
                 if bound >= self.threshold() {
                     // Rounded up, so that it stays a bound.
                     pairs.push(((bound as f32).next_up(), a as u32, b as u32));
                 }
             }
+            self.row = row;
             if self.spent > self.budget || pairs.len() > MOST_PAIRS {
                 complete = false;
                 break;
@@ -162,6 +189,7 @@ impl<'a> Seeds<'a> {
         let graph = self.climb.graph;
         let next = graph.rank[b] as usize + 1;
         self.meet(graph.row(a), b, next);
+        self.common.iter_mut().zip(&self.free).for_each(|(word, free)| *word &= free);
         // Three members of a mode lead to it again.
         let likely = self.modes.iter().take(COMPARED);
         let holding: Vec<&Mode> = likely.filter(|mode| mode.holds(a) && mode.holds(b)).collect();
@@ -223,10 +251,13 @@ impl<'a> Seeds<'a> {
         if let Some(mode) = self.climb.from(members, &motion, self.threshold()) {
             self.keep(mode);
         }
+        self.spent += COST_OF_A_PAIR * self.climb.compared.take();
     }
 
     fn keep(&mut self, mode: Mode) {
-        if mode.ln_evidence < self.threshold() || self.modes.iter().any(|known| known.members == mode.members) {
+        let small = mode.members.len() < self.bounds.least;
+        if small || mode.ln_evidence < self.threshold() || self.modes.iter().any(|known| known.members == mode.members)
+        {
             return;
         }
         let before = |known: &Mode| {

@@ -1,0 +1,42 @@
+//! What is believed of a search that weighs evidence.
+
+use super::{Alternative, Outcome, Refusal, judge::Judge};
+use crate::{Belief, Explanation, Identification};
+
+impl Judge<'_> {
+    /// The pose of a search that weighs evidence: believed when little speaks for no object at all, little
+    /// for a pose elsewhere, and nothing for a second copy of the object.
+    pub(super) fn weighed(&self, found: &Identification, belief: &Belief) -> (Outcome, Option<Alternative>) {
+        let shares = belief.shares(self.problem.model, self.alert_limit);
+        let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
+        let runner_up = elsewhere.first().map(|other| other.alternative());
+        let limit = self.acceptance.absence;
+        // Written so that a NaN is refused too.
+        if !(shares.absent <= limit) {
+            return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
+        }
+        if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
+            let all = belief.explanations.first().into_iter().chain(elsewhere);
+            return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
+        }
+        if let (Some(best), Some(copy)) =
+            (belief.explanations.first(), belief.copy(self.problem.model, self.alert_limit, limit))
+        {
+            return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
+        }
+        let (mut outcome, _) = self.poses(found);
+        if let (Outcome::Referenced(reference), Some(best)) = (&mut outcome, belief.explanations.first()) {
+            // The solver has the pairs alone: what it makes of them must be the pose that was weighed.
+            if self.apart(&reference.object_from_camera, &best.object_from_camera) {
+                let solved = Alternative {
+                    object_from_camera: reference.object_from_camera,
+                    pairs: reference.pairs.clone(),
+                    score: reference.score,
+                };
+                return (Outcome::Ambiguous(vec![best.alternative(), solved]), None);
+            }
+            reference.score = best.ln_evidence;
+        }
+        (outcome, runner_up)
+    }
+}
