@@ -6,7 +6,7 @@ use seafix_component::{BuildError, Choice, Fault, line_of};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Axis, Pipeline, Stages,
+    Axis, Pipeline, Place, Stages,
     pipeline::PipelineError,
     read_text,
     source::{SOURCES, Source},
@@ -73,7 +73,7 @@ pub struct Trial {
     /// Its name: a number and what distinguishes it.
     pub name: String,
     /// Its value on each axis.
-    pub cell: Vec<(String, toml::Value)>,
+    pub cell: Vec<Place>,
     /// The resolved experiment of this trial alone, nothing varying: running it gives this trial again.
     pub resolved: Experiment,
     /// Where its frames come from.
@@ -154,23 +154,20 @@ impl Plan {
             // A fault in one point of the grid belongs to the line of the axis whose key it is in.
             let in_cell = |message: String, path: &[String]| {
                 let at = path.join(".");
-                let axis = experiment
-                    .vary
-                    .iter()
-                    .position(|axis| axis.key == at || axis.key.starts_with(&at) || at.starts_with(&axis.key));
+                let axis = experiment.vary.iter().position(|axis| axis.touches(&at));
                 let place = axis.map(|axis| axis.to_string());
                 let mut path: Vec<&str> = vec!["vary"];
                 path.extend(place.as_deref());
                 vec![fault(&path, &message)]
             };
             let mut table = base.clone();
-            for (key, value) in &cell {
+            for (key, value) in cell.iter().flat_map(|place| &place.set) {
                 vary::set(&mut table, key, value.clone())
                     .map_err(|message| in_cell(message, std::slice::from_ref(key)))?;
             }
             let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
                 let fault = Fault::in_toml(file, "", &error);
-                let last: Vec<String> = cell.last().map(|(key, _)| key.clone()).into_iter().collect();
+                let last: Vec<String> = cell.last().map(|place| place.key.clone()).into_iter().collect();
                 let parts = [fault.value, fault.remedy].into_iter().filter(|part| !part.is_empty());
                 in_cell(std::iter::once(fault.what).chain(parts).collect::<Vec<_>>().join(", "), &last)
             })?;
@@ -228,6 +225,23 @@ mod tests {
         );
         assert_eq!(plan.trials[1].resolved.pipeline.solver.name, "kabsch");
         assert!(plan.trials[1].resolved.vary.is_empty());
+    }
+
+    #[test]
+    fn settings_that_vary_together_are_cases_of_one_axis() {
+        let text = "question = 'why'\nsource = 'virtual-layouts'\n[[vary]]\nkey = 'camera'\ncases = [\n\
+                    { label = 'near', set = { 'source.distance' = 2.0, 'source.rig.focal' = 500.0 } },\n\
+                    { label = 'far', set = { 'source.distance' = 5.0, 'source.rig.focal' = 800.0 } },\n]\n";
+        let plan_of = plan(text).unwrap();
+        let names: Vec<&str> = plan_of.trials.iter().map(|trial| trial.name.as_str()).collect();
+        assert_eq!(names, ["001-camera-near", "002-camera-far"]);
+        let settings = &plan_of.trials[1].resolved.source.settings;
+        assert_eq!((settings["distance"].as_float(), settings["rig"]["focal"].as_float()), (Some(5.0), Some(800.0)));
+        assert!(plan(&text.replace("'far'", "'near'")).unwrap_err().contains("two cases of one name"));
+        assert!(
+            plan(&text.replace("key = 'camera'", "key = 'camera'\nvalues = [1]")).unwrap_err().contains("and cases")
+        );
+        assert!(plan(&text.replace("source.rig.focal", "source.rig.fokal")).unwrap_err().contains("e.toml:3"));
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Where an answer meets the truth: after the method is done, and nowhere else.
 
 use nalgebra::Vector3;
-use seafix_evaluation::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
+use seafix_evaluation::{
+    alert_limit, attitude_error, nees, position_error, residual_rms, transfer_bound, transfer_rms,
+};
 use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform, World};
 use seafix_log::{Evaluation, FrameRecord, TruthRecord, VisiblePoint};
 use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
@@ -37,7 +39,7 @@ pub(crate) fn judge(
         .enumerate()
         .map(|(index, target)| {
             let objects = match kind {
-                TargetKind::Object => vec![index],
+                TargetKind::Object | TargetKind::Joint => vec![index],
                 TargetKind::Site => (0..site.objects.len()).collect(),
             };
             true_target(target, &objects, site, truth, kind)
@@ -57,6 +59,14 @@ pub(crate) fn judge(
         let identified = row.evaluation.identified;
         let visible = count_visible(known, rig);
         row.evaluation = Evaluation { identified, visible, wrong: Some(false), ..Evaluation::default() };
+        if let Some((_, bound)) =
+            truth.bound.filter(|(object, _)| kind != TargetKind::Site && *object == attempt.target)
+        {
+            let true_pose = known.world_from_object.inverse() * truth.world_from_camera;
+            let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
+            row.evaluation.m2_bound = Some(transfer_bound(&bound, &true_pose, &model));
+            row.evaluation.m3_bound = Some(bound.position_sigma());
+        }
         if let Outcome::Referenced(fix) = &attempt.answer.outcome {
             evaluate(&mut row.evaluation, fix, known, sighting, truth, rig);
         }
@@ -71,7 +81,7 @@ fn true_target<'a>(
     kind: TargetKind,
 ) -> Option<TrueTarget<'a>> {
     let frame = match kind {
-        TargetKind::Object => objects[0],
+        TargetKind::Object | TargetKind::Joint => objects[0],
         TargetKind::Site => site.frame,
     };
     let camera_from_world = truth.world_from_camera.inverse();

@@ -8,6 +8,7 @@
 pub mod dataset;
 mod diff;
 mod experiment;
+mod joint;
 mod judge;
 mod manifest;
 mod pipeline;
@@ -15,6 +16,7 @@ mod record;
 mod results;
 mod run;
 pub mod source;
+mod thin;
 pub mod trajectory;
 mod vary;
 
@@ -24,4 +26,4 @@ pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
 pub use results::COLUMNS;
 pub use run::{Finished, Observer, RunError, Silent, run};
 pub use seafix_component::read_text;
-pub use vary::{Axis, changed};
+pub use vary::{Axis, Case, Place, changed};

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use rand::Rng;
-use seafix_component::{BuildError, Choice, Fault, Registry};
+use seafix_component::{BuildError, Choice, Fault, Registry, in_range};
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
@@ -24,8 +24,10 @@ use crate::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Pipeline {
-    /// What is searched for: each object in view, or the whole site at once.
+    /// What is searched for: each object in view, each and then all together, or the whole site at once.
     pub target: TargetKind,
+    /// How many frames a joint fix is over: the frame itself and those before it.
+    pub window: usize,
     /// Prepare each image, one after the other; none by default.
     pub filters: Vec<Choice>,
     /// Finds corners in each image.
@@ -56,6 +58,7 @@ impl Default for Pipeline {
     fn default() -> Self {
         Self {
             target: TargetKind::Object,
+            window: 1,
             filters: Vec::new(),
             detector: Choice::named("harris"),
             locator: Choice::named("corner"),
@@ -137,6 +140,7 @@ impl Pipeline {
         fits("gate", self.gate.check())?;
         fits("tolerance", self.tolerance.check())?;
         fits("acceptance", self.acceptance.check())?;
+        fits("window", in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000"))?;
         Ok(Stages {
             front_end: self.front_end()?,
             search: build(&SEARCHES, &self.search)?,
@@ -233,7 +237,7 @@ impl Stages {
                 let world = sight.prior.as_ref();
                 let prior = world.and_then(|world| target.prior(&world.world_from_camera, &world.covariance));
                 let in_view = in_view(target, prior.as_ref(), rig)?;
-                let mut attempt = self.attempt(index, target, &cloud, prior.as_ref(), &in_view, rig, rng);
+                let mut attempt = self.attempt(index, target, &cloud, sight, prior.as_ref(), &in_view, rig, rng);
                 attempt.times.total_ms = Some(common + milliseconds(attempt.started));
                 Some(attempt)
             })
@@ -266,6 +270,7 @@ impl Stages {
         index: usize,
         target: &Target,
         cloud: &[MeasuredPoint],
+        sight: &Sight,
         prior: Option<&Prior>,
         in_view: &[bool],
         rig: &StereoRig,
@@ -273,7 +278,10 @@ impl Stages {
     ) -> Attempt {
         let started = Instant::now();
         let settings = &self.settings;
-        let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)));
+        let (candidates, stage1) = timed(|| match &sight.names {
+            Some(names) => named(names, index, target),
+            None => candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)),
+        });
         let tolerance = settings.tolerance;
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
@@ -286,6 +294,12 @@ impl Stages {
         };
         Attempt { target: index, candidates, answer, times, started }
     }
+}
+
+/// What points that say which ones they are may be: of an object its own, of the site those of all its objects.
+fn named(names: &[(usize, usize)], index: usize, target: &Target) -> Candidates {
+    let pairs = names.iter().enumerate().filter_map(|(cloud, &name)| Some((target.place_of(index, name)?, cloud)));
+    Candidates::from_pairs(target.points.len(), pairs)
 }
 
 /// Which points of `target` may be in view: predicted in both images, or out of them by no more than
@@ -324,6 +338,6 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (result, milliseconds(start))
 }
 
-fn milliseconds(since: Instant) -> f64 {
+pub(crate) fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }

@@ -14,7 +14,7 @@ use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, Tar
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
 
 use crate::{
-    Attempt, Pipeline, Plan, Sighting, Trial,
+    Attempt, Pipeline, Place, Plan, Sighting, Trial,
     manifest::Git,
     source::{Eyes, Passage, Sight},
 };
@@ -34,7 +34,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
         axes: trial
             .cell
             .iter()
-            .map(|(key, value)| Axis {
+            .map(|Place { key, value, .. }| Axis {
                 key: key.clone(),
                 value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
             })

@@ -1,12 +1,22 @@
 //! The table of results: one row a trial, frame and attempted target.
 
-use std::{fs::File, path::Path, sync::Arc};
+use std::{
+    fs::{self, File},
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use parquet::{
     basic::{Compression, ZstdLevel},
+    column::writer::ColumnCloseResult,
     data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type},
     errors::ParquetError,
-    file::{properties::WriterProperties, writer::SerializedFileWriter},
+    file::{
+        properties::WriterProperties,
+        reader::{FileReader, SerializedFileReader},
+        writer::SerializedFileWriter,
+    },
     schema::parser::parse_message_type,
 };
 use seafix_log::{FrameRecord, FrameTimes, TargetRecord};
@@ -29,13 +39,16 @@ impl Row {
             frame: frame.frame,
             stamp_ns: frame.stamp_ns,
             times: frame.times,
-            target: TargetRecord { candidates: Vec::new(), alternatives: Vec::new(), ..target.clone() },
+            // Rows wait in their thousands: what no column has is left out.
+            target: TargetRecord {
+                candidates: Vec::new(),
+                alternatives: Vec::new(),
+                pairs: Vec::new(),
+                used: Vec::new(),
+                detail: String::new(),
+                ..target.clone()
+            },
         })
-    }
-
-    /// What the table is sorted by; rows of one frame keep their order.
-    pub(crate) fn order(&self) -> (&str, u64) {
-        (&self.trial, self.frame)
     }
 }
 
@@ -83,6 +96,8 @@ pub static COLUMNS: &[Column] = columns![
     Real "m3_position" = |r: &Row| r.target.evaluation.m3_position,
     Real "m3_attitude" = |r: &Row| r.target.evaluation.m3_attitude,
     Real "nees" = |r: &Row| r.target.evaluation.nees,
+    Real "m2_bound" = |r: &Row| r.target.evaluation.m2_bound,
+    Real "m3_bound" = |r: &Row| r.target.evaluation.m3_bound,
     Real "residual_rms" = |r: &Row| r.target.residual_rms,
     Flag "optimal" = |r: &Row| r.target.optimal,
     Whole "size_bound" = |r: &Row| r.target.size_bound.map(|n| n as i64),
@@ -100,9 +115,110 @@ pub static COLUMNS: &[Column] = columns![
     Real "total_ms" = |r: &Row| r.target.times.total_ms,
 ];
 
-/// The table as CSV (RFC 4180); unknown values are empty.
-pub(crate) fn csv(rows: &[Row]) -> String {
-    let mut text = COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n";
+/// The rows of one trial, on their way into the tables: written in pieces as they come, so that however many there are
+/// few are in memory.
+pub(crate) struct Part {
+    /// How many rows there are.
+    pub(crate) rows: usize,
+    csv: PathBuf,
+    parquet: PathBuf,
+    text: Option<BufWriter<File>>,
+    columns: Option<SerializedFileWriter<File>>,
+    waiting: Vec<Row>,
+}
+
+/// Rows of one row group of the Parquet table.
+const ROW_GROUP: usize = 8192;
+
+impl Part {
+    /// The part of `trial`, in files of its own beside the tables until they are joined.
+    pub(crate) fn create(folder: &Path, trial: &str) -> Result<Self, String> {
+        let at = |ending: &str| folder.join(format!("{trial}.results.{ending}.partial"));
+        let (csv, parquet) = (at("csv"), at("parquet"));
+        let text = BufWriter::new(File::create(&csv).map_err(|error| error.to_string())?);
+        let columns = parquet_writer(&parquet)?;
+        Ok(Self { rows: 0, csv, parquet, text: Some(text), columns: Some(columns), waiting: Vec::new() })
+    }
+
+    /// Adds a row.
+    pub(crate) fn add(&mut self, row: Row) -> Result<(), String> {
+        self.rows += 1;
+        self.waiting.push(row);
+        if self.waiting.len() < ROW_GROUP { Ok(()) } else { self.flush() }
+    }
+
+    fn flush(&mut self) -> Result<(), String> {
+        let rows = std::mem::take(&mut self.waiting);
+        if let (Some(text), Some(columns), false) = (&mut self.text, &mut self.columns, rows.is_empty()) {
+            text.write_all(csv_lines(&rows).as_bytes()).map_err(|error| error.to_string())?;
+            write_row_group(columns, &rows).map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+
+    /// No more rows come.
+    pub(crate) fn close(&mut self) -> Result<(), String> {
+        self.flush()?;
+        if let (Some(mut text), Some(columns)) = (self.text.take(), self.columns.take()) {
+            text.flush().map_err(|error| error.to_string())?;
+            columns.close().map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+
+    /// Removes its files.
+    pub(crate) fn remove(self) -> Result<(), String> {
+        [&self.csv, &self.parquet].into_iter().try_for_each(fs::remove_file).map_err(|error| error.to_string())
+    }
+}
+
+/// Joins parts into the table at `path`, `results.csv.…` or `results.parquet.…`.
+pub(crate) fn join(parts: &[Part], path: &Path) -> Result<(), String> {
+    if path.to_string_lossy().contains(".csv") {
+        let mut all = File::create(path).map_err(|error| error.to_string())?;
+        all.write_all(csv_head().as_bytes()).map_err(|error| error.to_string())?;
+        for part in parts {
+            let mut text = File::open(&part.csv).map_err(|error| error.to_string())?;
+            io::copy(&mut text, &mut all).map_err(|error| error.to_string())?;
+        }
+        return all.sync_all().map_err(|error| error.to_string());
+    }
+    let mut all = parquet_writer(path)?;
+    parts.iter().try_for_each(|part| append(&mut all, &part.parquet)).map_err(|error| error.to_string())?;
+    // Writes the footer and gives the file back.
+    all.into_inner().map_err(|error| error.to_string())?.sync_all().map_err(|error| error.to_string())
+}
+
+/// Copies the row groups of another table of the same columns, as they are.
+fn append(all: &mut SerializedFileWriter<File>, part: &Path) -> Result<(), ParquetError> {
+    let file = File::open(part)?;
+    let read = SerializedFileReader::new(file.try_clone()?)?;
+    for group in read.metadata().row_groups() {
+        let mut copy = all.next_row_group()?;
+        for column in group.columns() {
+            let closed = ColumnCloseResult {
+                bytes_written: column.compressed_size() as u64,
+                rows_written: group.num_rows() as u64,
+                metadata: column.clone(),
+                bloom_filter: None,
+                column_index: None,
+                offset_index: None,
+            };
+            copy.append_column(&file, closed)?;
+        }
+        copy.close()?;
+    }
+    Ok(())
+}
+
+/// The head of the table as CSV.
+fn csv_head() -> String {
+    COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
+}
+
+/// Rows as CSV (RFC 4180); unknown values are empty.
+fn csv_lines(rows: &[Row]) -> String {
+    let mut text = String::new();
     for row in rows {
         let cells: Vec<String> = COLUMNS
             .iter()
@@ -134,8 +250,8 @@ fn quoted(word: &str) -> String {
     }
 }
 
-/// Writes the table as Parquet, one row group, ZSTD.
-pub(crate) fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), ParquetError> {
+/// An empty Parquet table, ZSTD.
+fn parquet_writer(path: &Path) -> Result<SerializedFileWriter<File>, String> {
     let fields: String = COLUMNS
         .iter()
         .map(|column| match column.kind {
@@ -145,12 +261,19 @@ pub(crate) fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), ParquetErro
             _ => format!("OPTIONAL BOOLEAN {};", column.name),
         })
         .collect();
-    let schema = Arc::new(parse_message_type(&format!("message results {{ {fields} }}"))?);
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_created_by(concat!("seafix ", env!("CARGO_PKG_VERSION")).to_owned())
-        .build();
-    let mut file = SerializedFileWriter::new(File::create(path)?, schema, Arc::new(properties))?;
+    let new = || -> Result<SerializedFileWriter<File>, ParquetError> {
+        let schema = Arc::new(parse_message_type(&format!("message results {{ {fields} }}"))?);
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::ZSTD(ZstdLevel::default()))
+            .set_created_by(concat!("seafix ", env!("CARGO_PKG_VERSION")).to_owned())
+            .build();
+        SerializedFileWriter::new(File::create(path)?, schema, Arc::new(properties))
+    };
+    new().map_err(|error| error.to_string())
+}
+
+/// Writes rows as one row group.
+fn write_row_group(file: &mut SerializedFileWriter<File>, rows: &[Row]) -> Result<(), ParquetError> {
     let mut group = file.next_row_group()?;
     for column in COLUMNS {
         let mut writer = group.next_column()?.expect("the schema has this column");
@@ -178,8 +301,6 @@ pub(crate) fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), ParquetErro
         writer.close()?;
     }
     group.close()?;
-    // Writes the footer and gives the file back.
-    file.into_inner()?.sync_all()?;
     Ok(())
 }
 
@@ -209,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_row_is_a_line_and_unknown_is_empty() {
-        let text = csv(&[row("a,b"), row("=1+1")]);
+        let text = csv_head() + &csv_lines(&[row("a,b"), row("=1+1")]);
         let mut lines = text.lines();
         assert!(
             lines
@@ -223,13 +344,23 @@ mod tests {
 
     #[test]
     fn the_same_table_is_read_back_from_parquet() {
-        use parquet::{
-            file::reader::{FileReader, SerializedFileReader},
-            record::Field,
-        };
+        use parquet::record::Field;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("results.parquet");
-        write_parquet(&path, &[row("manifold"), row("")]).unwrap();
+        // Two parts of a row each become one table.
+        let part = |trial: &str, object: &str| {
+            let mut part = Part::create(folder.path(), trial).unwrap();
+            part.add(row(object)).unwrap();
+            part.close().unwrap();
+            part
+        };
+        let parts = [part("001", "manifold"), part("002", "")];
+        join(&parts, &path).unwrap();
+        let text = folder.path().join("results.csv");
+        join(&parts, &text).unwrap();
+        assert_eq!(fs::read_to_string(&text).unwrap(), csv_head() + &csv_lines(&[row("manifold"), row("")]));
+        parts.into_iter().for_each(|part| part.remove().unwrap());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "the parts are gone");
         let reader = SerializedFileReader::new(File::open(&path).unwrap()).unwrap();
         let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
         let field = |row: usize, name: &str| {

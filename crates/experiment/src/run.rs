@@ -9,17 +9,18 @@ use std::{
 use rayon::prelude::*;
 use seafix_component::Fault;
 use seafix_log::{FrameRecord, LogError, Writer};
-use seafix_referencing::Target;
+use seafix_referencing::{Glimpse, Target};
 use seafix_simulation::{Purpose, Stream};
 
 use crate::{
-    Plan, Trial,
+    Plan, Sighting, Trial,
     dataset::sha256,
     judge::judge,
     manifest::{Git, Input, Machine, Manifest, TrialEntry},
     record,
-    results::{Row, csv, write_parquet},
-    source::Passage,
+    results::{Part, Row, join},
+    source::{Eyes, Passage, Sight},
+    thin::Thinned,
 };
 
 /// Watches a run. The runner itself prints nothing.
@@ -67,6 +68,8 @@ struct Group<'a> {
     trials: Vec<&'a Trial>,
     /// What each trial searches for.
     targets: Vec<Vec<Target>>,
+    /// About how much log (bytes) one frame takes.
+    frame_bytes: u64,
 }
 
 /// Runs `plan` into the folder `out`, or into the next free folder below `runs`.
@@ -82,21 +85,22 @@ pub fn run(plan: &Plan, out: Option<&Path>, threads: usize, observer: &dyn Obser
     groups.iter().flat_map(|group| group.passage.warnings()).for_each(|warning| observer.warns(warning));
     let folder = make_folder(out, &plan.name).map_err(RunError::Output)?;
     let frames = groups.iter().map(|group| group.passage.frames() * group.trials.len()).sum();
-    observer.begins(frames, groups.iter().map(expected_bytes).sum(), &folder);
+    observer.begins(frames, groups.iter().map(|group| expected_bytes(plan, group)).sum(), &folder);
 
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|error| RunError::Output(Fault::new(format!("no threads ({error})"), Path::new("the machine"))))?;
-    let mut rows = Vec::new();
+    let (mut parts, mut rows) = (BTreeMap::new(), 0);
     for group in &groups {
-        run_group(plan, group, &folder, &pool, observer, &mut rows)?;
+        run_group(plan, group, &folder, &pool, observer, &mut parts)?;
     }
     // Groups finish in the order of their sources; the table is in the order of the trials.
-    rows.sort_by(|a, b| a.order().cmp(&b.order()));
-    write_tables(&folder, &rows)?;
+    let parts: Vec<Part> = plan.trials.iter().filter_map(|trial| parts.remove(&trial.name)).collect();
+    parts.iter().for_each(|part| rows += part.rows);
+    write_tables(&folder, parts)?;
     write_manifest(plan, &groups, &folder, threads)?;
-    Ok(Finished { folder, rows: rows.len() })
+    Ok(Finished { folder, rows })
 }
 
 /// Opens every source once and checks what it needs.
@@ -112,7 +116,12 @@ fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
             continue;
         }
         match trial.source.open(trial.resolved.seed, &plan.folder) {
-            Ok(passage) => groups.push(Group { passage, trials: vec![trial], targets: Vec::new() }),
+            Ok(passage) => match frame_bytes(&*passage) {
+                Ok(frame_bytes) => {
+                    groups.push(Group { passage, trials: vec![trial], targets: Vec::new(), frame_bytes });
+                }
+                Err(fault) => faults.push(fault),
+            },
             Err(more) => faults.extend(more),
         }
     }
@@ -134,69 +143,148 @@ fn run_group(
     folder: &Path,
     pool: &rayon::ThreadPool,
     observer: &dyn Observer,
-    rows: &mut Vec<Row>,
+    parts: &mut BTreeMap<String, Part>,
 ) -> Result<(), RunError> {
     let passage = &*group.passage;
-    let mut writers = Vec::new();
+    let mut outputs = Vec::new();
     for (trial, targets) in group.trials.iter().zip(&group.targets) {
         let header = record::header(plan, trial, passage, targets, folder);
-        writers.push(Writer::create(&folder.join(format!("{}.mcap", trial.name)), &header)?);
+        outputs.push(Output {
+            trial,
+            log: Writer::create(&folder.join(format!("{}.mcap", trial.name)), &header)?,
+            thinned: thinned(plan, group),
+            part: Part::create(folder, &trial.name).map_err(|error| unwritable(folder, &error))?,
+        });
     }
-    // A few frames a thread at a time: enough to keep all busy, few enough to keep in memory.
-    let batch = 2 * pool.current_num_threads();
+    let mut glimpses: Vec<Vec<Glimpse>> = Vec::new();
+    let back = group.trials.iter().map(|trial| trial.stages.looks_back()).max().unwrap_or(0);
+    // A few images a thread at a time, or some hundred clouds: enough to keep all busy, few enough to keep in memory.
+    let batch = if passage.images() { 2 } else { 128 } * pool.current_num_threads();
     for first in (0..passage.frames()).step_by(batch) {
         let last = passage.frames().min(first + batch);
-        let done: Vec<Result<Vec<FrameRecord>, Fault>> =
-            pool.install(|| (first..last).into_par_iter().map(|index| frame(group, index)).collect());
+        let looked: Result<Vec<Looked>, Fault> =
+            pool.install(|| (first..last).into_par_iter().map(|index| look(group, index)).collect());
+        let mut looked = looked.map_err(|fault| RunError::Input(vec![fault]))?;
+        // What joint fixes look back on: the glimpses of the frames before this batch, then its own.
+        let before = glimpses.len();
+        glimpses.extend(looked.iter_mut().map(|looked| std::mem::take(&mut looked.glimpses)));
+        let done: Vec<Vec<FrameRecord>> = pool.install(|| {
+            let frames = looked.into_par_iter().enumerate();
+            frames.map(|(k, looked)| record(group, first + k, looked, &glimpses[..=before + k])).collect()
+        });
+        glimpses.drain(..glimpses.len().saturating_sub(back));
         for records in done {
-            let records = records.map_err(|fault| RunError::Input(vec![fault]))?;
-            for ((record, writer), trial) in records.iter().zip(&mut writers).zip(&group.trials) {
-                writer.frame(record)?;
-                rows.extend(Row::of(&trial.name, record));
-                observer.frame(&trial.name);
+            for (record, output) in records.iter().zip(&mut outputs) {
+                if output.thinned.keeps(record) {
+                    output.log.frame(record)?;
+                }
+                for row in Row::of(&output.trial.name, record) {
+                    output.part.add(row).map_err(|error| unwritable(folder, &error))?;
+                }
+                observer.frame(&output.trial.name);
             }
         }
     }
-    writers.into_iter().try_for_each(Writer::finish)?;
+    for Output { trial, mut log, thinned, mut part } in outputs {
+        log.totals(&thinned.totals)?;
+        log.finish()?;
+        part.close().map_err(|error| unwritable(folder, &error))?;
+        parts.insert(trial.name.clone(), part);
+    }
     Ok(())
+}
+
+/// What one trial writes.
+struct Output<'a> {
+    trial: &'a Trial,
+    log: Writer,
+    thinned: Thinned,
+    part: Part,
+}
+
+/// All logs of point-level trials together stay below this (bytes).
+const MOST_LOG: u64 = 900_000_000;
+
+/// Which frames of each of a group's trials are logged: all that have images.
+fn thinned(plan: &Plan, group: &Group<'_>) -> Thinned {
+    let frames = group.passage.frames();
+    match group.passage.images() {
+        true => Thinned::new(frames, 1, u64::MAX),
+        false => Thinned::new(frames, group.frame_bytes, MOST_LOG / plan.trials.len() as u64),
+    }
+}
+
+fn unwritable(folder: &Path, error: &str) -> RunError {
+    RunError::Output(Fault::new(format!("cannot write the results ({error})"), folder).remedy("make room on the disk"))
+}
+
+/// What every trial of a group made of one frame, each object by itself.
+struct Looked {
+    sight: Sight,
+    sightings: Vec<Sighting>,
+    /// Of each trial, what a joint fix takes from it.
+    glimpses: Vec<Glimpse>,
 }
 
 /// One frame through every trial of its group. The sight is made once; every trial does all of its
 /// own work on it, so that times are its own.
-fn frame(group: &Group<'_>, index: usize) -> Result<Vec<FrameRecord>, Fault> {
+fn look(group: &Group<'_>, index: usize) -> Result<Looked, Fault> {
+    let rig = group.passage.rig();
+    let sight = group.passage.sight(index)?;
+    let (mut sightings, mut glimpses) = (Vec::new(), Vec::new());
+    for (trial, targets) in group.trials.iter().zip(&group.targets) {
+        let mut stream = Stream::new(trial.resolved.seed, 0, index as u64, Purpose::Search);
+        let sighting = trial.stages.reference(&sight, targets, rig, stream.rng());
+        glimpses.push(trial.stages.glimpse(&sighting, targets, rig));
+        sightings.push(sighting);
+    }
+    Ok(Looked { sight, sightings, glimpses })
+}
+
+/// The records of one frame, a trial each: what is solved together is joined, then truth is asked. `glimpses` are those
+/// of the frames before, the last of them the frame's own.
+fn record(group: &Group<'_>, index: usize, looked: Looked, glimpses: &[Vec<Glimpse>]) -> Vec<FrameRecord> {
     let passage = &*group.passage;
-    let sight = passage.sight(index)?;
     let truth = passage.truth(index);
-    Ok(group
-        .trials
-        .iter()
-        .zip(&group.targets)
-        .map(|(trial, targets)| {
-            let mut stream = Stream::new(trial.resolved.seed, 0, index as u64, Purpose::Search);
-            let sighting = trial.stages.reference(&sight, targets, passage.rig(), stream.rng());
-            let mut record = record::frame(index, &sight, &sighting, trial, targets);
+    let sightings = looked.sightings.into_iter().enumerate();
+    sightings
+        .zip(group.trials.iter().zip(&group.targets))
+        .map(|((which, mut sighting), (trial, targets))| {
+            if let Some((own, before)) = glimpses.split_last() {
+                let back = before.len().saturating_sub(trial.stages.looks_back());
+                let before: Vec<&Glimpse> = before[back..].iter().map(|all| &all[which]).collect();
+                trial.stages.join(&mut sighting, &before, &own[which], targets, passage.rig());
+            }
+            let mut record = record::frame(index, &looked.sight, &sighting, trial, targets);
             if let Some(truth) = &truth {
                 let kind = trial.stages.settings().target;
                 judge(&mut record, &sighting, truth, passage.site(), targets, kind, passage.rig());
             }
             record
         })
-        .collect())
+        .collect()
 }
 
 /// About how much log a group writes: images, losslessly compressed to some 0.7 of their size, are
-/// nearly all of it.
-fn expected_bytes(group: &Group<'_>) -> u64 {
+/// nearly all of it where there are any.
+fn expected_bytes(plan: &Plan, group: &Group<'_>) -> u64 {
+    thinned(plan, group).most(group.passage.frames()) * group.frame_bytes * group.trials.len() as u64
+}
+
+/// About how much log (bytes) one frame of a passage takes, by its first.
+fn frame_bytes(passage: &dyn Passage) -> Result<u64, Fault> {
     const CLOUD_BYTES: f64 = 150e3;
-    let images = if group.passage.images() {
-        [group.passage.rig().left(), group.passage.rig().right()]
-            .iter()
-            .map(|camera| 0.7 * f64::from(camera.size()[0]) * f64::from(camera.size()[1]))
-            .sum()
-    } else {
-        0.0
+    if passage.images() {
+        let pixels = [passage.rig().left(), passage.rig().right()]
+            .map(|camera| f64::from(camera.size()[0]) * f64::from(camera.size()[1]));
+        return Ok((0.7 * (pixels[0] + pixels[1]) + CLOUD_BYTES) as u64);
+    }
+    let points = match passage.sight(0)?.eyes {
+        Eyes::Points(cloud) => cloud.len(),
+        Eyes::Pair(..) => 0,
     };
-    ((images + CLOUD_BYTES) * (group.passage.frames() * group.trials.len()) as f64) as u64
+    // As measured on logs of 3 to 50 points, and a little more.
+    Ok(4000 + 350 * points as u64)
 }
 
 /// The folder of the run: new, or empty.
@@ -244,9 +332,11 @@ fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
     })
 }
 
-fn write_tables(folder: &Path, rows: &[Row]) -> Result<(), RunError> {
-    write_bytes(&folder.join("results.csv"), csv(rows).as_bytes())?;
-    complete(&folder.join("results.parquet"), |partial| write_parquet(partial, rows).map_err(|error| error.to_string()))
+fn write_tables(folder: &Path, parts: Vec<Part>) -> Result<(), RunError> {
+    for table in ["results.csv", "results.parquet"] {
+        complete(&folder.join(table), |partial| join(&parts, partial))?;
+    }
+    parts.into_iter().try_for_each(Part::remove).map_err(|error| unwritable(folder, &error))
 }
 
 fn write_manifest(plan: &Plan, groups: &[Group<'_>], folder: &Path, threads: usize) -> Result<(), RunError> {

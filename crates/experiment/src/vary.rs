@@ -9,14 +9,61 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
-    /// The setting, as a dotted path: `source.distance`, `pipeline.solver`.
+    /// The setting, as a dotted path: `source.distance`, `pipeline.solver`; with `cases`, only what the axis is called.
     pub key: String,
     /// Its values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<toml::Value>,
+    /// Instead of values: several settings that vary together, under a name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cases: Vec<Case>,
 }
 
-/// One point of the grid: a value for each axis, in the order of the axes.
-pub(crate) type Cell = Vec<(String, toml::Value)>;
+/// Settings that go together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// What tables call it.
+    pub label: String,
+    /// A value for each setting, by its dotted path.
+    pub set: toml::Table,
+}
+
+/// The place of a trial on one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// The axis.
+    pub key: String,
+    /// The value there, or the name of the case.
+    pub value: toml::Value,
+    /// What is set, by dotted path.
+    pub(crate) set: Vec<(String, toml::Value)>,
+}
+
+impl Axis {
+    fn places(&self) -> impl Iterator<Item = Place> {
+        let one = |value: &toml::Value| Place {
+            key: self.key.clone(),
+            value: value.clone(),
+            set: vec![(self.key.clone(), value.clone())],
+        };
+        let several = |case: &Case| Place {
+            key: self.key.clone(),
+            value: case.label.clone().into(),
+            set: case.set.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
+        };
+        self.values.iter().map(one).chain(self.cases.iter().map(several))
+    }
+
+    /// Whether one of its settings is at this path, above it or below.
+    pub(crate) fn touches(&self, path: &str) -> bool {
+        let near = |key: &str| key.starts_with(path) || path.starts_with(key);
+        near(&self.key) || self.cases.iter().any(|case| case.set.keys().any(|key| near(key)))
+    }
+}
+
+/// One point of the grid: a place on each axis, in the order of the axes.
+pub(crate) type Cell = Vec<Place>;
 
 /// All points of the grid, the last axis fastest; without axes one empty point.
 pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
@@ -24,9 +71,9 @@ pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
         cells
             .iter()
             .flat_map(|cell| {
-                axis.values.iter().map(move |value| {
+                axis.places().map(move |place| {
                     let mut longer = cell.clone();
-                    longer.push((axis.key.clone(), value.clone()));
+                    longer.push(place);
                     longer
                 })
             })
@@ -83,7 +130,7 @@ pub(crate) fn set(table: &mut toml::Table, key: &str, value: toml::Value) -> Res
 /// The name of a trial: its number and what distinguishes it, fit for a file.
 pub(crate) fn name(number: usize, cell: &Cell) -> String {
     let mut name = format!("{number:03}");
-    for (key, value) in cell {
+    for Place { key, value, .. } in cell {
         let key = key.rsplit('.').next().unwrap_or(key);
         let value = match value {
             toml::Value::String(text) => text.clone(),
@@ -100,8 +147,21 @@ pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], &str) -> Fault) -> Ve
     let mut faults = Vec::new();
     for (index, axis) in axes.iter().enumerate() {
         let place = index.to_string();
-        if axis.values.is_empty() {
-            faults.push(fault(&["vary", &place, "values"], "an axis without values").remedy("list at least one value"));
+        match (axis.values.is_empty(), axis.cases.is_empty()) {
+            (true, true) => {
+                let fault = fault(&["vary", &place, "values"], "an axis without values");
+                faults.push(fault.remedy("list at least one value, or one case"));
+            }
+            (false, false) => {
+                let fault = fault(&["vary", &place, "cases"], "an axis with values and cases");
+                faults.push(fault.remedy("make them two axes, or write the values as cases"));
+            }
+            _ => {}
+        }
+        let labels: Vec<&str> = axis.cases.iter().map(|case| case.label.as_str()).collect();
+        if let Some(twice) = (1..labels.len()).find(|&k| labels[..k].contains(&labels[k])) {
+            let fault = fault(&["vary", &place, "cases"], "two cases of one name").value(labels[twice]);
+            faults.push(fault.remedy("name each case by what is special about it"));
         }
         if axes[..index].iter().any(|other| other.key == axis.key) {
             faults.push(
@@ -119,14 +179,14 @@ mod tests {
     use super::*;
 
     fn axis(key: &str, values: &[i64]) -> Axis {
-        Axis { key: key.to_owned(), values: values.iter().map(|&v| v.into()).collect() }
+        Axis { key: key.to_owned(), values: values.iter().map(|&v| v.into()).collect(), cases: Vec::new() }
     }
 
     #[test]
     fn the_grid_has_the_last_axis_fastest() {
         let cells = grid(&[axis("a", &[1, 2]), axis("b", &[3, 4])]);
         let values: Vec<Vec<i64>> =
-            cells.iter().map(|cell| cell.iter().map(|(_, v)| v.as_integer().unwrap()).collect()).collect();
+            cells.iter().map(|cell| cell.iter().map(|place| place.value.as_integer().unwrap()).collect()).collect();
         assert_eq!(values, [[1, 3], [1, 4], [2, 3], [2, 4]]);
         assert_eq!(grid(&[]), [Vec::new()]);
     }
@@ -144,7 +204,8 @@ mod tests {
 
     #[test]
     fn names_are_fit_for_files() {
-        let cell = vec![("source.distance".to_owned(), 2.5.into()), ("pipeline.solver".to_owned(), "../triad".into())];
+        let place = |key: &str, value: toml::Value| Place { key: key.to_owned(), value, set: Vec::new() };
+        let cell = vec![place("source.distance", 2.5.into()), place("pipeline.solver", "../triad".into())];
         assert_eq!(name(3, &cell), "003-distance-2.5-solver-.._triad");
     }
 }

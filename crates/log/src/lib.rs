@@ -27,6 +27,7 @@
 //! | `/referencing/result` | `seafix.v1.ReferencingResult` | likewise |
 //! | `/metrics/evaluation` | `seafix.v1.Evaluation` | likewise: comparison with truth |
 //! | `/metrics/timing` | `seafix.v1.Timing` | one a frame |
+//! | `/metrics/totals` | `seafix.v1.Totals` | once, last: what all frames add up to, logged or not |
 //! | `/referencing/frame` | `seafix.v1.Frame` | one a frame, its last: cloud, key points, prior, truth |
 //! | `/camera/left/image`, `right` | `foxglove.CompressedImage` | PNG, lossless; the only copy of the images |
 //! | `/camera/left/calibration`, `right` | `foxglove.CameraCalibration` | once |
@@ -67,7 +68,7 @@ pub use read::{Reader, TrialLog, read};
 pub use record::{
     Alternative, Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, Matrix3,
     Matrix4, Matrix6, ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord,
-    TargetTimes, TrialHeader, TruthRecord, VisiblePoint,
+    TargetTimes, Totals, TrialHeader, TruthRecord, VisiblePoint,
 };
 pub use recover::{Recovered, recover};
 pub use write::Writer;

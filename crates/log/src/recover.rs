@@ -225,7 +225,9 @@ impl Output {
         let message = Pending { header: MessageHeader { channel_id: *channel_id, ..header }, data };
         self.trial |= topic == topic::HEADER;
         let (closes, begins) = (topic == topic::FRAME, topic == topic::MODEL);
-        if !self.trial || !self.begun {
+        // What all frames add up to holds whatever was lost of them.
+        let totals = self.trial && topic == topic::TOTALS;
+        if !self.trial || !self.begun || totals {
             self.begun |= self.trial && begins;
             return self.write(&message);
         }

@@ -16,6 +16,8 @@ pub(crate) const RESULT: &str = "/referencing/result";
 pub(crate) const CANDIDATES: &str = "/referencing/candidates";
 /// Comparison with truth.
 pub(crate) const EVALUATION: &str = "/metrics/evaluation";
+/// What all frames add up to.
+pub(crate) const TOTALS: &str = "/metrics/totals";
 /// Wall-clock times.
 pub(crate) const TIMING: &str = "/metrics/timing";
 
@@ -59,7 +61,7 @@ macro_rules! own {
         }
     )*};
 }
-own!(TrialHeader, Frame, ReferencingResult, Candidates, Evaluation, Timing);
+own!(TrialHeader, Frame, ReferencingResult, Candidates, Evaluation, Timing, Totals);
 
 macro_rules! well_known {
     ($($message:ident),*) => {$(

@@ -6,7 +6,7 @@ mod synthetic;
 
 use std::fs;
 
-use seafix_log::{LogError, Reader, Writer, read};
+use seafix_log::{LogError, Reader, Totals, Writer, read};
 
 #[test]
 fn every_record_comes_back() {
@@ -53,6 +53,27 @@ fn a_trial_without_frames_is_a_log() {
     let path = folder.path().join("t.mcap");
     synthetic::write(&path, 0);
     assert_eq!(read(&path).unwrap().frames, []);
+}
+
+#[test]
+fn totals_come_back_after_the_last_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.mcap");
+    let mut totals = Totals { every: 3, failures_left_out: 2, ..Totals::default() };
+    let mut writer = Writer::create(&path, &synthetic::header()).unwrap();
+    for number in 0..4 {
+        let frame = synthetic::frame(number);
+        totals.add(&frame);
+        writer.frame(&frame).unwrap();
+    }
+    assert_eq!((totals.frames, totals.attempted, totals.found, totals.refused()), (4, 8, 4, 4));
+    assert_eq!((totals.judged, totals.bounded, totals.nees_count, totals.nees_within), (4, 0, 4, 4));
+    writer.totals(&totals).unwrap();
+    writer.finish().unwrap();
+    let mut reader = Reader::open(&path).unwrap();
+    assert_eq!(reader.totals(), None, "they stand last");
+    assert_eq!(reader.by_ref().count(), 4);
+    assert_eq!(reader.totals(), Some(&totals));
 }
 
 #[test]

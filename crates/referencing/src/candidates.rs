@@ -1,5 +1,7 @@
 //! Stage 1: which cloud points the prior allows for each model point.
 
+use std::{cell::RefCell, collections::VecDeque};
+
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::in_range;
 use seafix_geometry::{Camera, MeasuredPoint, Point};
@@ -157,8 +159,24 @@ impl PointShell {
 }
 
 /// The quantile of χ² with these degrees of freedom.
+///
+/// It is found by bisection, and asked for a handful of arguments over and over: each thread remembers the last ones.
 pub(crate) fn chi_square(freedom: usize, confidence: f64) -> f64 {
-    ChiSquared::new(freedom as f64).expect("the degrees of freedom are positive").inverse_cdf(confidence)
+    const REMEMBERED: usize = 64;
+    thread_local! {
+        static KNOWN: RefCell<VecDeque<(usize, f64, f64)>> = const { RefCell::new(VecDeque::new()) };
+    }
+    let same = |&&(n, c, _): &&(usize, f64, f64)| n == freedom && c == confidence;
+    if let Some((_, _, known)) = KNOWN.with_borrow(|known| known.iter().find(same).copied()) {
+        return known;
+    }
+    let quantile =
+        ChiSquared::new(freedom as f64).expect("the degrees of freedom are positive").inverse_cdf(confidence);
+    KNOWN.with_borrow_mut(|known| {
+        known.truncate(REMEMBERED - 1);
+        known.push_front((freedom, confidence, quantile));
+    });
+    quantile
 }
 
 #[cfg(test)]

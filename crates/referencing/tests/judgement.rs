@@ -1,12 +1,13 @@
 //! When a pose is believed, and what is said when it is not.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint};
 use seafix_referencing::{
-    Acceptance, Attempt, Candidates, Correspondence, Kabsch, MaximumClique, ModelPoint, Outcome, Prior, PriorBound,
-    Problem, Refusal, Search, StructuralCoherence, Tolerance, Unidentified, judge, reference,
+    Acceptance, Attempt, Candidates, Correspondence, Identification, Kabsch, Mahalanobis, MaximumClique, ModelPoint,
+    Outcome, Prior, PriorBound, Problem, Refusal, Search, StructuralCoherence, Tolerance, Unidentified, judge,
+    reference,
 };
 
 const SIGMA: f64 = 0.005;
@@ -368,4 +369,50 @@ fn what_was_not_looked_at_is_not_believed() {
     assert_eq!((refused.outcome.reason(), refused.identified.len()), (Some("budget"), 7));
     let none = judge(&problem, Err(why), &Kabsch::default(), &Acceptance::default(), None);
     assert_eq!((none.tests, none.size_bound, none.optimal), (Some(9), Some(7), false));
+}
+
+/// Measured points at one depth, each with a depth noise of 30 mm and 2 mm across: one disparity for all.
+fn at_one_depth(places: &[[f64; 3]]) -> Vec<MeasuredPoint> {
+    let covariance = Matrix3::from_diagonal(&Vector3::new(2e-3, 2e-3, 30e-3).map(|s| s * s));
+    let seen = places.iter().map(|[x, y, _]| UncertainPoint { at: Point::new(*x, *y, 3.0), covariance });
+    seen.map(|position| MeasuredPoint { position, pixels: None }).collect()
+}
+
+/// What comes of points at one depth that are all identified.
+fn named(places: &[[f64; 3]]) -> Outcome {
+    let (model, cloud) = (model_of(places), at_one_depth(places));
+    let candidates = Candidates::from_pairs(model.len(), (0..model.len()).map(|i| (i, i)));
+    let tolerance = Tolerance::Sigmas(4.0);
+    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+    let pairs: Vec<Correspondence> = (0..model.len()).map(|i| Correspondence { model: i, cloud: i }).collect();
+    let found = Identification {
+        size_bound: pairs.len(),
+        pairs,
+        rivals: Vec::new(),
+        rivals_complete: true,
+        optimal: true,
+        tests: 0,
+        undecided: None,
+        belief: None,
+    };
+    let acceptance = Acceptance { chance_budget: f64::MAX, ..Acceptance::default() };
+    judge(&problem, Ok(found), &Mahalanobis::default(), &acceptance, None).outcome
+}
+
+/// One disparity for all points of a model with relief: no rigid motion lays it flat, and χ² says so. Of a plate that
+/// is small for its distance it says nothing of the attitude, and the predicted error says so.
+#[test]
+fn one_disparity_is_refused_with_the_number_that_failed() {
+    match named(&MODEL) {
+        Outcome::Unidentified(Refusal::Residuals { chi2, limit }) => assert!(chi2 > 10.0 * limit, "{chi2} {limit}"),
+        other => panic!("{other:?}"),
+    }
+    let plate = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.25, 0.0], [0.28, 0.22, 0.0]];
+    match named(&plate) {
+        Outcome::Unidentified(Refusal::Imprecise { rms, limit }) => assert!(2.0 * rms > limit, "{rms} {limit}"),
+        other => panic!("{other:?}"),
+    }
+    // The same plate, ten times as large, is no worse than any object.
+    let large = plate.map(|at| at.map(|x| x * 10.0));
+    assert!(matches!(named(&large), Outcome::Referenced(_)));
 }

@@ -21,7 +21,7 @@ use std::{
 
 pub use error::ReportError;
 pub use paper::PAPER_M1;
-pub use summary::{Row, Spread, StageTimes, Summary};
+pub use summary::{Limits, Row, Spread, StageTimes, Summary};
 
 use run::Run;
 

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_log::{FrameRecord, FrameTimes, LogError, Reader, TargetRecord, TrialHeader};
+use seafix_log::{FrameRecord, FrameTimes, LogError, Reader, TargetRecord, Totals, TrialHeader};
 
 use crate::{ReportError, disparity};
 
@@ -21,6 +21,8 @@ pub(crate) struct Trial {
     pub(crate) path: PathBuf,
     pub(crate) header: TrialHeader,
     pub(crate) frames: Vec<Frame>,
+    /// What all frames add up to, logged or not; `None` where the log does not say.
+    pub(crate) totals: Option<Totals>,
     /// Whether the log has images, or no frame at all; without images the points came as they are.
     pub(crate) images: bool,
     /// The errors of the disparities of correctly identified points (px), where truth tells.
@@ -76,7 +78,8 @@ impl Trial {
             frames.push(Frame { number, stamp_ns, targets, times });
         }
         let images = reader.has_images() || frames.is_empty();
-        Ok(Self { path, header: reader.header().clone(), images, frames, disparity_errors })
+        let totals = reader.totals().cloned();
+        Ok(Self { path, header: reader.header().clone(), images, frames, totals, disparity_errors })
     }
 
     /// The name of the log.
@@ -84,10 +87,20 @@ impl Trial {
         self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }
 
-    /// Every attempt of every frame.
+    /// How many frames it has, logged or not.
+    pub(crate) fn count(&self) -> usize {
+        self.totals.as_ref().map_or(self.frames.len(), |totals| totals.frames as usize)
+    }
+
+    /// The frames that were logged whatever came of them: all, or a fair sample of many.
+    pub(crate) fn sample(&self) -> impl Iterator<Item = &Frame> {
+        let every = self.totals.as_ref().map_or(1, |totals| totals.every.max(1));
+        self.frames.iter().filter(move |frame| frame.number.is_multiple_of(every))
+    }
+
+    /// Every attempt of every frame of the sample.
     pub(crate) fn attempts(&self) -> impl Iterator<Item = (&Frame, &TargetRecord)> {
-        self.frames
-            .iter()
+        self.sample()
             .flat_map(|frame| frame.targets.iter().map(move |target| (frame, target)))
             .filter(|(_, target)| target.attempted())
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use seafix_evaluation::quantile;
-use seafix_log::{Axis, Evaluation, Outcome};
+use seafix_log::{Axis, Evaluation, Outcome, Totals};
 
 use crate::run::{Run, Trial};
 
@@ -67,10 +67,44 @@ pub struct Row {
     pub nees_count: usize,
     /// Identified points of the fixes found.
     pub identified: Option<Spread>,
+    /// Root mean squares over all fixes that truth could judge, wrong ones included, beside their bounds.
+    pub limits: Option<Limits>,
     /// Measured standard deviation of the disparity of correctly identified points (px).
     pub disparity_sigma: Option<f64>,
     /// Median times of the stages.
     pub times: StageTimes,
+}
+
+/// Root mean square errors and the Cramér–Rao bound on them, over all fixes of a trial, logged or not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// How many fixes.
+    pub count: u64,
+    /// Of m2 (m), and its bound.
+    pub m2: [f64; 2],
+    /// Of the position (m), and its bound.
+    pub m3: [f64; 2],
+    /// Mean of the normalised error squared.
+    pub nees: f64,
+    /// Share of the fixes whose normalised error squared is below the 95 % quantile of χ²₆.
+    pub coverage: f64,
+}
+
+impl Limits {
+    /// Those of totals that have a bound for every fix.
+    fn of(totals: &Totals) -> Option<Self> {
+        (totals.bounded > 0 && totals.bounded == totals.judged).then(|| {
+            let rms = |squares: f64| (squares / totals.judged as f64).sqrt();
+            let nees = totals.nees_count as f64;
+            Self {
+                count: totals.judged,
+                m2: [rms(totals.m2_squares), rms(totals.m2_bound_squares)],
+                m3: [rms(totals.m3_squares), rms(totals.m3_bound_squares)],
+                nees: totals.nees_sum / nees,
+                coverage: totals.nees_within as f64 / nees,
+            }
+        })
+    }
 }
 
 /// How a quantity spreads.
@@ -162,7 +196,7 @@ impl Row {
             axes: trial.header.axes.clone(),
             search,
             solver,
-            frames: trial.frames.len(),
+            frames: trial.sample().count(),
             referenced_frames: 0,
             wrong_frames: 0,
             attempted: 0,
@@ -180,10 +214,11 @@ impl Row {
             nees_mean: None,
             nees_count: 0,
             identified: None,
+            limits: trial.totals.as_ref().and_then(Limits::of),
             disparity_sigma: root_mean_square(&trial.disparity_errors),
             times: times(trial),
         };
-        for frame in &trial.frames {
+        for frame in trial.sample() {
             let fixes = || frame.targets.iter().filter(|target| target.outcome == Outcome::Referenced);
             row.referenced_frames += usize::from(fixes().next().is_some());
             row.wrong_frames += usize::from(fixes().any(|fix| fix.evaluation.wrong == Some(true)));
@@ -220,7 +255,20 @@ impl Row {
             all_m2.sort_by(f64::total_cmp);
             row.m2_of_all = all_m2.get((row.attempted - 1) / 2).copied();
         }
+        if let Some(totals) = &trial.totals {
+            row.count(totals);
+        }
         row
+    }
+
+    /// Takes the counts of all frames in place of those of the sample.
+    fn count(&mut self, totals: &Totals) {
+        let whole = |count: u64| count as usize;
+        (self.frames, self.attempted) = (whole(totals.frames), whole(totals.attempted));
+        (self.referenced_frames, self.wrong_frames) = (whole(totals.referenced_frames), whole(totals.wrong_frames));
+        (self.found, self.wrong, self.unjudged) = (whole(totals.found), whole(totals.wrong), whole(totals.unjudged));
+        self.refused = whole(totals.refused());
+        self.reasons = totals.reasons.iter().map(|(reason, &count)| (reason.clone(), whole(count))).collect();
     }
 
     /// Search and solver, as tables name the method.
@@ -236,7 +284,7 @@ impl Row {
 
 fn times(trial: &Trial) -> StageTimes {
     let median = |values: Vec<f64>| Spread::of(values).map(|spread| spread.median);
-    let frames = |time: fn(&crate::run::Frame) -> Option<f64>| median(trial.frames.iter().filter_map(time).collect());
+    let frames = |time: fn(&crate::run::Frame) -> Option<f64>| median(trial.sample().filter_map(time).collect());
     let attempts = |time: fn(&seafix_log::TargetTimes) -> Option<f64>| {
         median(trial.attempts().filter_map(|(_, target)| time(&target.times)).collect())
     };

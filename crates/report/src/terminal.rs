@@ -51,6 +51,15 @@ impl fmt::Display for Summary {
             "frames fixed of all, targets attempted (n); m1 residual C·H − P, m2 transferred model points, m3 camera position and attitude; medians of the fixes found."
         )?;
 
+        if self.rows.iter().any(|row| row.limits.is_some()) {
+            writeln!(f)?;
+            self.limits(&conditions).write(f)?;
+            writeln!(
+                f,
+                "Root mean squares over all n fixes and their ratio to the Cramér–Rao bound; NEES is 6, and 0.95 of it below the 95 % quantile, where a covariance is honest."
+            )?;
+        }
+
         let stages = self.rows.first().map(|row| row.times.stages().map(|(stage, _)| stage));
         let mut times = Table::new(
             ["method"].into_iter().chain(conditions.iter().map(String::as_str)).chain(stages.into_iter().flatten()),
@@ -61,6 +70,26 @@ impl fmt::Display for Summary {
         writeln!(f)?;
         times.write(f)?;
         write!(f, "Median milliseconds; the first six stages a frame, the others a target.")
+    }
+}
+
+impl Summary {
+    /// Errors beside their bound.
+    fn limits(&self, conditions: &[String]) -> Table {
+        let heads = ["n", "m2 RMSE mm", "bound mm", "ratio", "m3 RMSE mm", "bound mm", "ratio", "NEES", "below 95 %"];
+        let mut table = Table::new(["method"].into_iter().chain(conditions.iter().map(String::as_str)).chain(heads));
+        for row in &self.rows {
+            let Some(limits) = row.limits else { continue };
+            let beside = |[rmse, bound]: [f64; 2]| {
+                [(rmse * 1e3, 3), (bound * 1e3, 3), (rmse / bound, 3)]
+                    .map(|(x, digits)| format::number(Some(x), digits))
+            };
+            let consistency =
+                [(limits.nees, 3), (limits.coverage, 4)].map(|(x, digits)| format::number(Some(x), digits));
+            let numbers = beside(limits.m2).into_iter().chain(beside(limits.m3)).chain(consistency);
+            table.row(leading(row).chain([limits.count.to_string()]).chain(numbers));
+        }
+        table
     }
 }
 

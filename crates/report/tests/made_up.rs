@@ -158,6 +158,7 @@ fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
             m3_position: Some(4.0 * scale),
             m3_attitude: Some(1.1 * scale),
             nees: Some(6.0 + 4.0 * noise(seed + 4)),
+            ..Evaluation::default()
         };
     }
     FrameRecord {

@@ -111,7 +111,7 @@ impl Passage for Recorded {
         let frame = &self.dataset.frames[index];
         let (left, right) = self.dataset.pair(frame)?;
         let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes: Eyes::Pair(left, right), prior })
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes: Eyes::Pair(left, right), prior, names: None })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -134,6 +134,7 @@ impl Passage for Recorded {
             world_from_camera: frame.truth?,
             world_from_object,
             visible: self.dataset.has_visibility.then(|| frame.visible.iter().filter_map(index_of).collect()),
+            bound: None,
         })
     }
 

@@ -84,7 +84,7 @@ impl Passage for Dived {
             Eyes::Points(instant.points())
         };
         let prior = instant.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
-        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior })
+        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior, names: None })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -94,6 +94,7 @@ impl Passage for Dived {
             world_from_camera: truth.world_from_camera,
             world_from_object: self.mission.world_from_object().iter().copied().map(Some).collect(),
             visible: Some(truth.visible.iter().map(|seen| (seen.object, seen.point)).collect()),
+            bound: None,
         })
     }
 

@@ -29,6 +29,9 @@ pub struct Sight {
     pub eyes: Eyes,
     /// The rough pose, if one is known.
     pub prior: Option<WorldPrior>,
+    /// Which feature point each point of the cloud says it is, as (object, point) indices, where points come with
+    /// their names: nothing else is then a candidate. `None` where they do not.
+    pub names: Option<Vec<(usize, usize)>>,
 }
 
 /// What the cameras gave.
@@ -58,6 +61,9 @@ pub struct Truth {
     pub world_from_object: Vec<Option<Transform<World, Object>>>,
     /// The feature points both cameras see, as (object, point) indices; `None` where nobody knows.
     pub visible: Option<Vec<(usize, usize)>>,
+    /// The Cramér–Rao bound on the pose relative to an object of the site, where it is known: the least covariance that
+    /// any unbiased estimate could have.
+    pub bound: Option<(usize, Covariance6<Object, Camera>)>,
 }
 
 /// A sequence of instants, simulated or recorded, opened and checked.

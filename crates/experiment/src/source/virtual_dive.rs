@@ -75,7 +75,7 @@ impl Passage for Virtual {
             world_from_camera: frame.prior.world_from_camera,
             covariance: Covariance6::isotropic(frame.prior.attitude_sigma, frame.prior.position_sigma),
         };
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior: Some(prior) })
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior: Some(prior), names: None })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -85,6 +85,7 @@ impl Passage for Virtual {
             world_from_camera: truth.world_from_camera,
             world_from_object: self.dive.world_from_object().iter().copied().map(Some).collect(),
             visible: Some(truth.visible.iter().map(|seen| (seen.object, seen.point)).collect()),
+            bound: None,
         })
     }
 

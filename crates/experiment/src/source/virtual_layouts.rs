@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix4, UnitQuaternion, Vector3};
 use seafix_component::{Component, Fault, in_range};
+use seafix_evaluation::{Seen, cramer_rao};
 use seafix_geometry::{Body, Camera, Covariance6, Object, Point, StereoRig, Transform, World, triad};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
 use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
@@ -11,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
 
-/// Many draws of many layouts, as clouds of noisy points: every layout is an object of one site, a kilometre from the
-/// next, and frame k is draw k / `layouts` of layout k mod `layouts`.
+/// Many draws of many layouts, as clouds of noisy points: every layout is an object of one site, or several that share its
+/// points, a kilometre from the next, and frame k is draw k / `layouts` of layout k mod `layouts`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct VirtualLayouts {
@@ -32,12 +33,30 @@ pub struct VirtualLayouts {
     pub model_sigma: f64,
     /// The cameras.
     pub rig: VirtualRig,
+    /// How many objects the points of a layout belong to, in turn.
+    pub objects: usize,
+    /// Standard deviation of each surveyed world coordinate of the objects' base points (m), drawn once.
+    pub survey_sigma: f64,
+    /// Whether every point says which one it is, so that nothing is left to be identified.
+    pub named: bool,
 }
 
 impl Default for VirtualLayouts {
     fn default() -> Self {
         let Layout { shape, points, distance, sigma_px, model_sigma, rig, .. } = Layout::default();
-        Self { shape, points, layouts: 20, frames: 10_000, distance, sigma_px, model_sigma, rig }
+        Self {
+            shape,
+            points,
+            layouts: 20,
+            frames: 10_000,
+            distance,
+            sigma_px,
+            model_sigma,
+            rig,
+            objects: 1,
+            survey_sigma: 0.0,
+            named: true,
+        }
     }
 }
 
@@ -61,6 +80,9 @@ impl Component for VirtualLayouts {
         let noise = |value: f64, most: f64| value >= 0.0 && value <= most;
         in_range(noise(self.sigma_px, 100.0), "sigma-px", self.sigma_px, "0 to 100")?;
         in_range(noise(self.model_sigma, 1.0), "model-sigma", self.model_sigma, "0 to 1")?;
+        in_range(noise(self.survey_sigma, 1.0), "survey-sigma", self.survey_sigma, "0 to 1")?;
+        let enough = self.objects >= 1 && 3 * self.objects <= self.points;
+        in_range(enough, "objects", self.objects, "1 or more, with three points each")?;
         self.rig.build().map(|_| ()).map_err(|error| error.to_string())
     }
 }
@@ -75,10 +97,25 @@ impl Source for VirtualLayouts {
         let refused =
             |error: seafix_simulation::BadDive| vec![Fault::new(error.to_string(), Path::new("the source's settings"))];
         let placed: Vec<Placed> = (0..self.layouts).map(place).collect::<Result<_, _>>().map_err(refused)?;
-        let objects = placed.iter().enumerate().map(|(k, placed)| object(k, placed, self.model_sigma)).collect();
+        let bounds = placed.iter().map(|placed| self.bound(placed)).collect();
+        let all = placed.iter().enumerate();
+        let (objects, stand): (Vec<SiteObject>, Vec<Transform<World, Object>>) =
+            all.flat_map(|(k, placed)| (0..self.objects).map(move |part| self.object(seed, k, part, placed))).unzip();
         let name = format!("layouts, seed {seed}, {} m, {} px", self.distance, self.sigma_px);
         let site = Site { name: "layouts".to_owned(), frame: 0, objects, warnings: Vec::new() };
-        Ok(Box::new(Layouts { settings: self.clone(), seed, name, site, placed }))
+        Ok(Box::new(Layouts { settings: self.clone(), seed, name, site, placed, stand, bounds }))
+    }
+}
+
+impl VirtualLayouts {
+    /// The Cramér–Rao bound of a layout that is one object.
+    fn bound(&self, placed: &Placed) -> Option<Covariance6<Object, Camera>> {
+        if self.objects > 1 {
+            return None;
+        }
+        let pixels = Matrix4::identity() * self.sigma_px.powi(2);
+        let seen = |&at: &Point<Object>| Seen { at, model_sigma: self.model_sigma, pixels };
+        cramer_rao(&placed.rig, &placed.object_from_camera, &placed.model.iter().map(seen).collect::<Vec<_>>())
     }
 }
 
@@ -87,28 +124,34 @@ fn world_from_layout(k: usize) -> Transform<World, Object> {
     Transform::new(UnitQuaternion::identity(), Vector3::new(APART * k as f64, 0.0, 0.0))
 }
 
-/// The layout as an object with a frame by the rule of Fig. 2 on its largest triangle.
-fn object(k: usize, placed: &Placed, sigma: f64) -> SiteObject {
-    let points: Vec<Point<World>> = placed.model.iter().map(|&at| world_from_layout(k) * at).collect();
-    let n = points.len();
-    let square = |[a, b, c]: [usize; 3]| (points[b] - points[a]).cross(&(points[c] - points[a])).norm_squared();
-    let all = (0..n).flat_map(|a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])));
-    let base = all.max_by(|a, b| square(*a).total_cmp(&square(*b))).expect("three points at least");
-    let base_in_world = base.map(|i| points[i]);
-    let [a, b, c] = &base_in_world;
-    let world_from_object = triad(a, b, c).expect("a layout is no line");
-    let own = |(i, at): (usize, &Point<World>)| ModelPoint {
-        sigma,
-        ..ModelPoint::exact(format!("P{i}"), world_from_object.inverse() * *at)
-    };
-    SiteObject {
-        id: format!("layout{k:02}"),
-        base,
-        base_in_world: Some(base_in_world),
-        survey_sigma: 0.0,
-        world_from_object: Some(world_from_object),
-        points: points.iter().enumerate().map(own).collect(),
-        interest: Vec::new(),
+impl VirtualLayouts {
+    /// A part of the k-th layout as an object with a frame by the rule of Fig. 2 on its largest triangle, as the survey has
+    /// it, and where it truly stands.
+    fn object(&self, seed: u64, k: usize, part: usize, placed: &Placed) -> (SiteObject, Transform<World, Object>) {
+        let points: Vec<Point<World>> =
+            placed.model.iter().skip(part).step_by(self.objects).map(|&at| world_from_layout(k) * at).collect();
+        let n = points.len();
+        let square = |[a, b, c]: [usize; 3]| (points[b] - points[a]).cross(&(points[c] - points[a])).norm_squared();
+        let all = (0..n).flat_map(|a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])));
+        let base = all.max_by(|a, b| square(*a).total_cmp(&square(*b))).expect("three points at least");
+        let stands = |base: &[Point<World>; 3]| triad(&base[0], &base[1], &base[2]).expect("a layout is no line");
+        let truly = stands(&base.map(|i| points[i]));
+        let mut stream = Stream::new(seed, k as u64, part as u64, Purpose::Survey);
+        let base_in_world = base.map(|i| points[i] + stream.normal3(self.survey_sigma));
+        let own = |(i, at): (usize, &Point<World>)| ModelPoint {
+            sigma: self.model_sigma,
+            ..ModelPoint::exact(format!("P{i}"), truly.inverse() * *at)
+        };
+        let object = SiteObject {
+            id: if self.objects == 1 { format!("layout{k:02}") } else { format!("layout{k:02}-{part}") },
+            base,
+            base_in_world: Some(base_in_world),
+            survey_sigma: self.survey_sigma,
+            world_from_object: Some(stands(&base_in_world)),
+            points: points.iter().enumerate().map(own).collect(),
+            interest: Vec::new(),
+        };
+        (object, truly)
     }
 }
 
@@ -118,12 +161,21 @@ struct Layouts {
     name: String,
     site: Site,
     placed: Vec<Placed>,
+    /// Where each object truly stands.
+    stand: Vec<Transform<World, Object>>,
+    bounds: Vec<Option<Covariance6<Object, Camera>>>,
 }
 
 impl Layouts {
     /// The layout and the draw of a frame.
     fn of(&self, index: usize) -> (usize, u64) {
         (index % self.placed.len(), (index / self.placed.len()) as u64)
+    }
+
+    /// The object and the place in it of a layout's point.
+    fn name_of(&self, layout: usize, point: usize) -> (usize, usize) {
+        let objects = self.settings.objects;
+        (layout * objects + point % objects, point / objects)
     }
 
     fn world_from_camera(&self, layout: usize) -> Transform<World, Camera> {
@@ -175,16 +227,19 @@ impl Passage for Layouts {
             covariance: Covariance6::isotropic(attitude, position),
         };
         // A draw that noise leaves untriangulable is a frame without points, and counts as one.
-        let eyes = Eyes::Points(self.placed[layout].draw(draw).unwrap_or_default());
-        Ok(Sight { stamp_ns: index as u64 * 100_000_000, eyes, prior: Some(prior) })
+        let cloud = self.placed[layout].draw(draw).unwrap_or_default();
+        let names = self.settings.named.then(|| (0..cloud.len()).map(|point| self.name_of(layout, point)).collect());
+        let eyes = Eyes::Points(cloud);
+        Ok(Sight { stamp_ns: index as u64 * 100_000_000, eyes, prior: Some(prior), names })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
         let (layout, _) = self.of(index);
         Some(Truth {
             world_from_camera: self.world_from_camera(layout),
-            world_from_object: self.site.objects.iter().map(|object| object.world_from_object).collect(),
-            visible: Some((0..self.settings.points).map(|point| (layout, point)).collect()),
+            world_from_object: self.stand.iter().copied().map(Some).collect(),
+            visible: Some((0..self.settings.points).map(|point| self.name_of(layout, point)).collect()),
+            bound: self.bounds[layout].map(|bound| (layout, bound)),
         })
     }
 
@@ -209,6 +264,31 @@ mod tests {
             let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[index % 3].unwrap();
             for (seen, known) in cloud.iter().zip(&object.points) {
                 assert!((camera_from_object * known.at).distance(&seen.position.at) < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_layout_may_be_several_objects_that_a_survey_misplaces() {
+        let settings = VirtualLayouts {
+            layouts: 2,
+            objects: 3,
+            survey_sigma: 0.01,
+            sigma_px: 0.0,
+            frames: 4,
+            ..VirtualLayouts::default()
+        };
+        let passage = settings.open(1, Path::new(".")).unwrap();
+        assert_eq!(passage.site().objects.iter().map(|o| o.points.len()).collect::<Vec<_>>(), [5, 4, 4, 5, 4, 4]);
+        for index in 0..4 {
+            let (sight, truth) = (passage.sight(index).unwrap(), passage.truth(index).unwrap());
+            let Eyes::Points(cloud) = sight.eyes else { panic!("points") };
+            for (seen, (object, point)) in cloud.iter().zip(sight.names.unwrap()) {
+                let known = &passage.site().objects[object];
+                let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[object].unwrap();
+                assert!((camera_from_object * known.points[point].at).distance(&seen.position.at) < 1e-9);
+                let off = known.world_from_object.unwrap().error_to(&truth.world_from_object[object].unwrap());
+                assert!(off.norm() > 1e-4 && off.norm() < 0.5, "{off}");
             }
         }
     }

@@ -3,6 +3,7 @@
 mod frame;
 mod header;
 mod result;
+mod totals;
 
 pub(crate) use frame::{frame_message, frame_record};
 pub(crate) use header::{header_message, header_record};
@@ -10,6 +11,7 @@ pub(crate) use result::{
     candidates_message, evaluation_message, evaluation_record, result_message, result_record, target_times,
     timing_message,
 };
+pub(crate) use totals::{totals_message, totals_record};
 
 /// What a message lacks to be a record.
 #[derive(Debug)]

@@ -125,6 +125,8 @@ pub(crate) fn evaluation_message(frame: &FrameRecord, index: usize) -> proto::Ev
         m3_position: it.m3_position,
         m3_attitude: it.m3_attitude,
         nees: it.nees,
+        m2_bound: it.m2_bound,
+        m3_bound: it.m3_bound,
     }
 }
 
@@ -142,6 +144,8 @@ pub(crate) fn evaluation_record(message: &proto::Evaluation) -> Evaluation {
         m3_position: message.m3_position,
         m3_attitude: message.m3_attitude,
         nees: message.nees,
+        m2_bound: message.m2_bound,
+        m3_bound: message.m3_bound,
     }
 }
 

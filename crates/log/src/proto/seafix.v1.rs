@@ -280,6 +280,67 @@ pub struct Evaluation {
     /// Normalised estimation error squared, six degrees of freedom.
     #[prost(double, optional, tag = "15")]
     pub nees: ::core::option::Option<f64>,
+    /// Cramer-Rao bound on m2, and on the position (m): what no unbiased estimate betters on average.
+    #[prost(double, optional, tag = "16")]
+    pub m2_bound: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "17")]
+    pub m3_bound: ::core::option::Option<f64>,
+}
+/// What all frames of a trial add up to, logged or not. Topic /metrics/totals, once, after the last frame.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Totals {
+    /// Of so many frames one is logged, whatever came of it: those whose number it divides.
+    #[prost(uint64, tag = "1")]
+    pub every: u64,
+    /// Frames with a failure that were not logged, because there are too many.
+    #[prost(uint64, tag = "2")]
+    pub failures_left_out: u64,
+    #[prost(uint64, tag = "3")]
+    pub frames: u64,
+    #[prost(uint64, tag = "4")]
+    pub referenced_frames: u64,
+    #[prost(uint64, tag = "5")]
+    pub wrong_frames: u64,
+    #[prost(uint64, tag = "6")]
+    pub attempted: u64,
+    #[prost(uint64, tag = "7")]
+    pub found: u64,
+    #[prost(uint64, tag = "8")]
+    pub wrong: u64,
+    #[prost(uint64, tag = "9")]
+    pub unjudged: u64,
+    /// Why attempts were refused, and how often.
+    #[prost(message, repeated, tag = "10")]
+    pub reasons: ::prost::alloc::vec::Vec<Reason>,
+    /// Over all fixes that truth could judge, wrong ones included: how many, sums of squares (m^2).
+    #[prost(uint64, tag = "11")]
+    pub judged: u64,
+    #[prost(double, tag = "12")]
+    pub m2_squares: f64,
+    #[prost(double, tag = "13")]
+    pub m3_squares: f64,
+    /// The same of the bounds, over those of them that have one.
+    #[prost(uint64, tag = "14")]
+    pub bounded: u64,
+    #[prost(double, tag = "15")]
+    pub m2_bound_squares: f64,
+    #[prost(double, tag = "16")]
+    pub m3_bound_squares: f64,
+    /// Sum of the normalised errors squared, over how many fixes, and how many of them are below 12.592.
+    #[prost(double, tag = "17")]
+    pub nees_sum: f64,
+    #[prost(uint64, tag = "18")]
+    pub nees_count: u64,
+    #[prost(uint64, tag = "19")]
+    pub nees_within: u64,
+}
+/// A reason and how often it was given.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Reason {
+    #[prost(string, tag = "1")]
+    pub reason: ::prost::alloc::string::String,
+    #[prost(uint64, tag = "2")]
+    pub count: u64,
 }
 /// Wall-clock times of the stages (ms): the only content of a log that differs between two runs of one
 /// configuration. Topic /metrics/timing.

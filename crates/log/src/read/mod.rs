@@ -5,7 +5,7 @@ mod source;
 
 use std::path::{Path, PathBuf};
 
-use crate::{FrameRecord, LogError, TrialHeader, convert, topic};
+use crate::{FrameRecord, LogError, Totals, TrialHeader, convert, topic};
 use pending::Pending;
 pub(crate) use source::looks_like;
 use source::{Message, Source};
@@ -41,6 +41,7 @@ pub struct Reader {
     pending: Pending,
     images: Images,
     seen_images: bool,
+    totals: Option<Totals>,
     ended: bool,
 }
 
@@ -81,6 +82,7 @@ impl Reader {
                     pending: Pending::default(),
                     images: Images::All,
                     seen_images: false,
+                    totals: None,
                     ended: false,
                 });
             }
@@ -112,9 +114,18 @@ impl Reader {
         self.seen_images
     }
 
+    /// What all frames of the trial add up to, logged or not: known after the last frame, where the log says it.
+    pub fn totals(&self) -> Option<&Totals> {
+        self.totals.as_ref()
+    }
+
     fn next_frame(&mut self) -> Result<Option<FrameRecord>, LogError> {
         let path: PathBuf = self.source.path().to_owned();
         while let Some(message) = self.source.next_message()? {
+            if message.topic == topic::TOTALS {
+                self.totals = Some(convert::totals_record(message.decode(&path, "Totals")?));
+                continue;
+            }
             self.seen_images |= topic::IMAGES.contains(&&message.topic[..]);
             if let Some(frame) = self.pending.take(&path, &message, self.images.wanted(message.log_time))? {
                 return Ok(Some(frame));

@@ -3,10 +3,12 @@
 mod frame;
 mod header;
 mod target;
+mod totals;
 
 pub use frame::{CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, PriorRecord, TruthRecord, VisiblePoint};
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use target::{Alternative, Evaluation, Outcome, Pair, TargetRecord, TargetTimes};
+pub use totals::Totals;
 
 /// Three rows of three numbers.
 pub type Matrix3 = [[f64; 3]; 3];

@@ -176,6 +176,10 @@ pub struct Evaluation {
     pub m3_attitude: Option<f64>,
     /// Normalised estimation error squared, six degrees of freedom.
     pub nees: Option<f64>,
+    /// The Cramér–Rao bound on m2 (m), where it is known.
+    pub m2_bound: Option<f64>,
+    /// The Cramér–Rao bound on the position (m), where it is known.
+    pub m3_bound: Option<f64>,
 }
 
 /// Times of the stages that serve one target (ms); `None` where a stage did not run.

@@ -5,7 +5,7 @@ mod sink;
 use std::{collections::BTreeMap, path::Path};
 
 use crate::{
-    FrameRecord, LogError, TrialHeader, check, convert, png, topic,
+    FrameRecord, LogError, Totals, TrialHeader, check, convert, png, topic,
     view::{self, Places},
 };
 use sink::Sink;
@@ -82,6 +82,19 @@ impl Writer {
         }
         sink.put(topic::TIMING, stamp, &convert::timing_message(frame))?;
         sink.put(topic::FRAME, stamp, &convert::frame_message(frame))
+    }
+
+    /// Adds what all frames of the trial add up to, those that were not logged included; after the last frame.
+    ///
+    /// # Errors
+    /// [`LogError`] when nothing more can be written.
+    pub fn totals(&mut self, totals: &Totals) -> Result<(), LogError> {
+        let stamp = self.last.unwrap_or(0);
+        if self.last.is_none() {
+            self.begin(stamp)?;
+            self.last = Some(stamp);
+        }
+        self.sink.put(topic::TOTALS, stamp, &convert::totals_message(totals))
     }
 
     /// Completes the log: index, check sums, onto the disk, renamed to its own name.

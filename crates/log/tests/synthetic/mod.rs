@@ -105,6 +105,8 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         m3_position: Some(0.01),
         m3_attitude: Some(0.002),
         nees: Some(5.5),
+        m2_bound: Some(0.005),
+        m3_bound: None,
     };
     fixed.times =
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };

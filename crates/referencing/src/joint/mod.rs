@@ -4,10 +4,12 @@
 //! points of an object and for all instants: six numbers an object, shared, not noise of every point. Poses and those
 //! six are therefore estimated together, and the survey is an observation like the pixels.
 
+mod displaced;
 mod system;
 #[cfg(test)]
 mod tests;
 
+use faer::Mat;
 use nalgebra::Matrix6;
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
@@ -15,6 +17,7 @@ use crate::{
     Degenerate, Observation, Observations,
     solve::{least_squares, wide_enough},
 };
+pub use displaced::{JointFixes, RelativePose, joint_fixes};
 use system::{State, System};
 
 /// What is known of where an object stands in the site's frame.
@@ -59,6 +62,30 @@ pub struct JointFix {
     pub chi2: f64,
     /// Its degrees of freedom.
     pub freedom: usize,
+    /// The covariance of all unknowns together.
+    covariance: Mat<f64>,
+    /// For each object the block of its six unknowns.
+    unknowns: Vec<Option<usize>>,
+}
+
+impl JointFix {
+    /// The camera of an instant relative to an object, with its covariance: both err together, and what they share
+    /// cancels.
+    ///
+    /// With T_sc = T̂_sc Exp(ξ) and T_so = T̂_so Exp(η): T_oc = T̂_oc Exp(ξ − Ad(T̂_co) η) to first order.
+    ///
+    /// # Panics
+    /// When an index is out of range.
+    pub fn object_from_camera(&self, instant: usize, object: usize) -> RelativePose {
+        let (site_from_camera, own) = &self.site_from_camera[instant];
+        let pose = self.site_from_object[object].0.inverse() * *site_from_camera;
+        let Some(place) = self.unknowns[object] else { return (pose, *own) };
+        let block = |a: usize, b: usize| Matrix6::from_fn(|i, j| self.covariance[(6 * a + i, 6 * b + j)]);
+        let ad = pose.inverse().adjoint();
+        let shared = ad * block(place, instant);
+        let all = own.matrix + ad * block(place, place) * ad.transpose() - shared - shared.transpose();
+        (pose, Covariance6::new(all))
+    }
 }
 
 /// The most likely poses of all instants and places of all objects, from the pixels that `rig` saw and the surveys:
@@ -87,17 +114,24 @@ pub fn joint_fix(rig: &StereoRig, members: &[Member], glimpses: &[Glimpse]) -> R
         wide_enough(&data)?;
         poses.push(least_squares(&data.points));
     }
+    if poses.is_empty() {
+        return Err(Degenerate::TooFew { found: 0, needed: 3 });
+    }
     let start = State { poses, places: members.iter().map(|member| member.site_from_object).collect() };
     let system = System::new(rig, members, glimpses).ok_or(Degenerate::Singular)?;
     let (state, chi2) = system.minimize(start).ok_or(Degenerate::Singular)?;
-    let blocks = system.covariances(&state).ok_or(Degenerate::Singular)?;
-    let block = |at: Option<usize>| at.map_or_else(Matrix6::zeros, |at| blocks[at]);
+    let covariance = system.covariance(&state).ok_or(Degenerate::Singular)?;
+    let block = |at: Option<usize>| {
+        at.map_or_else(Matrix6::zeros, |b| Matrix6::from_fn(|i, j| covariance[(6 * b + i, 6 * b + j)]))
+    };
     Ok(JointFix {
-        site_from_camera: (0..glimpses.len()).map(|f| (state.poses[f], Covariance6::new(blocks[f]))).collect(),
+        site_from_camera: (0..glimpses.len()).map(|f| (state.poses[f], Covariance6::new(block(Some(f))))).collect(),
         site_from_object: (0..members.len())
             .map(|o| (state.places[o], Covariance6::new(block(system.unknown(o)))))
             .collect(),
         chi2,
         freedom: system.freedom(),
+        unknowns: (0..members.len()).map(|o| system.unknown(o)).collect(),
+        covariance,
     })
 }

@@ -12,26 +12,26 @@ use crate::{Solver, StereoReprojection};
 const MODEL: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.1, 0.6, 0.1], [0.2, 0.2, 0.4], [-0.4, 0.3, 0.2]];
 const SIGMA: f64 = 0.2;
 
-fn rig() -> StereoRig {
+pub(super) fn rig() -> StereoRig {
     let camera = Pinhole::new([1600, 1200], [1348.3; 2], [799.5, 599.5], &[]).unwrap();
     StereoRig::new(camera, camera, Transform::exp(&[0.0, 0.0, 0.0, -0.25, 0.0, 0.0].into())).unwrap()
 }
 
-fn standing(x: f64, turn: f64) -> Transform<Object, Object> {
+pub(super) fn standing(x: f64, turn: f64) -> Transform<Object, Object> {
     Transform::exp(&[0.0, turn, 0.0, x, 0.2 * x, 0.0].into())
 }
 
-fn instant(k: usize) -> Transform<Object, Camera> {
+pub(super) fn instant(k: usize) -> Transform<Object, Camera> {
     Transform::exp(&[0.05 * k as f64, -0.03, 0.1, 0.2 * k as f64, 0.1, -3.0].into())
 }
 
 /// Nearly normal, of variance one: the sum of twelve uniform numbers.
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
+pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()
 }
 
 /// What an instant sees of the objects standing truly there, with `noise` times σ of pixel noise.
-fn glimpse(
+pub(super) fn glimpse(
     rig: &StereoRig,
     places: &[Transform<Object, Object>],
     k: usize,
@@ -133,4 +133,67 @@ fn a_survey_is_one_error_an_object() {
     assert!((nees - 6.0).abs() < 4.0 * (12.0 / f64::from(draws)).sqrt(), "{nees}");
     let spread = 4.0 * (2.0 * freedom as f64 / f64::from(draws)).sqrt();
     assert!((chi2 - freedom as f64).abs() < spread, "{chi2} of {freedom}");
+}
+
+/// Seen from an object itself, what all objects share cancels: the pose relative to each is as its covariance says, and
+/// better known than from that object's own points, when the survey is good.
+#[test]
+fn relative_to_each_object_the_fix_is_better_than_its_own() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(4));
+    let survey = Covariance6::<Object, Object>::isotropic(5e-4, 5e-4);
+    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+    let members: Vec<Member> = said
+        .iter()
+        .map(|&site_from_object| Member { site_from_object, standing: Standing::Surveyed(survey) })
+        .collect();
+    let draws = 300;
+    let (mut nees, mut joint, mut alone) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    for _ in 0..draws {
+        let truly = said.map(|place| place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 5e-4)));
+        let seen = [0, 1].map(|k| glimpse(&rig, &truly, k, 1.0, &mut rng));
+        let fixes = joint_fixes(&rig, &members, &seen, 0.9999).unwrap().expect("a likely draw");
+        assert_eq!(fixes.displaced, Vec::<usize>::new());
+        for object in 0..3 {
+            let truth = truly[object].inverse() * instant(1);
+            let (pose, covariance) = fixes.object_from_camera[object].unwrap();
+            let xi = pose.error_to(&truth);
+            nees[object] += xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)) / f64::from(draws);
+            joint[object] += xi.fixed_rows::<3>(3).norm_squared();
+            let own = seen[1].points.iter().filter(|(o, _)| *o == object).map(|(_, p)| *p).collect();
+            let own = StereoReprojection::default().solve(&Observations { points: own, rig: Some(&rig) }).unwrap();
+            alone[object] += own.error_to(&truth).fixed_rows::<3>(3).norm_squared();
+        }
+    }
+    for object in 0..3 {
+        // Four standard deviations of the mean.
+        assert!((nees[object] - 6.0).abs() < 4.0 * (12.0 / f64::from(draws)).sqrt(), "{nees:?}");
+        assert!(joint[object] < 0.25 * alone[object], "{object}: {joint:?} {alone:?}");
+    }
+}
+
+#[test]
+fn a_survey_that_the_images_contradict_is_given_up() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(5));
+    let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
+    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+    let member = |&site_from_object| Member { site_from_object, standing: Standing::Surveyed(survey) };
+    let members: Vec<Member> = said.iter().map(member).collect();
+    let mut truly = said;
+    truly[1] = standing(0.86, 0.05);
+    let seen = glimpse(&rig, &truly, 1, 1.0, &mut rng);
+    let fixes = joint_fixes(&rig, &members, std::slice::from_ref(&seen), 0.999).unwrap().unwrap();
+    assert_eq!(fixes.displaced, [1]);
+    for (object, place) in truly.iter().enumerate() {
+        let truth = place.inverse() * instant(1);
+        let (pose, covariance) = fixes.object_from_camera[object].unwrap();
+        let xi = pose.error_to(&truth);
+        assert!(xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)) < 30.0, "{object}");
+    }
+    // Points that no rigid objects explain are refused, whatever the surveys.
+    let mut torn = seen;
+    for (k, (_, point)) in torn.points.iter_mut().enumerate() {
+        point.pixels.as_mut().unwrap().at.left.v += 20.0 * f64::from(u8::try_from(k % 3).unwrap());
+    }
+    assert_eq!(joint_fixes(&rig, &members, &[torn], 0.999), Ok(None));
+    assert_eq!(joint_fixes(&rig, &members, &[], 0.999), Err(Degenerate::TooFew { found: 0, needed: 3 }));
 }

@@ -46,6 +46,9 @@ pub struct Support {
     pub chi2_limit: f64,
     /// The farthest that the position moves (m) when one point is left out.
     pub separation: Option<f64>,
+    /// The same when two points are left out, where two wrong matches are assumed to happen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub separation_two: Option<f64>,
     /// Radii that the errors of position (m) and attitude (rad) exceed with no more than the stated risk.
     pub protection: Option<Levels>,
 }
@@ -71,6 +74,7 @@ impl From<&Integrity> for Support {
             freedom: integrity.freedom,
             chi2_limit: integrity.chi2_limit,
             separation: integrity.separation,
+            separation_two: integrity.separation_two,
             protection: integrity.protection.map(|level| Levels { position: level.position, attitude: level.attitude }),
         }
     }

@@ -18,14 +18,18 @@ pub struct Acceptance {
     pub doubt: f64,
     /// Confidence of the χ² tests of residuals and prior: a true set fails with one minus this.
     pub confidence: f64,
-    /// Poses further apart than this (m, RMS over the model points), or than 5 % of the model's
-    /// diameter if that is less, are different answers; a pose that by its own covariance may be off
+    /// Poses further apart than this (m, RMS over the model points), or than [`alert_share`](Self::alert_share) of the
+    /// model's diameter if that is less, are different answers; a pose that by its own covariance may be off
     /// by as much is none.
     pub alert_limit: f64,
+    /// The share of the model's diameter that limits it where that is less.
+    pub alert_share: f64,
     /// With what probability a protection level may be exceeded.
     pub risk: f64,
     /// Share of believed sets that hold one wrong match, as protection levels assume it.
     pub wrong_match_rate: f64,
+    /// Share of believed sets that hold two wrong matches, as protection levels assume it; of none where it is nought.
+    pub two_wrong_rate: f64,
 }
 
 impl Default for Acceptance {
@@ -37,8 +41,10 @@ impl Default for Acceptance {
             doubt: 0.05,
             confidence: 0.999,
             alert_limit: 0.10,
+            alert_share: 0.05,
             risk: 1e-4,
             wrong_match_rate: 0.1,
+            two_wrong_rate: 0.0,
         }
     }
 }
@@ -61,10 +67,14 @@ impl Acceptance {
             in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
             let alert = self.alert_limit > 0.0 && self.alert_limit.is_finite();
             in_range(alert, "alert-limit", self.alert_limit, "a positive number of metres")?;
+            let share = self.alert_share > 0.0 && self.alert_share.is_finite();
+            in_range(share, "alert-share", self.alert_share, "a positive number")?;
             let risk = self.risk > 0.0 && self.risk < 1.0;
             in_range(risk, "risk", self.risk, "a probability between 0 and 1")?;
             let rate = self.wrong_match_rate > 0.0 && self.wrong_match_rate <= 1.0;
-            in_range(rate, "wrong-match-rate", self.wrong_match_rate, "a share above 0, at most 1")
+            in_range(rate, "wrong-match-rate", self.wrong_match_rate, "a share above 0, at most 1")?;
+            let two = self.two_wrong_rate >= 0.0 && self.two_wrong_rate <= 1.0;
+            in_range(two, "two-wrong-rate", self.two_wrong_rate, "a share from 0 to 1")
         };
         check().map_err(|message| format!("acceptance: {message}"))
     }

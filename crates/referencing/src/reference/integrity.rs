@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
 
 use super::Acceptance;
-use crate::{Mahalanobis, Observations, Solver, candidates::chi_square};
+use crate::{Observations, candidates::chi_square, solve::deletion::Deletions};
 
 /// What the number of points allows to know of a wrong match.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,56 +51,92 @@ pub struct Integrity {
     /// Solution separation: the farthest that the position moves (m) when one point is left out; `None` with fewer
     /// than four points.
     pub separation: Option<f64>,
+    /// The same when two points are left out; `None` with fewer than five points, or where
+    /// [`Acceptance::two_wrong_rate`] is nought.
+    pub separation_two: Option<f64>,
     /// Protection levels at [`Acceptance::risk`]; `None` where nothing can vouch for the fix (three points, or a point
     /// that cannot be spared).
     pub protection: Option<Protection>,
 }
 
+/// How far the fix moves when points are left out, and what that protects.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Separation {
+    /// Farthest move of the position (m) without one point; `None` with fewer than four.
+    pub(super) one: Option<f64>,
+    /// Without two; `None` with fewer than five, or where two wrong matches are not assumed to happen.
+    pub(super) two: Option<f64>,
+    /// The levels.
+    pub(super) protection: Option<Protection>,
+}
+
 /// Protection levels by solution separation (Blanch and others, *Baseline advanced RAIM user algorithm*, 2015).
 ///
-/// If point i is a wrong match, the pose x_i without it is not disturbed, and the fix x is off by no more than
-/// |x − x_i| + K σ_i: the separation as it is, no threshold assumed, and the radius that x_i itself exceeds with
-/// the share of the risk that the rate of wrong matches leaves. Half of the risk goes to the case that nothing is
-/// wrong, half to one wrong match. Radii are the greatest semi-axis times √χ²₃. x_i is the most likely pose,
-/// whatever solver gave x.
+/// If the points of a set I are wrong matches, the pose x_I without them is not disturbed, and the fix x is off by no more
+/// than |x − x_I| + K σ_I: the separation as it is, no threshold assumed, and the radius that x_I itself exceeds with
+/// the share of the risk that the rate of such sets leaves. Half of the risk goes to the case that nothing is wrong,
+/// the other half to one wrong match, or where two may be wrong in equal parts to one and to two. Radii are the greatest
+/// semi-axis times √χ²₃. x_I is the most likely pose, whatever solver gave x. Sets of two need five points at least,
+/// and six for a level: three that are left fit whatever they are.
 pub(super) fn protection(
     data: &Observations<'_>,
     pose: &Transform<Object, Camera>,
     covariance: &Covariance6<Object, Camera>,
     acceptance: &Acceptance,
-) -> (Option<f64>, Option<Protection>) {
+) -> Separation {
     let n = data.points.len();
     if Redundancy::of(n) == Redundancy::Unmonitored {
-        return (None, None);
+        return Separation::default();
     }
-    let quiet = radius(0.5 * acceptance.risk);
     let (position, attitude) = semi_axes(covariance);
-    let mut level = Protection { position: quiet * position, attitude: quiet * attitude };
-    let share = (0.5 * acceptance.risk / acceptance.wrong_match_rate).min(1.0);
-    let k = radius(share);
-    let mut separation: f64 = 0.0;
-    let mut spared = true;
-    for out in 0..n {
-        let mut fewer = data.clone();
-        fewer.points.remove(out);
-        let witness = Mahalanobis::default();
-        let Ok(without) = witness.solve(&fewer) else {
-            spared = false;
-            continue;
-        };
-        let Ok(certainty) = witness.covariance(&fewer, &without) else {
-            spared = false;
-            continue;
-        };
-        let moved = (pose.translation() - without.translation()).norm();
-        let turned = so3::angle(&(pose.rotation().inverse() * without.rotation()));
-        let (position, attitude) = semi_axes(&certainty);
-        separation = separation.max(moved);
-        level.position = level.position.max(moved + k * position);
-        level.attitude = level.attitude.max(turned + k * attitude);
-        spared &= attitude <= WEAK;
+    let quiet = radius(0.5 * acceptance.risk);
+    let own = Protection { position: quiet * position, attitude: quiet * attitude };
+    let Some(deletions) = Deletions::of(data) else {
+        return Separation { one: Some(0.0), ..Separation::default() };
+    };
+    let mut watch = Watch { pose, deletions, level: own, spared: true };
+    let twice = acceptance.two_wrong_rate > 0.0;
+    let share = if twice { 0.25 } else { 0.5 } * acceptance.risk;
+    let ones = (0..n).map(|out| vec![out]);
+    let one = Some(watch.farthest(ones, (share / acceptance.wrong_match_rate).min(1.0)));
+    let two = (twice && n >= 5).then(|| {
+        let twos = (0..n).flat_map(|i| (i + 1..n).map(move |j| vec![i, j]));
+        watch.farthest(twos, (share / acceptance.two_wrong_rate).min(1.0))
+    });
+    let available = watch.spared && (!twice || n >= 6);
+    Separation { one, two, protection: available.then_some(watch.level) }
+}
+
+/// A fix, watched while points are left out.
+struct Watch<'a> {
+    pose: &'a Transform<Object, Camera>,
+    deletions: Deletions<'a>,
+    level: Protection,
+    /// Whether every set so far could be spared.
+    spared: bool,
+}
+
+impl Watch<'_> {
+    /// Raises the levels to what these sets of wrong matches, each as likely as `share` of the risk says, may do; the
+    /// farthest move of the position (m).
+    fn farthest(&mut self, sets: impl Iterator<Item = Vec<usize>>, share: f64) -> f64 {
+        let k = radius(share);
+        let mut farthest: f64 = 0.0;
+        for out in sets {
+            let Some((without, certainty)) = self.deletions.without(&out) else {
+                self.spared = false;
+                continue;
+            };
+            let moved = (self.pose.translation() - without.translation()).norm();
+            let turned = so3::angle(&(self.pose.rotation().inverse() * without.rotation()));
+            let (position, attitude) = semi_axes(&certainty);
+            farthest = farthest.max(moved);
+            self.level.position = self.level.position.max(moved + k * position);
+            self.level.attitude = self.level.attitude.max(turned + k * attitude);
+            self.spared &= attitude <= WEAK;
+        }
+        farthest
     }
-    (Some(separation), spared.then_some(level))
 }
 
 /// An attitude less certain than this (rad) has other valleys nearby: no Gaussian radius bounds its error.
@@ -123,7 +159,7 @@ fn radius(probability: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Observation;
+    use crate::{Mahalanobis, Observation, Solver};
     use nalgebra::Vector3;
     use seafix_geometry::{Point, UncertainPoint};
 
@@ -145,7 +181,9 @@ mod tests {
     fn of(data: &Observations<'_>, acceptance: &Acceptance) -> (Option<f64>, Option<Protection>) {
         let witness = Mahalanobis::default();
         let pose = witness.solve(data).unwrap();
-        protection(data, &pose, &witness.covariance(data, &pose).unwrap(), acceptance)
+        let all = protection(data, &pose, &witness.covariance(data, &pose).unwrap(), acceptance);
+        assert_eq!(all.two.is_some(), acceptance.two_wrong_rate > 0.0 && data.points.len() >= 5);
+        (all.one, all.protection)
     }
 
     #[test]
@@ -185,5 +223,25 @@ mod tests {
                 "{off} {level:?}"
             );
         }
+    }
+
+    #[test]
+    fn two_wrong_matches_are_within_the_level_where_they_are_assumed() {
+        let acceptance = Acceptance { two_wrong_rate: 0.01, ..Acceptance::default() };
+        for (one, two) in (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j))) {
+            let (mut data, truth) = seen(6);
+            for wrong in [one, two] {
+                data.points[wrong].measured.at = data.points[wrong].measured.at + Vector3::new(0.1, -0.2, 0.1);
+            }
+            let pose = Mahalanobis::default().solve(&data).unwrap();
+            let off = (pose.translation() - truth.translation()).norm();
+            // Four points are left, none of them wrong: the level holds whatever the two did.
+            if let Some(level) = of(&data, &acceptance).1 {
+                assert!(off <= level.position, "{one} {two}: {off} {level:?}");
+            }
+        }
+        assert!(of(&seen(6).0, &acceptance).1.is_some());
+        assert_eq!(of(&seen(5).0, &acceptance).1, None, "three that are left bear no witness");
+        assert!(of(&seen(5).0, &Acceptance::default()).1.is_some());
     }
 }

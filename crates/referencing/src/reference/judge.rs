@@ -207,15 +207,16 @@ impl Judge<'_> {
             Ok(covariance) => covariance,
             Err(why) => return Outcome::Degenerate(why),
         };
-        let (separation, protection) = protection(&data, &hypothesis.pose, &covariance, self.acceptance);
+        let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance);
         let freedom = 3 * hypothesis.pairs.len() - 6;
         let integrity = Integrity {
             redundancy: Redundancy::of(hypothesis.pairs.len()),
             chi2: hypothesis.likelihood.cost,
             freedom,
             chi2_limit: chi_square(freedom, self.acceptance.confidence),
-            separation,
-            protection,
+            separation: left_out.one,
+            separation_two: left_out.two,
+            protection: left_out.protection,
         };
         Outcome::Referenced(Box::new(Reference {
             object_from_camera: hypothesis.pose,

@@ -24,9 +24,6 @@ pub use refusal::Refusal;
 
 use judge::Judge;
 
-/// The alert limit is at most this share of the model's diameter.
-const ALERT_SHARE: f64 = 0.05;
-
 /// One attempt at a fix, after Stage 1: Stage 2 (which cloud points are which model points), the
 /// rigid motion, and the tests that it must pass before it is believed.
 pub fn reference(
@@ -54,7 +51,7 @@ pub fn judge(
         Ok(found) => found,
         Err(why) => return Attempt::without(why),
     };
-    let alert_limit = alert_limit(problem.model, acceptance.alert_limit);
+    let alert_limit = alert_limit(problem.model, acceptance);
     let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
     let judge = Judge { problem, solver, acceptance, alert_limit, largest, rig };
     let likely = judge.size(&found.pairs).and_then(|()| match found.belief {
@@ -86,11 +83,12 @@ pub fn judge(
     }
 }
 
-/// Poses further apart than this (m) are different answers: `most`, or [`ALERT_SHARE`] of the model's diameter.
-fn alert_limit(model: &[ModelPoint], most: f64) -> f64 {
+/// Poses further apart than this (m) are different answers: the alert limit, or its share of the model's diameter.
+fn alert_limit(model: &[ModelPoint], acceptance: &Acceptance) -> f64 {
+    let (most, share) = (acceptance.alert_limit, acceptance.alert_share);
     // The diameter is no less than the longest side of the shell, which is found at once.
     let side = Shell::around(model.iter().map(|point| point.at)).map_or(0.0, |shell| (shell.max - shell.min).amax());
-    if ALERT_SHARE * side >= most { most } else { most.min(ALERT_SHARE * diameter(model)) }
+    if share * side >= most { most } else { most.min(share * diameter(model)) }
 }
 
 /// Whether the outcome stands whatever sets the search did not look at. These may contradict a fix, and

@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, World};
 use serde::{Deserialize, Serialize};
 
 use super::{Congruence, ModelPoint, Shell, Site, SiteObject, congruence};
-use crate::{Prior, PriorBound};
+use crate::{Member, Prior, PriorBound, Standing};
 
 /// What is searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -16,6 +16,9 @@ pub enum TargetKind {
     /// Each object by itself, in its own frame.
     #[default]
     Object,
+    /// Each object by itself, in its own frame; then all that were found, and those of the frames before, are solved
+    /// together, their surveyed places with the poses.
+    Joint,
     /// All points of the site at once, in the site's frame.
     Site,
 }
@@ -41,6 +44,8 @@ pub struct Target {
     pub world_from_object: Option<Transform<World, Object>>,
     /// How well that place is known; `None` where no world is known.
     pub survey: Option<Covariance6<World, Object>>,
+    /// For each object in it, in the site's order, the place of its first point; empty of an object by itself.
+    firsts: Vec<usize>,
     /// Computed when they are first asked for.
     congruences: OnceLock<Vec<Congruence>>,
 }
@@ -72,6 +77,30 @@ impl Target {
         Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) })
     }
 
+    /// The place among its points of a point of the site, given as (object, point) indices, when this is the
+    /// `index`-th target of its kind; `None` where it does not belong to it.
+    pub fn place_of(&self, index: usize, (object, point): (usize, usize)) -> Option<usize> {
+        let place = match self.firsts.is_empty() {
+            true => (object == index).then_some(point),
+            false => self.firsts.get(object).map(|first| first + point),
+        };
+        place.filter(|&place| place < self.points.len())
+    }
+
+    /// How well its place is known, as a joint fix takes it; the site's frame is then the world's. Without a survey
+    /// nothing but the images says where it stands.
+    pub fn member(&self) -> Member {
+        let site_from_object = self.world_from_object.map_or_else(Transform::identity, |place| place.relabel());
+        let standing = match (self.world_from_object, &self.survey) {
+            (None, _) => Standing::Displaced,
+            (Some(_), Some(survey)) if survey.matrix.trace() > 0.0 => {
+                Standing::Surveyed(Covariance6::new(survey.matrix))
+            }
+            (Some(_), _) => Standing::Exact,
+        };
+        Member { site_from_object, standing }
+    }
+
     /// The min–max shell of its points in its own frame.
     pub fn shell(&self) -> Shell<Object> {
         Shell::around(self.points.iter().map(|point| point.at)).expect("a target has at least three points")
@@ -83,6 +112,7 @@ impl Target {
             points: object.points.clone(),
             world_from_object: object.world_from_object,
             survey: object.survey_covariance(),
+            firsts: Vec::new(),
             congruences: OnceLock::new(),
         }
     }
@@ -105,7 +135,7 @@ pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
 /// The targets of a kind; see [`Site::targets`].
 pub(super) fn targets(site: &Site, kind: TargetKind) -> Result<Vec<Target>, NoWorld> {
     match kind {
-        TargetKind::Object => Ok(site.objects.iter().map(Target::of).collect()),
+        TargetKind::Object | TargetKind::Joint => Ok(site.objects.iter().map(Target::of).collect()),
         TargetKind::Site => Ok(vec![whole(site)?]),
     }
 }
@@ -113,7 +143,7 @@ pub(super) fn targets(site: &Site, kind: TargetKind) -> Result<Vec<Target>, NoWo
 /// All points of the site in the frame of its frame object, carried there through Eq. (1).
 fn whole(site: &Site) -> Result<Target, NoWorld> {
     let frame = site.frame_object();
-    let mut points = Vec::new();
+    let (mut points, mut firsts) = (Vec::new(), Vec::new());
     for (index, object) in site.objects.iter().enumerate() {
         let own = index == site.frame;
         let site_from_object: Transform<Object, Object> = if own {
@@ -122,6 +152,7 @@ fn whole(site: &Site) -> Result<Target, NoWorld> {
             let place = |o: &SiteObject| o.world_from_object.ok_or_else(|| NoWorld { object: o.id.clone() });
             (place(frame)?.inverse() * place(object)?).relabel()
         };
+        firsts.push(points.len());
         points.extend(object.points.iter().map(|point| {
             let at = site_from_object * point.at;
             // Within the frame object the survey cancels; to the others both surveys count, the more
@@ -143,6 +174,7 @@ fn whole(site: &Site) -> Result<Target, NoWorld> {
         points,
         world_from_object: frame.world_from_object,
         survey: frame.survey_covariance(),
+        firsts,
         congruences: OnceLock::new(),
     })
 }

@@ -25,6 +25,7 @@ impl Term {
 }
 
 /// All terms at one pose: normal equations of the step ξ in `pose · Exp(ξ)`.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Linearized {
     /// Σ Jᵀ W J: the information on ξ.
     normal: Normal,
@@ -60,6 +61,22 @@ pub(super) fn linearize(
 }
 
 impl Linearized {
+    /// With the terms of `other` besides.
+    pub(super) fn plus(mut self, other: &Self) -> Self {
+        self.normal.join(&other.normal);
+        self.gradient += other.gradient;
+        self.cost += other.cost;
+        self
+    }
+
+    /// What is left when the terms of `other`, which are among them, are left out.
+    pub(super) fn less(mut self, other: &Self) -> Self {
+        self.normal.remove(&other.normal);
+        self.gradient -= other.gradient;
+        self.cost -= other.cost;
+        self
+    }
+
     /// The covariance of ξ; `None` where some motion changes nothing that was measured.
     pub(super) fn covariance(&self) -> Option<Matrix6<f64>> {
         Some(self.normal.matrix().cholesky()?.inverse())
@@ -75,7 +92,7 @@ impl Linearized {
     }
 
     /// The step and its decrement gᵀ ξ: the square of its length in standard deviations.
-    fn step(&self, damping: f64) -> Option<(Vector6<f64>, f64)> {
+    pub(super) fn step(&self, damping: f64) -> Option<(Vector6<f64>, f64)> {
         let step = self.normal.solve(damping, &self.gradient)?;
         let decrement = self.gradient.dot(&step);
         decrement.is_finite().then_some((step, decrement))

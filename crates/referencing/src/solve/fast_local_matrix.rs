@@ -1,7 +1,7 @@
 //! Fast local matrix: the rotation linearised, a closed 6×6 solve, repeated.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, triad};
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use super::{
     descent::{Term, minimize},
     roots::widest,
     sandwich,
-    spread::check,
+    spread::{check, share},
 };
 use crate::Observations;
 
@@ -39,9 +39,7 @@ impl Component for FastLocalMatrix {
     const SOURCE: &'static str = "ours, after a phrase in Bobkov, Kudryashov, Inzartsev 2021";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 

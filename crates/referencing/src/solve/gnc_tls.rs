@@ -4,7 +4,13 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, irls::distance, kabsch::fit_weighted, sandwich, spread::check};
+use super::{
+    Degenerate, Solver,
+    irls::distance,
+    kabsch::fit_weighted,
+    sandwich,
+    spread::{check, share},
+};
 use crate::Observations;
 
 /// The motion of least Σ σ_k² min(d_k², c²), d_k = ‖C·H − P‖ / σ_k, σ_k² = tr(Σ_k + σ_model² I)/3, c the threshold: least
@@ -41,8 +47,7 @@ impl Component for GncTls {
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
         let grows = self.growth > 1.0 && self.growth <= 10.0;
         in_range(grows, "growth", self.growth, "a number above 1, at most 10")?;
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 

@@ -1,13 +1,13 @@
 //! Horn: unweighted least squares by unit quaternions.
 
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion};
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver, sandwich,
-    spread::{centroid, check},
+    spread::{centroid, check, share},
 };
 use crate::Observations;
 
@@ -32,9 +32,7 @@ impl Component for Horn {
     const SOURCE: &'static str = "Horn, Closed-form solution of absolute orientation using unit quaternions, 1987";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 

@@ -4,7 +4,12 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, kabsch::fit_weighted, spread::check, weighted_kabsch::variance};
+use super::{
+    Degenerate, Solver,
+    kabsch::fit_weighted,
+    spread::{check, share},
+    weighted_kabsch::variance,
+};
 use crate::{Observation, Observations};
 
 /// What a residual costs.
@@ -49,8 +54,7 @@ impl Component for Irls {
         // Written so that a NaN is refused too.
         let positive = self.threshold > 0.0 && self.threshold.is_finite();
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 

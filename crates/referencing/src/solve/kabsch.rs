@@ -1,11 +1,14 @@
 //! Kabsch: unweighted least squares over the rigid motions.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, sandwich, spread::check};
+use super::{
+    Degenerate, Solver, sandwich,
+    spread::{check, share},
+};
 use crate::{Observation, Observations};
 
 /// The rigid motion of least squared residuals, min Σ ‖P_k − C_k H‖² over SE(3): the paper's
@@ -33,9 +36,7 @@ impl Component for Kabsch {
                                   Umeyama, Least-squares estimation of transformation parameters, 1991";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 

@@ -2,17 +2,13 @@
 
 use argmin::core::Executor;
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
-use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Covariance6, Object, Transform};
+use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver, StereoReprojection,
-    pixel_cost::{PixelCost, nothing},
-    spread::{check, in_front},
-    stereo_reprojection::pixels_and_rig,
+    Degenerate,
+    pixel_cost::{Best, Optimiser, PixelCost},
 };
-use crate::Observations;
 
 /// The pose of least Σ rᵀ S⁻¹ r over the pixels of both images, the cost of `stereo-reprojection`, by limited-memory
 /// BFGS with Moré's and Thuente's line search on six numbers and a numerical gradient: an independent judge of our own
@@ -39,46 +35,28 @@ impl Component for LBfgs {
         "Liu, Nocedal, On the limited memory BFGS method for large scale optimization, 1989; the crate argmin";
 
     fn check(&self) -> Result<(), String> {
-        let some = (1..=1_000_000).contains(&self.iterations);
-        in_range(some, "iterations", self.iterations, "1 to 1000000")?;
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        self.check_limits()
     }
 }
 
-impl Solver for LBfgs {
-    fn needs_pixels(&self) -> bool {
-        true
+impl Optimiser for LBfgs {
+    fn limits(&self) -> (u64, f64) {
+        (self.iterations, self.least_ratio)
     }
 
-    fn to_rounding(&self) -> bool {
-        false
-    }
-
-    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
-        let rig = pixels_and_rig(data)?;
-        in_front(data)?;
-        let best = nothing();
-        let cost = PixelCost::of(data, rig, &best)?;
+    fn lower<'a>(
+        &self,
+        cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
+        _best: &'a Best,
+    ) -> Result<(), Degenerate> {
         let search = MoreThuenteLineSearch::new().with_c(1e-4, 0.9).map_err(|_| Degenerate::Singular)?;
         let method = LBFGS::new(search, 7).with_tolerance_grad(1e-8).and_then(|m| m.with_tolerance_cost(0.0));
         let method = method.map_err(|_| Degenerate::Singular)?;
         // An error means that the line search found no lower place: where the digits end. The best seen is the answer.
-        let _ = Executor::new(cost, method)
+        let _ = Executor::new(cost()?, method)
             .configure(|state| state.param(vec![0.0; 6]).max_iters(self.iterations))
             .timer(false)
             .run();
-        Ok(PixelCost::of(data, rig, &best)?.pose(&best.borrow().1))
-    }
-
-    /// That of the likelihood whose maximum this is.
-    fn covariance(
-        &self,
-        data: &Observations<'_>,
-        at: &Transform<Object, Camera>,
-    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        StereoReprojection::default().covariance(data, at)
+        Ok(())
     }
 }

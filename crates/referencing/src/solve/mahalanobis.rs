@@ -11,7 +11,7 @@ use super::{
     descent::{Term, linearize, minimize},
     kabsch,
     sightings::{FEW, Sightings, Target},
-    spread::{check, in_front},
+    spread::{check, share},
     starts::likeliest,
 };
 use crate::{Observation, Observations};
@@ -49,9 +49,7 @@ impl Component for Mahalanobis {
 
     fn check(&self) -> Result<(), String> {
         in_range((1..=5).contains(&self.starts), "starts", self.starts, "1 to 5")?;
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 
@@ -63,7 +61,6 @@ impl Solver for Mahalanobis {
             let term = |k: usize, at: &_| Some(measured.term(k, at));
             return minimize(&data.points, &start, &term).ok_or(Degenerate::NotFinite);
         };
-        in_front(data)?;
         let mut sightings = Sightings::new(rig);
         sightings.see(&data.points, Target::Triangulated).ok_or(Degenerate::Singular)?;
         likeliest(data, rig, self.starts, &sightings).ok_or(Degenerate::Singular)
@@ -74,22 +71,27 @@ impl Solver for Mahalanobis {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        let information = match self.rig(data) {
-            Some(rig) => {
-                let mut all = Sightings::new(rig);
-                let seen = all.see(&data.points, Target::Triangulated);
-                seen.and_then(|()| linearize(&data.points, at, &|k, place: &_| all.live(k, place)))
-            }
-            None => {
-                let measured = Measured::of(&data.points);
-                linearize(&data.points, at, &|k, place: &_| Some(measured.term(k, place)))
-            }
-        };
+        let information = self.with_terms(data, |term| linearize(&data.points, at, &term));
         information.and_then(|all| all.covariance()).map(Covariance6::new).ok_or(Degenerate::Singular)
     }
 }
 
 impl Mahalanobis {
+    /// What `work` makes of the points' terms.
+    pub(super) fn with_terms<R>(
+        &self,
+        data: &Observations<'_>,
+        work: impl FnOnce(&dyn Fn(usize, &Vector3<f64>) -> Option<Term>) -> Option<R>,
+    ) -> Option<R> {
+        let Some(rig) = self.rig(data) else {
+            let measured = Measured::of(&data.points);
+            return work(&|k, place| Some(measured.term(k, place)));
+        };
+        let mut all = Sightings::new(rig);
+        all.see(&data.points, Target::Triangulated)?;
+        work(&|k, place| all.live(k, place))
+    }
+
     fn rig<'a>(&self, data: &Observations<'a>) -> Option<&'a StereoRig> {
         data.rig.filter(|_| self.refit && data.points.iter().any(|point| point.pixels.is_some()))
     }

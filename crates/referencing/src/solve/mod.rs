@@ -5,6 +5,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::Observations;
 
+pub(crate) mod deletion;
 mod descent;
 mod eyes;
 mod fast_local_matrix;
@@ -71,6 +72,17 @@ pub enum Degenerate {
         /// Its depth (m), zero or less.
         depth: f64,
     },
+    /// All points are so far away that the two cameras see them from one place.
+    #[error(
+        "even the best measured distance is uncertain by {share:.2} of itself, at most {most:.2} is accepted: the \
+         points are too far away for the baseline"
+    )]
+    Far {
+        /// Least standard deviation of a distance over the distance.
+        share: f64,
+        /// The most accepted.
+        most: f64,
+    },
     /// The solver looks at pixels, and there are none, or no rig.
     #[error("the points have no pixels or there is no rig; `mahalanobis` takes points alone")]
     NoPixels,
@@ -93,11 +105,10 @@ pub enum Degenerate {
     NotFinite,
 }
 
-/// Refuses what determines no pose: fewer than three points, numbers that are not finite, points on a line or behind
-/// the camera.
+/// Refuses what determines no pose: fewer than three points, numbers that are not finite, points on a line and, seen by a
+/// rig, behind the camera or too far away.
 pub(crate) fn wide_enough(data: &Observations<'_>) -> Result<(), Degenerate> {
-    spread::check(data, 3, 1e-3)?;
-    spread::in_front(data)
+    spread::check(data, 3, 1e-3)
 }
 
 /// Computes the rigid motion that carries observed points onto model points.

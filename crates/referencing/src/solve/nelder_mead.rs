@@ -2,17 +2,13 @@
 
 use argmin::core::Executor;
 use argmin::solver::neldermead;
-use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Covariance6, Object, Transform};
+use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver, StereoReprojection,
-    pixel_cost::{PixelCost, nothing},
-    spread::{check, in_front},
-    stereo_reprojection::pixels_and_rig,
+    Degenerate,
+    pixel_cost::{Best, Optimiser, PixelCost},
 };
-use crate::Observations;
 
 /// The pose of least Σ rᵀ S⁻¹ r over the pixels of both images, the cost of `stereo-reprojection`, by a simplex of seven
 /// poses, begun anew from its own answer until that gains nothing: an independent judge that no error of a
@@ -38,31 +34,23 @@ impl Component for NelderMead {
     const SOURCE: &'static str = "Nelder, Mead, A simplex method for function minimization, 1965; the crate argmin";
 
     fn check(&self) -> Result<(), String> {
-        let some = (1..=1_000_000).contains(&self.iterations);
-        in_range(some, "iterations", self.iterations, "1 to 1000000")?;
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        self.check_limits()
     }
 }
 
 /// Simplices begun at most.
 const MOST_ROUNDS: usize = 20;
 
-impl Solver for NelderMead {
-    fn needs_pixels(&self) -> bool {
-        true
+impl Optimiser for NelderMead {
+    fn limits(&self) -> (u64, f64) {
+        (self.iterations, self.least_ratio)
     }
 
-    fn to_rounding(&self) -> bool {
-        false
-    }
-
-    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
-        let rig = pixels_and_rig(data)?;
-        in_front(data)?;
-        let best = nothing();
+    fn lower<'a>(
+        &self,
+        cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
+        best: &'a Best,
+    ) -> Result<(), Degenerate> {
         let mut size = 5.0;
         for _ in 0..MOST_ROUNDS {
             let (before, centre) = best.borrow().clone();
@@ -75,22 +63,13 @@ impl Solver for NelderMead {
             };
             let method = neldermead::NelderMead::new((0..7).map(corner).collect()).with_sd_tolerance(1e-15);
             let method = method.map_err(|_| Degenerate::Singular)?;
-            let cost = PixelCost::of(data, rig, &best)?;
-            let _ = Executor::new(cost, method).configure(|state| state.max_iters(self.iterations)).timer(false).run();
+            let _ =
+                Executor::new(cost()?, method).configure(|state| state.max_iters(self.iterations)).timer(false).run();
             if before - best.borrow().0 < 1e-10 {
                 break;
             }
             size = f64::max(0.1, 0.5 * size);
         }
-        Ok(PixelCost::of(data, rig, &best)?.pose(&best.borrow().1))
-    }
-
-    /// That of the likelihood whose maximum this is.
-    fn covariance(
-        &self,
-        data: &Observations<'_>,
-        at: &Transform<Object, Camera>,
-    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        StereoReprojection::default().covariance(data, at)
+        Ok(())
     }
 }

@@ -29,6 +29,20 @@ impl Normal {
         self.shift += w;
     }
 
+    /// Adds what others have added.
+    pub(super) fn join(&mut self, other: &Self) {
+        self.turn += other.turn;
+        self.mixed += other.mixed;
+        self.shift += other.shift;
+    }
+
+    /// Takes away what was added.
+    pub(super) fn remove(&mut self, other: &Self) {
+        self.turn -= other.turn;
+        self.mixed -= other.mixed;
+        self.shift -= other.shift;
+    }
+
     pub(super) fn matrix(&self) -> Matrix6<f64> {
         let mut all = Matrix6::zeros();
         all.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.turn);

@@ -1,6 +1,6 @@
 //! P3P with two cameras: the minimal solver of pixels.
 
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use super::{
     kabsch,
     roots::{Roots, squares, widest},
     sightings::{Sightings, Target},
-    spread::{check, in_front},
+    spread::{check, share},
     stereo_reprojection::pixels_and_rig,
 };
 use crate::Observations;
@@ -41,9 +41,7 @@ impl Component for P3pStereo {
         "Persson, Nordberg, Lambda Twist: an accurate fast robust perspective three point solver, 2018";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 
@@ -55,7 +53,6 @@ impl Solver for P3pStereo {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         let rig = pixels_and_rig(data)?;
-        in_front(data)?;
         let chosen = widest(data);
         let three = Observations { points: chosen.map(|i| data.points[i]).to_vec(), rig: data.rig };
         check(&three, self.minimum(), self.least_ratio)?;

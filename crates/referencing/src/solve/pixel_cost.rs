@@ -4,10 +4,58 @@ use std::cell::RefCell;
 
 use argmin::core::{CostFunction, Error, Gradient};
 use nalgebra::{Matrix4, Matrix6, Vector6};
-use seafix_geometry::{Camera, Object, StereoRig, Transform};
+use seafix_component::in_range;
+use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
-use super::{Degenerate, kabsch};
+use super::{
+    Degenerate, Solver, StereoReprojection, kabsch,
+    spread::{check, share},
+    stereo_reprojection::pixels_and_rig,
+};
 use crate::{Observation, Observations};
+
+/// A general-purpose optimiser: it lowers a [`PixelCost`] and is a [`Solver`] by that.
+pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
+    /// Iterations at most, and the second extent of the points over the first below which they count as a line.
+    fn limits(&self) -> (u64, f64);
+
+    /// Lowers the cost that `cost` makes anew, from `best` on; the best place seen is left there.
+    fn lower<'a>(&self, cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>, best: &'a Best)
+    -> Result<(), Degenerate>;
+
+    /// What is wrong with the limits.
+    fn check_limits(&self) -> Result<(), String> {
+        let (iterations, least_ratio) = self.limits();
+        in_range((1..=1_000_000).contains(&iterations), "iterations", iterations, "1 to 1000000")?;
+        share("least-ratio", least_ratio)
+    }
+}
+
+impl<T: Optimiser> Solver for T {
+    fn needs_pixels(&self) -> bool {
+        true
+    }
+
+    fn to_rounding(&self) -> bool {
+        false
+    }
+
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        check(data, self.minimum(), self.limits().1)?;
+        let (rig, best) = (pixels_and_rig(data)?, RefCell::new((f64::INFINITY, vec![0.0; 6])));
+        self.lower(|| PixelCost::of(data, rig, &best), &best)?;
+        Ok(PixelCost::of(data, rig, &best)?.pose(&best.borrow().1))
+    }
+
+    /// That of the likelihood whose maximum this is.
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        StereoReprojection::default().covariance(data, at)
+    }
+}
 
 /// The best place seen: its cost and its six numbers.
 pub(super) type Best = RefCell<(f64, Vec<f64>)>;
@@ -109,9 +157,4 @@ impl Gradient for PixelCost<'_> {
         };
         Ok((0..6).map(&mut by).collect())
     }
-}
-
-/// Nothing seen yet.
-pub(super) fn nothing() -> Best {
-    RefCell::new((f64::INFINITY, vec![0.0; 6]))
 }

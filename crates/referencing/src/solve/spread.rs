@@ -1,9 +1,15 @@
 //! How far points spread: what tells a line from a plane.
 
 use nalgebra::{Matrix3, Vector3};
+use seafix_component::in_range;
 
 use super::Degenerate;
 use crate::{Observation, Observations};
+
+/// Whether the setting `key` is a share that leaves something: from 0 to below 1.
+pub(super) fn share(key: &str, value: f64) -> Result<(), String> {
+    in_range((0.0..1.0).contains(&value), key, value, "a share from 0 to below 1")
+}
 
 /// The centroid of points.
 pub(crate) fn centroid(points: impl ExactSizeIterator<Item = Vector3<f64>>) -> Vector3<f64> {
@@ -46,9 +52,20 @@ pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degen
     if data.points.iter().all(Observation::is_finite) { Ok(()) } else { Err(Degenerate::NotFinite) }
 }
 
-/// Refuses what [`finite`] refuses, and points (measured or model) on a line: second extent below `least` of the first.
-pub(super) fn check(data: &Observations<'_>, needed: usize, least: f64) -> Result<(), Degenerate> {
+/// Refuses what [`finite`] refuses and, where a rig is given, points that it cannot have seen, or too far away to be
+/// measured by it.
+pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
     finite(data, needed)?;
+    if data.rig.is_some() {
+        in_front(data)?;
+        near(data)?;
+    }
+    Ok(())
+}
+
+/// Refuses what [`seen`] refuses, and points (measured or model) on a line: second extent below `least` of the first.
+pub(super) fn check(data: &Observations<'_>, needed: usize, least: f64) -> Result<(), Degenerate> {
+    seen(data, needed)?;
     let model = data.points.iter().map(|point| point.model.coords);
     let measured = data.points.iter().map(|point| point.measured.at.coords);
     if clearly_wide(model.clone(), least) && clearly_wide(measured.clone(), least) {
@@ -59,8 +76,30 @@ pub(super) fn check(data: &Observations<'_>, needed: usize, least: f64) -> Resul
     if ratio >= least { Ok(()) } else { Err(Degenerate::Collinear { ratio, least }) }
 }
 
+/// A distance known to no better than this share of itself is none: the parallax is within three of its standard
+/// deviations of nought.
+const FAR: f64 = 1.0 / 3.0;
+
+/// Refuses points so far away that not one distance is known to [`FAR`] of itself: two views of them are one view.
+fn near(data: &Observations<'_>) -> Result<(), Degenerate> {
+    // σ_d / d of a rectified rig, of any rig the same: the standard deviation along the line of sight over its length.
+    let square = |point: &Observation| {
+        let (at, covariance) = (&point.measured.at.coords, &point.measured.covariance);
+        let length = at.norm_squared();
+        at.dot(&(covariance * at)) / (length * length)
+    };
+    let mut best = f64::INFINITY;
+    for point in &data.points {
+        best = best.min(square(point));
+        if best <= FAR * FAR {
+            return Ok(());
+        }
+    }
+    Err(Degenerate::Far { share: best.sqrt(), most: FAR })
+}
+
 /// Refuses points measured behind the left camera: where a rig is given, they were seen.
-pub(super) fn in_front(data: &Observations<'_>) -> Result<(), Degenerate> {
+fn in_front(data: &Observations<'_>) -> Result<(), Degenerate> {
     let behind = data.points.iter().position(|point| !(point.measured.at.coords.z > 0.0));
     behind.map_or(Ok(()), |index| Err(Degenerate::Behind { index, depth: data.points[index].measured.at.coords.z }))
 }

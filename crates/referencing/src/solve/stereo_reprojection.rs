@@ -8,7 +8,7 @@ use super::{
     Degenerate, Solver,
     descent::linearize,
     sightings::{Sightings, Target},
-    spread::{check, in_front},
+    spread::{check, share},
     starts::likeliest,
 };
 use crate::Observations;
@@ -43,9 +43,7 @@ impl Component for StereoReprojection {
 
     fn check(&self) -> Result<(), String> {
         in_range((1..=5).contains(&self.starts), "starts", self.starts, "1 to 5")?;
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 
@@ -57,7 +55,6 @@ impl Solver for StereoReprojection {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         let rig = pixels_and_rig(data)?;
-        in_front(data)?;
         let mut sightings = Sightings::new(rig);
         sightings.see(&data.points, Target::Pixels).ok_or(Degenerate::Singular)?;
         likeliest(data, rig, self.starts, &sightings).ok_or(Degenerate::Singular)

@@ -220,3 +220,107 @@ fn truncated_squares_leave_outliers_out() {
         assert!(motion().error_to(&robust).norm() < 0.7 * motion().error_to(&plain).norm(), "{loss:?}");
     }
 }
+
+/// Every solver, pixels at hand: whatever the geometry lacks is refused by all, with the number that failed.
+#[test]
+fn degenerate_views_are_refused_with_the_number_that_failed() {
+    let rig = rig();
+    let view = |places: &[[f64; 3]]| {
+        let pose = motion();
+        let points = places.iter().map(|at| {
+            let place = Point::from(*at);
+            let pixels = UncertainPixels::independent(rig.project(&place).unwrap(), 0.3);
+            let found = rig.triangulate(&pixels).unwrap();
+            let measured = UncertainPoint { at: found.point, covariance: found.covariance };
+            Observation { measured, pixels: Some(pixels), model: pose * place, model_sigma: 0.0 }
+        });
+        Observations { points: points.collect(), rig: Some(&rig) }
+    };
+    let good = [[0.0, 0.0, 3.0], [0.8, 0.1, 3.2], [-0.4, 0.6, 2.8], [0.3, -0.5, 3.5]];
+    let line = [0.0, 1.0, 2.0, 3.0].map(|k| [-0.6 + 0.4 * k, 0.1 * k, 3.0 + 0.2 * k]);
+    let far = good.map(|[x, y, z]| [x * 100.0, y * 100.0, z * 100.0]);
+    let plate = [[0.0, 0.0, 3.0], [0.8, 0.1, 3.0], [-0.4, 0.6, 3.0], [0.3, -0.5, 3.0]];
+    for name in SOLVERS.names() {
+        let solver = SOLVERS.build(&seafix_component::Choice::named(name)).unwrap();
+        assert!(solver.solve(&view(&good)).is_ok(), "{name}");
+        match solver.solve(&view(&line)) {
+            Err(Degenerate::Collinear { ratio, least }) => assert!(ratio < least, "{name}: {ratio}"),
+            other => panic!("{name}: a line gives {other:?}"),
+        }
+        match solver.solve(&view(&far)) {
+            Err(Degenerate::Far { share, most }) => assert!(share > most && share < 10.0, "{name}: {share}"),
+            other => panic!("{name}: all points far give {other:?}"),
+        }
+        let mut behind = view(&good);
+        behind.points[2].measured.at.coords.z *= -1.0;
+        match solver.solve(&behind) {
+            Err(Degenerate::Behind { index: 2, depth }) => assert!(depth < 0.0),
+            other => panic!("{name}: a point behind gives {other:?}"),
+        }
+        // One disparity alone is no fault: a plate seen from the front determines its pose.
+        let pose = solver.solve(&view(&plate)).unwrap();
+        assert!(motion().error_to(&pose).amax() < 1e-4, "{name}: {pose:?}");
+    }
+}
+
+/// The gradient and the normal equations of a pose, at random poses and with every kind of weight: J against central
+/// differences of the projections, the gradient against those of χ², ≤ 1e-6 of the largest.
+#[test]
+fn derivatives_are_those_of_the_projections_at_random_poses() {
+    use super::{
+        descent::linearize,
+        sightings::{Sightings, Target},
+    };
+    let rig = rig();
+    let mut rng = ChaCha8Rng::seed_from_u64(46);
+    for round in 0..50 {
+        let (mut data, truth) = through_a_rig(&rig);
+        let model_sigma = if round % 2 == 0 { 0.0 } else { 3e-3 };
+        for point in &mut data.points {
+            point.model_sigma = model_sigma;
+            let pixels = point.pixels.as_mut().unwrap();
+            pixels.at.left.u += rng.random_range(-0.5..0.5);
+            pixels.at.right.v += rng.random_range(-0.5..0.5);
+        }
+        let pose = truth.perturbed(&Vector6::from_fn(|_, _| rng.random_range(-0.05..0.05)));
+        let mut sightings = Sightings::new(&rig);
+        sightings.see(&data.points, Target::Pixels).unwrap();
+        let at = |pose: &Transform<Object, Camera>, live: bool| {
+            let term = |k: usize, place: &Vector3<f64>| match live {
+                true => sightings.live(k, place),
+                false => sightings.frozen(k, place),
+            };
+            linearize(&data.points, pose, &term).unwrap()
+        };
+        // χ² of the frozen weights: the gradient is minus half of its derivative.
+        let here = at(&pose, false);
+        for i in 0..6 {
+            let cost = |size: f64| at(&pose.perturbed(&Vector6::ith(i, size)), false).cost;
+            let expected = -(cost(1e-5) - cost(-1e-5)) / 4e-5;
+            let off = (here.gradient[i] - expected).abs();
+            assert!(off < 1e-6 * here.gradient.amax(), "round {round}, {i}: {} for {expected}", here.gradient[i]);
+        }
+        // Σ Jᵀ (Σ_px + σ² D Dᵀ)⁻¹ J with J and D by differences: what the live terms add up to.
+        let mut information = nalgebra::Matrix6::zeros();
+        for point in &data.points {
+            let project = |pose: &Transform<Object, Camera>, model: &Point<Object>| {
+                rig.project(&(pose.inverse() * *model)).unwrap().coordinates()
+            };
+            let mut j = nalgebra::Matrix4x6::zeros();
+            for i in 0..6 {
+                let by = |size: f64| project(&pose.perturbed(&Vector6::ith(i, size)), &point.model);
+                j.set_column(i, &((by(1e-5) - by(-1e-5)) / 2e-5));
+            }
+            let mut d = nalgebra::Matrix4x3::zeros();
+            for i in 0..3 {
+                let by = |size: f64| project(&pose, &(point.model + Vector3::ith(i, size)));
+                d.set_column(i, &((by(1e-5) - by(-1e-5)) / 2e-5));
+            }
+            let noise = point.pixels.unwrap().covariance + d * d.transpose() * model_sigma.powi(2);
+            information += j.transpose() * noise.try_inverse().unwrap() * j;
+        }
+        let expected = information.try_inverse().unwrap();
+        let off = (at(&pose, true).covariance().unwrap() - expected).amax() / expected.amax();
+        assert!(off < 1e-6, "round {round}: {off}");
+    }
+}

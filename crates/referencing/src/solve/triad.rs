@@ -1,11 +1,14 @@
 //! Triad: the paper's pose from three identified points.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, numerical, spread::finite};
+use super::{
+    Degenerate, Solver, numerical,
+    spread::{seen, share},
+};
 use crate::{Observation, Observations};
 
 /// Which three of the identified points the pose rests on ("the three most reliable", which the
@@ -46,9 +49,7 @@ impl Component for Triad {
          underwater vehicles to man-made objects using stereo images, 2021";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
-        let share = self.least_sine >= 0.0 && self.least_sine < 1.0;
-        in_range(share, "least-sine", self.least_sine, "a sine from 0 to below 1")
+        share("least-sine", self.least_sine)
     }
 }
 
@@ -79,29 +80,26 @@ impl Solver for Triad {
 impl Triad {
     /// The three points the pose rests on, ascending.
     fn three(&self, data: &Observations<'_>) -> Result<[usize; 3], Degenerate> {
-        finite(data, 3)?;
+        seen(data, 3)?;
+        let wide = |three: [usize; 3]| least_sine(&three.map(|i| &data.points[i])) >= self.least_sine;
+        if self.choose == Choose::LargestArea
+            && let Some(three) = largest(&data.points).filter(|&three| wide(three))
+        {
+            return Ok(three);
+        }
         let mut best: Option<([usize; 3], f64)> = None;
-        for three in triangles(data.points.len()) {
-            let points = three.map(|i| &data.points[i]);
-            // The cheaper test first: a triangle that is no larger than the best needs no second look.
+        for three in triangles(data.points.len()).filter(|&three| wide(three)) {
             let worth = match self.choose {
-                Choose::LargestArea => square_area(&points),
-                Choose::First | Choose::SmallestCovariance => 0.0,
+                Choose::First => return Ok(three),
+                Choose::LargestArea => square_area(&three.map(|i| &data.points[i])),
+                Choose::SmallestCovariance => match predicted_error(&three.map(|i| data.points[i]), data) {
+                    Ok(error) => -error,
+                    Err(_) => continue,
+                },
             };
             // Ties are broken by the order of the model: strictly better replaces.
-            let better = |worth: f64| best.is_none_or(|(_, most)| worth > most);
-            let wide = |points: &[&Observation; 3]| least_sine(points) >= self.least_sine;
-            match self.choose {
-                Choose::First if wide(&points) => return Ok(three),
-                Choose::LargestArea if better(worth) && wide(&points) => best = Some((three, worth)),
-                Choose::SmallestCovariance if wide(&points) => {
-                    if let Ok(error) = predicted_error(&points.map(|point| *point), data)
-                        && better(-error)
-                    {
-                        best = Some((three, -error));
-                    }
-                }
-                _ => {}
+            if best.is_none_or(|(_, most)| worth > most) {
+                best = Some((three, worth));
             }
         }
         best.map(|(three, _)| three).ok_or_else(|| self.line(data))
@@ -114,11 +112,80 @@ impl Triad {
     }
 }
 
+/// The k-th of the points that are weighed, of `count`: all, or an even sample of many.
+fn weighed(count: usize, k: usize) -> usize {
+    if count <= MOST_WEIGHED { k } else { k * count / MOST_WEIGHED }
+}
+
 /// All triangles of `count` points, lexicographic; of many points, those of an even sample.
 fn triangles(count: usize) -> impl Iterator<Item = [usize; 3]> {
     let kept = count.min(MOST_WEIGHED);
-    let at = move |i: usize| if kept == count { i } else { i * count / kept };
+    let at = move |i: usize| weighed(count, i);
     (0..kept).flat_map(move |i| (i + 1..kept).flat_map(move |j| (j + 1..kept).map(move |k| [at(i), at(j), at(k)])))
+}
+
+/// The triangle of largest area in the model among those of [`triangles`], ascending; `None` where all points coincide.
+///
+/// Exact, though few triangles are looked at: on a longest side of length L none has more than √3/4 L², so that a
+/// side too short for the best area known needs no third point. A greedy triangle makes the first best one large.
+fn largest(points: &[Observation]) -> Option<[usize; 3]> {
+    let kept = points.len().min(MOST_WEIGHED);
+    let (mut x, mut y, mut z) = ([0.0; MOST_WEIGHED], [0.0; MOST_WEIGHED], [0.0; MOST_WEIGHED]);
+    for k in 0..kept {
+        let at = &points[weighed(points.len(), k)].model.coords;
+        (x[k], y[k], z[k]) = (at.x, at.y, at.z);
+    }
+    let (x, y, z) = (&x[..kept], &y[..kept], &z[..kept]);
+    let side = |i: usize, j: usize| (x[j] - x[i], y[j] - y[i], z[j] - z[i]);
+    let square = |i: usize, j: usize| {
+        let (a, b, c) = side(i, j);
+        a * a + b * b + c * c
+    };
+    // Four times the square of the area, over all third points: the greatest and its place.
+    let third = |i: usize, j: usize| {
+        let (a, b, c) = side(i, j);
+        let mut worth = [0.0; MOST_WEIGHED];
+        for (k, worth) in worth[..kept].iter_mut().enumerate() {
+            let (d, e, f) = (x[k] - x[i], y[k] - y[i], z[k] - z[i]);
+            let (u, v, w) = (b * f - c * e, c * d - a * f, a * e - b * d);
+            *worth = u * u + v * v + w * w;
+        }
+        first_greatest(&worth[..kept])
+    };
+    let farthest = |i: usize| {
+        let mut away = [0.0; MOST_WEIGHED];
+        away[..kept].iter_mut().enumerate().for_each(|(k, away)| *away = square(i, k));
+        first_greatest(&away[..kept]).0
+    };
+    let one = farthest(0);
+    let two = farthest(one);
+    let (three, mut most) = third(one, two);
+    let mut best = [one, two, three];
+    for i in 0..kept {
+        for j in i + 1..kept {
+            let length = square(i, j);
+            // Strictly: what only equals the best is left.
+            if 0.75 * length * length > most {
+                let (k, worth) = third(i, j);
+                if worth > most {
+                    (best, most) = ([i, j, k], worth);
+                }
+            }
+        }
+    }
+    best.sort_unstable();
+    (most > 0.0).then(|| best.map(|k| weighed(points.len(), k)))
+}
+
+/// The greatest of some numbers and the first place where it stands.
+fn first_greatest(values: &[f64]) -> (usize, f64) {
+    let mut best = (0, f64::NEG_INFINITY);
+    for (k, &value) in values.iter().enumerate() {
+        if value > best.1 {
+            best = (k, value);
+        }
+    }
+    best
 }
 
 /// Eq. (3)–(5): the axes of both auxiliary frames laid on each other, R = M_object M_cameraᵀ, and P1 on C1.
@@ -191,6 +258,36 @@ mod tests {
         let expected = triad::<Camera, Object>(&pa, &pb, &pc).unwrap().rotation_matrix();
         assert!((axes(&a, &b, &c).unwrap() - expected).amax() < 1e-15);
         assert!(axes(&a, &a, &c).is_err() && axes(&a, &b, &(a + (b - a) * 2.0)).is_err());
+    }
+
+    /// Points in a box, by a small generator: the corners of a triangle are any of them.
+    fn scattered(count: usize, seed: u64) -> Vec<Observation> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let point = |_| {
+            let at = Point::new(next() * 1.4, next(), 3.0 + 0.6 * next());
+            let measured = seafix_geometry::UncertainPoint::isotropic(at, 1e-3);
+            Observation { measured, pixels: None, model: Point::from(at.coords), model_sigma: 0.0 }
+        };
+        (0..count).map(point).collect()
+    }
+
+    #[test]
+    fn the_bounded_search_finds_the_largest_triangle() {
+        for (count, seed) in (3..30).flat_map(|count| (0..20).map(move |seed| (count, seed))).chain([(90, 1), (200, 2)])
+        {
+            let points = scattered(count, seed);
+            let area = |three: [usize; 3]| square_area(&three.map(|i| &points[i]));
+            let most = triangles(count).map(area).fold(0.0, f64::max);
+            let found = area(largest(&points).unwrap());
+            assert!((found / most - 1.0).abs() < 1e-12, "{count} points, seed {seed}: {found} of {most}");
+        }
+        let mut one_place = scattered(5, 1);
+        one_place.iter_mut().for_each(|point| point.model = Point::origin());
+        assert_eq!(largest(&one_place), None);
     }
 
     #[test]

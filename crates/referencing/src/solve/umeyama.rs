@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver, sandwich,
-    spread::{centroid, check},
+    spread::{centroid, check, share},
 };
 use crate::Observations;
 
@@ -38,9 +38,7 @@ impl Component for Umeyama {
                                   patterns, 1991";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")?;
+        share("least-ratio", self.least_ratio)?;
         in_range(self.most_scale_error > 0.0, "most-scale-error", self.most_scale_error, "a positive number")
     }
 }

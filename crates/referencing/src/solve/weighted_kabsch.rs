@@ -1,10 +1,15 @@
 //! Weighted Kabsch: one number a point says how well it is known.
 
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{Degenerate, Solver, kabsch::fit_weighted, sandwich, spread::check};
+use super::{
+    Degenerate, Solver,
+    kabsch::fit_weighted,
+    sandwich,
+    spread::{check, share},
+};
 use crate::{Observation, Observations};
 
 /// The motion of least Σ w_k ‖P_k − C_k H‖² with w_k = 3 / tr(Σ_k + σ_model² I): near points count more than far ones.
@@ -29,9 +34,7 @@ impl Component for WeightedKabsch {
                                   Sorkine-Hornung, Rabinovich, Least-squares rigid motion using SVD, 2017";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
-        let share = self.least_ratio >= 0.0 && self.least_ratio < 1.0;
-        in_range(share, "least-ratio", self.least_ratio, "a share from 0 to below 1")
+        share("least-ratio", self.least_ratio)
     }
 }
 

@@ -1,9 +1,11 @@
 //! Figures.
 
+mod field;
 mod marks;
 mod picture;
 mod plot;
 
+pub(crate) use field::{Cell, Field, field};
 pub(crate) use picture::Picture;
 pub(crate) use plot::{Panel, Plot, Series, Value, plot};
 

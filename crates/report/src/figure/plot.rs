@@ -53,7 +53,7 @@ const TOP: f64 = 10.0;
 const BOTTOM: f64 = 44.0;
 
 /// Coordinates with two decimals: the same text on every machine.
-fn c(value: f64) -> String {
+pub(super) fn c(value: f64) -> String {
     format!("{value:.2}")
 }
 
@@ -175,7 +175,7 @@ fn colour(index: usize) -> &'static str {
 }
 
 /// Another shape for every series: circle, square, triangle, diamond.
-fn mark(index: usize, x: f64, y: f64) -> Markup {
+pub(super) fn mark(index: usize, x: f64, y: f64) -> Markup {
     let fill = colour(index);
     html! {
         @match index % 4 {
@@ -188,7 +188,7 @@ fn mark(index: usize, x: f64, y: f64) -> Markup {
 }
 
 /// A tick without needless zeros.
-fn tick_text(tick: f64) -> String {
+pub(super) fn tick_text(tick: f64) -> String {
     let text = format!("{tick:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     format::number(text.parse().ok(), text.split_once('.').map_or(0, |(_, decimals)| decimals.len()))

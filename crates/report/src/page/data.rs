@@ -12,7 +12,7 @@ use crate::{
 
 pub(super) fn section(run: &Run, summary: &Summary) -> Markup {
     let of = |say: fn(&TrialHeader) -> String| distinct(run.trials.iter().map(|trial| say(&trial.header))).join("; ");
-    let frames = distinct(run.trials.iter().map(|trial| counted(trial.frames.len(), "frame", "frames"))).join(", ");
+    let frames = distinct(run.trials.iter().map(|trial| counted(trial.count(), "frame", "frames"))).join(", ");
     let measured: Vec<f64> = summary.rows.iter().filter_map(|row| row.disparity_sigma).collect();
     let measured = measured.iter().fold([f64::INFINITY, 0.0], |[a, b], &s| [s.min(a), s.max(b)]);
     html! {

@@ -60,7 +60,7 @@ fn conditions(run: &Run, trial: Option<&Trial>) -> Markup {
 
 /// How many frames a trial has.
 fn frames(run: &Run) -> String {
-    distinct(run.trials.iter().map(|trial| counted(trial.frames.len(), "frame", "frames"))).join(" or ")
+    distinct(run.trials.iter().map(|trial| counted(trial.count(), "frame", "frames"))).join(" or ")
 }
 
 /// m1 and m2 over the conditions, or over the frames where nothing but the method varies.

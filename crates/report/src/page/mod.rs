@@ -4,6 +4,7 @@ mod abstract_;
 mod appendix;
 mod data;
 mod figures;
+mod limits;
 mod method;
 mod results;
 mod worst;

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{distinct, figures};
+use super::{distinct, figures, limits};
 use crate::{
     PAPER_M1, Row, Spread, Summary,
     format::{decimals, headed, interval, number, percent},
@@ -14,20 +14,20 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Markup {
         h2 { "Results" }
         (outcomes(summary))
         (errors(summary))
-        (figures::errors(run, summary))
+        @if limits::known(summary) { (limits::section(summary)) } @else { (figures::errors(run, summary)) }
         (refusals(summary))
         (times(summary))
     }
 }
 
 /// Heads of the columns that say which trial a row is.
-fn heads(summary: &Summary) -> Vec<String> {
+pub(super) fn heads(summary: &Summary) -> Vec<String> {
     let conditions = summary.rows.first().into_iter().flat_map(Row::conditions);
     ["Method".to_owned()].into_iter().chain(conditions.map(|axis| headed(&axis.key))).collect()
 }
 
 /// The cells that say which trial `row` is.
-fn cells(row: &Row) -> Markup {
+pub(super) fn cells(row: &Row) -> Markup {
     html! {
         td.nowrap { (row.method()) }
         @for axis in row.conditions() {
@@ -37,7 +37,7 @@ fn cells(row: &Row) -> Markup {
 }
 
 /// Whether a thin line goes above row `index`: where the first condition changes.
-fn breaks(summary: &Summary, index: usize) -> bool {
+pub(super) fn breaks(summary: &Summary, index: usize) -> bool {
     let first = |index: usize| summary.rows[index].conditions().next().map(|axis| &axis.value);
     index > 0 && first(index) != first(index - 1)
 }

@@ -1,0 +1,97 @@
+//! What all frames of a trial add up to, logged or not.
+
+use std::collections::BTreeMap;
+
+use super::{FrameRecord, Outcome};
+
+/// Sums over every frame of a trial, of which the log may hold a part.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Totals {
+    /// Of so many frames one is logged, whatever came of it: those whose number it divides.
+    pub every: u64,
+    /// Frames with a failure that were not logged, because there are too many.
+    pub failures_left_out: u64,
+    /// Frames.
+    pub frames: u64,
+    /// Frames with a fix of at least one target.
+    pub referenced_frames: u64,
+    /// Frames with a wrong fix of at least one target.
+    pub wrong_frames: u64,
+    /// Attempts.
+    pub attempted: u64,
+    /// Fixes that are not known to be wrong.
+    pub found: u64,
+    /// Fixes beyond the alert limit.
+    pub wrong: u64,
+    /// Fixes that no truth could judge.
+    pub unjudged: u64,
+    /// Why attempts were refused, and how often.
+    pub reasons: BTreeMap<String, u64>,
+    /// Fixes that truth could judge, wrong ones included.
+    pub judged: u64,
+    /// Over them: sum of m2² (m²).
+    pub m2_squares: f64,
+    /// Sum of the squared errors of the position (m²).
+    pub m3_squares: f64,
+    /// Those of them that have a bound.
+    pub bounded: u64,
+    /// Over those: sum of the squared bounds on m2 (m²).
+    pub m2_bound_squares: f64,
+    /// Sum of the squared bounds on the position (m²).
+    pub m3_bound_squares: f64,
+    /// Sum of the normalised errors squared.
+    pub nees_sum: f64,
+    /// Over so many fixes.
+    pub nees_count: u64,
+    /// So many of which are below the 95 % quantile of χ² with six degrees of freedom.
+    pub nees_within: u64,
+}
+
+/// χ²₆ at 95 %.
+const NINETY_FIVE: f64 = 12.591_587_243_743_977;
+
+impl Totals {
+    /// Adds a frame.
+    pub fn add(&mut self, frame: &FrameRecord) {
+        let fixes = || frame.targets.iter().filter(|target| target.outcome == Outcome::Referenced);
+        self.frames += 1;
+        self.referenced_frames += u64::from(fixes().next().is_some());
+        self.wrong_frames += u64::from(fixes().any(|fix| fix.evaluation.wrong == Some(true)));
+        for target in frame.targets.iter().filter(|target| target.attempted()) {
+            self.attempted += 1;
+            if target.outcome != Outcome::Referenced {
+                let reason = if target.reason.is_empty() { target.outcome.name() } else { &target.reason };
+                *self.reasons.entry(reason.to_owned()).or_default() += 1;
+                continue;
+            }
+            let fix = &target.evaluation;
+            match fix.wrong {
+                Some(true) => self.wrong += 1,
+                known => {
+                    self.found += 1;
+                    self.unjudged += u64::from(known.is_none());
+                }
+            }
+            if let (Some(m2), Some(m3)) = (fix.m2_rms, fix.m3_position) {
+                self.judged += 1;
+                self.m2_squares += m2 * m2;
+                self.m3_squares += m3 * m3;
+                if let (Some(m2), Some(m3)) = (fix.m2_bound, fix.m3_bound) {
+                    self.bounded += 1;
+                    self.m2_bound_squares += m2 * m2;
+                    self.m3_bound_squares += m3 * m3;
+                }
+            }
+            if let Some(nees) = fix.nees {
+                self.nees_sum += nees;
+                self.nees_count += 1;
+                self.nees_within += u64::from(nees <= NINETY_FIVE);
+            }
+        }
+    }
+
+    /// Attempts that gave no fix.
+    pub fn refused(&self) -> u64 {
+        self.reasons.values().sum()
+    }
+}

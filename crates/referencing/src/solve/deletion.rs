@@ -1,0 +1,113 @@
+//! The likeliest pose without some of the points, from the likeliest with all of them.
+
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
+
+use super::{
+    Mahalanobis, Solver,
+    descent::{Linearized, linearize},
+};
+use crate::Observations;
+
+/// What each point contributes to the likeliest pose of all, so that leaving some out costs six equations.
+pub(crate) struct Deletions<'a> {
+    data: &'a Observations<'a>,
+    pose: Transform<Object, Camera>,
+    all: Linearized,
+    each: Vec<Linearized>,
+}
+
+/// With fewer points left another valley may be the likeliest.
+const ENOUGH: usize = 5;
+/// A step of more than a standard deviation, squared, is not trusted to be straight.
+const NEAR: f64 = 1.0;
+/// Nor is an attitude less certain than this (rad, three axes together).
+const SURE: f64 = 0.01;
+
+impl<'a> Deletions<'a> {
+    /// `None` where all points together determine no pose.
+    pub(crate) fn of(data: &'a Observations<'a>) -> Option<Self> {
+        let witness = Mahalanobis::default();
+        let pose = witness.solve(data).ok()?;
+        let each = witness.each(data, &pose)?;
+        let mut all = *each.first()?;
+        each[1..].iter().for_each(|one| all = all.plus(one));
+        Some(Self { data, pose, all, each })
+    }
+
+    /// The likeliest pose without the points `out`, and its covariance: one step from that of all points where it is
+    /// short and enough points are left, else from the beginning. `None` where the others determine no pose.
+    pub(crate) fn without(&self, out: &[usize]) -> Option<(Transform<Object, Camera>, Covariance6<Object, Camera>)> {
+        if self.each.len() >= out.len() + ENOUGH {
+            let left = out.iter().fold(self.all, |left, &k| left.less(&self.each[k]));
+            let sure = left.attitude_variance().is_some_and(|variance| variance <= SURE * SURE);
+            if let (true, Some((step, decrement))) = (sure, left.step(0.0))
+                && decrement <= NEAR
+            {
+                return Some((self.pose.perturbed(&step), Covariance6::new(left.covariance()?)));
+            }
+        }
+        let mut fewer = self.data.clone();
+        let mut place = 0..;
+        fewer.points.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
+        let witness = Mahalanobis::default();
+        let pose = witness.solve(&fewer).ok()?;
+        let covariance = witness.covariance(&fewer, &pose).ok()?;
+        Some((pose, covariance))
+    }
+}
+
+impl Mahalanobis {
+    /// What each point says at a pose.
+    fn each(&self, data: &Observations<'_>, at: &Transform<Object, Camera>) -> Option<Vec<Linearized>> {
+        let one = |k: usize, term: &dyn Fn(usize, &nalgebra::Vector3<f64>) -> Option<super::Term>| {
+            linearize(&data.points[k..=k], at, &|_, place: &_| term(k, place))
+        };
+        self.with_terms(data, |term| (0..data.points.len()).map(|k| one(k, term)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Observation;
+    use nalgebra::Vector3;
+    use seafix_geometry::{Point, UncertainPoint};
+
+    /// Seven points, bare, one of them a little off.
+    fn seen() -> Observations<'static> {
+        let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -3.0].into());
+        let points = (0..7).map(|k| {
+            let (a, b) = (f64::from(k) * 1.3, f64::from(k * k % 5) * 0.4);
+            let at = Point::new(a.sin(), b - 0.7, 0.5 * (a * 0.7).cos());
+            let off = Vector3::new(2e-3, -1e-3, 3e-3) * f64::from(u8::from(k == 2));
+            Observation {
+                measured: UncertainPoint::isotropic(pose.inverse() * at + off, 2e-3),
+                pixels: None,
+                model: at,
+                model_sigma: 0.0,
+            }
+        });
+        Observations { points: points.collect(), rig: None }
+    }
+
+    #[test]
+    fn a_step_leads_where_the_beginning_does() {
+        let data = seen();
+        let all = Deletions::of(&data).unwrap();
+        for out in [&[2][..], &[0], &[2, 5]] {
+            let (pose, covariance) = all.without(out).unwrap();
+            let mut fewer = data.clone();
+            let mut place = 0..;
+            fewer.points.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
+            let witness = Mahalanobis::default();
+            let expected = witness.solve(&fewer).unwrap();
+            // In standard deviations.
+            let xi = expected.error_to(&pose);
+            let off = xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)).sqrt();
+            assert!(off < 0.02, "{out:?}: {off}");
+            let own = witness.covariance(&fewer, &expected).unwrap();
+            assert!((covariance.matrix - own.matrix).amax() < 0.02 * own.matrix.amax(), "{out:?}");
+        }
+        assert!(all.without(&[0, 1, 2, 3, 4]).is_none(), "two points are left");
+    }
+}
