@@ -335,7 +335,7 @@ pub struct Totals {
     pub nees_within: u64,
 }
 /// A reason and how often it was given.
-#[derive(Clone, PartialEq, ::prost::Message)]
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Reason {
     #[prost(string, tag = "1")]
     pub reason: ::prost::alloc::string::String,

@@ -227,8 +227,7 @@ mod tests {
     use seafix_geometry::Covariance6;
 
     /// P46. The gradient of χ² by every unknown, at random states, against central differences of χ² itself: ≤ 1e-6 of
-    /// the largest. Seen to fail when the survey's derivative is taken for the identity, and when an object's lever is
-    /// measured from the site's origin.
+    /// the largest.
     #[test]
     fn derivatives_are_those_of_the_cost() {
         let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(11));
