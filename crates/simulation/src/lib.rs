@@ -47,7 +47,9 @@ pub use blueprint::{Blueprint, BoxPlan, ChequerPlan, ObjectPlan, PanelPlan, Pipe
 pub use dive::{BadDive, Dive, DiveFrame, FrameTruth, PlannedDive, RoughPose, VirtualRig, VisiblePoint};
 pub use draw::{Exposure, Imager};
 pub use layout::{Layout, Placed, Shape};
-pub use mission::{CalibrationError, FocalIn, Instant, InstantTruth, Mission, PlannedMission, PriorKind, RigPlan};
+pub use mission::{
+    CALIBRATION_RANGE, CalibrationError, FocalIn, Instant, InstantTruth, Mission, PlannedMission, PriorKind, RigPlan,
+};
 pub use points::PointNoise;
 pub use sensor::Sensor;
 pub use stream::{Purpose, Stream};

@@ -6,7 +6,7 @@ use clap::Args;
 use seafix_component::Fault;
 use seafix_experiment::{
     Observer, Plan, dataset,
-    source::{Passage, Sight, Truth},
+    source::{CalibratedPort, Passage, Sight, Truth},
 };
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
@@ -99,6 +99,18 @@ impl Passage for Watched<'_> {
 
     fn prior_sigma(&self) -> Option<(f64, f64)> {
         self.passage.prior_sigma()
+    }
+
+    fn bits(&self) -> u8 {
+        self.passage.bits()
+    }
+
+    fn ports(&self) -> [Option<CalibratedPort>; 2] {
+        self.passage.ports()
+    }
+
+    fn sensors(&self) -> Vec<(String, String)> {
+        self.passage.sensors()
     }
 
     fn sight(&self, index: usize) -> Result<Sight, Fault> {

@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, path::Path};
 
 use seafix_component::{Fault, line_of};
 use seafix_geometry::{Pinhole, StereoRig, Transform};
+use seafix_simulation::optics::{Port, PortKind};
 use serde::{Deserialize, Serialize};
+
+use crate::source::CalibratedPort;
 
 /// The versions of the format that are read; the last is written.
 pub(super) const FORMATS: [&str; 2] = ["seafix-dataset/1", "seafix-dataset/1.1"];
@@ -69,9 +72,53 @@ pub(super) struct CameraNumbers {
     pub(super) cy: f64,
     #[serde(default)]
     pub(super) distortion: Vec<f64>,
-    /// A dome or flat port; read so that such a set is refused by name instead of by an unknown key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) port: Option<toml::Table>,
+    pub(super) port: Option<PortNumbers>,
+}
+
+/// The dome or flat port that a camera stands behind.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PortNumbers {
+    pub(super) kind: PortKind,
+    /// Distance (m) at which the camera's numbers were found in the water; without it they are those in the air.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) calibrated_at: Option<f64>,
+    /// From the pupil to a flat port, thickness of the glass, inner radius of a dome and its centre in the camera's
+    /// frame (m); refractive indices of glass and water.
+    #[serde(default)]
+    pub(super) distance: f64,
+    pub(super) thickness: f64,
+    #[serde(default)]
+    pub(super) radius: f64,
+    #[serde(default)]
+    pub(super) offset: [f64; 3],
+    pub(super) glass: f64,
+    pub(super) water: f64,
+}
+
+impl PortNumbers {
+    fn of(behind: &CalibratedPort) -> Self {
+        let Port { kind, distance, thickness, radius, offset, glass, water } = behind.port;
+        Self { kind, calibrated_at: Some(behind.range), distance, thickness, radius, offset, glass, water }
+    }
+
+    fn build(&self) -> Result<CalibratedPort, String> {
+        let Self { kind, distance, thickness, radius, offset, glass, water, .. } = *self;
+        let port = Port { kind, distance, thickness, radius, offset, glass, water };
+        // A flat port has no radius to be wrong.
+        let checked = if kind == PortKind::Flat { Port { radius: 1.0, ..port.clone() } } else { port.clone() };
+        checked.check()?;
+        match self.calibrated_at {
+            Some(range) if range > 0.0 && range.is_finite() => Ok(CalibratedPort { port, range }),
+            Some(range) => Err(format!("calibrated_at = {range}; give a distance above zero")),
+            None => {
+                Err("a camera calibrated in the air behind a port is not modelled; calibrate it in the water and give \
+                         `calibrated_at`"
+                    .to_owned())
+            }
+        }
+    }
 }
 
 impl Description {
@@ -89,6 +136,11 @@ impl Description {
         })
     }
 
+    /// The ports of the two cameras; those of a rig that was built are in order.
+    pub(super) fn ports(&self) -> [Option<CalibratedPort>; 2] {
+        [&self.rig.left, &self.rig.right].map(|camera| camera.port.as_ref().and_then(|port| port.build().ok()))
+    }
+
     /// Depth of the pixels in images of 16 bits, or what is wrong with it.
     pub(super) fn depth(&self, file: &Path, source: &str) -> Result<u8, Fault> {
         match self.bits.unwrap_or(16) {
@@ -102,27 +154,35 @@ impl Description {
 }
 
 impl CameraNumbers {
-    pub(super) fn of(camera: &Pinhole) -> Self {
+    pub(super) fn of(camera: &Pinhole, port: Option<&CalibratedPort>) -> Self {
         let ([fx, fy], [cx, cy]) = (camera.focal(), camera.principal());
-        Self { size: camera.size(), fx, fy, cx, cy, distortion: camera.distortion().shortest().to_vec(), port: None }
+        Self {
+            size: camera.size(),
+            fx,
+            fy,
+            cx,
+            cy,
+            distortion: camera.distortion().shortest().to_vec(),
+            port: port.map(PortNumbers::of),
+        }
     }
 }
 
 impl Rig {
-    pub(super) fn of(rig: &StereoRig) -> Self {
+    pub(super) fn of(rig: &StereoRig, [left, right]: [Option<CalibratedPort>; 2]) -> Self {
         Self {
             right_from_left: rig.right_from_left().rows(),
             rectified: rig.is_rectified(),
-            left: CameraNumbers::of(rig.left()),
-            right: CameraNumbers::of(rig.right()),
+            left: CameraNumbers::of(rig.left(), left.as_ref()),
+            right: CameraNumbers::of(rig.right(), right.as_ref()),
         }
     }
 
     /// The rig, or the path of the key at fault below `rig` and what is wrong with it.
     fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
         let camera = |side: &'static str, c: &CameraNumbers| {
-            if c.port.is_some() {
-                return Err((vec![side, "port"], "views through a dome or flat port are not read yet".to_owned()));
+            if let Some(port) = &c.port {
+                port.build().map_err(|what| (vec![side, "port"], format!("{side} port: {what}")))?;
             }
             Pinhole::new(c.size, [c.fx, c.fy], [c.cx, c.cy], &c.distortion)
                 .map_err(|error| (vec![side], format!("{side} camera: {error}")))

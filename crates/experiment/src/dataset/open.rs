@@ -16,7 +16,7 @@ use super::{
     picture::{ImageLimits, read_image},
     tables, tum,
 };
-use crate::read_text;
+use crate::{read_text, source::CalibratedPort};
 
 /// A `seafix-dataset/1` folder whose description, tables and paths are in order. Its images are
 /// read frame by frame.
@@ -28,6 +28,8 @@ pub struct Dataset {
     pub folder: PathBuf,
     /// The rig that took it.
     pub rig: StereoRig,
+    /// The ports that its cameras stand behind; the rig's numbers were found in the water behind them.
+    pub ports: [Option<CalibratedPort>; 2],
     /// What there is to see, where that is known.
     pub site: Option<Site>,
     /// Where the left camera sits in the vehicle; the identity where the set does not say.
@@ -217,6 +219,7 @@ impl Reader<'_> {
                 name: d.name.clone(),
                 folder: self.folder.to_owned(),
                 rig,
+                ports: d.ports(),
                 site,
                 body_from_camera,
                 table: d.frames.clone(),

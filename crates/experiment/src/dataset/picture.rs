@@ -2,7 +2,10 @@
 
 use std::{io::Cursor, path::Path};
 
-use image::{DynamicImage, ImageReader, Limits};
+use image::{
+    DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits,
+    codecs::png::{CompressionType, FilterType, PngEncoder},
+};
 use seafix_component::Fault;
 use seafix_log::encode_png;
 use seafix_vision::Image;
@@ -121,19 +124,32 @@ fn damaged(path: &Path, error: &image::ImageError) -> Fault {
         .remedy("PNG, JPEG and PNM are read, grey or colour, 8 or 16 bits")
 }
 
-/// Writes `image` as an 8-bit grey PNG.
+/// Writes `image` as a grey PNG: of 8 bits, or of 16 that hold `bits`.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_png(path: &Path, image: &Image) -> Result<(), Fault> {
-    encode_png(&grey(image))
+pub fn write_png(path: &Path, image: &Image, bits: u8) -> Result<(), Fault> {
+    let encoded = if bits <= 8 { encode_png(&grey(image)) } else { encode_deep(image, bits) };
+    encoded
         .and_then(|bytes| std::fs::write(path, bytes).map_err(|error| error.to_string()))
         .map_err(|error| Fault::new(format!("cannot write ({error})"), path).remedy("check space and permissions"))
 }
 
+/// The image as a PNG of 16 bits whose white is the greatest number of `bits`.
+fn encode_deep(image: &Image, bits: u8) -> Result<Vec<u8>, String> {
+    let white = f64::from((1_u32 << bits) - 1);
+    let level = |grey: &f32| (f64::from(*grey) * white / 255.0).round().clamp(0.0, white) as u16;
+    let samples: Vec<u8> = image.pixels().iter().flat_map(|grey| level(grey).to_ne_bytes()).collect();
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(&samples, image.width() as u32, image.height() as u32, ExtendedColorType::L16)
+        .map_err(|error| error.to_string())?;
+    Ok(bytes)
+}
+
 #[cfg(test)]
 mod tests {
-    use image::{ExtendedColorType, ImageFormat};
+    use image::ImageFormat;
 
     use super::*;
 
@@ -186,6 +202,16 @@ mod tests {
         assert_eq!(found.pixels()[47], (4048.0 * 255.0 / 4095.0_f64) as f32);
         let said = read("a", &twelve, [8, 6], 8).unwrap_err();
         assert!(said.contains("4095, white is 255; correct `bits`"), "{said}");
+    }
+
+    #[test]
+    fn what_is_written_in_twelve_bits_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let levels: Vec<f32> = (0..48).map(|k| (f64::from(k * 87) * 255.0 / 4095.0) as f32).collect();
+        let image = Image::new(8, 6, levels).unwrap();
+        write_png(&path, &image, 12).unwrap();
+        assert_eq!(read_image(&path, [8, 6], 12).unwrap(), image);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use super::{
 use crate::source::{Eyes, Passage};
 
 /// Writes every frame of `passage` as a data set in `folder`, which must not exist: images, frames,
-/// site, and truth, prior and visibility where they are known, with the hash of every file. The folder
+/// site, truth, prior and visibility where they are known, and what sensors said, with the hash of every file. The folder
 /// has its name only when it is complete.
 ///
 /// # Errors
@@ -57,8 +57,8 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
         let sight = passage.sight(index)?;
         if let Eyes::Pair(left, right) = &sight.eyes {
             let (left_name, right_name) = (format!("left{index:03}.png"), format!("right{index:03}.png"));
-            write_png(&folder.join(&left_name), left)?;
-            write_png(&folder.join(&right_name), right)?;
+            write_png(&folder.join(&left_name), left, passage.bits())?;
+            write_png(&folder.join(&right_name), right, passage.bits())?;
             frames += &format!("{},{left_name},{right_name}\n", sight.stamp_ns);
         }
         priors.extend(sight.prior.map(|prior| (sight.stamp_ns, prior.world_from_camera)));
@@ -92,6 +92,9 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
     if let Some(table) = &objects {
         put("objects.csv", table)?;
     }
+    for (name, table) in passage.sensors() {
+        put(&name, &table)?;
+    }
     let known = |file: &str, is: bool| is.then(|| file.to_owned());
     let description = Description {
         format: FORMATS[1].to_owned(),
@@ -109,8 +112,8 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
         visibility: known("visibility.csv", visibility.is_some()),
         objects: known("objects.csv", objects.is_some()),
         body_from_camera: Some(passage.body_from_camera().rows()),
-        bits: None,
-        rig: Rig::of(passage.rig()),
+        bits: (passage.bits() > 8).then(|| passage.bits()),
+        rig: Rig::of(passage.rig(), passage.ports()),
         hashes: input_hashes(folder)?.into_iter().collect::<BTreeMap<_, _>>(),
     };
     put("dataset.toml", &toml::to_string(&description).expect("a description is plain values"))

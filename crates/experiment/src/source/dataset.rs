@@ -8,7 +8,7 @@ use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
-use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
+use super::{CalibratedPort, Eyes, Passage, Sight, Source, Truth, WorldPrior};
 use crate::dataset::{Dataset, ImageLimits, hash_faults, input_hashes, swapped};
 
 /// Reads a `seafix-dataset/1` folder.
@@ -92,6 +92,15 @@ impl Passage for Recorded {
 
     fn images(&self) -> bool {
         true
+    }
+
+    fn bits(&self) -> u8 {
+        // Sixteen is what a set of eight bits says that says nothing.
+        if self.dataset.bits < 16 { self.dataset.bits } else { 8 }
+    }
+
+    fn ports(&self) -> [Option<CalibratedPort>; 2] {
+        self.dataset.ports.clone()
     }
 
     fn frames(&self) -> usize {

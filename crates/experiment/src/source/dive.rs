@@ -5,11 +5,11 @@ use std::path::Path;
 use seafix_component::{Component, Fault};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
-use seafix_simulation::{Mission, PlannedMission};
+use seafix_simulation::{CALIBRATION_RANGE, Mission, PlannedMission, optics::PortKind};
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
-use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
+use super::{CalibratedPort, Eyes, Passage, Sight, Source, Truth, WorldPrior, readings};
 
 /// A vehicle's dive over a site given as data, under lamps in water: rendered stereo pairs, or clouds of
 /// the same views with `as-points`.
@@ -73,6 +73,20 @@ impl Passage for Dived {
 
     fn pixel_sigma(&self) -> Option<f64> {
         (!self.images()).then_some(self.mission.settings().points.sigma_px)
+    }
+
+    fn bits(&self) -> u8 {
+        self.mission.settings().imager.bits
+    }
+
+    fn ports(&self) -> [Option<CalibratedPort>; 2] {
+        let port = self.mission.settings().rig.port.clone();
+        let port = (port.kind != PortKind::None).then_some(CalibratedPort { port, range: CALIBRATION_RANGE });
+        [port.clone(), port]
+    }
+
+    fn sensors(&self) -> Vec<(String, String)> {
+        readings::tables(&self.mission)
     }
 
     fn sight(&self, index: usize) -> Result<Sight, Fault> {

@@ -5,10 +5,12 @@ use std::path::Path;
 use seafix_component::{Fault, Registry, entry};
 use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
 use seafix_referencing::Site;
+use seafix_simulation::optics::Port;
 use seafix_vision::Image;
 
 mod dataset;
 mod dive;
+mod readings;
 mod virtual_dive;
 mod virtual_images;
 mod virtual_layouts;
@@ -66,6 +68,15 @@ pub struct Truth {
     pub bound: Option<(usize, Covariance6<Object, Camera>)>,
 }
 
+/// A port, and the distance at which the camera behind it was calibrated in the water.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibratedPort {
+    /// The port.
+    pub port: Port,
+    /// Distance of the calibration (m): the camera's numbers hold there, and only nearly elsewhere.
+    pub range: f64,
+}
+
 /// A sequence of instants, simulated or recorded, opened and checked.
 pub trait Passage: Send + Sync {
     /// Its name, for people.
@@ -86,6 +97,18 @@ pub trait Passage: Send + Sync {
     /// Standard deviation of a pixel coordinate in clouds that come without images (px), where known.
     fn pixel_sigma(&self) -> Option<f64> {
         None
+    }
+    /// Depth of the pixels of its images (bits).
+    fn bits(&self) -> u8 {
+        8
+    }
+    /// The ports that the cameras stand behind, where they stand behind any, as the rig was calibrated behind them.
+    fn ports(&self) -> [Option<CalibratedPort>; 2] {
+        [None, None]
+    }
+    /// What the vehicle's navigation sensors said, as tables: names of files and their CSV text.
+    fn sensors(&self) -> Vec<(String, String)> {
+        Vec::new()
     }
     /// What is odd about it but not wrong.
     fn warnings(&self) -> &[Fault] {

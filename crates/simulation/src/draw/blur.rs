@@ -37,16 +37,17 @@ pub(super) fn gaussian(image: &mut [f32], width: usize, sigma: f64, threads: Thr
             padded[..radius].fill(row[0]);
             padded[radius..radius + width].copy_from_slice(row);
             padded[radius + width..].fill(row[width - 1]);
-            out.fill(0.0);
-            for (k, weight) in weights.iter().enumerate() {
-                add(out, &padded[k..k + width], *weight);
-            }
+            weigh(out, padded, 1, weights);
         }
     });
     let across = &work.across[..];
     threads.pieces(image, ROWS * width, &mut work.none, |piece, rows, ()| {
         for (k, out) in rows.chunks_exact_mut(width).enumerate() {
             let y = piece * ROWS + k;
+            if y >= radius && y + radius < height {
+                weigh(out, &across[(y - radius) * width..], width, weights);
+                continue;
+            }
             out.fill(0.0);
             for (k, weight) in weights.iter().enumerate() {
                 let from = (y + k).saturating_sub(radius).min(height - 1);
@@ -63,6 +64,30 @@ fn add(out: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
+/// The weighted sum of slices that begin `stride` apart.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn weigh(out: &mut [f32], from: &[f32], stride: usize, weights: &[f32]) {
+    const CHUNK: usize = 64;
+    for (c, out) in out.chunks_mut(CHUNK).enumerate() {
+        let mut sum = [0.0_f32; CHUNK];
+        for (k, weight) in weights.iter().enumerate() {
+            let from = &from[k * stride + c * CHUNK..][..out.len()];
+            sum.iter_mut().zip(from).for_each(|(sum, f)| *sum += weight * f);
+        }
+        out.copy_from_slice(&sum[..out.len()]);
+    }
+}
+
+/// No depth is taken to be less (m).
+const NEAREST: f32 = 0.05;
+/// Pixels that are spread at once.
+const CHUNK: usize = 64;
+
+/// A row of an image with the one above and the one below.
+fn neighbours(image: &[f32], width: usize, row: usize) -> [&[f32]; 3] {
+    [row - 1, row, row + 1].map(|row| &image[row * width..][..width])
+}
+
 /// The motion of a camera during the exposure: its step in its own frame (rotation φ, translation ρ), and
 /// focal length and principal point.
 #[derive(Debug, Clone, Copy)]
@@ -75,10 +100,9 @@ pub(super) struct Smear {
 
 impl Smear {
     /// How far the image of a place at depth `z` moves (px).
-    #[inline]
-    fn flow(&self, column: usize, row: usize, z: f32) -> [f32; 2] {
-        let (x, y) =
-            ((column as f32 - self.principal[0]) / self.focal[0], (row as f32 - self.principal[1]) / self.focal[1]);
+    #[inline(always)]
+    fn flow(&self, column: f32, row: f32, z: f32) -> [f32; 2] {
+        let (x, y) = ((column - self.principal[0]) / self.focal[0], (row - self.principal[1]) / self.focal[1]);
         let ([a, b, c], [p, q, r]) = (self.turn, self.step);
         // ẋ of a resting point: −ρ/Z − φ × (x, y, 1), on the plane z = 1. (Longuet-Higgins and Prazdny, 1980.)
         let du = (-p + x * r) / z + a * x * y - b * (1.0 + x * x) + c * y;
@@ -110,25 +134,78 @@ impl Smear {
                 (at(i, j) + fu * (at(i + 1, j) - at(i, j)), at(i, j + 1) + fu * (at(i + 1, j + 1) - at(i, j + 1)));
             above + fv * (below - above)
         };
+        let spread = |column: usize, row: usize| {
+            let [du, dv] = self.flow(column as f32, row as f32, depths[row * width + column].max(NEAREST));
+            let half = (du * du + dv * dv).sqrt().min(64.0).ceil() as i32;
+            let step = 1.0 / (2 * half + 1) as f32;
+            let taps = (-half..=half).map(|k| k as f32 * step);
+            taps.map(|t| sample(column as f32 + t * du, row as f32 + t * dv)).sum::<f32>() * step
+        };
         threads.pieces(&mut work.across, ROWS * width, &mut work.none, |piece, rows, ()| {
             for (k, out) in rows.chunks_exact_mut(width).enumerate() {
                 let row = piece * ROWS + k;
-                for (column, out) in out.iter_mut().enumerate() {
-                    let [du, dv] = self.flow(column, row, depths[row * width + column].max(0.05));
-                    let length = (du * du + dv * dv).sqrt().min(64.0);
-                    let half = length.ceil() as i32;
-                    let step = 1.0 / (2 * half + 1) as f32;
-                    let mut sum = 0.0;
-                    for k in -half..=half {
-                        let t = k as f32 * step;
-                        sum += sample(column as f32 + t * du, row as f32 + t * dv);
+                let inner = row > 0 && row + 1 < height && width > 2;
+                let three = |list| inner.then(|| neighbours(list, width, row));
+                let mut from = 0;
+                if let Some(near) = three(source) {
+                    out[0] = spread(0, row);
+                    from = 1;
+                    while from + 1 < width {
+                        let to = (from + CHUNK).min(width - 1);
+                        if !short(self, from, row, &depths[row * width..], &near, &mut out[..to]) {
+                            (from..to).for_each(|column| out[column] = spread(column, row));
+                        }
+                        from = to;
                     }
-                    *out = sum * step;
                 }
+                (from..width).for_each(|column| out[column] = spread(column, row));
             }
         });
         std::mem::swap(image, &mut work.across);
     }
+}
+
+/// Spreads the pixels from column `from` to the end of `out`, at most a chunk and none at the border, where all
+/// move by a pixel or less: then three samples, at thirds of the way, lie among the pixel and its neighbours.
+/// Otherwise nothing is done, and the answer is no.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn short(smear: &Smear, from: usize, row: usize, depths: &[f32], near: &[&[f32]; 3], out: &mut [f32]) -> bool {
+    let n = out.len() - from;
+    let mut z = [1.0_f32; CHUNK];
+    z[..n].copy_from_slice(&depths[from..from + n]);
+    let (mut across, mut down, mut longest) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK], 0.0_f32);
+    for i in 0..CHUNK {
+        let [du, dv] = smear.flow((from + i) as u32 as f32, row as u32 as f32, z[i].max(NEAREST));
+        (across[i], down[i]) = (du * (1.0 / 3.0), dv * (1.0 / 3.0));
+    }
+    for i in 0..n {
+        longest = longest.max(across[i] * across[i] + down[i] * down[i]);
+    }
+    if !(longest <= 1.0 / 9.0) {
+        return false;
+    }
+    // Three rows of three: [row][column] from the pixel.
+    let mut nine = [[[0.0_f32; CHUNK]; 3]; 3];
+    for (rows, image) in nine.iter_mut().zip(near) {
+        for (k, list) in rows.iter_mut().enumerate() {
+            list[..n].copy_from_slice(&image[from - 1 + k..][..n]);
+        }
+    }
+    let mut sum = [0.0_f32; CHUNK];
+    for i in 0..CHUNK {
+        let (tu, tv) = (across[i].abs(), down[i].abs());
+        let (right, below) = (across[i] >= 0.0, down[i] >= 0.0);
+        // Each row a way to the right and a way to the left, then between the rows.
+        let ahead = |row: &[[f32; CHUNK]; 3]| row[1][i] + tu * (if right { row[2][i] } else { row[0][i] } - row[1][i]);
+        let back = |row: &[[f32; CHUNK]; 3]| row[1][i] + tu * (if right { row[0][i] } else { row[2][i] } - row[1][i]);
+        let first = |a: f32, b: f32| if below { b } else { a };
+        let (here, there) = (ahead(&nine[1]), back(&nine[1]));
+        let forth = here + tv * (first(ahead(&nine[0]), ahead(&nine[2])) - here);
+        let before = there + tv * (first(back(&nine[2]), back(&nine[0])) - there);
+        sum[i] = (before + nine[1][1][i] + forth) * (1.0 / 3.0);
+    }
+    out[from..].copy_from_slice(&sum[..n]);
+    true
 }
 
 #[cfg(test)]
@@ -148,6 +225,33 @@ mod tests {
         for spread in [second(&|k| (k % width) as f32 - 30.0), second(&|k| (k / width) as f32 - 70.0)] {
             assert!((spread.sqrt() - 1.7).abs() < 0.02, "{spread}");
         }
+    }
+
+    #[test]
+    fn a_short_way_is_spread_as_a_long_one() {
+        // Between neighbours the image is bilinear: a plane stays, a pyramid is smoothed by what it bends.
+        let (width, height) = (150, 9);
+        let plane: Vec<f32> =
+            (0..width * height).map(|k| 3.0 * (k % width) as f32 - 2.0 * (k / width) as f32).collect();
+        for step in [[0.01, 0.0, 0.0], [-0.004, 0.01, 0.0], [0.0, -0.012, 0.003]] {
+            let smear = Smear { turn: [0.001, 0.0, -0.002], step, focal: [100.0; 2], principal: [74.5, 4.0] };
+            let depths = vec![2.0; width * height];
+            let mut image = plane.clone();
+            smear.apply(&mut image, &depths, width, Threads::One, &mut BlurScratch::default());
+            for row in 1..height - 1 {
+                for column in 1..width - 1 {
+                    let k = row * width + column;
+                    assert!((image[k] - plane[k]).abs() < 1e-4, "{row} {column}: {} {}", image[k], plane[k]);
+                }
+            }
+        }
+        // One bright pixel, moved by 0.6 px to the right: thirds of it at −0.2, 0 and 0.2 px.
+        let smear = Smear { turn: [0.0; 3], step: [-0.012, 0.0, 0.0], focal: [100.0; 2], principal: [74.5, 4.0] };
+        let mut image = vec![0.0; width * height];
+        image[4 * width + 70] = 3.0;
+        smear.apply(&mut image, &vec![2.0; width * height], width, Threads::One, &mut BlurScratch::default());
+        let row = &image[4 * width + 69..4 * width + 72];
+        assert!(row.iter().zip([0.2, 2.6, 0.2]).all(|(found, exact)| (found - exact).abs() < 1e-5), "{row:?}");
     }
 
     #[test]

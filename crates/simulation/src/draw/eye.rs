@@ -20,6 +20,9 @@ pub(crate) struct Eye {
     water: Water,
     /// Rays of every pixel (direction x, y with z = 1; origin); empty for an ideal pinhole.
     rays: Vec<[f32; 5]>,
+    /// Direction x of every column and y of every row of an ideal pinhole.
+    columns: Vec<f32>,
+    rows: Vec<f32>,
     /// Tangent of the greatest angle to the axis at which it sees.
     pub(crate) reach: f64,
 }
@@ -62,13 +65,16 @@ impl Eye {
                 }
             }
         }
+        let ([fx, fy], [cx, cy]) = (lens.camera().focal(), lens.camera().principal());
+        let directions = |n: u32, f: f64, c: f64| (0..n).map(|k| ((f64::from(k) - c) / f) as f32).collect();
+        let (columns, rows) = (directions(width, fx, cx), directions(height, fy, cy));
         let border = |n: u32| [0.0, 0.5, 1.0].map(|t| t * f64::from(n - 1));
         let reach = border(width)
             .into_iter()
             .flat_map(|u| border(height).map(|v| Pixel { u, v }))
             .filter_map(|pixel| Some(lens.ray(&pixel)?.along.xy().norm()))
             .fold(0.0, f64::max);
-        Self { lens, lamps, haze: OnceLock::new(), water: water.clone(), rays, reach }
+        Self { lens, lamps, haze: OnceLock::new(), water: water.clone(), rays, columns, rows, reach }
     }
 
     /// The light that the water throws back; tabulated when it is first asked for.
@@ -86,6 +92,11 @@ impl Eye {
             }
         }
         Some(pixel)
+    }
+
+    /// Directions (x, y, 1) of the pixels of a row of an ideal pinhole: x of each, y of all.
+    pub(super) fn straight(&self, row: usize) -> (&[f32], f32) {
+        (&self.columns, self.rows[row])
     }
 
     /// The ray of a place within half a pixel of the pixel (column, row).

@@ -4,7 +4,16 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::field::Triangle;
 
-use super::eye::Line;
+use super::{
+    eye::Line,
+    parts::{Lines, NOWHERE, Run},
+    visibility::NONE,
+};
+
+/// Places are computed in whole vectors of this length.
+pub(super) const LANES: usize = 16;
+/// A pixel's footprint is drawn out by no more than the inverse of this where a surface is seen edge-on.
+const FLATTEST: f32 = 0.2;
 
 /// A triangle in a camera's frame.
 #[derive(Debug, Clone, Copy)]
@@ -22,17 +31,23 @@ pub(super) struct Facet {
     pub(super) skin: u32,
 }
 
-/// A place on a surface.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Spot {
-    pub(super) at: [f32; 3],
+/// Places on surfaces in one camera's frame, each number a list.
+#[derive(Debug, Default, Clone)]
+pub(super) struct Spots {
+    pub(super) x: Vec<f32>,
+    pub(super) y: Vec<f32>,
+    pub(super) z: Vec<f32>,
     /// The shading normal, unit length.
-    pub(super) normal: [f32; 3],
-    pub(super) uv: [f32; 2],
+    pub(super) nx: Vec<f32>,
+    pub(super) ny: Vec<f32>,
+    pub(super) nz: Vec<f32>,
+    /// The texture's coordinates (m).
+    pub(super) u: Vec<f32>,
+    pub(super) v: Vec<f32>,
+    /// Width of a pixel on the surface (m).
+    pub(super) footprint: Vec<f32>,
     /// The distance from where its ray enters the water (m).
-    pub(super) range: f32,
-    /// The cosine between its ray and the plane's normal.
-    pub(super) slope: f32,
+    pub(super) range: Vec<f32>,
 }
 
 fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
@@ -70,19 +85,102 @@ impl Facet {
         }
     }
 
-    /// Where a ray meets its plane.
-    #[inline]
-    pub(super) fn spot(&self, line: &Line) -> Spot {
-        let climb = dot(&self.normal, &line.along);
-        let t = (self.offset - dot(&self.normal, &line.from)) / climb;
-        let length = dot(&line.along, &line.along).sqrt();
-        let at: [f32; 3] = std::array::from_fn(|i| line.from[i] + t * line.along[i]);
-        let from: [f32; 3] = std::array::from_fn(|i| at[i] - self.corner[i]);
-        let (b, c) = (dot(&self.second, &from), dot(&self.third, &from));
-        let uv = std::array::from_fn(|i| self.uv[0][i] + b * self.uv[1][i] + c * self.uv[2][i]);
-        let [n, dn, en] = &self.normals;
-        let normal: [f32; 3] = std::array::from_fn(|i| n[i] + b * dn[i] + c * en[i]);
-        let scale = 1.0 / dot(&normal, &normal).sqrt();
-        Spot { at, normal: normal.map(|x| x * scale), uv, range: t * length, slope: climb.abs() / length }
+    /// Depth Z and range at which a ray meets its plane.
+    pub(super) fn spot(&self, line: &Line) -> (f32, f32) {
+        let t = (self.offset - dot(&self.normal, &line.from)) / dot(&self.normal, &line.along);
+        (line.from[2] + t * line.along[2], t * dot(&line.along, &line.along).sqrt())
+    }
+
+    /// Where rays meet its plane; `BENT` rays have directions and origins of their own.
+    #[expect(clippy::too_many_arguments, reason = "a slice of its own each: the compiler knows that none overlap")]
+    #[inline(always)]
+    fn spots<const BENT: bool>(
+        &self,
+        per_focal: f32,
+        [ax, ay, az, fx, fy, fz]: [&[f32]; 6],
+        x: &mut [f32],
+        y: &mut [f32],
+        z: &mut [f32],
+        nx: &mut [f32],
+        ny: &mut [f32],
+        nz: &mut [f32],
+        u: &mut [f32],
+        v: &mut [f32],
+        footprint: &mut [f32],
+        range: &mut [f32],
+    ) {
+        let n = x.len();
+        let (ax, ay) = (&ax[..n], &ay[..n]);
+        let [az, fx, fy, fz] = [az, fx, fy, fz].map(|list| if BENT { &list[..n] } else { list });
+        let (y, z, nx, ny, nz) = (&mut y[..n], &mut z[..n], &mut nx[..n], &mut ny[..n], &mut nz[..n]);
+        let (u, v, footprint, range) = (&mut u[..n], &mut v[..n], &mut footprint[..n], &mut range[..n]);
+        let [uv, du, dv] = &self.uv;
+        let [m, dm, em] = &self.normals;
+        for i in 0..n {
+            let along = [ax[i], ay[i], if BENT { az[i] } else { 1.0 }];
+            let from = if BENT { [fx[i], fy[i], fz[i]] } else { [0.0; 3] };
+            let climb = dot(&self.normal, &along);
+            let start = if BENT { dot(&self.normal, &from) } else { 0.0 };
+            let t = (self.offset - start) / climb;
+            let length = dot(&along, &along).sqrt();
+            let at = [from[0] + t * along[0], from[1] + t * along[1], from[2] + t * along[2]];
+            let to = [at[0] - self.corner[0], at[1] - self.corner[1], at[2] - self.corner[2]];
+            let (b, c) = (dot(&self.second, &to), dot(&self.third, &to));
+            (x[i], y[i], z[i]) = (at[0], at[1], at[2]);
+            u[i] = uv[0] + b * du[0] + c * dv[0];
+            v[i] = uv[1] + b * du[1] + c * dv[1];
+            let normal = [m[0] + b * dm[0] + c * em[0], m[1] + b * dm[1] + c * em[1], m[2] + b * dm[2] + c * em[2]];
+            let scale = 1.0 / dot(&normal, &normal).sqrt();
+            (nx[i], ny[i], nz[i]) = (normal[0] * scale, normal[1] * scale, normal[2] * scale);
+            let reach = t * length;
+            range[i] = reach;
+            footprint[i] = reach * per_focal / (climb.abs() / length).max(FLATTEST);
+        }
+    }
+}
+
+/// Where all parts lie. A run is computed in whole vectors; what stands beyond its end is the next run's to write.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+pub(super) fn spots(runs: &[Run], count: usize, facets: &[Facet], lines: &Lines, per_focal: f32, out: &mut Spots) {
+    let Spots { x, y, z, nx, ny, nz, u, v, footprint, range } = out;
+    for list in [&mut *x, y, z, nx, ny, nz, u, v, footprint, range] {
+        list.resize(count + LANES, 0.0);
+    }
+    let [fx, fy, fz] = &lines.from;
+    for run in runs {
+        if run.facet == NONE {
+            for (list, value) in [
+                (&mut *x, 0.0),
+                (y, 0.0),
+                (z, NOWHERE),
+                (nx, 0.0),
+                (ny, 0.0),
+                (nz, -1.0),
+                (u, 0.0),
+                (v, 0.0),
+                (footprint, NOWHERE),
+                (range, NOWHERE),
+            ] {
+                list[run.from..run.to].fill(value);
+            }
+            continue;
+        }
+        let facet = &facets[run.facet as usize];
+        let span = run.from..run.from + (run.to - run.from).next_multiple_of(LANES);
+        macro_rules! cut {
+            ($($list:ident)*) => { ($(&mut $list[span.clone()]),*) };
+        }
+        let (x, y, z, nx, ny, nz, u, v, footprint, range) = cut!(x y z nx ny nz u v footprint range);
+        if lines.bent() {
+            let rays = [&lines.x, &lines.y, &lines.z, fx, fy, fz].map(|list| &list[span.clone()]);
+            facet.spots::<true>(per_focal, rays, x, y, z, nx, ny, nz, u, v, footprint, range);
+        } else {
+            let none: &[f32] = &[];
+            let rays = [&lines.x[span.clone()], &lines.y[span.clone()], none, none, none, none];
+            facet.spots::<false>(per_focal, rays, x, y, z, nx, ny, nz, u, v, footprint, range);
+        }
+    }
+    for list in [x, y, z, nx, ny, nz, u, v, footprint, range] {
+        list.truncate(count);
     }
 }

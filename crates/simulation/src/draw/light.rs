@@ -1,35 +1,10 @@
 //! What the lamps send to places: Lambert's cosine, the beam, 1/r², and what the water takes.
 
-use super::math::{exp, exp2, log2};
+use super::{
+    facet::Spots,
+    math::{exp, exp2, log2},
+};
 use crate::optics::Lamp;
-
-/// Places on surfaces in one camera's frame, each number a list.
-#[derive(Debug, Default, Clone)]
-pub(super) struct Spots {
-    pub(super) x: Vec<f32>,
-    pub(super) y: Vec<f32>,
-    pub(super) z: Vec<f32>,
-    pub(super) nx: Vec<f32>,
-    pub(super) ny: Vec<f32>,
-    pub(super) nz: Vec<f32>,
-}
-
-impl Spots {
-    pub(super) fn clear(&mut self) {
-        for list in [&mut self.x, &mut self.y, &mut self.z, &mut self.nx, &mut self.ny, &mut self.nz] {
-            list.clear();
-        }
-    }
-
-    pub(super) fn push(&mut self, at: &[f32; 3], normal: &[f32; 3]) {
-        self.x.push(at[0]);
-        self.y.push(at[1]);
-        self.z.push(at[2]);
-        self.nx.push(normal[0]);
-        self.ny.push(normal[1]);
-        self.nz.push(normal[2]);
-    }
-}
 
 /// A lamp in f32.
 #[derive(Debug, Clone, Copy)]
@@ -102,8 +77,12 @@ mod tests {
         let beam = Beam::of(&lamp);
         let mut spots = Spots::default();
         let places = [[0.0, 0.0, 2.0], [1.0, -0.5, 3.0], [-2.0, 0.3, 1.0], [0.3, 0.0, -1.0]];
-        for at in &places {
-            spots.push(at, &[0.0, 0.0, -1.0]);
+        for [x, y, z] in places {
+            [&mut spots.x, &mut spots.y, &mut spots.z].into_iter().zip([x, y, z]).for_each(|(list, x)| list.push(x));
+            [&mut spots.nx, &mut spots.ny, &mut spots.nz]
+                .into_iter()
+                .zip([0.0, 0.0, -1.0])
+                .for_each(|(l, x)| l.push(x));
         }
         let mut found = Vec::new();
         irradiance(&spots, &beam, 0.4, &mut found);

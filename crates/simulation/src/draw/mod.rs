@@ -6,12 +6,14 @@
 //! there, triangles are cut until they are straight to a fiftieth of a pixel, and only visibility
 //! depends on the cuts. Work is shared by rows in bands of fixed size: the same bytes on any number of threads.
 
+mod band;
 mod blur;
 mod eye;
 mod facet;
 mod light;
 mod math;
 mod outline;
+mod parts;
 mod scene;
 mod sensor;
 mod shadow;

@@ -19,10 +19,28 @@ const DEEPEST: u32 = 12;
 pub(super) struct Side {
     pub(super) line: [f64; 3],
     /// Half the width of a pixel across it.
-    pub(super) half: f64,
+    half: f64,
+    /// Where it crosses row v: column step·v + start; nothing for a side along the rows.
+    step: f64,
+    start: f64,
+    /// Half the width of a pixel along the row.
+    reach: f64,
     /// Whether it is an edge of the body, not a seam.
     pub(super) edge: bool,
 }
+
+impl Side {
+    fn new(line: [f64; 3], edge: bool) -> Self {
+        let [a, b, c] = line;
+        let half = 0.5 * (a.abs() + b.abs());
+        // Both triangles of a seam have the same numbers with other signs, and so the same crossings.
+        let per = if a.abs() > LEVEL { 1.0 / a } else { 0.0 };
+        Self { line, half, step: -b * per, start: -c * per, reach: half * per.abs(), edge }
+    }
+}
+
+/// Sides with less of a slope lie along the rows.
+const LEVEL: f64 = 1e-12;
 
 /// A convex piece of a triangle in the image.
 #[derive(Debug, Clone, Copy)]
@@ -244,7 +262,7 @@ fn polygon(
         let length = (a * a + b * b).sqrt() * area.signum();
         if length != 0.0 {
             let line = [a / length, b / length, (p[0] * q[1] - q[0] * p[1]) / length];
-            sides[count] = Side { line, half: 0.5 * (line[0].abs() + line[1].abs()), edge: edges[k] };
+            sides[count] = Side::new(line, edges[k]);
             count += 1;
         }
     }
@@ -280,12 +298,11 @@ impl Outline {
         let (mut low, mut high) = (0.0, width as f64 - 1.0);
         for side in self.sides().iter().filter(|side| side.edge || !edges_only) {
             let [a, b, c] = side.line;
-            let rest = b * v + c + slack * side.half;
-            if a > 1e-12 {
-                low = f64::max(low, -rest / a);
-            } else if a < -1e-12 {
-                high = f64::min(high, -rest / a);
-            } else if rest < 0.0 {
+            if a > LEVEL {
+                low = f64::max(low, side.step * v + side.start - slack * side.reach);
+            } else if a < -LEVEL {
+                high = f64::min(high, side.step * v + side.start + slack * side.reach);
+            } else if b * v + c + slack * side.half < 0.0 {
                 return (0, 0);
             }
         }

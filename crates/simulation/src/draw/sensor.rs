@@ -134,25 +134,77 @@ impl Imager {
         let black = self.black as f32 * levels / 255.0;
         let (read2, back) = ((self.read_noise * self.read_noise) as f32, 255.0 / levels);
         let well = self.full_well as f32;
+        let numbers = Numbers {
+            electrons,
+            well,
+            read2,
+            shot: if self.shot_noise { 1.0 } else { 0.0 },
+            k,
+            black,
+            levels,
+            back,
+            seed,
+        };
         threads.pieces(image, PIECE, &mut Vec::<()>::new(), |piece, pixels, ()| {
-            for (i, value) in pixels.iter_mut().enumerate() {
-                let place = piece * PIECE + i;
-                let mut n = *value * electrons;
-                if let Some(response) = pattern.response.get(place) {
-                    n *= response;
-                }
-                n = n.clamp(0.0, well);
-                let variance = read2 + if self.shot_noise { n } else { 0.0 };
-                if variance > 0.0 {
-                    n += variance.sqrt() * pattern.normal.at(mix(place as u32, 9, seed));
-                }
-                if let Some(dark) = pattern.dark.get(place) {
-                    n += dark;
-                }
-                let grey = k * n + black;
-                *value = (grey + 0.5).clamp(0.0, levels).trunc() * back;
-            }
+            numbers.develop(pixels, piece * PIECE, pattern);
         });
+    }
+}
+
+/// What turns radiances into grey levels, in single precision.
+#[derive(Debug, Clone, Copy)]
+struct Numbers {
+    /// Electrons a radiance, and how many a pixel holds.
+    electrons: f32,
+    well: f32,
+    /// Variance of the read noise, and that of each electron.
+    read2: f32,
+    shot: f32,
+    /// Grey levels an electron, of darkness, of white, and what they are of 255.
+    k: f32,
+    black: f32,
+    levels: f32,
+    back: f32,
+    seed: u32,
+}
+
+impl Numbers {
+    /// Develops the pixels from number `first` of the image on.
+    fn develop(&self, pixels: &mut [f32], first: usize, pattern: &Pattern) {
+        developed(self, pixels, first, pattern);
+    }
+}
+
+/// Pixels that are developed at once.
+const CHUNK: usize = 64;
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn developed(numbers: &Numbers, pixels: &mut [f32], first: usize, pattern: &Pattern) {
+    for (c, pixels) in pixels.chunks_mut(CHUNK).enumerate() {
+        let (n, place) = (pixels.len(), first + c * CHUNK);
+        let (mut values, mut response, mut dark) = ([0.0_f32; CHUNK], [1.0_f32; CHUNK], [0.0_f32; CHUNK]);
+        values[..n].copy_from_slice(pixels);
+        for (chunk, list) in [(&mut response, &pattern.response), (&mut dark, &pattern.dark)] {
+            if let Some(list) = list.get(place..place + n) {
+                chunk[..n].copy_from_slice(list);
+            }
+        }
+        let mut bits = [0_u32; CHUNK];
+        for i in 0..CHUNK {
+            bits[i] = mix(place as u32 + i as u32, 9, numbers.seed);
+        }
+        let mut cells = [[0.0_f32; 2]; CHUNK];
+        for i in 0..CHUNK {
+            cells[i] = pattern.normal.0[(bits[i] >> 20) as usize];
+        }
+        for i in 0..CHUNK {
+            let light = (values[i] * numbers.electrons * response[i]).clamp(0.0, numbers.well);
+            let sigma = (numbers.read2 + numbers.shot * light).sqrt();
+            let n = light + sigma * Normal::between(cells[i], bits[i]) + dark[i];
+            let grey = numbers.k * n + numbers.black;
+            values[i] = ((grey + 0.5).clamp(0.0, numbers.levels) as i32) as f32 * numbers.back;
+        }
+        pixels.copy_from_slice(&values[..n]);
     }
 }
 
@@ -173,9 +225,9 @@ pub(crate) struct Pattern {
     normal: Normal,
 }
 
-/// Normal numbers from random bits, by a table of quantiles with linear interpolation; ends at ±4.1.
+/// Normal numbers from random bits, by a table of quantiles and their steps with linear interpolation; ends at ±4.1.
 #[derive(Debug, Clone)]
-pub(super) struct Normal(Vec<f32>);
+pub(super) struct Normal(Vec<[f32; 2]>);
 
 impl Normal {
     const CELLS: usize = 4096;
@@ -187,16 +239,19 @@ impl Normal {
         let variance: f64 =
             table.windows(2).map(|w| (w[0] * w[0] + w[0] * w[1] + w[1] * w[1]) / 3.0).sum::<f64>() / n as f64;
         table.iter_mut().for_each(|x| *x /= variance.sqrt());
-        Self(table.into_iter().map(|x| x as f32).collect())
+        Self(table.windows(2).map(|w| [w[0] as f32, w[1] as f32 - w[0] as f32]).collect())
     }
 
     /// The number of these bits.
     #[inline]
     pub(super) fn at(&self, bits: u32) -> f32 {
-        let cell = (bits >> 20) as usize;
-        let between = (bits & 0xF_FFFF) as f32 * (1.0 / (1 << 20) as f32);
-        let [low, high] = [self.0[cell], self.0[cell + 1]];
-        low + between * (high - low)
+        Self::between(self.0[(bits >> 20) as usize], bits)
+    }
+
+    /// The number of these bits, whose cell is this.
+    #[inline(always)]
+    fn between([low, step]: [f32; 2], bits: u32) -> f32 {
+        low + (bits & 0xF_FFFF) as i32 as f32 * (1.0 / (1 << 20) as f32) * step
     }
 }
 

@@ -5,7 +5,7 @@ use seafix_geometry::{Camera, Transform};
 
 use super::{
     eye::Eye,
-    light::Spots,
+    facet::Spots,
     outline::{Origin, Outline, outline},
 };
 use crate::optics::{Lamp, Lens, Port, Water};
@@ -86,56 +86,57 @@ impl ShadowMap {
             }
         }
     }
-
-    /// Share of the lamp's light that reaches place `i`, 0 to 1: bilinear over four pixels of the map.
-    #[inline(always)]
-    pub(super) fn reaches(&self, places: &MapPlaces, i: usize) -> f32 {
-        let (u, v, own) = (places.u[i], places.v[i], places.inverse[i]);
-        const LAST: f32 = SIDE as f32 - 1.0;
-        if !(u >= 0.0 && v >= 0.0 && u < LAST && v < LAST) {
-            return 1.0;
-        }
-        let (column, row) = (u as i32, v as i32);
-        let (fu, fv) = (u - column as f32, v - row as f32);
-        let side = SIDE as usize;
-        let four = &self.depths[row as usize * side + column as usize..][..side + 2];
-        let lit = |depth: f32| if depth <= own { 1.0_f32 } else { 0.0 };
-        let (a, b, c, d) = (lit(four[0]), lit(four[1]), lit(four[side]), lit(four[side + 1]));
-        let (above, below) = (a + fu * (b - a), c + fu * (d - c));
-        above + fv * (below - above)
-    }
 }
 
-/// Places of a row in a lamp's map, and their 1/Z there.
-#[derive(Debug, Default)]
-pub(super) struct MapPlaces {
-    u: Vec<f32>,
-    v: Vec<f32>,
-    inverse: Vec<f32>,
-}
+/// Places that are looked up at once.
+const CHUNK: usize = 64;
 
-/// Looks up where spots lie in a map.
+/// Multiplies the light of a lamp at places by the share that reaches each, 0 to 1: bilinear over four pixels of
+/// its map.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-pub(super) fn map_places(spots: &Spots, view: &ShadowView, out: &mut MapPlaces) {
-    let n = spots.x.len();
-    for list in [&mut out.u, &mut out.v, &mut out.inverse] {
-        list.resize(n, 0.0);
-    }
-    let (x, y, z) = (&spots.x[..n], &spots.y[..n], &spots.z[..n]);
-    let (nx, ny, nz) = (&spots.nx[..n], &spots.ny[..n], &spots.nz[..n]);
-    let (u, v, inverse) = (&mut out.u[..n], &mut out.v[..n], &mut out.inverse[..n]);
-    let middle = 0.5 * (SIDE as f32 - 1.0);
-    for i in 0..n {
-        let p = [x[i] + LIFT * nx[i], y[i] + LIFT * ny[i], z[i] + LIFT * nz[i]];
-        let row = |k: usize| {
-            let turn = &view.turn[k];
-            turn[0] * p[0] + turn[1] * p[1] + turn[2] * p[2] + view.step[k]
-        };
-        let depth = row(2);
-        // Behind the lamp: a place outside the map, which counts as lit; its cosine is none anyway.
-        let scale = if depth > 0.05 { 1.0 / depth } else { -1e9 };
-        u[i] = if depth > 0.05 { row(0) * scale * FOCAL as f32 + middle } else { -1.0 };
-        v[i] = row(1) * scale * FOCAL as f32 + middle;
-        inverse[i] = scale * BIAS;
+pub(super) fn cast(map: &ShadowMap, view: &ShadowView, spots: &Spots, light: &mut [f32]) {
+    const MIDDLE: f32 = 0.5 * (SIDE as f32 - 1.0);
+    const LAST: f32 = SIDE as f32 - 1.0;
+    const WIDE: usize = SIDE as usize;
+    let lists = [&spots.x, &spots.y, &spots.z, &spots.nx, &spots.ny, &spots.nz];
+    let mut at = [[0.0_f32; CHUNK]; 6];
+    for (k, light) in light.chunks_mut(CHUNK).enumerate() {
+        let n = light.len();
+        for (at, list) in at.iter_mut().zip(lists) {
+            at[..n].copy_from_slice(&list[k * CHUNK..][..n]);
+        }
+        let [x, y, z, nx, ny, nz] = &at;
+        let (mut place, mut own) = ([0_u32; CHUNK], [0.0_f32; CHUNK]);
+        let (mut across, mut down) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK]);
+        for i in 0..CHUNK {
+            let p = [x[i] + LIFT * nx[i], y[i] + LIFT * ny[i], z[i] + LIFT * nz[i]];
+            let row = |k: usize| {
+                let turn = &view.turn[k];
+                turn[0] * p[0] + turn[1] * p[1] + turn[2] * p[2] + view.step[k]
+            };
+            let depth = row(2);
+            let scale = 1.0 / depth.max(0.05);
+            let (u, v) = (row(0) * scale * FOCAL as f32 + MIDDLE, row(1) * scale * FOCAL as f32 + MIDDLE);
+            // Outside the map counts as lit; behind the lamp its beam has nothing anyway.
+            let inside = (depth > 0.05) & (u >= 0.0) & (v >= 0.0) & (u < LAST) & (v < LAST);
+            let (u, v) = (if inside { u } else { 0.0 }, if inside { v } else { 0.0 });
+            let (column, row) = (u as i32, v as i32);
+            (across[i], down[i]) = (u - column as f32, v - row as f32);
+            place[i] = (row * SIDE as i32 + column) as u32;
+            own[i] = if inside { scale * BIAS } else { f32::INFINITY };
+        }
+        let mut four = [[0.0_f32; CHUNK]; 4];
+        for i in 0..n {
+            let near = &map.depths[place[i] as usize..][..WIDE + 2];
+            (four[0][i], four[1][i], four[2][i], four[3][i]) = (near[0], near[1], near[WIDE], near[WIDE + 1]);
+        }
+        let mut share = [0.0_f32; CHUNK];
+        for i in 0..CHUNK {
+            let lit = |depth: f32| if depth <= own[i] { 1.0_f32 } else { 0.0 };
+            let [a, b, c, d] = [lit(four[0][i]), lit(four[1][i]), lit(four[2][i]), lit(four[3][i])];
+            let (above, below) = (a + across[i] * (b - a), c + across[i] * (d - c));
+            share[i] = above + down[i] * (below - above);
+        }
+        light.iter_mut().zip(&share).for_each(|(light, share)| *light *= share);
     }
 }

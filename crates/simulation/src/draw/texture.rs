@@ -8,12 +8,15 @@ use crate::field::Texture;
 /// Side of a tile (texels); a power of two.
 const SIDE: usize = 1024;
 
+/// Places that are looked up at once.
+pub(super) const CHUNK: usize = 32;
+
 /// A tile that repeats, with coarser and coarser versions of it.
 #[derive(Debug, Clone)]
 pub(super) struct Tile {
-    /// The levels, finest first; each half the side of the one before. A texel comes with its neighbours
-    /// to the right, below, and both: one look-up instead of four.
-    levels: Vec<Vec<[u16; 4]>>,
+    /// All levels one after the other, finest first, each half the side of the one before. A texel comes
+    /// with its neighbours to the right, below, and both: one look-up instead of four.
+    texels: Vec<[u16; 4]>,
     /// Texels a metre.
     scale: f32,
 }
@@ -44,13 +47,13 @@ impl Tile {
         for x in &mut finest {
             *x = (f64::from(*x) / mean) as f32;
         }
-        let mut levels = Vec::new();
+        let mut texels = Vec::new();
         let (mut side, mut level) = (SIDE, finest);
         loop {
             let at = |x: usize, y: usize| level[(y % side) * side + x % side];
             let short = |x: usize, y: usize| (at(x, y) * 16384.0 + 0.5).clamp(0.0, 65535.0) as u16;
             let quad = |x, y| [short(x, y), short(x + 1, y), short(x, y + 1), short(x + 1, y + 1)];
-            levels.push((0..side * side).map(|i| quad(i % side, i / side)).collect());
+            texels.extend((0..side * side).map(|i| quad(i % side, i / side)));
             if side == 1 {
                 break;
             }
@@ -63,39 +66,76 @@ impl Tile {
                 .collect();
             side = half;
         }
-        Self { levels, scale: (1.0 / texel) as f32 }
+        Self { texels, scale: (1.0 / texel) as f32 }
     }
 
-    /// The value at (u, v) metres for a pixel as wide as `footprint` metres: bilinear in two levels,
-    /// linear between them.
+    /// The values at (u, v) metres for pixels as wide as `footprint` metres: bilinear in two levels, linear
+    /// between them. Of the answer the first `count` mean something.
     #[inline(always)]
-    fn at(&self, u: f32, v: f32, footprint: f32) -> f32 {
-        let (u, v) = (u * self.scale, v * self.scale);
-        let texels = (footprint * self.scale).max(1.0);
-        // log2 of the width, from the float's own exponent, linear between powers of two.
-        let bits = texels.to_bits();
-        let level = ((bits >> 23) as usize - 127).min(self.levels.len() - 2);
-        let between = (texels * f32::from_bits((127 - level as u32) << 23) - 1.0).clamp(0.0, 1.0);
-        let fine = self.bilinear(level, u, v);
-        // Near by, the finest level is all there is.
-        if between == 0.0 { fine } else { fine + between * (self.bilinear(level + 1, u, v) - fine) }
+    fn at(&self, count: usize, u: &[f32; CHUNK], v: &[f32; CHUNK], footprint: &[f32; CHUNK], out: &mut [f32; CHUNK]) {
+        let mut between = [0.0; CHUNK];
+        let (mut fine, mut coarse) = (Cells::default(), Cells::default());
+        for i in 0..CHUNK {
+            let (x, y) = (u[i] * self.scale, v[i] * self.scale);
+            let texels = (footprint[i] * self.scale).max(1.0);
+            // log2 of the width, from the float's own exponent, linear between powers of two.
+            let level = ((texels.to_bits() >> 23) - 127).min(COARSEST - 1);
+            between[i] = (texels * f32::from_bits((127 - level) << 23) - 1.0).clamp(0.0, 1.0);
+            (fine.place[i], fine.across[i], fine.down[i]) = cell(level, x, y);
+            (coarse.place[i], coarse.across[i], coarse.down[i]) = cell(level + 1, x, y);
+        }
+        // The look-ups by themselves, so that what is around them works on whole vectors.
+        let (mut near, mut far) = ([0; CHUNK], [0; CHUNK]);
+        for i in 0..count.min(CHUNK) {
+            near[i] = packed(self.texels[fine.place[i] as usize]);
+            far[i] = packed(self.texels[coarse.place[i] as usize]);
+        }
+        for i in 0..CHUNK {
+            let value = bilinear(near[i], fine.across[i], fine.down[i]);
+            out[i] = value + between[i] * (bilinear(far[i], coarse.across[i], coarse.down[i]) - value);
+        }
     }
+}
 
-    #[inline(always)]
-    fn bilinear(&self, level: usize, u: f32, v: f32) -> f32 {
-        let values = &self.levels[level][..];
-        let shift = (SIDE.trailing_zeros() as usize) - level;
-        let mask = (1_usize << shift) - 1;
-        let scale = f32::from_bits((127 - level as u32) << 23);
-        // Texel centres at whole numbers and a half.
-        let (x, y) = (u * scale - 0.5, v * scale - 0.5);
-        let (xi, yi) = (floor(x), floor(y));
-        let (fx, fy) = (x - xi as f32, y - yi as f32);
-        let place = ((yi as usize & mask) << shift) + (xi as usize & mask);
-        let [a, b, c, d] = values[place].map(f32::from);
-        let (above, below) = (a + fx * (b - a), c + fx * (d - c));
-        (above + fy * (below - above)) * (1.0 / 16384.0)
-    }
+/// The coarsest level: one texel.
+const COARSEST: u32 = SIDE.trailing_zeros();
+
+/// Texels and where between them.
+#[derive(Default)]
+struct Cells {
+    place: [u32; CHUNK],
+    across: [f32; CHUNK],
+    down: [f32; CHUNK],
+}
+
+/// The texel of a level whose centre lies before (x, y), given in texels of the finest, and how far before.
+#[inline(always)]
+fn cell(level: u32, x: f32, y: f32) -> (u32, f32, f32) {
+    const ALL: u32 = (SIDE * SIDE) as u32;
+    let shift = COARSEST - level;
+    let side = 1_u32 << shift;
+    // Finer levels have S² + S²/4 + … = 4 (S² − s²)/3 texels; a multiple of 3 is divided by its inverse mod 2³².
+    let before = ((ALL - side * side).wrapping_mul(0xAAAA_AAAB)) * 4;
+    let scale = f32::from_bits((127 - level) << 23);
+    // Texel centres at whole numbers and a half.
+    let (x, y) = (x * scale - 0.5, y * scale - 0.5);
+    let (xi, yi) = (floor(x), floor(y));
+    let mask = side - 1;
+    let place = before + ((yi as u32 & mask) << shift) + (xi as u32 & mask);
+    (place, x - xi as f32, y - yi as f32)
+}
+
+#[inline(always)]
+fn packed([a, b, c, d]: [u16; 4]) -> u64 {
+    u64::from(a) | u64::from(b) << 16 | u64::from(c) << 32 | u64::from(d) << 48
+}
+
+/// Between the four values of a texel and its neighbours.
+#[inline(always)]
+fn bilinear(four: u64, across: f32, down: f32) -> f32 {
+    let [a, b, c, d] = [0, 16, 32, 48].map(|shift| ((four >> shift) & 0xFFFF) as u32 as i32 as f32);
+    let (above, below) = (a + across * (b - a), c + across * (d - c));
+    (above + down * (below - above)) * (1.0 / 16384.0)
 }
 
 /// The whole number below.
@@ -110,16 +150,43 @@ impl Looks {
         Self { looks: Default::default(), seed }
     }
 
-    /// By what the albedo is multiplied at (u, v) of a surface (m), seen by pixels as wide as `footprint` (m).
-    #[inline]
-    pub(super) fn at(&self, texture: Texture, u: f32, v: f32, footprint: f32) -> f32 {
-        if texture == Texture::Plain {
-            return 1.0;
+    /// By what the albedo is multiplied at places (u, v) of a surface (m), each seen by a pixel as wide as its
+    /// `footprint` (m).
+    pub(super) fn at(&self, texture: Texture, u: &[f32], v: &[f32], footprint: &[f32], out: &mut Vec<f32>) {
+        out.clear();
+        out.resize(u.len(), 1.0);
+        if texture != Texture::Plain {
+            let look = self.looks[texture as usize].get_or_init(|| Box::new(look(texture, self.seed)));
+            look.at(u, v, footprint, out);
         }
-        let look = self.looks[texture as usize].get_or_init(|| Box::new(look(texture, self.seed)));
-        // The coarse tile is turned, so that the two grids do not align.
-        let (p, q) = (0.8 * u - 0.6 * v, 0.6 * u + 0.8 * v);
-        look.fine.at(u, v, footprint) * look.coarse.at(p, q, footprint)
+    }
+}
+
+impl Look {
+    fn at(&self, u: &[f32], v: &[f32], footprint: &[f32], out: &mut [f32]) {
+        looked_up(self, u, v, footprint, out);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn looked_up(look: &Look, u: &[f32], v: &[f32], footprint: &[f32], out: &mut [f32]) {
+    let (mut s, mut t, mut width) = ([0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+    let (mut p, mut q, mut fine, mut coarse) = ([0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+    let chunks = u.chunks(CHUNK).zip(v.chunks(CHUNK)).zip(footprint.chunks(CHUNK)).zip(out.chunks_mut(CHUNK));
+    for (((u, v), footprint), out) in chunks {
+        let n = out.len();
+        s[..n].copy_from_slice(u);
+        t[..n].copy_from_slice(v);
+        width[..n].copy_from_slice(footprint);
+        for i in 0..CHUNK {
+            // The coarse tile is turned, so that the two grids do not align.
+            (p[i], q[i]) = (0.8 * s[i] - 0.6 * t[i], 0.6 * s[i] + 0.8 * t[i]);
+        }
+        look.fine.at(n, &s, &t, &width, &mut fine);
+        look.coarse.at(n, &p, &q, &width, &mut coarse);
+        for i in 0..n {
+            out[i] = fine[i] * coarse[i];
+        }
     }
 }
 
@@ -235,6 +302,13 @@ fn pebbles(x: usize, y: usize, cells: u32, seed: u32) -> f32 {
 mod tests {
     use super::*;
 
+    /// One place of a tile.
+    fn at(tile: &Tile, u: f32, v: f32, footprint: f32) -> f32 {
+        let mut out = [0.0; CHUNK];
+        tile.at(1, &[u; CHUNK], &[v; CHUNK], &[footprint; CHUNK], &mut out);
+        out[0]
+    }
+
     #[test]
     fn a_tile_repeats_is_continuous_and_fades_to_its_mean() {
         let look = look(Texture::Sand, 3);
@@ -242,22 +316,34 @@ mod tests {
         let (mut sum, mut n) = (0.0, 0.0);
         for k in 0..3000 {
             let (u, v) = (k as f32 * 0.013, (k % 71) as f32 * 0.029);
-            let here = look.fine.at(u, v, 0.004);
-            assert!((look.fine.at(u + period, v - period, 0.004) - here).abs() < 0.02);
-            assert!((look.fine.at(u + 1e-4, v, 0.004) - here).abs() < 0.08);
-            assert!((look.fine.at(u, v, 0.00881) - look.fine.at(u, v, 0.00879)).abs() < 0.01);
+            let here = at(&look.fine, u, v, 0.004);
+            assert!((at(&look.fine, u + period, v - period, 0.004) - here).abs() < 0.02);
+            assert!((at(&look.fine, u + 1e-4, v, 0.004) - here).abs() < 0.08);
+            assert!((at(&look.fine, u, v, 0.00881) - at(&look.fine, u, v, 0.00879)).abs() < 0.01);
             sum += f64::from(here);
             n += 1.0;
         }
         assert!((sum / n - 1.0).abs() < 0.05);
-        assert!((look.fine.at(0.3, 0.4, 1e3) - 1.0).abs() < 1e-3);
-        assert_eq!(Looks::new(1).at(Texture::Plain, 0.1, 0.2, 0.01), 1.0);
+        assert!((at(&look.fine, 0.3, 0.4, 1e3) - 1.0).abs() < 1e-3);
+        let mut plain = Vec::new();
+        Looks::new(1).at(Texture::Plain, &[0.1; 3], &[0.2; 3], &[0.01; 3], &mut plain);
+        assert_eq!(plain, [1.0; 3]);
+    }
+
+    #[test]
+    fn levels_lie_one_behind_the_other() {
+        let sides = (0..=COARSEST).map(|level| 1_u32 << (COARSEST - level));
+        let mut before = 0;
+        for (level, side) in (0..).zip(sides) {
+            assert_eq!(cell(level, 0.75 * f32::from_bits((127 + level) << 23), 0.5).0, before);
+            before += side * side;
+        }
     }
 
     #[test]
     fn negative_places_have_values_too() {
         assert_eq!((floor(-0.25), floor(-1.0), floor(2.75)), (-1, -1, 2));
         let look = look(Texture::Rock, 3);
-        assert!((0.1..3.0).contains(&look.fine.at(-20.3, -7.7, 0.002)));
+        assert!((0.1..3.0).contains(&at(&look.fine, -20.3, -7.7, 0.002)));
     }
 }

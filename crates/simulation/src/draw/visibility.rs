@@ -25,13 +25,13 @@ pub(super) struct Strip {
     first_row: usize,
     rows: usize,
     depths: Vec<f32>,
-    pub(super) seen: Vec<u32>,
+    seen: Vec<u32>,
     crossed: Vec<bool>,
     /// Columns of crossed pixels, row by row, and where each row begins.
-    pub(super) columns: Vec<u32>,
-    pub(super) starts: Vec<usize>,
+    columns: Vec<u32>,
+    starts: Vec<usize>,
     sample_depths: Vec<[f32; SAMPLES]>,
-    pub(super) samples: Vec<[u32; SAMPLES]>,
+    samples: Vec<[u32; SAMPLES]>,
 }
 
 impl Strip {
@@ -107,17 +107,31 @@ impl Strip {
     /// other, no edge says so.
     fn cross_borders(&mut self, outlines: &[Outline]) {
         let body = |seen: u32| if seen == NONE { NONE } else { outlines[seen as usize].body };
+        let width = self.width;
+        let Self { seen, crossed, .. } = self;
         for row in 0..self.rows {
-            for column in 0..self.width {
-                let here = row * self.width + column;
-                let seen = self.seen[here];
-                for (there, exists) in [(here + 1, column + 1 < self.width), (here + self.width, row + 1 < self.rows)] {
-                    if exists && self.seen[there] != seen && body(seen) != body(self.seen[there]) {
-                        (self.crossed[here], self.crossed[there]) = (true, true);
-                    }
+            let here = row * width;
+            for column in changes(&seen[here..here + width - 1], &seen[here + 1..here + width]) {
+                if body(seen[here + column]) != body(seen[here + column + 1]) {
+                    crossed[here + column..here + column + 2].fill(true);
+                }
+            }
+            if row + 1 == self.rows {
+                continue;
+            }
+            let (above, below) = seen[here..here + 2 * width].split_at(width);
+            for column in changes(above, below) {
+                if body(above[column]) != body(below[column]) {
+                    (crossed[here + column], crossed[here + width + column]) = (true, true);
                 }
             }
         }
+    }
+
+    /// What a row's centres see, the columns that edges cross, and what their samples see.
+    pub(super) fn row(&self, row: usize) -> (&[u32], &[u32], &[[u32; SAMPLES]]) {
+        let slots = self.starts[row]..self.starts[row + 1];
+        (&self.seen[row * self.width..][..self.width], &self.columns[slots.clone()], &self.samples[slots])
     }
 
     fn draw_samples(&mut self, outline: &Outline, index: u32, places: &[[f32; SAMPLES]; 2]) {
@@ -138,29 +152,53 @@ impl Strip {
                 let u = f64::from(column);
                 let slot = self.starts[row] + k;
                 let whole = (inner..inner_end).contains(&(column as usize));
-                let mut inside = [0.0_f32; SAMPLES];
-                if !whole {
-                    for side in outline.sides() {
-                        let [a, b, c] = side.line;
-                        let at = (a * u + b * v + c) as f32;
-                        let (a, b) = (a as f32, b as f32);
-                        for k in 0..SAMPLES {
-                            inside[k] = inside[k].min(at + a * places[0][k] + b * places[1][k]);
-                        }
-                    }
-                }
-                let at = (outline.inverse_depth(u, v) * outline.layer) as f32;
-                let slope = outline.slope().map(|x| (x * outline.layer) as f32);
+                let sides = if whole { &[] } else { outline.sides() };
+                let lines = sides.iter().map(|side| {
+                    let [a, b, c] = side.line;
+                    [(a * u + b * v + c) as f32, a as f32, b as f32]
+                });
+                let mut three = [[0.0; 3]; 4];
+                three.iter_mut().zip(lines).for_each(|(kept, line)| *kept = line);
+                let plane = [outline.inverse_depth(u, v), outline.slope()[0], outline.slope()[1]];
+                let plane = plane.map(|x| (x * outline.layer) as f32);
                 let (depths, samples) = (&mut self.sample_depths[slot], &mut self.samples[slot]);
-                for k in 0..SAMPLES {
-                    let depth = at + slope[0] * places[0][k] + slope[1] * places[1][k];
-                    let nearer = inside[k] >= 0.0 && depth > depths[k];
-                    depths[k] = if nearer { depth } else { depths[k] };
-                    samples[k] = if nearer { index } else { samples[k] };
-                }
+                sample(&three[..sides.len()], &plane, places, index, depths, samples);
             }
         }
     }
+}
+
+/// Gives a pixel's samples within all sides to an outline where it is nearer (1/Z) than what they see. A line
+/// or plane is its value at the pixel's centre and its steps.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn sample(
+    sides: &[[f32; 3]],
+    plane: &[f32; 3],
+    places: &[[f32; SAMPLES]; 2],
+    index: u32,
+    depths: &mut [f32; SAMPLES],
+    samples: &mut [u32; SAMPLES],
+) {
+    let mut inside = [0.0_f32; SAMPLES];
+    for [at, a, b] in sides {
+        for k in 0..SAMPLES {
+            inside[k] = inside[k].min(at + a * places[0][k] + b * places[1][k]);
+        }
+    }
+    for k in 0..SAMPLES {
+        let depth = plane[0] + plane[1] * places[0][k] + plane[2] * places[1][k];
+        let nearer = (inside[k] >= 0.0) & (depth > depths[k]);
+        depths[k] = if nearer { depth } else { depths[k] };
+        samples[k] = if nearer { index } else { samples[k] };
+    }
+}
+
+/// Where two rows differ.
+fn changes<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = usize> + 'a {
+    const PIECE: usize = 16;
+    // Most of the way nothing changes: whole pieces are compared first.
+    let pieces = a.chunks(PIECE).zip(b.chunks(PIECE)).enumerate().filter(|(_, (a, b))| a != b);
+    pieces.flat_map(|(k, (a, b))| (0..a.len()).filter(move |&i| a[i] != b[i]).map(move |i| k * PIECE + i))
 }
 
 /// Sets the depths (1/Z) that are nearer than what is there.

@@ -7,7 +7,7 @@ use seafix_geometry::{
 };
 use seafix_vision::{Image, Threads};
 
-use super::PlannedMission;
+use super::{PlannedMission, PriorKind};
 use crate::{
     dive::VisiblePoint,
     draw::{Exposure, Rolling, Shot},
@@ -15,9 +15,6 @@ use crate::{
     sensors::{Device, DeviceFault, FaultKind, Rough},
     stream::Purpose,
 };
-
-/// The first stamp: some time in 2023, so that stamps look like those of a real log.
-const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
 
 /// One instant.
 #[derive(Debug, Clone)]
@@ -45,11 +42,11 @@ pub struct InstantTruth {
 impl<'a> Instant<'a> {
     pub(super) fn new(mission: &'a PlannedMission, index: usize, time: f64) -> Self {
         let world_from_camera = mission.camera(time);
-        let prior = match &mission.navigation {
-            None => Some(rough(mission, index, &world_from_camera)),
-            Some(navigation) => navigation.at(time).map(|rough| from_sensors(mission, &rough)),
+        let prior = match mission.settings.prior {
+            PriorKind::Drawn => Some(rough(mission, index, &world_from_camera)),
+            PriorKind::Sensors => mission.reckoned(time).map(|rough| from_sensors(mission, &rough)),
         };
-        let stamp_ns = EPOCH_NS + (time * 1e9).round() as u64;
+        let stamp_ns = mission.stamp(time);
         let empty = InstantTruth { world_from_camera, visible: Vec::new() };
         let mut instant = Self { mission, index, stamp_ns, prior, time, truth: empty };
         instant.truth.visible = instant.visible();

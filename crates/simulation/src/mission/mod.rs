@@ -7,7 +7,7 @@ mod settings;
 
 pub use frame::{Instant, InstantTruth};
 pub use plan::PlannedMission;
-pub use rig::{CalibrationError, FocalIn, RigPlan};
+pub use rig::{CALIBRATION_RANGE, CalibrationError, FocalIn, RigPlan};
 pub use settings::{Mission, PriorKind};
 
 #[cfg(test)]

@@ -7,17 +7,19 @@ use seafix_geometry::{Body, Camera, Object, StereoRig, Transform, World};
 use seafix_referencing::Site;
 use seafix_vision::{Threads, Workspace};
 
-use super::{Instant, Mission, PriorKind, rig::Cameras};
+use super::{Instant, Mission, rig::Cameras};
 use crate::{
     draw::{Eye, Looks, Studio},
     field::{Field, SitePlan},
     optics::Lamp,
-    sensors::Navigation,
+    sensors::{Navigation, Readings, Rough},
     stream::{Purpose, Stream},
     survey::SurveyErrors,
     vehicle::{Track, Way},
 };
 
+/// The first stamp: some time in 2023, so that stamps look like those of a real log.
+const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
 /// Seconds between two looks for collisions.
 const LOOK: f64 = 0.1;
 
@@ -34,8 +36,9 @@ pub struct PlannedMission {
     /// How far the water has carried what floats in it, at the track's times (m).
     drifts: Vec<Vector3<f64>>,
     pub(super) body_from_camera: Transform<Body, Camera>,
-    /// What the sensors say, where the rough pose comes from them.
-    pub(super) navigation: Option<Navigation>,
+    /// What the sensors say, and where the route leads.
+    navigation: Navigation,
+    way: Way,
     times: Vec<f64>,
     /// Memories of rendering, one for each that renders at once.
     memories: Mutex<Vec<Workspace>>,
@@ -46,7 +49,7 @@ impl PlannedMission {
         let errors = SurveyErrors { model: settings.model_sigma, survey: settings.survey_sigma };
         let field = Field::new(plan, &settings.changes, errors, seed);
         let cameras = settings.rig.build()?;
-        let body_from_camera = mount(settings.rig.ahead_deg);
+        let body_from_camera = mount(settings.rig.ahead_deg, settings.rig.at);
         let way = Way::new(&settings.route, &field)?;
         let last = settings.start
             + if settings.rate > 0.0 {
@@ -71,8 +74,8 @@ impl PlannedMission {
         let place = body_from_camera.translation();
         let (track, drifts) =
             settings.vehicle.travel(&way, last + 0.2, &place, &field.bed, &settings.current, (seed, dive));
-        let navigation = (settings.prior == PriorKind::Sensors)
-            .then(|| Navigation::new(&settings.sensors, &settings.faults, &track, &field, last + 0.1, (seed, dive)));
+        let until = last + 0.1;
+        let navigation = Navigation::new(&settings.sensors, &settings.faults, &track, &field, until, (seed, dive));
         let studio = build_studio(settings, &cameras, seed, dive);
         let planned = Self {
             settings: settings.clone(),
@@ -85,6 +88,7 @@ impl PlannedMission {
             drifts,
             body_from_camera,
             navigation,
+            way,
             times,
             memories: Mutex::new(Vec::new()),
         };
@@ -115,6 +119,28 @@ impl PlannedMission {
     /// Where the left camera sits in the vehicle.
     pub fn body_from_camera(&self) -> Transform<Body, Camera> {
         self.body_from_camera
+    }
+
+    /// What the navigation sensors say during the whole dive, faults included; no truth is in it.
+    pub fn readings(&self) -> Readings {
+        self.navigation.readings()
+    }
+
+    /// The rough pose of the vehicle that the sensors give at a time (s).
+    pub(super) fn reckoned(&self, time: f64) -> Option<Rough> {
+        self.navigation.at(time)
+    }
+
+    /// The stamp of a time of the dive (s): ns since 1970.
+    pub fn stamp(&self, time: f64) -> u64 {
+        EPOCH_NS + (time * 1e9).round() as u64
+    }
+
+    /// The places that the route leads through: north, east, height above the mean bed (m), as
+    /// [`Route::waypoints`](crate::vehicle::Route::waypoints) has them.
+    pub fn waypoints(&self) -> Vec<[f64; 3]> {
+        let depth = self.field.bed.depth();
+        self.way.places().iter().map(|p| [p.x, p.y, depth - p.z]).collect()
     }
 
     /// How many frames it has.
@@ -179,17 +205,21 @@ impl PlannedMission {
     /// Whether the vehicle, its cameras or its lamps come too near to anything.
     fn collision(&self, last: f64) -> Result<(), String> {
         let clearance = self.settings.clearance;
-        let parts = |time: f64| {
+        let lamps = self.studio.left.lamps.iter().enumerate();
+        let right = self.cameras.right_from_left.inverse().translation();
+        let parts: Vec<(String, Vector3<f64>)> =
+            [("the left camera".to_owned(), Vector3::zeros()), ("the right camera".to_owned(), right)]
+                .into_iter()
+                .chain(lamps.map(|(k, lamp)| (format!("lamp {k}"), Vector3::from(lamp.at))))
+                .collect();
+        let places = |time: f64| {
             let camera = self.camera(time);
-            let lamps = self.studio.left.lamps.iter().map(|lamp| Vector3::from(lamp.at));
-            let right = self.cameras.right_from_left.inverse().translation();
-            let places: Vec<Vector3<f64>> = [Vector3::zeros(), right].into_iter().chain(lamps).collect();
-            places.into_iter().map(move |p| camera.rotation() * p + camera.translation()).collect::<Vec<_>>()
+            parts.iter().map(|(_, p)| camera.rotation() * p + camera.translation()).collect::<Vec<_>>()
         };
         let mut before: Option<Vec<Vector3<f64>>> = None;
         for k in 0..=(last / LOOK).ceil() as usize {
             let time = k as f64 * LOOK;
-            let now = parts(time);
+            let now = places(time);
             for (i, place) in now.iter().enumerate() {
                 let near = self.field.distance(place, clearance.max(1e-6)).is_some();
                 // Below the bed, or through a thin body between two looks.
@@ -209,9 +239,9 @@ impl PlannedMission {
                         })
                         .map_or("nothing", |(_, told)| told.id.as_str());
                     return Err(format!(
-                        "route: the vehicle comes within {clearance} m of something near `{nearest}` after {time:.1} s, at \
+                        "route: {} comes within {clearance} m of something near `{nearest}` after {time:.1} s, at \
                          north {:.2}, east {:.2}, depth {:.2} m; raise route.altitude or lower clearance",
-                        place.x, place.y, place.z
+                        parts[i].0, place.x, place.y, place.z
                     ));
                 }
             }
@@ -222,11 +252,11 @@ impl PlannedMission {
 }
 
 /// The cameras look down and `ahead` degrees forward: right in the image is starboard, its lower edge is aft.
-fn mount(ahead: f64) -> Transform<Body, Camera> {
+fn mount(ahead: f64, at: [f64; 3]) -> Transform<Body, Camera> {
     let (sine, cosine) = libm::sincos(ahead.to_radians());
     let forward = Vector3::new(sine, 0.0, cosine);
     let axes = Matrix3::from_columns(&[Vector3::y(), forward.cross(&Vector3::y()), forward]);
-    Transform::from_axes(&axes, Vector3::zeros())
+    Transform::from_axes(&axes, at.into())
 }
 
 fn build_studio(settings: &Mission, cameras: &Cameras, seed: u64, dive: u64) -> Studio {

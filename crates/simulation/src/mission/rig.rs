@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::optics::{Lens, Port, PortKind};
 
 /// The distance at which cameras behind ports are calibrated (m).
-const CALIBRATION_RANGE: f64 = 3.0;
+pub const CALIBRATION_RANGE: f64 = 3.0;
 
 /// What a focal length is that of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -35,6 +35,8 @@ pub struct RigPlan {
     pub baseline: f64,
     /// Brown's distortion, k1 k2 p1 p2 \[k3 \[k4 k5 k6\]\].
     pub distortion: Vec<f64>,
+    /// Where the left camera is in the vehicle, whose origin is its centre of gravity: ahead, to starboard, down (m).
+    pub at: [f64; 3],
     /// By how much the cameras look ahead of straight down (degrees).
     pub ahead_deg: f64,
     /// The port of each camera.
@@ -51,6 +53,7 @@ impl Default for RigPlan {
             focal_in: FocalIn::Air,
             baseline: 0.25,
             distortion: Vec::new(),
+            at: [0.0; 3],
             ahead_deg: 15.0,
             port: Port::default(),
             error: CalibrationError::default(),
@@ -91,6 +94,7 @@ impl RigPlan {
         within("focal", self.focal, 1.0, 1e5)?;
         within("baseline", self.baseline, 1e-3, 100.0)?;
         within("ahead-deg", self.ahead_deg, -60.0, 60.0)?;
+        self.at.iter().try_for_each(|x| within("at", *x, -10.0, 10.0))?;
         within("error.focal", self.error.focal, -0.5, 0.5)?;
         for x in self.error.principal {
             within("error.principal", x, -100.0, 100.0)?;

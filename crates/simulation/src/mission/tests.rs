@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use nalgebra::Vector3;
 use seafix_geometry::Point;
 use seafix_vision::Threads;
 
@@ -130,8 +131,68 @@ fn a_way_through_an_object_is_refused_with_place_and_time() {
         .plan(1, 0, Path::new(""))
         .unwrap_err();
     let line = faults[0].to_string();
-    assert!(line.contains("near `manifold` after 0.0 s, at north"), "{line}");
+    assert!(line.contains("camera comes within 0.3 m of something near `manifold` after 0.0 s, at north"), "{line}");
     assert!(!line.contains('\n'));
+    // A lamp that hangs too low is named.
+    let lamp = crate::optics::Lamp { at: [0.0, 0.0, 2.6], aim: [0.0, 0.0, 4.0], ..Default::default() };
+    let line = Mission { lamps: vec![lamp], ..small() }.plan(1, 0, Path::new("")).unwrap_err()[0].to_string();
+    assert!(line.contains("route: lamp 0 comes within 0.3 m of something near `"), "{line}");
+}
+
+#[test]
+fn routes_are_waypoints() {
+    let rail = Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() };
+    for kind in [RouteKind::Tour, RouteKind::Lawnmower, RouteKind::Approach] {
+        let route = Route { kind, length: 30.0, ..Route::default() };
+        let plan = planned(&Mission { route: route.clone(), vehicle: rail.clone(), ..small() });
+        let written = Route { kind: RouteKind::Waypoints, waypoints: plan.waypoints(), ..route };
+        let again = planned(&Mission { route: written, vehicle: rail.clone(), ..small() });
+        for time in [0.0, 3.0, 7.7] {
+            let (a, b) = (plan.camera(time), again.camera(time));
+            let turn = if kind == RouteKind::Approach { 0.0 } else { (a.rotation().angle_to(&b.rotation())).abs() };
+            assert!((a.translation() - b.translation()).norm() < 1e-9 && turn < 1e-9, "{kind:?} {time}");
+        }
+    }
+    // The paper's: 200 m over seven objects, from one to the next 15 m at most.
+    let tour = planned(&Mission { vehicle: rail, ..small() }).waypoints();
+    let steps: Vec<f64> = tour.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).collect();
+    assert!(steps.iter().all(|step| *step <= 15.0), "{steps:?}");
+    assert!((200.0..215.0).contains(&steps.iter().sum::<f64>()), "{steps:?}");
+}
+
+#[test]
+fn a_sensor_away_from_the_centre_says_what_its_place_does() {
+    let quiet = || {
+        let mut sensors = Sensors {
+            acoustic: Acoustic { sigma: 0.0, share: 0.0, outliers: 0.0, dropouts: 0.0, ..Acoustic::default() },
+            ..Sensors::default()
+        };
+        (sensors.doppler.sigma, sensors.doppler.scale, sensors.depth.sigma, sensors.depth.bias) = (0.0, 0.0, 0.0, 0.0);
+        sensors
+    };
+    let said = |place: [f64; 3]| {
+        let mut sensors = quiet();
+        (sensors.acoustic.at, sensors.doppler.at, sensors.depth.at) = (place, place, place);
+        let plan = planned(&Mission { sensors, start: 2.0, ..small() });
+        (plan.readings(), plan)
+    };
+    let place = [0.7, -0.3, 0.4];
+    let (centre, plan) = said([0.0; 3]);
+    let (away, _) = said(place);
+    let lever = Vector3::from(place);
+    for (a, b) in centre.doppler.iter().zip(&away.doppler).filter(|(a, b)| a.time == b.time) {
+        let turning = plan.track.at(a.time).motion.fixed_rows::<3>(0).into_owned();
+        assert!((b.value - a.value - turning.cross(&lever)).norm() < 1e-12);
+    }
+    for (a, b) in centre.acoustic.iter().zip(&away.acoustic) {
+        let turn = plan.track.at(a.time).world_from_body.rotation();
+        assert!((b.value.at - a.value.at - turn * lever).norm() < 1e-12);
+    }
+    for (a, b) in centre.depth.iter().zip(&away.depth) {
+        let turn = plan.track.at(a.time).world_from_body.rotation();
+        assert!((b.value - a.value - (turn * lever).z).abs() < 1e-12);
+    }
+    assert!(!centre.doppler.is_empty() && !centre.acoustic.is_empty() && !centre.depth.is_empty());
 }
 
 #[test]

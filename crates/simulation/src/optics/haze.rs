@@ -114,25 +114,55 @@ impl Haze {
         row.extend(above.iter().zip(below).map(|(a, b)| a + f * (b - a)));
     }
 
-    /// The light from the water up to the range `r` (m) at a column of the row that
+    /// The light from the water up to the ranges `r` (m) at places `u` of the row that
     /// [`along_row`](Self::along_row) has prepared; `through` is exp(−c r).
-    #[inline(always)]
-    pub(crate) fn at(&self, row: &[f32], u: f32, r: f32, through: f32) -> f32 {
-        if self.none {
-            return 0.0;
+    pub(crate) fn at(&self, row: &[f32], u: &[f32], r: &[f32], through: &[f32], out: &mut Vec<f32>) {
+        out.clear();
+        out.resize(u.len(), 0.0);
+        if !self.none {
+            looked_up(self, row, u, r, through, out);
         }
-        let x = (u * self.nodes).max(0.0);
-        let i = (x as usize).min(self.columns - 2);
-        let fu = x - i as f32;
-        let t = (r * (1.0 / REACH as f32)).min(1.0).sqrt() * (RANGES - 1) as f32;
-        let k = (t as usize).min(RANGES - 2);
-        // Linear in the range itself: between its two nodes.
-        let low = k as f32 * k as f32;
-        let fr = ((t * t - low) / (2 * k + 1) as f32).min(1.0);
-        let values = &row[i * RANGES + k..][..RANGES + 2];
-        let near = values[0] + fr * (values[1] - values[0]);
-        let next = values[RANGES] + fr * (values[RANGES + 1] - values[RANGES]);
-        near + fu * (next - near) + self.veil * (1.0 - through)
+    }
+}
+
+/// Places that are looked up at once.
+const CHUNK: usize = 64;
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn looked_up(haze: &Haze, row: &[f32], u: &[f32], r: &[f32], through: &[f32], out: &mut [f32]) {
+    let last = haze.columns as i32 - 2;
+    let (mut x, mut s) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK]);
+    let chunks = u.chunks(CHUNK).zip(r.chunks(CHUNK)).zip(through.chunks(CHUNK)).zip(out.chunks_mut(CHUNK));
+    for (((u, r), through), out) in chunks {
+        let n = out.len();
+        x[..n].copy_from_slice(u);
+        s[..n].copy_from_slice(r);
+        let (mut place, mut across, mut along) = ([0_u32; CHUNK], [0.0_f32; CHUNK], [0.0_f32; CHUNK]);
+        for i in 0..CHUNK {
+            let x = (x[i] * haze.nodes).max(0.0);
+            let column = (x as i32).min(last);
+            across[i] = x - column as f32;
+            let t = (s[i] * (1.0 / REACH as f32)).min(1.0).sqrt() * (RANGES - 1) as f32;
+            let k = (t as i32).min(RANGES as i32 - 2);
+            // Linear in the range itself: between its two nodes.
+            let low = k as f32 * k as f32;
+            along[i] = ((t * t - low) / (2 * k + 1) as f32).min(1.0);
+            place[i] = (column * RANGES as i32 + k) as u32;
+        }
+        let mut four = [[0.0_f32; CHUNK]; 4];
+        for i in 0..n {
+            let near = &row[place[i] as usize..][..RANGES + 2];
+            (four[0][i], four[1][i], four[2][i], four[3][i]) = (near[0], near[1], near[RANGES], near[RANGES + 1]);
+        }
+        let mut light = [0.0_f32; CHUNK];
+        for i in 0..CHUNK {
+            let near = four[0][i] + along[i] * (four[1][i] - four[0][i]);
+            let next = four[2][i] + along[i] * (four[3][i] - four[2][i]);
+            light[i] = near + across[i] * (next - near);
+        }
+        for i in 0..n {
+            out[i] = light[i] + haze.veil * (1.0 - through[i]);
+        }
     }
 }
 
@@ -184,7 +214,9 @@ mod tests {
                 let exact = direct(&water, &lamps, &Pixel { u, v }, r);
                 let through = libm::exp(-0.6 * r) as f32;
                 haze.along_row(v as f32, &mut row);
-                let table = f64::from(haze.at(&row, u as f32, r as f32, through));
+                let mut found = Vec::new();
+                haze.at(&row, &[u as f32], &[r as f32], &[through], &mut found);
+                let table = f64::from(found[0]);
                 assert!((table / exact - 1.0).abs() < 0.01, "{u} {v} {r}: {table} for {exact}");
             }
         }
@@ -217,7 +249,9 @@ mod tests {
         assert!(sums.windows(2).all(|w| w[1] >= w[0]));
         assert!(sums[RANGES - 1] / sums[RANGES - 10] < 1.001);
         for none in [Water { attenuation: 0.0, ..Water::default() }, Water { albedo: 0.0, ..Water::default() }] {
-            assert_eq!(Haze::new(&none, &lamps, &lens()).at(&[], 3.0, 2.0, 1.0), 0.0);
+            let mut found = Vec::new();
+            Haze::new(&none, &lamps, &lens()).at(&[], &[3.0], &[2.0], &[1.0], &mut found);
+            assert_eq!(found, [0.0]);
         }
     }
 }

@@ -64,7 +64,11 @@ impl Default for Port {
 }
 
 impl Port {
-    pub(crate) fn check(&self) -> Result<(), String> {
+    /// Whether its numbers are those of a port.
+    ///
+    /// # Errors
+    /// The first number outside its range: `name = value; give range`.
+    pub fn check(&self) -> Result<(), String> {
         let within = |name: &str, x: f64, low: f64, high: f64| {
             in_range(x >= low && x <= high, &format!("port.{name}"), x, &format!("a number from {low} to {high}"))
         };

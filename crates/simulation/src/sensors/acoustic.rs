@@ -21,6 +21,8 @@ const OUTLIER: f64 = 0.1;
 pub struct Acoustic {
     /// Where the transceiver is: north, east, down (m).
     pub from: [f64; 3],
+    /// Where its transponder sits in the vehicle: body frame (m).
+    pub at: [f64; 3],
     /// Part of σ that grows with the slant range.
     pub share: f64,
     /// Part of σ that does not (m).
@@ -35,7 +37,15 @@ pub struct Acoustic {
 
 impl Default for Acoustic {
     fn default() -> Self {
-        Self { from: [30.0, 20.0, 2.0], share: 0.005, sigma: 0.0, rate: 0.5, outliers: 0.05, dropouts: 0.05 }
+        Self {
+            from: [30.0, 20.0, 2.0],
+            at: [0.0; 3],
+            share: 0.005,
+            sigma: 0.0,
+            rate: 0.5,
+            outliers: 0.05,
+            dropouts: 0.05,
+        }
     }
 }
 
@@ -43,6 +53,7 @@ impl Acoustic {
     pub(super) fn check(&self) -> Result<(), String> {
         let within = |name, x, low, high| within("acoustic", name, x, low, high);
         self.from.iter().try_for_each(|x| within("from", *x, -1e5, 1e5))?;
+        self.at.iter().try_for_each(|x| within("at", *x, -10.0, 10.0))?;
         within("share", self.share, 0.0, 0.2)?;
         within("sigma", self.sigma, 0.0, 100.0)?;
         within("rate", self.rate, 1e-3, 100.0)?;
@@ -60,7 +71,8 @@ impl Acoustic {
         let fix = |k: u64| {
             let time = k as f64 / self.rate;
             let mut stream = Stream::new(seeds.0, seeds.1, k, Purpose::Acoustics);
-            let at = track.at(time).world_from_body.translation();
+            let world_from_body = track.at(time).world_from_body;
+            let at = world_from_body.translation() + world_from_body.rotation() * Vector3::from(self.at);
             let range = (at - Vector3::from(self.from)).norm();
             let error = stream.normal3(self.spread(range));
             let far = Vector3::from_fn(|_, _| stream.between(-1.0, 1.0)) * (OUTLIER * range);

@@ -1,5 +1,6 @@
 //! The pressure sensor.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{Reading, within};
@@ -12,6 +13,8 @@ use crate::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DepthGauge {
+    /// Where it sits in the vehicle: body frame (m).
+    pub at: [f64; 3],
     /// Standard deviation of the bias (m).
     pub bias: f64,
     /// Standard deviation of the noise (m).
@@ -24,13 +27,14 @@ pub struct DepthGauge {
 
 impl Default for DepthGauge {
     fn default() -> Self {
-        Self { bias: 0.1, sigma: 0.02, rate: 5.0, latency: 0.02 }
+        Self { at: [0.0; 3], bias: 0.1, sigma: 0.02, rate: 5.0, latency: 0.02 }
     }
 }
 
 impl DepthGauge {
     pub(super) fn check(&self) -> Result<(), String> {
         let within = |name, x, low, high| within("depth", name, x, low, high);
+        self.at.iter().try_for_each(|x| within("at", *x, -10.0, 10.0))?;
         within("bias", self.bias, 0.0, 100.0)?;
         within("sigma", self.sigma, 0.0, 100.0)?;
         within("rate", self.rate, 1e-3, 1e3)?;
@@ -43,7 +47,9 @@ impl DepthGauge {
         let reading = |k: u64| {
             let time = k as f64 / self.rate;
             let noise = self.sigma * Stream::new(seeds.0, seeds.1, k, Purpose::Depth).normal();
-            let value = track.at(time).world_from_body.translation().z + bias + noise;
+            let world_from_body = track.at(time).world_from_body;
+            let below = (world_from_body.rotation() * Vector3::from(self.at)).z;
+            let value = world_from_body.translation().z + below + bias + noise;
             Reading { time, arrival: time + self.latency, value }
         };
         (0..=(until * self.rate) as u64).map(reading).collect()

@@ -15,11 +15,13 @@ const BEAM_DEG: f64 = 30.0;
 /// Share of beams on a structure that give a velocity.
 const ON_STRUCTURE: f64 = 0.5;
 
-/// Velocity over ground in the body frame: a scale error of the dive, and white noise. It needs three of
+/// Velocity over ground of its place, in the body frame: a scale error of the dive, and white noise. It needs three of
 /// four beams; those that meet a structure fail half of the time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Doppler {
+    /// Where it sits in the vehicle: body frame (m).
+    pub at: [f64; 3],
     /// Standard deviation of the scale error (relative).
     pub scale: f64,
     /// Standard deviation of the noise, each axis (m/s).
@@ -34,13 +36,14 @@ pub struct Doppler {
 
 impl Default for Doppler {
     fn default() -> Self {
-        Self { scale: 0.002, sigma: 0.004, rate: 5.0, reach: [0.4, 100.0], latency: 0.05 }
+        Self { at: [0.0; 3], scale: 0.002, sigma: 0.004, rate: 5.0, reach: [0.4, 100.0], latency: 0.05 }
     }
 }
 
 impl Doppler {
     pub(super) fn check(&self) -> Result<(), String> {
         let within = |name, x, low, high| within("doppler", name, x, low, high);
+        self.at.iter().try_for_each(|x| within("at", *x, -10.0, 10.0))?;
         within("scale", self.scale, 0.0, 0.5)?;
         within("sigma", self.sigma, 0.0, 10.0)?;
         within("rate", self.rate, 1e-3, 100.0)?;
@@ -64,7 +67,8 @@ impl Doppler {
             let state = track.at(time);
             let noise = stream.normal3(self.sigma);
             let (sine, cosine) = libm::sincos(BEAM_DEG.to_radians());
-            let from = state.world_from_body.translation();
+            let at = Vector3::from(self.at);
+            let from = state.world_from_body.translation() + state.world_from_body.rotation() * at;
             let beams = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|[x, y]: [f64; 2]| {
                 let slant = sine * std::f64::consts::FRAC_1_SQRT_2;
                 let along = state.world_from_body.rotation() * Vector3::new(x * slant, y * slant, cosine);
@@ -74,7 +78,8 @@ impl Doppler {
                 length >= self.reach[0] && length <= self.reach[1] && (on_bed || luck)
             });
             let locked = beams.iter().filter(|b| **b).count() >= 3;
-            let value = state.motion.fixed_rows::<3>(3).into_owned() * scale + noise;
+            let turning = state.motion.fixed_rows::<3>(0).into_owned();
+            let value = (state.motion.fixed_rows::<3>(3) + turning.cross(&at)) * scale + noise;
             locked.then_some(Reading { time, arrival: time + self.latency, value })
         };
         (0..=(until * self.rate) as u64).filter_map(reading).collect()

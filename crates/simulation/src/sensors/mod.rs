@@ -32,6 +32,29 @@ pub struct Reading<V> {
     pub value: V,
 }
 
+/// An acoustic position of the transponder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AcousticFix {
+    /// North, east, down (m).
+    pub at: Vector3<f64>,
+    /// What the sensor says about it: standard deviation of each axis (m), outliers apart.
+    pub sigma: f64,
+}
+
+/// Everything that the navigation sensors say during a dive, each in order of what it measured. A reading may be
+/// used from its arrival on; errors, latency, losses and faults are in it, truth is not.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Readings {
+    /// Position from USBL or LBL.
+    pub acoustic: Vec<Reading<AcousticFix>>,
+    /// Velocity over ground of the log's place, body frame (m/s).
+    pub doppler: Vec<Reading<Vector3<f64>>>,
+    /// Rate of turn (rad/s, body frame) and attitude.
+    pub attitude: Vec<Reading<AttitudeReading>>,
+    /// Depth of the gauge (m).
+    pub depth: Vec<Reading<f64>>,
+}
+
 /// The navigation sensors.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Body, Transform, World};
 
 use super::{
-    AttitudeReading, Reading, Sensors,
+    AcousticFix, AttitudeReading, Reading, Readings, Sensors,
     fault::{Device, DeviceFault, failed},
 };
 use crate::{field::Field, vehicle::Track};
@@ -53,6 +53,38 @@ impl Navigation {
         }
     }
 
+    /// Everything that was said.
+    pub(crate) fn readings(&self) -> Readings {
+        let fix = |fix: &Reading<Vector3<f64>>| Reading {
+            time: fix.time,
+            arrival: fix.arrival,
+            value: AcousticFix { at: fix.value, sigma: self.spread(&fix.value) },
+        };
+        Readings {
+            acoustic: self.fixes.iter().map(fix).collect(),
+            doppler: self.velocities.clone(),
+            attitude: self.attitudes.clone(),
+            depth: self.depths.clone(),
+        }
+    }
+
+    /// The standard deviation of each axis of an acoustic position, by its own range.
+    fn spread(&self, at: &Vector3<f64>) -> f64 {
+        let range = (at - Vector3::from(self.sensors.acoustic.from)).norm();
+        self.sensors.acoustic.spread(range).max(1e-3)
+    }
+
+    /// The attitude reading that was last made at a time.
+    fn turned(&self, time: f64) -> Option<&AttitudeReading> {
+        self.attitudes.partition_point(|a| a.time <= time).checked_sub(1).map(|k| &self.attitudes[k].value)
+    }
+
+    /// The vehicle's place when its transponder was at a fix.
+    fn place(&self, fix: &Reading<Vector3<f64>>) -> Vector3<f64> {
+        let turn = self.turned(fix.time).map(|said| said.world_from_body).unwrap_or_default();
+        fix.value - turn * Vector3::from(self.sensors.acoustic.at)
+    }
+
     /// The pose at a time (s): the acoustic fixes that are there, carried on by Doppler velocity and attitude,
     /// each new one weighed with what was known; the depth from the gauge. `None` before the first fix.
     ///
@@ -62,18 +94,14 @@ impl Navigation {
         let attitude = latest(&self.attitudes, now)?;
         let mut fixes = self.fixes.iter().filter(|fix| fix.arrival <= now);
         let first = fixes.next()?;
-        let spread = |fix: &Reading<Vector3<f64>>| {
-            let range = (fix.value - Vector3::from(self.sensors.acoustic.from)).norm();
-            self.sensors.acoustic.spread(range).max(1e-3)
-        };
         let heading = self.sensors.attitude.heading_deg.to_radians();
         let level = self.sensors.attitude.level_deg.to_radians();
         let doppler = &self.sensors.doppler;
         let drift = doppler.scale.powi(2) + heading * heading + level * level;
         let noise = doppler.sigma.powi(2) / doppler.rate;
         // Position, drift, and their variances: (position, both, drift).
-        let (mut at, mut slope, mut time) = (first.value, Vector3::zeros(), first.time);
-        let mut p = [spread(first).powi(2), 0.0, drift];
+        let (mut at, mut slope, mut time) = (self.place(first), Vector3::zeros(), first.time);
+        let mut p = [self.spread(&first.value).powi(2), 0.0, drift];
         let travel = |at: &mut Vector3<f64>, slope: &Vector3<f64>, p: &mut [f64; 3], from: f64, to: f64| {
             let (step, length) = self.travelled(from, to);
             *at += step + slope * length;
@@ -86,8 +114,8 @@ impl Navigation {
         for fix in fixes {
             travel(&mut at, &slope, &mut p, time, fix.time);
             time = fix.time;
-            let total = p[0] + spread(fix).powi(2);
-            let miss = fix.value - at;
+            let total = p[0] + self.spread(&fix.value).powi(2);
+            let miss = self.place(fix) - at;
             if miss.norm_squared() < GATE * GATE * 3.0 * total {
                 let gains = [p[0] / total, p[1] / total];
                 (at, slope) = (at + miss * gains[0], slope + miss * gains[1]);
@@ -98,7 +126,7 @@ impl Navigation {
         let variance = p[0];
         let mut position = Matrix3::from_diagonal_element(variance);
         if let Some(depth) = latest(&self.depths, now) {
-            at.z = depth.value;
+            at.z = depth.value - (attitude.value.world_from_body * Vector3::from(self.sensors.depth.at)).z;
             // Between reading and now it rises and sinks slowly.
             let slow = (0.1 * (now - depth.time)).powi(2);
             position[(2, 2)] = self.sensors.depth.bias.powi(2) + self.sensors.depth.sigma.powi(2) + slow;
@@ -122,9 +150,9 @@ impl Navigation {
             else {
                 break;
             };
-            let turn = self.attitudes.partition_point(|a| a.time <= last).checked_sub(1);
-            let turn = turn.map(|k| self.attitudes[k].value.world_from_body).unwrap_or_default();
-            let step = turn * velocity.value * (next - last);
+            let (turn, rate) = self.turned(last).map(|said| (said.world_from_body, said.rate)).unwrap_or_default();
+            let lever = rate.cross(&Vector3::from(self.sensors.doppler.at));
+            let step = turn * (velocity.value - lever) * (next - last);
             sum += step;
             length += step.norm();
             (last, ping) = (next, ping + 1);

@@ -186,6 +186,11 @@ impl Way {
         Goal { at, velocity: ahead * self.speed, heading }
     }
 
+    /// The places that it leads through.
+    pub(crate) fn places(&self) -> &[Vector3<f64>] {
+        &self.places
+    }
+
     /// Its length (m).
     pub(crate) fn length(&self) -> f64 {
         self.lengths[self.lengths.len() - 1]

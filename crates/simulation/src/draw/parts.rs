@@ -1,0 +1,223 @@
+//! The parts of a row's pixels: which facet each of them shows, where, and how much of the pixel it is.
+
+use super::{
+    eye::{Eye, Line, RowPose},
+    facet::{Facet, LANES, Spots},
+    outline::Outline,
+    visibility::{NONE, SAMPLES, Strip, places},
+};
+
+/// The range that a pixel has which sees nothing (m).
+pub(super) const NOWHERE: f32 = 1e3;
+
+/// One row of the image.
+pub(super) struct Row {
+    pub(super) number: usize,
+    pub(super) in_strip: usize,
+    pub(super) pose: Option<RowPose>,
+}
+
+impl Row {
+    fn line(&self, eye: &Eye, column: usize, [du, dv]: [f32; 2]) -> Line {
+        let line = eye.line(column, self.number, du, dv);
+        self.pose.as_ref().map_or(line, |pose| pose.apply(&line))
+    }
+}
+
+/// Parts one after the other that show the same facet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Run {
+    pub(super) facet: u32,
+    pub(super) from: usize,
+    pub(super) to: usize,
+}
+
+/// Rays of parts, each number a list; `z` and `from` stay empty where all are (x, y, 1) from the pupil.
+#[derive(Debug, Default)]
+pub(super) struct Lines {
+    pub(super) x: Vec<f32>,
+    pub(super) y: Vec<f32>,
+    pub(super) z: Vec<f32>,
+    pub(super) from: [Vec<f32>; 3],
+}
+
+/// The samples of a pixel that see one facet: how many, and the sum of their offsets.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    outline: u32,
+    facet: u32,
+    count: f32,
+    offset: [f32; 2],
+}
+
+/// All parts of a row, each number a list.
+#[derive(Debug, Default)]
+pub(super) struct Parts {
+    pub(super) columns: Vec<u32>,
+    /// Share of the pixel.
+    pub(super) shares: Vec<f32>,
+    /// Where in the row.
+    pub(super) u: Vec<f32>,
+    pub(super) lines: Lines,
+    pub(super) runs: Vec<Run>,
+    /// Column, Z and range of the centres of pixels that edges cross.
+    pub(super) centres: Vec<(u32, f32, f32)>,
+    groups: Vec<Group>,
+}
+
+impl Lines {
+    fn clear(&mut self) {
+        let [a, b, c] = &mut self.from;
+        [&mut self.x, &mut self.y, &mut self.z, a, b, c].into_iter().for_each(Vec::clear);
+    }
+
+    fn push(&mut self, line: &Line, bent: bool) {
+        self.x.push(line.along[0]);
+        self.y.push(line.along[1]);
+        if bent {
+            self.z.push(line.along[2]);
+            self.from.iter_mut().zip(line.from).for_each(|(list, x)| list.push(x));
+        }
+    }
+
+    /// Whether each has a direction and an origin of its own.
+    pub(super) fn bent(&self) -> bool {
+        !self.z.is_empty()
+    }
+}
+
+impl Parts {
+    /// The parts of a row as the strip saw it.
+    pub(super) fn find(&mut self, row: &Row, strip: &Strip, outlines: &[Outline], facets: &[Facet], eye: &Eye) {
+        self.columns.clear();
+        self.shares.clear();
+        self.u.clear();
+        self.runs.clear();
+        self.centres.clear();
+        self.lines.clear();
+        let offsets = places();
+        let (seen, crossed, samples) = strip.row(row.in_strip);
+        let bent = row.pose.is_some() || !eye.lens.is_straight();
+        let mut column = 0;
+        for (&next, samples) in crossed.iter().zip(samples) {
+            self.whole(column..next as usize, seen, row, outlines, eye, bent);
+            self.crossed(next as usize, seen, samples, &offsets, row, outlines, facets, eye, bent);
+            column = next as usize + 1;
+        }
+        self.whole(column..seen.len(), seen, row, outlines, eye, bent);
+        // Work on whole vectors reads beyond the end.
+        let padded = self.columns.len() + LANES;
+        let [a, b, c] = &mut self.lines.from;
+        for list in [&mut self.lines.x, &mut self.lines.y] {
+            list.resize(padded, 0.0);
+        }
+        if bent {
+            for list in [&mut self.lines.z, a, b, c] {
+                list.resize(padded, 0.0);
+            }
+        }
+    }
+
+    /// Pixels that no edge crosses.
+    fn whole(
+        &mut self,
+        columns: std::ops::Range<usize>,
+        seen: &[u32],
+        row: &Row,
+        outlines: &[Outline],
+        eye: &Eye,
+        bent: bool,
+    ) {
+        if columns.is_empty() {
+            return;
+        }
+        let first = self.columns.len();
+        self.columns.extend(columns.clone().map(|c| c as u32));
+        self.u.extend(columns.clone().map(|c| c as f32));
+        self.shares.resize(self.columns.len(), 1.0);
+        if bent {
+            for column in columns.clone() {
+                self.lines.push(&row.line(eye, column, [0.0; 2]), true);
+            }
+        } else {
+            let (x, y) = eye.straight(row.number);
+            self.lines.x.extend_from_slice(&x[columns.clone()]);
+            self.lines.y.resize(self.columns.len(), y);
+        }
+        let (offset, mut from) = (first.wrapping_sub(columns.start), columns.start);
+        for run in seen[columns].chunk_by(|a, b| a == b) {
+            let to = from + run.len();
+            self.run(facet_of(outlines, run[0]), offset.wrapping_add(from), offset.wrapping_add(to));
+            from = to;
+        }
+    }
+
+    /// A pixel that an edge crosses: one part for each facet that its samples see.
+    #[expect(clippy::too_many_arguments, reason = "an inner step, called in one place")]
+    fn crossed(
+        &mut self,
+        column: usize,
+        seen: &[u32],
+        samples: &[u32; SAMPLES],
+        offsets: &[[f32; SAMPLES]; 2],
+        row: &Row,
+        outlines: &[Outline],
+        facets: &[Facet],
+        eye: &Eye,
+        bent: bool,
+    ) {
+        let centre = (seen[column] != NONE).then(|| {
+            let line = row.line(eye, column, [0.0; 2]);
+            facets[facet_of(outlines, seen[column]) as usize].spot(&line)
+        });
+        let (z, range) = centre.unwrap_or((NOWHERE, NOWHERE));
+        self.centres.push((column as u32, z, range));
+        group(samples, outlines, offsets, &mut self.groups);
+        for k in 0..self.groups.len() {
+            let Group { facet, count, offset: [du, dv], .. } = self.groups[k];
+            let offset = [du / count, dv / count];
+            let here = self.columns.len();
+            self.columns.push(column as u32);
+            self.u.push(column as f32 + offset[0]);
+            self.shares.push(count * (1.0 / SAMPLES as f32));
+            self.lines.push(&row.line(eye, column, offset), bent);
+            self.run(facet, here, here + 1);
+        }
+    }
+
+    fn run(&mut self, facet: u32, from: usize, to: usize) {
+        match self.runs.last_mut() {
+            Some(last) if last.facet == facet && last.to == from => last.to = to,
+            _ => self.runs.push(Run { facet, from, to }),
+        }
+    }
+
+    /// Where all parts lie; those that see nothing lie far away, facing the camera.
+    pub(super) fn spots(&self, facets: &[Facet], focal: f32, out: &mut Spots) {
+        super::facet::spots(&self.runs, self.columns.len(), facets, &self.lines, 1.0 / focal, out);
+    }
+}
+
+fn facet_of(outlines: &[Outline], index: u32) -> u32 {
+    if index == NONE { NONE } else { outlines[index as usize].facet }
+}
+
+/// The samples of a pixel by what they see. Triangles of one smooth surface stay apart: each has its
+/// own plane.
+fn group(samples: &[u32; SAMPLES], outlines: &[Outline], offsets: &[[f32; SAMPLES]; 2], groups: &mut Vec<Group>) {
+    groups.clear();
+    let mut here = 0;
+    for (k, &outline) in samples.iter().enumerate() {
+        if groups.get(here).is_none_or(|g| g.outline != outline) {
+            let facet = facet_of(outlines, outline);
+            let found = groups.iter().position(|g| g.outline == outline || g.facet == facet);
+            here = found.unwrap_or_else(|| {
+                groups.push(Group { outline, facet, count: 0.0, offset: [0.0; 2] });
+                groups.len() - 1
+            });
+        }
+        let group = &mut groups[here];
+        group.count += 1.0;
+        group.offset = [group.offset[0] + offsets[0][k], group.offset[1] + offsets[1][k]];
+    }
+}

@@ -1,0 +1,161 @@
+//! What is switched on with magnitude 0 is the same, bit for bit, as what is left out; and with a magnitude it shows.
+
+use std::path::Path;
+
+use seafix_geometry::MeasuredPoint;
+use seafix_simulation::{
+    Imager, Mission, PriorKind, RigPlan,
+    field::Changes,
+    optics::{Lamp, Port, PortKind, Water},
+    sensors::{Device, DeviceFault, FaultKind, Readings},
+    vehicle::{Current, Route, RouteKind, Vehicle, VehicleKind},
+};
+use seafix_vision::{Image, Threads};
+
+/// A short, small dive in clear water over the first object, with rough poses from the sensors.
+fn base() -> Mission {
+    Mission {
+        frames: 2,
+        rate: 0.5,
+        start: 3.0,
+        prior: PriorKind::Sensors,
+        rig: RigPlan { size: [128, 96], focal: 62.5, ..RigPlan::default() },
+        water: Water { attenuation: 0.0, snow: 0.0, ..Water::default() },
+        lamps: Lamp::pair(0.25),
+        ..Mission::default()
+    }
+}
+
+/// Everything that a method, or a judge, sees of a dive.
+#[derive(Debug, PartialEq)]
+struct Seen {
+    images: Vec<(Image, Image)>,
+    points: Vec<Vec<MeasuredPoint>>,
+    poses: Vec<String>,
+    readings: Readings,
+    told: String,
+}
+
+fn seen(mission: &Mission) -> Seen {
+    let plan = mission.plan(5, 0, Path::new("")).unwrap();
+    let instants: Vec<_> = (0..plan.len()).map(|k| plan.instant(k)).collect();
+    let pair = |instant: &seafix_simulation::Instant<'_>| {
+        let (left, right, _) = instant.render(Threads::One);
+        (left, right)
+    };
+    Seen {
+        images: instants.iter().map(pair).collect(),
+        points: instants.iter().map(|i| i.points()).collect(),
+        poses: instants.iter().map(|i| format!("{:?} {:?}", i.prior, i.truth())).collect(),
+        readings: plan.readings(),
+        told: format!("{} {:?} {:?}", plan.site().to_toml(), plan.rig(), plan.world_from_object()),
+    }
+}
+
+/// A factor: its name, how it is switched on with magnitude 0, and with one that shows.
+type Factor = (&'static str, fn(&mut Mission), fn(&mut Mission));
+
+fn fault(device: Device, kind: FaultKind, to: f64, amount: f64) -> DeviceFault {
+    DeviceFault { device, kind, from: 1.0, to, amount }
+}
+
+const DEVICES: [Device; 5] = [Device::Images, Device::Acoustic, Device::Doppler, Device::Attitude, Device::Depth];
+
+/// One named object, changed by nothing.
+fn named() -> Changes {
+    Changes { objects: vec!["manifold".into()], ..Changes::default() }
+}
+
+const FACTORS: &[Factor] = &[
+    (
+        "turbidity",
+        |m| {
+            m.water =
+                Water { albedo: 0.5, forwardness: 0.3, isotropic: 0.4, small_angle: 0.9, blur: 3.0, ..m.water.clone() }
+        },
+        |m| m.water.attenuation = 0.3,
+    ),
+    (
+        "named water",
+        |m| m.water = Water { level: "none".into(), attenuation: 1.0, ..m.water.clone() },
+        |m| m.water.level = "coastal".into(),
+    ),
+    ("snow", |m| m.water.snow_radius = [0.002, 0.004], |m| m.water.snow = 900.0),
+    ("daylight", |m| m.water.ambient = 0.0, |m| m.water.ambient = 0.2),
+    (
+        "a port",
+        |m| m.rig.port = Port { distance: 0.1, thickness: 0.05, glass: 1.7, water: 1.4, ..Port::default() },
+        |m| m.rig.port = Port { kind: PortKind::Dome, offset: [0.0, 0.002, 0.005], ..Port::default() },
+    ),
+    ("distortion", |m| m.rig.distortion = vec![0.0; 5], |m| m.rig.distortion = vec![-0.1, 0.0, 0.0, 0.0]),
+    ("an error of the calibration", |m| m.rig.error.turn_deg = [0.0; 3], |m| m.rig.error.turn_deg = [0.02, 0.0, 0.0]),
+    ("an error of the focal length", |m| m.rig.error.focal = 0.0, |m| m.rig.error.focal = 0.001),
+    ("an error of the baseline", |m| m.rig.error.baseline = 0.0, |m| m.rig.error.baseline = 0.001),
+    ("a lamp", |m| m.lamps.push(Lamp { power: 0.0, ..Lamp::default() }), |m| m.lamps.push(Lamp::default())),
+    (
+        "a current",
+        |m| m.current = Current { towards_deg: 10.0, roughness: 0.01, tau: 9.0, ..m.current.clone() },
+        |m| {
+            m.current.speed = 0.1;
+        },
+    ),
+    ("a gusty current", |m| m.current.tau = 1.0, |m| m.current.sigma = 0.05),
+    ("a shift", |m| m.changes = named(), |m| m.changes = Changes { shift: 0.2, ..named() }),
+    ("a settlement", |m| m.changes = named(), |m| m.changes = Changes { settlement: 0.05, ..named() }),
+    ("a tilt", |m| m.changes = named(), |m| m.changes = Changes { tilt_deg: 1.0, ..named() }),
+    ("a heading", |m| m.changes = named(), |m| m.changes = Changes { heading_deg: 2.0, ..named() }),
+    ("growth", |m| m.changes = named(), |m| m.changes = Changes { growth: 0.4, ..named() }),
+    ("rounded corners", |m| m.changes = named(), |m| m.changes = Changes { rounding: 0.04, ..named() }),
+    ("silt", |m| m.changes = named(), |m| m.changes = Changes { silt: 0.1, ..named() }),
+    ("things in the way", |m| m.changes = named(), |m| m.changes = Changes { occluders: 9, ..named() }),
+    (
+        "devices that fail at no time",
+        |m| m.faults.extend(DEVICES.map(|device| fault(device, FaultKind::Off, 1.0, 0.5))),
+        |m| m.faults.extend(DEVICES.map(|device| fault(device, FaultKind::Off, 9.0, 0.5))),
+    ),
+    (
+        "devices that lose nothing",
+        |m| m.faults.extend(DEVICES.map(|device| fault(device, FaultKind::Intermittent, 9.0, 0.0))),
+        |m| m.faults.extend(DEVICES.map(|device| fault(device, FaultKind::Intermittent, 9.0, 0.9))),
+    ),
+    (
+        "devices that are late by nothing",
+        |m| m.faults.extend(DEVICES.map(|device| fault(device, FaultKind::Delayed, 9.0, 0.0))),
+        |m| m.faults.extend(DEVICES.map(|device| fault(device, FaultKind::Delayed, 9.0, 0.4))),
+    ),
+    ("a place of the cameras", |m| m.rig.at = [0.0; 3], |m| m.rig.at = [0.4, 0.1, 0.2]),
+    ("a place of the log", |m| m.sensors.doppler.at = [0.0; 3], |m| m.sensors.doppler.at = [-0.5, 0.0, 0.2]),
+    ("a place of the transponder", |m| m.sensors.acoustic.at = [0.0; 3], |m| m.sensors.acoustic.at = [0.0, 0.0, -0.6]),
+    ("a place of the gauge", |m| m.sensors.depth.at = [0.0; 3], |m| m.sensors.depth.at = [0.5, 0.0, 0.3]),
+    ("an imprecise model", |m| m.model_sigma = 0.001, |m| m.model_sigma = 0.004),
+];
+
+#[test]
+fn a_factor_of_magnitude_zero_is_a_factor_left_out() {
+    let plain = seen(&base());
+    assert!(plain.poses.iter().any(|pose| pose.contains("VisiblePoint")), "nothing is in view");
+    for (name, nothing, something) in FACTORS {
+        let with = |change: &fn(&mut Mission)| {
+            let mut mission = base();
+            change(&mut mission);
+            seen(&mission)
+        };
+        assert!(with(nothing) == plain, "{name} of magnitude 0 changes something");
+        assert!(with(something) != plain, "{name} changes nothing");
+    }
+}
+
+#[test]
+fn while_nothing_moves_no_time_is_seen() {
+    let rest = Mission {
+        route: Route { kind: RouteKind::Approach, speed: 0.0, length: 0.3, ..Route::default() },
+        vehicle: Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() },
+        imager: Imager { automatic: false, ..Imager::default() },
+        ..base()
+    };
+    let slow =
+        |m: &Mission| Mission { imager: Imager { readout_ms: 20.0, sync_ms: 30.0, ..m.imager.clone() }, ..m.clone() };
+    assert!(seen(&slow(&rest)) == seen(&rest));
+    let moving = Mission { route: Route { speed: 0.4, ..Route::default() }, ..rest };
+    assert!(seen(&slow(&moving)) != seen(&moving));
+}
