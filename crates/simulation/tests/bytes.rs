@@ -30,7 +30,7 @@ fn full() -> Mission {
 
 /// FNV-1a of the bits of all images and points of a dive.
 fn digest(mission: &Mission, threads: Threads) -> u64 {
-    let plan = mission.plan(7, 0, Path::new("")).unwrap();
+    let plan = mission.plan(7, 0, Path::new("")).expect("the mission can be planned");
     let mut hash = 0xCBF2_9CE4_8422_2325_u64;
     let mut take = |bits: u64| hash = (hash ^ bits).wrapping_mul(0x100_0000_01B3);
     for index in 0..plan.len() {

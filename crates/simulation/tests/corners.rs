@@ -26,7 +26,7 @@ fn is_x(plan: &ObjectPlan, panel: usize) -> bool {
 
 fn save(path: &Path, image: &Image) {
     let header = format!("P5\n{} {}\n255\n", image.width(), image.height());
-    fs::write(path, [header.into_bytes(), image.to_u8()].concat()).unwrap();
+    fs::write(path, [header.into_bytes(), image.to_u8()].concat()).expect("the temporary folder can be written");
 }
 
 #[test]

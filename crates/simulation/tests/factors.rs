@@ -37,7 +37,7 @@ struct Seen {
 }
 
 fn seen(mission: &Mission) -> Seen {
-    let plan = mission.plan(5, 0, Path::new("")).unwrap();
+    let plan = mission.plan(5, 0, Path::new("")).expect("the mission can be planned");
     let instants: Vec<_> = (0..plan.len()).map(|k| plan.instant(k)).collect();
     let pair = |instant: &seafix_simulation::Instant<'_>| {
         let (left, right, _) = instant.render(Threads::One);

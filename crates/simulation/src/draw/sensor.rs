@@ -190,12 +190,12 @@ fn developed(numbers: &Numbers, pixels: &mut [f32], first: usize, pattern: &Patt
             }
         }
         let mut bits = [0_u32; CHUNK];
-        for i in 0..CHUNK {
-            bits[i] = mix(place as u32 + i as u32, 9, numbers.seed);
+        for (bits, i) in bits.iter_mut().zip(0..) {
+            *bits = mix(place as u32 + i, 9, numbers.seed);
         }
         let mut cells = [[0.0_f32; 2]; CHUNK];
-        for i in 0..CHUNK {
-            cells[i] = pattern.normal.0[(bits[i] >> 20) as usize];
+        for (cell, bits) in cells.iter_mut().zip(&bits) {
+            *cell = pattern.normal.0[(bits >> 20) as usize];
         }
         for i in 0..CHUNK {
             let light = (values[i] * numbers.electrons * response[i]).clamp(0.0, numbers.well);

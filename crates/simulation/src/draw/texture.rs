@@ -335,7 +335,8 @@ mod tests {
         let sides = (0..=COARSEST).map(|level| 1_u32 << (COARSEST - level));
         let mut before = 0;
         for (level, side) in (0..).zip(sides) {
-            assert_eq!(cell(level, 0.75 * f32::from_bits((127 + level) << 23), 0.5).0, before);
+            let inside = 0.75 * f32::from_bits((127 + level) << 23);
+            assert_eq!(cell(level, inside, inside).0, before);
             before += side * side;
         }
     }
