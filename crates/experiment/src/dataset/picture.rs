@@ -211,7 +211,7 @@ mod tests {
         let levels: Vec<f32> = (0..48).map(|k| (f64::from(k * 87) * 255.0 / 4095.0) as f32).collect();
         let image = Image::new(8, 6, levels).unwrap();
         write_png(&path, &image, 12).unwrap();
-        assert_eq!(read_image(&path, [8, 6], 12).unwrap(), image);
+        assert_eq!(read_image(&path, [8, 6], 12, ImageLimits::default()).unwrap(), image);
     }
 
     #[test]
