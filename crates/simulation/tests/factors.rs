@@ -104,7 +104,7 @@ const FACTORS: &[Factor] = &[
     ("a settlement", |m| m.changes = named(), |m| m.changes = Changes { settlement: 0.05, ..named() }),
     ("a tilt", |m| m.changes = named(), |m| m.changes = Changes { tilt_deg: 1.0, ..named() }),
     ("a heading", |m| m.changes = named(), |m| m.changes = Changes { heading_deg: 2.0, ..named() }),
-    ("growth", |m| m.changes = named(), |m| m.changes = Changes { growth: 0.4, ..named() }),
+    ("growth", |m| m.changes = named(), |m| m.changes = Changes { growth: 0.9, ..named() }),
     ("rounded corners", |m| m.changes = named(), |m| m.changes = Changes { rounding: 0.04, ..named() }),
     ("silt", |m| m.changes = named(), |m| m.changes = Changes { silt: 0.1, ..named() }),
     ("things in the way", |m| m.changes = named(), |m| m.changes = Changes { occluders: 9, ..named() }),

@@ -238,7 +238,7 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
     };
     let good = [[0.0, 0.0, 3.0], [0.8, 0.1, 3.2], [-0.4, 0.6, 2.8], [0.3, -0.5, 3.5]];
     let line = [0.0, 1.0, 2.0, 3.0].map(|k| [-0.6 + 0.4 * k, 0.1 * k, 3.0 + 0.2 * k]);
-    let far = good.map(|[x, y, z]| [x * 100.0, y * 100.0, z * 100.0]);
+    let far = good.map(|[x, y, z]| [x * 40.0, y * 40.0, z * 40.0]);
     let plate = [[0.0, 0.0, 3.0], [0.8, 0.1, 3.0], [-0.4, 0.6, 3.0], [0.3, -0.5, 3.0]];
     for name in SOLVERS.names() {
         let solver = SOLVERS.build(&seafix_component::Choice::named(name)).unwrap();
