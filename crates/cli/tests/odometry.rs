@@ -91,6 +91,25 @@ impl Passage {
         command.arg("odometry").arg(self.folder.path()).args(more).assert()
     }
 
+    /// What is said on standard error by a command that ends with `code`.
+    fn refusal(&self, more: &[&str], code: i32) -> String {
+        let ended = self.odometry(more).code(code);
+        assert!(ended.get_output().stdout.is_empty());
+        String::from_utf8(ended.get_output().stderr.clone()).unwrap()
+    }
+
+    /// Puts stripes in place of the left image of `pair`: it shows something, and no point of the right one.
+    fn spoil(&self, pair: usize) {
+        let [width, height] = SIZE;
+        let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
+        let shift = pair * 7;
+        bytes.extend((0..width * height).map(|at| match (at % width + shift) % 64 < 32 {
+            true => 90,
+            false => 160,
+        }));
+        self.put(&format!("l{pair}.pgm"), bytes);
+    }
+
     fn json(&self, more: &[&str]) -> Value {
         serde_json::from_slice(&self.odometry(&[&["--json"], more].concat()).success().get_output().stdout).unwrap()
     }
@@ -155,18 +174,19 @@ fn a_gap_and_a_leap_break_the_way() {
     assert!(segments[1]["broken"].as_str().unwrap().contains("7.900 s"), "{all}");
     let ways = Passage::ways(&all);
     assert_eq!(ways[1], ways[2], "the motion between is left out, not guessed");
-    let fast = passage.json(&["--set", "most-speed=0.1"]);
-    assert!(fast.to_string().contains("0.1 m/s"), "{fast}");
+    // Faster than is believed at every pair: no motion at all.
+    let said = passage.refusal(&["--set", "most-speed=0.1"], 3);
+    assert!(said.contains("0.1 m/s"), "{said}");
+    passage.frames(&[(0, 0), (1, 1), (1_000_000_000, 2), (1_000_000_001, 3)]);
+    let why = passage.json(&[])["segments"][1]["broken"].to_string();
+    assert!(why.contains("seconds and nanoseconds mixed?"), "{why}");
 }
 
 #[test]
 fn what_cannot_be_is_refused_in_one_line() {
     let passage = Passage::new();
-    let refusal = |more: &[&str], code: i32| {
-        let ended = passage.odometry(more).code(code);
-        assert!(ended.get_output().stdout.is_empty());
-        String::from_utf8(ended.get_output().stderr.clone()).unwrap()
-    };
+    let refusal = |more: &[&str], code: i32| passage.refusal(more, code);
+    assert!(refusal(&["--set", "window=0"], 2).contains("1 to 100"));
     assert!(refusal(&["--odometry", "sterio"], 2).contains("did you mean `stereo`?"));
     assert!(refusal(&["--set", "windou=3"], 2).contains("did you mean `window`?"));
     assert!(refusal(&["--set", "follow.window=4"], 2).contains("odd number"));
@@ -174,4 +194,61 @@ fn what_cannot_be_is_refused_in_one_line() {
     passage.frames(&[(0, 0), (1, 1), (1, 2)]);
     let said = refusal(&[], 3);
     assert!(said.contains("frames.csv:4") && said.contains("not after the one before"), "{said}");
+}
+
+/// Each of two pairs has too few points to follow and to begin with: what comes after is a segment, and says why.
+#[test]
+fn no_break_goes_unannounced() {
+    let passage = Passage::new();
+    [3, 4].into_iter().for_each(|pair| passage.spoil(pair));
+    let all = passage.json(&[]);
+    let segments = all["segments"].as_array().unwrap();
+    assert_eq!((segments.len(), all["left_out"].as_array().unwrap().len()), (2, 2), "{all}");
+    assert!(segments[0]["broken"].is_null() && segments[1]["broken"].is_string(), "{all}");
+    let file = passage.path("way.tum");
+    let ended = passage.odometry(&["--out", file.to_str().unwrap()]).success();
+    let said = String::from_utf8(ended.get_output().stdout.clone()).unwrap();
+    assert!(said.contains("broken before 1.500000000 s"), "{said}");
+    assert!(fs::read_to_string(&file).unwrap().contains("# broken"));
+}
+
+#[test]
+fn no_motion_is_no_result() {
+    let passage = Passage::new();
+    let file = passage.path("way.tum");
+    let out = ["--out", file.to_str().unwrap()];
+    let nothing = || !file.exists() && !passage.path("way.tum.partial").exists();
+    passage.frames(&[(0, 0)]);
+    let said = passage.refusal(&out, 3);
+    assert!(said.contains("1 pose from 1 stereo pair; a motion needs two") && nothing(), "{said}");
+    let black = [format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes(), vec![0; SIZE[0] * SIZE[1]]].concat();
+    (0..3).for_each(|pair| passage.put(&format!("l{pair}.pgm"), &black));
+    passage.frames(&[(0, 0), (1, 1), (2, 2)]);
+    let said = passage.refusal(&out, 3);
+    assert!(said.contains("0 poses from 3 stereo pairs; 3 left out: the left image shows nothing"), "{said}");
+    assert!(nothing());
+    // More than half of the images are not there: each is named once, and then the rule.
+    passage.frames(&[(0, 20), (1, 21), (2, 5)]);
+    let said = passage.refusal(&out, 3);
+    assert!(said.contains("fewer than half of the stereo pairs can be read") && said.contains("1 of 3"), "{said}");
+    assert_eq!(said.matches("l20.pgm").count(), 1, "{said}");
+    assert!(nothing());
+}
+
+#[test]
+fn exchanged_images_are_refused() {
+    let passage = Passage::new();
+    for pair in 0..PAIRS {
+        let x = STEP * pair as f64;
+        passage.put(&format!("r{pair}.pgm"), view(x));
+        passage.put(&format!("l{pair}.pgm"), view(x + BASELINE));
+    }
+    let said = passage.refusal(&[], 3);
+    assert!(said.contains("changed places"), "{said}");
+}
+
+#[test]
+fn a_sound_way_is_not_doubted() {
+    let all = Passage::new().json(&[]);
+    assert!(all["agreement"].as_f64().unwrap() > 0.35 && all["warnings"].as_array().unwrap().is_empty(), "{all}");
 }

@@ -121,9 +121,19 @@ impl StereoRig {
     /// beside the other along x.
     pub fn is_rectified(&self) -> bool {
         let t = self.right_from_left.translation();
-        let aligned = crate::so3::angle(&self.right_from_left.rotation()) < 1e-12
-            && t.y.abs().max(t.z.abs()) < 1e-12 * self.baseline();
-        aligned && self.left == self.right && self.left.distortion().shortest().is_empty()
+        t.y.abs().max(t.z.abs()) < 1e-12 * self.baseline() && self.is_parallel()
+    }
+
+    /// The same for columns: one camera above the other along y.
+    pub fn is_rectified_upright(&self) -> bool {
+        let t = self.right_from_left.translation();
+        t.x.abs().max(t.z.abs()) < 1e-12 * self.baseline() && self.is_parallel()
+    }
+
+    /// The same camera twice, without distortion, looking the same way.
+    fn is_parallel(&self) -> bool {
+        let turn = crate::so3::angle(&self.right_from_left.rotation());
+        turn < 1e-12 && self.left == self.right && self.left.distortion().shortest().is_empty()
     }
 
     /// Where both cameras see `point`, inside their images or not; `None` if one of them cannot.

@@ -119,7 +119,7 @@ pub enum Lost {
     #[error("the motion is known to {0:.3} m only")]
     Weak(f64),
     /// Too long a time between two pairs.
-    #[error("{seconds:.3} s without a pair that could be followed; at most {most} s are bridged")]
+    #[error("{seconds:.3} s without a pair that could be followed; at most {most} s are bridged{}", units(.seconds))]
     Gap {
         /// How long (s).
         seconds: f64,
@@ -136,11 +136,32 @@ pub enum Lost {
     },
 }
 
+/// What a gap of more than a year suggests.
+fn units(seconds: &f64) -> &'static str {
+    const YEAR: f64 = 365.25 * 86_400.0;
+    if *seconds > YEAR { "; that is more than a year: are seconds and nanoseconds mixed?" } else { "" }
+}
+
 impl Journey {
     /// The length of the way over all segments (m).
     pub fn length(&self) -> f64 {
         let steps = self.segments.iter().flat_map(|segment| segment.poses.windows(2));
-        steps.map(|two| (two[1].world_from_camera.translation() - two[0].world_from_camera.translation()).norm()).sum()
+        steps
+            .map(|two| (two[1].world_from_camera.translation() - two[0].world_from_camera.translation()).norm())
+            // The empty sum is −0.
+            .fold(0.0, |way, step| way + step)
+    }
+
+    /// The median share of the landmarks sought in a pair that were found and agree with its pose; `None` when no pair
+    /// was followed. Where much of what is in view moves otherwise than the rest it is small.
+    pub fn agreement(&self) -> Option<f64> {
+        let share = |outcome: &Outcome| match outcome {
+            Outcome::Followed { sought, found } => Some(*found as f64 / (*sought).max(1) as f64),
+            Outcome::Began | Outcome::Skipped(_) => None,
+        };
+        let mut shares: Vec<f64> = self.outcomes.iter().filter_map(share).collect();
+        shares.sort_unstable_by(f64::total_cmp);
+        shares.get(shares.len() / 2).copied()
     }
 
     /// All waypoints, in order of time.

@@ -47,10 +47,14 @@ impl Sides {
         Self::of(&view(left, 0), &view(right, 1), rig, &mut Workspace::default())
     }
 
+    /// Whether there are enough matches to say anything.
+    pub fn can_tell(&self) -> bool {
+        self.given + self.exchanged >= FEW
+    }
+
     /// Whether the images have changed places: more than nine in ten of at least twenty matches say so.
     pub fn are_swapped(&self) -> bool {
-        let all = self.given + self.exchanged;
-        all >= FEW && 10 * self.exchanged > 9 * all
+        self.can_tell() && 10 * self.exchanged > 9 * (self.given + self.exchanged)
     }
 }
 

@@ -1,6 +1,7 @@
 //! `seafix odometry`.
 
 use std::{
+    collections::HashSet,
     fs,
     path::{Path, PathBuf},
     time::Instant,
@@ -11,9 +12,9 @@ use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
 use seafix_experiment::{
     changed,
-    dataset::{Dataset, tum},
+    dataset::{Dataset, swapped_at_first, tum},
 };
-use seafix_navigation::{Journey, ODOMETRIES, Odometry, Outcome, Segment, StereoPair};
+use seafix_navigation::{Journey, Lost, ODOMETRIES, Odometry, Outcome, Segment, StereoPair};
 use seafix_vision::Threads;
 use serde_json::{Value, json};
 
@@ -43,6 +44,9 @@ pub(crate) struct Odometer {
     json: bool,
 }
 
+/// A smaller share of the landmarks that agree with the motion, in the median over the pairs, is worth a warning.
+const LITTLE_AGREEMENT: f64 = 0.35;
+
 /// What came of all pairs.
 struct Trip {
     journey: Journey,
@@ -63,11 +67,21 @@ impl Odometer {
             .num_threads(usize::from(self.threads))
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
-        let trip = pool.install(|| self.travel(&*odometry, &dataset))?;
-        if let Some(out) = &self.out {
-            write(out, &poses(&trip.journey))?;
+        // A file that cannot be written shall not be found out after the work.
+        let out = self.out.as_deref().map(Out::begin).transpose()?;
+        if let Some(fault) = swapped_at_first(&dataset) {
+            return Err(Failure::new(INPUT, fault));
         }
-        print(&if self.json { machines(&trip, &settings) } else { people(&trip) })?;
+        let trip = pool.install(|| self.travel(&*odometry, &dataset))?;
+        if let Some(fault) = trip.motionless(&dataset.folder) {
+            return Err(Failure::new(INPUT, fault));
+        }
+        let warnings = trip.warnings();
+        warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+        if let Some(out) = out {
+            out.finish(&poses(&trip.journey))?;
+        }
+        print(&if self.json { machines(&trip, &warnings, &settings) } else { people(&trip) })?;
         Ok(DONE)
     }
 
@@ -88,10 +102,15 @@ impl Odometer {
         let progress = Progress::new();
         progress.expect(dataset.frames.len());
         let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
+        let mut said = HashSet::new();
         for frame in &dataset.frames {
             match dataset.pair(frame) {
                 Err(fault) => {
-                    tell(&format!("warning: {fault}"));
+                    let warning = format!("warning: {fault}");
+                    if !said.contains(&warning) {
+                        tell(&warning);
+                        said.insert(warning);
+                    }
                     unread.push((frame.stamp_ns, fault));
                 }
                 Ok((left, right)) => {
@@ -107,8 +126,10 @@ impl Odometer {
         progress.end();
         // Half a passage is none.
         if given.len() < unread.len() {
-            let faults: Vec<Fault> = unread.into_iter().map(|(_, fault)| fault).collect();
-            return Err(Failure::faults(INPUT, &faults));
+            let fault = Fault::new("fewer than half of the stereo pairs can be read", &dataset.folder)
+                .value(format!("{} of {}", given.len(), given.len() + unread.len()))
+                .remedy("restore the images named above, or leave their lines out");
+            return Err(Failure::new(INPUT, fault));
         }
         Ok(Trip { journey: reckoning.journey(), given, unread, odometry_ms })
     }
@@ -125,6 +146,50 @@ impl Trip {
         let mut all: Vec<_> = skipped.chain(unread).collect();
         all.sort_unstable();
         all
+    }
+
+    /// What to say where no pair was followed: how many there were, and what was wrong with most of them.
+    fn motionless(&self, folder: &Path) -> Option<Fault> {
+        let outcomes = &self.journey.outcomes;
+        if outcomes.iter().any(|outcome| matches!(outcome, Outcome::Followed { .. })) {
+            return None;
+        }
+        let (poses, pairs) = (self.journey.waypoints().count(), self.given.len() + self.unread.len());
+        let fault = Fault::new("no motion can be computed", folder);
+        let counts = format!("{} from {}", counted(poses, "pose"), counted(pairs, "stereo pair"));
+        let skipped = |outcome: &Outcome| match outcome {
+            Outcome::Skipped(lost) => Some(lost.clone()),
+            Outcome::Began | Outcome::Followed { .. } => None,
+        };
+        let breaks = self.journey.segments.iter().filter_map(|segment| segment.broken.clone());
+        let reasons: Vec<Lost> = outcomes.iter().filter_map(skipped).chain(breaks).collect();
+        let alike =
+            |a: &Lost| reasons.iter().filter(|b| std::mem::discriminant(a) == std::mem::discriminant(b)).count();
+        // The first of the most frequent kind.
+        let most = reasons.iter().rev().max_by_key(|lost| alike(lost));
+        let unread = self.unread.len();
+        Some(match most {
+            Some(lost) if alike(lost) >= unread => fault
+                .value(format!("{counts}; {} left out: {lost}", alike(lost)))
+                .remedy("check the images and that the rig is the one that took them"),
+            _ if unread > 0 => {
+                fault.value(format!("{counts}; {unread} cannot be read")).remedy("restore the images named above")
+            }
+            _ => fault.value(counts).remedy("a motion needs two stereo pairs at least"),
+        })
+    }
+
+    /// What is odd about the whole way.
+    fn warnings(&self) -> Vec<String> {
+        let agreement = self.journey.agreement().filter(|share| *share < LITTLE_AGREEMENT);
+        let said = |share: f64| {
+            format!(
+                "only {:.0} % of the landmarks agree with the motion (median over the pairs): is something fixed to the \
+                 vehicle in view, or are the cameras out of step?",
+                100.0 * share
+            )
+        };
+        agreement.map(said).into_iter().collect()
     }
 
     /// Landmarks found in a pair, of those sought: the least, and the means.
@@ -161,17 +226,47 @@ fn poses(journey: &Journey) -> String {
     text
 }
 
-/// Writes a file that has its name only when it is whole.
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
-    let done = fs::write(&partial, text).and_then(|()| fs::rename(&partial, path));
-    done.map_err(|error| {
-        let _ = fs::remove_file(&partial);
+/// A file that has its name only when it is whole; what was begun and not finished is removed.
+struct Out<'a> {
+    path: &'a Path,
+    partial: PathBuf,
+}
+
+impl<'a> Out<'a> {
+    /// Finds out whether the file can be written.
+    fn begin(path: &'a Path) -> Result<Self, Failure> {
+        if path.is_dir() {
+            let fault = Fault::new("a folder, not a file", path).remedy("name a file to write the poses to");
+            return Err(Failure::new(OUTPUT, fault));
+        }
+        let mut partial = path.as_os_str().to_owned();
+        partial.push(".partial");
+        let partial = PathBuf::from(partial);
+        fs::write(&partial, "").map_err(|error| Self::failed(path, &error))?;
+        Ok(Self { path, partial })
+    }
+
+    fn finish(self, text: &str) -> Result<(), Failure> {
+        let done = fs::write(&self.partial, text).and_then(|()| fs::rename(&self.partial, self.path));
+        done.map_err(|error| Self::failed(self.path, &error))
+    }
+
+    fn failed(path: &Path, error: &std::io::Error) -> Failure {
         let fault = Fault::new(format!("cannot write ({error})"), path).remedy("check the folder and the space left");
         Failure::new(OUTPUT, fault)
-    })
+    }
+}
+
+impl Drop for Out<'_> {
+    fn drop(&mut self) {
+        // After a rename there is none.
+        let _ = fs::remove_file(&self.partial);
+    }
+}
+
+/// `1 pair`, `2 pairs`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// For people: how far, how fast, and where not.
@@ -179,7 +274,8 @@ fn people(trip: &Trip) -> String {
     let journey = &trip.journey;
     let poses = journey.waypoints().count();
     let pairs = trip.given.len() + trip.unread.len();
-    let mut text = format!("{poses} poses of {pairs} stereo pairs over {:.2} m", journey.length());
+    let (poses, pairs) = (counted(poses, "pose"), counted(pairs, "stereo pair"));
+    let mut text = format!("{poses} of {pairs} over {:.2} m", journey.length());
     text += &format!(", {:.1} pairs a second\n", trip.pairs_a_second());
     if let Some([least, found, sought]) = trip.landmarks() {
         text += &format!("{found:.0} of {sought:.0} landmarks found in a pair, at least {least:.0}\n");
@@ -189,7 +285,7 @@ fn people(trip: &Trip) -> String {
     }
     let left_out = trip.left_out();
     if !left_out.is_empty() {
-        text += &format!("{} pairs left out\n", left_out.len());
+        text += &format!("{} left out\n", counted(left_out.len(), "pair"));
     }
     for (stamp, why) in &left_out {
         text += &format!("  {}: {why}\n", seconds(*stamp));
@@ -200,7 +296,7 @@ fn people(trip: &Trip) -> String {
 }
 
 /// For programs: everything.
-fn machines(trip: &Trip, settings: &Choice) -> String {
+fn machines(trip: &Trip, warnings: &[String], settings: &Choice) -> String {
     let journey = &trip.journey;
     let count = trip.given.len() as f64;
     let segments: Vec<Value> = journey.segments.iter().map(segment).collect();
@@ -215,6 +311,8 @@ fn machines(trip: &Trip, settings: &Choice) -> String {
         "segments": segments,
         "left_out": left_out,
         "landmarks": trip.landmarks().map(|[least, found, sought]| json!({ "least": least, "found": found, "sought": sought })),
+        "agreement": journey.agreement(),
+        "warnings": warnings,
         "pairs_a_second": trip.pairs_a_second(),
         "times_ms": times,
         "odometry": settings,

@@ -40,6 +40,20 @@ pub(crate) fn swapped(dataset: &Dataset) -> Option<Fault> {
     swapped_fault(sides.fold(Sides::default(), Sides::add), &dataset.folder.join(&dataset.table))
 }
 
+/// The same by the first pairs that can tell, for a set whose images need not all be good: the first that speaks for
+/// their places ends the search, three that speak against it decide.
+pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
+    let (mut sides, mut told) = (Sides::default(), 0);
+    for (left, right) in dataset.frames.iter().filter_map(|frame| dataset.pair(frame).ok()) {
+        sides = sides + Sides::of_images(&left, &right, &dataset.rig);
+        told += usize::from(sides.can_tell());
+        if told == LOOKED_AT || sides.can_tell() && !sides.are_swapped() {
+            break;
+        }
+    }
+    swapped_fault(sides, &dataset.folder.join(&dataset.table))
+}
+
 /// What is wrong with the images of `file` if left and right have changed places.
 pub fn swapped_fault(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_swapped().then(|| {

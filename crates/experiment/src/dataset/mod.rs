@@ -10,7 +10,7 @@ mod tables;
 pub mod tum;
 mod write;
 
-pub use check::{check, swapped_fault};
+pub use check::{check, swapped_at_first, swapped_fault};
 pub(crate) use check::{hash_faults, input_hashes, sha256, swapped};
 pub use open::{Dataset, DatasetFrame, read_rig};
 pub use picture::{ImageLimits, read_image, write_png};

@@ -194,6 +194,7 @@ impl Reader<'_> {
         if let Ok(rig) = &rig
             && d.rig.rectified
             && !rig.is_rectified()
+            && !rig.is_rectified_upright()
         {
             warnings.push(
                 Fault::new("a rig that is called rectified and is not", self.file)

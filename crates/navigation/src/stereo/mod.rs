@@ -75,7 +75,7 @@ pub struct Stereo {
     pub apart_px: f64,
     /// A pair becomes a key frame when it sees less than this share of the landmarks of the last key frame.
     pub keyframe_share: f64,
-    /// Key frames that are adjusted together; below 2 none are.
+    /// Key frames that are adjusted together, from 1 to 100; with 1 none are.
     pub window: usize,
     /// A motion known worse than this is no answer: one standard deviation over the three axes together (m).
     pub most_sigma: f64,
@@ -140,7 +140,7 @@ impl Component for Stereo {
         positive("apart-px", self.apart_px, "a positive number of pixels")?;
         let share = (0.0..=1.0).contains(&self.keyframe_share);
         in_range(share, "keyframe-share", self.keyframe_share, "a share from 0 to 1")?;
-        in_range(self.window <= 100, "window", self.window, "at most 100 key frames")?;
+        in_range((1..=100).contains(&self.window), "window", self.window, "1 to 100 key frames")?;
         positive("most-sigma", self.most_sigma, "a positive length (m)")?;
         positive("most-gap", self.most_gap, "a positive time (s)")?;
         positive("most-speed", self.most_speed, "a positive speed (m/s)")

@@ -34,6 +34,8 @@ pub(super) struct StereoReckoning<'a> {
     last: Option<Last>,
     /// A pair that could not be followed, its place among the outcomes, and why.
     pending: Option<(Seen, usize, Lost)>,
+    /// Why the way ended, while no pair was good enough to begin the next segment.
+    broken: Option<Lost>,
     frames: Vec<KeyFrame>,
     /// The first key frame of the segment.
     first: usize,
@@ -147,6 +149,7 @@ impl<'a> StereoReckoning<'a> {
             raw: None,
             last: None,
             pending: None,
+            broken: None,
             frames: Vec::new(),
             first: 0,
             seen_by_keyframe: 0,
@@ -191,8 +194,11 @@ impl<'a> StereoReckoning<'a> {
 
     /// Begins a segment where the one before ended.
     fn begin(&mut self, seen: Seen, broken: Option<Lost>) -> Outcome {
+        let broken = self.broken.take().or(broken);
         let (found, needed) = (seen.cloud.len(), self.settings.least_points);
         if found < needed {
+            // The reason waits for the pair that does begin.
+            self.broken = broken;
             return Outcome::Skipped(Lost::FewPoints { found, needed });
         }
         let world_from_camera = self.world_from_last();
