@@ -51,10 +51,13 @@ fn a_stretched_walk_has_the_drift_of_its_stretch() {
 fn people_see_what_matched() {
     let folder = walks();
     walk(folder.path(), "short.tum", |t| format!("{} 0 0 0 0 0 0 1\n", if t < 30.0 { t } else { t + 0.4 }));
+    walk(folder.path(), "two.tum", |t| if t < 2.0 { format!("{t} 0 0 0 0 0 0 1\n") } else { String::new() });
     let (code, out, warned) = eval(folder.path(), &["truth.tum", "short.tum"]);
     assert_eq!(code, 0);
     assert!(out.contains("30 poses: 60.0 % of 50 in truth.tum") && out.contains("drift over"), "{out}");
-    assert!(warned.starts_with("warning: only 30 poses matched"), "{warned}");
+    assert!(warned.contains("warning: only 30 poses matched"), "{warned}");
+    let (_, _, warned) = eval(folder.path(), &["truth.tum", "two.tum"]);
+    assert!(warned.starts_with("warning: two.tum covers 2.0 % of the time of truth.tum"), "{warned}");
 }
 
 #[test]

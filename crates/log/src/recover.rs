@@ -3,13 +3,13 @@
 use std::{
     collections::HashMap,
     fs::File,
-    io::{BufReader, BufWriter, Read, Write as _},
+    io::{BufReader, BufWriter, Read, Seek as _, SeekFrom, Write as _},
     path::{Path, PathBuf},
 };
 
 use mcap::{
     Attachment, McapError, WriteOptions,
-    records::{MessageHeader, Record},
+    records::{self, MessageHeader, Record},
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
@@ -52,6 +52,7 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
     let mut partial = to.as_os_str().to_owned();
     partial.push(".partial");
     let mut output = Output::create(PathBuf::from(partial))?;
+    output.summary = summary(from, size).unwrap_or_default();
     let mut at = 8;
     let mut sum = crc32fast::Hasher::new();
     sum.update(mcap::MAGIC);
@@ -75,6 +76,7 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
                 if crc != 0 && crc32fast::hash(&body[..body.len() - 4]) != crc =>
             {
                 output.found.lost.push(lost(format!("attachment `{}` (its check sum is wrong)", header.name)));
+                output.gap();
             }
             Ok(Record::DataEnd(end)) => {
                 let known = end.data_section_crc != 0;
@@ -83,7 +85,6 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
                 }
                 break;
             }
-            Ok(Record::Footer(_)) => break,
             Ok(Record::Chunk { .. }) => match chunk(&head, &body, size) {
                 Ok(records) => records.into_iter().try_for_each(|record| output.take(record))?,
                 Err(error) => {
@@ -91,7 +92,19 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
                     output.gap();
                 }
             },
-            Ok(record) => output.take(record.into_owned())?,
+            Ok(
+                record @ (Record::Schema { .. }
+                | Record::Channel(_)
+                | Record::Message { .. }
+                | Record::Attachment { .. }
+                | Record::Metadata(_)),
+            ) => output.take(record.into_owned())?,
+            Ok(Record::Header(_) | Record::MessageIndex(_)) => {}
+            // What has no place before the end of the data was something else once.
+            Ok(_) => {
+                output.found.lost.push(lost(format!("a record of kind {:#04x} that does not belong there", head[0])));
+                output.gap();
+            }
             Err(error) => {
                 output.found.lost.push(lost(format!("a record of kind {:#04x} ({error})", head[0])));
                 output.gap();
@@ -102,6 +115,46 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
         at += 9 + length;
     }
     output.finish(from, to)
+}
+
+/// The schemas and channels that the summary at the end of the file repeats, by their numbers.
+#[derive(Debug, Default)]
+struct Summary {
+    schemas: HashMap<u16, Record<'static>>,
+    channels: HashMap<u16, records::Channel>,
+}
+
+/// The summary of a file whose end is whole.
+fn summary(path: &Path, size: u64) -> Option<Summary> {
+    const FOOTER: u64 = 9 + 20 + 8;
+    let mut file = File::open(path).ok()?;
+    file.seek(SeekFrom::Start(size.checked_sub(FOOTER)?)).ok()?;
+    let mut end = Vec::new();
+    file.read_to_end(&mut end).ok()?;
+    let (footer, magic) = end.split_at_checked(29)?;
+    let Ok(Record::Footer(footer)) = mcap::parse_record(*footer.first()?, &footer[9..]) else { return None };
+    let length = size.checked_sub(FOOTER)?.checked_sub(footer.summary_start)?;
+    if magic != mcap::MAGIC || footer.summary_start == 0 {
+        return None;
+    }
+    file.seek(SeekFrom::Start(footer.summary_start)).ok()?;
+    let mut bytes = Vec::new();
+    file.take(length).read_to_end(&mut bytes).ok()?;
+    let mut found = Summary::default();
+    let mut rest = &bytes[..];
+    while let Some((head, after)) = rest.split_at_checked(9) {
+        let length = usize::try_from(u64::from_le_bytes(head[1..].try_into().ok()?)).ok()?;
+        let (body, next) = after.split_at_checked(length)?;
+        match mcap::parse_record(head[0], body).ok()?.into_owned() {
+            Record::Channel(channel) => drop(found.channels.insert(channel.id, channel)),
+            Record::Schema { header, data } => {
+                drop(found.schemas.insert(header.id, Record::Schema { header, data }));
+            }
+            _ => {}
+        }
+        rest = next;
+    }
+    Some(found)
 }
 
 /// The records of a chunk, all of them or none: nothing is taken before its check sum is verified.
@@ -154,6 +207,8 @@ struct Output {
     /// From the numbers of the old file to those of the new.
     schemas: HashMap<u16, u16>,
     channels: HashMap<u16, (u16, String)>,
+    /// What the end of the old file says of those whose declaration is lost.
+    summary: Summary,
     /// The messages since the last whole frame.
     pending: Vec<Pending>,
     /// Whether this is a trial's log, and its header has been passed.
@@ -178,8 +233,8 @@ impl Output {
             .create(BufWriter::new(file));
         let mcap = mcap.map_err(|error| unwritten(&partial, error))?;
         let (schemas, channels, pending) = (HashMap::new(), HashMap::new(), Vec::new());
-        let found = Recovered::default();
-        Ok(Self { mcap, partial, schemas, channels, pending, trial: false, begun: false, torn: false, found })
+        let (summary, found) = (Summary::default(), Recovered::default());
+        Ok(Self { mcap, partial, schemas, channels, summary, pending, trial: false, begun: false, torn: false, found })
     }
 
     /// Some records are missing here.
@@ -218,6 +273,14 @@ impl Output {
     }
 
     fn message(&mut self, header: MessageHeader, data: Vec<u8>) -> Result<(), LogError> {
+        if let Some(channel) = self.summary.channels.remove(&header.channel_id) {
+            if !self.channels.contains_key(&channel.id) {
+                if let Some(schema) = self.summary.schemas.remove(&channel.schema_id) {
+                    self.take(schema)?;
+                }
+                self.take(Record::Channel(channel))?;
+            }
+        }
         let Some((channel_id, topic)) = self.channels.get(&header.channel_id) else {
             self.found.dropped += 1;
             return Ok(());

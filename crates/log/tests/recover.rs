@@ -132,6 +132,35 @@ fn a_chunk_lost_in_the_middle_leaves_the_others() {
     assert!(are_of(&again, &log.whole) && again.frames.len() < FRAMES as usize - 1);
 }
 
+/// One bit of the kind of a chunk's record turns it into another kind, or one that is unknown.
+///
+/// Seen to fail when records of kinds that have no place there are passed over.
+#[test]
+fn a_chunk_that_is_taken_for_another_record_is_a_gap() {
+    let log = Log::new(FRAMES);
+    let (start, _) = log.chunks()[1];
+    for bit in 0..8 {
+        let mut altered = log.bytes.clone();
+        altered[start] ^= 1 << bit;
+        let (found, again) = log.recover(&altered).unwrap();
+        assert!(are_of(&again, &log.whole) && !found.lost.is_empty(), "bit {bit}");
+        assert!(again.frames.last() == log.whole.frames.last(), "bit {bit}: {:?}", found.lost);
+    }
+}
+
+/// Without the chunk that declares its channels the rest is no trial any more, but its messages are there.
+#[test]
+fn channels_are_known_from_the_summary_too() {
+    let log = Log::new(FRAMES);
+    let (start, end) = log.chunks()[0];
+    let mut altered = log.bytes.clone();
+    altered[(start + end) / 2] ^= 1;
+    let (from, to) = (log.path("damaged.mcap"), log.path("saved.mcap"));
+    fs::write(&from, altered).unwrap();
+    let found = recover(&from, &to).unwrap();
+    assert!(found.messages > 1000 && found.frames == 0, "{found:?}");
+}
+
 #[test]
 fn what_is_no_log_is_refused_and_nothing_is_left() {
     let folder = tempfile::tempdir().unwrap();

@@ -112,6 +112,8 @@ struct Matched {
     stamps: Option<Vec<u64>>,
     /// How many poses the two files hold.
     of: (usize, usize),
+    /// The share of the reference's time between the first and the last matched pose.
+    covered: f64,
 }
 
 impl Matched {
@@ -141,6 +143,13 @@ impl Eval {
             end: end(&matched),
             alignment,
         };
+        if matched.covered < MOSTLY {
+            let (reference, estimate) = (self.reference.display(), self.estimate.display());
+            let covered = 100.0 * matched.covered;
+            tell(&format!(
+                "warning: {estimate} covers {covered:.1} % of the time of {reference}; errors speak for that part"
+            ));
+        }
         if matched.share() < MOSTLY {
             let (n, (a, b)) = (matched.reference.len(), matched.of);
             tell(&format!(
@@ -204,13 +213,30 @@ impl Eval {
                 (belong, Some(stamps))
             }
             (a, b) if of.0 == of.1 => ((0..of.0).map(|i| (i, i)).collect(), a.clone().or_else(|| b.clone())),
-            _ => return refuse(format!("{} and {} poses, one of them without stamps,", of.0, of.1)),
+            _ => {
+                return refuse(format!(
+                    "{} and {} poses, one of them without stamps; give as many poses, or stamps, to both,",
+                    of.0, of.1
+                ));
+            }
+        };
+        let covered = match (&reference.stamps, belong.first(), belong.last()) {
+            (Some(stamps), Some(first), Some(last)) if stamps.len() > 1 => {
+                let span = |from: usize, to: usize| (stamps[to] - stamps[from]) as f64;
+                span(first.0, last.0) / span(0, stamps.len() - 1)
+            }
+            _ => 1.0,
         };
         if belong.len() < 2 {
-            return refuse(format!("only {} of {} and {} poses belong together", belong.len(), of.0, of.1));
+            return refuse(format!(
+                "only {} of {} and {} poses belong together; check --t-offset and --t-max-diff,",
+                belong.len(),
+                of.0,
+                of.1
+            ));
         }
         let (reference, estimate) = belong.iter().map(|&(i, j)| (reference.poses[i], estimate.poses[j])).unzip();
-        Ok(Matched { reference, estimate, stamps, of })
+        Ok(Matched { reference, estimate, stamps, of, covered })
     }
 
     fn alignment(&self, matched: &Matched) -> Result<Option<Alignment>, Failure> {
@@ -328,7 +354,7 @@ impl Eval {
             "end_m": found.end,
             "matched": {
                 "poses": matched.reference.len(), "reference": matched.of.0, "estimate": matched.of.1,
-                "share": matched.share(),
+                "share": matched.share(), "covered": matched.covered,
             },
             "alignment": found.alignment.as_ref().map(|alignment| json!({
                 "matrix": alignment.rows(), "scale": alignment.scale,

@@ -43,10 +43,9 @@ impl Format {
     /// The format of a text, by the separator and the number of columns of its first line with numbers.
     fn of_text(text: &str) -> Option<Self> {
         let line = lines(text).next()?.1;
+        let whole = |stamp: &str| stamp.trim().parse::<u64>().is_ok();
         match (line.contains(','), line.split_whitespace().count()) {
-            (true, _) if line.split(',').next().is_some_and(|stamp| stamp.trim().parse::<u64>().is_ok()) => {
-                Some(Self::Euroc)
-            }
+            (true, _) if text.contains("#timestamp") || line.split(',').next().is_some_and(whole) => Some(Self::Euroc),
             (false, 12) => Some(Self::Kitti),
             _ => Some(Self::Tum),
         }
