@@ -273,13 +273,12 @@ impl Output {
     }
 
     fn message(&mut self, header: MessageHeader, data: Vec<u8>) -> Result<(), LogError> {
-        if let Some(channel) = self.summary.channels.remove(&header.channel_id) {
-            if !self.channels.contains_key(&channel.id) {
-                if let Some(schema) = self.summary.schemas.remove(&channel.schema_id) {
-                    self.take(schema)?;
-                }
-                self.take(Record::Channel(channel))?;
+        let declared = self.channels.contains_key(&header.channel_id);
+        if let Some(channel) = self.summary.channels.remove(&header.channel_id).filter(|_| !declared) {
+            if let Some(schema) = self.summary.schemas.remove(&channel.schema_id) {
+                self.take(schema)?;
             }
+            self.take(Record::Channel(channel))?;
         }
         let Some((channel_id, topic)) = self.channels.get(&header.channel_id) else {
             self.found.dropped += 1;
