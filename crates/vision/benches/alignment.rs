@@ -143,12 +143,11 @@ fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -
         let start = right_at + Vector2::new(random.uniform() - 0.5, random.uniform() - 0.5);
         let pixel = |v: &Vector2<f64>| Pixel { u: v.x, v: v.y };
         let [l, r] = [&left_at, &start].map(|at| Place::independent(pixel(at), 0.15));
-        let pair = refine.align(&[Pair { left: l, right: r }], &left, &right, &rig)[0];
         sums.count += 1;
-        if pair.at.right == pixel(&start) {
+        let [pair] = refine.align(&[Pair { left: l, right: r }], &left, &right, &rig)[..] else {
             sums.failed += 1;
             continue;
-        }
+        };
         let error = Vector2::new(pair.at.right.u, pair.at.right.v) - right_at;
         sums.squares += error.norm_squared();
         sums.along += error.x * error.x;

@@ -181,13 +181,32 @@ def photograph(request):
     return {"image": encode(cv2.imread(path, cv2.IMREAD_GRAYSCALE))}
 
 
+def picture(request):
+    """A picture from a file, grey, 8 bits."""
+    return {"image": encode(cv2.imread(request["path"], cv2.IMREAD_GRAYSCALE))}
+
+
+def calibrate(request):
+    """Each camera by itself, then the rig; rows of x, y, z, u left, v left, u right, v right. RMS in pixels."""
+    boards = [decode(board) for board in request["boards"]]
+    space, left, right = ([np.ascontiguousarray(b[:, i:j]) for b in boards] for i, j in [(0, 3), (3, 5), (5, 7)])
+    size = tuple(request["size"])
+    criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-9)
+    rms_left, k1, d1 = cv2.calibrateCamera(space, left, size, None, None, criteria=criteria)[:3]
+    rms_right, k2, d2 = cv2.calibrateCamera(space, right, size, None, None, criteria=criteria)[:3]
+    rms, k1, d1, k2, d2, turn, step = cv2.stereoCalibrate(
+        space, left, right, k1, d1, k2, d2, size, flags=cv2.CALIB_FIX_INTRINSIC, criteria=criteria)[:7]
+    numbers = dict(K1=k1, D1=d1.ravel(), K2=k2, D2=d2.ravel(), R=turn, T=step.ravel())
+    return dict({key: value.tolist() for key, value in numbers.items()}, left=rms_left, right=rms_right, stereo=rms)
+
+
 def versions(_):
     return {"opencv": cv2.__version__, "python": sys.version.split()[0]}
 
 
 TIMED = {f.__name__: f for f in [
     clahe, corner_sub_pix, corners, describe, fast, features, lucas_kanade, nearest_two, pair]}
-PLAIN = {f.__name__: f for f in [keep, photograph, versions]}
+PLAIN = {f.__name__: f for f in [calibrate, keep, photograph, picture, versions]}
 
 
 def answer(request):

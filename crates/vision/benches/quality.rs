@@ -182,11 +182,6 @@ fn methods() -> Vec<(&'static str, &'static str, Method)> {
         ("surf + surf rotated", "OpenCV SURF rotated", ours(named("surf"), own_turned)),
         ("harris + surf upright", "OpenCV Harris + SURF upright", ours(corners("harris"), named("surf"))),
         ("harris + surf rotated", "", ours(corners("harris"), named("surf").with("upright", false))),
-        (
-            "harris σ 1.5 + surf upright",
-            "OpenCV Harris + SURF upright",
-            ours(corners("harris").with("sigma", 1.5), named("surf")),
-        ),
         ("harris by default + surf upright", "", ours(named("harris"), named("surf"))),
         ("shi-tomasi + surf upright", "", ours(corners("shi-tomasi"), named("surf"))),
         (

@@ -187,12 +187,15 @@ fn any_size_and_any_finite_values_are_an_image() {
     });
 }
 
-/// Whoever works, and whatever was looked at before.
+/// Whoever works, and whatever was looked at before, brighter or darker.
+///
+/// Seen to fail when the strongest response of the image before stays, and when rows are left where they were.
 #[test]
 fn threads_and_memory_change_no_bit() {
     for listing in DETECTORS.listings() {
         let sizes = [(190, 150), (40, 90), (5, 5), (190, 150), (300, 70)];
-        let images = sizes.map(|(width, height)| shown(listing.name, width, height));
+        let mut images = sizes.map(|(width, height)| shown(listing.name, width, height));
+        images[1].pixels_mut().iter_mut().for_each(|pixel| *pixel *= 0.3);
         let detector = DETECTORS.build(&Choice::named(listing.name)).unwrap();
         for threads in [Threads::One, Threads::Pool] {
             let (mut work, mut found) = (Workspace::new(threads), Vec::new());

@@ -21,6 +21,7 @@ fn texture(width: usize, height: usize) -> Image {
     Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
 }
 
+/// Seen to fail when a mean counts one pixel too many.
 #[test]
 fn a_constant_image_stays_constant() {
     for (name, filter) in filters() {
@@ -37,6 +38,7 @@ fn a_constant_image_stays_constant() {
     }
 }
 
+/// Seen to fail when what is beyond white is not cut off.
 #[test]
 fn what_comes_out_is_finite_and_within_the_range() {
     let extreme = |i: usize| [0.0, f32::MAX, -f32::MAX, 1e-40, 255.0, -1.0, 65535.0][i % 7];
@@ -51,6 +53,7 @@ fn what_comes_out_is_finite_and_within_the_range() {
     }
 }
 
+/// Seen to fail when a band of rows begins without the last row above it.
 #[test]
 fn an_image_shifted_is_filtered_and_shifted() {
     // Turned around its borders, so that the mean of the image stays.
@@ -75,6 +78,7 @@ fn an_image_shifted_is_filtered_and_shifted() {
     }
 }
 
+/// Seen to fail when a histogram keeps the counts of the one before, and when a band takes the rows of the first.
 #[test]
 fn threads_and_memory_change_nothing() {
     let images = [texture(150, 333), texture(40, 30), texture(301, 170)];

@@ -110,7 +110,28 @@ fn a_quarter_turn_turns_the_places() {
     });
 }
 
+/// No corner is taken that lies further than 3.5 px from its key point.
+///
+/// Seen to fail when a fit is believed wherever it ends.
+#[test]
+fn a_place_is_near_its_key_point() {
+    let image = board(SIDE, SIDE);
+    let beside = |k: &Keypoint, d: f64| [[d, 0.0], [0.0, d]].map(|[u, v]| Pixel { u: k.at.u + u, v: k.at.v + v });
+    let points: Vec<Keypoint> = corners(&image)
+        .iter()
+        .flat_map(|k| (-6..=6).flat_map(|d| beside(k, f64::from(d)).map(|at| Keypoint { at, ..*k })))
+        .collect();
+    every(|name, locator| {
+        for (place, point) in locator.locate(&image, &points).iter().zip(&points) {
+            let off = place.map_or(0.0, |place| place.at.distance(&point.at));
+            assert!(off <= 3.5, "{name}: {off} px");
+        }
+    });
+}
+
 /// Wherever a key point is and whatever the image, there is a place with a covariance or none, and never in a flat image.
+///
+/// Seen to fail when windows may leave the image.
 #[test]
 fn any_key_point_of_any_image_is_looked_at() {
     let mut points = Vec::new();
@@ -139,6 +160,8 @@ fn any_key_point_of_any_image_is_looked_at() {
 }
 
 /// Whoever works, and whatever was looked at before.
+///
+/// Seen to fail when a piece begins at the first key point, and when a fit keeps the mean of the window before.
 #[test]
 fn threads_and_memory_change_no_bit() {
     let images = [board(SIDE, SIDE), board(60, 90), board(SIDE, SIDE)];

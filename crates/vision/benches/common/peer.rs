@@ -90,7 +90,16 @@ impl Peer {
 
     /// A photograph of scikit-image's wheel.
     pub(crate) fn photograph(&mut self, name: &str) -> Image {
-        let answer = self.ask(&json!({"do": "photograph", "name": name}));
+        self.image(&json!({"do": "photograph", "name": name}))
+    }
+
+    /// A picture from a file.
+    pub(crate) fn picture(&mut self, path: &str) -> Image {
+        self.image(&json!({"do": "picture", "path": path}))
+    }
+
+    fn image(&mut self, request: &Value) -> Image {
+        let answer = self.ask(request);
         let ([height, width], pixels) = (shape(&answer["image"]), bytes(&answer["image"]));
         let pixels = pixels.into_iter().map(f32::from).collect();
         Image::new(width, height, pixels).expect("an image fills its shape")

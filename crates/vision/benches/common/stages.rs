@@ -258,27 +258,33 @@ impl Scene {
             floats(&[3, 4], &values)
         };
         let projections = [projection(0.0), projection(focal * self.rig.baseline())];
-        let front_end = FrontEnd {
-            filters: Vec::new(),
-            detector: listed(&DETECTORS, &Choice::named("harris").with("features", COUNT as i64)).expect("a detector"),
-            descriptor: listed(&DESCRIPTORS, &Choice::named("surf")).expect("a descriptor"),
-            matcher: MATCHERS.build(&Choice::named("epipolar-band")).expect("a matcher"),
-            locator: LOCATORS.build(&Choice::named("corner")).expect("a locator"),
-            refine: Refine::default(),
-            triangulator: Triangulator::default(),
-        };
-        let mut looks = [Threads::One, Threads::Pool].map(Look::new);
         let limit = if self.images[0].width() > 1024 { 40.0 } else { 25.0 };
-        vec![Stage {
-            name: "whole pair, the pipeline's defaults",
-            asks: SURF,
-            request: json!({"do": "pair", "count": COUNT, "projections": projections}),
-            at_most: None,
-            at_most_ms: Some(limit),
-            ours: Box::new(move |threads| {
-                let look = &mut looks[usize::from(threads == Threads::Pool)];
-                front_end.look(&self.images[0], &self.images[1], &self.rig, look);
-            }),
-        }]
+        // The peer's stages; then with every corner located first, as the pipeline does by default.
+        let list = [("whole pair, the peer's stages", "peak"), ("whole pair, the pipeline's defaults", "corner")];
+        let stages = list.into_iter().map(|(name, locator)| {
+            let harris = Choice::named("harris").with("features", COUNT as i64);
+            let front_end = FrontEnd {
+                filters: Vec::new(),
+                detector: listed(&DETECTORS, &harris).expect("a detector"),
+                descriptor: listed(&DESCRIPTORS, &Choice::named("surf")).expect("a descriptor"),
+                matcher: MATCHERS.build(&Choice::named("epipolar-band")).expect("a matcher"),
+                locator: LOCATORS.build(&Choice::named(locator)).expect("a locator"),
+                refine: Refine::default(),
+                triangulator: Triangulator::default(),
+            };
+            let mut looks = [Threads::One, Threads::Pool].map(Look::new);
+            Stage {
+                name,
+                asks: SURF,
+                request: json!({"do": "pair", "count": COUNT, "projections": projections}),
+                at_most: None,
+                at_most_ms: Some(limit),
+                ours: Box::new(move |threads| {
+                    let look = &mut looks[usize::from(threads == Threads::Pool)];
+                    front_end.look(&self.images[0], &self.images[1], &self.rig, look);
+                }),
+            }
+        });
+        stages.collect()
     }
 }

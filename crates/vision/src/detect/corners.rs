@@ -1,7 +1,17 @@
 //! Corners by the structure tensor: what the detectors that rest on it share.
 
-use super::{Keypoint, peaks, peaks::Peaks, select, select::Budget, tensor, tensor::Tensor};
-use crate::{Image, Workspace};
+use std::ops::Range;
+
+use seafix_geometry::Pixel;
+
+use super::{
+    Keypoint,
+    peaks::{Disc, in_rows, to_vertex},
+    select,
+    select::Budget,
+    tensor::{Stream, Tensor, Weights},
+};
+use crate::{Image, Threads, Workspace};
 
 /// The greatest responses of a structure tensor, to a fraction of a pixel.
 #[derive(Debug, Clone, Copy)]
@@ -16,25 +26,106 @@ pub(super) struct Corners {
 
 #[derive(Debug, Default)]
 struct Scratch {
-    response: Vec<f32>,
-    tensor: tensor::Scratch,
-    peaks: peaks::Scratch,
+    weights: Option<Weights>,
+    disc: Disc,
+    bands: Vec<Band>,
     selection: select::Scratch,
 }
+
+/// The memory of a band of rows, and the corners in it.
+#[derive(Debug, Default)]
+struct Band {
+    stream: Stream,
+    /// The response at a few rows: they stay in the second-level cache until their corners are found.
+    response: Vec<f32>,
+    marks: Vec<u8>,
+    /// At whole pixels, row by row, and from there to where the response peaks.
+    found: Vec<(Keypoint, [f64; 2])>,
+}
+
+/// Rows whose corners are sought at a time.
+const ROWS: usize = 32;
 
 impl Corners {
     /// Replaces `found` by the corners, strongest first.
     pub(super) fn find(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {
         let threads = work.threads();
         let (width, height) = (image.width(), image.height());
-        let Scratch { response, tensor, peaks, selection } = work.get::<Scratch>();
-        let strongest = self.tensor.response_into(image, threads, tensor, response);
-        let least = (f64::from(strongest) * self.quality) as f32;
-        Peaks { least, radius: self.radius }.find(response, width, threads, peaks, found);
+        let Scratch { weights, disc, bands, selection } = work.get::<Scratch>();
+        found.clear();
+        let Some(weights) = self.tensor.weights(image, weights) else { return };
+        let radius = self.radius.min(width.max(height));
+        disc.set(radius);
+        // Few bands: each begins with rows that belong to the one before.
+        let rows = match threads {
+            Threads::One => height,
+            Threads::Pool => height.div_ceil(2 * rayon::current_num_threads()).max(ROWS),
+        };
+        let count = (height - 2).div_ceil(rows);
+        bands.resize_with(count.max(bands.len()), Band::default);
+        threads.pieces(&mut bands[..count], 1, &mut Vec::<()>::new(), |index, band, ()| {
+            let rows = 1 + index * rows..(1 + (index + 1) * rows).min(height - 1);
+            band[0].search(self, image, weights, (radius, disc), rows);
+        });
+        let bands = &bands[..count];
+        let strongest = bands.iter().map(|band| band.stream.strongest).fold(0.0, f32::max);
+        let least = self.least(strongest);
+        let all = || bands.iter().flat_map(|band| &band.found);
+        found.extend(all().map(|(corner, _)| *corner).filter(|corner| corner.response >= least));
         self.budget.keep(found, [width, height], selection);
         for corner in found {
-            peaks::to_vertex(corner, response, width);
+            // Bands follow each other, and in each the corners are in order.
+            let before = |other: &Keypoint| (other.at.v, other.at.u) < (corner.at.v, corner.at.u);
+            let reaches = |band: &&Band| band.found.last().is_some_and(|(last, _)| !before(last));
+            let of_band = &bands.iter().find(reaches).expect("every corner is one of a band's").found;
+            let [dx, dy] = of_band[of_band.partition_point(|(other, _)| before(other))].1;
+            corner.at.u += dx;
+            corner.at.v += dy;
             corner.scale = self.tensor.sigma as f32;
+        }
+    }
+
+    /// The weakest response worth keeping where this is the strongest.
+    fn least(&self, strongest: f32) -> f32 {
+        (f64::from(strongest) * self.quality) as f32
+    }
+}
+
+impl Band {
+    /// Finds the corners in some rows, but for those that are too weak already beside the strongest of the band so far.
+    fn search(
+        &mut self,
+        corners: &Corners,
+        image: &Image,
+        weights: &Weights,
+        (radius, disc): (usize, &Disc),
+        rows: Range<usize>,
+    ) {
+        let Self { stream, response, marks, found } = self;
+        let (width, height) = (image.width(), image.height());
+        // Rows above and below that decide about a corner.
+        let around = radius.max(1);
+        found.clear();
+        stream.begin();
+        // The rows of the image that `response` holds.
+        let mut held = 0..0;
+        for first in rows.clone().step_by(ROWS) {
+            let last = (first + ROWS).min(rows.end);
+            let needed = first.saturating_sub(around)..(last + around).min(height);
+            let kept = needed.start.max(held.start)..held.end.max(needed.start);
+            if !kept.is_empty() {
+                response.copy_within((kept.start - held.start) * width..(kept.end - held.start) * width, 0);
+            }
+            response.resize(needed.len() * width, 0.0);
+            stream.fill(image, &corners.tensor, weights, kept.end, &mut response[kept.len() * width..]);
+            held = needed;
+            let least = corners.least(stream.strongest);
+            let (response, rows) = (&**response, first - held.start..last - held.start);
+            in_rows(response, width, rows, least, disc, marks, |x, y| {
+                let at = Pixel { u: x as f64, v: (held.start + y) as f64 };
+                let corner = Keypoint { at, response: response[y * width + x], scale: 0.0 };
+                found.push((corner, to_vertex(response, width, [x, y])));
+            });
         }
     }
 }

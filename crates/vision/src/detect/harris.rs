@@ -49,7 +49,7 @@ impl Default for Harris {
     fn default() -> Self {
         Self {
             window: Window::Gaussian,
-            sigma: 2.0,
+            sigma: 1.8,
             k: 0.04,
             quality: 1e-4,
             radius: 4,

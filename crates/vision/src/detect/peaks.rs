@@ -19,14 +19,24 @@ pub(super) struct Peaks {
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     bands: Vec<Band>,
-    /// How far the disc reaches sideways in its middle row, the next, and so on (px).
-    chords: Vec<usize>,
+    disc: Disc,
 }
 
 #[derive(Debug, Default)]
 struct Band {
     marks: Vec<u8>,
     found: Vec<Keypoint>,
+}
+
+/// How far a disc reaches sideways in its middle row, the next, and so on (px).
+#[derive(Debug, Default)]
+pub(super) struct Disc(Vec<usize>);
+
+impl Disc {
+    pub(super) fn set(&mut self, radius: usize) {
+        self.0.clear();
+        self.0.extend((0..=radius).map(|dy| (radius * radius - dy * dy).isqrt()));
+    }
 }
 
 impl Peaks {
@@ -46,30 +56,46 @@ impl Peaks {
         if width < 3 || height < 3 {
             return;
         }
-        let Scratch { bands, chords } = scratch;
-        let radius = self.radius.min(width.max(height));
-        chords.clear();
-        chords.extend((0..=radius).map(|dy| (radius * radius - dy * dy).isqrt()));
-        let least = self.least.max(f32::from_bits(1));
+        let Scratch { bands, disc } = scratch;
+        disc.set(self.radius.min(width.max(height)));
         let rows = threads.rows_a_band(height - 2);
         let count = (height - 2).div_ceil(rows);
         bands.resize_with(count.max(bands.len()), Band::default);
         threads.pieces(&mut bands[..count], 1, &mut Vec::<()>::new(), |index, band, ()| {
             let Band { marks, found } = &mut band[0];
-            marks.resize(width, 0);
             found.clear();
-            for y in 1 + index * rows..(1 + (index + 1) * rows).min(height - 1) {
-                let row = |y: usize| &response[y * width..][..width];
-                mark(row(y - 1), row(y), row(y + 1), least, &mut marks[1..width - 1]);
-                each(marks, |x| {
-                    if is_greatest(response, width, [x, y], chords) {
-                        let at = Pixel { u: x as f64, v: y as f64 };
-                        found.push(Keypoint { at, response: response[y * width + x], scale: 0.0 });
-                    }
-                });
-            }
+            let rows = 1 + index * rows..(1 + (index + 1) * rows).min(height - 1);
+            in_rows(response, width, rows, self.least, disc, marks, |x, y| {
+                let at = Pixel { u: x as f64, v: y as f64 };
+                found.push(Keypoint { at, response: response[y * width + x], scale: 0.0 });
+            });
         });
         bands[..count].iter().for_each(|band| found.extend_from_slice(&band.found));
+    }
+}
+
+/// Calls `visit` with x and y of each such pixel in some rows, neither the first nor the last; the disc around it may
+/// reach beyond the rows that are there only where the image ends.
+pub(super) fn in_rows(
+    response: &[f32],
+    width: usize,
+    rows: std::ops::Range<usize>,
+    least: f32,
+    disc: &Disc,
+    marks: &mut Vec<u8>,
+    mut visit: impl FnMut(usize, usize),
+) {
+    marks.clear();
+    marks.resize(width, 0);
+    let least = least.max(f32::from_bits(1));
+    for y in rows {
+        let row = |y: usize| &response[y * width..][..width];
+        mark(row(y - 1), row(y), row(y + 1), least, &mut marks[1..width - 1]);
+        each(marks, |x| {
+            if is_greatest(response, width, [x, y], &disc.0) {
+                visit(x, y);
+            }
+        });
     }
 }
 
@@ -155,13 +181,10 @@ pub(crate) fn vertex(nine: [[f32; 3]; 3]) -> [f64; 2] {
     [0.0, 0.0]
 }
 
-/// Moves a point at an inner pixel to the vertex around it.
-pub(super) fn to_vertex(point: &mut Keypoint, response: &[f32], width: usize) {
-    let (x, y) = (point.at.u as usize, point.at.v as usize);
+/// From an inner pixel to the vertex around it.
+pub(super) fn to_vertex(response: &[f32], width: usize, [x, y]: [usize; 2]) -> [f64; 2] {
     let row = |y: usize| std::array::from_fn(|i| response[y * width + x - 1 + i]);
-    let [dx, dy] = vertex([row(y - 1), row(y), row(y + 1)]);
-    point.at.u += dx;
-    point.at.v += dy;
+    vertex([row(y - 1), row(y), row(y + 1)])
 }
 
 #[cfg(test)]
@@ -193,8 +216,9 @@ mod tests {
         let response: Vec<f32> = (0..20).map(value).collect();
         let mut found = maxima(&response, 5, 0.0, 2, Threads::One);
         assert_eq!(found.len(), 1);
-        to_vertex(&mut found[0], &response, 5);
-        assert!(found[0].at.distance(&Pixel { u: 2.3, v: 1.8 }) < 1e-5, "{found:?}");
+        let Pixel { u, v } = found.remove(0).at;
+        let [dx, dy] = to_vertex(&response, 5, [u as usize, v as usize]);
+        assert!((u + dx - 2.3).abs() < 1e-5 && (v + dy - 1.8).abs() < 1e-5, "{u} + {dx}, {v} + {dy}");
     }
 
     #[test]

@@ -5,14 +5,14 @@ use multiversion::multiversion;
 use super::tensor::{Measure, Weights};
 use crate::Image;
 
-/// The memory of one band of rows, and the strongest response in it.
-#[derive(Debug, Default)]
-pub(super) struct Band {
+/// What one strip works in, and the strongest response so far.
+#[derive(Debug)]
+pub(super) struct Band<'a> {
     /// gx gx, gx gy, gy gy of one row of a strip, with what the window needs on either side.
-    pub(super) products: [Vec<f32>; 3],
+    pub(super) products: &'a mut [Vec<f32>; 3],
     /// The three, smoothed along x, of as many rows as the window is high.
-    pub(super) ring: Vec<Planes>,
-    pub(super) strongest: f32,
+    pub(super) ring: &'a mut [Planes],
+    pub(super) strongest: &'a mut f32,
 }
 
 /// Columns of a strip: what a window needs of one stays in the first-level cache.
@@ -33,14 +33,16 @@ pub(super) struct Part<'a> {
     pub(super) image: &'a Image,
     pub(super) weights: &'a Weights,
     pub(super) measure: Measure,
-    /// The image's row that is the first of the band.
+    /// The image's row that is the first of `out`.
     pub(super) first: usize,
     pub(super) rows: std::ops::Range<usize>,
+    /// The first row that the ring does not hold yet.
+    pub(super) next: usize,
     pub(super) columns: std::ops::Range<usize>,
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-pub(super) fn strip(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
+pub(super) fn strip(part: &Part<'_>, out: &mut [f32], band: Band<'_>) {
     strip_in_any_lanes(part, out, band);
 }
 
@@ -49,15 +51,15 @@ pub(super) fn strip(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
 ///
 /// Smoothing works on whole strips; what lies beyond a narrower part is computed and never read.
 #[inline(always)]
-fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: &mut Band) {
-    let Part { image, weights, measure, first, rows, columns } = part;
+fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: Band<'_>) {
+    let Part { image, weights, measure, first, rows, next, columns } = part;
     let (reach, half) = (weights.reach(), weights.half.as_slice());
     let Band { products, ring, strongest } = band;
     let size = ring.len();
     let count = columns.len();
     let mut tensor = Planes::ZERO;
     let mut greatest = [0.0_f32; STRIP];
-    for y in rows.start.saturating_sub(reach)..rows.end + reach {
+    for y in *next..rows.end + reach {
         let row = |y: usize| &image.row(y)[columns.start - reach - 1..columns.end + reach + 1];
         gradient_products([row(y - 1), row(y), row(y + 1)], products);
         for (smooth, product) in ring[y % size].0.as_chunks_mut::<STRIP>().0.iter_mut().zip(products.iter()) {
@@ -179,13 +181,14 @@ mod tests {
             [Measure::Harris { k: 0.04 }, Measure::LeastEigenvalue].into_iter().zip([Window::Gaussian, Window::Box])
         {
             let weights = Weights::new(window, 1.5);
-            let run = |strip: fn(&Part<'_>, &mut [f32], &mut Band)| {
+            let run = |strip: fn(&Part<'_>, &mut [f32], Band<'_>)| {
                 let mut out = vec![0.0; 150 * 40];
-                let products = [0; 3].map(|_| vec![0.0; STRIP + 2 * weights.reach()]);
-                let ring = vec![Planes::ZERO; 2 * weights.reach() + 1];
-                let mut band = Band { products, ring, strongest: 0.0 };
-                let part = Part { image: &image, weights: &weights, measure, first: 0, rows: 9..31, columns: 11..130 };
-                strip(&part, &mut out, &mut band);
+                let mut products = [0; 3].map(|_| vec![0.0; STRIP + 2 * weights.reach()]);
+                let mut ring = vec![Planes::ZERO; 2 * weights.reach() + 1];
+                let band = Band { products: &mut products, ring: &mut ring, strongest: &mut 0.0 };
+                let (rows, next) = (9..31, 9 - weights.reach());
+                let part = Part { image: &image, weights: &weights, measure, first: 0, rows, next, columns: 11..130 };
+                strip(&part, &mut out, band);
                 out.iter().map(|r| r.to_bits()).collect::<Vec<_>>()
             };
             assert_eq!(run(strip), run(strip_in_any_lanes));

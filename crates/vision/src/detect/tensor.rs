@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::strip::{Band, Part, Planes, STRIP, strip};
-use crate::{Image, Threads, gaussian::half_kernel};
+use crate::{Image, gaussian::half_kernel};
 
 /// The weights that integrate the structure tensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -35,11 +35,16 @@ pub(super) struct Tensor {
     pub(super) measure: Measure,
 }
 
-/// What the response keeps between frames.
+/// The response, some rows after the other: what the window needs of the rows before stays.
 #[derive(Debug, Default)]
-pub(super) struct Scratch {
-    weights: Option<Weights>,
-    bands: Vec<Band>,
+pub(super) struct Stream {
+    products: [Vec<f32>; 3],
+    /// Of each strip the rows under the window.
+    rings: Vec<Planes>,
+    /// The first row of the image that the rings do not hold yet.
+    next: usize,
+    /// The greatest response so far.
+    pub(super) strongest: f32,
 }
 
 /// The weights of a window along one axis.
@@ -68,46 +73,39 @@ impl Weights {
     pub(super) fn reach(&self) -> usize {
         self.half.len() - 1
     }
+
+    /// Pixels at the border without a response: the window's and the gradient's.
+    pub(super) fn margin(&self) -> usize {
+        self.reach() + 1
+    }
 }
 
 impl Tensor {
-    /// Fills `response` for every pixel, zero nearer to the border than the operator reaches, and
-    /// returns the greatest. An image too small for the operator has no response.
-    pub(super) fn response_into(
-        &self,
-        image: &Image,
-        threads: Threads,
-        scratch: &mut Scratch,
-        response: &mut Vec<f32>,
-    ) -> f32 {
-        let (width, height) = (image.width(), image.height());
-        response.resize(width * height, 0.0);
+    /// The weights of the window, made anew only if others are `kept`; `None` if the image is too small for the operator.
+    pub(super) fn weights<'a>(&self, image: &Image, kept: &'a mut Option<Weights>) -> Option<&'a Weights> {
+        let shorter = image.width().min(image.height());
         // Checked before the weights are made: their number is the user's.
-        if !(2.0 * self.sigma < width.min(height) as f64) {
-            response.fill(0.0);
-            return 0.0;
+        if !(2.0 * self.sigma < shorter as f64) {
+            return None;
         }
-        let Scratch { weights, bands } = scratch;
-        let weights = match weights {
-            Some(weights) if weights.of == (self.window, self.sigma) => weights,
-            other => other.insert(Weights::new(self.window, self.sigma)),
-        };
-        let margin = weights.reach() + 1;
-        if width.min(height) <= 2 * margin {
-            response.fill(0.0);
-            return 0.0;
+        if kept.as_ref().is_none_or(|weights| weights.of != (self.window, self.sigma)) {
+            *kept = Some(Weights::new(self.window, self.sigma));
         }
-        let rows = threads.rows_a_band(height);
-        threads.pieces(response, rows * width, bands, |index, out, band: &mut Band| {
-            self.fill(image, index * rows, out, weights, band);
-        });
-        bands[..height.div_ceil(rows)].iter().map(|band| band.strongest).fold(0.0, f32::max)
+        kept.as_ref().filter(|weights| shorter > 2 * weights.margin())
+    }
+}
+
+impl Stream {
+    /// What came before is forgotten.
+    pub(super) fn begin(&mut self) {
+        (self.next, self.strongest) = (0, 0.0);
     }
 
-    /// Fills a band of whole rows, the first of which is row `first` of the image.
-    fn fill(&self, image: &Image, first: usize, out: &mut [f32], weights: &Weights, band: &mut Band) {
+    /// Fills `out` with the response at whole rows of the image, the first of which is `first`; zero nearer to the
+    /// border than the operator reaches. The rows follow those of the call before, or are the first.
+    pub(super) fn fill(&mut self, image: &Image, tensor: &Tensor, weights: &Weights, first: usize, out: &mut [f32]) {
         let (width, height) = (image.width(), image.height());
-        let margin = weights.reach() + 1;
+        let (margin, reach) = (weights.margin(), weights.reach());
         let end = first + out.len() / width;
         for (y, row) in (first..).zip(out.chunks_exact_mut(width)) {
             if y < margin || y >= height - margin {
@@ -117,14 +115,21 @@ impl Tensor {
                 row[width - margin..].fill(0.0);
             }
         }
-        band.products.iter_mut().for_each(|plane| plane.resize(STRIP + 2 * weights.reach(), 0.0));
-        band.ring.resize(2 * weights.reach() + 1, Planes::ZERO);
-        band.strongest = 0.0;
         let rows = first.max(margin)..end.min(height - margin);
-        let whole = Part { image, weights, measure: self.measure, first, rows, columns: 0..0 };
-        for left in (margin..width - margin).step_by(STRIP) {
+        if rows.is_empty() {
+            return;
+        }
+        let size = 2 * reach + 1;
+        self.products.iter_mut().for_each(|plane| plane.resize(STRIP + 2 * reach, 0.0));
+        self.rings.resize(size * (width - 2 * margin).div_ceil(STRIP), Planes::ZERO);
+        let next = if self.next == rows.start + reach { self.next } else { rows.start - reach };
+        self.next = rows.end + reach;
+        let Self { products, rings, strongest, .. } = self;
+        let strips = (margin..width - margin).step_by(STRIP);
+        for (left, ring) in strips.zip(rings.chunks_exact_mut(size)) {
             let columns = left..(left + STRIP).min(width - margin);
-            strip(&Part { columns, ..whole.clone() }, out, band);
+            let part = Part { image, weights, measure: tensor.measure, first, rows: rows.clone(), next, columns };
+            strip(&part, out, Band { products, ring, strongest });
         }
     }
 }
@@ -141,10 +146,16 @@ mod tests {
         Image::new(width, height, (0..width * height).map(value).collect()).unwrap()
     }
 
-    fn response(tensor: &Tensor, image: &Image, threads: Threads) -> (Vec<f32>, f32) {
-        let mut response = vec![7.0; 3];
-        let strongest = tensor.response_into(image, threads, &mut Scratch::default(), &mut response);
-        (response, strongest)
+    /// The response at every pixel, so many rows at a time.
+    fn response(tensor: &Tensor, image: &Image, rows: usize) -> (Vec<f32>, f32) {
+        let mut response = vec![7.0; image.pixels().len()];
+        let (mut weights, mut stream) = (None, Stream { strongest: 9.0, ..Stream::default() });
+        let weights = tensor.weights(image, &mut weights).expect("an image large enough");
+        stream.begin();
+        for (index, out) in response.chunks_mut(rows * image.width()).enumerate() {
+            stream.fill(image, tensor, weights, index * rows, out);
+        }
+        (response, stream.strongest)
     }
 
     /// The response at a pixel as the definition has it, in f64.
@@ -173,7 +184,7 @@ mod tests {
     const MEASURES: [Measure; 2] = [Measure::Harris { k: 0.04 }, Measure::LeastEigenvalue];
 
     #[test]
-    fn it_is_the_definition_at_every_pixel_on_any_threads() {
+    fn it_is_the_definition_at_every_pixel_however_many_rows_at_a_time() {
         for (window, sigma, reach) in [
             (Window::Gaussian, 0.3, 1),
             (Window::Gaussian, 1.0, 3),
@@ -183,7 +194,7 @@ mod tests {
         ] {
             for (measure, (width, height)) in MEASURES.into_iter().zip([(163, 33), (31, 60)]) {
                 let (tensor, image) = (Tensor { window, sigma, measure }, rough(width, height));
-                let (found, strongest) = response(&tensor, &image, Threads::One);
+                let (found, strongest) = response(&tensor, &image, height);
                 let margin = reach + 1;
                 let inner = |at: usize, n: usize| at >= margin && at + margin < n;
                 for (i, &r) in found.iter().enumerate() {
@@ -197,7 +208,9 @@ mod tests {
                     }
                 }
                 assert_eq!(strongest, found.iter().copied().fold(0.0, f32::max));
-                assert_eq!((found, strongest), response(&tensor, &image, Threads::Pool));
+                for rows in [1, 7, 20] {
+                    assert_eq!((&found, strongest), (&response(&tensor, &image, rows).0, strongest), "{rows} rows");
+                }
             }
         }
     }
