@@ -4,9 +4,11 @@
 
 mod bound;
 mod fix;
+mod solved;
 mod statistics;
 pub mod trajectory;
 
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
 pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
-pub use statistics::{clopper_pearson, quantile};
+pub use solved::Solved;
+pub use statistics::{Bootstrap, SignedRank, clopper_pearson, holm, mcnemar, median, quantile, signed_rank};

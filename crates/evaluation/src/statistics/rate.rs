@@ -1,4 +1,4 @@
-//! Rates with their intervals, and quantiles.
+//! Rates with their intervals.
 
 use statrs::distribution::{Beta, ContinuousCDF};
 
@@ -22,27 +22,6 @@ pub fn clopper_pearson(k: usize, n: usize, confidence: f64) -> (f64, f64) {
     (low, high)
 }
 
-/// The `p` quantile of `values` (linear between order statistics, Hyndman and Fan's type 7);
-/// sorts them in place; NaN without values.
-///
-/// ```
-/// assert_eq!(seafix_evaluation::quantile(&mut [3.0, 1.0, 2.0], 0.5), 2.0);
-/// assert_eq!(seafix_evaluation::quantile(&mut [1.0, 2.0], 0.25), 1.25);
-/// ```
-pub fn quantile(values: &mut [f64], p: f64) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    values.sort_by(f64::total_cmp);
-    let place = p.clamp(0.0, 1.0) * (values.len() - 1) as f64;
-    let (below, share) = (place.floor() as usize, place.fract());
-    match values.get(below + 1) {
-        // An infinite neighbour (a failure counted as infinity) must not turn an exact hit into NaN.
-        Some(above) if share > 0.0 => values[below] + share * (above - values[below]),
-        _ => values[below],
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -54,11 +33,5 @@ mod tests {
         assert!((low - 0.6397).abs() < 1e-4 && (high - 0.998_05).abs() < 1e-4, "{low} {high}");
         assert_eq!(clopper_pearson(0, 0, 0.95), (0.0, 1.0));
         assert_eq!(clopper_pearson(5, 5, 0.95).1, 1.0);
-    }
-
-    #[test]
-    fn failures_at_infinity_keep_the_median() {
-        assert_eq!(quantile(&mut [f64::INFINITY, 1.0, 2.0], 0.5), 2.0);
-        assert!(quantile(&mut [], 0.5).is_nan());
     }
 }

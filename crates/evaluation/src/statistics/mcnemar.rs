@@ -1,0 +1,32 @@
+//! Two rates over the same trials.
+
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+/// The exact two-sided p-value that two methods succeed equally often (McNemar, 1947), `first` being the trials where
+/// only the one succeeded and `second` those where only the other did: twice the smaller tail of a fair coin.
+///
+/// ```
+/// assert_eq!(seafix_evaluation::mcnemar(0, 0), 1.0);
+/// assert_eq!(seafix_evaluation::mcnemar(5, 0), 0.0625);
+/// ```
+pub fn mcnemar(first: usize, second: usize) -> f64 {
+    let n = (first + second) as u64;
+    if n == 0 {
+        return 1.0;
+    }
+    let coin = Binomial::new(0.5, n).expect("one half is a probability");
+    (2.0 * coin.cdf(first.min(second) as u64)).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_have_the_textbook_value() {
+        // R: binom.test(2, 12)$p.value
+        assert!((mcnemar(2, 10) - 0.038_574).abs() < 1e-6);
+        assert_eq!(mcnemar(2, 10), mcnemar(10, 2));
+        assert_eq!(mcnemar(4, 4), 1.0);
+    }
+}
