@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use seafix_component::{BuildError, Choice, Fault, line_of};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::{
     Axis, Pipeline, Place, Stages,
+    dataset::hex,
     pipeline::PipelineError,
     read_text,
     source::{SOURCES, Source},
@@ -42,6 +44,11 @@ impl Experiment {
             pipeline: Pipeline::default(),
             vary: Vec::new(),
         }
+    }
+
+    /// It as a file says it.
+    pub(crate) fn to_toml(&self) -> String {
+        toml::to_string(self).expect("an experiment is a table of plain values")
     }
 
     /// The same experiment with every default written out.
@@ -102,6 +109,12 @@ impl Unfit {
 }
 
 impl Plan {
+    /// What the run is called: the experiment's name, and a number that changes with any of its settings.
+    pub(crate) fn id(&self) -> String {
+        let settings: String = self.trials.iter().map(|trial| trial.resolved.to_toml()).collect();
+        format!("{}-{}", self.name, &hex(&Sha256::digest(settings))[..8])
+    }
+
     /// Reads an experiment file, or takes a data set's folder for an experiment of its own; then
     /// gives each of `settings`, `key=value` with a dotted key and a TOML value, the last word.
     ///
@@ -123,7 +136,8 @@ impl Plan {
         Self::resolve(changed(experiment, settings)?, &name, folder, path, &text, settings)
     }
 
-    fn resolve(
+    /// The plan of an experiment that `file`, whose text is `text`, holds; relative paths start from `folder`.
+    pub(crate) fn resolve(
         experiment: Experiment,
         name: &str,
         folder: &Path,
@@ -156,8 +170,10 @@ impl Plan {
                 let at = path.join(".");
                 let axis = experiment.vary.iter().position(|axis| axis.touches(&at));
                 let place = axis.map(|axis| axis.to_string());
-                let mut path: Vec<&str> = vec!["vary"];
-                path.extend(place.as_deref());
+                let path: Vec<&str> = match &place {
+                    Some(place) => vec!["vary", place],
+                    None => path.iter().map(String::as_str).collect(),
+                };
                 vec![fault(&path, &message)]
             };
             let mut table = base.clone();
@@ -178,6 +194,12 @@ impl Plan {
                 .pipeline
                 .build()
                 .map_err(|error| in_cell(error.message, &["pipeline".to_owned(), error.setting.to_owned()]))?;
+            if stages.needs_pixels() && !source.has_pixels() {
+                let (solver, source) = (&trial.pipeline.solver.name, &trial.source.name);
+                let what =
+                    format!("solver `{solver}` needs pixels, which source `{source}` has not; use `mahalanobis`");
+                return Err(in_cell(what, &["pipeline".to_owned(), "solver".to_owned()]));
+            }
             trials.push(Trial { name: vary::name(index + 1, &cell), cell, resolved: trial, source, stages });
         }
         let settings: String = settings.iter().map(|setting| format!(" --set '{setting}'")).collect();

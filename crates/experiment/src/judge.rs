@@ -8,7 +8,7 @@ use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform,
 use seafix_log::{Evaluation, FrameRecord, TruthRecord, VisiblePoint};
 use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
 
-use crate::{Sighting, source::Truth};
+use crate::{Sighting, exact, source::Truth};
 
 /// A pair is correct when its cloud point shows within this distance (px) of the true projections.
 const CORRECT_PX: f64 = 2.0;
@@ -54,6 +54,9 @@ pub(crate) fn judge(
             .collect(),
         visible: known.iter().flatten().flat_map(visible_points).collect(),
     });
+    if let Some(inputs) = &mut record.inputs {
+        inputs.truth = Some(exact::truth(truth, site));
+    }
     for (attempt, row) in sighting.attempts.iter().zip(record.targets.iter_mut()) {
         let Some(known) = &known[attempt.target] else { continue };
         let identified = row.evaluation.identified;
@@ -125,7 +128,11 @@ fn evaluate(
     let estimate = &fix.object_from_camera;
     let true_pose = known.world_from_object.inverse() * truth.world_from_camera;
     let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
-    let is_correct: Vec<bool> = fix.pairs.iter().map(|pair| correct(pair, known, sighting, rig)).collect();
+    let correct = |pair: &Correspondence| match &truth.answer {
+        Some(answer) => answer.pairs.contains(&(pair.model, pair.cloud)),
+        None => shows_the_point(pair, known, sighting, rig),
+    };
+    let is_correct: Vec<bool> = fix.pairs.iter().map(correct).collect();
     let of = |keep: &dyn Fn(usize) -> bool| -> Vec<(Point<Camera>, Point<Object>)> {
         let kept = fix.pairs.iter().enumerate().filter(|(index, _)| is_correct[*index] && keep(*index));
         kept.map(|(_, pair)| (sighting.cloud[pair.cloud].position.at, model[pair.model])).collect()
@@ -142,11 +149,14 @@ fn evaluate(
     row.m3_position = Some(position_error(estimate, &true_pose));
     row.m3_attitude = Some(attitude_error(estimate, &true_pose));
     row.nees = nees(estimate, &true_pose, &fix.covariance, &centroid);
-    row.wrong = row.m2_rms.map(|m2| !(m2 <= alert_limit(known.target.diameter())));
+    row.wrong = match &truth.answer {
+        Some(answer) => Some(!answer.rule.holds(estimate, &true_pose, &model)),
+        None => row.m2_rms.map(|m2| !(m2 <= alert_limit(known.target.diameter()))),
+    };
 }
 
 /// Whether the cloud point of `pair` shows where its model point truly is, in both images.
-fn correct(pair: &Correspondence, known: &TrueTarget<'_>, sighting: &Sighting, rig: &StereoRig) -> bool {
+fn shows_the_point(pair: &Correspondence, known: &TrueTarget<'_>, sighting: &Sighting, rig: &StereoRig) -> bool {
     let measured = &sighting.cloud[pair.cloud];
     let shown: Option<StereoPixels> =
         measured.pixels.map(|pixels| pixels.at).or_else(|| rig.project(&measured.position.at));

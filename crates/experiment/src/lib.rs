@@ -7,13 +7,16 @@
 
 pub mod dataset;
 mod diff;
+mod exact;
 mod experiment;
 mod joint;
 mod judge;
 mod manifest;
 mod pipeline;
 mod record;
+mod replay;
 mod results;
+mod ros;
 mod run;
 pub mod source;
 mod thin;
@@ -23,7 +26,8 @@ mod vary;
 pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
 pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
+pub use replay::{Replay, ReplayFrom};
 pub use results::COLUMNS;
-pub use run::{Finished, Observer, RunError, Silent, run};
+pub use run::{Existing, Finished, Observer, Options, RunError, Shard, Silent, merge, run};
 pub use seafix_component::read_text;
 pub use vary::{Axis, Case, Place, changed};

@@ -1,16 +1,26 @@
 //! `manifest.json`: what made a run.
 
-use std::{collections::BTreeMap, process::Command};
+use std::{collections::BTreeMap, io::Write, path::Path, process::Command, sync::OnceLock};
 
-use serde::Serialize;
+use seafix_component::{Fault, read_text};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Plan, Trial,
+    run::{Group, Options, RunError},
+};
+
+/// The format that this version writes.
+const FORMAT: &str = "seafix-manifest/1.1";
 
 /// What made a run: enough to make it again and to know whether it would be the same.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Manifest {
-    pub(crate) format: &'static str,
-    pub(crate) state: &'static str,
+    pub(crate) format: String,
+    /// `running` (or killed), `interrupted`, `finished`; of a part that is to be merged `shard`.
+    pub(crate) state: String,
     pub(crate) question: String,
-    pub(crate) seafix: &'static str,
+    pub(crate) seafix: String,
     pub(crate) git: Git,
     pub(crate) machine: Machine,
     pub(crate) threads: usize,
@@ -18,11 +28,28 @@ pub(crate) struct Manifest {
     pub(crate) experiment: String,
     pub(crate) trials: Vec<TrialEntry>,
     pub(crate) inputs: Vec<Input>,
+    /// SHA-256 of what was written; empty until the run is finished.
     pub(crate) outputs: BTreeMap<String, String>,
+    /// Whether durations are logged.
+    #[serde(default = "yes")]
+    pub(crate) timed: bool,
+    /// Into how many pieces the run is cut.
+    #[serde(default)]
+    pub(crate) pieces: usize,
+    /// Which part of the run this is, as `k/n`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) shard: Option<String>,
+    /// Rows of the tables, once they are there.
+    #[serde(default)]
+    pub(crate) rows: usize,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// One trial of the run.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct TrialEntry {
     pub(crate) name: String,
     pub(crate) log: String,
@@ -31,32 +58,133 @@ pub(crate) struct TrialEntry {
 }
 
 /// The inputs of one source.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Input {
     pub(crate) source: String,
+    /// What was odd about them, pairs left out among it.
+    #[serde(default)]
+    pub(crate) warnings: Vec<String>,
     pub(crate) files: BTreeMap<String, String>,
 }
 
 /// The state of the code, where it was run from a checkout.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Git {
     pub(crate) commit: Option<String>,
     pub(crate) dirty: Option<bool>,
 }
 
 /// The kind of machine: what times depend on.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Machine {
-    os: &'static str,
-    architecture: &'static str,
+    os: String,
+    architecture: String,
     cores: Option<usize>,
     optimised: bool,
 }
+
+impl Manifest {
+    /// What is to be run; nothing is written yet.
+    ///
+    /// # Errors
+    /// An input that cannot be read.
+    pub(crate) fn new(plan: &Plan, options: &Options, groups: &[Group<'_>], pieces: usize) -> Result<Self, Fault> {
+        let mut inputs = Vec::new();
+        for group in groups {
+            let files: BTreeMap<String, String> = group.passage.inputs()?.into_iter().collect();
+            let warnings = group.passage.warnings().iter().map(ToString::to_string).collect();
+            inputs.push(Input { source: group.passage.name().to_owned(), warnings, files });
+        }
+        let frames = |trial: &Trial| {
+            let group = groups.iter().find(|group| group.trials.iter().any(|other| other.name == trial.name));
+            group.map_or(0, |group| group.passage.frames())
+        };
+        let entry = |trial: &Trial| TrialEntry {
+            name: trial.name.clone(),
+            log: format!("{}.mcap", trial.name),
+            frames: frames(trial),
+            configuration: trial.resolved.to_toml(),
+        };
+        Ok(Self {
+            format: FORMAT.to_owned(),
+            state: String::new(),
+            question: plan.experiment.question.clone(),
+            seafix: env!("CARGO_PKG_VERSION").to_owned(),
+            git: Git::here(),
+            machine: Machine::here(),
+            threads: options.threads,
+            seeds: BTreeMap::from([("experiment".to_owned(), plan.experiment.seed)]),
+            experiment: plan.experiment.to_toml(),
+            trials: plan.trials.iter().map(entry).collect(),
+            inputs,
+            outputs: BTreeMap::new(),
+            timed: options.timed,
+            pieces,
+            shard: options.shard.map(|shard| shard.to_string()),
+            rows: 0,
+        })
+    }
+
+    /// The manifest of the run in `folder`.
+    ///
+    /// # Errors
+    /// A folder that has none, or one that this version cannot read.
+    pub(crate) fn read(folder: &Path) -> Result<Self, Fault> {
+        let file = folder.join(NAME);
+        let text = read_text(&file).map_err(|fault| fault.remedy("name the folder of a run"))?;
+        let manifest: Self = serde_json::from_str(&text)
+            .map_err(|error| Fault::new("a manifest that cannot be read", &file).on_line(error.line()).value(error))?;
+        if !manifest.format.starts_with("seafix-manifest/1") {
+            return Err(Fault::new("not a manifest of this version", &file).value(manifest.format).remedy(FORMAT));
+        }
+        Ok(manifest)
+    }
+
+    /// Writes it into `folder`, with a new state.
+    pub(crate) fn write(&mut self, folder: &Path, state: &str) -> Result<(), RunError> {
+        state.clone_into(&mut self.state);
+        let text = serde_json::to_string_pretty(self).expect("a manifest is plain data") + "\n";
+        let (file, partial) = (folder.join(NAME), folder.join(format!("{NAME}.partial")));
+        let write = || {
+            let mut file = std::fs::File::create(&partial)?;
+            file.write_all(text.as_bytes())?;
+            file.sync_all()
+        };
+        write().map_err(|error| RunError::unwritable(&partial, error))?;
+        std::fs::rename(&partial, &file).map_err(|error| RunError::unwritable(&file, error))
+    }
+
+    /// What keeps this run from being the same as another: which of the things that the answer depends on differs.
+    pub(crate) fn differs(&self, other: &Self) -> Option<&'static str> {
+        let trials = |manifest: &Self| -> Vec<(String, usize)> {
+            manifest.trials.iter().map(|trial| (trial.name.clone(), trial.frames)).collect()
+        };
+        let differing = [
+            ("the version of the program", self.seafix != other.seafix || self.format != other.format),
+            ("the commit of the program, or whether it has changes", self.git != other.git),
+            ("the experiment", self.experiment != other.experiment),
+            ("the trials", trials(self) != trials(other)),
+            ("the configuration of a trial", self.trials != other.trials),
+            ("the inputs", self.inputs != other.inputs),
+            ("whether durations are logged", self.timed != other.timed),
+            ("how the run is cut into pieces", self.pieces != other.pieces),
+        ];
+        differing.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
+    }
+}
+
+/// The name of its file.
+pub(crate) const NAME: &str = "manifest.json";
 
 impl Git {
     /// The checkout this program was built in, as it is now; nothing for a program that was carried
     /// elsewhere.
     pub(crate) fn here() -> Self {
+        static HERE: OnceLock<Git> = OnceLock::new();
+        HERE.get_or_init(Self::find).clone()
+    }
+
+    fn find() -> Self {
         let workspace = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
         let inside = std::env::current_exe().ok().zip(std::fs::canonicalize(workspace).ok());
         if !inside.is_some_and(|(program, workspace)| program.starts_with(workspace)) {
@@ -76,8 +204,8 @@ impl Git {
 impl Machine {
     pub(crate) fn here() -> Self {
         Self {
-            os: std::env::consts::OS,
-            architecture: std::env::consts::ARCH,
+            os: std::env::consts::OS.to_owned(),
+            architecture: std::env::consts::ARCH.to_owned(),
             cores: std::thread::available_parallelism().ok().map(usize::from),
             optimised: !cfg!(debug_assertions),
         }

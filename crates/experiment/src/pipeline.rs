@@ -8,7 +8,7 @@ use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
     Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind,
-    Tolerance, candidates, judge,
+    Tolerance, candidates, judge, problem_file::CoherenceProblem,
 };
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, Refine, Triangulator,
@@ -16,7 +16,7 @@ use seafix_vision::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    source::{Eyes, Sight},
+    source::{Eyes, Sight, Told},
     vary,
 };
 
@@ -219,6 +219,11 @@ pub struct Attempt {
 }
 
 impl Stages {
+    /// Whether its solver works on pixels, and on nothing else.
+    pub fn needs_pixels(&self) -> bool {
+        self.solver.needs_pixels()
+    }
+
     /// The settings it was built from.
     pub fn settings(&self) -> &Pipeline {
         &self.settings
@@ -234,10 +239,16 @@ impl Stages {
             .iter()
             .enumerate()
             .filter_map(|(index, target)| {
-                let world = sight.prior.as_ref();
-                let prior = world.and_then(|world| target.prior(&world.world_from_camera, &world.covariance));
-                let in_view = in_view(target, prior.as_ref(), rig)?;
-                let mut attempt = self.attempt(index, target, &cloud, sight, prior.as_ref(), &in_view, rig, rng);
+                let mut attempt = match &sight.told {
+                    Told::Problem(object, problem) if *object == index => self.answer(index, target, problem, rng),
+                    Told::Problem(..) => return None,
+                    told => {
+                        let world = sight.prior.as_ref();
+                        let prior = world.and_then(|world| target.prior(&world.world_from_camera, &world.covariance));
+                        let in_view = in_view(target, prior.as_ref(), rig)?;
+                        self.attempt(index, target, &cloud, told, prior.as_ref(), &in_view, rig, rng)
+                    }
+                };
                 attempt.times.total_ms = Some(common + milliseconds(attempt.started));
                 Some(attempt)
             })
@@ -270,7 +281,7 @@ impl Stages {
         index: usize,
         target: &Target,
         cloud: &[MeasuredPoint],
-        sight: &Sight,
+        told: &Told,
         prior: Option<&Prior>,
         in_view: &[bool],
         rig: &StereoRig,
@@ -278,14 +289,35 @@ impl Stages {
     ) -> Attempt {
         let started = Instant::now();
         let settings = &self.settings;
-        let (candidates, stage1) = timed(|| match &sight.names {
-            Some(names) => named(names, index, target),
-            None => candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)),
+        let (candidates, stage1) = timed(|| match told {
+            Told::Names(names) => named(names, index, target),
+            _ => candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)),
         });
         let tolerance = settings.tolerance;
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
         let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, &settings.acceptance, Some(rig)));
+        let times = TargetTimes {
+            candidates_ms: Some(stage1),
+            search_ms: Some(stage2),
+            solve_ms: Some(solution),
+            total_ms: None,
+        };
+        Attempt { target: index, candidates, answer, times, started }
+    }
+
+    /// The answer to a problem that states its own candidates, tolerance and rough pose.
+    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> Attempt {
+        let started = Instant::now();
+        let (listed, stage1) = timed(|| problem.candidates());
+        let (candidates, refused) = match listed {
+            Ok(candidates) => (candidates, None),
+            Err(refused) => (Candidates::from_pairs(target.points.len(), []), Some(refused)),
+        };
+        let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
+        let posed = Problem { model: &target.points, cloud: &problem.cloud, candidates: &candidates, tolerance, prior };
+        let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
+        let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
         let times = TargetTimes {
             candidates_ms: Some(stage1),
             search_ms: Some(stage2),

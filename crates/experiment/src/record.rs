@@ -1,7 +1,5 @@
 //! From what happened to what is logged.
 
-use std::path::Path;
-
 use nalgebra::{Matrix3, Matrix6};
 use seafix_component::Registry;
 use seafix_evaluation::alert_limit;
@@ -14,19 +12,19 @@ use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, Tar
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
 
 use crate::{
-    Attempt, Pipeline, Place, Plan, Sighting, Trial,
+    Attempt, Pipeline, Place, Plan, Sighting, Trial, exact,
     manifest::Git,
     source::{Eyes, Passage, Sight},
 };
 
 /// What is the same for every frame of `trial`.
-pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets: &[Target], run: &Path) -> TrialHeader {
+pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets: &[Target]) -> TrialHeader {
     let site = passage.site();
     let world_from_site = site.frame_object().world_from_object;
     let pipeline = trial.stages.settings();
     let prior = passage.prior_sigma();
     TrialHeader {
-        run: run.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+        run: plan.id(),
         trial: trial.name.clone(),
         title: plan.name.replace(['-', '_'], " "),
         question: plan.experiment.question.clone(),
@@ -72,13 +70,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
 }
 
 /// What one frame gave, without truth.
-pub(crate) fn frame(
-    index: usize,
-    sight: &Sight,
-    sighting: &Sighting,
-    trial: &Trial,
-    targets: &[Target],
-) -> FrameRecord {
+pub(crate) fn frame(number: u64, sight: &Sight, sighting: &Sighting, trial: &Trial, targets: &[Target]) -> FrameRecord {
     let pipeline = trial.stages.settings();
     let (search, solver) = (&pipeline.search.name, &pipeline.solver.name);
     let mut attempts: Vec<TargetRecord> =
@@ -88,7 +80,7 @@ pub(crate) fn frame(
         attempts.push(TargetRecord::not_attempted(search, solver, reason));
     }
     FrameRecord {
-        frame: index as u64,
+        frame: number,
         stamp_ns: sight.stamp_ns,
         images: match &sight.eyes {
             Eyes::Pair(left, right) => Some([grey(left), grey(right)]),
@@ -108,6 +100,7 @@ pub(crate) fn frame(
         truth: None,
         targets: attempts,
         times: sighting.times,
+        inputs: Some(Box::new(exact::inputs(sight, &sighting.cloud))),
     }
 }
 
@@ -190,6 +183,7 @@ fn rig(rig: &StereoRig) -> RigRecord {
         right: camera(rig.right()),
         right_from_left: rig.right_from_left().rows(),
         rectified: rig.is_rectified(),
+        right_from_left_rotation: Some(exact::pose(rig.right_from_left()).rotation),
     }
 }
 
@@ -222,6 +216,6 @@ fn rows3(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
     std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
 }
 
-fn rows6(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
+pub(crate) fn rows6(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
     std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
 }

@@ -10,17 +10,9 @@ pub(crate) struct Thinned {
 }
 
 impl Thinned {
-    /// Of `frames` frames of about `bytes` each, what a log of at most `most` bytes holds: all, or every k-th in half
-    /// of it and failures in the other half.
-    pub(crate) fn new(frames: usize, bytes: u64, most: u64) -> Self {
-        let (frames, fit) = (frames as u64, (most / bytes.max(1)).max(2));
-        let (every, failures) = if frames <= fit { (1, 0) } else { (frames.div_ceil(fit / 2), fit / 2) };
+    /// Logs frames whose number `every` divides, and so many failures besides.
+    pub(crate) fn new(every: u64, failures: u64) -> Self {
         Self { totals: Totals { every, ..Totals::default() }, failures }
-    }
-
-    /// How many frames at most are logged of so many.
-    pub(crate) fn most(&self, frames: usize) -> u64 {
-        (frames as u64).div_ceil(self.totals.every) + self.failures
     }
 
     /// Counts a frame; whether it is logged.
@@ -67,15 +59,14 @@ mod tests {
 
     #[test]
     fn few_frames_are_all_kept() {
-        let mut thinned = Thinned::new(5, 100, 1000);
+        let mut thinned = Thinned::new(1, 0);
         assert!((0..5).all(|number| thinned.keeps(&frame(number, number == 3))));
         assert_eq!((thinned.totals.frames, thinned.totals.wrong, thinned.totals.every), (5, 1, 1));
     }
 
     #[test]
     fn of_many_every_kth_is_kept_and_failures_within_the_budget() {
-        let mut thinned = Thinned::new(100, 100, 1000);
-        assert_eq!(thinned.most(100), 10);
+        let mut thinned = Thinned::new(20, 5);
         // Frames 0, 20, 40, 60, 80, and the first five of the wrong ones besides.
         let kept: Vec<u64> = (0..100).filter(|&number| thinned.keeps(&frame(number, number % 10 == 1))).collect();
         assert_eq!(kept, [0, 1, 11, 20, 21, 31, 40, 41, 60, 80]);

@@ -4,7 +4,7 @@
 
 use std::{fs, path::Path};
 
-use seafix_experiment::{Plan, Silent, run};
+use seafix_experiment::{Options, Plan, Silent, run};
 use seafix_log::{FrameRecord, FrameTimes, TargetTimes, TrialLog, read};
 use tempfile::TempDir;
 
@@ -19,7 +19,7 @@ fn logs(folder: &Path, experiment: &str, settings: &[&str], threads: usize) -> V
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let plan = Plan::read(&file, &settings).unwrap();
     let out = TempDir::new_in(folder).unwrap();
-    run(&plan, Some(out.path()), threads, &Silent).unwrap();
+    run(&plan, &Options { threads, ..Options::into(out.path()) }, &Silent).unwrap();
     plan.trials
         .iter()
         .map(|trial| {

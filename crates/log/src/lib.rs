@@ -28,10 +28,11 @@
 //! | `/metrics/evaluation` | `seafix.v1.Evaluation` | likewise: comparison with truth |
 //! | `/metrics/timing` | `seafix.v1.Timing` | one a frame |
 //! | `/metrics/totals` | `seafix.v1.Totals` | once, last: what all frames add up to, logged or not |
+//! | `/referencing/inputs` | `seafix.v1.Inputs` | one a frame: what the method was given, to the last bit |
 //! | `/referencing/frame` | `seafix.v1.Frame` | one a frame, its last: cloud, key points, prior, truth |
-//! | `/camera/left/image`, `right` | `foxglove.CompressedImage` | PNG, lossless; the only copy of the images |
-//! | `/camera/left/calibration`, `right` | `foxglove.CameraCalibration` | once |
-//! | `/camera/left/annotations`, `right` | `foxglove.ImageAnnotations` | key points, candidates, identified points |
+//! | `/camera/left/image`, `/camera/right/image` | `foxglove.CompressedImage` | PNG, lossless; the only copy of the images |
+//! | `/camera/left/calibration`, `/camera/right/calibration` | `foxglove.CameraCalibration` | once |
+//! | `/camera/left/annotations`, `/camera/right/annotations` | `foxglove.ImageAnnotations` | key points, candidates, identified points |
 //! | `/tf` | `foxglove.FrameTransforms` | the tree of frames |
 //! | `/cloud`, `/cloud/candidates`, `/cloud/identified` | `foxglove.PointCloud` | coloured by target |
 //! | `/model`, `/scene/model` | `foxglove.PointCloud`, `foxglove.SceneUpdate` | once: the feature points |
@@ -53,22 +54,29 @@
 mod check;
 mod convert;
 mod error;
+mod frames;
+mod join;
 mod png;
 mod proto;
 mod read;
 mod record;
+mod recording;
 mod recover;
 mod topic;
 mod view;
 mod write;
 
 pub use error::LogError;
+pub use frames::Frames;
+pub use join::join;
 pub use png::encode_png;
 pub use read::{Reader, TrialLog, read};
 pub use record::{
-    Alternative, Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, Matrix3,
-    Matrix4, Matrix6, ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord,
-    TargetTimes, Totals, TrialHeader, TruthRecord, VisiblePoint,
+    Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, Evaluation, ExactPose, FrameRecord,
+    FrameTimes, GreyImage, Inputs, Matrix3, Matrix4, Matrix6, ModelPoint, Outcome, Pair, PixelPair, PriorRecord,
+    ProblemRecord, RigRecord, SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState,
+    TruthRecord, VisiblePoint,
 };
+pub use recording::{Entry, Recording, Topic};
 pub use recover::{Recovered, recover};
 pub use write::Writer;

@@ -158,7 +158,7 @@ fn summary(path: &Path, size: u64) -> Option<Summary> {
 }
 
 /// The records of a chunk, all of them or none: nothing is taken before its check sum is verified.
-fn chunk(head: &[u8], body: &[u8], size: u64) -> Result<Vec<Record<'static>>, McapError> {
+pub(crate) fn chunk(head: &[u8], body: &[u8], size: u64) -> Result<Vec<Record<'static>>, McapError> {
     // Images are compressed already, so nothing honest grows more.
     let limit = usize::try_from(size.saturating_mul(4).saturating_add(32 << 20)).unwrap_or(usize::MAX);
     let mut reader = LinearReader::new_with_options(

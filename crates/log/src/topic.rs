@@ -10,6 +10,8 @@ use crate::proto;
 pub(crate) const HEADER: &str = "/run/header";
 /// The exact record of a frame; it closes the frame.
 pub(crate) const FRAME: &str = "/referencing/frame";
+/// What the method of a frame was given, to the last bit.
+pub(crate) const INPUTS: &str = "/referencing/inputs";
 /// What came of each attempt.
 pub(crate) const RESULT: &str = "/referencing/result";
 /// Which cloud points might be which points of the target.
@@ -61,7 +63,7 @@ macro_rules! own {
         }
     )*};
 }
-own!(TrialHeader, Frame, ReferencingResult, Candidates, Evaluation, Timing, Totals);
+own!(TrialHeader, Frame, Inputs, ReferencingResult, Candidates, Evaluation, Timing, Totals);
 
 macro_rules! well_known {
     ($($message:ident),*) => {$(
@@ -82,3 +84,27 @@ well_known!(
     SceneUpdate,
     PoseInFrame
 );
+
+/// A schema's name and its serialised `FileDescriptorSet`.
+pub(crate) type Schema = fn() -> (String, Cow<'static, [u8]>);
+
+/// The topics of which every frame has its own messages, with their schemas: what is copied when logs are joined.
+pub(crate) const OF_FRAMES: [(&str, Schema); 17] = [
+    (IMAGES[0], messages::CompressedImage::schema),
+    (IMAGES[1], messages::CompressedImage::schema),
+    (ANNOTATIONS[0], messages::ImageAnnotations::schema),
+    (ANNOTATIONS[1], messages::ImageAnnotations::schema),
+    (TF, messages::FrameTransforms::schema),
+    (POSE_ESTIMATE, messages::PoseInFrame::schema),
+    (POSE_TRUTH, messages::PoseInFrame::schema),
+    (POSE_PRIOR, messages::PoseInFrame::schema),
+    (CLOUD, messages::PointCloud::schema),
+    (CLOUD_CANDIDATES, messages::PointCloud::schema),
+    (CLOUD_IDENTIFIED, messages::PointCloud::schema),
+    (CANDIDATES, proto::Candidates::schema),
+    (RESULT, proto::ReferencingResult::schema),
+    (EVALUATION, proto::Evaluation::schema),
+    (TIMING, proto::Timing::schema),
+    (INPUTS, proto::Inputs::schema),
+    (FRAME, proto::Frame::schema),
+];

@@ -1,6 +1,7 @@
 //! Everything that is wrong with a data set, images included.
 
 use std::{
+    io::Read,
     ops::Add,
     path::{Path, PathBuf},
 };
@@ -83,8 +84,15 @@ pub(crate) fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
 
 /// The SHA-256 of a file in hexadecimal.
 pub(crate) fn sha256(path: &Path) -> Result<String, Fault> {
-    let bytes = std::fs::read(path).map_err(|error| Fault::new(format!("cannot read ({error})"), path))?;
-    Ok(hex(&Sha256::digest(bytes)))
+    let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), path);
+    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    let (mut hasher, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut buffer).map_err(unreadable)? {
+            0 => return Ok(hex(&hasher.finalize())),
+            read => hasher.update(&buffer[..read]),
+        }
+    }
 }
 
 /// Bytes in hexadecimal.

@@ -1,17 +1,25 @@
-//! `seafix-dataset/1`: a folder with stereo pairs, their rig, and what is known about them.
+//! Data sets: folders with stereo pairs, their rig, and what is known about them. Our own are `seafix-dataset/1`; those
+//! of EuRoC and KITTI are read as they are.
 
 mod check;
 mod describe;
 mod encoded;
+mod euroc;
 mod folder;
+mod foreign;
+mod kitti;
 mod open;
+mod pairing;
 mod picture;
 mod tables;
 pub mod tum;
 mod write;
 
 pub use check::{check, swapped_at_first, swapped_fault};
-pub(crate) use check::{hash_faults, input_hashes, sha256, swapped};
-pub use open::{Dataset, DatasetFrame, read_rig};
+pub(crate) use check::{hash_faults, hex, input_hashes, sha256, swapped};
+pub use kitti::Cameras;
+pub use open::{Dataset, DatasetFrame, is_one, read_rig};
+pub(crate) use pairing::{SAME_INSTANT_NS, left_out, pairs};
 pub use picture::{ImageLimits, read_image, write_png};
+pub(crate) use picture::{decode_image, image_of_samples};
 pub use write::write;

@@ -11,14 +11,17 @@ use seafix_referencing::Site;
 use seafix_vision::Image;
 
 use super::{
+    Cameras,
     describe::{Description, FORMATS},
+    euroc,
     folder::{inside, is_absent},
-    picture::{ImageLimits, read_image},
+    kitti,
+    picture::{ImageLimits, read_image, size_fault},
     tables, tum,
 };
 use crate::{read_text, source::CalibratedPort};
 
-/// A `seafix-dataset/1` folder whose description, tables and paths are in order. Its images are
+/// A data set whose description, tables and paths are in order. Its images are
 /// read frame by frame.
 #[derive(Debug)]
 pub struct Dataset {
@@ -69,12 +72,32 @@ pub struct DatasetFrame {
 }
 
 impl Dataset {
-    /// Reads the data set in `folder`.
+    /// Reads the data set in `folder`: a `seafix-dataset/1`, a folder of EuRoC, or a sequence of KITTI.
     ///
     /// # Errors
     /// Everything that is wrong with it, at once.
     pub fn open(folder: &Path) -> Result<Self, Vec<Fault>> {
         Self::read(folder, false)
+    }
+
+    /// Reads the KITTI sequence in `folder` with two of its cameras.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once.
+    pub(crate) fn open_kitti(folder: &Path, cameras: Cameras) -> Result<Self, Vec<Fault>> {
+        kitti::read(folder, cameras, false)
+    }
+
+    /// Reads the EuRoC data set in `folder`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once.
+    pub(crate) fn open_euroc(folder: &Path) -> Result<Self, Vec<Fault>> {
+        let Some(home) = euroc::home(folder) else {
+            let fault = Fault::new("a folder that is no data set of EuRoC", folder);
+            return Err(vec![fault.remedy("name the folder that has mav0/cam0")]);
+        };
+        euroc::read(folder, &home, false)
     }
 
     /// Reads what odometry may know of the data set in `folder`: the rig and the stereo pairs. Site, truth and prior are
@@ -91,6 +114,17 @@ impl Dataset {
         if !folder.is_dir() {
             return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
         }
+        if !file.exists() {
+            if let Some(home) = euroc::home(folder) {
+                return euroc::read(folder, &home, pairs_only);
+            }
+            if kitti::is_one(folder) {
+                return kitti::read(folder, Cameras::Any, pairs_only);
+            }
+            let fault = Fault::new("a folder that is no data set", folder);
+            let remedy = "it has neither a dataset.toml, nor EuRoC's mav0/cam0, nor KITTI's calib.txt and image_0";
+            return Err(vec![fault.remedy(remedy)]);
+        }
         let source = read_text(&file).map_err(|fault| vec![fault])?;
         let mut described: Description =
             toml::from_str(&source).map_err(|error| vec![Fault::in_toml(&file, &source, &error)])?;
@@ -100,6 +134,11 @@ impl Dataset {
         let (faults, warnings) = (Vec::new(), Vec::new());
         Reader { folder, file: &file, source: &source, described: &described, pairs_only, faults, warnings }.read()
     }
+}
+
+/// Whether `folder` holds a data set, ours or others'.
+pub fn is_one(folder: &Path) -> bool {
+    folder.join("dataset.toml").exists() || euroc::home(folder).is_some() || kitti::is_one(folder)
 }
 
 /// The rig that a data set's description, the file or its folder, has, and the depth of its images of
@@ -115,6 +154,12 @@ pub fn read_rig(path: &Path) -> Result<(StereoRig, u8), Fault> {
 }
 
 impl Dataset {
+    /// The same, its images held to other limits.
+    #[must_use]
+    pub(crate) fn within(self, limits: ImageLimits) -> Self {
+        Self { limits, ..self }
+    }
+
     /// The two images of `frame`.
     ///
     /// # Errors
@@ -122,6 +167,29 @@ impl Dataset {
     pub fn pair(&self, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
         let left = read_image(&frame.left, self.rig.left().size(), self.bits, self.limits)?;
         Ok((left, read_image(&frame.right, self.rig.right().size(), self.bits, self.limits)?))
+    }
+
+    /// Leaves out the pairs with an image of another size than its camera was calibrated for, as a set recorded in two
+    /// modes has them, and warns of them. If more than half of the pairs would go, all stay: then it is the
+    /// calibration that belongs elsewhere, and reading them says so.
+    pub fn leave_out_misfits(&mut self) {
+        let sizes = [self.rig.left().size(), self.rig.right().size()];
+        let faults: Vec<Option<Fault>> = self
+            .frames
+            .iter()
+            .map(|frame| {
+                [&frame.left, &frame.right].into_iter().zip(sizes).find_map(|(path, size)| size_fault(path, size))
+            })
+            .collect();
+        let (all, misfits) = (faults.len(), faults.iter().flatten().count());
+        let Some(first) = faults.iter().flatten().next().filter(|_| 2 * misfits <= all) else { return };
+        self.warnings.push(Fault {
+            what: format!("{misfits} of {all} pairs left out: {}", first.what),
+            remedy: "`strict = true` of the source refuses them".to_owned(),
+            ..first.clone()
+        });
+        let mut fits = faults.iter().map(Option::is_none);
+        self.frames.retain(|_| fits.next().unwrap_or(true));
     }
 }
 

@@ -45,11 +45,25 @@ pub fn read_image(path: &Path, expected: [u32; 2], bits: u8, limits: ImageLimits
         let remedy = format!("at most {} bytes are read; `max-bytes` allows more", limits.bytes);
         return Err(Fault::new("an image file too large", path).value(format!("{size} bytes")).remedy(remedy));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    let reader = || ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(unreadable);
+    decode_image(&std::fs::read(path).map_err(unreadable)?, path, expected, bits, limits)
+}
+
+/// The same of the bytes of such a file; faults name `path`.
+///
+/// # Errors
+/// As [`read_image`].
+pub(crate) fn decode_image(
+    bytes: &[u8],
+    path: &Path,
+    expected: [u32; 2],
+    bits: u8,
+    limits: ImageLimits,
+) -> Result<Image, Fault> {
+    let unreadable = |error| Fault::new(format!("cannot read ({error})"), path);
+    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(unreadable);
     let (width, height) = reader()?.into_dimensions().map_err(|error| damaged(path, &error))?;
     check_size(path, [width, height], expected, limits)?;
-    if let Some((what, remedy)) = objection(&bytes) {
+    if let Some((what, remedy)) = objection(bytes) {
         return Err(Fault::new(what, path).remedy(remedy));
     }
     let mut reader = reader()?;
@@ -61,6 +75,13 @@ pub fn read_image(path: &Path, expected: [u32; 2], bits: u8, limits: ImageLimits
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
 }
 
+/// The image of samples as a camera gave them, row by row: grey, or red, green and blue; `white` is the greatest.
+pub(crate) fn image_of_samples(samples: &[u16], [width, height]: [u32; 2], white: u16) -> Result<Image, Fault> {
+    let channels = samples.len() / (width as usize * height as usize).max(1);
+    let pixels = levels_of(samples, channels.max(1), white, 0)?;
+    Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), Path::new("")))
+}
+
 /// `expected` is the size that the calibration has.
 fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits: ImageLimits) -> Result<(), Fault> {
     if u64::from(width) * u64::from(height) > limits.pixels {
@@ -68,13 +89,22 @@ fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits
             .value(format!("{width}×{height}"))
             .remedy(format!("at most {} pixels are read; `max-pixels` allows more", limits.pixels)));
     }
-    let [w, h] = expected;
-    if (width, height) != (w, h) {
-        return Err(Fault::new("an image of another size than the calibration", path)
-            .value(format!("{width}×{height}, calibrated {w}×{h}"))
-            .remedy("give the images the rig was calibrated with, or correct `size`"));
+    if [width, height] != expected {
+        return Err(misfit(path, [width, height], expected));
     }
     Ok(())
+}
+
+fn misfit(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
+    Fault::new("an image of another size than the calibration", path)
+        .value(format!("{width}×{height}, calibrated {w}×{h}"))
+        .remedy("give the images the rig was calibrated with, or correct `size`")
+}
+
+/// The fault of an image whose header declares another size than `expected`; none where there is no header to read.
+pub(super) fn size_fault(path: &Path, expected: [u32; 2]) -> Option<Fault> {
+    let (width, height) = ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_dimensions().ok()?;
+    ([width, height] != expected).then(|| misfit(path, [width, height], expected))
 }
 
 /// Rec. 709's weights of red, green and blue, in ten thousandths.

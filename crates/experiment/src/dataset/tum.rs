@@ -108,8 +108,25 @@ pub fn at<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64) -> Option<Tra
         .map(|(_, pose)| *pose)
 }
 
+/// The pose at `stamp`: that within a millisecond of it, else between its neighbours, if they are no more than `most_gap`
+/// (ns) apart; the position in proportion to time, the attitude by the shortest turn.
+pub(crate) fn between<A: Frame, B: Frame>(
+    poses: &[Stamped<A, B>],
+    stamp: u64,
+    most_gap: u64,
+) -> Option<Transform<A, B>> {
+    let after = poses.partition_point(|(time, _)| *time < stamp);
+    at(poses, stamp).or_else(|| {
+        let ((t0, before), (t1, after)) = (poses.get(after.checked_sub(1)?)?, poses.get(after)?);
+        let share = (stamp - t0) as f64 / (t1 - t0) as f64;
+        let turn = before.rotation().try_slerp(&after.rotation(), share, 1e-9)?;
+        let place = before.translation().lerp(&after.translation(), share);
+        (t1 - t0 <= most_gap).then(|| Transform::new(turn, place))
+    })
+}
+
 /// Decimal seconds as nanoseconds, digit by digit: a float would lose them from 2004 on.
-fn nanoseconds(word: &str) -> Option<u64> {
+pub(super) fn nanoseconds(word: &str) -> Option<u64> {
     if word.contains(['e', 'E']) {
         let seconds: f64 = word.parse().ok()?;
         return (seconds.is_finite() && (0.0..1.8e10).contains(&seconds)).then(|| (seconds * 1e9).round() as u64);

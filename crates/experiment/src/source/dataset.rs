@@ -8,31 +8,39 @@ use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
-use super::{CalibratedPort, Eyes, Passage, Sight, Source, Truth, WorldPrior};
-use crate::dataset::{Dataset, ImageLimits, hash_faults, input_hashes, swapped};
+use super::{CalibratedPort, Eyes, Passage, Sight, Source, Told, Truth, WorldPrior};
+use crate::{
+    dataset::{Dataset, ImageLimits, hash_faults, input_hashes, swapped},
+    read_text,
+};
 
-/// Reads a `seafix-dataset/1` folder.
+/// Reads a `seafix-dataset/1` folder, one of EuRoC, or a sequence of KITTI.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DatasetSource {
     /// The folder; relative to the experiment file.
     pub path: String,
+    /// The file of a site to look for, instead of the data set's own; relative to the experiment file.
+    pub site: String,
     /// The most pixels that an image's header may declare.
     pub max_pixels: u64,
     /// The most memory that an image's decoder may take, and the largest image file (bytes).
     pub max_bytes: u64,
+    /// Whether one image of another size than the calibration refuses the whole set; otherwise its pair is left out
+    /// and counted, as long as at least half of the pairs stay.
+    pub strict: bool,
 }
 
 impl Default for DatasetSource {
     fn default() -> Self {
         let ImageLimits { pixels, bytes } = ImageLimits::default();
-        Self { path: String::new(), max_pixels: pixels, max_bytes: bytes }
+        Self { path: String::new(), site: String::new(), max_pixels: pixels, max_bytes: bytes, strict: false }
     }
 }
 
 impl Component for DatasetSource {
     const NAME: &'static str = "dataset";
-    const SUMMARY: &'static str = "stereo pairs from a seafix-dataset/1 folder";
+    const SUMMARY: &'static str = "stereo pairs from the folder of a data set, ours or others'";
     const SOURCE: &'static str = "docs/formats.md";
 
     fn check(&self) -> Result<(), String> {
@@ -46,14 +54,31 @@ impl Component for DatasetSource {
 
 impl Source for DatasetSource {
     fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
-        let path = folder.join(&self.path);
-        let mut dataset = Dataset::open(&path)?;
-        dataset.limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
+        let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
+        let mut dataset = Dataset::open(&folder.join(&self.path))?.within(limits);
+        if !self.strict {
+            dataset.leave_out_misfits();
+        }
+        Recorded::open(dataset, &self.site, folder)
+    }
+}
+
+/// A data set with a site.
+pub(super) struct Recorded {
+    dataset: Dataset,
+    site: Site,
+}
+
+impl Recorded {
+    /// The data set with the site in the file `site`, relative to `folder`, or its own.
+    pub(super) fn open(mut dataset: Dataset, site: &str, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        if !site.is_empty() {
+            let file = folder.join(site);
+            dataset.site = Some(Site::parse(&read_text(&file).map_err(|fault| vec![fault])?, &file)?);
+        }
         let Some(site) = dataset.site.clone() else {
-            return Err(vec![
-                Fault::new("no site", &path.join("dataset.toml"))
-                    .remedy("a fix needs a known object: add `site = \"site.toml\"`"),
-            ]);
+            let fault = Fault::new("no site", &dataset.folder);
+            return Err(vec![fault.remedy("a fix needs a known object: add `site = \"site.toml\"`")]);
         };
         // Every image is decoded once before anything is written: a damaged one shall not end a run midway.
         let mut faults: Vec<Fault> =
@@ -65,12 +90,6 @@ impl Source for DatasetSource {
         }
         if faults.is_empty() { Ok(Box::new(Recorded { dataset, site })) } else { Err(faults) }
     }
-}
-
-/// A data set with a site.
-struct Recorded {
-    dataset: Dataset,
-    site: Site,
 }
 
 impl Passage for Recorded {
@@ -120,7 +139,7 @@ impl Passage for Recorded {
         let frame = &self.dataset.frames[index];
         let (left, right) = self.dataset.pair(frame)?;
         let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes: Eyes::Pair(left, right), prior, names: None })
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes: Eyes::Pair(left, right), prior, told: Told::Nothing })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -144,6 +163,7 @@ impl Passage for Recorded {
             world_from_object,
             visible: self.dataset.has_visibility.then(|| frame.visible.iter().filter_map(index_of).collect()),
             bound: None,
+            answer: None,
         })
     }
 

@@ -9,7 +9,7 @@ use seafix_simulation::{CALIBRATION_RANGE, Mission, PlannedMission, optics::Port
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
-use super::{CalibratedPort, Eyes, Passage, Sight, Source, Truth, WorldPrior, readings};
+use super::{CalibratedPort, Eyes, Passage, Sight, Source, Told, Truth, WorldPrior, readings};
 
 /// A vehicle's dive over a site given as data, under lamps in water: rendered stereo pairs, or clouds of
 /// the same views with `as-points`.
@@ -98,7 +98,7 @@ impl Passage for Dived {
             Eyes::Points(instant.points())
         };
         let prior = instant.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
-        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior, names: None })
+        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior, told: Told::Nothing })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -109,6 +109,7 @@ impl Passage for Dived {
             world_from_object: self.mission.world_from_object().iter().copied().map(Some).collect(),
             visible: Some(truth.visible.iter().map(|seen| (seen.object, seen.point)).collect()),
             bound: None,
+            answer: None,
         })
     }
 

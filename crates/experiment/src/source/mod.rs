@@ -1,16 +1,26 @@
 //! Sources: where stereo pairs, or clouds, come from.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use seafix_component::{Fault, Registry, entry};
+use seafix_evaluation::Solved;
 use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
-use seafix_referencing::Site;
+use seafix_referencing::{Site, problem_file::CoherenceProblem};
 use seafix_simulation::optics::Port;
 use seafix_vision::Image;
 
 mod dataset;
 mod dive;
+mod drawn_problems;
+mod euroc;
+mod kitti;
+mod logged;
+mod mcap;
+mod problem_passage;
+mod problems;
 mod readings;
+mod recorded;
+mod topics;
 mod virtual_dive;
 mod virtual_images;
 mod virtual_layouts;
@@ -18,6 +28,13 @@ mod virtual_points;
 
 pub use dataset::DatasetSource;
 pub use dive::Dive;
+pub use drawn_problems::DrawnProblems;
+pub use euroc::Euroc;
+pub use kitti::Kitti;
+pub use mcap::{Mcap, Reading};
+
+pub use crate::{dataset::Cameras, ros::Views};
+pub use problems::Problems;
 pub use virtual_images::VirtualImages;
 pub use virtual_layouts::VirtualLayouts;
 pub use virtual_points::VirtualPoints;
@@ -31,9 +48,22 @@ pub struct Sight {
     pub eyes: Eyes,
     /// The rough pose, if one is known.
     pub prior: Option<WorldPrior>,
-    /// Which feature point each point of the cloud says it is, as (object, point) indices, where points come with
-    /// their names: nothing else is then a candidate. `None` where they do not.
-    pub names: Option<Vec<(usize, usize)>>,
+    /// What is told beside what the cameras gave.
+    pub told: Told,
+}
+
+/// What a method is told of one instant beside what the cameras gave and the rough pose in the world.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum Told {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// Which feature point each point of the cloud says it is, as (object, point) indices: nothing else is then a
+    /// candidate.
+    Names(Vec<(usize, usize)>),
+    /// An identification problem about the object of this index, its tolerance, candidates and rough pose included:
+    /// only that object is attempted, and the pipeline's `gate` and `tolerance` have no say.
+    Problem(usize, Arc<CoherenceProblem>),
 }
 
 /// What the cameras gave.
@@ -66,6 +96,17 @@ pub struct Truth {
     /// The Cramér–Rao bound on the pose relative to an object of the site, where it is known: the least covariance that
     /// any unbiased estimate could have.
     pub bound: Option<(usize, Covariance6<Object, Camera>)>,
+    /// The answer to an identification problem, where the frame is one.
+    pub answer: Option<TrueAnswer>,
+}
+
+/// The true answer to an identification problem, and by which rule a pose is right.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueAnswer {
+    /// The true pairs (model point, cloud point).
+    pub pairs: Vec<(usize, usize)>,
+    /// When a pose counts as found.
+    pub rule: Solved,
 }
 
 /// A port, and the distance at which the camera behind it was calibrated in the water.
@@ -91,6 +132,10 @@ pub trait Passage: Send + Sync {
     fn images(&self) -> bool;
     /// How many instants there are.
     fn frames(&self) -> usize;
+    /// The number of instant `index`: it seeds what a method draws, and names the frame in logs.
+    fn number(&self, index: usize) -> u64 {
+        index as u64
+    }
     /// Standard deviations of the prior, typical for the passage: position per world axis (m) and
     /// attitude per camera axis (rad).
     fn prior_sigma(&self) -> Option<(f64, f64)>;
@@ -136,10 +181,25 @@ pub trait Source: Send + Sync + std::fmt::Debug {
     /// # Errors
     /// Everything that is wrong with it, at once.
     fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>>;
+    /// Whether its points have pixels, which some solvers need.
+    fn has_pixels(&self) -> bool {
+        true
+    }
 }
 
 /// All sources.
 pub static SOURCES: Registry<dyn Source> = Registry::new(
     "source",
-    &[entry!(DatasetSource), entry!(Dive), entry!(VirtualImages), entry!(VirtualLayouts), entry!(VirtualPoints)],
+    &[
+        entry!(DatasetSource),
+        entry!(Dive),
+        entry!(DrawnProblems),
+        entry!(Euroc),
+        entry!(Kitti),
+        entry!(Mcap),
+        entry!(Problems),
+        entry!(VirtualImages),
+        entry!(VirtualLayouts),
+        entry!(VirtualPoints),
+    ],
 );

@@ -8,7 +8,7 @@ use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform};
 use seafix_referencing::Site;
 use seafix_simulation::{Dive, PlannedDive};
 
-use super::{Eyes, Passage, Sight, Truth, WorldPrior};
+use super::{Eyes, Passage, Sight, Told, Truth, WorldPrior};
 
 pub(super) fn open(dive: &Dive, seed: u64, images: bool) -> Result<Box<dyn Passage>, Vec<Fault>> {
     let dive =
@@ -75,7 +75,7 @@ impl Passage for Virtual {
             world_from_camera: frame.prior.world_from_camera,
             covariance: Covariance6::isotropic(frame.prior.attitude_sigma, frame.prior.position_sigma),
         };
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior: Some(prior), names: None })
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior: Some(prior), told: Told::Nothing })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -86,6 +86,7 @@ impl Passage for Virtual {
             world_from_object: self.dive.world_from_object().iter().copied().map(Some).collect(),
             visible: Some(truth.visible.iter().map(|seen| (seen.object, seen.point)).collect()),
             bound: None,
+            answer: None,
         })
     }
 

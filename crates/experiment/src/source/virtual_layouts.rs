@@ -10,7 +10,7 @@ use seafix_referencing::{ModelPoint, Site, SiteObject};
 use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
 use serde::{Deserialize, Serialize};
 
-use super::{Eyes, Passage, Sight, Source, Truth, WorldPrior};
+use super::{Eyes, Passage, Sight, Source, Told, Truth, WorldPrior};
 
 /// Many draws of many layouts, as clouds of noisy points: every layout is an object of one site, or several that share its
 /// points, a kilometre from the next, and frame k is draw k / `layouts` of layout k mod `layouts`.
@@ -228,9 +228,12 @@ impl Passage for Layouts {
         };
         // A draw that noise leaves untriangulable is a frame without points, and counts as one.
         let cloud = self.placed[layout].draw(draw).unwrap_or_default();
-        let names = self.settings.named.then(|| (0..cloud.len()).map(|point| self.name_of(layout, point)).collect());
+        let told = match self.settings.named {
+            true => Told::Names((0..cloud.len()).map(|point| self.name_of(layout, point)).collect()),
+            false => Told::Nothing,
+        };
         let eyes = Eyes::Points(cloud);
-        Ok(Sight { stamp_ns: index as u64 * 100_000_000, eyes, prior: Some(prior), names })
+        Ok(Sight { stamp_ns: index as u64 * 100_000_000, eyes, prior: Some(prior), told })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -240,6 +243,7 @@ impl Passage for Layouts {
             world_from_object: self.stand.iter().copied().map(Some).collect(),
             visible: Some((0..self.settings.points).map(|point| self.name_of(layout, point)).collect()),
             bound: self.bounds[layout].map(|bound| (layout, bound)),
+            answer: None,
         })
     }
 
@@ -283,7 +287,8 @@ mod tests {
         for index in 0..4 {
             let (sight, truth) = (passage.sight(index).unwrap(), passage.truth(index).unwrap());
             let Eyes::Points(cloud) = sight.eyes else { panic!("points") };
-            for (seen, (object, point)) in cloud.iter().zip(sight.names.unwrap()) {
+            let Told::Names(names) = sight.told else { panic!("named") };
+            for (seen, (object, point)) in cloud.iter().zip(names) {
                 let known = &passage.site().objects[object];
                 let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[object].unwrap();
                 assert!((camera_from_object * known.points[point].at).distance(&seen.position.at) < 1e-9);

@@ -176,6 +176,9 @@ pub struct Rig {
     /// Whether rows of the two images correspond.
     #[prost(bool, tag = "4")]
     pub rectified: bool,
+    /// The rotation of right_from_left without rounding: qx qy qz qw.
+    #[prost(double, repeated, tag = "5")]
+    pub right_from_left_rotation: ::prost::alloc::vec::Vec<f64>,
 }
 /// A pinhole camera with plumb_bob distortion.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -235,6 +238,130 @@ pub struct Version {
     pub name: ::prost::alloc::string::String,
     #[prost(string, tag = "2")]
     pub value: ::prost::alloc::string::String,
+}
+/// What a frame's method was given and its judge knew, to the last bit, beyond what Frame holds: enough to run another
+/// method on the same. Topic /referencing/inputs; absent from older logs.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Inputs {
+    #[prost(uint64, tag = "1")]
+    pub frame: u64,
+    #[prost(uint64, tag = "2")]
+    pub stamp_ns: u64,
+    #[prost(message, optional, tag = "3")]
+    pub prior: ::core::option::Option<RoughPose>,
+    /// For each point of the cloud with pixels, in order, the covariance of (u left, v left, u right, v right) (px2):
+    /// 4 x 4 numbers.
+    #[prost(double, repeated, tag = "4")]
+    pub pixel_covariances: ::prost::alloc::vec::Vec<f64>,
+    /// Whether every point of the cloud says which point of the site it is; then one a point.
+    #[prost(bool, tag = "5")]
+    pub named: bool,
+    #[prost(message, repeated, tag = "6")]
+    pub names: ::prost::alloc::vec::Vec<SitePoint>,
+    /// An identification problem that states its own candidates and tolerance.
+    #[prost(message, optional, tag = "7")]
+    pub problem: ::core::option::Option<Problem>,
+    #[prost(message, optional, tag = "8")]
+    pub truth: ::core::option::Option<TrueState>,
+    /// Whether the logged images are the method's to the last bit: true of images of 8 bits.
+    #[prost(bool, tag = "9")]
+    pub exact_images: bool,
+}
+/// A rigid motion without rounding: qx qy qz qw tx ty tz.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ExactPose {
+    #[prost(double, repeated, tag = "1")]
+    pub numbers: ::prost::alloc::vec::Vec<f64>,
+}
+/// The rough pose that a method may use.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct RoughPose {
+    #[prost(message, optional, tag = "1")]
+    pub world_from_camera: ::core::option::Option<ExactPose>,
+    /// 6 x 6, rotation first.
+    #[prost(double, repeated, tag = "2")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+}
+/// A point of the site by the indices of its object and of itself.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct SitePoint {
+    #[prost(uint32, tag = "1")]
+    pub object: u32,
+    #[prost(uint32, tag = "2")]
+    pub point: u32,
+}
+/// An identification problem about one object; its model is that object's points.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Problem {
+    #[prost(uint32, tag = "1")]
+    pub object: u32,
+    /// Distances that differ by no more agree (m).
+    #[prost(double, tag = "2")]
+    pub delta: f64,
+    #[prost(message, optional, tag = "3")]
+    pub object_from_camera: ::core::option::Option<ExactPose>,
+    /// Half-size of the shells about the rough pose (m).
+    #[prost(double, tag = "4")]
+    pub shell_half: f64,
+    /// Whether only some pairs are to be considered, and which: model, cloud.
+    #[prost(bool, tag = "5")]
+    pub is_putative: bool,
+    #[prost(message, repeated, tag = "6")]
+    pub putative: ::prost::alloc::vec::Vec<Match>,
+}
+/// A model point and a cloud point.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Match {
+    #[prost(uint32, tag = "1")]
+    pub model: u32,
+    #[prost(uint32, tag = "2")]
+    pub cloud: u32,
+}
+/// What the judge knew.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct TrueState {
+    #[prost(message, optional, tag = "1")]
+    pub world_from_camera: ::core::option::Option<ExactPose>,
+    /// Objects that are not where the survey has them.
+    #[prost(message, repeated, tag = "2")]
+    pub moved: ::prost::alloc::vec::Vec<TruePlace>,
+    /// Whether it is known which points both cameras see, and which.
+    #[prost(bool, tag = "3")]
+    pub is_visibility_known: bool,
+    #[prost(message, repeated, tag = "4")]
+    pub visible: ::prost::alloc::vec::Vec<SitePoint>,
+    #[prost(message, optional, tag = "5")]
+    pub bound: ::core::option::Option<Bound>,
+    #[prost(message, optional, tag = "6")]
+    pub answer: ::core::option::Option<TrueAnswer>,
+}
+/// Where an object truly stands; absent where nobody knows.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct TruePlace {
+    #[prost(uint32, tag = "1")]
+    pub object: u32,
+    #[prost(message, optional, tag = "2")]
+    pub world_from_object: ::core::option::Option<ExactPose>,
+}
+/// The Cramer-Rao bound on the pose relative to an object.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Bound {
+    #[prost(uint32, tag = "1")]
+    pub object: u32,
+    /// 6 x 6, rotation first.
+    #[prost(double, repeated, tag = "2")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+}
+/// The answer to an identification problem, and what the best fit could do.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct TrueAnswer {
+    #[prost(message, repeated, tag = "1")]
+    pub pairs: ::prost::alloc::vec::Vec<Match>,
+    /// Absent where the pairs determine no pose (m).
+    #[prost(double, optional, tag = "2")]
+    pub ideal_rms: ::core::option::Option<f64>,
+    #[prost(bool, tag = "3")]
+    pub is_putative: bool,
 }
 /// How an attempt compares with truth; fields are absent where truth or a pose is missing.
 /// Topic /metrics/evaluation.

@@ -6,9 +6,9 @@ mod source;
 use std::path::{Path, PathBuf};
 
 use crate::{FrameRecord, LogError, Totals, TrialHeader, convert, topic};
-use pending::Pending;
-pub(crate) use source::looks_like;
-use source::{Message, Source};
+pub(crate) use pending::Pending;
+use source::Source;
+pub(crate) use source::{Message, looks_like};
 
 /// A whole trial, as its log has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,6 +109,11 @@ impl Reader {
         &self.header
     }
 
+    /// The next message behind the header as it stands in the file; `None` at the end, when every check sum held.
+    pub(crate) fn next_message(&mut self) -> Result<Option<Message>, LogError> {
+        self.source.next_message()
+    }
+
     /// Whether a frame read so far has images in the log, decoded or not.
     pub fn has_images(&self) -> bool {
         self.seen_images
@@ -153,7 +158,7 @@ impl Iterator for Reader {
 }
 
 /// The error that `message` is not what its topic promises.
-fn foreign(path: &Path, message: &Message, what: &str) -> LogError {
+pub(crate) fn foreign(path: &Path, message: &Message, what: &str) -> LogError {
     let what = format!("message {} on {} at {} ns: {what}", message.sequence, message.topic, message.log_time);
     LogError::Foreign { path: path.to_owned(), what }
 }

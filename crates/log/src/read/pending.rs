@@ -9,13 +9,14 @@ use crate::{FrameRecord, GreyImage, LogError, convert, png, proto, topic};
 
 /// What has come of the frame that is being read.
 #[derive(Debug, Default)]
-pub(super) struct Pending {
+pub(crate) struct Pending {
     images: Vec<GreyImage>,
     skipped_images: usize,
     results: Vec<proto::ReferencingResult>,
     candidates: Vec<proto::Candidates>,
     evaluations: Vec<proto::Evaluation>,
     timing: Option<proto::Timing>,
+    inputs: Option<proto::Inputs>,
 }
 
 impl Pending {
@@ -24,10 +25,11 @@ impl Pending {
         self.images.len() + self.skipped_images + self.results.len() + self.candidates.len() + self.evaluations.len()
             == 0
             && self.timing.is_none()
+            && self.inputs.is_none()
     }
 
     /// Takes in one message; the whole frame, if it closes one.
-    pub(super) fn take(
+    pub(crate) fn take(
         &mut self,
         path: &Path,
         message: &Message,
@@ -46,6 +48,7 @@ impl Pending {
             topic::RESULT => self.results.push(message.decode(path, "ReferencingResult")?),
             topic::CANDIDATES => self.candidates.push(message.decode(path, "Candidates")?),
             topic::EVALUATION => self.evaluations.push(message.decode(path, "Evaluation")?),
+            topic::INPUTS => self.inputs = Some(message.decode(path, "Inputs")?),
             topic::TIMING => self.timing = Some(message.decode(path, "Timing")?),
             topic::FRAME => {
                 let frame = message.decode(path, "Frame")?;
@@ -74,6 +77,12 @@ impl Pending {
         let (times, target_times) = convert::target_times(&timing);
         let mut frame = convert::frame_record(closing).map_err(|error| error.0)?;
         frame.times = times;
+        if let Some(inputs) = self.inputs {
+            if inputs.frame != number {
+                return Err(format!("the inputs of frame {} stand in frame {number}", inputs.frame));
+            }
+            frame.inputs = Some(Box::new(convert::inputs_record(inputs).map_err(|error| error.0)?));
+        }
         frame.images = <[GreyImage; 2]>::try_from(self.images).ok();
         let attempts = self.results.into_iter().zip(self.candidates).zip(self.evaluations).zip(target_times);
         for (index, (((result, candidates), evaluation), times)) in (0..).zip(attempts) {

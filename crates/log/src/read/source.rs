@@ -19,23 +19,23 @@ use crate::{LogError, proto};
 
 /// A message as it stands in the file.
 #[derive(Debug)]
-pub(super) struct Message {
-    pub(super) topic: String,
-    pub(super) schema: String,
-    pub(super) encoding: String,
-    pub(super) sequence: u32,
-    pub(super) log_time: u64,
-    pub(super) data: Vec<u8>,
+pub(crate) struct Message {
+    pub(crate) topic: String,
+    pub(crate) schema: String,
+    pub(crate) encoding: String,
+    pub(crate) sequence: u32,
+    pub(crate) log_time: u64,
+    pub(crate) data: Vec<u8>,
 }
 
 impl Message {
     /// The content, which must be this project's own message `name`.
-    pub(super) fn decode<M: prost::Message + Default>(&self, path: &Path, name: &str) -> Result<M, LogError> {
+    pub(crate) fn decode<M: prost::Message + Default>(&self, path: &Path, name: &str) -> Result<M, LogError> {
         self.decode_as(path, &format!("{}.{name}", proto::PACKAGE))
     }
 
     /// The content, which must have this schema.
-    pub(super) fn decode_as<M: prost::Message + Default>(&self, path: &Path, schema: &str) -> Result<M, LogError> {
+    pub(crate) fn decode_as<M: prost::Message + Default>(&self, path: &Path, schema: &str) -> Result<M, LogError> {
         if self.encoding != "protobuf" || self.schema != schema {
             let what = format!(
                 "it is a `{}` in `{}`; this version reads `{schema}` in `protobuf`",

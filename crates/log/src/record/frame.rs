@@ -1,6 +1,6 @@
 //! What one stereo pair gave.
 
-use super::{Matrix3, Matrix4, TargetRecord};
+use super::{Inputs, Matrix3, Matrix4, TargetRecord};
 
 /// One frame: what was seen, what was known, and what came of every attempted target.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -24,6 +24,8 @@ pub struct FrameRecord {
     pub targets: Vec<TargetRecord>,
     /// Times of the stages that serve all targets.
     pub times: FrameTimes,
+    /// What the method was given, to the last bit; `None` in logs that are older than it.
+    pub inputs: Option<Box<Inputs>>,
 }
 
 /// An 8-bit grey image.

@@ -79,6 +79,8 @@ pub struct RigRecord {
     pub right: CameraRecord,
     /// The left camera's pose in the right one: `p_right = right_from_left · p_left`.
     pub right_from_left: Matrix4,
+    /// Its rotation without rounding, as a quaternion (x, y, z, w); `None` in logs that are older than it.
+    pub right_from_left_rotation: Option<[f64; 4]>,
     /// Whether rows of the two images correspond.
     pub rectified: bool,
 }

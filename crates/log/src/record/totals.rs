@@ -90,6 +90,31 @@ impl Totals {
         }
     }
 
+    /// Adds what other frames of the same trial add up to.
+    pub fn merge(&mut self, other: &Self) {
+        self.every = other.every;
+        self.failures_left_out += other.failures_left_out;
+        self.frames += other.frames;
+        self.referenced_frames += other.referenced_frames;
+        self.wrong_frames += other.wrong_frames;
+        self.attempted += other.attempted;
+        self.found += other.found;
+        self.wrong += other.wrong;
+        self.unjudged += other.unjudged;
+        for (reason, count) in &other.reasons {
+            *self.reasons.entry(reason.clone()).or_default() += count;
+        }
+        self.judged += other.judged;
+        self.m2_squares += other.m2_squares;
+        self.m3_squares += other.m3_squares;
+        self.bounded += other.bounded;
+        self.m2_bound_squares += other.m2_bound_squares;
+        self.m3_bound_squares += other.m3_bound_squares;
+        self.nees_sum += other.nees_sum;
+        self.nees_count += other.nees_count;
+        self.nees_within += other.nees_within;
+    }
+
     /// Attempts that gave no fix.
     pub fn refused(&self) -> u64 {
         self.reasons.values().sum()

@@ -8,7 +8,7 @@ use crate::{
     FrameRecord, LogError, Totals, TrialHeader, check, convert, png, topic,
     view::{self, Places},
 };
-use sink::Sink;
+use sink::{Sink, Use};
 
 /// Writes the log of one trial.
 ///
@@ -28,10 +28,28 @@ impl Writer {
     /// # Errors
     /// [`LogError`] when the file cannot be created or the header contradicts itself.
     pub fn create(path: &Path, header: &TrialHeader) -> Result<Self, LogError> {
+        Self::new(path, header, Use::Kept)
+    }
+
+    /// The same for a log of some of the trial's frames that [`join`](crate::join) shall take soon: it is not
+    /// compressed, and [`Writer::finish`] does not wait for the disk.
+    ///
+    /// # Errors
+    /// As [`Writer::create`].
+    pub fn piece(path: &Path, header: &TrialHeader) -> Result<Self, LogError> {
+        Self::new(path, header, Use::Joined)
+    }
+
+    fn new(path: &Path, header: &TrialHeader, purpose: Use) -> Result<Self, LogError> {
         let record = |what| LogError::Record { path: path.to_owned(), what };
         check::header(header).map_err(record)?;
         let places = Places::of(header).map_err(record)?;
-        Ok(Self { sink: Sink::create(path)?, header: header.clone(), places, last: None })
+        Ok(Self { sink: Sink::create(path, purpose)?, header: header.clone(), places, last: None })
+    }
+
+    /// The trial it writes of.
+    pub(crate) fn header(&self) -> &TrialHeader {
+        &self.header
     }
 
     /// Adds one frame; stamps must not decrease.
@@ -81,7 +99,24 @@ impl Writer {
             sink.put(topic::EVALUATION, stamp, &convert::evaluation_message(frame, index))?;
         }
         sink.put(topic::TIMING, stamp, &convert::timing_message(frame))?;
+        if let Some(inputs) = &frame.inputs {
+            sink.put(topic::INPUTS, stamp, &convert::inputs_message(frame, inputs))?;
+        }
         sink.put(topic::FRAME, stamp, &convert::frame_message(frame))
+    }
+
+    /// Adds a message of a frame as another log of the same trial has it; topics that no frame has are left out.
+    pub(crate) fn copy(&mut self, topic: &str, stamp: u64, message: &[u8]) -> Result<(), LogError> {
+        let Some(&(topic, schema)) = topic::OF_FRAMES.iter().find(|(name, _)| *name == topic) else { return Ok(()) };
+        if let Some(last) = self.last.filter(|last| stamp < *last) {
+            let what = format!("stamp {stamp} ns follows {last} ns; stamps must not decrease");
+            return Err(LogError::Record { path: self.sink.path().to_owned(), what });
+        }
+        if self.last.is_none() {
+            self.begin(stamp)?;
+        }
+        self.last = Some(stamp);
+        self.sink.put_bytes(topic, schema, stamp, message)
     }
 
     /// Adds what all frames of the trial add up to, those that were not logged included; after the last frame.

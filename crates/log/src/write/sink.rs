@@ -14,13 +14,26 @@ use mcap::{
     records::{MessageHeader, Metadata},
 };
 
-use crate::{LogError, topic::Logged};
+use crate::{
+    LogError,
+    topic::{Logged, Schema},
+};
+
+/// What becomes of a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Use {
+    /// It is kept: compressed, and put on the disk before it gets its name.
+    Kept,
+    /// It is joined with others soon: neither.
+    Joined,
+}
 
 /// An MCAP file that is renamed from `.partial` when it is complete.
 pub(super) struct Sink {
     mcap: mcap::Writer<BufWriter<File>>,
     path: PathBuf,
     partial: PathBuf,
+    purpose: Use,
     /// Identity of each topic's channel, and how many messages it has.
     channels: BTreeMap<&'static str, (u16, u32)>,
 }
@@ -32,7 +45,7 @@ impl fmt::Debug for Sink {
 }
 
 impl Sink {
-    pub(super) fn create(path: &Path) -> Result<Self, LogError> {
+    pub(super) fn create(path: &Path, purpose: Use) -> Result<Self, LogError> {
         let mut partial = OsString::from(path);
         partial.push(".partial");
         let partial = PathBuf::from(partial);
@@ -42,13 +55,18 @@ impl Sink {
             source,
             remedy: "choose another folder with --out",
         })?;
+        let compression = match purpose {
+            Use::Kept => Some(mcap::Compression::Zstd),
+            Use::Joined => None,
+        };
         let mcap = WriteOptions::new()
+            .compression(compression)
             .library(concat!("seafix-log/", env!("CARGO_PKG_VERSION")))
             // The library's default depends on the machine's number of processors, and so do the bytes.
             .compression_threads(0)
             .create(BufWriter::new(file))
             .map_err(|error| write_error(&partial, error))?;
-        Ok(Self { mcap, path: path.to_owned(), partial, channels: BTreeMap::new() })
+        Ok(Self { mcap, path: path.to_owned(), partial, purpose, channels: BTreeMap::new() })
     }
 
     /// The name the complete file will have.
@@ -58,19 +76,28 @@ impl Sink {
 
     /// Writes one message; its topic's channel is made by the first.
     pub(super) fn put<M: Logged>(&mut self, topic: &'static str, stamp: u64, message: &M) -> Result<(), LogError> {
+        self.put_bytes(topic, M::schema, stamp, &message.encode_to_vec())
+    }
+
+    /// Writes one message that is encoded already.
+    pub(super) fn put_bytes(
+        &mut self,
+        topic: &'static str,
+        schema: Schema,
+        stamp: u64,
+        message: &[u8],
+    ) -> Result<(), LogError> {
         let (channel_id, sequence) = match self.channels.get(topic) {
             Some(channel) => *channel,
-            None => (self.channel::<M>(topic).map_err(|error| write_error(&self.partial, error))?, 0),
+            None => (self.channel(topic, schema).map_err(|error| write_error(&self.partial, error))?, 0),
         };
         self.channels.insert(topic, (channel_id, sequence.wrapping_add(1)));
         let header = MessageHeader { channel_id, sequence, log_time: stamp, publish_time: stamp };
-        self.mcap
-            .write_to_known_channel(&header, &message.encode_to_vec())
-            .map_err(|error| write_error(&self.partial, error))
+        self.mcap.write_to_known_channel(&header, message).map_err(|error| write_error(&self.partial, error))
     }
 
-    fn channel<M: Logged>(&mut self, topic: &str) -> Result<u16, McapError> {
-        let (name, descriptors) = M::schema();
+    fn channel(&mut self, topic: &str, schema: Schema) -> Result<u16, McapError> {
+        let (name, descriptors) = schema();
         let schema = self.mcap.add_schema(&name, "protobuf", &descriptors)?;
         self.mcap.add_channel(schema, topic, "protobuf", &BTreeMap::new())
     }
@@ -98,7 +125,7 @@ impl Sink {
 
     /// Index and check sums, onto the disk, renamed.
     pub(super) fn finish(self) -> Result<(), LogError> {
-        let Self { mut mcap, path, partial, .. } = self;
+        let Self { mut mcap, path, partial, purpose, .. } = self;
         let io = |doing| {
             let path = partial.clone();
             move |source| LogError::Io { doing, path, source, remedy: "the log so far is in that file" }
@@ -106,6 +133,9 @@ impl Sink {
         mcap.finish().map_err(|error| write_error(&partial, error))?;
         let mut buffer = mcap.into_inner();
         buffer.flush().map_err(io("write"))?;
+        if purpose == Use::Joined {
+            return std::fs::rename(&partial, &path).map_err(io("rename"));
+        }
         buffer.get_ref().sync_all().map_err(io("put on the disk"))?;
         drop(buffer);
         std::fs::rename(&partial, &path).map_err(io("rename"))?;

@@ -50,7 +50,13 @@ pub(crate) fn header() -> TrialHeader {
         configuration: "question = 'why'\n".to_owned(),
         site: "format = 'seafix-site/1'\n".to_owned(),
         source: "made up".to_owned(),
-        rig: RigRecord { left: camera.clone(), right: camera, right_from_left: at(-0.25, 0.0, 0.0), rectified: true },
+        rig: RigRecord {
+            left: camera.clone(),
+            right: camera,
+            right_from_left: at(-0.25, 0.0, 0.0),
+            rectified: true,
+            right_from_left_rotation: Some([0.1, 0.2, -0.3, 0.9273618495495704]),
+        },
         body_from_camera: [[0.0, 0.0, 1.0, 0.1], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
         world_from_site: Some(at(10.0, 20.0, 30.0)),
         targets: vec![target("A", 0.0), target("B", 2.0), target("nowhere", 4.0)],
@@ -138,6 +144,36 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
             refine_ms: Some(2.5),
             triangulate_ms: Some(1.0),
         },
+        inputs: (number % 4 != 3).then(|| Box::new(inputs(number))),
+    }
+}
+
+/// What the method of frame `number` was given: in turn with and without everything that may be missing.
+fn inputs(number: u64) -> Inputs {
+    let odd = number % 2 == 1;
+    let x = number as f64 * 0.1;
+    let pose = ExactPose { rotation: [0.1, 0.2, -0.3, 0.9273618495495704], translation: [x, 1.0 / 3.0, -2.0] };
+    let covariance =
+        std::array::from_fn(|r| std::array::from_fn(|c| if r == c { 0.01 } else { 1e-4 * (r + c) as f64 }));
+    let pixels = std::array::from_fn(|r| std::array::from_fn(|c| if r == c { 0.1 } else { 0.01 * (r + c) as f64 }));
+    Inputs {
+        prior: odd.then_some((pose, covariance)),
+        pixel_covariances: vec![pixels; number as usize],
+        names: odd.then(|| vec![SitePoint { object: 1, point: 2 }]),
+        problem: (!odd).then(|| ProblemRecord {
+            object: 1,
+            delta: 0.04,
+            prior: (number > 0).then_some((pose, 0.5)),
+            putative: (number > 1).then(|| vec![[0, 3], [1, 4]]),
+        }),
+        truth: Some(TrueState {
+            world_from_camera: pose,
+            moved: vec![(0, Some(pose)), (2, None)],
+            visible: odd.then(Vec::new),
+            bound: odd.then_some((1, covariance)),
+            answer: (!odd).then(|| AnswerRecord { pairs: vec![[0, 3]], ideal_rms: Some(0.002), is_putative: odd }),
+        }),
+        exact_images: odd,
     }
 }
 

@@ -92,7 +92,7 @@ impl Default for Stereo {
         let deep = 1e4;
         Self {
             filters: Vec::new(),
-            detector: Choice::named("harris").with("features", 1000),
+            detector: Choice::named("harris").with("sigma", 2.0).with("features", 1000),
             locator: Choice::named("peak"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band").with("max-depth", deep),

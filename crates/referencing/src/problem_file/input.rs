@@ -146,12 +146,21 @@ impl CoherenceProblem {
         })
     }
 
-    /// Stage 1: which cloud points may be which model points; `None` when there are too many to list.
-    pub fn candidates(&self) -> Option<Candidates> {
+    /// Stage 1: which cloud points may be which model points.
+    ///
+    /// # Errors
+    /// There are too many to list.
+    pub fn candidates(&self) -> Result<Candidates, Unidentified> {
+        let (n, m) = (self.model.len(), self.cloud.len());
         match &self.putative {
-            Some(pairs) => Some(Candidates::from_pairs(self.model.len(), pairs.iter().copied())),
-            None if self.model.len().saturating_mul(self.cloud.len()) > MOST_CANDIDATES && self.prior.is_none() => None,
-            None => Some(candidates(&self.model, &self.cloud, self.prior.as_ref(), &Gate::default(), None)),
+            Some(pairs) => Ok(Candidates::from_pairs(n, pairs.iter().copied())),
+            None if n.saturating_mul(m) > MOST_CANDIDATES && self.prior.is_none() => Err(Unidentified::TooLarge {
+                size: n.saturating_mul(m),
+                what: "candidate pairs",
+                most: MOST_CANDIDATES,
+                bound: n.min(m),
+            }),
+            None => Ok(candidates(&self.model, &self.cloud, self.prior.as_ref(), &Gate::default(), None)),
         }
     }
 
@@ -163,11 +172,9 @@ impl CoherenceProblem {
         acceptance: &Acceptance,
         rng: &mut dyn Rng,
     ) -> Attempt {
-        let Some(candidates) = self.candidates() else {
-            let (size, bound) =
-                (self.model.len().saturating_mul(self.cloud.len()), self.model.len().min(self.cloud.len()));
-            let what = "candidate pairs";
-            return Attempt::without(Unidentified::TooLarge { size, what, most: MOST_CANDIDATES, bound });
+        let candidates = match self.candidates() {
+            Ok(candidates) => candidates,
+            Err(refused) => return Attempt::without(refused),
         };
         let problem = Problem {
             model: &self.model,

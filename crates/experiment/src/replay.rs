@@ -1,0 +1,107 @@
+//! Running a method on the logged inputs of another run.
+
+use std::path::Path;
+
+use seafix_component::{Choice, Fault};
+use seafix_log::Reader;
+
+use crate::{Axis, Experiment, Pipeline, Plan, vary};
+
+/// Which of a log's frames a replay starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReplayFrom {
+    /// The clouds, unless a stage before the search is another than the logged one.
+    #[default]
+    Suited,
+    /// The clouds: the same for every search and solver, and no image needed.
+    Clouds,
+    /// The images.
+    Images,
+}
+
+/// What is changed of a logged trial when its inputs are run again.
+#[derive(Debug, Clone, Default)]
+pub struct Replay {
+    /// Searches, by name; the logged one if there is none, several make a trial each.
+    pub searches: Vec<String>,
+    /// Solvers, likewise.
+    pub solvers: Vec<String>,
+    /// Further settings, `key=value`: `pipeline.acceptance.confidence=0.999`.
+    pub settings: Vec<String>,
+    /// Images or clouds.
+    pub from: ReplayFrom,
+}
+
+impl Replay {
+    /// The plan that runs the trial logged in `log` again, changed so. Unchanged, it has the trial's own name and gives
+    /// its own results.
+    ///
+    /// # Errors
+    /// A log that cannot be read, or a setting that cannot be.
+    pub fn plan(&self, log: &Path) -> Result<Plan, Vec<Fault>> {
+        let fault = |what: &str| vec![Fault::new(what, log)];
+        let reader = Reader::open(log).map_err(|error| fault(&error.to_string()))?;
+        let header = reader.header().clone();
+        let logged: Experiment = toml::from_str(&header.configuration)
+            .map_err(|error| fault(&format!("its configuration is not this version's ({})", error.message())))?;
+        let mut changed: Experiment = vary::changed(&logged, &self.settings, "pipeline.acceptance.confidence=0.999")?;
+        if changed.source != logged.source || changed.seed != logged.seed {
+            let fault = Fault::new("a change of what was logged", Path::new("--set"));
+            return Err(vec![fault.remedy("change the pipeline; to change source or seed, run the experiment again")]);
+        }
+        let own = |names: &[String], key: &str| {
+            let values = names.iter().map(|name| toml::Value::from(name.as_str())).collect();
+            (names.len() > 1).then(|| Axis { key: key.to_owned(), values, cases: Vec::new() })
+        };
+        for (names, choice) in
+            [(&self.searches, &mut changed.pipeline.search), (&self.solvers, &mut changed.pipeline.solver)]
+        {
+            // The logged component keeps its logged settings.
+            if let [name] = &names[..]
+                && *name != choice.name
+            {
+                *choice = Choice::named(name);
+            }
+        }
+        let clouds = match self.from {
+            ReplayFrom::Clouds => true,
+            ReplayFrom::Images => false,
+            ReplayFrom::Suited => same_eyes(&logged.pipeline, &changed.pipeline),
+        };
+        let read = if clouds { "clouds" } else { "images" };
+        let file = log.canonicalize().unwrap_or_else(|_| log.to_owned());
+        let source = Choice::named("mcap").with("path", file.to_string_lossy().into_owned()).with("read", read);
+        let vary = [own(&self.searches, "pipeline.search"), own(&self.solvers, "pipeline.solver")];
+        let replayed = Experiment { source, vary: vary.into_iter().flatten().collect(), ..changed };
+        let name = format!("replay-{}", header.trial);
+        let mut plan = Plan::resolve(replayed, &name, Path::new(""), log, "", &[])?;
+        plan.command = self.command(log);
+        if let [trial] = &mut plan.trials[..] {
+            trial.name.clone_from(&header.trial);
+        }
+        Ok(plan)
+    }
+
+    fn command(&self, log: &Path) -> String {
+        let mut command = format!("cargo run --release -- replay {}", log.display());
+        self.searches.iter().for_each(|name| command += &format!(" --search {name}"));
+        self.solvers.iter().for_each(|name| command += &format!(" --solver {name}"));
+        self.settings.iter().for_each(|setting| command += &format!(" --set '{setting}'"));
+        command
+    }
+}
+
+/// Whether all stages before the candidates are the same.
+fn same_eyes(a: &Pipeline, b: &Pipeline) -> bool {
+    let eyes = |p: &Pipeline| Pipeline {
+        target: Default::default(),
+        window: 1,
+        gate: Default::default(),
+        tolerance: seafix_referencing::Tolerance::Sigmas(1.0),
+        search: Choice::named(""),
+        solver: Choice::named(""),
+        acceptance: Default::default(),
+        ..p.clone()
+    };
+    eyes(a) == eyes(b)
+}

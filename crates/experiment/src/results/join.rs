@@ -1,0 +1,153 @@
+//! One table of the tables of its pieces.
+
+use std::{
+    fs::File,
+    io::{self, BufWriter, Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+use parquet::{
+    column::writer::ColumnCloseResult,
+    errors::ParquetError,
+    file::{
+        reader::{FileReader, SerializedFileReader},
+        writer::SerializedFileWriter,
+    },
+};
+
+use super::table::{self, ROW_GROUP, Table};
+
+/// The rows of one trial in the tables of one piece.
+#[derive(Debug, Clone)]
+pub(crate) struct Stretch {
+    /// The piece's table as CSV, without a head.
+    pub(crate) csv: PathBuf,
+    /// Where the rows begin in it, and how long they are (bytes).
+    pub(crate) text: (u64, u64),
+    /// The piece's table as Parquet.
+    pub(crate) parquet: PathBuf,
+    /// The first of their row groups in it, and how many.
+    pub(crate) groups: (usize, usize),
+    /// How many there are.
+    pub(crate) rows: usize,
+}
+
+/// Writes the rows of all stretches, in order, below one head.
+pub(crate) fn join_csv(stretches: &[Stretch], to: &Path) -> io::Result<()> {
+    let mut all = BufWriter::with_capacity(1 << 18, File::create(to)?);
+    all.write_all(Table::head().as_bytes())?;
+    for Stretch { csv, text: (start, length), .. } in stretches {
+        let mut piece = File::open(csv)?;
+        piece.seek(SeekFrom::Start(*start))?;
+        let copied = io::copy(&mut piece.take(*length), &mut all)?;
+        if copied < *length {
+            return Err(io::Error::other(format!("{} ends {} bytes early", csv.display(), length - copied)));
+        }
+    }
+    all.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+}
+
+/// Writes the rows of all stretches, in order. Row groups that are full are copied as they are; smaller ones are
+/// collected, so that a table of many small pieces has few row groups.
+pub(crate) fn join_parquet(stretches: &[Stretch], to: &Path) -> Result<(), ParquetError> {
+    let mut all = table::create(to)?;
+    let mut waiting = Table::default();
+    for Stretch { parquet, groups: (first, count), .. } in stretches {
+        let file = File::open(parquet)?;
+        let read = SerializedFileReader::new(file.try_clone()?)?;
+        for group in *first..first + count {
+            if waiting.rows == 0 && read.metadata().row_group(group).num_rows() as usize >= ROW_GROUP {
+                copy(&mut all, &file, &read, group)?;
+                continue;
+            }
+            waiting.read(&*read.get_row_group(group)?)?;
+            waiting.write(&mut all, false)?;
+        }
+    }
+    waiting.write(&mut all, true)?;
+    // Writes the footer and gives the file back.
+    all.into_inner()?.sync_all()?;
+    Ok(())
+}
+
+/// Copies a row group of another table of the same columns as it is.
+fn copy(
+    all: &mut SerializedFileWriter<File>,
+    file: &File,
+    read: &SerializedFileReader<File>,
+    group: usize,
+) -> Result<(), ParquetError> {
+    let group = read.metadata().row_group(group);
+    let mut copy = all.next_row_group()?;
+    for column in group.columns() {
+        let closed = ColumnCloseResult {
+            bytes_written: column.compressed_size() as u64,
+            rows_written: group.num_rows() as u64,
+            metadata: column.clone(),
+            bloom_filter: None,
+            column_index: None,
+            offset_index: None,
+        };
+        copy.append_column(file, closed)?;
+    }
+    copy.close()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::Row;
+    use parquet::record::Field;
+    use seafix_log::{FrameRecord, TargetRecord};
+    use std::fs;
+
+    fn frame(number: u64, object: &str) -> FrameRecord {
+        let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "chance");
+        target.evaluation.visible = (!number.is_multiple_of(3)).then_some(4);
+        target.residual_rms = Some(number as f64 / 7.0);
+        FrameRecord { frame: number, stamp_ns: 7, targets: vec![target], ..Default::default() }
+    }
+
+    /// The tables of one piece.
+    fn piece(folder: &Path, frames: std::ops::Range<u64>) -> Stretch {
+        let at = |ending: &str| folder.join(format!("{}.{ending}", frames.start));
+        let (csv, parquet) = (at("csv"), at("parquet"));
+        let rows = (frames.end - frames.start) as usize;
+        let mut table = Table::default();
+        frames.clone().for_each(|k| Row::of("001", &frame(k, "a")).for_each(|row| table.add(&row)));
+        fs::write(&csv, &table.text).unwrap();
+        let text = (0, table.text.len() as u64);
+        let mut file = table::create(&parquet).unwrap();
+        let groups = (0, table.write(&mut file, true).unwrap());
+        file.close().unwrap();
+        Stretch { csv, text, parquet, groups, rows }
+    }
+
+    #[test]
+    fn a_joined_table_has_the_rows_of_its_pieces_in_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        // Small pieces, one with two row groups of which the first is full, and a small one again.
+        let cuts = [0, 5, 9, 9 + 8192 + 100, 9 + 2 * 8192 + 100, 9 + 2 * 8192 + 107];
+        let pieces: Vec<Stretch> = cuts.windows(2).map(|cut| piece(folder.path(), cut[0]..cut[1])).collect();
+        join_csv(&pieces, &at("results.csv")).unwrap();
+        join_parquet(&pieces, &at("results.parquet")).unwrap();
+        let whole = piece(folder.path(), 0..cuts[5]);
+        let text = fs::read_to_string(&whole.csv).unwrap();
+        assert_eq!(fs::read_to_string(at("results.csv")).unwrap(), Table::head() + &text);
+        let reader = SerializedFileReader::new(File::open(at("results.parquet")).unwrap()).unwrap();
+        assert!(reader.num_row_groups() <= 4, "{} row groups", reader.num_row_groups());
+        let mut count = 0;
+        for row in reader.get_row_iter(None).unwrap() {
+            let row = row.unwrap();
+            let field = |name: &str| row.get_column_iter().find(|(column, _)| *column == name).unwrap().1.clone();
+            assert_eq!(field("frame"), Field::Long(count));
+            assert_eq!(field("object"), Field::Str("a".into()));
+            assert_eq!(field("visible"), if count % 3 > 0 { Field::Long(4) } else { Field::Null });
+            assert_eq!(field("residual_rms"), Field::Double(count as f64 / 7.0));
+            count += 1;
+        }
+        assert_eq!(count as u64, cuts[5]);
+    }
+}

@@ -1,0 +1,233 @@
+//! Rows in memory, column by column, on their way into files.
+
+use std::{fs::File, path::Path, sync::Arc};
+
+use parquet::{
+    basic::{Compression, ZstdLevel},
+    column::{reader::ColumnReader, writer::ColumnWriter},
+    data_type::ByteArray,
+    errors::ParquetError,
+    file::{properties::WriterProperties, reader::RowGroupReader, writer::SerializedFileWriter},
+    schema::parser::parse_message_type,
+};
+
+use super::{
+    COLUMNS, Row,
+    columns::{Cell, Kind},
+};
+
+/// Rows of one row group of the Parquet table, where there are as many.
+pub(super) const ROW_GROUP: usize = 8192;
+
+/// Rows of one trial: their text as CSV (RFC 4180; unknown values are empty), and their columns.
+#[derive(Debug)]
+pub(crate) struct Table {
+    pub(crate) rows: usize,
+    pub(crate) text: String,
+    columns: Vec<Values>,
+}
+
+/// The values of one column; of those that may be unknown the known ones, and for every row whether it has one.
+#[derive(Debug)]
+enum Values {
+    Text(Vec<ByteArray>),
+    Whole(Vec<i64>, Vec<i16>),
+    Real(Vec<f64>, Vec<i16>),
+    Flag(Vec<bool>, Vec<i16>),
+}
+
+impl Default for Table {
+    fn default() -> Self {
+        let empty = |kind| match kind {
+            Kind::Text => Values::Text(Vec::new()),
+            Kind::Whole => Values::Whole(Vec::new(), Vec::new()),
+            Kind::Real => Values::Real(Vec::new(), Vec::new()),
+            Kind::Flag => Values::Flag(Vec::new(), Vec::new()),
+        };
+        let columns = COLUMNS.iter().map(|column| empty(column.kind)).collect();
+        Self { rows: 0, text: String::new(), columns }
+    }
+}
+
+impl Table {
+    /// The head of the table as CSV.
+    pub(super) fn head() -> String {
+        COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
+    }
+
+    /// Adds a row.
+    pub(crate) fn add(&mut self, row: &Row<'_>) {
+        self.rows += 1;
+        for (place, (column, values)) in COLUMNS.iter().zip(&mut self.columns).enumerate() {
+            if place > 0 {
+                self.text.push(',');
+            }
+            let cell = (column.fill)(row);
+            write_cell(&mut self.text, &cell);
+            values.push(cell);
+        }
+        self.text.push('\n');
+    }
+
+    /// Adds the rows of a row group to the columns; their text is not made again.
+    pub(super) fn read(&mut self, group: &dyn RowGroupReader) -> Result<(), ParquetError> {
+        let rows = group.metadata().num_rows() as usize;
+        self.rows += rows;
+        for (place, values) in self.columns.iter_mut().enumerate() {
+            values.read(group.get_column_reader(place)?, rows)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the columns as row groups of [`ROW_GROUP`] rows, and forgets them; how many groups. What is left over is a
+    /// smaller group where this is the `end`, else it waits.
+    pub(crate) fn write(&mut self, file: &mut SerializedFileWriter<File>, end: bool) -> Result<usize, ParquetError> {
+        let mut groups = 0;
+        while self.rows >= ROW_GROUP || (end && self.rows > 0) {
+            let rows = self.rows.min(ROW_GROUP);
+            let mut group = file.next_row_group()?;
+            for values in &mut self.columns {
+                let mut writer = group.next_column()?.expect("the schema has this column");
+                values.write(writer.untyped(), rows)?;
+                writer.close()?;
+            }
+            group.close()?;
+            self.rows -= rows;
+            groups += 1;
+        }
+        Ok(groups)
+    }
+}
+
+impl Values {
+    fn push(&mut self, cell: Cell) {
+        fn known<T>((values, levels): (&mut Vec<T>, &mut Vec<i16>), value: Option<T>) {
+            levels.push(i16::from(value.is_some()));
+            values.extend(value);
+        }
+        match (self, cell) {
+            (Self::Text(all), Cell::Text(word)) => all.push(ByteArray::from(word.into_bytes())),
+            (Self::Whole(all, levels), Cell::Whole(value)) => known((all, levels), value),
+            (Self::Real(all, levels), Cell::Real(value)) => known((all, levels), value),
+            (Self::Flag(all, levels), Cell::Flag(value)) => known((all, levels), value),
+            _ => unreachable!("a column fills cells of its own kind"),
+        }
+    }
+
+    fn read(&mut self, reader: ColumnReader, rows: usize) -> Result<(), ParquetError> {
+        match (self, reader) {
+            (Self::Text(all), ColumnReader::ByteArrayColumnReader(mut reader)) => {
+                reader.read_records(rows, None, None, all).map(drop)
+            }
+            (Self::Whole(all, levels), ColumnReader::Int64ColumnReader(mut reader)) => {
+                reader.read_records(rows, Some(levels), None, all).map(drop)
+            }
+            (Self::Real(all, levels), ColumnReader::DoubleColumnReader(mut reader)) => {
+                reader.read_records(rows, Some(levels), None, all).map(drop)
+            }
+            (Self::Flag(all, levels), ColumnReader::BoolColumnReader(mut reader)) => {
+                reader.read_records(rows, Some(levels), None, all).map(drop)
+            }
+            _ => Err(ParquetError::General("a column of another kind".to_owned())),
+        }
+    }
+
+    /// Writes the first `rows` rows and forgets them.
+    fn write(&mut self, writer: &mut ColumnWriter<'_>, rows: usize) -> Result<(), ParquetError> {
+        fn first<T>(values: &mut Vec<T>, levels: &mut Vec<i16>, rows: usize) -> (Vec<T>, Vec<i16>) {
+            let levels: Vec<i16> = levels.drain(..rows).collect();
+            let known = levels.iter().filter(|level| **level > 0).count();
+            (values.drain(..known).collect(), levels)
+        }
+        match (self, writer) {
+            (Self::Text(all), ColumnWriter::ByteArrayColumnWriter(writer)) => {
+                let words: Vec<ByteArray> = all.drain(..rows).collect();
+                writer.write_batch(&words, None, None).map(drop)
+            }
+            (Self::Whole(all, levels), ColumnWriter::Int64ColumnWriter(writer)) => {
+                let (values, levels) = first(all, levels, rows);
+                writer.write_batch(&values, Some(&levels), None).map(drop)
+            }
+            (Self::Real(all, levels), ColumnWriter::DoubleColumnWriter(writer)) => {
+                let (values, levels) = first(all, levels, rows);
+                writer.write_batch(&values, Some(&levels), None).map(drop)
+            }
+            (Self::Flag(all, levels), ColumnWriter::BoolColumnWriter(writer)) => {
+                let (values, levels) = first(all, levels, rows);
+                writer.write_batch(&values, Some(&levels), None).map(drop)
+            }
+            _ => Err(ParquetError::General("a column of another kind".to_owned())),
+        }
+    }
+}
+
+/// An empty Parquet table, ZSTD.
+pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetError> {
+    let fields: String = COLUMNS
+        .iter()
+        .map(|column| match column.kind {
+            Kind::Text => format!("REQUIRED BYTE_ARRAY {} (UTF8);", column.name),
+            Kind::Whole => format!("OPTIONAL INT64 {};", column.name),
+            Kind::Real => format!("OPTIONAL DOUBLE {};", column.name),
+            Kind::Flag => format!("OPTIONAL BOOLEAN {};", column.name),
+        })
+        .collect();
+    let schema = Arc::new(parse_message_type(&format!("message results {{ {fields} }}"))?);
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_created_by(concat!("seafix ", env!("CARGO_PKG_VERSION")).to_owned())
+        .build();
+    SerializedFileWriter::new(File::create(path)?, schema, Arc::new(properties))
+}
+
+fn write_cell(text: &mut String, cell: &Cell) {
+    use std::fmt::Write;
+    // Writing into a string cannot fail.
+    let _ = match cell {
+        Cell::Text(word) => {
+            quote(text, word);
+            Ok(())
+        }
+        Cell::Whole(Some(number)) => write!(text, "{number}"),
+        // All its digits; very small ones with an exponent instead of many zeros.
+        Cell::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
+        Cell::Real(Some(x)) => write!(text, "{x}"),
+        Cell::Flag(Some(flag)) => write!(text, "{flag}"),
+        _ => Ok(()),
+    };
+}
+
+/// A word as a CSV field: quoted where it must be; a spreadsheet shall not take it for a formula.
+fn quote(text: &mut String, word: &str) {
+    let formula = word.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    if formula || word.contains([',', '"', '\n', '\r']) {
+        text.push('"');
+        text.push_str(if formula { "'" } else { "" });
+        text.push_str(&word.replace('"', "\"\""));
+        text.push('"');
+    } else {
+        text.push_str(word);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_log::{FrameRecord, TargetRecord};
+
+    #[test]
+    fn a_row_is_a_line_and_unknown_is_empty() {
+        let mut table = Table::default();
+        for object in ["a,b", "=1+1"] {
+            let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "chance");
+            target.evaluation.visible = Some(4);
+            let frame = FrameRecord { frame: 2, stamp_ns: 7, targets: vec![target], ..Default::default() };
+            Row::of("001", &frame).for_each(|row| table.add(&row));
+        }
+        let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,wrong,wrong_pairs,visible";
+        assert!(Table::head().starts_with(head));
+        let mut lines = table.text.lines();
+        assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,unidentified,chance,,,4,,"));
+        assert!(lines.next().unwrap().contains("\"'=1+1\""));
+    }
+}

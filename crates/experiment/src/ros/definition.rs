@@ -1,0 +1,147 @@
+//! Whether a recording's schema is the one that is decoded.
+
+use super::idl;
+
+/// The types that are read, and those they are made of: name, then type and name of each field.
+const KNOWN: [(&str, &[(&str, &str)]); 17] = [
+    (
+        "sensor_msgs/Image",
+        &[
+            ("Header", "header"),
+            ("uint32", "height"),
+            ("uint32", "width"),
+            ("string", "encoding"),
+            ("uint8", "is_bigendian"),
+            ("uint32", "step"),
+            ("uint8[]", "data"),
+        ],
+    ),
+    ("sensor_msgs/CompressedImage", &[("Header", "header"), ("string", "format"), ("uint8[]", "data")]),
+    (
+        "sensor_msgs/CameraInfo",
+        &[
+            ("Header", "header"),
+            ("uint32", "height"),
+            ("uint32", "width"),
+            ("string", "distortion_model"),
+            ("float64[]", "d"),
+            ("float64[9]", "k"),
+            ("float64[9]", "r"),
+            ("float64[12]", "p"),
+            ("uint32", "binning_x"),
+            ("uint32", "binning_y"),
+            ("RegionOfInterest", "roi"),
+        ],
+    ),
+    (
+        "nav_msgs/Odometry",
+        &[
+            ("Header", "header"),
+            ("string", "child_frame_id"),
+            ("PoseWithCovariance", "pose"),
+            ("TwistWithCovariance", "twist"),
+        ],
+    ),
+    ("tf2_msgs/TFMessage", &[("TransformStamped[]", "transforms")]),
+    (
+        "sensor_msgs/RegionOfInterest",
+        &[
+            ("uint32", "x_offset"),
+            ("uint32", "y_offset"),
+            ("uint32", "height"),
+            ("uint32", "width"),
+            ("bool", "do_rectify"),
+        ],
+    ),
+    ("std_msgs/Header", &[("Time", "stamp"), ("string", "frame_id")]),
+    ("builtin_interfaces/Time", &[("int32", "sec"), ("uint32", "nanosec")]),
+    ("geometry_msgs/PoseWithCovariance", &[("Pose", "pose"), ("float64[36]", "covariance")]),
+    ("geometry_msgs/TwistWithCovariance", &[("Twist", "twist"), ("float64[36]", "covariance")]),
+    ("geometry_msgs/Pose", &[("Point", "position"), ("Quaternion", "orientation")]),
+    ("geometry_msgs/Twist", &[("Vector3", "linear"), ("Vector3", "angular")]),
+    ("geometry_msgs/Point", &[("float64", "x"), ("float64", "y"), ("float64", "z")]),
+    ("geometry_msgs/Vector3", &[("float64", "x"), ("float64", "y"), ("float64", "z")]),
+    ("geometry_msgs/Quaternion", &[("float64", "x"), ("float64", "y"), ("float64", "z"), ("float64", "w")]),
+    (
+        "geometry_msgs/TransformStamped",
+        &[("Header", "header"), ("string", "child_frame_id"), ("Transform", "transform")],
+    ),
+    ("geometry_msgs/Transform", &[("Vector3", "translation"), ("Quaternion", "rotation")]),
+];
+
+/// A type by its package and name: `sensor_msgs/msg/Image` is `sensor_msgs/Image`.
+pub(crate) fn plain(name: &str) -> String {
+    name.replace("::", "/").replace("/msg/", "/")
+}
+
+/// A type and its fields: type without package, and name.
+pub(super) type Definition = (String, Vec<(String, String)>);
+
+/// The first field in which the schema `definition` of the type `name`, written in `encoding`, differs from what is
+/// decoded; `None` if it does not, or says nothing.
+pub(crate) fn differs(name: &str, encoding: &str, definition: &str) -> Option<String> {
+    let found = if encoding == "ros2idl" { idl::definitions(definition) } else { messages(name, definition) };
+    found.iter().find_map(|(name, fields)| {
+        let (_, known) = KNOWN.iter().find(|(known, _)| known == name)?;
+        let count = fields.len().max(known.len());
+        (0..count).find_map(|index| {
+            let found = fields.get(index).map(|(kind, field)| format!("{kind} {field}"));
+            let known = known.get(index).map(|(kind, field)| format!("{kind} {field}"));
+            let said =
+                |field: &Option<String>| field.as_deref().map_or("nothing".to_owned(), |field| format!("`{field}`"));
+            (found != known)
+                .then(|| format!("field {} of {name} is {}, and {} is decoded", index + 1, said(&found), said(&known)))
+        })
+    })
+}
+
+/// The types of a `ros2msg` schema: that of its name, then each behind a line `MSG: package/Type`.
+fn messages(name: &str, text: &str) -> Vec<Definition> {
+    let mut all: Vec<Definition> = vec![(plain(name), Vec::new())];
+    for line in text.lines() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if let Some(name) = line.strip_prefix("MSG:") {
+            all.push((plain(name.trim()), Vec::new()));
+            continue;
+        }
+        let mut words = line.split_whitespace();
+        let (Some(kind), Some(field)) = (words.next(), words.next()) else { continue };
+        // A constant is no field.
+        if field.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) || kind.starts_with("===") {
+            continue;
+        }
+        let kind = plain(kind);
+        let kind = kind.rsplit('/').next().unwrap_or(&kind).to_owned();
+        let (_, fields) = all.last_mut().expect("the first is always there");
+        fields.push((if kind == "byte" { "uint8".to_owned() } else { kind }, field.to_owned()));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IMAGE: &str = "# an image\nstd_msgs/Header header # Header timestamp\nuint32 height\nuint32 width\nstring encoding\n\
+                         uint8 is_bigendian\nuint32 step\nuint8[] data\n\
+                         ================================================================================\n\
+                         MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
+                         ================================================================================\n\
+                         MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+
+    #[test]
+    fn the_first_difference_is_named() {
+        let of = |text: &str| differs("sensor_msgs/msg/Image", "ros2msg", text);
+        assert_eq!(of(IMAGE), None);
+        assert_eq!(
+            of(&IMAGE.replace("uint32 width", "uint64 width")).unwrap(),
+            "field 3 of sensor_msgs/Image is `uint64 width`, and `uint32 width` is decoded"
+        );
+        assert_eq!(
+            of(&IMAGE.replace("uint8[] data\n", "")).unwrap(),
+            "field 7 of sensor_msgs/Image is nothing, and `uint8[] data` is decoded"
+        );
+        assert!(of(&IMAGE.replace("uint32 nanosec", "uint32 nsec")).unwrap().contains("builtin_interfaces/Time"));
+        assert_eq!(of(&IMAGE.replace("uint32 height", "uint8 MONO=1\nuint8 RGB = 2\nuint32 height")), None);
+    }
+}

@@ -1,0 +1,64 @@
+//! The pixels of a `sensor_msgs/Image`.
+
+use super::Image;
+
+impl Image<'_> {
+    /// Its samples row by row, grey or red, green and blue, and the greatest that a sample can be; images of 16 bits
+    /// hold `bits`.
+    pub(crate) fn samples(&self, bits: u8) -> Result<(Vec<u16>, u16), String> {
+        // Bytes a sample, samples a pixel, and which of them are red, green and blue.
+        let (bytes, channels, colours): (usize, usize, &[usize]) = match self.encoding.as_str() {
+            "mono8" | "8UC1" => (1, 1, &[0]),
+            "mono16" | "16UC1" => (2, 1, &[0]),
+            "rgb8" => (1, 3, &[0, 1, 2]),
+            "bgr8" | "8UC3" => (1, 3, &[2, 1, 0]),
+            "rgba8" => (1, 4, &[0, 1, 2]),
+            "bgra8" | "8UC4" => (1, 4, &[2, 1, 0]),
+            other => {
+                let read = "mono8, mono16, rgb8, bgr8, rgba8, bgra8, 8UC1, 16UC1, 8UC3, 8UC4";
+                return Err(format!("pixels in `{other}`; {read} are read"));
+            }
+        };
+        let [width, height] = self.size.map(|length| length as usize);
+        let (row, step) = (width * channels * bytes, self.step as usize);
+        if width == 0 || height == 0 || step < row || self.data.len() != step.saturating_mul(height) {
+            let held = self.data.len();
+            return Err(format!("an image of {width}×{height}, rows of {row} bytes {step} apart, in {held} bytes"));
+        }
+        let sample = |at: &[u8]| match (bytes, self.is_bigendian) {
+            (1, _) => u16::from(at[0]),
+            (_, true) => u16::from_be_bytes([at[0], at[1]]),
+            (_, false) => u16::from_le_bytes([at[0], at[1]]),
+        };
+        let samples = self.data.chunks_exact(step).flat_map(|line| {
+            let pixels = line[..row].chunks_exact(channels * bytes);
+            pixels.flat_map(|pixel| colours.iter().map(|&colour| sample(&pixel[colour * bytes..])))
+        });
+        let white = if bytes == 1 { 255 } else { ((1_u32 << bits.min(16)) - 1) as u16 };
+        Ok((samples.collect(), white))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(encoding: &str, size: [u32; 2], step: u32, data: &[u8]) -> Result<(Vec<u16>, u16), String> {
+        Image { size, encoding: encoding.to_owned(), is_bigendian: encoding == "mono16", step, data }.samples(16)
+    }
+
+    #[test]
+    fn rows_may_be_filled_up_and_colours_in_any_order() {
+        assert_eq!(samples("mono8", [2, 2], 3, &[1, 2, 0, 3, 4, 0]), Ok((vec![1, 2, 3, 4], 255)));
+        assert_eq!(samples("bgra8", [1, 1], 4, &[1, 2, 3, 9]), Ok((vec![3, 2, 1], 255)));
+        assert_eq!(samples("mono16", [1, 1], 2, &[1, 2]), Ok((vec![258], 65535)));
+        assert_eq!(samples("16UC1", [1, 1], 2, &[1, 2]), Ok((vec![513], 65535)));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        assert!(samples("bayer_rggb8", [1, 1], 1, &[1]).unwrap_err().contains("`bayer_rggb8`; mono8"));
+        assert!(samples("mono8", [2, 2], 2, &[1, 2, 3]).unwrap_err().contains("in 3 bytes"));
+        assert!(samples("rgb8", [2, 1], 2, &[1, 2]).unwrap_err().contains("rows of 6 bytes 2 apart"));
+    }
+}

@@ -1,0 +1,91 @@
+//! All pieces become one log a trial and one table.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use rayon::prelude::*;
+use seafix_component::Fault;
+
+use super::{Observer, RunError, store::Sealed};
+use crate::{
+    dataset::sha256,
+    manifest::Manifest,
+    results::{Stretch, join_csv, join_parquet},
+};
+
+/// Writes the logs and tables of the run that `manifest` describes from its pieces, in their order; `false` when the
+/// observer ended it before.
+pub(super) fn assemble(
+    folder: &Path,
+    manifest: &mut Manifest,
+    pieces: &[Sealed],
+    threads: usize,
+    observer: &dyn Observer,
+) -> Result<bool, RunError> {
+    let mut stretches = Vec::new();
+    let mut outputs: Vec<Output> = Vec::new();
+    for trial in &manifest.trials {
+        let of_trial: Vec<(&Sealed, Stretch)> =
+            pieces.iter().filter_map(|piece| Some((piece, piece.stretch(&trial.name)?))).collect();
+        let logs = of_trial.iter().map(|(piece, _)| piece.log(&trial.name)).collect();
+        outputs.push(Output { path: folder.join(&trial.log), kind: Kind::Log(logs) });
+        stretches.extend(of_trial.into_iter().map(|(_, stretch)| stretch));
+    }
+    manifest.rows = stretches.iter().map(|stretch| stretch.rows).sum();
+    outputs.push(Output { path: folder.join("results.csv"), kind: Kind::Csv(&stretches) });
+    outputs.push(Output { path: folder.join("results.parquet"), kind: Kind::Parquet(&stretches) });
+
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build().map_err(|error| {
+        RunError::Output(Fault::new(format!("no threads ({error})"), Path::new("the machine")).value(threads))
+    })?;
+    let hashes: Result<Vec<Option<(String, String)>>, RunError> =
+        pool.install(|| outputs.par_iter().map(|output| output.write(observer)).collect());
+    let hashes: Option<BTreeMap<String, String>> = hashes?.into_iter().collect();
+    let done = hashes.is_some();
+    manifest.outputs = hashes.unwrap_or_default();
+    Ok(done)
+}
+
+/// A file of the run, and what it is made of.
+struct Output<'a> {
+    path: PathBuf,
+    kind: Kind<'a>,
+}
+
+enum Kind<'a> {
+    Log(Vec<PathBuf>),
+    Csv(&'a [Stretch]),
+    Parquet(&'a [Stretch]),
+}
+
+impl Output<'_> {
+    /// Writes the file; its name and SHA-256, or nothing when the observer ended it before.
+    fn write(&self, observer: &dyn Observer) -> Result<Option<(String, String)>, RunError> {
+        if observer.stops() {
+            return Ok(None);
+        }
+        match &self.kind {
+            Kind::Log(parts) => {
+                if !seafix_log::join(parts, &self.path, || !observer.stops())? {
+                    return Ok(None);
+                }
+            }
+            Kind::Csv(stretches) => self.complete(|path| join_csv(stretches, path).map_err(|e| e.to_string()))?,
+            Kind::Parquet(stretches) => {
+                self.complete(|path| join_parquet(stretches, path).map_err(|e| e.to_string()))?
+            }
+        }
+        let name = self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        Ok(Some((name, sha256(&self.path).map_err(RunError::Output)?)))
+    }
+
+    /// Writes the file under a `.partial` name and renames it when it is on the disk.
+    fn complete(&self, write: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), RunError> {
+        let partial = PathBuf::from(format!("{}.partial", self.path.display()));
+        write(&partial).map_err(|error| RunError::unwritable(&partial, error))?;
+        fs::rename(&partial, &self.path).map_err(|error| RunError::unwritable(&self.path, error))
+    }
+}

@@ -1,0 +1,106 @@
+//! How a run is cut into pieces: by the plan alone.
+
+use super::group::Group;
+use crate::{Plan, thin::Thinned};
+
+/// Some successive frames of one source, led through every trial that shares it: what one thread makes at a time, what a
+/// kill costs at most, and what shards are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Piece {
+    /// Its place in the run.
+    pub(super) number: usize,
+    /// The place of its source's group of trials.
+    pub(super) group: usize,
+    /// Its first frame.
+    pub(super) first: usize,
+    /// The frame behind its last.
+    pub(super) end: usize,
+    /// Of so many frames one is logged, whatever came of it.
+    every: u64,
+    /// So many failures are logged besides.
+    failures: u64,
+}
+
+impl Piece {
+    /// How many frames, for each trial.
+    pub(super) fn frames(&self) -> usize {
+        self.end - self.first
+    }
+
+    /// Which of its frames are logged.
+    pub(super) fn thinned(&self) -> Thinned {
+        Thinned::new(self.every, self.failures)
+    }
+
+    /// How many frames at most are logged of each trial.
+    fn logged(&self) -> u64 {
+        let regular = (self.end as u64).div_ceil(self.every) - (self.first as u64).div_ceil(self.every);
+        (regular + self.failures).min(self.frames() as u64)
+    }
+}
+
+/// All logs of point-level trials together stay below this (bytes).
+const MOST_LOG: u64 = 900_000_000;
+
+/// The pieces of a run, source after source.
+pub(super) fn cut(plan: &Plan, groups: &[Group<'_>]) -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = Vec::new();
+    for (place, group) in groups.iter().enumerate() {
+        let frames = group.passage.frames();
+        let size = size(group);
+        let count = frames.div_ceil(size).max(1);
+        let (every, failures) = match group.passage.images() {
+            true => (1, 0),
+            false => thinning(frames as u64, group.frame_bytes, MOST_LOG / plan.trials.len() as u64),
+        };
+        for k in 0..count {
+            // The failures that may be logged are dealt out evenly, so that pieces know nothing of each other.
+            let share = |k: usize| failures * k as u64 / count as u64;
+            let (first, end) = ((k * size).min(frames), ((k + 1) * size).min(frames));
+            let failures = share(k + 1) - share(k);
+            pieces.push(Piece { number: pieces.len(), group: place, first, end, every, failures });
+        }
+    }
+    pieces
+}
+
+/// How many frames a piece of `group` has: few enough that some dozen pieces keep all threads busy and that their rows
+/// fit into memory, many enough that their files are no burden, and that what joint fixes look back on is little beside.
+fn size(group: &Group<'_>) -> usize {
+    /// The most rows, over all trials.
+    const ROWS: usize = 32_768;
+    let frames = group.passage.frames();
+    let (least, most) = if group.passage.images() { (1, 8) } else { (16, 8192) };
+    let size = (frames / 64).clamp(least, most).min(ROWS / group.trials.len().min(ROWS)).max(1);
+    size.max(4 * group.looks_back())
+}
+
+/// Of `frames` frames of about `bytes` each, what a log of at most `most` bytes holds: all, or every k-th in half of it
+/// and failures in the other half.
+fn thinning(frames: u64, bytes: u64, most: u64) -> (u64, u64) {
+    let fit = (most / bytes.max(1)).max(2);
+    if frames <= fit { (1, 0) } else { (frames.div_ceil(fit / 2), fit / 2) }
+}
+
+/// About how much log (bytes) some pieces write.
+pub(super) fn bytes(groups: &[Group<'_>], pieces: &[&Piece]) -> u64 {
+    let of = |piece: &&Piece| {
+        let group = &groups[piece.group];
+        piece.logged() * group.frame_bytes * group.trials.len() as u64
+    };
+    pieces.iter().map(of).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_frames_are_all_logged_and_many_within_the_budget() {
+        assert_eq!(thinning(5, 100, 1000), (1, 0));
+        assert_eq!(thinning(100, 100, 1000), (20, 5));
+        let piece = |first, end, failures| Piece { number: 0, group: 0, first, end, every: 20, failures };
+        // Frames 0, 20, 40, 60, 80, and five failures.
+        assert_eq!((piece(0, 100, 5).logged(), piece(1, 20, 3).logged(), piece(41, 45, 9).logged()), (10, 3, 4));
+    }
+}

@@ -1,0 +1,81 @@
+//! The shards of a run become the run.
+
+use std::path::{Path, PathBuf};
+
+use seafix_component::Fault;
+
+use super::{
+    Finished, Observer, Options, RunError, assemble,
+    folder::Claim,
+    store::{Sealed, Store},
+};
+use crate::manifest::{self, Manifest};
+
+/// Joins the shards in `folders` into a run in the folder of `options`: the same bytes, durations apart, as if it had been
+/// made at once. Shards may come from different machines, and from different ways to deal the run.
+///
+/// # Errors
+/// [`RunError`]: folders that hold no shard, shards of different runs, pieces that are missing or damaged, or an output
+/// that cannot be written.
+pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
+    let (mut manifest, pieces) = gather(folders).map_err(|fault| RunError::Input(vec![fault]))?;
+    manifest.shard = None;
+    manifest.threads = options.threads;
+    let name = folders
+        .first()
+        .and_then(|folder| folder.file_name())
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let claim = Claim::new(options, &name, &manifest)?;
+    if let Some(finished) = claim.finished {
+        return Ok(Finished { folder: claim.folder, rows: finished.rows });
+    }
+    manifest.write(&claim.folder, "running")?;
+    if !assemble::assemble(&claim.folder, &mut manifest, &pieces, options.threads, observer)? {
+        manifest.write(&claim.folder, "interrupted")?;
+        return Err(RunError::Interrupted(claim.folder));
+    }
+    manifest.write(&claim.folder, "finished")?;
+    Ok(Finished { folder: claim.folder, rows: manifest.rows })
+}
+
+/// What the shards have in common, and all their pieces.
+fn gather(folders: &[PathBuf]) -> Result<(Manifest, Vec<Sealed>), Fault> {
+    let mut first: Option<(&Path, Manifest)> = None;
+    let mut pieces: Vec<Option<Sealed>> = Vec::new();
+    for folder in folders {
+        let manifest = Manifest::read(folder)?;
+        let file = folder.join(manifest::NAME);
+        if manifest.state != "shard" {
+            let fault = Fault::new("not a finished shard", &file).value(format!("a run, {}", manifest.state));
+            return Err(fault.remedy("make it with `seafix run --shard k/n`, or go on with --resume"));
+        }
+        match &first {
+            None => {
+                pieces.resize(manifest.pieces, None);
+                first = Some((folder, manifest));
+            }
+            Some((other, known)) => {
+                if let Some(what) = known.differs(&manifest) {
+                    let fault = Fault::new("shards of different runs", &file).value(format!("{what} differs"));
+                    return Err(fault.remedy(format!("merge shards of one run; compare with {}", other.display())));
+                }
+            }
+        }
+        for sealed in Store::of(folder).all() {
+            if let Some(place) = pieces.get_mut(sealed.seal.piece) {
+                place.get_or_insert(sealed);
+            }
+        }
+    }
+    let Some((folder, manifest)) = first else {
+        return Err(Fault::new("no shards", Path::new("the command line")).remedy("name their folders"));
+    };
+    let missing: Vec<usize> = (0..pieces.len()).filter(|&number| pieces[number].is_none()).collect();
+    if let Some(number) = missing.first() {
+        let what = format!("{} of {} pieces are missing or damaged", missing.len(), pieces.len());
+        return Err(Fault::new(what, folder)
+            .value(format!("the first is {number}"))
+            .remedy("name the folders of all shards, and make damaged ones again with --resume"));
+    }
+    Ok((manifest, pieces.into_iter().flatten().collect()))
+}

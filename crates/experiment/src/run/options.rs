@@ -1,0 +1,90 @@
+//! How a plan is run: what does not change the answer.
+
+use std::{fmt, path::PathBuf, str::FromStr};
+
+/// Where a run goes, who works on it, and on how much of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Options {
+    /// The folder of the run; the next free one below `runs` where none is given.
+    pub out: Option<PathBuf>,
+    /// What becomes of a run that is there already.
+    pub existing: Existing,
+    /// How many threads work.
+    pub threads: usize,
+    /// Make only this part of the run; [`merge`](super::merge) joins all parts.
+    pub shard: Option<Shard>,
+    /// Whether durations are logged: without them two runs of a plan have the same bytes.
+    pub timed: bool,
+}
+
+impl Options {
+    /// A run into `out` by one thread, which must be a new or an empty folder.
+    pub fn into(out: impl Into<PathBuf>) -> Self {
+        Self { out: Some(out.into()), existing: Existing::Refuse, threads: 1, shard: None, timed: true }
+    }
+
+    /// Whether the piece of this number is to be made.
+    pub(super) fn takes(&self, piece: usize) -> bool {
+        self.shard.is_none_or(|shard| piece % shard.of == shard.number - 1)
+    }
+}
+
+/// What becomes of a run that is in the folder already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// It stays, and the new run is refused.
+    Refuse,
+    /// It is continued, if it is the same run.
+    Resume,
+    /// It is removed.
+    Overwrite,
+}
+
+/// One of several parts that a run is dealt into, piece by piece: `2/7` is the second of seven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    number: usize,
+    of: usize,
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((number, of)) if 1 <= number && number <= of && of <= 1_000_000 => Ok(Self { number, of }),
+            _ => Err(format!("`{text}` is no shard; write k/n with 1 <= k <= n <= 1000000, for instance 2/7")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_piece_is_in_one_shard() {
+        let all: Vec<Options> = (1..=3)
+            .map(|k| Options { shard: Some(format!("{k}/3").parse().unwrap()), ..Options::into("out") })
+            .collect();
+        for piece in 0..10 {
+            assert_eq!(all.iter().filter(|options| options.takes(piece)).count(), 1);
+        }
+        assert!(Options::into("out").takes(4));
+    }
+
+    #[test]
+    fn only_some_words_are_shards() {
+        for wrong in ["0/3", "4/3", "3", "a/b", "1/", "-1/3", "1/2000000"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+        assert_eq!("2/7".parse::<Shard>().unwrap().to_string(), "2/7");
+    }
+}

@@ -1,0 +1,210 @@
+//! Where pieces lie until they are joined: `pieces/000012/` below the folder of the run.
+//!
+//! A piece has one log a trial, the rows of all its trials as `rows.csv` and `rows.parquet`, and `seal.json`, written
+//! last: lengths and check sums. Its folder carries `.partial` until then, so that what has its name is whole.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io::{Read, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{RunError, work::Output};
+use crate::results::{Stretch, create_parquet};
+
+const FORMAT: &str = "seafix-piece/1";
+
+/// The pieces of one folder.
+#[derive(Debug, Clone)]
+pub(super) struct Store {
+    folder: PathBuf,
+}
+
+/// What a piece holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Seal {
+    format: String,
+    /// Its place in the run.
+    pub(super) piece: usize,
+    first: usize,
+    end: usize,
+    pub(super) trials: Vec<Share>,
+    files: BTreeMap<String, Sum>,
+}
+
+/// What of a piece is one trial's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Share {
+    pub(super) name: String,
+    pub(super) rows: usize,
+    /// Where its rows begin in `rows.csv`, and how long they are (bytes).
+    text: (u64, u64),
+    /// The first of its row groups in `rows.parquet`, and how many.
+    groups: (usize, usize),
+}
+
+/// Length and check sum of a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Sum {
+    bytes: u64,
+    crc32: u32,
+}
+
+/// A piece that is whole.
+#[derive(Debug, Clone)]
+pub(super) struct Sealed {
+    folder: PathBuf,
+    pub(super) seal: Seal,
+}
+
+impl Sealed {
+    /// The log of a trial.
+    pub(super) fn log(&self, trial: &str) -> PathBuf {
+        self.folder.join(format!("{trial}.mcap"))
+    }
+
+    /// The rows of a trial, where this piece has some.
+    pub(super) fn stretch(&self, trial: &str) -> Option<Stretch> {
+        let share = self.seal.trials.iter().find(|share| share.name == trial)?;
+        let (csv, parquet) = (self.folder.join(CSV), self.folder.join(PARQUET));
+        Some(Stretch { csv, text: share.text, parquet, groups: share.groups, rows: share.rows })
+    }
+}
+
+const CSV: &str = "rows.csv";
+const PARQUET: &str = "rows.parquet";
+const SEAL: &str = "seal.json";
+
+impl Store {
+    /// The pieces below the folder of a run; the folder for them is made.
+    pub(super) fn open(run: &Path) -> Result<Self, RunError> {
+        let store = Self::of(run);
+        fs::create_dir_all(&store.folder).map_err(|error| RunError::unwritable(&store.folder, error))?;
+        Ok(store)
+    }
+
+    /// The same of a run that is only read.
+    pub(super) fn of(run: &Path) -> Self {
+        Self { folder: run.join("pieces") }
+    }
+
+    fn at(&self, number: usize) -> PathBuf {
+        self.folder.join(format!("{number:06}"))
+    }
+
+    /// Whether a piece is there.
+    pub(super) fn has(&self, number: usize) -> bool {
+        self.at(number).is_dir()
+    }
+
+    /// A piece, if it is there and every check sum holds.
+    pub(super) fn sound(&self, number: usize) -> Option<Sealed> {
+        let folder = self.at(number);
+        let seal: Seal = serde_json::from_slice(&fs::read(folder.join(SEAL)).ok()?).ok()?;
+        let sound = |(name, sum): (&String, &Sum)| self::sum(&folder.join(name)).is_ok_and(|found| found == *sum);
+        let whole = seal.format == FORMAT && seal.piece == number && seal.files.iter().all(sound);
+        whole.then_some(Sealed { folder, seal })
+    }
+
+    /// All pieces that are there and whole, in their order.
+    pub(super) fn all(&self) -> Vec<Sealed> {
+        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+        let mut all: Vec<Sealed> = numbers.filter_map(|number| self.sound(number)).collect();
+        all.sort_by_key(|sealed| sealed.seal.piece);
+        all
+    }
+
+    /// Removes all pieces.
+    pub(super) fn remove(&self) -> Result<(), RunError> {
+        match fs::remove_dir_all(&self.folder) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(RunError::unwritable(&self.folder, error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A piece that is being made.
+pub(super) struct Draft {
+    number: usize,
+    partial: PathBuf,
+    folder: PathBuf,
+}
+
+impl Draft {
+    /// Begins a piece anew, whatever was there of it.
+    pub(super) fn begin(store: &Store, number: usize) -> Result<Self, RunError> {
+        let folder = store.at(number);
+        let partial = folder.with_extension("partial");
+        for old in [&folder, &partial] {
+            if old.exists() {
+                fs::remove_dir_all(old).map_err(|error| RunError::unwritable(old, error))?;
+            }
+        }
+        fs::create_dir(&partial).map_err(|error| RunError::unwritable(&partial, error))?;
+        Ok(Self { number, partial, folder })
+    }
+
+    /// Where the log of a trial goes.
+    pub(super) fn log(&self, trial: &str) -> PathBuf {
+        self.partial.join(format!("{trial}.mcap"))
+    }
+
+    /// Closes the logs of a piece that was stopped before its end: they can be read, but the piece is not whole.
+    pub(super) fn abandon(self, outputs: Vec<Output>) -> Result<(), RunError> {
+        for Output { mut log, thinned, .. } in outputs {
+            log.totals(&thinned.totals)?;
+            log.finish()?;
+        }
+        Ok(())
+    }
+
+    /// Closes the logs of a whole piece, writes its rows, and gives it its name.
+    pub(super) fn seal(self, first: usize, end: usize, outputs: Vec<Output>) -> Result<(), RunError> {
+        let at = |name: &str| self.partial.join(name);
+        let mut files: Vec<String> = vec![CSV.to_owned(), PARQUET.to_owned()];
+        let (mut trials, mut length, mut groups) = (Vec::new(), 0, 0);
+        let mut csv = File::create(at(CSV)).map_err(|error| RunError::unwritable(&at(CSV), error))?;
+        let mut parquet = create_parquet(&at(PARQUET)).map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
+        for Output { trial, mut log, thinned, mut table } in outputs {
+            log.totals(&thinned.totals)?;
+            log.finish()?;
+            files.push(format!("{trial}.mcap"));
+            let (rows, text) = (table.rows, table.text.len() as u64);
+            csv.write_all(table.text.as_bytes()).map_err(|error| RunError::unwritable(&at(CSV), error))?;
+            let more = table.write(&mut parquet, true).map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
+            trials.push(Share { name: trial, rows, text: (length, text), groups: (groups, more) });
+            (length, groups) = (length + text, groups + more);
+        }
+        parquet.close().map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
+        let sums = files.into_iter().map(|name| {
+            let found = sum(&at(&name)).map_err(|error| RunError::unwritable(&at(&name), error))?;
+            Ok((name, found))
+        });
+        let files = sums.collect::<Result<_, RunError>>()?;
+        let seal = Seal { format: FORMAT.to_owned(), piece: self.number, first, end, trials, files };
+        let text = serde_json::to_string(&seal).expect("a seal is plain data") + "\n";
+        fs::write(at(SEAL), text).map_err(|error| RunError::unwritable(&at(SEAL), error))?;
+        fs::rename(&self.partial, &self.folder).map_err(|error| RunError::unwritable(&self.folder, error))
+    }
+}
+
+fn sum(path: &Path) -> std::io::Result<Sum> {
+    let mut file = File::open(path)?;
+    let (mut hasher, mut bytes) = (crc32fast::Hasher::new(), 0);
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer)? {
+            0 => return Ok(Sum { bytes, crc32: hasher.finalize() }),
+            read => {
+                hasher.update(&buffer[..read]);
+                bytes += read as u64;
+            }
+        }
+    }
+}

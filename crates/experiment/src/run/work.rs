@@ -1,0 +1,117 @@
+//! Pieces are made: each by one thread, whole.
+
+use std::sync::{
+    Mutex,
+    atomic::{AtomicBool, AtomicUsize, Ordering},
+};
+
+use seafix_component::Fault;
+use seafix_log::{FrameRecord, FrameTimes, TargetTimes, Writer};
+use seafix_referencing::Glimpse;
+
+use super::{
+    Observer, Options, RunError,
+    cut::Piece,
+    group::Group,
+    store::{Draft, Store},
+};
+use crate::{
+    results::{Row, Table},
+    thin::Thinned,
+};
+
+/// Makes all of `pieces`; `false` when the observer ended it before.
+pub(super) fn work(
+    groups: &[Group<'_>],
+    pieces: &[&Piece],
+    store: &Store,
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<bool, RunError> {
+    let threads = options.threads.min(pieces.len()).max(1);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
+        let fault = Fault::new(format!("no threads ({error})"), std::path::Path::new("the machine"));
+        RunError::Output(fault.value(threads).remedy("ask for fewer with --threads"))
+    })?;
+    let (next, halted, failure) = (AtomicUsize::new(0), AtomicBool::new(false), Mutex::new(None));
+    let stops = || halted.load(Ordering::Relaxed) || observer.stops();
+    pool.scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|_| {
+                while let Some(piece) = pieces.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !stops()) {
+                    match make(&groups[piece.group], piece, store, options.timed, observer, &stops) {
+                        Ok(true) => {}
+                        Ok(false) => break,
+                        Err(error) => {
+                            halted.store(true, Ordering::Relaxed);
+                            failure.lock().expect("no thread panics while it holds this").get_or_insert(error);
+                        }
+                    }
+                }
+            });
+        }
+    });
+    match failure.into_inner().expect("no thread panics while it holds this") {
+        Some(error) => Err(error),
+        None => Ok(!observer.stops() || pieces.iter().all(|piece| store.has(piece.number))),
+    }
+}
+
+/// What one trial writes of a piece.
+pub(super) struct Output {
+    pub(super) trial: String,
+    pub(super) log: Writer,
+    pub(super) thinned: Thinned,
+    pub(super) table: Table,
+}
+
+/// Makes one piece; `false` when it was stopped before its end, its logs then closed behind the last frame.
+fn make(
+    group: &Group<'_>,
+    piece: &Piece,
+    store: &Store,
+    timed: bool,
+    observer: &dyn Observer,
+    stops: &dyn Fn() -> bool,
+) -> Result<bool, RunError> {
+    let input = |fault: Fault| RunError::Input(vec![fault]);
+    let draft = Draft::begin(store, piece.number)?;
+    let mut outputs = Vec::with_capacity(group.trials.len());
+    for (trial, header) in group.trials.iter().zip(&group.headers) {
+        let log = Writer::piece(&draft.log(&trial.name), header)?;
+        outputs.push(Output { trial: trial.name.clone(), log, thinned: piece.thinned(), table: Table::default() });
+    }
+    let back = group.looks_back();
+    let mut glimpses: Vec<Vec<Glimpse>> = Vec::new();
+    for index in piece.first.saturating_sub(back)..piece.first {
+        glimpses.push(group.look(index).map_err(input)?.glimpses);
+    }
+    for index in piece.first..piece.end {
+        if stops() {
+            draft.abandon(outputs)?;
+            return Ok(false);
+        }
+        let mut looked = group.look(index).map_err(input)?;
+        glimpses.push(std::mem::take(&mut looked.glimpses));
+        let records = group.record(index, looked, &glimpses);
+        glimpses.drain(..glimpses.len().saturating_sub(back));
+        for (mut record, output) in records.into_iter().zip(&mut outputs) {
+            if !timed {
+                forget_times(&mut record);
+            }
+            if output.thinned.keeps(&record) {
+                output.log.frame(&record)?;
+            }
+            Row::of(&output.trial, &record).for_each(|row| output.table.add(&row));
+            observer.frame(&output.trial);
+        }
+    }
+    draft.seal(piece.first, piece.end, outputs)?;
+    Ok(true)
+}
+
+/// Leaves out what differs from run to run.
+fn forget_times(record: &mut FrameRecord) {
+    record.times = FrameTimes::default();
+    record.targets.iter_mut().for_each(|target| target.times = TargetTimes::default());
+}

@@ -1,0 +1,224 @@
+//! The frames that another run logged.
+
+use std::path::Path;
+
+use nalgebra::Matrix4;
+use seafix_component::Fault;
+use seafix_geometry::{Body, Camera, Covariance6, Pinhole, Point, RightCamera, StereoRig, Transform, World};
+use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord, TrialHeader};
+use seafix_referencing::{ModelPoint, Site, SiteObject};
+use seafix_vision::Image;
+
+use super::{Eyes, Passage, Reading, Sight, Truth, WorldPrior};
+use crate::{dataset::sha256, exact};
+
+/// A trial's log as a passage: what its method was given, its judge's truth, but none of its answers.
+pub(super) struct Logged {
+    frames: Frames,
+    name: String,
+    site: Site,
+    rig: StereoRig,
+    body_from_camera: Transform<Body, Camera>,
+    images: bool,
+    numbers: Vec<u64>,
+    warnings: Vec<Fault>,
+    path: String,
+}
+
+impl Logged {
+    /// The log in `path`; `reading` says whether its images or its clouds are looked at.
+    pub(super) fn open(path: &Path, reading: Reading) -> Result<Self, Vec<Fault>> {
+        let one = |fault| vec![fault];
+        let frames = Frames::open(path).map_err(|error| one(fault(path, &error)))?;
+        let header = frames.header();
+        if frames.is_empty() {
+            return Err(one(Fault::new("a log without frames", path).remedy("it says nothing that could be replayed")));
+        }
+        let images = match (reading, frames.has_images(0)) {
+            (Reading::Clouds, _) | (Reading::Any, false) => false,
+            (_, true) => true,
+            (Reading::Images, false) => {
+                let fault = Fault::new("a log without images", path);
+                return Err(one(fault.remedy("read its clouds, and leave the stages before the search as they are")));
+            }
+        };
+        let rig = rig(&header.rig).map_err(|what| one(Fault::new(what, path)))?;
+        let body_from_camera = Transform::from_rows(&header.body_from_camera)
+            .map_err(|error| one(Fault::new(format!("body_from_camera: {error}"), path)))?;
+        let mut warnings = Vec::new();
+        let (mut numbers, mut exact) = (Vec::with_capacity(frames.len()), true);
+        let mut posed = false;
+        for place in 0..frames.len() {
+            let frame = frames.frame(place, false).map_err(|error| one(fault(path, &error)))?;
+            numbers.push(frame.frame);
+            exact &= frame.inputs.as_ref().is_some_and(|inputs| !images || inputs.exact_images);
+            posed |= frame.inputs.as_ref().is_some_and(|inputs| inputs.problem.is_some());
+        }
+        if !exact {
+            let what =
+                if images { "images that were logged with fewer bits" } else { "inputs that were logged rounded" };
+            warnings
+                .push(Fault::new(what, path).remedy("results may differ from the logged ones in their last digits"));
+        }
+        let site = if posed { Ok(site_of_targets(header)) } else { Site::parse(&header.site, path) }?;
+        Ok(Self {
+            name: format!("log {} of {}", header.trial, header.source),
+            site,
+            rig,
+            body_from_camera,
+            images,
+            numbers,
+            warnings,
+            path: path.display().to_string(),
+            frames,
+        })
+    }
+
+    fn frame(&self, index: usize, images: bool) -> Result<FrameRecord, Fault> {
+        self.frames.frame(index, images).map_err(|error| fault(Path::new(&self.path), &error))
+    }
+}
+
+/// What is wrong with a log.
+pub(super) fn fault(path: &Path, error: &LogError) -> Fault {
+    let text = error.to_string();
+    let (what, remedy) = text.split_once("; ").unwrap_or((&text, ""));
+    let shown = path.display().to_string();
+    let what = what.strip_prefix(&shown).map_or(what, str::trim_start);
+    Fault::new(what, path).remedy(remedy)
+}
+
+/// Problems are no site that a file could describe: their objects have no frame by the rule.
+fn site_of_targets(header: &TrialHeader) -> Site {
+    let objects = header.targets.iter().map(|target| SiteObject {
+        id: target.id.clone(),
+        base: [0, 1, 2],
+        base_in_world: None,
+        survey_sigma: 0.0,
+        world_from_object: None,
+        points: target
+            .points
+            .iter()
+            .map(|point| ModelPoint { sigma: point.sigma, ..ModelPoint::exact(&*point.id, Point::from(point.at)) })
+            .collect(),
+        interest: Vec::new(),
+    });
+    Site { name: "problems".to_owned(), frame: 0, objects: objects.collect(), warnings: Vec::new() }
+}
+
+fn rig(record: &RigRecord) -> Result<StereoRig, String> {
+    let camera =
+        |side: &str, CameraRecord { size, matrix: [[fx, _, cx], [_, fy, cy], _], distortion }: &CameraRecord| {
+            Pinhole::new(*size, [*fx, *fy], [*cx, *cy], distortion).map_err(|error| format!("{side} camera: {error}"))
+        };
+    let right_from_left: Transform<RightCamera, Camera> = match record.right_from_left_rotation {
+        Some(rotation) => {
+            let translation = std::array::from_fn(|row| record.right_from_left[row][3]);
+            exact::transform(&ExactPose { rotation, translation })
+        }
+        None => Transform::from_rows(&record.right_from_left).map_err(|error| format!("right_from_left: {error}"))?,
+    };
+    StereoRig::new(camera("left", &record.left)?, camera("right", &record.right)?, right_from_left)
+        .map_err(|error| error.to_string())
+}
+
+fn image(grey: &GreyImage) -> Result<Image, String> {
+    let pixels = grey.pixels.iter().map(|&level| f32::from(level)).collect();
+    Image::new(grey.width as usize, grey.height as usize, pixels).map_err(|error| error.to_string())
+}
+
+impl Passage for Logged {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+
+    fn rig(&self) -> &StereoRig {
+        &self.rig
+    }
+
+    fn body_from_camera(&self) -> Transform<Body, Camera> {
+        self.body_from_camera
+    }
+
+    fn images(&self) -> bool {
+        self.images
+    }
+
+    fn frames(&self) -> usize {
+        self.numbers.len()
+    }
+
+    fn number(&self, index: usize) -> u64 {
+        self.numbers[index]
+    }
+
+    fn prior_sigma(&self) -> Option<(f64, f64)> {
+        let header = self.frames.header();
+        header.prior_position_sigma.zip(header.prior_attitude_sigma)
+    }
+
+    fn pixel_sigma(&self) -> Option<f64> {
+        self.frames.header().pixel_sigma.filter(|_| !self.images)
+    }
+
+    fn warnings(&self) -> &[Fault] {
+        &self.warnings
+    }
+
+    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+        let frame = self.frame(index, self.images)?;
+        let broken = |what: String| Fault::new(what, Path::new(&self.path)).value(format!("frame {}", frame.frame));
+        let rounded = Inputs::default();
+        let inputs = frame.inputs.as_deref().unwrap_or(&rounded);
+        let cloud = match frame.inputs {
+            Some(_) => exact::cloud(&frame.cloud, inputs)
+                .ok_or_else(|| broken("a point whose pixels have no covariance".to_owned()))?,
+            None => self.old_cloud(&frame),
+        };
+        let told = exact::told(inputs, &self.site, &cloud);
+        let prior = match frame.inputs {
+            Some(_) => exact::prior(inputs),
+            None => self.old_prior(&frame).map_err(broken)?,
+        };
+        let eyes = match &frame.images {
+            Some([left, right]) => Eyes::Pair(image(left).map_err(broken)?, image(right).map_err(broken)?),
+            None => Eyes::Points(cloud),
+        };
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior, told })
+    }
+
+    fn truth(&self, index: usize) -> Option<Truth> {
+        let frame = self.frame(index, false).ok()?;
+        Some(exact::truth_of(frame.inputs?.truth.as_ref()?, &self.site))
+    }
+
+    fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
+        let path = Path::new(&self.path);
+        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        Ok(vec![(name, sha256(path)?)])
+    }
+}
+
+impl Logged {
+    /// The cloud of a log that is older than its inputs: pixels err independently.
+    fn old_cloud(&self, frame: &FrameRecord) -> Vec<seafix_geometry::MeasuredPoint> {
+        let sigma = self.frames.header().pixel_sigma.unwrap_or(0.3);
+        let pairs = frame.cloud.iter().filter(|point| point.pixels.is_some());
+        let isotropic = Matrix4::<f64>::identity() * (sigma * sigma);
+        let rows = std::array::from_fn(|r| std::array::from_fn(|c| isotropic[(r, c)]));
+        let inputs = Inputs { pixel_covariances: pairs.map(|_| rows).collect(), ..Inputs::default() };
+        exact::cloud(&frame.cloud, &inputs).expect("every pair of pixels was given a covariance")
+    }
+
+    /// The rough pose of such a log, with the standard deviations that are typical of it.
+    fn old_prior(&self, frame: &FrameRecord) -> Result<Option<WorldPrior>, String> {
+        let (Some(prior), Some((position, attitude))) = (&frame.prior, self.prior_sigma()) else { return Ok(None) };
+        let world_from_camera: Transform<World, Camera> =
+            Transform::from_rows(&prior.world_from_camera).map_err(|error| format!("prior: {error}"))?;
+        Ok(Some(WorldPrior { world_from_camera, covariance: Covariance6::isotropic(attitude, position) }))
+    }
+}

@@ -1,0 +1,78 @@
+//! What a method was given, to the last bit.
+
+use super::{Matrix4, Matrix6};
+
+/// What a frame's method was given and its judge knew beyond what [`FrameRecord`](super::FrameRecord) holds, to the last
+/// bit: enough to run another method on the same.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Inputs {
+    /// The rough pose and its covariance.
+    pub prior: Option<(ExactPose, Matrix6)>,
+    /// For each point of the cloud with pixels, in order, their covariance (px²).
+    pub pixel_covariances: Vec<Matrix4>,
+    /// For each point of the cloud the point of the site that it says it is.
+    pub names: Option<Vec<SitePoint>>,
+    /// An identification problem that states its own candidates and tolerance.
+    pub problem: Option<ProblemRecord>,
+    /// What the judge knew.
+    pub truth: Option<TrueState>,
+    /// Whether the logged images are the method's to the last bit.
+    pub exact_images: bool,
+}
+
+/// A rigid motion `a_from_b` without rounding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExactPose {
+    /// The rotation as a quaternion (x, y, z, w).
+    pub rotation: [f64; 4],
+    /// The translation (m).
+    pub translation: [f64; 3],
+}
+
+/// A point of the site by the indices of its object and of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SitePoint {
+    /// Index of the object.
+    pub object: u32,
+    /// Index of the point in the object.
+    pub point: u32,
+}
+
+/// An identification problem about one object; its model is that object's points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProblemRecord {
+    /// Index of the object.
+    pub object: u32,
+    /// Distances that differ by no more agree (m).
+    pub delta: f64,
+    /// The rough pose, object from camera, and the half-size of the shells about it (m).
+    pub prior: Option<(ExactPose, f64)>,
+    /// The only pairs (model, cloud) to consider.
+    pub putative: Option<Vec<[u32; 2]>>,
+}
+
+/// What the judge knew.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueState {
+    /// The left camera.
+    pub world_from_camera: ExactPose,
+    /// Objects, by index, that are not where the survey has them; `None` where nobody knows where they are.
+    pub moved: Vec<(u32, Option<ExactPose>)>,
+    /// The points that both cameras see, where that is known.
+    pub visible: Option<Vec<SitePoint>>,
+    /// The Cramér–Rao bound on the pose relative to the object of this index.
+    pub bound: Option<(u32, Matrix6)>,
+    /// The answer to an identification problem.
+    pub answer: Option<AnswerRecord>,
+}
+
+/// The answer to an identification problem, and what the best fit could do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnswerRecord {
+    /// The true pairs (model, cloud).
+    pub pairs: Vec<[u32; 2]>,
+    /// RMS over all model points of where the least-squares pose of the pairs misplaces them (m).
+    pub ideal_rms: Option<f64>,
+    /// Whether putative pairs were given.
+    pub is_putative: bool,
+}
