@@ -3,6 +3,8 @@
 use seafix_component::Fault;
 use seafix_experiment::RunError;
 
+use crate::signals;
+
 /// Done; refused frames and problems included.
 pub(crate) const DONE: u8 = 0;
 /// Done, and something was found: `check` saw faults.
@@ -37,6 +39,7 @@ impl From<RunError> for Failure {
             RunError::Input(faults) => Self::faults(INPUT, &faults),
             RunError::Output(fault) => Self::new(OUTPUT, fault),
             RunError::Log(error) => Self::new(OUTPUT, error),
+            RunError::Interrupted(_) => Self::new(signals::exit_code(), error),
         }
     }
 }

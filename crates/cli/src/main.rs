@@ -8,6 +8,7 @@ mod catalogue;
 mod commands;
 mod exit;
 mod ply;
+mod signals;
 mod terminal;
 
 /// Positions of an underwater vehicle relative to a known structure, from stereo images.

@@ -9,7 +9,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use seafix_component::Fault;
 use seafix_experiment::Observer;
 
-use crate::exit::{Failure, OUTPUT};
+use crate::{
+    exit::{Failure, OUTPUT},
+    signals,
+};
 
 /// Prints `text` to standard output. A reader that went away (`| head`) ends the program quietly.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
@@ -55,7 +58,7 @@ impl Progress {
         } else {
             // A log file gets a line at every tenth of the way.
             let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(1).max(1));
-            if done * 10 / all != (done - 1) * 10 / all {
+            if done * 10 / all != done.saturating_sub(1) * 10 / all {
                 tell(&format!("{done}/{all} frames"));
             }
         }
@@ -76,7 +79,16 @@ impl Observer for Progress {
         tell(&format!("warning: {warning}"));
     }
 
+    fn resumes(&self, frames: usize) {
+        tell(&format!("{frames} of them are there already"));
+        self.bar.set_position(frames as u64);
+    }
+
     fn frame(&self, trial: &str) {
         self.step(trial);
+    }
+
+    fn stops(&self) -> bool {
+        signals::came()
     }
 }

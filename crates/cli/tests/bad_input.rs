@@ -166,6 +166,34 @@ fn images_of_another_size() {
 }
 
 #[test]
+fn pairs_of_another_size_are_left_out_and_counted() {
+    let sample = Sample::new();
+    sample.put("b.pgm", &pgm(64, 48)).put("c.pgm", &pgm(32, 48)).change(
+        "frames.csv",
+        "a.pgm,a.pgm",
+        "a.pgm,b.pgm\n2000000000,a.pgm,c.pgm",
+    );
+    let run = |name: &str, more: &[&str]| {
+        let out = sample.path(name);
+        let given = ["run", sample.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()];
+        let output = Command::cargo_bin("seafix").unwrap().args(given).args(more).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap(), out)
+    };
+    let (code, said, out) = run("out", &[]);
+    let counted = "1 of 2 pairs left out: an image of another size than the calibration in";
+    assert!(code == Some(0) && said.contains(counted) && said.contains("c.pgm"), "{said}");
+    let rows = fs::read_to_string(out.join("results.csv")).unwrap().lines().count() - 1;
+    assert_eq!(rows, 1, "one pair, one object");
+    assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains(counted));
+    let (code, said, out) = run("strict", &["--set", "source.strict=true"]);
+    assert!(code == Some(3) && said.contains("c.pgm") && !out.exists(), "{said}");
+    // Two of three belong to another calibration.
+    sample.change("frames.csv", "2000000000,a.pgm,c.pgm", "2000000000,a.pgm,c.pgm\n3000000000,c.pgm,c.pgm");
+    let (code, said, out) = run("most", &[]);
+    assert!(code == Some(3) && said.contains("32×48, calibrated 64×48") && !out.exists(), "{said}");
+}
+
+#[test]
 fn a_truncated_image() {
     let sample = Sample::new();
     fs::write(sample.path("a.pgm"), b"\x89PNG\r\n\x1a\n\0\0").unwrap();

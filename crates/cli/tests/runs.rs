@@ -34,6 +34,34 @@ fn two_runs_are_compared() {
 }
 
 #[test]
+fn reports_are_verified_and_runs_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    for (out, seed) in [("a", "seed=3"), ("b", "seed=3"), ("c", "seed=4")] {
+        assert_eq!(seafix(folder, &["run", "e.toml", "--out", out, "--set", seed]).0, 0);
+    }
+    let (code, out, _) = seafix(folder, &["report", "a", "b", "--out", "reports", "--index"]);
+    assert!(code == 0 && out.contains("findings: reports/README.md"), "{out}");
+    assert!(folder.join("reports/b/report.pdf").exists() && folder.join("reports/a/tables/errors.json").exists());
+    let (code, out, _) = seafix(folder, &["report", "a", "b", "--out", "reports", "--verify"]);
+    assert!(code == 0 && out.contains("numbers equal to the last digit"), "{out}");
+    let page = folder.join("reports/a/report.html");
+    let text = fs::read_to_string(&page).unwrap().replacen("</data>", "7</data>", 1);
+    fs::write(&page, text).unwrap();
+    let (code, out, _) = seafix(folder, &["report", "a", "--out", "reports/a", "--verify"]);
+    assert!(code == 1 && out.contains("report.html: printed"), "{out}");
+
+    let (code, out, error) = seafix(folder, &["compare", "a", "b", "--out", "compared"]);
+    assert!(code == 0 && folder.join("compared/compare.html").exists(), "{out}{error}");
+    let (code, _, error) = seafix(folder, &["compare", "a", "c"]);
+    assert!(code == 3 && error.contains("seeds: experiment 3 against experiment 4"), "{error}");
+    assert_ne!(seafix(folder, &["compare", "a", "c", "--force"]).0, 3);
+    assert_eq!(seafix(folder, &["compare", "a", "a"]).0, 2);
+    assert_eq!(seafix(folder, &["report", "a", "a", "--out", "x"]).0, 2);
+}
+
+#[test]
 fn a_log_that_was_cut_off_is_saved() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -1,8 +1,10 @@
 //! The noise of the disparity σ_d, measured where truth tells what it should have been.
 
-use nalgebra::{Matrix4, Point3};
+use nalgebra::Point3;
 use seafix_geometry::{Camera, Pinhole, Point, RightCamera, StereoRig, Transform};
 use seafix_log::{CameraRecord, FrameRecord, RigRecord, TargetModel, TrialHeader};
+
+use crate::place::matrix;
 
 /// A pair whose pixels are further than this from the true projections (px) is not the point it is
 /// taken for.
@@ -46,10 +48,6 @@ fn surveyed(model: &TargetModel) -> bool {
     let mut objects = model.points.iter().map(|point| point.id.rsplit_once('/').map(|(object, _)| object));
     let first = objects.next();
     objects.any(|object| Some(object) != first)
-}
-
-fn matrix(rows: &[[f64; 4]; 4]) -> Matrix4<f64> {
-    Matrix4::from_fn(|row, column| rows[row][column])
 }
 
 fn rig(record: &RigRecord) -> Option<StereoRig> {

@@ -31,14 +31,14 @@ pub enum ReportError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// A picture cannot be encoded.
-    #[error("cannot draw the picture of frame {frame} of {}: {message}", .path.display())]
-    Picture {
-        /// The log.
-        path: PathBuf,
-        /// The frame.
-        frame: u64,
-        /// What the encoder said.
-        message: String,
+    /// Runs that say nothing about each other.
+    #[error("{} and {} are not comparable: {}; compare runs of the same data, or say --force", .first.display(), .other.display(), .differences.join(", "))]
+    Incomparable {
+        /// The first run.
+        first: PathBuf,
+        /// One that differs.
+        other: PathBuf,
+        /// What differs, a line each.
+        differences: Vec<String>,
     },
 }

@@ -26,8 +26,15 @@ pub(crate) fn headed(key: &str) -> String {
 pub(crate) fn number(value: Option<f64>, decimals: usize) -> String {
     match value {
         None => "–".to_owned(),
+        Some(value) if value.is_nan() => "–".to_owned(),
         Some(value) if value == f64::INFINITY => "∞".to_owned(),
-        Some(value) => format!("{value:.decimals$}").replace('-', "−"),
+        Some(value) if value == f64::NEG_INFINITY => "−∞".to_owned(),
+        Some(value) => {
+            let text = format!("{value:.decimals$}");
+            // What rounds to nothing has no sign.
+            let zero = text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.'));
+            if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
+        }
     }
 }
 
@@ -42,18 +49,10 @@ pub(crate) fn decimals(values: impl IntoIterator<Item = f64>) -> usize {
     }
 }
 
-/// `k` of `n` in percent.
-pub(crate) fn percent(k: usize, n: usize) -> String {
-    if n == 0 { "–".to_owned() } else { format!("{:.1}", 100.0 * k as f64 / n as f64) }
-}
-
-/// The exact 95 % interval of the rate `k` of `n`, in percent.
-pub(crate) fn interval(k: usize, n: usize) -> String {
-    if n == 0 {
-        return "–".to_owned();
-    }
-    let (low, high) = seafix_evaluation::clopper_pearson(k, n, 0.95);
-    format!("[{:.1}, {:.1}]", 100.0 * low, 100.0 * high)
+/// A number of a setting, without needless zeros.
+pub(crate) fn trimmed(value: f64) -> String {
+    let text = format!("{value:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
 /// A word for a count.

@@ -1,38 +1,43 @@
 //! Reports made from logs alone.
 //!
-//! [`summary`] gives the results of a run as a table for the terminal, [`report`] writes them as a paper:
-//! one self-contained HTML page without scripts. Both read nothing but the `*.mcap` of the run, and give
-//! the same bytes for the same logs.
+//! [`summary`] gives the results of a run as a table for the terminal. [`report`] writes them as a paper: one
+//! self-contained HTML page without scripts, LaTeX source, a PDF, figures as SVG and PDF, every plotted number as CSV
+//! and JSON, and an entry for a bibliography. All read nothing but the `*.mcap` of the run, and give the same bytes for
+//! the same logs. Every number carries a key that says where it comes from; [`verify`] computes each again.
+//!
+//! What a report says (`content`) is data (`document`), which printers (`print`) know nothing about.
 
+mod compare;
+mod content;
 mod disparity;
+mod document;
 mod error;
+mod field;
 mod figure;
 mod format;
-mod page;
+mod number;
+mod paired;
 mod paper;
+mod place;
+mod print;
 mod run;
 mod summary;
 mod terminal;
+mod verify;
+mod write;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
-
+pub use compare::{Compared, compare};
 pub use error::ReportError;
 pub use paper::PAPER_M1;
 pub use summary::{Limits, Row, Spread, StageTimes, Summary};
+pub use verify::{Mismatch, Verified, verify};
+pub use write::{Forms, Report, index, report};
 
+use std::path::Path;
+
+use field::Field;
+use number::{Key, Number};
 use run::Run;
-
-/// A report that was written.
-#[derive(Debug)]
-pub struct Report {
-    /// The page.
-    pub page: PathBuf,
-    /// The results in it, as a table for the terminal.
-    pub summary: Summary,
-}
 
 /// Reads the logs in `run_dir` and gives the results, a row a trial.
 ///
@@ -40,32 +45,4 @@ pub struct Report {
 /// [`ReportError`] when there is no log, or one cannot be read.
 pub fn summary(run_dir: &Path) -> Result<Summary, ReportError> {
     Ok(Summary::of(&Run::read(run_dir)?))
-}
-
-/// Reads the logs in `run_dir` and writes into `folder`: `report.html`, the picture in it as `fix.jpg`,
-/// and the table for the terminal as `summary.txt`.
-///
-/// # Errors
-/// [`ReportError`] when there is no log, one cannot be read, or the report cannot be written.
-pub fn report(run_dir: &Path, folder: &Path) -> Result<Report, ReportError> {
-    let run = Run::read(run_dir)?;
-    let summary = Summary::of(&run);
-    let picture = figure::Picture::choose(&run)?;
-    let page = page::page(&run, &summary, picture.as_ref()).into_string();
-
-    if let Some(picture) = &picture {
-        write(folder, "fix.jpg", &picture.jpeg)?;
-    }
-    write(folder, "summary.txt", summary.to_string().as_bytes())?;
-    Ok(Report { page: write(folder, "report.html", page.as_bytes())?, summary })
-}
-
-/// Writes a file whole or not at all.
-fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, ReportError> {
-    let (path, partial) = (folder.join(name), folder.join(format!("{name}.partial")));
-    let io = |source| ReportError::Io { doing: "write", path: path.clone(), source };
-    fs::create_dir_all(folder).map_err(io)?;
-    fs::write(&partial, bytes).map_err(io)?;
-    fs::rename(&partial, &path).map_err(io)?;
-    Ok(path)
 }

@@ -5,28 +5,40 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_log::{FrameRecord, FrameTimes, LogError, Reader, TargetRecord, Totals, TrialHeader};
+use seafix_log::{FrameRecord, LogError, Outcome, Reader, TargetRecord, Totals, TrialHeader};
+use sha2::{Digest, Sha256};
 
-use crate::{ReportError, disparity};
+use crate::{Field, ReportError, disparity, place};
 
 /// All trials of a run, in the order of their names.
 #[derive(Debug)]
 pub(crate) struct Run {
     pub(crate) trials: Vec<Trial>,
+    /// Whether the trials come from several runs, the first axis saying which.
+    pub(crate) joined: bool,
 }
 
 /// One trial without what is large: no images, no clouds.
 #[derive(Debug)]
 pub(crate) struct Trial {
     pub(crate) path: PathBuf,
+    /// What the log is called: its file, with its run before it where there are several.
+    pub(crate) label: String,
     pub(crate) header: TrialHeader,
     pub(crate) frames: Vec<Frame>,
     /// What all frames add up to, logged or not; `None` where the log does not say.
     pub(crate) totals: Option<Totals>,
     /// Whether the log has images, or no frame at all; without images the points came as they are.
     pub(crate) images: bool,
-    /// The errors of the disparities of correctly identified points (px), where truth tells.
-    pub(crate) disparity_errors: Vec<f64>,
+    /// The errors of the disparities of correctly identified points, where truth tells: their squares' sum (px²) and
+    /// how many there are.
+    pub(crate) disparity: (f64, usize),
+    /// What searches and solvers the rows name.
+    pub(crate) named: [String; 2],
+    /// SHA-256 of all results but the times.
+    pub(crate) digest: Vec<u8>,
+    rows: Vec<Attempt>,
+    words: Vec<String>,
 }
 
 /// One frame of a trial.
@@ -34,8 +46,24 @@ pub(crate) struct Trial {
 pub(crate) struct Frame {
     pub(crate) number: u64,
     pub(crate) stamp_ns: u64,
-    pub(crate) targets: Vec<TargetRecord>,
-    pub(crate) times: FrameTimes,
+    /// Where the left camera really was in the world (m).
+    pub(crate) truth: Option<[f64; 3]>,
+    /// Times of the stages that serve all targets, in the order of [`crate::FRAME_STAGES`] (ms); NaN where none.
+    pub(crate) times: [f64; 6],
+    rows: (u32, u32),
+}
+
+/// One attempt at one target.
+#[derive(Debug)]
+pub(crate) struct Attempt {
+    pub(crate) outcome: Outcome,
+    pub(crate) wrong: Option<bool>,
+    pub(crate) points: u32,
+    /// Where the left camera is in the world by this fix and the survey (m); NaN where unknown.
+    pub(crate) estimate: [f64; 3],
+    object: u16,
+    reason: u16,
+    values: [f64; Field::ALL.len()],
 }
 
 impl Run {
@@ -59,7 +87,7 @@ impl Run {
         if let Some(other) = trials.iter().find(|trial| keys(trial) != keys(&trials[0])) {
             return Err(ReportError::Mixed { first: trials[0].path.clone(), other: other.path.clone() });
         }
-        Ok(Self { trials })
+        Ok(Self { trials, joined: false })
     }
 
     /// The header of the first trial: what all trials share is read there.
@@ -71,20 +99,88 @@ impl Run {
 impl Trial {
     fn read(path: PathBuf) -> Result<Self, LogError> {
         let mut reader = Reader::open(&path)?.without_images();
-        let (mut frames, mut disparity_errors) = (Vec::new(), Vec::new());
+        let mut trial = Self {
+            label: path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+            path,
+            header: reader.header().clone(),
+            frames: Vec::new(),
+            totals: None,
+            images: false,
+            disparity: (0.0, 0),
+            named: Default::default(),
+            digest: Vec::new(),
+            rows: Vec::new(),
+            words: vec![String::new()],
+        };
+        let mut digest = Sha256::new();
         while let Some(frame) = reader.next().transpose()? {
-            disparity_errors.extend(disparity::errors(reader.header(), &frame));
-            let FrameRecord { frame: number, stamp_ns, targets, times, .. } = frame;
-            frames.push(Frame { number, stamp_ns, targets, times });
+            trial.take(&frame);
+            results(&mut digest, &frame);
         }
-        let images = reader.has_images() || frames.is_empty();
-        let totals = reader.totals().cloned();
-        Ok(Self { path, header: reader.header().clone(), images, frames, totals, disparity_errors })
+        trial.digest = digest.finalize().to_vec();
+        trial.images = reader.has_images() || trial.frames.is_empty();
+        trial.totals = reader.totals().cloned();
+        trial.frames.shrink_to_fit();
+        trial.rows.shrink_to_fit();
+        Ok(trial)
+    }
+
+    fn take(&mut self, frame: &FrameRecord) {
+        for error in disparity::errors(&self.header, frame) {
+            self.disparity.0 += error * error;
+            self.disparity.1 += 1;
+        }
+        let first = self.rows.len() as u32;
+        for target in &frame.targets {
+            if self.rows.is_empty() {
+                self.named = [target.search.clone(), target.solver.clone()];
+            }
+            let (object, reason) = (self.word(&target.object), self.word(&target.reason));
+            self.rows.push(Attempt {
+                outcome: target.outcome,
+                wrong: target.evaluation.wrong,
+                points: target.pairs.len() as u32,
+                estimate: place::estimate(&self.header, target),
+                object,
+                reason,
+                values: values(target),
+            });
+        }
+        let times = &frame.times;
+        self.frames.push(Frame {
+            number: frame.frame,
+            stamp_ns: frame.stamp_ns,
+            truth: frame.truth.as_ref().map(|truth| truth.world_from_camera).map(|m| [m[0][3], m[1][3], m[2][3]]),
+            times: [
+                times.detect_ms,
+                times.locate_ms,
+                times.describe_ms,
+                times.match_ms,
+                times.refine_ms,
+                times.triangulate_ms,
+            ]
+            .map(|time| time.unwrap_or(f64::NAN)),
+            rows: (first, self.rows.len() as u32),
+        });
+    }
+
+    /// The place of `word` among those known.
+    fn word(&mut self, word: &str) -> u16 {
+        let place = self.words.iter().position(|known| known == word).unwrap_or_else(|| {
+            self.words.push(word.to_owned());
+            self.words.len() - 1
+        });
+        u16::try_from(place).unwrap_or(u16::MAX)
     }
 
     /// The name of the log.
     pub(crate) fn file(&self) -> String {
-        self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+        self.label.clone()
+    }
+
+    /// The first and the last stamp of the log (ns).
+    pub(crate) fn span(&self) -> [u64; 2] {
+        [self.frames.first(), self.frames.last()].map(|frame| frame.map_or(0, |frame| frame.stamp_ns))
     }
 
     /// How many frames it has, logged or not.
@@ -92,27 +188,96 @@ impl Trial {
         self.totals.as_ref().map_or(self.frames.len(), |totals| totals.frames as usize)
     }
 
+    /// Of so many frames one is logged whatever came of it.
+    pub(crate) fn every(&self) -> u64 {
+        self.totals.as_ref().map_or(1, |totals| totals.every.max(1))
+    }
+
     /// The frames that were logged whatever came of them: all, or a fair sample of many.
     pub(crate) fn sample(&self) -> impl Iterator<Item = &Frame> {
-        let every = self.totals.as_ref().map_or(1, |totals| totals.every.max(1));
+        let every = self.every();
         self.frames.iter().filter(move |frame| frame.number.is_multiple_of(every))
     }
 
+    /// The attempts of `frame`.
+    pub(crate) fn attempts_of(&self, frame: &Frame) -> impl Iterator<Item = &Attempt> {
+        self.rows[frame.rows.0 as usize..frame.rows.1 as usize].iter().filter(|row| row.object != 0)
+    }
+
     /// Every attempt of every frame of the sample.
-    pub(crate) fn attempts(&self) -> impl Iterator<Item = (&Frame, &TargetRecord)> {
-        self.sample()
-            .flat_map(|frame| frame.targets.iter().map(move |target| (frame, target)))
-            .filter(|(_, target)| target.attempted())
+    pub(crate) fn attempts(&self) -> impl Iterator<Item = (&Frame, &Attempt)> {
+        self.sample().flat_map(|frame| self.attempts_of(frame).map(move |row| (frame, row)))
+    }
+
+    /// What an attempt's target is called.
+    pub(crate) fn object(&self, row: &Attempt) -> &str {
+        self.words.get(row.object as usize).map_or("", String::as_str)
+    }
+
+    /// Why an attempt was refused: the word for it, or its outcome.
+    pub(crate) fn reason(&self, row: &Attempt) -> &str {
+        match self.words.get(row.reason as usize).map_or("", String::as_str) {
+            "" => row.outcome.name(),
+            word => word,
+        }
     }
 
     /// What the trial's search and solver are called.
     pub(crate) fn method(&self) -> [String; 2] {
         let of_stage = |stage: &str| self.header.components.iter().find(|c| c.stage == stage).map(|c| c.name.clone());
-        let row = self.frames.iter().flat_map(|frame| &frame.targets).next();
-        let of_row = |name: fn(&TargetRecord) -> &String| row.map(name).cloned().unwrap_or_default();
         [
-            of_stage("search").unwrap_or_else(|| of_row(|row| &row.search)),
-            of_stage("solver").unwrap_or_else(|| of_row(|row| &row.solver)),
+            of_stage("search").unwrap_or_else(|| self.named[0].clone()),
+            of_stage("solver").unwrap_or_else(|| self.named[1].clone()),
         ]
+    }
+}
+
+impl Attempt {
+    /// The value of one of its quantities; `None` where nothing is known.
+    pub(crate) fn get(&self, field: Field) -> Option<f64> {
+        Some(self.values[field as usize]).filter(|value| !value.is_nan())
+    }
+
+    /// A fix that is not known to be wrong.
+    pub(crate) fn found(&self) -> bool {
+        self.outcome == Outcome::Referenced && self.wrong != Some(true)
+    }
+
+    /// A fix beyond the alert limit.
+    pub(crate) fn wrong(&self) -> bool {
+        self.outcome == Outcome::Referenced && self.wrong == Some(true)
+    }
+
+    /// What a comparison takes for its error: infinity where there is none, or a wrong one.
+    pub(crate) fn error_or_failure(&self, field: Field) -> f64 {
+        if self.found() { self.get(field).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
+    }
+}
+
+fn values(target: &TargetRecord) -> [f64; Field::ALL.len()] {
+    std::array::from_fn(|index| Field::ALL[index].of(target).unwrap_or(f64::NAN))
+}
+
+/// Everything that came of the attempts of `frame`, bit by bit; times alone are left out.
+fn results(digest: &mut Sha256, frame: &FrameRecord) {
+    digest.update(frame.frame.to_le_bytes());
+    digest.update(frame.stamp_ns.to_le_bytes());
+    for target in &frame.targets {
+        for word in [&target.object, &target.search, &target.solver, &target.reason] {
+            digest.update((word.len() as u64).to_le_bytes());
+            digest.update(word.as_bytes());
+        }
+        digest.update(target.outcome.name().as_bytes());
+        for pair in &target.pairs {
+            digest.update(pair.model.to_le_bytes());
+            digest.update(pair.cloud.to_le_bytes());
+        }
+        let pose = target.object_from_camera.iter().flatten().flatten();
+        let covariance = target.covariance.iter().flatten().flatten();
+        let fields = Field::ALL.iter().filter(|field| field.topic() != "/metrics/timing");
+        let fields: Vec<f64> = fields.map(|field| field.of(target).unwrap_or(f64::NAN)).collect();
+        for value in pose.chain(covariance).chain(&fields) {
+            digest.update(value.to_bits().to_le_bytes());
+        }
     }
 }

@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 
 use seafix_evaluation::quantile;
-use seafix_log::{Axis, Evaluation, Outcome, Totals};
+use seafix_log::{Axis, Totals};
 
-use crate::run::{Run, Trial};
+use crate::{
+    Field, paired,
+    run::{Attempt, Run, Trial},
+};
 
 /// The results of a run.
 ///
@@ -73,6 +76,8 @@ pub struct Row {
     pub disparity_sigma: Option<f64>,
     /// Median times of the stages.
     pub times: StageTimes,
+    /// The 95 % quantile of the time from the images to the answer (ms).
+    pub total_p95: Option<f64>,
 }
 
 /// Root mean square errors and the Cramér–Rao bound on them, over all fixes of a trial, logged or not.
@@ -186,6 +191,13 @@ impl Summary {
             rows: run.trials.iter().map(Row::of).collect(),
         }
     }
+
+    /// What a figure calls a trial: what varies, or the method where nothing does.
+    pub(crate) fn name(run: &Run, trial: &Trial) -> String {
+        let members: Vec<usize> = (0..run.trials.len()).collect();
+        let place = run.trials.iter().position(|other| std::ptr::eq(other, trial)).unwrap_or(0);
+        paired::names(run, &members).1.swap_remove(place)
+    }
 }
 
 impl Row {
@@ -215,45 +227,46 @@ impl Row {
             nees_count: 0,
             identified: None,
             limits: trial.totals.as_ref().and_then(Limits::of),
-            disparity_sigma: root_mean_square(&trial.disparity_errors),
+            disparity_sigma: Some(trial.disparity)
+                .filter(|(_, n)| *n > 0)
+                .map(|(squares, n)| (squares / n as f64).sqrt()),
             times: times(trial),
+            total_p95: Spread::of(trial.attempts().filter_map(|(_, row)| row.get(Field::TotalTime))).map(|s| s.p95),
         };
         for frame in trial.sample() {
-            let fixes = || frame.targets.iter().filter(|target| target.outcome == Outcome::Referenced);
-            row.referenced_frames += usize::from(fixes().next().is_some());
-            row.wrong_frames += usize::from(fixes().any(|fix| fix.evaluation.wrong == Some(true)));
+            row.referenced_frames += usize::from(trial.attempts_of(frame).any(|row| row.found() || row.wrong()));
+            row.wrong_frames += usize::from(trial.attempts_of(frame).any(Attempt::wrong));
         }
-        let (mut found, mut all_m2): (Vec<Evaluation>, Vec<f64>) = (Vec::new(), Vec::new());
-        for (_, target) in trial.attempts() {
+        let mut found: Vec<&Attempt> = Vec::new();
+        for (_, attempt) in trial.attempts() {
             row.attempted += 1;
-            if target.outcome != Outcome::Referenced {
-                row.refused += 1;
-                let reason = if target.reason.is_empty() { target.outcome.name() } else { &target.reason };
-                *row.reasons.entry(reason.to_owned()).or_default() += 1;
-            } else if target.evaluation.wrong == Some(true) {
+            if attempt.found() {
+                row.found += 1;
+                row.unjudged += usize::from(attempt.wrong.is_none());
+                found.push(attempt);
+            } else if attempt.wrong() {
                 row.wrong += 1;
             } else {
-                row.found += 1;
-                row.unjudged += usize::from(target.evaluation.wrong.is_none());
-                all_m2.extend(target.evaluation.m2_rms);
-                found.push(target.evaluation);
+                row.refused += 1;
+                *row.reasons.entry(trial.reason(attempt).to_owned()).or_default() += 1;
             }
         }
-        let spread = |value: fn(&Evaluation) -> Option<f64>| Spread::of(found.iter().filter_map(value));
-        row.m1 = spread(|fix| fix.m1_rms);
-        row.m1_unused = spread(|fix| fix.m1_unused_rms);
-        row.m2 = spread(|fix| fix.m2_rms);
-        row.m3_position = spread(|fix| fix.m3_position);
-        row.m3_attitude = spread(|fix| fix.m3_attitude);
-        row.identified = spread(|fix| fix.identified.map(f64::from));
-        let nees: Vec<f64> = found.iter().filter_map(|fix| fix.nees).collect();
+        let values = |field: Field| found.iter().filter_map(move |fix| fix.get(field));
+        let spread = |field: Field| Spread::of(values(field));
+        row.m1 = spread(Field::M1);
+        row.m1_unused = spread(Field::M1Unused);
+        row.m2 = spread(Field::M2);
+        row.m3_position = spread(Field::Position);
+        row.m3_attitude = spread(Field::Attitude);
+        row.identified = spread(Field::Identified);
+        let nees: Vec<f64> = values(Field::Nees).collect();
         row.nees_count = nees.len();
         row.nees_mean = (!nees.is_empty()).then(|| nees.iter().sum::<f64>() / nees.len() as f64);
         if row.m2.is_some() && row.unjudged == 0 {
             // The lower middle order statistic: between a number and infinity there is no mean.
-            all_m2.resize(row.attempted, f64::INFINITY);
+            let mut all_m2: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::M2)).collect();
             all_m2.sort_by(f64::total_cmp);
-            row.m2_of_all = all_m2.get((row.attempted - 1) / 2).copied();
+            row.m2_of_all = all_m2.get((all_m2.len().max(1) - 1) / 2).copied();
         }
         if let Some(totals) = &trial.totals {
             row.count(totals);
@@ -284,25 +297,19 @@ impl Row {
 
 fn times(trial: &Trial) -> StageTimes {
     let median = |values: Vec<f64>| Spread::of(values).map(|spread| spread.median);
-    let frames = |time: fn(&crate::run::Frame) -> Option<f64>| median(trial.sample().filter_map(time).collect());
-    let attempts = |time: fn(&seafix_log::TargetTimes) -> Option<f64>| {
-        median(trial.attempts().filter_map(|(_, target)| time(&target.times)).collect())
-    };
+    let frames =
+        |stage: usize| median(trial.sample().map(|frame| frame.times[stage]).filter(|time| !time.is_nan()).collect());
+    let attempts = |field: Field| median(trial.attempts().filter_map(|(_, row)| row.get(field)).collect());
     StageTimes {
-        detect_ms: frames(|frame| frame.times.detect_ms),
-        locate_ms: frames(|frame| frame.times.locate_ms),
-        describe_ms: frames(|frame| frame.times.describe_ms),
-        match_ms: frames(|frame| frame.times.match_ms),
-        refine_ms: frames(|frame| frame.times.refine_ms),
-        triangulate_ms: frames(|frame| frame.times.triangulate_ms),
-        candidates_ms: attempts(|times| times.candidates_ms),
-        search_ms: attempts(|times| times.search_ms),
-        solve_ms: attempts(|times| times.solve_ms),
-        total_ms: attempts(|times| times.total_ms),
+        detect_ms: frames(0),
+        locate_ms: frames(1),
+        describe_ms: frames(2),
+        match_ms: frames(3),
+        refine_ms: frames(4),
+        triangulate_ms: frames(5),
+        candidates_ms: attempts(Field::CandidatesTime),
+        search_ms: attempts(Field::SearchTime),
+        solve_ms: attempts(Field::SolveTime),
+        total_ms: attempts(Field::TotalTime),
     }
-}
-
-fn root_mean_square(values: &[f64]) -> Option<f64> {
-    let mean = values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64;
-    (!values.is_empty()).then(|| mean.sqrt())
 }

@@ -23,7 +23,9 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
         return Err(Failure::new(INPUT, format!("no such file or folder: {}", missing.display())));
     }
     let mut found = false;
-    for path in paths {
+    let mut files = Vec::new();
+    paths.iter().for_each(|path| gather(path, &mut files));
+    for path in &files {
         let (faults, warnings) = examine(path, limits);
         let mut text: String = faults.iter().map(|fault| format!("fault: {fault}\n")).collect();
         text += &warnings.iter().map(|warning| format!("warning: {warning}\n")).collect::<String>();
@@ -35,6 +37,36 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
         found |= !faults.is_empty();
     }
     Ok(if found { FINDINGS } else { DONE })
+}
+
+/// What is examined of `path`: itself, or, of a folder that is no data set but holds files that can be examined, these and
+/// those of the folders in it, in the order of their names.
+fn gather(path: &Path, files: &mut Vec<PathBuf>) {
+    let before = files.len();
+    let entries = if path.is_dir() && !dataset::is_one(path) { std::fs::read_dir(path).ok() } else { None };
+    let mut entries: Vec<PathBuf> =
+        entries.into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
+    entries.sort();
+    for entry in entries {
+        let name = entry.to_string_lossy();
+        let known = [".toml", ".json", ".mcap"].iter().any(|end| name.ends_with(end)) && !name.ends_with(".truth.json");
+        // Links are not followed: they may lead back.
+        let is_link = entry.is_symlink();
+        match entry.is_dir() {
+            true if dataset::is_one(&entry) => files.push(entry),
+            true if !is_link => {
+                let here = files.len();
+                gather(&entry, files);
+                // A folder of other things says nothing.
+                files[here..].first().is_some_and(|first| *first == entry).then(|| files.truncate(here));
+            }
+            false if known => files.push(entry),
+            _ => {}
+        }
+    }
+    if files.len() == before {
+        files.push(path.to_owned());
+    }
 }
 
 /// The faults and warnings of one file or folder, by what it is.
@@ -54,10 +86,6 @@ fn log(path: &Path) -> Result<(), seafix_log::LogError> {
 
 fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     let faults = |result: Result<(), Vec<Fault>>| (result.err().unwrap_or_default(), Vec::new());
-    if path.is_dir() && !path.join("dataset.toml").exists() {
-        let what = Fault::new("a folder without a dataset.toml", path);
-        return (vec![what.remedy("name a data set, or the files of the folder one by one")], Vec::new());
-    }
     if path.is_dir() {
         return dataset::check(path, limits);
     }

@@ -8,6 +8,7 @@ use crate::exit::Ended;
 
 mod check;
 mod cloud;
+mod compare;
 mod diff;
 mod dive;
 mod draw;
@@ -15,8 +16,10 @@ mod eval;
 mod export;
 mod limits;
 mod list;
+mod merge;
 mod odometry;
 mod recover;
+mod replay;
 mod report;
 mod run;
 mod show;
@@ -27,6 +30,8 @@ mod solve;
 pub(crate) enum Command {
     /// Run an experiment, or the default pipeline on a data set: logs, results and a report.
     Run(run::Run),
+    /// Join the shards of a run into the run.
+    Merge(merge::Merge),
     /// Solve coherence problems (coherence-problem/1), one result each.
     Solve(solve::Solve),
     /// Make the cloud of measured points of one stereo pair.
@@ -35,6 +40,8 @@ pub(crate) enum Command {
     Odometry(odometry::Odometer),
     /// Draw identification problems with truth (coherence-problem/1).
     Draw(draw::Draw),
+    /// Compare runs of the same data: results side by side, and which differences are sure.
+    Compare(compare::Compare),
     /// Say what differs between two runs: configuration, inputs, results.
     Diff(diff::Diff),
     /// Judge a trajectory against a reference: absolute and relative errors, drift (evo's definitions).
@@ -56,7 +63,9 @@ pub(crate) enum Command {
     },
     /// Save what is sound of a log that was cut off or damaged.
     Recover(recover::Recover),
-    /// Make the report of a run again, from its logs alone.
+    /// Run a search and a solver on the logged inputs of another run.
+    Replay(replay::Replayed),
+    /// Make the reports of runs again, from their logs alone, or verify them.
     Report(report::Report),
     /// Make a dive: stereo pairs with truth, visibility and rough poses, as a data set.
     Dive(dive::Dive),
@@ -68,16 +77,19 @@ impl Command {
     pub(crate) fn execute(&self) -> Ended {
         match self {
             Self::Run(command) => command.execute(),
+            Self::Merge(command) => command.execute(),
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),
             Self::Odometry(command) => command.execute(),
             Self::Draw(command) => command.execute(),
+            Self::Compare(command) => command.execute(),
             Self::Diff(command) => command.execute(),
             Self::Eval(command) => command.execute(),
             Self::Check { paths, limits } => check::execute(paths, limits.of_images()),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),
             Self::Recover(command) => command.execute(),
+            Self::Replay(command) => command.execute(),
             Self::Report(command) => command.execute(),
             Self::Dive(command) => command.execute(),
             Self::Export(command) => command.execute(),

@@ -3,29 +3,104 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use seafix_report::{ReportError, report};
+use seafix_report::{Forms, ReportError, Verified, index, report, verify};
 
 use crate::{
-    exit::{DONE, Ended, Failure, INPUT, OUTPUT},
+    exit::{DONE, Ended, FINDINGS, Failure, INPUT, OUTPUT, USAGE},
     terminal::print,
 };
 
 #[derive(Debug, Args)]
 pub(crate) struct Report {
-    /// The folder of the run.
-    run: PathBuf,
-    /// Where the report goes [default: report/ in the run's folder].
+    /// The folders of the runs, a report each.
+    #[arg(required = true)]
+    runs: Vec<PathBuf>,
+    /// Where the report goes, or a folder below it for each of several runs [default: report/ in the run's folder].
     #[arg(long)]
     out: Option<PathBuf>,
+    /// The page [default: all forms].
+    #[arg(long)]
+    html: bool,
+    /// The LaTeX source.
+    #[arg(long)]
+    latex: bool,
+    /// The PDF.
+    #[arg(long)]
+    pdf: bool,
+    /// Write nothing: compute every printed number again from the logs, and say what differs.
+    #[arg(long, conflicts_with_all = ["html", "latex", "pdf", "index"])]
+    verify: bool,
+    /// Also write README.md into the folder of all reports: what the runs found.
+    #[arg(long, requires = "out")]
+    index: bool,
 }
 
 impl Report {
     pub(crate) fn execute(&self) -> Ended {
-        let folder = self.out.clone().unwrap_or_else(|| self.run.join("report"));
-        let written = report(&self.run, &folder).map_err(failure)?;
-        print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
+        let folders = self.folders()?;
+        if self.verify {
+            return self.verify_all(&folders);
+        }
+        let forms = match (self.html, self.latex, self.pdf) {
+            (false, false, false) => Forms::ALL,
+            (html, latex, pdf) => Forms { html, latex, pdf },
+        };
+        for (run, folder) in self.runs.iter().zip(&folders) {
+            let written = report(run, folder, forms).map_err(failure)?;
+            print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
+        }
+        if let (true, Some(out)) = (self.index, &self.out) {
+            print(&format!("findings: {}\n", index(&self.runs, out).map_err(failure)?.display()))?;
+        }
         Ok(DONE)
     }
+
+    /// Where each report goes.
+    fn folders(&self) -> Result<Vec<PathBuf>, Failure> {
+        let several = self.runs.len() > 1 || self.index;
+        let folder = |run: &PathBuf| match &self.out {
+            None => run.join("report"),
+            Some(out) if several => out.join(run.file_name().unwrap_or_default()),
+            Some(out) => out.clone(),
+        };
+        let folders: Vec<PathBuf> = self.runs.iter().map(folder).collect();
+        for (index, one) in folders.iter().enumerate() {
+            if folders[..index].contains(one) {
+                let line = format!(
+                    "two runs would write their report to {}; give them folders of different names",
+                    one.display()
+                );
+                return Err(Failure::new(USAGE, line));
+            }
+        }
+        Ok(folders)
+    }
+
+    fn verify_all(&self, folders: &[PathBuf]) -> Ended {
+        let mut code = DONE;
+        for (run, folder) in self.runs.iter().zip(folders) {
+            let verified = verify(run, folder).map_err(failure)?;
+            print(&said(&verified, &folder.display().to_string()))?;
+            if !verified.holds() {
+                code = FINDINGS;
+            }
+        }
+        Ok(code)
+    }
+}
+
+/// What a verification found, for people.
+fn said(verified: &Verified, folder: &str) -> String {
+    let mut text = String::new();
+    for wrong in &verified.mismatches {
+        text += &format!("{}: printed {}, logged {}: {}\n", wrong.file, wrong.printed, wrong.logged, wrong.key);
+    }
+    for file in &verified.changed {
+        text += &format!("{file} is not what the logs make\n");
+    }
+    let text: String = text.chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect();
+    let equal = verified.numbers - verified.mismatches.len();
+    format!("{text}{folder}: {equal} of {} numbers equal to the last digit\n", verified.numbers)
 }
 
 /// Logs that cannot be read are input, a report that cannot be written is output.

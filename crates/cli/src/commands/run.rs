@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use seafix_experiment::{Plan, run};
-use seafix_report::report;
+use seafix_experiment::{Existing, Options, Plan, Shard, run};
+use seafix_report::{Forms, report};
 
 use crate::{
     exit::{DONE, Ended, Failure, USAGE},
+    signals,
     terminal::{Progress, print},
 };
 
@@ -18,25 +19,67 @@ pub(crate) struct Run {
     /// Change a setting of the experiment: a dotted key and a TOML value, `source.frames=3`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    #[command(flatten)]
+    place: Place,
+    /// Make only the k-th of n parts of the run; `seafix merge` joins them.
+    #[arg(long, value_name = "K/N", requires = "out")]
+    shard: Option<Shard>,
+    /// Log no durations: two runs of one experiment then have the same bytes.
+    #[arg(long)]
+    untimed: bool,
+}
+
+/// Where a run goes, and who works on it.
+#[derive(Debug, Args)]
+pub(crate) struct Place {
     /// The folder of the run; it must not exist or be empty [default: the next free one below runs/].
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Go on with the run that is in the folder, if it is the same one; begin it if there is none.
+    #[arg(long, requires = "out", conflicts_with = "overwrite")]
+    resume: bool,
+    /// Remove the run that is in the folder first.
+    #[arg(long, requires = "out")]
+    overwrite: bool,
     /// How many threads work; the answers do not depend on it [default: all cores].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
 
+impl Place {
+    pub(crate) fn options(&self) -> Options {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let existing = match (self.resume, self.overwrite) {
+            (true, _) => Existing::Resume,
+            (_, true) => Existing::Overwrite,
+            _ => Existing::Refuse,
+        };
+        let threads = self.threads.map_or(cores, usize::from);
+        Options { out: self.out.clone(), existing, threads, shard: None, timed: true }
+    }
+}
+
 impl Run {
     pub(crate) fn execute(&self) -> Ended {
         let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let threads = self.threads.map_or(cores, usize::from);
+        let options = Options { shard: self.shard, timed: !self.untimed, ..self.place.options() };
         let progress = Progress::new();
-        let finished = run(&plan, self.out.as_deref(), threads, &progress);
+        signals::listen();
+        let finished = run(&plan, &options, &progress);
+        signals::end_at_once();
         progress.end();
         let finished = finished?;
-        let written = report(&finished.folder, &finished.folder.join("report")).map_err(super::report::failure)?;
-        print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
+        match self.shard {
+            Some(shard) => print(&format!("shard {shard}: {}\n", finished.folder.display()))?,
+            None => tell_of(&finished)?,
+        }
         Ok(DONE)
     }
+}
+
+/// Makes the report of a run that is complete, and prints its summary.
+pub(crate) fn tell_of(finished: &seafix_experiment::Finished) -> Result<(), Failure> {
+    let written =
+        report(&finished.folder, &finished.folder.join("report"), Forms::ALL).map_err(super::report::failure)?;
+    print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))
 }

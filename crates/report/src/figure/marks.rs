@@ -46,6 +46,74 @@ pub(super) fn plus(image: &mut RgbImage, centre: [f64; 2], arm: f64, width: f64,
     paint(image, centre, arm, colour, |x, y| bar(x, y).min(bar(y, x)));
 }
 
+/// The outline of a rectangle with these half sides.
+pub(super) fn frame(image: &mut RgbImage, centre: [f64; 2], [a, b]: [f64; 2], width: f64, colour: [u8; 3]) {
+    let inside = |x: f64, y: f64| (x.abs() - a).max(y.abs() - b);
+    paint(image, centre, a.max(b) + width, colour, |x, y| inside(x, y).abs() - width / 2.0);
+}
+
+/// A digit from 0 to 9 of this half height, as lines of even width.
+pub(super) fn digit(image: &mut RgbImage, centre: [f64; 2], digit: usize, half: f64, colour: [u8; 3]) {
+    // Lines between the corners of a grid of 3 × 5: (x, y) from −1 to 1 and from −2 to 2.
+    const LINES: [&[[[f64; 2]; 2]]; 10] = [
+        &[
+            [[-1.0, -2.0], [1.0, -2.0]],
+            [[1.0, -2.0], [1.0, 2.0]],
+            [[1.0, 2.0], [-1.0, 2.0]],
+            [[-1.0, 2.0], [-1.0, -2.0]],
+        ],
+        &[[[-0.7, -1.2], [0.2, -2.0]], [[0.2, -2.0], [0.2, 2.0]]],
+        &[
+            [[-1.0, -1.6], [-0.6, -2.0]],
+            [[-0.6, -2.0], [0.8, -2.0]],
+            [[0.8, -2.0], [1.0, -0.8]],
+            [[1.0, -0.8], [-1.0, 2.0]],
+            [[-1.0, 2.0], [1.0, 2.0]],
+        ],
+        &[[[-1.0, -2.0], [1.0, -2.0]], [[1.0, -2.0], [1.0, 2.0]], [[1.0, 2.0], [-1.0, 2.0]], [[-0.5, 0.0], [1.0, 0.0]]],
+        &[[[0.5, 2.0], [0.5, -2.0]], [[0.5, -2.0], [-1.1, 0.8]], [[-1.1, 0.8], [1.1, 0.8]]],
+        &[
+            [[1.0, -2.0], [-1.0, -2.0]],
+            [[-1.0, -2.0], [-1.0, -0.3]],
+            [[-1.0, -0.3], [1.0, -0.3]],
+            [[1.0, -0.3], [1.0, 2.0]],
+            [[1.0, 2.0], [-1.0, 2.0]],
+        ],
+        &[
+            [[0.9, -2.0], [-1.0, 0.0]],
+            [[-1.0, 0.0], [-1.0, 2.0]],
+            [[-1.0, 2.0], [1.0, 2.0]],
+            [[1.0, 2.0], [1.0, 0.0]],
+            [[1.0, 0.0], [-1.0, 0.0]],
+        ],
+        &[[[-1.0, -2.0], [1.0, -2.0]], [[1.0, -2.0], [-0.3, 2.0]]],
+        &[
+            [[-1.0, -2.0], [1.0, -2.0]],
+            [[1.0, -2.0], [1.0, 2.0]],
+            [[1.0, 2.0], [-1.0, 2.0]],
+            [[-1.0, 2.0], [-1.0, -2.0]],
+            [[-1.0, 0.0], [1.0, 0.0]],
+        ],
+        &[
+            [[1.0, 0.0], [-1.0, 0.0]],
+            [[-1.0, 0.0], [-1.0, -2.0]],
+            [[-1.0, -2.0], [1.0, -2.0]],
+            [[1.0, -2.0], [1.0, 0.0]],
+            [[1.0, 0.0], [-0.9, 2.0]],
+        ],
+    ];
+    let unit = half / 2.0;
+    let near = |x: f64, y: f64, [[ax, ay], [bx, by]]: [[f64; 2]; 2]| {
+        let ([ax, ay], [bx, by]) = ([ax * unit, ay * unit], [bx * unit, by * unit]);
+        let (dx, dy) = (bx - ax, by - ay);
+        let along = (((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+        (x - ax - along * dx).hypot(y - ay - along * dy)
+    };
+    let lines = LINES[digit % 10];
+    let distance = |x: f64, y: f64| lines.iter().map(|line| near(x, y, *line)).fold(f64::INFINITY, f64::min);
+    paint(image, centre, half * 1.3, colour, |x, y| distance(x, y) - 0.17 * half);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

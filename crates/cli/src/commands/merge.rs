@@ -1,0 +1,33 @@
+//! `seafix merge`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use seafix_experiment::merge;
+
+use super::run::{Place, tell_of};
+use crate::{
+    exit::{DONE, Ended},
+    signals,
+    terminal::Progress,
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Merge {
+    /// The folders of all shards of one run, made by `seafix run --shard k/n`.
+    #[arg(required = true)]
+    shards: Vec<PathBuf>,
+    #[command(flatten)]
+    place: Place,
+}
+
+impl Merge {
+    pub(crate) fn execute(&self) -> Ended {
+        let progress = Progress::new();
+        signals::listen();
+        let finished = merge(&self.shards, &self.place.options(), &progress);
+        signals::end_at_once();
+        tell_of(&finished?)?;
+        Ok(DONE)
+    }
+}

@@ -1,0 +1,348 @@
+//! Nothing is lost: runs that are killed, interrupted, out of disk, or in each other's way.
+
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it did")]
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::{Child, Command, Output, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use tempfile::TempDir;
+
+const EXPERIMENT: &str = "question = 'Is anything lost?'\nseed = 3\n[source]\nname = 'virtual-points'\n\
+    [[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'triad']\n";
+
+/// A folder with an experiment of so many frames.
+fn experiment(frames: usize) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(
+        folder.path().join("e.toml"),
+        EXPERIMENT.replace("'virtual-points'\n", &format!("'virtual-points'\nframes = {frames}\n")),
+    )
+    .unwrap();
+    folder
+}
+
+fn seafix(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_seafix"));
+    command.current_dir(folder).args(arguments).stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+/// A run into `out` without durations.
+fn run(folder: &Path, out: &str, more: &[&str]) -> Command {
+    seafix(folder, &[&["run", "e.toml", "--untimed", "--out", out], more].concat())
+}
+
+fn ended(output: &Output) -> (Option<i32>, String) {
+    (output.status.code(), String::from_utf8(output.stderr.clone()).unwrap())
+}
+
+/// The files of a run, all but its manifest, which tells of the machine.
+fn files(run: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![run.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if !["manifest.json", ".lock"].contains(&path.file_name().unwrap().to_str().unwrap()) {
+                found.insert(path.strip_prefix(run).unwrap().to_owned(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+fn same(one: &Path, other: &Path) {
+    let (one, other) = (files(one), files(other));
+    assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+    for (name, bytes) in &one {
+        assert!(*bytes == other[name], "{} differs", name.display());
+    }
+}
+
+fn state(run: &Path) -> String {
+    let manifest: serde_json::Value = serde_json::from_slice(&fs::read(run.join("manifest.json")).unwrap()).unwrap();
+    manifest["state"].as_str().unwrap().to_owned()
+}
+
+/// Waits until some piece of the run is there.
+fn until_begun(child: &mut Child, run: &Path) {
+    let begun = |run: &Path| fs::read_dir(run.join("pieces")).is_ok_and(|mut all| all.next().is_some());
+    let start = Instant::now();
+    while !begun(run) {
+        assert!(child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(60), "it never began");
+        sleep(Duration::from_millis(2));
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args([&format!("-{name}"), &pid]).status().unwrap().success());
+}
+
+/// Every log that a killed run left: what is closed is sound, what is not can be saved, or has no frame yet.
+fn recoverable(folder: &Path, run: &Path) {
+    let logs = |ending: &str| -> Vec<String> {
+        let all = files(run).into_keys().map(|name| run.join(name).to_str().unwrap().to_owned());
+        all.filter(|log| log.ends_with(ending)).collect()
+    };
+    let closed = logs(".mcap");
+    if !closed.is_empty() {
+        let (code, error) = ended(&seafix(folder, &["check"]).args(&closed).output().unwrap());
+        assert_eq!(code, Some(0), "{error}");
+    }
+    for log in logs(".mcap.partial") {
+        let (code, error) = ended(&seafix(folder, &["recover", &log, "--out", "saved.mcap"]).output().unwrap());
+        let nothing = error.contains("no message in it is readable") || error.contains("it is empty");
+        assert!(code == Some(0) || (code == Some(3) && nothing), "{log}: {error}");
+        let _ = fs::remove_file(folder.join("saved.mcap"));
+    }
+}
+
+/// Kills a run at random instants; resumed it must end with the bytes of one that was not killed.
+fn kill(times: u64, frames: usize) {
+    let folder = experiment(frames);
+    let folder = folder.path();
+    let start = Instant::now();
+    assert_eq!(ended(&run(folder, "whole", &[]).output().unwrap()).0, Some(0));
+    let whole = start.elapsed();
+    let (mut lost, mut killed) = (0, 0);
+    for time in 0..times {
+        let out = format!("run-{time}");
+        let mut child = run(folder, &out, &[]).spawn().unwrap();
+        // Spread over the run by the golden ratio.
+        sleep(whole.mul_f64((time as f64 * 0.618_033_988_75).fract()));
+        child.kill().unwrap();
+        killed += u64::from(child.wait().unwrap().code().is_none());
+        let out_path = folder.join(&out);
+        if out_path.exists() {
+            recoverable(folder, &out_path);
+            lost += u64::from(fs::read_dir(out_path.join("pieces")).is_ok_and(|all| all.count() > 0));
+        }
+        let (code, error) = ended(&run(folder, &out, &["--resume"]).output().unwrap());
+        assert_eq!(code, Some(0), "{error}");
+        same(&folder.join("whole"), &out_path);
+        fs::remove_dir_all(&out_path).unwrap();
+    }
+    println!("{killed} of {times} runs were killed, {lost} of them amid their pieces");
+}
+
+#[test]
+fn a_run_that_is_killed_and_resumed_has_the_same_bytes() {
+    kill(4, 200);
+}
+
+/// `cargo test --release --workspace --test safety -- --ignored two_hundred --nocapture`
+#[test]
+#[ignore = "200 runs"]
+fn two_hundred_kills() {
+    kill(200, 2000);
+}
+
+#[test]
+fn an_interrupted_run_ends_in_good_order() {
+    let folder = experiment(1_000_000);
+    let folder = folder.path();
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
+        let mut child = run(folder, name, &[]).spawn().unwrap();
+        until_begun(&mut child, &folder.join(name));
+        signal(&child, name);
+        let output = child.wait_with_output().unwrap();
+        let (ended, error) = ended(&output);
+        assert_eq!(ended, Some(code), "{error}");
+        assert!(error.contains("interrupted") && error.contains("--resume"), "{error}");
+        assert_eq!(state(&folder.join(name)), "interrupted");
+        // What had begun is closed, with its summary.
+        assert!(files(&folder.join(name)).keys().all(|file| !file.to_string_lossy().ends_with(".mcap.partial")));
+        recoverable(folder, &folder.join(name));
+    }
+}
+
+#[test]
+fn two_runs_in_one_folder() {
+    let folder = experiment(1_000_000);
+    let folder = folder.path();
+    let mut first = run(folder, "out", &[]).spawn().unwrap();
+    until_begun(&mut first, &folder.join("out"));
+    for more in [&["--resume"], &["--overwrite"]] {
+        let (code, error) = ended(&run(folder, "out", more).output().unwrap());
+        assert_eq!(code, Some(4), "{error}");
+        assert!(error.contains(&format!("process {}", first.id())), "{error}");
+    }
+    first.kill().unwrap();
+    first.wait().unwrap();
+    // The lock went with it.
+    let (code, error) = ended(&run(folder, "out", &["--overwrite", "--set", "source.frames=3"]).output().unwrap());
+    assert_eq!(code, Some(0), "{error}");
+}
+
+#[test]
+fn a_run_that_is_there_stays_unless_told_otherwise() {
+    let folder = experiment(4);
+    let folder = folder.path();
+    let run = |more: &[&str]| ended(&run(folder, "out", more).output().unwrap());
+    assert_eq!(run(&["--resume"]).0, Some(0), "there is none yet, so it begins");
+    let before = files(&folder.join("out"));
+    let (code, error) = run(&[]);
+    assert!(code == Some(4) && error.contains("not empty") && error.contains("--resume"), "{error}");
+    let (code, error) = run(&["--resume", "--set", "seed=4"]);
+    assert!(code == Some(4) && error.contains("holds another run") && error.contains("the experiment"), "{error}");
+    assert_eq!(run(&["--resume"]).0, Some(0));
+    assert!(files(&folder.join("out")) == before);
+    assert_eq!(run(&["--overwrite", "--set", "seed=4"]).0, Some(0));
+    assert!(files(&folder.join("out")) != before);
+    fs::write(folder.join("out/thesis.txt"), "all my work").unwrap();
+    let (code, error) = run(&["--overwrite"]);
+    assert!(code == Some(4) && error.contains("thesis.txt"), "{error}");
+    assert!(folder.join("out/results.csv").exists());
+}
+
+#[test]
+fn a_folder_that_cannot_be_written() {
+    let folder = experiment(4);
+    fs::write(folder.path().join("file"), "").unwrap();
+    for out in ["/proc/nowhere", "file/below", "/dev/null"] {
+        let (code, error) = ended(&run(folder.path(), out, &[]).output().unwrap());
+        assert!(code == Some(4) && error.starts_with("error: "), "{error}");
+        assert_eq!(error.lines().count(), 1, "before anything is computed: {error}");
+    }
+}
+
+#[test]
+fn threads_are_some() {
+    let folder = experiment(4);
+    for threads in ["0", "100000", "-1", "many"] {
+        assert_eq!(ended(&run(folder.path(), "out", &["--threads", threads]).output().unwrap()).0, Some(2));
+    }
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn the_surroundings_change_no_byte() {
+    let folder = experiment(6);
+    let folder = folder.path();
+    assert!(run(folder, "plain", &[]).output().unwrap().status.success());
+    let mut other = run(folder, "other", &["--threads", "3"]);
+    other.env("LC_ALL", "de_DE.UTF-8").env("TZ", "Asia/Kathmandu").env_remove("HOME");
+    assert!(other.output().unwrap().status.success());
+    same(&folder.join("plain"), &folder.join("other"));
+}
+
+#[test]
+fn a_reader_that_goes_away_ends_the_run_quietly() {
+    let folder = experiment(4);
+    let mut command = run(folder.path(), "out", &[]);
+    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let (code, error) = ended(&child.wait_with_output().unwrap());
+    assert!(code == Some(0) && !error.contains("panicked"), "{error}");
+}
+
+#[test]
+fn a_run_without_memory_is_resumed() {
+    let folder = experiment(200);
+    let folder = folder.path();
+    assert!(run(folder, "whole", &[]).output().unwrap().status.success());
+    for limit in [60_000, 120_000] {
+        let command = format!(
+            "ulimit -v {limit}; exec {} run e.toml --untimed --out small --resume",
+            env!("CARGO_BIN_EXE_seafix")
+        );
+        let output = Command::new("sh").args(["-c", &command]).current_dir(folder).output().unwrap();
+        assert!(output.status.success() || !folder.join("small/results.csv").exists());
+        if folder.join("small").exists() {
+            recoverable(folder, &folder.join("small"));
+        }
+    }
+    assert!(run(folder, "small", &["--resume"]).output().unwrap().status.success());
+    same(&folder.join("whole"), &folder.join("small"));
+}
+
+/// Of a short run every nth change of a file fails, for each n that `takes` says.
+fn fail(takes: impl Fn(u64) -> bool) {
+    let folder = experiment(3);
+    let folder = folder.path();
+    let library = folder.join("fail.so");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fail/every_nth_write.c");
+    let compiled =
+        Command::new("cc").args(["-shared", "-fPIC", "-O1", "-o"]).arg(&library).arg(source).arg("-ldl").status();
+    if !compiled.is_ok_and(|status| status.success()) {
+        println!("skipped: no C compiler");
+        return;
+    }
+    let failing = |out: &str, every: u64| {
+        let mut command = run(folder, out, &["--threads", "2"]);
+        command.env("LD_PRELOAD", &library).env("FAIL_BELOW", folder.join(out)).env("FAIL_EVERY", every.to_string());
+        command.env("FAIL_COUNT", folder.join("count"));
+        ended(&command.output().unwrap())
+    };
+    assert_eq!(failing("whole", 0).0, Some(0));
+    let writes: u64 = fs::read_to_string(folder.join("count")).unwrap().trim().parse().unwrap();
+    assert!(writes > 50, "only {writes} changes of files were seen");
+    let mut tried = 0;
+    for every in (1..=writes).filter(|every| takes(*every)) {
+        let (code, error) = failing("out", every);
+        let out = folder.join("out");
+        assert_eq!(code, Some(4), "every {every} of {writes}: {error}");
+        assert!(!error.contains("panicked") && error.contains("error: ") && error.contains("out"), "{error}");
+        if out.exists() {
+            recoverable(folder, &out);
+        }
+        let (code, error) = ended(&run(folder, "out", &["--resume"]).output().unwrap());
+        assert_eq!(code, Some(0), "every {every} of {writes}: {error}");
+        same(&folder.join("whole"), &out);
+        fs::remove_dir_all(&out).unwrap();
+        tried += 1;
+    }
+    println!("{tried} of {writes} changes of files failed in turn");
+}
+
+#[test]
+fn a_full_disk_is_said_and_nothing_is_lost() {
+    fail(|every| every % 31 == 1);
+}
+
+/// `cargo test --release --workspace --test safety -- --ignored every_write --nocapture`
+#[test]
+#[ignore = "several hundred runs"]
+fn every_write_fails_in_turn() {
+    fail(|_| true);
+}
+
+#[test]
+fn neither_threads_nor_shards_change_a_byte() {
+    let folder = experiment(200);
+    let folder = folder.path();
+    assert!(run(folder, "whole", &["--threads", "1"]).output().unwrap().status.success());
+    for threads in ["2", "8"] {
+        assert!(run(folder, threads, &["--threads", threads]).output().unwrap().status.success());
+        same(&folder.join("whole"), &folder.join(threads));
+    }
+    for (shards, threads) in [(1, "8"), (3, "2"), (7, "1")] {
+        let names: Vec<String> = (1..=shards).map(|k| format!("shards-{shards}/{k}")).collect();
+        for (k, name) in names.iter().enumerate() {
+            let shard = format!("{}/{shards}", k + 1);
+            let (code, error) = ended(&run(folder, name, &["--shard", &shard, "--threads", threads]).output().unwrap());
+            assert_eq!(code, Some(0), "{error}");
+        }
+        let merged = format!("merged-{shards}");
+        let merge = |names: &[String], out: &str| {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            ended(&seafix(folder, &[&["merge", "--out", out], &names[..]].concat()).output().unwrap())
+        };
+        assert_eq!(merge(&names, &merged).0, Some(0));
+        same(&folder.join("whole"), &folder.join(&merged));
+        if shards > 1 {
+            let (code, error) = merge(&names[1..], "fewer");
+            assert!(code == Some(3) && error.contains("pieces are missing"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Several runs side by side, where that says something.
+
+use std::path::{Path, PathBuf};
+
+use seafix_log::Axis;
+
+use crate::{
+    ReportError, Summary, content, format,
+    paired::{self, Comparison},
+    print,
+    run::{Run, Trial},
+    write::write,
+};
+
+/// What a comparison found.
+#[derive(Debug)]
+pub struct Compared {
+    /// The results of all runs and their differences, for a terminal.
+    pub table: String,
+    /// The page, where one was wanted.
+    pub page: Option<PathBuf>,
+    /// Whether a difference is significant.
+    pub differ: bool,
+}
+
+/// Compares runs of the same data: the same source, seeds, cameras, site, targets and limits.
+///
+/// # Errors
+/// [`ReportError::Incomparable`] with what differs, unless `force`; [`ReportError`] when a log cannot be read or the page
+/// cannot be written.
+pub fn compare(folders: &[PathBuf], force: bool, out: Option<&Path>) -> Result<Compared, ReportError> {
+    let mut runs: Vec<Run> = folders.iter().map(|folder| Run::read(folder)).collect::<Result<_, _>>()?;
+    if !force {
+        for (run, folder) in runs.iter().zip(folders).skip(1) {
+            let differences = differences(&runs[0], run);
+            if !differences.is_empty() {
+                return Err(ReportError::Incomparable {
+                    first: folders[0].clone(),
+                    other: folder.clone(),
+                    differences,
+                });
+            }
+        }
+    }
+    let names = names(folders);
+    let keys = content::distinct(runs.iter().flat_map(|run| run.header().axes.iter().map(|axis| axis.key.clone())));
+    for (run, name) in runs.iter_mut().zip(&names) {
+        for trial in &mut run.trials {
+            joined(trial, name, &keys);
+        }
+    }
+    let mut run = Run { trials: runs.into_iter().flat_map(|run| run.trials).collect(), joined: true };
+    let title = names.join(" and ");
+    for trial in &mut run.trials {
+        trial.header.title = format!("comparison of {title}");
+        trial.header.run.clone_from(&title);
+        trial.header.command = format!("seafix compare {}", names.join(" "));
+    }
+    let summary = Summary::of(&run);
+    let comparisons = paired::comparisons(&run, &summary);
+    let page = out.map(|folder| {
+        let document = content::document(&run, &summary)?;
+        write(folder, "compare.html", print::html(&document).as_bytes())
+    });
+    Ok(Compared {
+        table: format!("{summary}\n\n{}", lines(&comparisons)),
+        page: page.transpose()?,
+        differ: comparisons.iter().any(|comparison| comparison.better().is_some()),
+    })
+}
+
+/// The names of the folders; the whole path where two have the same.
+fn names(folders: &[PathBuf]) -> Vec<String> {
+    let name =
+        |folder: &PathBuf| folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let short: Vec<String> = folders.iter().map(name).collect();
+    let unique = short.iter().all(|one| short.iter().filter(|other| *other == one).count() == 1);
+    if unique { short } else { folders.iter().map(|folder| folder.display().to_string()).collect() }
+}
+
+/// Makes a trial one of several runs: the run is an axis, and every run has all axes.
+fn joined(trial: &mut Trial, name: &str, keys: &[String]) {
+    let of = |key: &String| {
+        let value = trial.header.axes.iter().find(|axis| axis.key == *key).map(|axis| axis.value.clone());
+        Axis { key: key.clone(), value: value.unwrap_or_else(|| "–".to_owned()) }
+    };
+    let own = keys.iter().map(of);
+    let axes = [Axis { key: "run".to_owned(), value: name.to_owned() }].into_iter().chain(own).collect();
+    trial.label = format!("{name}/{}", trial.label);
+    trial.header.axes = axes;
+}
+
+/// What makes two runs incomparable, a line each.
+fn differences(first: &Run, other: &Run) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut say = |what: &str, own: Vec<String>, its: Vec<String>| {
+        let only =
+            |a: &[String], b: &[String]| a.iter().filter(|line| !b.contains(line)).take(3).cloned().collect::<Vec<_>>();
+        let (left, right) = (only(&own, &its), only(&its, &own));
+        if !left.is_empty() || !right.is_empty() {
+            let show = |lines: Vec<String>| if lines.is_empty() { "–".to_owned() } else { lines.join(" and ") };
+            found.push(format!("{what}: {} against {}", show(left), show(right)));
+        }
+    };
+    let of = |run: &Run, lines: fn(&Trial) -> Vec<String>| content::distinct(run.trials.iter().flat_map(lines));
+    let mut both = |what: &str, lines: fn(&Trial) -> Vec<String>| say(what, of(first, lines), of(other, lines));
+    both("source", |trial| vec![trial.header.source.clone()]);
+    both("settings of the source", |trial| {
+        let table = trial.header.configuration.parse::<toml::Table>().unwrap_or_default();
+        let source = table.get("source").and_then(|source| source.as_table()).cloned().unwrap_or_default();
+        source.into_iter().map(|(key, value)| format!("{key} = {value}")).collect()
+    });
+    both("seeds", |trial| trial.header.seeds.iter().map(|(name, seed)| format!("{name} {seed}")).collect());
+    both("cameras", |trial| {
+        let rig = &trial.header.rig;
+        let side = |camera: &seafix_log::CameraRecord| {
+            format!(
+                "{} × {} px, f = {} px, {:?}",
+                camera.size[0], camera.size[1], camera.matrix[0][0], camera.distortion
+            )
+        };
+        vec![side(&rig.left), side(&rig.right), format!("right from left {:?}", rig.right_from_left)]
+    });
+    both("targets", |trial| {
+        let target = |target: &seafix_log::TargetModel| {
+            format!("{} with {} points, wrong beyond {} m", target.id, target.points.len(), target.alert_limit)
+        };
+        trial.header.targets.iter().map(target).collect()
+    });
+    both("site", |trial| trial.header.site.lines().map(str::to_owned).collect());
+    found
+}
+
+/// The comparisons, a line each.
+fn lines(comparisons: &[Comparison]) -> String {
+    if comparisons.is_empty() {
+        return "No two trials saw the same frames, so nothing is compared.\n".to_owned();
+    }
+    let mut text = String::from(
+        "First − second on the same attempts, m2, failures as infinitely far off; p adjusted after Holm.\n",
+    );
+    for c in comparisons {
+        let real = |value: f64| if c.over_conditions { value.exp() } else { value * 1e3 };
+        let [middle, low, high] = [c.difference, c.interval.0, c.interval.1].map(|v| format::number(Some(real(v)), 3));
+        let unit = if c.over_conditions { "times" } else { "mm" };
+        let sure = if c.better().is_some() { "significant" } else { "not significant" };
+        let condition = if c.condition.is_empty() { String::new() } else { format!("{}: ", c.condition) };
+        let line = format!(
+            "{condition}{} – {}: {middle} {unit} [{low}, {high}], n {}, p {}, {sure}",
+            c.names[0],
+            c.names[1],
+            c.n,
+            format::number(Some(c.holm), 4)
+        );
+        text.extend(line.chars().map(|sign| if sign.is_control() { ' ' } else { sign }));
+        text.push('\n');
+    }
+    text
+}

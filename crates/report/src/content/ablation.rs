@@ -1,0 +1,73 @@
+//! What each setting does by itself, all others pooled.
+
+use super::{distinct, tell};
+use crate::{
+    Key, Number, Row, Summary,
+    document::{Block, Head, Section, Table, text},
+    format::{decimals, headed},
+    run::{Run, Trial},
+};
+
+pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+    let axes = &summary.rows.first()?.axes;
+    let mut heads = vec![Head::words("Setting"), Head::words("value"), Head::numbers("trials"), Head::numbers("n")];
+    heads.extend(
+        ["found (%)", "wrong (%)", "m2 least (mm)", "m2 middle (mm)", "m2 greatest (mm)", "total (ms)"]
+            .map(Head::numbers),
+    );
+    let caption = text![
+        "Each setting by itself, all others pooled: shares of all attempts; the least, the middle and the greatest of the trials’ medians of m2 over all attempts, failures as infinitely far off; the middle of their median times."
+    ];
+    let mut table = Table::new("ablation", caption, heads);
+    let all = summary.rows.iter().filter_map(|row| row.m2_of_all).map(|m2| m2 * 1e3);
+    let digits = decimals(all);
+    for (place, axis) in axes.iter().enumerate() {
+        let value = |row: &Row| row.axes[place].value.clone();
+        let values = distinct(summary.rows.iter().map(value));
+        if values.len() < 2 || values.len() > 12 {
+            continue;
+        }
+        for (index, wanted) in values.iter().enumerate() {
+            let own: Vec<usize> = (0..summary.rows.len()).filter(|&i| value(&summary.rows[i]) == *wanted).collect();
+            let trials: Vec<&Trial> = own.iter().map(|&i| &run.trials[i]).collect();
+            let total = |count: fn(&Row) -> usize| own.iter().map(|&i| count(&summary.rows[i])).sum::<usize>();
+            let over = |topic: &str, what: &str| -> Key { tell::over(&trials, topic, what.to_owned()) };
+            let n = total(|row| row.attempted);
+            let share = |group: &str, k: usize| {
+                let key = over("/metrics/evaluation", &format!("percent {group} of attempted"));
+                Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
+            };
+            let mut m2: Vec<f64> = own.iter().filter_map(|&i| summary.rows[i].m2_of_all).map(|m| m * 1e3).collect();
+            let middle = (!m2.is_empty()).then(|| seafix_evaluation::median(&mut m2));
+            let ends = m2.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
+            let [least, most] = ends.map(|end| (!m2.is_empty()).then_some(end));
+            let error = |which: &str, value| {
+                Number::new(
+                    value,
+                    digits,
+                    over("/metrics/evaluation", &format!("{which} all m2_rms of attempted in mm")),
+                )
+            };
+            let mut times: Vec<f64> = own.iter().filter_map(|&i| summary.rows[i].times.total_ms).collect();
+            let time = (!times.is_empty()).then(|| seafix_evaluation::median(&mut times));
+            let first = index == 0;
+            let name = if first { headed(&axis.key) } else { String::new() };
+            table.line(
+                first,
+                vec![
+                    name.into(),
+                    wanted.clone().into(),
+                    own.len().to_string().into(),
+                    Number::count(n, over("/metrics/evaluation", "count attempted")).into(),
+                    share("found", total(|row| row.found)).into(),
+                    share("wrong", total(|row| row.wrong)).into(),
+                    error("least", least).into(),
+                    error("middle", middle).into(),
+                    error("greatest", most).into(),
+                    Number::new(time, 1, over("/metrics/timing", "middle median total_ms of attempted")).into(),
+                ],
+            );
+        }
+    }
+    (!table.lines.is_empty()).then(|| Section::new("Ablation and sensitivity").with([Block::Table(table)]))
+}

@@ -1,0 +1,142 @@
+//! What the methods were given.
+
+use seafix_log::{CameraRecord, TrialHeader};
+use sha2::{Digest, Sha256};
+
+use super::distinct;
+use crate::{
+    Number, Summary,
+    document::{Block, Cell, Head, Section, Table, Text, code, text},
+    format::number,
+    run::Run,
+};
+
+use super::tell;
+
+pub(super) fn section(run: &Run, summary: &Summary) -> Section {
+    let of = |say: fn(&TrialHeader) -> String| distinct(run.trials.iter().map(|trial| say(&trial.header))).join("; ");
+    let mut table = Table::new(
+        "data",
+        text!["Conditions of the run. Where trials differ, all values stand side by side."],
+        vec![Head::words(""), Head::words("")],
+    );
+    let mut line = |name: &str, value: Text| {
+        if !value.iter().all(|span| span.plain().is_empty()) {
+            let name = Cell { text: vec![crate::document::italic(name)], ..Cell::default() };
+            table.line(false, vec![name, Cell::prose(value)]);
+        }
+    };
+    line("Source", text![of(|header| header.source.clone())]);
+    let frames = distinct(run.trials.iter().map(|trial| trial.count().to_string())).join(", ");
+    line("Frames", text![format!("{frames} a trial, {} in all", counted(run.trials.len(), "trial", "trials"))]);
+    if let Some(trial) = run.trials.iter().find(|trial| trial.every() > 1) {
+        let mut said = text!["every "];
+        said.push(tell::header(trial, "every", Some(trial.every() as f64), 0).into());
+        said.push(
+            "th frame, and failures as long as there was room; medians and quantiles are over these, counts over all"
+                .into(),
+        );
+        line("Frames logged", said);
+    }
+    line("Targets", text![of(targets)]);
+    line("Left camera", text![of(|header| camera(&header.rig.left))]);
+    line("Right camera", text![of(|header| camera(&header.rig.right))]);
+    line("Rig", text![of(rig)]);
+    line("Prior, one σ", text![of(prior)]);
+    line(
+        "Corner noise assumed",
+        text![of(|header| header.pixel_sigma.map_or(String::new(), |s| format!("σ = {s} px per axis and image")))],
+    );
+    line("Disparity noise measured", disparity(run, summary));
+    line(
+        "Model points",
+        text![of(|header| {
+            let sigmas = header.targets.iter().flat_map(|target| &target.points);
+            let sigmas = distinct(sigmas.map(|point| format!("{} mm", number(Some(point.sigma * 1e3), 2))));
+            format!("σ = {} per axis", sigmas.join(", "))
+        })],
+    );
+    line("Seeds", text![of(|header| pairs(header.seeds.iter().map(|(name, seed)| (name, seed.to_string()))))]);
+    line("Versions", text![of(|header| pairs(header.versions.iter().map(|(name, version)| (name, version.clone()))))]);
+    Section::new("Data").with([Block::Table(table), Block::Table(hashes(run))])
+}
+
+fn pairs<'a>(of: impl Iterator<Item = (&'a String, String)>) -> String {
+    of.map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>().join(", ")
+}
+
+pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+/// What identifies configuration, site and results: equal text, equal hash.
+fn hashes(run: &Run) -> Table {
+    let caption = text![
+        "SHA-256, the first 16 digits: of the resolved configuration and of the site as the log has them, and of all results of the log but its times; a run of the same configuration gives the same on every machine and any number of threads."
+    ];
+    let heads = ["Log", "configuration", "site", "results"].map(Head::words).to_vec();
+    let mut table = Table::new("hashes", caption, heads);
+    for trial in &run.trials {
+        let hash = |text: &str| code(hex(&Sha256::digest(text.as_bytes())));
+        let cells =
+            [code(trial.file()), hash(&trial.header.configuration), hash(&trial.header.site), code(hex(&trial.digest))];
+        table.line(false, cells.into_iter().map(Cell::from).collect());
+    }
+    table
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn disparity(run: &Run, summary: &Summary) -> Text {
+    let with: Vec<usize> = (0..run.trials.len()).filter(|&i| summary.rows[i].disparity_sigma.is_some()).collect();
+    let sigmas = || with.iter().filter_map(|&i| summary.rows[i].disparity_sigma);
+    let [low, high] = sigmas().fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], s| [a.min(s), b.max(s)]);
+    if with.is_empty() {
+        return Vec::new();
+    }
+    let trials: Vec<_> = with.iter().map(|&i| &run.trials[i]).collect();
+    let end = |which: &str, value: f64| {
+        Number::new(Some(value), 2, tell::over(&trials, "/referencing/frame", format!("{which} disparity")))
+    };
+    let mut said = text!["σ = ", end("least", low)];
+    if number(Some(low), 2) != number(Some(high), 2) {
+        said.extend(text!["–", end("greatest", high)]);
+    }
+    said.push(" px, RMS over the identified points within 2 px of truth, which truncates it; targets of several objects left out".into());
+    said
+}
+
+fn targets(header: &TrialHeader) -> String {
+    let targets = header.targets.iter().map(|target| format!("{} ({})", target.id, target.points.len()));
+    let points: usize = header.targets.iter().map(|target| target.points.len()).sum();
+    format!("{}: {points} feature points", targets.collect::<Vec<_>>().join(", "))
+}
+
+fn camera(camera: &CameraRecord) -> String {
+    let k = camera.matrix;
+    let distortion = if camera.distortion.iter().all(|k| *k == 0.0) { "no distortion" } else { "with distortion" };
+    format!("{} × {} px, f = {:.1}, {:.1} px, {distortion}", camera.size[0], camera.size[1], k[0][0], k[1][1])
+}
+
+/// The distance of both cameras (m).
+pub(super) fn baseline(header: &TrialHeader) -> f64 {
+    let t = header.rig.right_from_left.map(|row| row[3]);
+    t[..3].iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn rig(header: &TrialHeader) -> String {
+    format!("baseline {:.3} m, {}", baseline(header), if header.rig.rectified { "rectified" } else { "general" })
+}
+
+fn prior(header: &TrialHeader) -> String {
+    match (header.prior_position_sigma, header.prior_attitude_sigma) {
+        (None, None) => "none".to_owned(),
+        (position, attitude) => format!(
+            "{} m per world axis, {}° per camera axis",
+            position.map_or("–".to_owned(), |s| s.to_string()),
+            number(attitude.map(f64::to_degrees), 2)
+        ),
+    }
+}

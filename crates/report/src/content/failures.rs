@@ -1,0 +1,232 @@
+//! The ten worst frames, with their images and the place in the log where to look.
+
+use std::collections::BTreeMap;
+
+use super::tell::{self, Unit};
+use crate::{
+    Field, Number, ReportError,
+    document::{Block, Cell, Head, Picture, Section, Table, Text, code, text},
+    figure::{Marked, draw_picture},
+    format::{counted, decimals, short},
+    run::{Attempt, Frame, Run, Trial},
+};
+
+/// How many are listed.
+const LISTED: usize = 10;
+/// Of them refusals at most, so that large errors are seen as well.
+const REFUSALS: usize = 5;
+/// Of more frames than this, wanted pictures are looked for in none: reading all images again takes too long.
+const SEARCHED: usize = 200_000;
+
+/// One attempt in its trial.
+type Case<'a> = (usize, &'a Frame, &'a Attempt);
+
+/// The picture of the best frame for the head of the report, and the section of the worst.
+pub(super) fn section(run: &Run) -> Result<(Option<Block>, Section), ReportError> {
+    let worst = worst(run);
+    let best = best(run);
+    let mut wanted: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
+    for (trial, stamp) in best.into_iter().chain(worst.iter().map(|(trial, frame, _)| (*trial, frame.stamp_ns))) {
+        wanted.entry(trial).or_default().push(stamp);
+    }
+    let mut pictures: BTreeMap<(usize, u64), Marked> = BTreeMap::new();
+    for (trial, stamps) in wanted {
+        let small = run.trials[trial].frames.len() <= SEARCHED;
+        if run.trials[trial].images && small {
+            pictures.extend(
+                draw_picture(&run.trials[trial], &stamps)?.into_iter().map(|marked| ((trial, marked.stamp_ns), marked)),
+            );
+        }
+    }
+    let first = best.and_then(|best| pictures.get(&best).map(|marked| best_picture(run, best.0, marked)));
+    let mut section = Section::new("Failures");
+    if worst.is_empty() {
+        section.say(text!["There is no attempt."]);
+        return Ok((first, section));
+    }
+    section.add(Block::Table(table(run, &worst)));
+    let mut shown: Vec<u64> = Vec::new();
+    for (place, (index, frame, row)) in worst.iter().enumerate() {
+        // Trials of one source share their frames: one picture of each is enough.
+        let source = format!("{}{}", run.trials[*index].header.source, frame.stamp_ns);
+        let hash = source.bytes().fold(7_u64, |hash, byte| hash.wrapping_mul(131).wrapping_add(u64::from(byte)));
+        let Some(marked) = pictures.get(&(*index, frame.stamp_ns)).filter(|_| !shown.contains(&hash)) else { continue };
+        shown.push(hash);
+        section.add(failure(run, place + 1, (*index, frame, row), marked));
+    }
+    Ok((first, section))
+}
+
+/// Wrong fixes by their error, then refusals where points were in view, then the largest errors.
+fn worst(run: &Run) -> Vec<Case<'_>> {
+    let all = || {
+        let trials = run.trials.iter().enumerate();
+        trials.flat_map(|(index, trial)| trial.attempts().map(move |(frame, row)| (index, frame, row)))
+    };
+    let error = |row: &Attempt| {
+        let errors = [Field::M2, Field::M1, Field::Residual].map(|field| row.get(field));
+        errors.into_iter().flatten().next().unwrap_or(0.0)
+    };
+    let most = |cases: Vec<Case<'_>>, n: usize| -> Vec<(usize, u64)> {
+        let mut keyed: Vec<(f64, usize, u64)> = cases.iter().map(|(i, f, row)| (error(row), *i, f.number)).collect();
+        keyed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+        keyed.into_iter().take(n).map(|(_, index, frame)| (index, frame)).collect()
+    };
+    let pick = |keys: &[(usize, u64)], of: &dyn Fn(&Attempt) -> bool| -> Vec<Case<'_>> {
+        let chosen = |key: &(usize, u64)| all().find(|(i, frame, row)| (*i, frame.number) == *key && of(row));
+        keys.iter().filter_map(chosen).collect()
+    };
+    let wrong = |row: &Attempt| row.wrong();
+    let refused = |row: &Attempt| !row.wrong() && !row.found() && row.get(Field::Visible).unwrap_or(0.0) >= 3.0;
+    let found = |row: &Attempt| row.found();
+    let mut cases = pick(&most(all().filter(|(.., row)| wrong(row)).collect(), LISTED), &wrong);
+    let mut refusals: Vec<Case<'_>> = all().filter(|(.., row)| refused(row)).collect();
+    // Most points in view first: those had the least cause.
+    let visible = |row: &Attempt| row.get(Field::Visible).unwrap_or(0.0);
+    refusals.sort_by(|a, b| visible(b.2).total_cmp(&visible(a.2)));
+    cases.extend(refusals.into_iter().take(REFUSALS.min(LISTED - cases.len())));
+    cases.extend(pick(&most(all().filter(|(.., row)| found(row)).collect(), LISTED - cases.len()), &found));
+    cases
+}
+
+/// The frame with most identified points among those that have images and whose fixes are right.
+fn best(run: &Run) -> Option<(usize, u64)> {
+    let mut best: Option<(u32, usize, u64)> = None;
+    for (index, trial) in run.trials.iter().enumerate().filter(|(_, trial)| trial.images) {
+        for frame in &trial.frames {
+            let points: u32 = trial.attempts_of(frame).filter(|row| row.found()).map(|row| row.points).sum();
+            let wrong = trial.attempts_of(frame).any(Attempt::wrong);
+            // The first of equals.
+            if !wrong && points > best.map_or(0, |best| best.0) {
+                best = Some((points, index, frame.stamp_ns));
+            }
+        }
+    }
+    best.map(|(_, index, stamp)| (index, stamp))
+}
+
+fn table(run: &Run, worst: &[Case<'_>]) -> Table {
+    let columns = [
+        ("m1 (mm)", Field::M1, Unit::Millimetres),
+        ("m2 (mm)", Field::M2, Unit::Millimetres),
+        ("m3 (mm)", Field::Position, Unit::Millimetres),
+        ("m3 (°)", Field::Attitude, Unit::Degrees),
+        ("NEES", Field::Nees, Unit::Plain),
+    ];
+    let digits = columns.map(|(_, field, unit)| {
+        decimals(worst.iter().filter_map(|(.., row)| row.get(field)).map(|v| v * unit.scale()))
+    });
+    let mut heads = vec![Head::words("Log"), Head::numbers("frame"), Head::numbers("stamp (ns)")];
+    heads.extend([Head::words("target"), Head::words("judged"), Head::numbers("points"), Head::numbers("visible")]);
+    heads.extend(columns.map(|(name, ..)| Head::numbers(name)));
+    let caption = text![
+        "The ten worst attempts: wrong fixes, then up to five refusals with most points in view, then the fixes with the largest m2. The stamp leads to the frame in its log."
+    ];
+    let mut table = Table::new("worst", caption, heads);
+    for (index, frame, row) in worst {
+        let trial = &run.trials[*index];
+        let object = trial.object(row);
+        let place = (object, frame.number, frame.stamp_ns);
+        let judged = match (row.wrong(), row.found()) {
+            (true, _) => "wrong".to_owned(),
+            (_, true) if row.wrong.is_none() => "not judged".to_owned(),
+            (_, true) => "found".to_owned(),
+            _ => format!("refused: {}", trial.reason(row)),
+        };
+        let told = |field, unit, digits| tell::value(trial, place, field, row.get(field), (unit, digits)).into();
+        let (number, stamp) = named(trial, frame);
+        let mut line: Vec<Cell> = vec![code(trial.file()).into(), number.into(), stamp.into()];
+        line.extend([object.to_owned().into(), judged.into()]);
+        line.extend([told(Field::Identified, Unit::Plain, 0), told(Field::Visible, Unit::Plain, 0)]);
+        line.extend(columns.iter().zip(digits).map(|((_, field, unit), digits)| told(*field, *unit, digits)));
+        table.line(false, line);
+    }
+    table
+}
+
+/// Number and stamp of a frame.
+fn named(trial: &Trial, frame: &Frame) -> (Number, Number) {
+    let key =
+        |what: &str| crate::Key { span: [frame.stamp_ns; 2], ..crate::Key::of(trial, "/referencing/frame", what) };
+    let stamp =
+        Number { text: frame.stamp_ns.to_string(), value: Some(frame.stamp_ns as f64), key: key("stamp").into() };
+    (Number::count(frame.number as usize, key("frame")), stamp)
+}
+
+/// What the marks mean, and how many of each there are.
+fn marks(trial: &Trial, marked: &Marked) -> Text {
+    let count = |what: &str, n: usize| {
+        let key = crate::Key {
+            span: [marked.stamp_ns; 2],
+            ..crate::Key::of(trial, "/referencing/frame", format!("marks {what}"))
+        };
+        Number::count(n, key)
+    };
+    let [corners, cloud, candidates, identified, used] = marked.counts;
+    text![
+        count("corners", corners),
+        " corners of the left image and ",
+        count("cloud", cloud),
+        " matched points (white crosses), ",
+        count("candidates", candidates),
+        " candidates (blue rings) in the shells of the rough pose (thin frames), ",
+        count("identified", identified),
+        " identified (black discs), ",
+        count("used", used),
+        " used by the solver (red rings, the first nine numbered). "
+    ]
+}
+
+fn best_picture(run: &Run, index: usize, marked: &Marked) -> Block {
+    let trial = &run.trials[index];
+    let mut caption = text!["Left and right image of one fix: "];
+    caption.extend(marks(trial, marked));
+    let axes = trial.header.axes.iter().map(|axis| format!("{} {}", short(&axis.key), axis.value));
+    let axes = axes.collect::<Vec<_>>().join(", ");
+    caption.extend(text![
+        format!(
+            "Fixed: {}. It is the frame with most identified points: frame {} of ",
+            marked.objects.join(", "),
+            marked.frame
+        ),
+        code(trial.file()),
+        format!(", stamp {} ns{}{axes}.", marked.stamp_ns, if axes.is_empty() { "" } else { "; " }),
+    ]);
+    Block::Picture(Picture {
+        id: "fix".to_owned(),
+        caption,
+        alternative: "Left and right image with key points, candidates and identified points".to_owned(),
+        jpeg: marked.jpeg(1.0, 88),
+        size: marked.size(1.0),
+    })
+}
+
+fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Marked) -> Block {
+    let trial = &run.trials[index];
+    let mut caption = text![format!("Line {place} of the table, marks as in Figure 1: ")];
+    let judged = if row.wrong() {
+        "wrong"
+    } else if row.found() {
+        "found"
+    } else {
+        trial.reason(row)
+    };
+    caption.extend(text![
+        format!(
+            "target {}, {judged}, of {}: frame {} of ",
+            trial.object(row),
+            counted(trial.frames.len(), "logged frame", "logged frames"),
+            frame.number
+        ),
+        code(trial.file()),
+        format!(", stamp {} ns.", frame.stamp_ns)
+    ]);
+    let scale = (960.0 / f64::from(marked.size(1.0)[0])).min(1.0);
+    Block::Picture(Picture {
+        id: format!("worst-{place}"),
+        caption,
+        alternative: format!("Left and right image of the attempt in line {place} of the table of the worst"),
+        jpeg: marked.jpeg(scale, 78),
+        size: marked.size(scale),
+    })
+}

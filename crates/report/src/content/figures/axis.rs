@@ -1,0 +1,235 @@
+//! Errors over a condition that has numbers.
+
+use super::{caption, distinct, figure, panels, series};
+use crate::{
+    Field, Number, PAPER_M1, Row, Spread, Summary,
+    content::tell::{self, Unit},
+    document::{Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    format::{headed, short, unit},
+    run::{Run, Trial},
+};
+
+/// The first condition with numbers that vary.
+pub(super) fn numeric(summary: &Summary) -> Option<String> {
+    keys(summary).into_iter().next()
+}
+
+/// All conditions with numbers that vary.
+pub(super) fn keys(summary: &Summary) -> Vec<String> {
+    let axes = summary.rows.first().into_iter().flat_map(Row::conditions);
+    let varies = |key: &String| {
+        let values: Vec<Option<f64>> = summary.rows.iter().map(|row| on(row, key)).collect();
+        values.iter().all(Option::is_some) && values.iter().any(|value| *value != values[0])
+    };
+    axes.map(|axis| axis.key.clone()).filter(varies).collect()
+}
+
+/// The value of a row on an axis.
+pub(super) fn on(row: &Row, key: &str) -> Option<f64> {
+    row.axes.iter().find(|axis| axis.key == key).and_then(|axis| axis.value.parse().ok())
+}
+
+/// What tells a row's line from the others of a figure over `key`.
+pub(super) fn name(row: &Row, key: &str) -> String {
+    let others = row.conditions().filter(|axis| axis.key != key);
+    others.fold(row.method(), |name, axis| format!("{name}, {} {}", short(&axis.key), axis.value))
+}
+
+/// A quantity, its spread in a row, and its name and unit.
+type Metric = (Field, fn(&Row) -> Option<Spread>, &'static str);
+
+/// m1 and m2 over the condition, with the paper's range and, over the distance, both laws.
+pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
+    let key = numeric(summary)?;
+    let names = distinct(summary.rows.iter().map(|row| name(row, &key)));
+    if names.len() > 14 {
+        return None;
+    }
+    let mut ticks: Vec<f64> = summary.rows.iter().filter_map(|row| on(row, &key)).collect();
+    ticks.sort_by(f64::total_cmp);
+    ticks.dedup();
+    let reach = ticks.last()? - ticks.first()?;
+    let mut heads = vec![Head::words("series"), Head::numbers(headed(&key)), Head::words("metric")];
+    heads.extend(["p5 (mm)", "median (mm)", "p95 (mm)"].map(Head::numbers));
+    let mut data =
+        Table::new("error-over-condition", text!["Every point of the figure of error over the condition."], heads);
+    let metrics: [Metric; 2] =
+        [(Field::M1, |row| row.m1, "m1, residual (mm)"), (Field::M2, |row| row.m2, "m2, model points (mm)")];
+    let mut drawn = Vec::new();
+    for (field, value, label) in metrics {
+        let mut layers = Vec::new();
+        let (mut lines, mut all) = (Vec::new(), Vec::new());
+        for (index, series_name) in names.iter().enumerate() {
+            let mut points: Vec<(f64, Spread, &Trial)> = Vec::new();
+            for (row, trial) in summary.rows.iter().zip(&run.trials).filter(|(row, _)| name(row, &key) == *series_name)
+            {
+                points.extend(value(row).zip(on(row, &key)).map(|(spread, x)| (x, spread, trial)));
+            }
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (x, spread, trial) in &points {
+                let told = |name: &str, value| {
+                    tell::statistic(trial, name, field, "found", Some(value), (Unit::Millimetres, 3)).into()
+                };
+                let place = tell::axis(trial, &key, Some(*x));
+                let ends = [told("q5", spread.p5), told("median", spread.median), told("q95", spread.p95)];
+                data.line(
+                    false,
+                    [series_name.clone().into(), place.into(), field.name().into()].into_iter().chain(ends).collect(),
+                );
+            }
+            // Series of the same place stand beside each other.
+            let shift = 0.012 * reach * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
+            let at = |x: f64| x + shift;
+            let line: Vec<[f64; 2]> = points.iter().map(|(x, s, _)| [at(*x), s.median * 1e3]).collect();
+            all.extend(line.iter().copied());
+            layers.push(Layer::Whiskers {
+                series: index,
+                values: points.iter().map(|(x, s, _)| [at(*x), s.p5 * 1e3, s.p95 * 1e3]).collect(),
+            });
+            layers.push(Layer::Line { series: index, points: line.clone() });
+            lines.push(Layer::Marks { series: index, points: line, radius: 2.2 });
+        }
+        layers.extend(lines);
+        if unit(&key) == Some("m") && short(&key) == "distance" {
+            layers.splice(0..0, laws(&ticks, &all));
+        }
+        if field == Field::M1 {
+            let [from, to] = PAPER_M1.map(|m| m * 1e3);
+            layers.insert(0, Layer::Range { from, to, note: "the paper, 2–5 m".to_owned() });
+        }
+        let (x, y) = (Axis::linear(headed(&key)).at(ticks.clone()), Axis::logarithmic(label));
+        drawn.push(Panel { title: String::new(), x, y, layers, equal: false });
+    }
+    let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
+    let chart = Chart { panels: drawn, columns: 2, page: true, shape: 0.78, legend };
+    let laws = if short(&key) == "distance" {
+        " Thin grey lines: growth with the distance z and with its square."
+    } else {
+        ""
+    };
+    let said = format!(
+        "Error over {}: medians of the fixes found, bars from the 5 % to the 95 % quantile, moved apart a little; the shaded range is the m1 that the paper reports for its virtual scene at 2–5 m.{laws}",
+        short(&key)
+    );
+    figure("error-over-condition", caption(&said, run), &chart, data)
+}
+
+/// z and z², through the middle of the values at the least distance.
+fn laws(ticks: &[f64], all: &[[f64; 2]]) -> Vec<Layer> {
+    let (Some(&first), Some(&last)) = (ticks.first(), ticks.last()) else { return Vec::new() };
+    let mut near: Vec<f64> = all.iter().filter(|p| (p[0] - first).abs() < 0.1 * (last - first)).map(|p| p[1]).collect();
+    if near.is_empty() || !(first > 0.0) {
+        return Vec::new();
+    }
+    let middle = seafix_evaluation::median(&mut near);
+    let steps = || (0..=24).map(|i| first + (last - first) * f64::from(i) / 24.0);
+    [(1, "∝ z", 4), (2, "∝ z²", 2)]
+        .map(|(power, note, dash)| Layer::Guide {
+            points: steps().map(|z| [z, middle * (z / first).powi(power)]).collect(),
+            note: note.replace('∝', "~"),
+            dash,
+        })
+        .into()
+}
+
+/// How m2 of the fixes found is distributed, a box a trial.
+pub(super) fn boxes(run: &Run, _summary: &Summary) -> Option<Figure> {
+    let groups = panels(run, 12);
+    let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
+    if names.len() > 7 || run.trials.len() < 2 {
+        return None;
+    }
+    let heads = [Head::words("condition"), Head::words("series")].into_iter();
+    let heads = heads.chain(["n", "p5 (mm)", "p25 (mm)", "median (mm)", "p75 (mm)", "p95 (mm)"].map(Head::numbers));
+    let mut data = Table::new("distribution", text!["The boxes of the figure of distributions."], heads.collect());
+    let mut layers: Vec<Layer> = (0..names.len()).map(|series| Layer::Boxes { series, values: Vec::new() }).collect();
+    for (place, (condition, members)) in groups.iter().enumerate() {
+        for (name, trial) in members {
+            let found = trial.attempts().filter(|(_, row)| row.found()).filter_map(|(_, row)| row.get(Field::M2));
+            let mut values: Vec<f64> = found.collect();
+            if values.is_empty() {
+                continue;
+            }
+            let quantiles = [0.05, 0.25, 0.5, 0.75, 0.95].map(|p| seafix_evaluation::quantile(&mut values, p));
+            let index = series(&names, name);
+            let width = 0.8 / names.len() as f64;
+            let x = place as f64 + width * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
+            if let Layer::Boxes { values, .. } = &mut layers[index] {
+                values.push(([x, 0.36 * width], quantiles.map(|q| q * 1e3)));
+            }
+            let told = |(name, value): (&str, f64)| {
+                tell::statistic(trial, name, Field::M2, "found", Some(value), (Unit::Millimetres, 3)).into()
+            };
+            let mut line = vec![condition.clone().into(), name.clone().into(), n(trial, values.len()).into()];
+            line.extend(["q5", "q25", "median", "q75", "q95"].into_iter().zip(quantiles).map(told));
+            data.line(false, line);
+        }
+    }
+    let conditions = groups.iter().map(|(condition, _)| condition.clone()).collect();
+    let panel = Panel {
+        x: Axis::named("", conditions),
+        y: Axis::logarithmic("m2 of the fixes found (mm)"),
+        layers,
+        ..Panel::default()
+    };
+    let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
+    let page = groups.len() * names.len() > 6;
+    let chart = Chart { panels: vec![panel], columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
+    let said = "Distribution of m2 over the fixes found: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
+    figure("distribution", caption(said, run), &chart, data)
+}
+
+/// How many fixes of the sample were found.
+fn n(trial: &Trial, n: usize) -> Number {
+    let key = crate::Key::of(trial, "/metrics/evaluation", "sampled m2_rms of found");
+    Number::count(n, key)
+}
+
+/// Precision over recall of the identified points, along the tolerance.
+pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
+    let key = keys(summary).into_iter().find(|key| key.contains("tolerance"))?;
+    let names = distinct(summary.rows.iter().map(|row| name(row, &key)));
+    let heads =
+        vec![Head::words("series"), Head::numbers(headed(&key)), Head::numbers("recall"), Head::numbers("precision")];
+    let mut data = Table::new("precision-recall", text!["Every point of the figure of precision over recall."], heads);
+    let mut layers = Vec::new();
+    for (index, series_name) in names.iter().enumerate() {
+        let mut points = Vec::new();
+        for (row, trial) in summary.rows.iter().zip(&run.trials).filter(|(row, _)| name(row, &key) == *series_name) {
+            let sum = |field: Field| trial.attempts().filter_map(|(_, row)| row.get(field)).sum::<f64>();
+            let (correct, identified, visible) = (sum(Field::Correct), sum(Field::Identified), sum(Field::Visible));
+            let place = on(row, &key)?;
+            let ratio = |to: f64| (to > 0.0).then(|| correct / to);
+            let (Some(recall), Some(precision)) = (ratio(visible), ratio(identified)) else { continue };
+            points.push((place, [recall, precision]));
+            let told = |over: Field, value| {
+                let what = format!("sum correct_pairs by {}", over.name());
+                Number::new(Some(value), 4, crate::Key::of(trial, "/metrics/evaluation", what)).into()
+            };
+            let at = tell::axis(trial, &key, Some(place)).into();
+            data.line(
+                false,
+                vec![series_name.clone().into(), at, told(Field::Visible, recall), told(Field::Identified, precision)],
+            );
+        }
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let line: Vec<[f64; 2]> = points.iter().map(|(_, point)| *point).collect();
+        layers.push(Layer::Line { series: index, points: line.clone() });
+        layers.push(Layer::Marks { series: index, points: line, radius: 2.0 });
+        layers.extend(points.into_iter().map(|(place, at)| Layer::Note { at, text: crate::format::trimmed(place) }));
+    }
+    let panel = Panel {
+        x: Axis::linear("recall of visible points"),
+        y: Axis::linear("precision of identified points"),
+        layers,
+        ..Panel::default()
+    };
+    let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
+    let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.8, legend };
+    let said = format!(
+        "Precision over recall of the identified points, along {}, whose value stands at each mark.",
+        headed(&key)
+    );
+    figure("precision-recall", caption(&said, run), &chart, data)
+}

@@ -1,0 +1,73 @@
+//! The error of every fix over the frames.
+
+use super::{caption, distinct, figure, series};
+use crate::{
+    Field, PAPER_M1, Summary,
+    content::tell::{self, Unit},
+    document::{Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    run::Run,
+};
+
+/// Marks of more fixes than this hide each other.
+const MOST: usize = 4000;
+
+/// m1 and m2 of every fix.
+pub(super) fn errors(run: &Run) -> Option<Figure> {
+    let names = distinct(run.trials.iter().map(|trial| Summary::name(run, trial)));
+    let fixes: usize = run.trials.iter().map(|trial| trial.attempts().count()).sum();
+    if names.len() > 7 || fixes > MOST {
+        return None;
+    }
+    let heads = [
+        Head::words("series"),
+        Head::numbers("frame"),
+        Head::words("target"),
+        Head::numbers("m1 (mm)"),
+        Head::numbers("m2 (mm)"),
+    ];
+    let mut data =
+        Table::new("error-over-frames", text!["Every point of the figure of error over frames."], heads.to_vec());
+    let metrics = [(Field::M1, "m1, residual (mm)"), (Field::M2, "m2, model points (mm)")];
+    let mut points = vec![vec![Vec::new(); names.len()]; 2];
+    for trial in &run.trials {
+        let index = series(&names, &Summary::name(run, trial));
+        for (frame, row) in trial.attempts() {
+            let place = (trial.object(row), frame.number, frame.stamp_ns);
+            let told = |field| tell::value(trial, place, field, row.get(field), (Unit::Millimetres, 3));
+            for (of, (field, _)) in metrics.iter().enumerate() {
+                points[of][index].extend(row.get(*field).map(|value| [frame.number as f64, value * 1e3]));
+            }
+            let at = tell::frame(trial, frame.number, frame.stamp_ns);
+            let object = trial.object(row).to_owned();
+            data.line(
+                false,
+                vec![
+                    names[index].clone().into(),
+                    at.into(),
+                    object.into(),
+                    told(Field::M1).into(),
+                    told(Field::M2).into(),
+                ],
+            );
+        }
+    }
+    let panels = metrics.into_iter().zip(points).map(|((field, label), points)| {
+        let marks = points.into_iter().enumerate();
+        let mut layers: Vec<Layer> =
+            marks.map(|(series, points)| Layer::Marks { series, points, radius: 1.8 }).collect();
+        if field == Field::M1 {
+            let [from, to] = PAPER_M1.map(|m| m * 1e3);
+            layers.insert(0, Layer::Range { from, to, note: "the paper, 2–5 m".to_owned() });
+        }
+        Panel { x: Axis::linear("frame"), y: Axis::logarithmic(label), layers, ..Panel::default() }
+    });
+    let legend = if names.len() > 1 {
+        names.iter().enumerate().map(|(i, name)| Entry::mark(name.clone(), i)).collect()
+    } else {
+        Vec::new()
+    };
+    let chart = Chart { panels: panels.collect(), columns: 2, page: true, shape: 0.7, legend };
+    let said = "Error of every fix over the frames; a frame without a mark gave none. The shaded range is the m1 that the paper reports for its virtual scene at 2–5 m, another scene and camera.";
+    figure("error-over-frames", caption(said, run), &chart, data)
+}

@@ -1,0 +1,82 @@
+//! The figures of the results; each is left out where the logs have nothing for it.
+
+mod axis;
+mod consistency;
+mod frames;
+mod grid;
+mod recall;
+mod way;
+
+use crate::{
+    Summary,
+    document::{Block, Figure, Text, text},
+    paired,
+    run::{Run, Trial},
+};
+
+use super::{data::baseline, distinct};
+
+pub(super) use consistency::search_cost;
+
+/// Those that show results.
+pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
+    let main =
+        if super::limits::known(summary) { None } else { axis::errors(run, summary).or_else(|| frames::errors(run)) };
+    [
+        main,
+        axis::boxes(run, summary),
+        recall::figure(run),
+        axis::precision_recall(run, summary),
+        grid::figure(run, summary),
+        way::figure(run),
+        consistency::histogram(run),
+        consistency::stanford(run),
+    ]
+    .into_iter()
+    .flatten()
+    .map(Block::Figure)
+    .collect()
+}
+
+/// Camera, noise and source of what all trials share, in one sentence.
+fn conditions(run: &Run) -> String {
+    let rig = &run.header().rig;
+    let sources = distinct(run.trials.iter().map(|trial| trial.header.source.clone())).join("; ");
+    let frames = distinct(run.trials.iter().map(|trial| trial.count().to_string())).join(" or ");
+    format!(
+        "Source: {sources}; {} × {} px, f = {:.0} px, baseline {:.2} m; {frames} frames a trial.",
+        rig.left.size[0],
+        rig.left.size[1],
+        rig.left.matrix[0][0],
+        baseline(run.header())
+    )
+}
+
+/// What a figure needs besides its drawing.
+fn figure(id: &str, caption: Text, chart: &crate::figure::Chart, data: crate::document::Table) -> Option<Figure> {
+    Some(Figure { id: id.to_owned(), caption, drawing: chart.draw()?, data })
+}
+
+/// The groups of trials on the same frames, at most `most` of them, with what their members are called.
+fn panels(run: &Run, most: usize) -> Vec<(String, Vec<(String, &Trial)>)> {
+    let groups = paired::groups(run);
+    // Of many conditions the first, the last, and some between.
+    let step = groups.len().div_ceil(most).max(1);
+    let chosen = groups.iter().step_by(step);
+    chosen
+        .map(|members| {
+            let (condition, names) = paired::names(run, members);
+            (condition, names.into_iter().zip(members.iter().map(|&index| &run.trials[index])).collect())
+        })
+        .collect()
+}
+
+/// A caption that ends with what all trials share.
+fn caption(said: &str, run: &Run) -> Text {
+    text![format!("{said} {}", conditions(run))]
+}
+
+/// The series of a name among all names.
+fn series(names: &[String], name: &str) -> usize {
+    names.iter().position(|known| known == name).unwrap_or(0)
+}

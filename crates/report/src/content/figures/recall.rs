@@ -1,0 +1,74 @@
+//! The share of attempts with an error below a bound.
+
+use seafix_evaluation::clopper_pearson;
+
+use super::{caption, distinct, panels, series};
+use crate::{
+    Field, Key, Number,
+    content::limits::share_axes,
+    document::{Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    run::Run,
+};
+
+/// Thresholds (mm): four a factor of two.
+const THRESHOLDS: [f64; 25] = [
+    0.78125, 0.9290, 1.1049, 1.3139, 1.5625, 1.8581, 2.2097, 2.6278, 3.125, 3.7163, 4.4194, 5.2556, 6.25, 7.4325,
+    8.8388, 10.5112, 12.5, 14.865, 17.6777, 21.0224, 25.0, 29.7302, 35.3553, 42.0448, 50.0,
+];
+
+/// Recall over the error m2, with exact 95 % bands; refused and wrong attempts are never below any bound.
+pub(super) fn figure(run: &Run) -> Option<Figure> {
+    let groups = panels(run, 6);
+    let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
+    if names.len() > 7 {
+        return None;
+    }
+    let heads = [Head::words("condition"), Head::words("series"), Head::numbers("m2 below (mm)")];
+    let heads = heads.into_iter().chain(["recall (%)", "low (%)", "high (%)"].map(Head::numbers));
+    let mut data = Table::new("recall", text!["Every point of the figure of recall."], heads.collect());
+    let mut drawn = Vec::new();
+    for (condition, members) in &groups {
+        let (mut bands, mut lines) = (Vec::new(), Vec::new());
+        for (name, trial) in members {
+            let mut errors: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::M2)).collect();
+            errors.sort_by(f64::total_cmp);
+            let n = errors.len();
+            if n == 0 || errors[0].is_infinite() {
+                continue;
+            }
+            let (mut line, mut band) = (Vec::new(), Vec::new());
+            for threshold in THRESHOLDS {
+                let k = errors.partition_point(|error| *error <= threshold / 1e3);
+                let (low, high) = clopper_pearson(k, n, 0.95);
+                let [share, low, high] = [k as f64 / n as f64, low, high].map(|share| 100.0 * share);
+                line.push([threshold, share]);
+                band.push([threshold, low, high]);
+                let told = |(what, value): (&str, f64)| {
+                    let what = format!("{what} m2_rms<={threshold} of attempted in mm");
+                    Number::new(Some(value), 2, Key::of(trial, "/metrics/evaluation", what)).into()
+                };
+                let mut cells = vec![condition.clone().into(), name.clone().into(), threshold.to_string().into()];
+                cells.extend([("percent", share), ("low", low), ("high", high)].map(told));
+                data.line(false, cells);
+            }
+            bands.push(Layer::Band { series: series(&names, name), values: band });
+            lines.push(Layer::Line { series: series(&names, name), points: line });
+        }
+        bands.extend(lines);
+        drawn.push(Panel {
+            title: condition.clone(),
+            x: Axis::logarithmic("m2 below (mm)").at(vec![1.0, 2.0, 5.0, 10.0, 20.0, 50.0]),
+            y: Axis::linear("recall (%)").within([0.0, 104.0]),
+            layers: bands,
+            equal: false,
+        });
+    }
+    share_axes(&mut drawn);
+    let columns = drawn.len().clamp(1, 3).min(if drawn.len() == 4 { 2 } else { 3 });
+    let page = drawn.len() > 1;
+    let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
+    let chart = Chart { panels: drawn, columns, page, shape: if columns == 2 { 0.6 } else { 0.75 }, legend };
+    let said = "Recall: the share of all attempts whose m2 is below a bound, with exact 95 % bands; refused and wrong attempts are below none.";
+    super::figure("recall", caption(said, run), &chart, data)
+}

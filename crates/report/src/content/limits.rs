@@ -1,0 +1,173 @@
+//! Errors beside the Cramér–Rao bound, where every fix has one.
+
+use super::{
+    distinct, results,
+    tell::{self, Unit},
+};
+use crate::{
+    Field, Number, Row, Summary,
+    document::{Block, Cell, Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    format::{headed, short, unit},
+    run::{Run, Trial},
+};
+
+/// Whether the rows have bounds.
+pub(super) fn known(summary: &Summary) -> bool {
+    summary.rows.iter().any(|row| row.limits.is_some())
+}
+
+pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
+    over_noise(run, summary).into_iter().map(Block::Figure).chain([Block::Table(table(run, summary))]).collect()
+}
+
+/// A number out of the totals.
+fn total(trial: &Trial, what: &str, value: f64, unit: Unit, decimals: usize) -> Number {
+    let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
+    let key = crate::Key::of(trial, "/metrics/totals", format!("{what}{suffix}"));
+    Number::new(Some(value * unit.scale()), decimals, key)
+}
+
+fn value(row: &Row, key: &str) -> Option<String> {
+    row.axes.iter().find(|axis| axis.key == key).map(|axis| axis.value.clone())
+}
+
+/// Root mean square m2 over the noise, a panel for each of all other conditions.
+fn over_noise(run: &Run, summary: &Summary) -> Option<Figure> {
+    let on = |key: &str| distinct(summary.rows.iter().filter_map(|row| value(row, key)));
+    let axes = summary.rows.first()?.axes.iter();
+    let key = axes.map(|axis| axis.key.clone()).find(|key| unit(key) == Some("px") && on(key).len() > 1)?;
+    let conditions = |row: &Row| -> String {
+        let others = row.conditions().filter(|axis| axis.key != key);
+        let words = others.map(|axis| match (axis.value.parse::<f64>(), unit(&axis.key)) {
+            (Ok(_), Some(unit)) => format!("{} {unit}", axis.value),
+            (Ok(_), None) => format!("{} {}", axis.value, short(&axis.key)),
+            _ => axis.value.clone(),
+        });
+        words.collect::<Vec<_>>().join(", ")
+    };
+    let with_limits = || summary.rows.iter().enumerate().filter(|(_, row)| row.limits.is_some());
+    let places = distinct(with_limits().map(|(_, row)| conditions(row)));
+    let methods = distinct(summary.rows.iter().map(|row| row.solver.clone()));
+    let bound = 6; // the dark grey of the palette
+    let ticks: Vec<f64> = on(&key).iter().filter_map(|value| value.parse().ok()).collect();
+    let heads =
+        [Head::words("condition"), Head::words("series"), Head::numbers(headed(&key)), Head::numbers("RMS m2 (mm)")];
+    let mut data =
+        Table::new("error-over-noise", text!["Every point of the figure of error over noise."], heads.to_vec());
+    let mut panels = Vec::new();
+    for place in &places {
+        let mut layers = Vec::new();
+        for (series, method) in methods.iter().map(String::as_str).chain(["Cramér–Rao bound"]).enumerate() {
+            let is_bound = series == methods.len();
+            let rows = with_limits().filter(|(_, row)| conditions(row) == *place && (is_bound || row.solver == method));
+            let mut points: Vec<([f64; 2], usize)> = rows
+                .filter_map(|(index, row)| {
+                    let m2 = row.limits?.m2[usize::from(is_bound)] * 1e3;
+                    Some(([value(row, &key)?.parse().ok()?, m2], index))
+                })
+                .collect();
+            points.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+            points.dedup_by(|a, b| is_bound && a.0[0] == b.0[0]);
+            for ([x, m2], index) in &points {
+                let what = if is_bound { "bound m2_bound of judged" } else { "rms m2_rms of judged" };
+                let number = total(&run.trials[*index], what, m2 / 1e3, Unit::Millimetres, 4);
+                let noise = tell::axis(&run.trials[*index], &key, Some(*x));
+                data.line(false, vec![place.clone().into(), method.into(), noise.into(), number.into()]);
+            }
+            let points: Vec<[f64; 2]> = points.into_iter().map(|(point, _)| point).collect();
+            let index = if is_bound { bound } else { series };
+            layers.push(Layer::Line { series: index, points: points.clone() });
+            if !is_bound {
+                layers.push(Layer::Marks { series: index, points, radius: 1.5 });
+            }
+        }
+        panels.push(Panel {
+            title: place.clone(),
+            x: Axis::logarithmic("").at(ticks.clone()),
+            y: Axis::logarithmic(""),
+            layers,
+            equal: false,
+        });
+    }
+    share_axes(&mut panels);
+    let entries = methods.iter().enumerate().map(|(series, name)| Entry::both(name.clone(), series));
+    let columns = if panels.len() > 24 { 6 } else { panels.len().clamp(1, 4) };
+    let rows = panels.len().div_ceil(columns);
+    for (index, panel) in panels.iter_mut().enumerate() {
+        if index % columns == 0 {
+            panel.y.label = "RMS m2 (mm)".to_owned();
+        }
+        if index / columns == rows - 1 {
+            panel.x.label = headed(&key);
+        }
+    }
+    let chart = Chart {
+        panels,
+        columns,
+        page: true,
+        shape: 0.95,
+        legend: entries.chain([Entry::line("Cramér–Rao bound", bound)]).collect(),
+    };
+    Some(Figure {
+        id: "error-over-noise".to_owned(),
+        caption: text![
+            "Root mean square error of the transferred model points (m2) over the pixel noise, both axes logarithmic and shared by all panels; over every fix of a trial, wrong ones included. Grey: the Cramér–Rao bound, which no unbiased estimate betters on average."
+        ],
+        drawing: chart.draw()?,
+        data,
+    })
+}
+
+/// The same ends for all panels.
+pub(super) fn share_axes(panels: &mut [Panel]) {
+    let values = |which: usize| {
+        panels
+            .iter()
+            .flat_map(|panel| &panel.layers)
+            .flat_map(|layer| layer.reach())
+            .map(move |point| point[which])
+            .collect::<Vec<_>>()
+    };
+    let Some(first) = panels.first() else { return };
+    let (x, y) = (first.x.ends(values(0).into_iter()), first.y.ends(values(1).into_iter()));
+    for panel in panels {
+        let power =
+            |axis: &Axis, ends: [f64; 2]| if axis.logarithmic { ends.map(|end| 10_f64.powf(end)) } else { ends };
+        panel.x.range = Some(power(&panel.x, x));
+        panel.y.range = Some(power(&panel.y, y));
+    }
+}
+
+fn table(run: &Run, summary: &Summary) -> Table {
+    let caption = text![
+        "Root mean squares beside the Cramér–Rao bound, over all n fixes, wrong ones included: m2, the position (m3), their ratio to the bound. NEES: mean of the normalised error squared, 6 for an honest covariance; below 95 %: share of the fixes within the χ² quantile of 95 %."
+    ];
+    let mut above = results::blank(summary, 1);
+    above.extend([Head::over(3, "m2 (mm)"), Head::over(3, "m3 (mm)"), Head::words(""), Head::words("")]);
+    let mut below = results::heads(summary);
+    below.push(Head::numbers("n"));
+    below.extend((0..2).flat_map(|_| ["RMSE", "bound", "ratio"].map(Head::numbers)));
+    below.extend(["NEES", "below 95 %"].map(Head::numbers));
+    let limits = |which: fn(&crate::Limits) -> f64| summary.rows.iter().map(move |row| row.limits.map(|l| which(&l)));
+    let digits = [limits(|l| l.m2[1]), limits(|l| l.m3[1])].map(|of| tell::decimals(of, Unit::Millimetres));
+    let mut table = Table { id: "limits".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let Some(limits) = row.limits else { continue };
+        let mut line = results::cells(row);
+        line.push(
+            Number::count(limits.count as usize, crate::Key::of(trial, "/metrics/totals", "count judged")).into(),
+        );
+        let pairs = [(Field::M2, Field::M2Bound, limits.m2), (Field::Position, Field::PositionBound, limits.m3)];
+        for ((field, bounded, [rmse, bound]), digits) in pairs.into_iter().zip(digits) {
+            let said = |what: String, value, digits| total(trial, &what, value, Unit::Millimetres, digits);
+            line.push(said(format!("rms {} of judged", field.name()), rmse, digits).into());
+            line.push(Cell::minor(said(format!("bound {} of judged", bounded.name()), bound, digits)));
+            line.push(total(trial, &format!("ratio {} of judged", field.name()), rmse / bound, Unit::Plain, 3).into());
+        }
+        line.push(total(trial, "mean nees of judged", limits.nees, Unit::Plain, 3).into());
+        line.push(total(trial, "within nees of judged", limits.coverage, Unit::Plain, 4).into());
+        table.line(results::breaks(summary, index), line);
+    }
+    table
+}

@@ -1,0 +1,84 @@
+//! What a report says, section by section.
+
+mod ablation;
+mod abstract_;
+mod data;
+mod failures;
+mod figures;
+mod limits;
+mod method;
+mod protocol;
+mod reproduce;
+mod results;
+mod significance;
+mod tell;
+mod threats;
+mod time;
+
+use crate::{
+    ReportError, Summary,
+    document::Document,
+    paired::{self, Comparison},
+    run::Run,
+};
+
+/// The report on a run.
+pub(crate) fn document(run: &Run, summary: &Summary) -> Result<Document, ReportError> {
+    let header = run.header();
+    let title = if header.title.is_empty() { &header.run } else { &header.title };
+    let comparisons = paired::comparisons(run, summary);
+    let (picture, failures) = failures::section(run)?;
+    let mut method = method::section(run);
+    method.blocks.splice(0..0, picture);
+    Ok(Document {
+        title: sentence_case(title),
+        run: header.run.clone(),
+        question: header.question.clone(),
+        summary: abstract_::section(run, summary),
+        sections: [
+            Some(method),
+            Some(data::section(run, summary)),
+            Some(protocol::section(run, &comparisons)),
+            Some(results::section(run, summary, &comparisons)),
+            significance::section(run, &comparisons),
+            ablation::section(run, summary),
+            Some(failures),
+            Some(time::section(run, summary)),
+            Some(threats::section(run, summary, &comparisons)),
+            Some(reproduce::section(run)),
+            Some(reproduce::configuration(run)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
+    })
+}
+
+/// The answer in numbers alone.
+pub(crate) fn findings(run: &Run, summary: &Summary) -> Vec<crate::document::Text> {
+    abstract_::section(run, summary)
+}
+
+/// The distinct texts in the order of their first appearance.
+pub(crate) fn distinct(texts: impl IntoIterator<Item = String>) -> Vec<String> {
+    let mut seen = Vec::new();
+    for text in texts {
+        if !seen.contains(&text) {
+            seen.push(text);
+        }
+    }
+    seen
+}
+
+/// With a capital letter.
+fn sentence_case(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Whether `index` is better than every trial it was compared with, surely.
+fn best(comparisons: &[Comparison], index: usize) -> bool {
+    let mut own =
+        comparisons.iter().filter(|c| !c.over_conditions && (c.first == index || c.second == index)).peekable();
+    own.peek().is_some() && own.all(|c| c.better() == Some(index))
+}

@@ -1,0 +1,81 @@
+//! How it was judged: metrics, thresholds, trials, statistics, all fixed beforehand.
+
+use crate::{
+    document::{Block, Section, italic, text},
+    paired::{ALPHA, Comparison, SEED},
+    run::Run,
+};
+
+pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
+    let [h, c, p, e] = ["H", "C", "P", "E"].map(italic);
+    let terms = vec![
+        (
+            text![italic("found, refused, wrong")],
+            text![
+                "A fix is wrong when m2 exceeds the alert limit (the smaller of 0.10 m and 5 % of the target’s diameter); an attempt without a fix is refused; all others are found. The three add up to the attempts. The rates of a trial carry exact (Clopper–Pearson) 95 % intervals."
+            ],
+        ),
+        (
+            text![italic("m1")],
+            text![
+                "RMS of ‖",
+                h,
+                " ",
+                c,
+                " − ",
+                p,
+                "‖ over the correctly identified points (within 2 px of truth in both images): the paper’s figure. It contains the evaluated points’ own noise; ",
+                italic("unused"),
+                " leaves out those the solver used."
+            ],
+        ),
+        (
+            text![italic("m2")],
+            text![
+                "RMS of ‖",
+                e.clone(),
+                " ",
+                italic("p"),
+                " − ",
+                italic("p"),
+                "‖ over all model points ",
+                italic("p"),
+                " of the target, ",
+                e.clone(),
+                " the estimated pose after the inverse of the true one."
+            ],
+        ),
+        (
+            text![italic("m3")],
+            text!["Error of the left camera’s position in the frame of the target, and the rotation angle of ", e, "."],
+        ),
+        (
+            text![italic("NEES")],
+            text![
+                "Squared error of the pose by its own covariance, six degrees of freedom; its mean is 6 where the covariance is honest."
+            ],
+        ),
+    ];
+    let mut section = Section::new("Protocol").with([
+        Block::Paragraph(text![
+            "Metrics and thresholds were fixed beforehand. No frame is excluded: one without an answer stays in every denominator. Medians and quantiles are over the fixes found, and say so; no failure is averaged into an error."
+        ]),
+        Block::Terms(terms),
+    ]);
+    if !comparisons.is_empty() {
+        let unit = if comparisons[0].over_conditions {
+            "Methods are compared over conditions, one value each: the median of m2 over all attempts, failures as infinitely far off; the difference is the ratio of two such medians"
+        } else {
+            "Trials that saw the same frames are compared attempt by attempt, failures as infinitely far off, by the median of the paired differences of m2"
+        };
+        section.say(text![format!(
+            "{unit}. Its 95 % interval is the percentile bootstrap of 10 000 resamples, seed {SEED}, over {}. The test is Wilcoxon’s signed rank, two-sided, adjusted after Holm for the family of {} comparison{}; the effect is the matched-pairs rank-biserial correlation. A difference is called significant where the adjusted p is below {ALPHA} and the interval leaves out none at all. Success and failure are compared by McNemar’s exact test.",
+            if comparisons[0].over_conditions { "the conditions" } else { "blocks of consecutive attempts, ⌈∛n⌉ long, for neighbouring frames are not independent" },
+            comparisons.len(),
+            if comparisons.len() == 1 { "" } else { "s" },
+        ).replace("⌈∛n⌉", "the cube root of n")]);
+    }
+    let frames: usize = run.trials.iter().map(crate::run::Trial::count).sum();
+    section.say(text![format!("Trials: {}; frames in all: {frames}.", run.trials.len())]);
+    section
+}

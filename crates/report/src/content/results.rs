@@ -1,0 +1,185 @@
+//! The tables of results.
+
+use super::{
+    best, figures, limits,
+    tell::{self, Unit},
+};
+use crate::{
+    Field, PAPER_M1, Row, Spread, Summary,
+    document::{Block, Cell, Head, Section, Span, Table, italic, text},
+    format::{headed, number},
+    paired::Comparison,
+    run::Run,
+};
+
+pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Section {
+    let mut section = Section::new("Results");
+    section.add(Block::Table(outcomes(run, summary)));
+    section.add(Block::Table(errors(run, summary, comparisons)));
+    if limits::known(summary) {
+        section.blocks.extend(limits::blocks(run, summary));
+    }
+    section.blocks.extend(figures::blocks(run, summary));
+    match refusals(run, summary) {
+        Some(table) => section.add(Block::Table(table)),
+        None => section.say(text!["No attempt was refused."]),
+    }
+    section
+}
+
+/// Heads of the columns that say which trial a row is.
+pub(super) fn heads(summary: &Summary) -> Vec<Head> {
+    let conditions = summary.rows.first().into_iter().flat_map(Row::conditions);
+    let numeric = |key: &str| {
+        summary
+            .rows
+            .iter()
+            .flat_map(Row::conditions)
+            .filter(|axis| axis.key == key)
+            .all(|axis| axis.value.parse::<f64>().is_ok())
+    };
+    [Head::words("Method")]
+        .into_iter()
+        .chain(conditions.map(|axis| Head { numbers: numeric(&axis.key), ..Head::words(headed(&axis.key)) }))
+        .collect()
+}
+
+/// The cells that say which trial `row` is.
+pub(super) fn cells(row: &Row) -> Vec<Cell> {
+    let conditions = row.conditions().map(|axis| axis.value.clone().into());
+    [row.method().into()].into_iter().chain(conditions).collect()
+}
+
+/// Whether a thin line goes above row `index`: where the first condition changes.
+pub(super) fn breaks(summary: &Summary, index: usize) -> bool {
+    let first = |index: usize| summary.rows[index].conditions().next().map(|axis| &axis.value);
+    index > 0 && first(index) != first(index - 1)
+}
+
+/// Empty heads above the columns that say which trial a row is.
+pub(super) fn blank(summary: &Summary, more: usize) -> Vec<Head> {
+    vec![Head::words(""); heads(summary).len() + more]
+}
+
+fn outcomes(run: &Run, summary: &Summary) -> Table {
+    let caption = text![
+        "Outcomes. n: targets attempted, one a frame and target in view of the prior; rates in % of n with exact 95 % intervals. Frames: with at least one fix, and with a wrong one, of all frames. Points: median number identified."
+    ];
+    let mut above = blank(summary, 1);
+    above.extend([Head::over(2, "Found"), Head::over(2, "Refused"), Head::over(2, "Wrong"), Head::over(3, "Frames")]);
+    above.push(Head::words(""));
+    let mut below = heads(summary);
+    below.push(Head::numbers("n"));
+    below.extend((0..3).flat_map(|_| ["%", "interval"].map(Head::numbers)));
+    below.extend(["fixed", "wrong", "of", "Points"].map(Head::numbers));
+    let mut table = Table { id: "outcomes".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let mut line = cells(row);
+        line.push(tell::count(trial, "attempted", row.attempted).into());
+        for (group, k) in [("found", row.found), ("refused", row.refused), ("wrong", row.wrong)] {
+            let [low, high] = tell::interval(trial, group, k, row.attempted);
+            line.push(tell::percent(trial, group, k, row.attempted).into());
+            line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
+        }
+        line.push(tell::count(trial, "fixed-frames", row.referenced_frames).into());
+        line.push(tell::count(trial, "wrong-frames", row.wrong_frames).into());
+        line.push(tell::count(trial, "frames", row.frames).into());
+        let points = row.identified.map(|spread| spread.median);
+        line.push(tell::statistic(trial, "median", Field::Identified, "found", points, (Unit::Plain, 0)).into());
+        table.line(breaks(summary, index), line);
+    }
+    table
+}
+
+/// One quantity of the table of errors.
+struct Column {
+    name: &'static str,
+    field: Field,
+    unit: Unit,
+    value: fn(&Row) -> Option<Spread>,
+}
+
+const COLUMNS: [Column; 5] = [
+    Column { name: "m1 (mm)", field: Field::M1, unit: Unit::Millimetres, value: |row| row.m1 },
+    Column { name: "unused (mm)", field: Field::M1Unused, unit: Unit::Millimetres, value: |row| row.m1_unused },
+    Column { name: "m2 (mm)", field: Field::M2, unit: Unit::Millimetres, value: |row| row.m2 },
+    Column { name: "m3 (mm)", field: Field::Position, unit: Unit::Millimetres, value: |row| row.m3_position },
+    Column { name: "m3 (°)", field: Field::Attitude, unit: Unit::Degrees, value: |row| row.m3_attitude },
+];
+
+fn errors(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Table {
+    let any_best = (0..summary.rows.len()).any(|index| best(comparisons, index));
+    let mut caption = text![
+        "Errors of the fixes found: median and 95 % quantile over n fixes. m3: position of the camera, and its attitude; unused: m1 without the points the solver used. ",
+        italic("All"),
+        ": median of m2 over all attempts, refused and wrong ones counted as infinitely far off. ",
+    ];
+    caption.push(Span::from(match (comparisons.is_empty(), any_best) {
+        (true, _) => "Nothing is compared: no two trials saw the same frames.",
+        (_, true) => "Bold: better than every trial it was compared with, significantly.",
+        _ => "No value is in bold: none is significantly better than all others on the same frames.",
+    }));
+    let mut above = blank(summary, 1);
+    above.extend(COLUMNS.iter().map(|column| Head::over(2, column.name)));
+    above.extend([Head::words(""), Head::words("")]);
+    let mut below = heads(summary);
+    below.push(Head::numbers("n"));
+    below.extend(COLUMNS.iter().flat_map(|_| ["median", "p95"].map(Head::numbers)));
+    below.extend([Head::numbers("m2 all (mm)"), Head::numbers("NEES mean")]);
+    let digits = COLUMNS.each_ref().map(|column| {
+        tell::decimals(summary.rows.iter().map(|row| (column.value)(row).map(|s| s.median)), column.unit)
+    });
+    let all_digits = tell::decimals(summary.rows.iter().map(|row| row.m2_of_all), Unit::Millimetres);
+    let mut table = Table { id: "errors".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let mut line = cells(row);
+        line.push(tell::count(trial, "found", row.found).into());
+        for (column, &digits) in COLUMNS.iter().zip(&digits) {
+            let spread = (column.value)(row);
+            let told = |name: &str, value: Option<f64>| {
+                tell::statistic(trial, name, column.field, "found", value, (column.unit, digits))
+            };
+            let median = told("median", spread.map(|s| s.median));
+            let marked = column.field == Field::M2 && best(comparisons, index);
+            line.push(if marked { Span::Best(median).into() } else { median.into() });
+            line.push(Cell::minor(told("q95", spread.map(|s| s.p95))));
+        }
+        let unit = (Unit::Millimetres, all_digits);
+        line.push(tell::statistic(trial, "all", Field::M2, "attempted", row.m2_of_all, unit).into());
+        line.push(tell::statistic(trial, "mean", Field::Nees, "found", row.nees_mean, (Unit::Plain, 2)).into());
+        table.line(breaks(summary, index), line);
+    }
+    let [low, high] = PAPER_M1.map(|m| number(Some(m * 1e3), 0));
+    let mut line = vec![Cell::from("The paper")];
+    line.extend((1..heads(summary).len()).map(|_| Cell::from("")));
+    line.push("–".into());
+    line.push(Cell::over(2, format!("{low}–{high}")));
+    line.push(Cell { minor: true, ..Cell::over(10, "virtual scene, three points, 2–5 m; nothing else reported") });
+    table.line(true, line);
+    table
+}
+
+fn refusals(run: &Run, summary: &Summary) -> Option<Table> {
+    let mut reasons: Vec<String> = summary.rows.iter().flat_map(|row| row.reasons.keys().cloned()).collect();
+    reasons.sort();
+    reasons.dedup();
+    if reasons.is_empty() {
+        return None;
+    }
+    let mut below = heads(summary);
+    below.push(Head::numbers("n"));
+    below.extend(reasons.iter().map(|reason| Head::numbers(reason.clone())));
+    below.push(Head::numbers("all"));
+    let mut table = Table::new("refusals", text!["Refused attempts by reason, out of n."], below);
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let mut line = cells(row);
+        line.push(tell::count(trial, "attempted", row.attempted).into());
+        for reason in &reasons {
+            let n = row.reasons.get(reason).copied().unwrap_or(0);
+            line.push(tell::count(trial, &format!("refused:{reason}"), n).into());
+        }
+        line.push(tell::count(trial, "refused", row.refused).into());
+        table.line(breaks(summary, index), line);
+    }
+    Some(table)
+}

@@ -1,0 +1,159 @@
+//! Which differences are sure.
+
+use crate::{
+    Key, Number,
+    document::{Block, Cell, Figure, Head, Section, Span, Table, text},
+    figure::{Axis, Chart, Layer, Panel},
+    format::decimals,
+    paired::Comparison,
+    run::{Run, Trial},
+};
+
+pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> {
+    if comparisons.is_empty() {
+        return None;
+    }
+    let sure = comparisons.iter().filter(|comparison| comparison.better().is_some()).count();
+    let mut section = Section::new("Significance");
+    section.say(text![format!(
+        "Of {} comparison{} {} significant. Negative differences: the first errs less.",
+        comparisons.len(),
+        if comparisons.len() == 1 { "" } else { "s" },
+        match sure {
+            0 => "none is".to_owned(),
+            1 => "one is".to_owned(),
+            _ => format!("{sure} are"),
+        }
+    )]);
+    section.add(Block::Table(table(run, comparisons)));
+    section.blocks.extend(forest(run, comparisons).map(Block::Figure));
+    Some(section)
+}
+
+/// The key of something about a comparison.
+fn key(run: &Run, comparison: &Comparison, what: &str) -> Key {
+    let trials: Vec<&Trial> = comparison.logs.iter().map(|&index| &run.trials[index]).collect();
+    let over = if comparison.over_conditions { " over conditions" } else { " over attempts" };
+    super::tell::over(&trials, "/metrics/evaluation", format!("{what} m2_rms{over}"))
+}
+
+fn table(run: &Run, comparisons: &[Comparison]) -> Table {
+    let over = comparisons[0].over_conditions;
+    let digits = decimals(comparisons.iter().map(|c| c.difference.abs() * 1e3));
+    let (scale, digits) = if over { (1.0, 3) } else { (1e3, digits.min(3)) };
+    let head = if over { "ratio" } else { "difference (mm)" };
+    let caption = text![if over {
+        "Methods over conditions: n conditions, median ratio of the medians of m2 over all attempts with its 95 % interval, rank-biserial effect, p of the signed rank test adjusted after Holm. Bold: significant."
+    } else {
+        "Paired comparisons on the same attempts: median of the differences of m2 (first − second) with its 95 % interval, rank-biserial effect (1: the first errs less in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted. Bold: significant."
+    }];
+    let mut heads = vec![Head::words("Condition"), Head::words("first"), Head::words("second"), Head::numbers("n")];
+    heads.extend([Head::numbers(head), Head::numbers("interval"), Head::numbers("effect"), Head::numbers("p (Holm)")]);
+    if over {
+        heads.remove(0);
+    } else {
+        heads.extend([Head::numbers("alone"), Head::numbers("p (McNemar)")]);
+    }
+    let mut table = Table::new("comparisons", caption, heads);
+    let mut before = None;
+    for comparison in comparisons {
+        let told = |what: &str, value: f64, decimals| Number::new(Some(value), decimals, key(run, comparison, what));
+        let real = |value: f64| if over { value.exp() } else { value * scale };
+        let difference = told("difference", real(comparison.difference), digits);
+        let (low, high) = comparison.interval;
+        let ends = [told("difference-low", real(low), digits), told("difference-high", real(high), digits)];
+        let [low, high] = ends;
+        let first = before != Some(&comparison.condition);
+        let mut line: Vec<Cell> = Vec::new();
+        if !over {
+            line.push(if first { comparison.condition.clone() } else { String::new() }.into());
+        }
+        line.extend([comparison.names[0].clone().into(), comparison.names[1].clone().into()]);
+        line.push(told("pairs", comparison.n as f64, 0).into());
+        line.push(if comparison.better().is_some() { Span::Best(difference).into() } else { difference.into() });
+        line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
+        line.push(told("effect", comparison.effect, 2).into());
+        line.push(holm(run, comparisons, comparison).into());
+        if !over {
+            let alone = [("alone-first", comparison.alone[0]), ("alone-second", comparison.alone[1])];
+            let [a, b] = alone.map(|(what, n)| told(what, n as f64, 0));
+            line.push(Cell { text: text![a, "/", b], ..Cell::default() });
+            line.push(told("mcnemar", comparison.mcnemar, 4).into());
+        }
+        table.line(first && before.is_some(), line);
+        before = Some(&comparison.condition);
+    }
+    table
+}
+
+/// The adjusted p: its key names the logs of the whole family, those of this comparison first.
+fn holm(run: &Run, comparisons: &[Comparison], own: &Comparison) -> Number {
+    let others = comparisons.iter().filter(|other| other.names != own.names || other.condition != own.condition);
+    let family: Vec<usize> = own.logs.iter().chain(others.flat_map(|other| &other.logs)).copied().collect();
+    let trials: Vec<&Trial> = family.iter().map(|&index| &run.trials[index]).collect();
+    let over = if own.over_conditions { "conditions" } else { "attempts" };
+    let what = format!("holm m2_rms over {over} in families of {}", own.logs.len());
+    Number::new(Some(own.holm), 4, super::tell::over(&trials, "/metrics/evaluation", what))
+}
+
+/// The intervals side by side.
+fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
+    if comparisons.len() < 2 || comparisons.len() > 40 {
+        return None;
+    }
+    let over = comparisons[0].over_conditions;
+    let real = |value: f64| if over { value.exp() } else { value * 1e3 };
+    let n = comparisons.len();
+    let place = |index: usize| (n - 1 - index) as f64;
+    let names = comparisons.iter().rev().map(|c| {
+        let condition = if c.condition.is_empty() { String::new() } else { format!("{}: ", c.condition) };
+        format!("{condition}{} – {}", c.names[0], c.names[1])
+    });
+    let finite =
+        |index: usize| [comparisons[index].interval.0, comparisons[index].interval.1].iter().all(|v| v.is_finite());
+    let seen = || (0..n).filter(|&index| finite(index));
+    let of = |sure: bool| {
+        let own: Vec<usize> = seen().filter(|&index| comparisons[index].better().is_some() == sure).collect();
+        let spans = own.iter().map(|&index| {
+            let c = &comparisons[index];
+            [place(index), real(c.interval.0), real(c.interval.1)]
+        });
+        let marks = own.iter().map(|&index| [real(comparisons[index].difference), place(index)]);
+        let series = if sure { 1 } else { 6 };
+        [
+            Layer::Spans { series, values: spans.collect() },
+            Layer::Marks { series, points: marks.collect(), radius: 2.0 },
+        ]
+    };
+    let none = if over { 1.0 } else { 0.0 };
+    let zero = Layer::Guide { points: vec![[none, -0.5], [none, n as f64 - 0.5]], note: String::new(), dash: 0 };
+    let label = if over { "ratio of the medians of m2" } else { "median difference of m2 (mm)" };
+    let panel = Panel {
+        x: if over { Axis::logarithmic(label) } else { Axis::linear(label) },
+        y: Axis { range: Some([-0.6, n as f64 - 0.4]), ..Axis::named("", names.collect()) },
+        layers: [zero].into_iter().chain(of(false)).chain(of(true)).collect(),
+        ..Panel::default()
+    };
+    let shape = ((n as f64 * 11.0 + 34.0) / 482.0).clamp(0.14, 1.1);
+    let chart = Chart { panels: vec![panel], columns: 1, page: true, shape, legend: Vec::new() };
+    let heads = [Head::words("comparison"), Head::numbers("difference"), Head::numbers("low"), Head::numbers("high")];
+    let mut data = Table::new("forest", text!["Every interval of the figure of comparisons."], heads.to_vec());
+    for comparison in comparisons {
+        let told = |what: &str, value: f64| Number::new(Some(real(value)), 4, key(run, comparison, what)).into();
+        let name = format!("{}: {} – {}", comparison.condition, comparison.names[0], comparison.names[1]);
+        let (low, high) = comparison.interval;
+        data.line(
+            false,
+            vec![
+                name.into(),
+                told("difference", comparison.difference),
+                told("difference-low", low),
+                told("difference-high", high),
+            ],
+        );
+    }
+    let caption = text![
+        "The comparisons with their 95 % intervals; coloured squares are significant after Holm, grey ones are not. Left of the line the first errs less."
+    ];
+    Some(Figure { id: "forest".to_owned(), caption, drawing: chart.draw()?, data })
+}

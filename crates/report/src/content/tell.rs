@@ -1,0 +1,112 @@
+//! Numbers about trials, with their keys.
+
+use crate::{Field, Key, Number, format, run::Trial};
+
+/// What a quantity is printed in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unit {
+    Plain,
+    Millimetres,
+    Degrees,
+}
+
+impl Unit {
+    pub(super) fn scale(self) -> f64 {
+        match self {
+            Self::Plain => 1.0,
+            Self::Millimetres => 1e3,
+            Self::Degrees => 1_f64.to_degrees(),
+        }
+    }
+
+    fn suffix(self) -> &'static str {
+        match self {
+            Self::Plain => "",
+            Self::Millimetres => " in mm",
+            Self::Degrees => " in deg",
+        }
+    }
+}
+
+/// The topic that counts stand on.
+fn counted(trial: &Trial) -> &'static str {
+    if trial.totals.is_some() { "/metrics/totals" } else { "/metrics/evaluation" }
+}
+
+/// How many of `group` there are.
+pub(super) fn count(trial: &Trial, group: &str, n: usize) -> Number {
+    Number::count(n, Key::of(trial, counted(trial), format!("count {group}")))
+}
+
+/// Their share of all attempts, in percent.
+pub(super) fn percent(trial: &Trial, group: &str, k: usize, n: usize) -> Number {
+    let key = Key::of(trial, counted(trial), format!("percent {group} of attempted"));
+    Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
+}
+
+/// The exact 95 % interval of that share.
+pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
+    let (low, high) = seafix_evaluation::clopper_pearson(k, n, 0.95);
+    [("low", low), ("high", high)].map(|(end, value)| {
+        let key = Key::of(trial, counted(trial), format!("{end} {group} of attempted"));
+        Number::new((n > 0).then_some(100.0 * value), 1, key)
+    })
+}
+
+/// A statistic of a quantity over the attempts of a group, `median m2_rms of found`.
+pub(super) fn statistic(
+    trial: &Trial,
+    name: &str,
+    field: Field,
+    group: &str,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let what = format!("{name} {} of {group}{}", field.name(), unit.suffix());
+    Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, field.topic(), what))
+}
+
+/// One attempt's quantity.
+pub(super) fn value(
+    trial: &Trial,
+    (object, frame, stamp_ns): (&str, u64, u64),
+    field: Field,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let key = Key {
+        what: format!("value {} of {object} at {frame}{}", field.name(), unit.suffix()),
+        topic: field.topic().to_owned(),
+        span: [stamp_ns; 2],
+        logs: vec![trial.file()],
+    };
+    Number::new(value.map(|value| value * unit.scale()), decimals, key)
+}
+
+/// The same key over several logs: what it says is summed, or said of the least, the greatest or the middle one.
+pub(super) fn over(trials: &[&Trial], topic: &str, what: String) -> Key {
+    let spans = trials.iter().map(|trial| trial.span());
+    let span = spans.fold([u64::MAX, 0], |[a, b], [from, to]| [a.min(from), b.max(to)]);
+    Key { what, topic: topic.to_owned(), span, logs: trials.iter().map(|trial| trial.file()).collect() }
+}
+
+/// A number of the header.
+pub(super) fn header(trial: &Trial, what: &str, value: Option<f64>, decimals: usize) -> Number {
+    Number::new(value, decimals, Key { span: [0; 2], ..Key::of(trial, "/run/header", what) })
+}
+
+/// The value of a trial on an axis.
+pub(super) fn axis(trial: &Trial, key: &str, value: Option<f64>) -> Number {
+    header(trial, &format!("axis {key}"), value, 4)
+}
+
+/// The number of a frame.
+pub(super) fn frame(trial: &Trial, number: u64, stamp_ns: u64) -> Number {
+    let key = Key { span: [stamp_ns; 2], ..Key::of(trial, "/referencing/frame", "frame") };
+    Number::count(number as usize, key)
+}
+
+/// As many decimals as a column needs.
+pub(super) fn decimals(values: impl Iterator<Item = Option<f64>>, unit: Unit) -> usize {
+    format::decimals(values.flatten().map(|value| value * unit.scale()))
+}

@@ -1,0 +1,47 @@
+//! What it costs: time a stage, and the search over the size of its problem.
+
+use super::{
+    figures, results,
+    tell::{self, Unit},
+};
+use crate::{
+    Key, Number, Summary,
+    document::{Block, Cell, Head, Section, Table, text},
+    run::Run,
+};
+
+pub(super) fn section(run: &Run, summary: &Summary) -> Section {
+    let caption = text![
+        "Time (ms), medians: of the first six stages a frame, of the others an attempted target; total is from the images, or the points where there are none, to the answer about one target; p95 is its 95 % quantile. Wall clock: it differs from run to run and from machine to machine."
+    ];
+    let stages: Vec<&str> = summary
+        .rows
+        .iter()
+        .flat_map(|row| row.times.stages())
+        .filter(|(_, time)| time.is_some())
+        .map(|(stage, _)| stage)
+        .collect();
+    let shown: Vec<&str> = summary.rows[0]
+        .times
+        .stages()
+        .map(|(stage, _)| stage)
+        .into_iter()
+        .filter(|stage| stages.contains(stage))
+        .collect();
+    let mut heads = results::heads(summary);
+    heads.extend(shown.iter().map(|stage| Head::numbers(*stage)));
+    heads.push(Head::numbers("total, p95"));
+    let mut table = Table::new("times", caption, heads);
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let mut line = results::cells(row);
+        for (stage, time) in row.times.stages().into_iter().filter(|(stage, _)| shown.contains(stage)) {
+            let what = format!("median {stage}_ms of attempted");
+            let decimals = if time.is_some_and(|t| t < 1.0) { 3 } else { 1 };
+            line.push(Number::new(time, decimals, Key::of(trial, "/metrics/timing", what)).into());
+        }
+        let most = tell::statistic(trial, "q95", crate::Field::TotalTime, "attempted", row.total_p95, (Unit::Plain, 1));
+        line.push(Cell::minor(most));
+        table.line(results::breaks(summary, index), line);
+    }
+    Section::new("Run time").with([Block::Table(table)]).with(figures::search_cost(run).map(Block::Figure))
+}

@@ -1,0 +1,126 @@
+//! Tables.
+
+use super::{Span, Text, plain_text};
+
+/// A table: heads, and lines of as many cells as the last row of heads has.
+#[derive(Debug, Default)]
+pub(crate) struct Table {
+    /// The name of its files.
+    pub(crate) id: String,
+    pub(crate) caption: Text,
+    /// Rows of heads, the last one head a column.
+    pub(crate) heads: Vec<Vec<Head>>,
+    pub(crate) lines: Vec<Line>,
+}
+
+/// The head of one column, or of several.
+#[derive(Debug, Clone)]
+pub(crate) struct Head {
+    pub(crate) text: String,
+    pub(crate) columns: usize,
+    /// Whether numbers stand below: to the right then.
+    pub(crate) numbers: bool,
+}
+
+/// One line.
+#[derive(Debug, Default)]
+pub(crate) struct Line {
+    pub(crate) cells: Vec<Cell>,
+    /// Whether a thin rule stands above it.
+    pub(crate) rule: bool,
+}
+
+/// One cell.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Cell {
+    pub(crate) text: Text,
+    /// How many columns it takes; 0 and 1 are one.
+    pub(crate) columns: usize,
+    /// Prose may be broken into lines.
+    pub(crate) prose: bool,
+    /// Of less weight than its neighbours.
+    pub(crate) minor: bool,
+}
+
+impl Head {
+    /// Of a column of words.
+    pub(crate) fn words(text: impl Into<String>) -> Self {
+        Self { text: text.into(), columns: 1, numbers: false }
+    }
+
+    /// Of a column of numbers.
+    pub(crate) fn numbers(text: impl Into<String>) -> Self {
+        Self { text: text.into(), columns: 1, numbers: true }
+    }
+
+    /// Over several columns.
+    pub(crate) fn over(columns: usize, text: impl Into<String>) -> Self {
+        Self { text: text.into(), columns, numbers: false }
+    }
+}
+
+impl<S: Into<Span>> From<S> for Cell {
+    fn from(span: S) -> Self {
+        Self { text: vec![span.into()], ..Self::default() }
+    }
+}
+
+impl Cell {
+    pub(crate) fn prose(text: Text) -> Self {
+        Self { text, prose: true, ..Self::default() }
+    }
+
+    pub(crate) fn minor(span: impl Into<Span>) -> Self {
+        Self { text: vec![span.into()], minor: true, ..Self::default() }
+    }
+
+    pub(crate) fn over(columns: usize, span: impl Into<Span>) -> Self {
+        Self { text: vec![span.into()], columns, ..Self::default() }
+    }
+
+    pub(crate) fn width(&self) -> usize {
+        self.columns.max(1)
+    }
+
+    pub(crate) fn plain(&self) -> String {
+        plain_text(&self.text)
+    }
+}
+
+impl Table {
+    /// One row of heads.
+    pub(crate) fn new(id: &str, caption: Text, heads: Vec<Head>) -> Self {
+        Self { id: id.to_owned(), caption, heads: vec![heads], lines: Vec::new() }
+    }
+
+    pub(crate) fn line(&mut self, rule: bool, cells: Vec<Cell>) {
+        self.lines.push(Line { cells, rule });
+    }
+
+    /// Whether column `place` has numbers.
+    pub(crate) fn numbers(&self, place: usize) -> bool {
+        self.heads.last().and_then(|heads| heads.get(place)).is_some_and(|head| head.numbers)
+    }
+
+    /// How many columns it has.
+    pub(crate) fn columns(&self) -> usize {
+        self.heads.last().map_or(0, Vec::len)
+    }
+
+    /// The names of its columns, those above and below in one.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let mut names = vec![String::new(); self.columns()];
+        for heads in &self.heads {
+            let mut place = 0;
+            for head in heads {
+                for name in names.iter_mut().skip(place).take(head.columns) {
+                    if !head.text.is_empty() {
+                        *name = if name.is_empty() { head.text.clone() } else { format!("{name}, {}", head.text) };
+                    }
+                }
+                place += head.columns;
+            }
+        }
+        names
+    }
+}

@@ -1,0 +1,64 @@
+//! The quantities of one attempt, under the names that the columns of the results have.
+
+use seafix_log::TargetRecord;
+
+macro_rules! fields {
+    ($($field:ident $name:literal $take:expr;)*) => {
+        /// One quantity of an attempt.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub(crate) enum Field { $($field),* }
+
+        impl Field {
+            pub(crate) const ALL: &[Self] = &[$(Self::$field),*];
+
+            /// Its name, that of its column in the results where it has one.
+            pub(crate) fn name(self) -> &'static str {
+                match self { $(Self::$field => $name),* }
+            }
+
+            /// Its value in the logged record; `None` where nothing is known.
+            pub(crate) fn of(self, record: &TargetRecord) -> Option<f64> {
+                match self { $(Self::$field => { let take: fn(&TargetRecord) -> Option<f64> = $take; take(record) })* }
+            }
+        }
+    };
+}
+
+fields! {
+    M1 "m1_rms" |r| r.evaluation.m1_rms;
+    M1Unused "m1_unused_rms" |r| r.evaluation.m1_unused_rms;
+    M2 "m2_rms" |r| r.evaluation.m2_rms;
+    Position "m3_position" |r| r.evaluation.m3_position;
+    Attitude "m3_attitude" |r| r.evaluation.m3_attitude;
+    Nees "nees" |r| r.evaluation.nees;
+    M2Bound "m2_bound" |r| r.evaluation.m2_bound;
+    PositionBound "m3_bound" |r| r.evaluation.m3_bound;
+    PositionRadius "position_radius" |r| crate::place::radius(r);
+    Residual "residual_rms" |r| r.residual_rms;
+    Visible "visible" |r| r.evaluation.visible.map(f64::from);
+    Identified "identified" |r| r.evaluation.identified.map(f64::from);
+    Correct "correct_pairs" |r| r.evaluation.correct_pairs.map(f64::from);
+    Candidates "candidates" |r| Some(r.candidates.iter().map(Vec::len).sum::<usize>() as f64);
+    Tests "tests" |r| r.tests.map(|tests| tests as f64);
+    CandidatesTime "candidates_ms" |r| r.times.candidates_ms;
+    SearchTime "search_ms" |r| r.times.search_ms;
+    SolveTime "solve_ms" |r| r.times.solve_ms;
+    TotalTime "total_ms" |r| r.times.total_ms;
+}
+
+impl Field {
+    /// The field that is called `name`.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|field| field.name() == name)
+    }
+
+    /// The topic that carries it.
+    pub(crate) fn topic(self) -> &'static str {
+        match self {
+            Self::Residual | Self::Tests | Self::PositionRadius => "/referencing/result",
+            Self::Candidates => "/referencing/candidates",
+            Self::CandidatesTime | Self::SearchTime | Self::SolveTime | Self::TotalTime => "/metrics/timing",
+            _ => "/metrics/evaluation",
+        }
+    }
+}

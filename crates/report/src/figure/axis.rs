@@ -1,0 +1,174 @@
+//! From quantities to places: axes with their ticks.
+
+use crate::format;
+
+/// One axis.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Axis {
+    /// Its quantity and unit.
+    pub(crate) label: String,
+    pub(crate) logarithmic: bool,
+    /// Where its ticks are; chosen where empty.
+    pub(crate) ticks: Vec<f64>,
+    /// What stands at the ticks 0, 1, 2, … in place of numbers.
+    pub(crate) names: Vec<String>,
+    /// Its ends; of the values where `None`.
+    pub(crate) range: Option<[f64; 2]>,
+}
+
+/// An axis with its ends, on an interval of the sheet.
+#[derive(Debug, Clone)]
+pub(crate) struct Scale {
+    pub(crate) axis: Axis,
+    ends: [f64; 2],
+    place: [f64; 2],
+}
+
+impl Axis {
+    pub(crate) fn linear(label: impl Into<String>) -> Self {
+        Self { label: label.into(), ..Self::default() }
+    }
+
+    pub(crate) fn logarithmic(label: impl Into<String>) -> Self {
+        Self { label: label.into(), logarithmic: true, ..Self::default() }
+    }
+
+    pub(crate) fn within(mut self, range: [f64; 2]) -> Self {
+        self.range = Some(range);
+        self
+    }
+
+    pub(crate) fn at(mut self, ticks: Vec<f64>) -> Self {
+        self.ticks = ticks;
+        self
+    }
+
+    pub(crate) fn named(label: impl Into<String>, names: Vec<String>) -> Self {
+        let range = Some([-0.6, names.len() as f64 - 0.4]);
+        Self { label: label.into(), names, range, ..Self::default() }
+    }
+
+    /// Ends that hold `values`, with a margin.
+    pub(crate) fn ends(&self, values: impl Iterator<Item = f64>) -> [f64; 2] {
+        if let Some(range) = self.range {
+            return if self.logarithmic { range.map(f64::log10) } else { range };
+        }
+        let usable =
+            values.chain(self.ticks.iter().copied()).filter(|v| v.is_finite() && (!self.logarithmic || *v > 0.0));
+        let usable = usable.map(|v| if self.logarithmic { v.log10() } else { v });
+        let [low, high] = usable.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+        if low > high {
+            return [0.0, 1.0];
+        }
+        let margin = if high > low {
+            0.06 * (high - low)
+        } else if self.logarithmic {
+            0.15
+        } else {
+            0.5
+        };
+        [low - margin, high + margin]
+    }
+}
+
+impl Scale {
+    pub(crate) fn new(axis: Axis, ends: [f64; 2], place: [f64; 2]) -> Self {
+        Self { axis, ends, place }
+    }
+
+    /// Where `value` is on the sheet; what lies beyond the ends stands on them.
+    pub(crate) fn at(&self, value: f64) -> f64 {
+        let value = if self.axis.logarithmic { if value > 0.0 { value.log10() } else { self.ends[0] } } else { value };
+        let share = ((value - self.ends[0]) / (self.ends[1] - self.ends[0])).clamp(0.0, 1.0);
+        self.place[0] + share * (self.place[1] - self.place[0])
+    }
+
+    /// Where it begins and ends on the sheet.
+    pub(crate) fn interval(&self) -> [f64; 2] {
+        self.place
+    }
+
+    /// Whether `value` lies between the ends.
+    pub(crate) fn holds(&self, value: f64) -> bool {
+        let value = if self.axis.logarithmic { value.log10() } else { value };
+        value >= self.ends[0] - 1e-9 && value <= self.ends[1] + 1e-9
+    }
+
+    /// The ticks in view.
+    pub(crate) fn ticks(&self) -> Vec<f64> {
+        let ticks = if !self.axis.names.is_empty() {
+            (0..self.axis.names.len()).map(|i| i as f64).collect()
+        } else if !self.axis.ticks.is_empty() {
+            self.axis.ticks.clone()
+        } else if self.axis.logarithmic {
+            decades(self.ends)
+        } else {
+            steps(self.ends, (self.place[1] - self.place[0]).abs() / 32.0)
+        };
+        ticks.into_iter().filter(|tick| self.holds(*tick)).collect()
+    }
+
+    /// What stands at a tick.
+    pub(crate) fn label(&self, tick: f64) -> String {
+        match self.axis.names.get(tick as usize) {
+            Some(name) if !self.axis.names.is_empty() => name.clone(),
+            _ => tick_text(tick),
+        }
+    }
+}
+
+/// 1, 2, 5 of every decade in view; the tens alone where there are many decades.
+fn decades([low, high]: [f64; 2]) -> Vec<f64> {
+    let steps: &[f64] = match high - low {
+        width if width > 2.2 => &[1.0],
+        width if width > 1.1 => &[1.0, 3.0],
+        _ => &[1.0, 2.0, 5.0],
+    };
+    let decades = low.floor() as i32..=high.ceil() as i32;
+    let every = if high - low > 6.5 { 2 } else { 1 };
+    decades
+        .filter(|decade| decade.rem_euclid(every) == 0)
+        .flat_map(|decade| steps.iter().map(move |step| step * 10_f64.powi(decade)))
+        .collect()
+}
+
+/// Round steps of 1, 2 or 5, at most `most` of them.
+fn steps([low, high]: [f64; 2], most: f64) -> Vec<f64> {
+    let wanted = (high - low) / most.max(2.0);
+    let power = 10_f64.powi(wanted.log10().floor() as i32);
+    let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * power).into_iter().find(|s| *s >= wanted).unwrap_or(wanted);
+    let first = (low / step).ceil() as i64;
+    let last = (high / step).floor() as i64;
+    (first..=last).map(|i| i as f64 * step).collect()
+}
+
+/// A tick without needless zeros; powers of ten where many would be needed.
+pub(crate) fn tick_text(tick: f64) -> String {
+    let size = tick.abs();
+    if size >= 1e5 || (size > 0.0 && size < 1e-4) {
+        let power = size.log10().floor();
+        let lead = tick / 10_f64.powf(power);
+        return format!("{lead:.0}e{power:.0}").replace('-', "−");
+    }
+    let text = format!("{tick:.5}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    format::number(text.parse().ok(), text.split_once('.').map_or(0, |(_, decimals)| decimals.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round() {
+        assert_eq!(steps([0.1, 9.7], 5.0), [2.0, 4.0, 6.0, 8.0]);
+        assert_eq!(decades([0.0, 1.0]), [1.0, 2.0, 5.0, 10.0, 20.0, 50.0]);
+        assert_eq!([0.02, 100.0, -3.5, 1e6].map(tick_text), ["0.02", "100", "−3.5", "1e6"]);
+    }
+
+    #[test]
+    fn values_beyond_the_ends_stand_on_them() {
+        let scale = Scale::new(Axis::logarithmic("x"), [0.0, 2.0], [0.0, 100.0]);
+        assert_eq!([10.0, 1e9, 0.0, f64::INFINITY].map(|v| scale.at(v)), [50.0, 100.0, 0.0, 100.0]);
+    }
+}

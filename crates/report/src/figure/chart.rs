@@ -1,0 +1,173 @@
+//! Charts: panels with axes, layers of marks, a legend.
+
+use super::{
+    Anchor, Axis, Drawing, Ink, Scale, Stroke,
+    drawing::FONT,
+    layer::{self, Layer},
+};
+use crate::print::width_of;
+
+/// Column and page of a journal (mm), in points.
+const COLUMN: f64 = 85.0 * 72.0 / 25.4;
+const PAGE: f64 = 170.0 * 72.0 / 25.4;
+
+/// Panels in rows, and a legend below them.
+#[derive(Debug, Default)]
+pub(crate) struct Chart {
+    pub(crate) panels: Vec<Panel>,
+    /// How many panels stand side by side.
+    pub(crate) columns: usize,
+    /// Whether it takes the page's width, not the column's.
+    pub(crate) page: bool,
+    /// Height of a panel by its width; 0.72 where zero.
+    pub(crate) shape: f64,
+    /// What the series are called, with their index.
+    pub(crate) legend: Vec<Entry>,
+}
+
+/// A line of the legend.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    pub(crate) name: String,
+    /// Index of the series.
+    pub(crate) series: usize,
+    pub(crate) line: bool,
+    pub(crate) mark: bool,
+}
+
+/// One pair of axes and what stands between them.
+#[derive(Debug, Default)]
+pub(crate) struct Panel {
+    /// Its condition.
+    pub(crate) title: String,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) layers: Vec<Layer>,
+    /// Whether a metre is as long in both directions.
+    pub(crate) equal: bool,
+}
+
+impl Chart {
+    /// Draws it; `None` where there is nothing to draw.
+    pub(crate) fn draw(&self) -> Option<Drawing> {
+        let any = self.panels.iter().flat_map(|panel| &panel.layers).any(Layer::draws);
+        if !any {
+            return None;
+        }
+        let width = if self.page { PAGE } else { COLUMN };
+        let columns = self.columns.clamp(1, self.panels.len().max(1));
+        let cell = width / columns as f64;
+        let shape = if self.shape > 0.0 { self.shape } else { 0.72 };
+        let titled = self.panels.iter().any(|panel| !panel.title.is_empty());
+        let height = cell * shape + if titled { FONT * 1.7 } else { 0.0 };
+        let mut drawing = Drawing::default();
+        for (index, panel) in self.panels.iter().enumerate() {
+            let (column, row) = (index % columns, index / columns);
+            panel.draw(&mut drawing, [column as f64 * cell, row as f64 * height], [cell, height], titled);
+        }
+        let below = self.panels.len().div_ceil(columns) as f64 * height;
+        drawing.size = [width, self.legend(&mut drawing, width, below)];
+        Some(drawing)
+    }
+
+    /// The entries in as many columns as fit; gives where the drawing ends.
+    fn legend(&self, drawing: &mut Drawing, width: f64, top: f64) -> f64 {
+        if self.legend.is_empty() {
+            return top;
+        }
+        let widest = self.legend.iter().map(|entry| width_of(&entry.name, FONT)).fold(0.0, f64::max);
+        let columns = ((width - 8.0) / (widest + 34.0)).floor().clamp(1.0, self.legend.len() as f64) as usize;
+        let rows = self.legend.len().div_ceil(columns);
+        let step = (width - 8.0) / columns as f64;
+        for (index, entry) in self.legend.iter().enumerate() {
+            let (row, column) = (index % rows, index / rows);
+            let x = 8.0 + column as f64 * step;
+            let y = top + 9.0 + row as f64 * 11.0;
+            if entry.line {
+                drawing.line([[x, y], [x + 20.0, y]], layer::stroke(entry.series));
+            }
+            if entry.mark {
+                drawing.mark(entry.series, [x + 10.0, y], 2.2);
+            }
+            drawing.words([x + 25.0, y + 2.6], Anchor::Start, Ink::Text, entry.name.clone());
+        }
+        top + 9.0 + rows as f64 * 11.0
+    }
+}
+
+impl Entry {
+    pub(crate) fn both(name: impl Into<String>, series: usize) -> Self {
+        Self { name: name.into(), series, line: true, mark: true }
+    }
+
+    pub(crate) fn line(name: impl Into<String>, series: usize) -> Self {
+        Self { mark: false, ..Self::both(name, series) }
+    }
+
+    pub(crate) fn mark(name: impl Into<String>, series: usize) -> Self {
+        Self { line: false, ..Self::both(name, series) }
+    }
+}
+
+impl Panel {
+    fn draw(&self, drawing: &mut Drawing, [x, y]: [f64; 2], [width, height]: [f64; 2], titled: bool) {
+        let values = |which: usize| self.layers.iter().flat_map(move |layer| layer.reach()).map(move |p| p[which]);
+        let (mut x_ends, mut y_ends) = (self.x.ends(values(0)), self.y.ends(values(1)));
+        let top = y + if titled { FONT * 1.7 } else { 4.0 };
+        // Names on the vertical axis need the room of the longest.
+        let probe = Scale::new(self.y.clone(), y_ends, [0.0, height]);
+        let label = probe.ticks().iter().map(|&tick| width_of(&probe.label(tick), FONT)).fold(0.0, f64::max);
+        let left = x + label + 7.0 + if self.y.label.is_empty() { 2.0 } else { FONT * 1.6 };
+        let right = x + width - 7.0;
+        // Long names on the horizontal axis are stacked in two levels.
+        let levels = if self.crowded(x_ends, right - left) { 2.0 } else { 1.0 };
+        let bottom = y + height - 6.0 - FONT * (levels + 0.4) - if self.x.label.is_empty() { 0.0 } else { FONT * 1.4 };
+        if self.equal {
+            equalise(&mut x_ends, &mut y_ends, (right - left) / (bottom - top));
+        }
+        let scale_x = Scale::new(self.x.clone(), x_ends, [left, right]);
+        let scale_y = Scale::new(self.y.clone(), y_ends, [bottom, top]);
+
+        for layer in self.layers.iter().filter(|layer| layer.below()) {
+            layer.draw(drawing, &scale_x, &scale_y);
+        }
+        for tick in scale_y.ticks() {
+            let at = scale_y.at(tick);
+            drawing.line([[left, at], [right, at]], Stroke::thin(Ink::Grid));
+            drawing.words([left - 4.0, at + 2.6], Anchor::End, Ink::Text, scale_y.label(tick));
+        }
+        for (index, tick) in scale_x.ticks().into_iter().enumerate() {
+            let at = scale_x.at(tick);
+            let level = index as f64 % levels;
+            drawing.line([[at, bottom], [at, top]], Stroke::thin(Ink::Grid));
+            drawing.words([at, bottom + FONT * (1.3 + level)], Anchor::Middle, Ink::Text, scale_x.label(tick));
+        }
+        for layer in self.layers.iter().filter(|layer| !layer.below()) {
+            layer.draw(drawing, &scale_x, &scale_y);
+        }
+        drawing.line([[left, top], [left, bottom], [right, bottom]], Stroke { ink: Ink::Text, width: 0.7, dash: 0 });
+        let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
+        drawing.words([middle[0], y + height - 5.0], Anchor::Middle, Ink::Text, self.x.label.clone());
+        drawing.turned([x + FONT, middle[1]], Ink::Text, self.y.label.clone());
+        drawing.words([left, y + FONT * 1.1], Anchor::Start, Ink::Text, self.title.clone());
+    }
+
+    /// Whether the labels of the horizontal axis would touch.
+    fn crowded(&self, ends: [f64; 2], width: f64) -> bool {
+        let scale = Scale::new(self.x.clone(), ends, [0.0, width]);
+        let ticks = scale.ticks();
+        let half = |tick: f64| width_of(&scale.label(tick), FONT) / 2.0;
+        ticks.windows(2).any(|pair| scale.at(pair[1]) - scale.at(pair[0]) < half(pair[0]) + half(pair[1]) + 3.0)
+    }
+}
+
+/// Widens the shorter of both ranges until a metre is as long in both directions.
+fn equalise(x: &mut [f64; 2], y: &mut [f64; 2], aspect: f64) {
+    let widen = |ends: &mut [f64; 2], to: f64| {
+        let more = (to - (ends[1] - ends[0])).max(0.0) / 2.0;
+        *ends = [ends[0] - more, ends[1] + more];
+    };
+    let (width, height) = (x[1] - x[0], y[1] - y[0]);
+    widen(x, height * aspect);
+    widen(y, width / aspect);
+}

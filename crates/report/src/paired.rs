@@ -1,0 +1,235 @@
+//! Which of two trials errs less, on the same frames.
+
+use std::collections::BTreeMap;
+
+use seafix_evaluation::{Bootstrap, holm, mcnemar, median, signed_rank};
+use seafix_log::Axis;
+
+use crate::{
+    Field, Summary,
+    content::distinct,
+    format,
+    run::{Run, Trial},
+};
+
+/// Of the resamples: any number, but the same for everyone.
+pub(crate) const SEED: u64 = 20_211_038;
+/// Claims in a family are wrong with at most this chance.
+pub(crate) const ALPHA: f64 = 0.05;
+/// From so many conditions on they are the units, one value each, not the frames.
+const CONDITIONS: usize = 10;
+
+/// Two trials, or two methods over many conditions, compared by m2, failures as infinitely far off.
+#[derive(Debug, Clone)]
+pub(crate) struct Comparison {
+    /// What both have in common; empty over conditions.
+    pub(crate) condition: String,
+    pub(crate) names: [String; 2],
+    /// Indices of the trials.
+    pub(crate) first: usize,
+    pub(crate) second: usize,
+    /// The logs of all pairs, first and second in turn.
+    pub(crate) logs: Vec<usize>,
+    /// Whether the units are conditions: then differences are logarithms of ratios.
+    pub(crate) over_conditions: bool,
+    pub(crate) n: usize,
+    /// Median of first − second (m), or of ln(first / second), and its 95 % interval.
+    pub(crate) difference: f64,
+    pub(crate) interval: (f64, f64),
+    pub(crate) p: f64,
+    pub(crate) holm: f64,
+    pub(crate) effect: f64,
+    /// Fixes found by the one alone, and by the other alone.
+    pub(crate) alone: [usize; 2],
+    pub(crate) mcnemar: f64,
+}
+
+impl Comparison {
+    /// The trial that errs less, if that is sure: by the test and by the interval.
+    pub(crate) fn better(&self) -> Option<usize> {
+        let (low, high) = self.interval;
+        match self.holm < ALPHA {
+            true if high < 0.0 => Some(self.first),
+            true if low > 0.0 => Some(self.second),
+            _ => None,
+        }
+    }
+}
+
+/// The trials that saw the same frames, by what those are.
+pub(crate) fn groups(run: &Run) -> Vec<Vec<usize>> {
+    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+    for (index, trial) in run.trials.iter().enumerate() {
+        let data = data(trial);
+        match groups.iter_mut().find(|(known, _)| *known == data) {
+            Some((_, members)) => members.push(index),
+            None => groups.push((data, vec![index])),
+        }
+    }
+    groups.into_iter().map(|(_, members)| members).collect()
+}
+
+/// What a trial was given: the same text, the same frames.
+pub(crate) fn data(trial: &Trial) -> String {
+    let header = &trial.header;
+    let source = header.configuration.parse::<toml::Table>().ok().and_then(|table| table.get("source").cloned());
+    let source = source.map_or_else(String::new, |source| source.to_string());
+    format!("{}\n{source}\n{:?}\n{:?}\n{}", header.source, header.seeds, header.rig, header.site)
+}
+
+/// What tells the trials of a group apart, one name a member, and what they share.
+pub(crate) fn names(run: &Run, members: &[usize]) -> (String, Vec<String>) {
+    let axes = |index: usize| &run.trials[index].header.axes;
+    let constant = |place: usize| members.iter().all(|&m| axes(m)[place].value == axes(members[0])[place].value);
+    let (mut shared, mut differing) = (Vec::new(), Vec::new());
+    for (place, axis) in axes(members[0]).iter().enumerate() {
+        // A method that all share names no condition.
+        match constant(place) {
+            true => shared.push(format!("{} {}", format::short(&axis.key), axis.value)),
+            false => differing.push(place),
+        }
+    }
+    let name = |&index: &usize| {
+        let values: Vec<String> = differing.iter().map(|&place| axes(index)[place].value.clone()).collect();
+        if values.is_empty() { run.trials[index].method().join(" + ") } else { values.join(", ") }
+    };
+    (shared.join(", "), members.iter().map(name).collect())
+}
+
+/// Every comparison the run allows, as one family.
+pub(crate) fn comparisons(run: &Run, summary: &Summary) -> Vec<Comparison> {
+    let groups: Vec<Vec<usize>> = groups(run).into_iter().filter(|group| group.len() > 1).collect();
+    let mut family =
+        if groups.len() >= CONDITIONS { over_conditions(run, summary, &groups) } else { within(run, &groups) };
+    let adjusted = holm(&family.iter().map(|c| c.p).collect::<Vec<_>>());
+    family.iter_mut().zip(adjusted).for_each(|(comparison, p)| comparison.holm = p);
+    family
+}
+
+/// Pairs of places: all of a few, each with the first of many.
+fn pairs(n: usize) -> Vec<(usize, usize)> {
+    let all = n <= 4;
+    (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).filter(|(a, _)| all || *a == 0).collect()
+}
+
+fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
+    let mut found = Vec::new();
+    for members in groups {
+        let (condition, names) = names(run, members);
+        let axes = |place: usize| &run.trials[members[place]].header.axes[1..];
+        let same = |a: usize, b: usize| {
+            let equal = |(x, y): (&Axis, &Axis)| x.value == y.value || x.value == "–" || y.value == "–";
+            run.trials[members[a]].header.axes[0] != run.trials[members[b]].header.axes[0]
+                && axes(a).iter().zip(axes(b)).all(equal)
+        };
+        let mut chosen = pairs(members.len());
+        if run.joined {
+            // Of several runs, what differs in nothing but the run; where nothing does, all.
+            let n = members.len();
+            let across = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).filter(|(a, b)| same(*a, *b));
+            let across: Vec<(usize, usize)> = across.collect();
+            chosen = if across.is_empty() { chosen } else { across };
+        }
+        for (a, b) in chosen {
+            let (first, second) = (members[a], members[b]);
+            let errors = errors(&run.trials[first], &run.trials[second]);
+            if errors.is_empty() {
+                continue;
+            }
+            let names = [names[a].clone(), names[b].clone()];
+            found.push(of(condition.clone(), names, vec![first, second], false, &errors));
+        }
+    }
+    found
+}
+
+/// The errors m2 of both on the attempts that both made, in order of time; infinity where there is no right fix.
+pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
+    let of = |trial: &Trial| -> BTreeMap<(u64, String), f64> {
+        let attempts = trial.attempts();
+        let error = attempts
+            .map(|(frame, row)| ((frame.number, trial.object(row).to_owned()), row.error_or_failure(Field::M2)));
+        error.collect()
+    };
+    let other = of(second);
+    of(first).into_iter().filter_map(|(key, a)| Some((a, *other.get(&key)?))).collect()
+}
+
+/// One value a condition: the median of m2 over all attempts.
+fn over_conditions(run: &Run, summary: &Summary, groups: &[Vec<usize>]) -> Vec<Comparison> {
+    let named: Vec<(Vec<usize>, Vec<String>)> =
+        groups.iter().map(|group| (group.clone(), names(run, group).1)).collect();
+    let methods = distinct(named.iter().flat_map(|(_, names)| names.clone()));
+    let mut found = Vec::new();
+    for (a, b) in pairs(methods.len()) {
+        let mut logs = Vec::new();
+        for (group, names) in &named {
+            let of = |method: &str| names.iter().position(|name| name == method).map(|place| group[place]);
+            if let (Some(first), Some(second)) = (of(&methods[a]), of(&methods[b])) {
+                logs.extend([first, second]);
+            }
+        }
+        let m2 = |index: usize| summary.rows[index].m2_of_all.unwrap_or(f64::INFINITY).ln();
+        let errors: Vec<(f64, f64)> = logs.chunks(2).map(|pair| (m2(pair[0]), m2(pair[1]))).collect();
+        if !errors.is_empty() {
+            found.push(of(String::new(), [methods[a].clone(), methods[b].clone()], logs, true, &errors));
+        }
+    }
+    found
+}
+
+fn of(condition: String, names: [String; 2], logs: Vec<usize>, over: bool, errors: &[(f64, f64)]) -> Comparison {
+    let statistics = Statistics::of(errors, over);
+    Comparison {
+        condition,
+        names,
+        first: logs[0],
+        second: logs[1],
+        logs,
+        over_conditions: over,
+        n: errors.len(),
+        difference: statistics.difference,
+        interval: statistics.interval,
+        p: statistics.p,
+        holm: 1.0,
+        effect: statistics.effect,
+        alone: statistics.alone,
+        mcnemar: mcnemar(statistics.alone[0], statistics.alone[1]),
+    }
+}
+
+/// What pairs of errors say.
+pub(crate) struct Statistics {
+    pub(crate) difference: f64,
+    pub(crate) interval: (f64, f64),
+    pub(crate) p: f64,
+    pub(crate) effect: f64,
+    pub(crate) alone: [usize; 2],
+}
+
+impl Statistics {
+    /// Of pairs in the order of time, or of conditions, which have none.
+    pub(crate) fn of(errors: &[(f64, f64)], conditions: bool) -> Self {
+        // Two failures differ by nothing.
+        let differences: Vec<f64> = errors.iter().map(|(a, b)| if a == b { 0.0 } else { a - b }).collect();
+        let bootstrap = Bootstrap::of(errors.len(), SEED);
+        let bootstrap = if conditions { Bootstrap { block: 1, ..bootstrap } } else { bootstrap };
+        let mut drawn = Vec::with_capacity(errors.len());
+        let interval = bootstrap.interval(errors.len(), 0.95, |at| {
+            drawn.clear();
+            drawn.extend(at.iter().map(|&i| differences[i]));
+            median(&mut drawn)
+        });
+        let test = signed_rank(errors);
+        let alone = |one: fn(&(f64, f64)) -> [f64; 2]| {
+            errors.iter().map(one).filter(|[own, other]| own.is_finite() && !other.is_finite()).count()
+        };
+        Self {
+            difference: median(&mut differences.clone()),
+            interval,
+            p: test.p,
+            effect: test.effect,
+            alone: [alone(|(a, b)| [*a, *b]), alone(|(a, b)| [*b, *a])],
+        }
+    }
+}

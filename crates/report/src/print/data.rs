@@ -1,0 +1,84 @@
+//! Tables as CSV and JSON: what others compute with.
+
+use serde_json::{Value, json};
+
+use crate::{
+    document::{Cell, Span, Table, plain_text},
+    print::unicode::harmless,
+};
+
+/// The cells as they are printed, one line each; a number under its head alone, never with its unit.
+pub(crate) fn csv(table: &Table) -> String {
+    let mut out = line(table.names().iter().map(String::as_str));
+    for row in &table.lines {
+        let mut cells: Vec<String> = Vec::new();
+        for cell in &row.cells {
+            cells.push(printed(cell));
+            cells.extend(std::iter::repeat_n(String::new(), cell.width() - 1));
+        }
+        out += &line(cells.iter().map(String::as_str));
+    }
+    out
+}
+
+/// A lone number with every digit it has; other cells as they read.
+fn printed(cell: &Cell) -> String {
+    match &cell.text[..] {
+        [span] => match span.number() {
+            Some(number) => number.value.map_or_else(String::new, |value| value.to_string()),
+            None => cell.plain(),
+        },
+        _ => cell.plain(),
+    }
+}
+
+fn line<'a>(fields: impl Iterator<Item = &'a str>) -> String {
+    fields.map(field).collect::<Vec<_>>().join(",") + "\n"
+}
+
+/// A field, quoted where it must be; a spreadsheet shall not take a name for a formula.
+pub(crate) fn field(text: &str) -> String {
+    let text = harmless(text);
+    let number = text.parse::<f64>().is_ok();
+    let formula = !number && text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    let text = if formula { format!("'{text}") } else { text };
+    if formula || text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
+}
+
+/// The same with keys: `{id, caption, columns, rows: [[{text, value, key} | text, …], …]}`.
+pub(crate) fn json(table: &Table) -> String {
+    let rows: Vec<Value> = table.lines.iter().map(|row| row.cells.iter().map(cell).collect()).collect();
+    let value = json!({
+        "id": table.id,
+        "caption": plain_text(&table.caption),
+        "columns": table.names(),
+        "rows": rows,
+    });
+    serde_json::to_string_pretty(&value).expect("text and numbers are JSON") + "\n"
+}
+
+fn cell(cell: &Cell) -> Value {
+    match &cell.text[..] {
+        [span @ (Span::Number(number) | Span::Best(number))] => json!({
+            "text": number.text,
+            "value": number.value.filter(|value| value.is_finite()),
+            "best": matches!(span, Span::Best(_)),
+            "key": number.key.to_string(),
+        }),
+        text => Value::String(plain_text(text)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_name_becomes_a_formula() {
+        assert_eq!(field("=cmd|'/c calc'!A1"), "\"'=cmd|'/c calc'!A1\"");
+        assert_eq!(field("-3.5"), "-3.5");
+        assert_eq!(field("-x"), "\"'-x\"");
+        assert_eq!(field("a,\"b\""), "\"a,\"\"b\"\"\"");
+        assert_eq!(field("\u{1b}[31mred"), "\u{fffd}[31mred");
+    }
+}

@@ -1,0 +1,176 @@
+//! A paper as one page of HTML: inline style, inline drawings, pictures as data, no scripts, nothing from elsewhere.
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
+
+use super::{fonts::Font, svg};
+use crate::{
+    Number,
+    document::{Block, Cell, Document, Figure, Picture, Span, Table},
+};
+
+/// The whole page. Every name out of the logs is escaped by the macro that writes it, or by [`svg::escape`].
+pub(crate) fn html(document: &Document) -> String {
+    let page = markup! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta name="generator" content={ "seafix-report " (env!("CARGO_PKG_VERSION")) };
+                // Without an icon of its own a browser asks the server for one.
+                link rel="icon" href="data:,";
+                title { (plain(&document.title)) }
+                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(font())) (PreEscaped(svg::style())) }
+            }
+            body {
+                header {
+                    h1 { (plain(&document.title)) }
+                    p.run { "Run " code { (plain(&document.run)) } }
+                }
+                section.abstract {
+                    p.question { (plain(&document.question)) }
+                    @for text in &document.summary { p { (spans(text)) } }
+                }
+                main {
+                    @for section in &document.sections {
+                        h2 { (section.title) }
+                        @for block in &section.blocks { (self::block(block)) }
+                    }
+                }
+                footer { "Made by seafix-report " (env!("CARGO_PKG_VERSION")) " from the logs alone. Point at a number to see where it comes from; " code { "seafix report --verify" } " computes it again." }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// The face of the figures, so that their words are as wide everywhere as they were measured.
+fn font() -> String {
+    let face = STANDARD.encode(Font::Sans.loaded().bytes);
+    format!(
+        "@font-face{{font-family:\"Seafix Sans\";src:url(data:font/ttf;base64,{face}) format(\"truetype\")}}svg{{font-family:\"Seafix Sans\",sans-serif}}"
+    )
+}
+
+fn block(block: &Block) -> Markup {
+    markup! {
+        @match block {
+            Block::Paragraph(text) => { p { (spans(text)) } }
+            Block::Formula(text) => { p.formula { (spans(text)) } }
+            Block::Terms(terms) => { dl { @for (term, meaning) in terms { dt { (spans(term)) } dd { (spans(meaning)) } } } }
+            Block::Items(items) => { ul { @for item in items { li { (spans(item)) } } } }
+            Block::Table(table) => { (self::table(table)) }
+            Block::Figure(figure) => { (self::figure(figure)) }
+            Block::Picture(picture) => { (self::picture(picture)) }
+            Block::Listing { title, text, folded } => {
+                @if *folded {
+                    details { summary { (plain(title)) } pre { (plain(text)) } }
+                } @else {
+                    @if !title.is_empty() { p { (plain(title)) } }
+                    pre { (plain(text)) }
+                }
+            }
+        }
+    }
+}
+
+fn spans(text: &[Span]) -> Markup {
+    markup! {
+        @for span in text {
+            @match span {
+                Span::Plain(text) => { (plain(text)) }
+                Span::Italic(text) => { i { (plain(text)) } }
+                Span::Bold(text) => { b { (plain(text)) } }
+                Span::Code(text) => { code { (plain(text)) } }
+                Span::Sub(text) => { sub { (plain(text)) } }
+                Span::Sup(text) => { sup { (plain(text)) } }
+                Span::Number(number) => { (self::number(number)) }
+                Span::Best(number) => { b { (self::number(number)) } }
+            }
+        }
+    }
+}
+
+/// A number carries what it is and where it comes from.
+fn number(number: &Number) -> Markup {
+    let value = number.value.map_or_else(String::new, |value| value.to_string());
+    markup! { data value=(value) title=(number.key.to_string()) { (number.text) } }
+}
+
+/// Text without characters that hide themselves.
+fn plain(text: &str) -> String {
+    super::unicode::harmless(text)
+}
+
+fn table(table: &Table) -> Markup {
+    let wide = table.columns() > 7;
+    markup! {
+        figure.table.wide[wide] id=(table.id) {
+            figcaption { (spans(&table.caption)) }
+            div.scroll {
+                table {
+                    @if table.heads.iter().flatten().any(|head| !head.text.is_empty()) {
+                        thead {
+                            @for (row, heads) in table.heads.iter().enumerate() {
+                                tr {
+                                    @for head in heads {
+                                        @if head.columns > 1 {
+                                            th.group colspan=(head.columns) { span { (plain(&head.text)) } }
+                                        } @else {
+                                            th.n[head.numbers] { (plain(&head.text)) }
+                                        }
+                                    }
+                                    @if row + 1 < table.heads.len() && heads.is_empty() { th {} }
+                                }
+                            }
+                        }
+                    }
+                    tbody {
+                        @for line in &table.lines {
+                            tr.break[line.rule] { (cells(table, &line.cells)) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn cells(table: &Table, cells: &[Cell]) -> Markup {
+    let mut next = 0;
+    let mut place = |cell: &Cell| {
+        next += cell.width();
+        next - cell.width()
+    };
+    let placed: Vec<(usize, &Cell)> = cells.iter().map(|cell| (place(cell), cell)).collect();
+    markup! {
+        @for (place, cell) in placed {
+            @let numbers = table.numbers(place) && cell.width() == 1;
+            td.n[numbers].minor[cell.minor].text[cell.prose].word[!numbers && !cell.prose] colspan=[(cell.width() > 1).then(|| cell.width())] {
+                (spans(&cell.text))
+            }
+        }
+    }
+}
+
+fn figure(figure: &Figure) -> Markup {
+    let page = figure.drawing.size[0] > 300.0;
+    markup! {
+        figure.plot.page[page] id=(figure.id) {
+            div.scroll { (PreEscaped(svg::inline(&figure.drawing))) }
+            figcaption { (spans(&figure.caption)) }
+        }
+    }
+}
+
+fn picture(picture: &Picture) -> Markup {
+    let small = picture.size[0] < 1000;
+    markup! {
+        figure.image.wide[!small] id=(picture.id) {
+            img src={ "data:image/jpeg;base64," (STANDARD.encode(&picture.jpeg)) } width=(picture.size[0]) height=(picture.size[1]) alt=(plain(&picture.alternative));
+            figcaption { (spans(&picture.caption)) }
+        }
+    }
+}

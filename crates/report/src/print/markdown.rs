@@ -1,0 +1,36 @@
+//! Running text as Markdown.
+
+use crate::document::Span;
+
+/// `text` with its emphasis; what Markdown would read as its own is escaped.
+pub(crate) fn markdown(text: &[Span]) -> String {
+    text.iter()
+        .map(|span| {
+            let plain = escape(span.plain());
+            match span {
+                Span::Italic(_) => format!("*{plain}*"),
+                Span::Bold(_) | Span::Best(_) => format!("**{plain}**"),
+                Span::Code(text) => format!("`{}`", text.replace('`', "'")),
+                _ => plain,
+            }
+        })
+        .collect()
+}
+
+/// Names in Markdown are text, never markup.
+pub(crate) fn escape(text: &str) -> String {
+    let mut out = String::new();
+    for c in super::unicode::harmless(text).chars() {
+        match c {
+            '<' => out += "&lt;",
+            '&' => out += "&amp;",
+            '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '#' => {
+                out.push('\\');
+                out.push(c);
+            }
+            '\n' => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}

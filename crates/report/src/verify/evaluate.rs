@@ -1,0 +1,314 @@
+//! What a key says, by the definitions.
+
+use std::collections::BTreeMap;
+
+use seafix_evaluation::{clopper_pearson, holm, mcnemar, quantile};
+use seafix_log::{FrameTimes, Outcome, TargetRecord};
+
+use super::logs::{Log, Logs};
+use crate::{Field, Key, ReportError, paired::Statistics};
+
+/// The value of a key, or why there is none.
+type Answer = Result<Option<f64>, String>;
+
+/// Computes what `key` says.
+pub(super) fn evaluate(key: &Key, logs: &mut Logs) -> Result<Answer, ReportError> {
+    for name in &key.logs {
+        if logs.get(name)?.is_none() {
+            return Ok(Err(format!("there is no log {name}")));
+        }
+    }
+    let mut all: Vec<&Log> = Vec::new();
+    let logs: &Logs = logs;
+    for name in &key.logs {
+        all.extend(logs.known(name));
+    }
+    Ok(answer(&key.what, key.span, &all).ok_or_else(|| format!("nobody knows what `{}` is", key.what)))
+}
+
+/// One attempt of a log, with the number of its candidates.
+type Row<'a> = &'a (TargetRecord, usize, [f64; 3]);
+
+fn rows(log: &Log, span: [u64; 2]) -> impl Iterator<Item = Row<'_>> {
+    log.sample(span).flat_map(|frame| &frame.rows)
+}
+
+/// `Some(None)`: a dash.
+fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    let (what, scale) = match what {
+        _ if what.ends_with(" in mm") => (what.trim_end_matches(" in mm"), 1e3),
+        _ if what.ends_with(" in deg") => (what.trim_end_matches(" in deg"), 1_f64.to_degrees()),
+        _ => (what, 1.0),
+    };
+    let (first, rest) = what.split_once(' ').unwrap_or((what, ""));
+    let log = logs.first()?;
+    if matches!(first, "least" | "greatest" | "middle") {
+        let each: Option<Vec<Option<f64>>> = logs.iter().map(|log| answer(rest, span, &[log])).collect();
+        let mut each: Vec<f64> = each?.into_iter().flatten().map(|value| value * scale).collect();
+        return Some(match first {
+            "least" => each.iter().copied().reduce(f64::min),
+            "greatest" => each.iter().copied().reduce(f64::max),
+            _ => (!each.is_empty()).then(|| quantile(&mut each, 0.5)),
+        });
+    }
+    if let Some((_, over)) = rest.split_once(" over ") {
+        return compared(first, over, logs, span);
+    }
+    if let Some(bin) = rest.strip_prefix("search_ms at ") {
+        let bin: f64 = bin.strip_suffix(" half octaves of candidates")?.parse().ok()?;
+        let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.1 > 0);
+        let own = own.filter(|row| (2.0 * (row.1 as f64).log2()).round() / 2.0 == bin);
+        return statistic(first, own.filter_map(|row| row.0.times.search_ms).filter(|t| *t > 0.0).collect());
+    }
+    Some(match (first, rest) {
+        ("axis", key) => log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok(),
+        ("every", _) => Some(log.totals.as_ref()?.every as f64),
+        ("frame", _) => Some(at(log, span)?.number as f64),
+        ("stamp", _) => Some(at(log, span)?.stamp_ns as f64),
+        ("marks", name) => {
+            let place = ["corners", "cloud", "candidates", "identified", "used"].iter().position(|n| *n == name)?;
+            Some(at(log, span)?.marks[place] as f64)
+        }
+        ("disparity", _) => (log.disparity.1 > 0).then(|| (log.disparity.0 / log.disparity.1 as f64).sqrt()),
+        ("count" | "density", range) if range.contains(" from ") => histogram(first, range, span, logs),
+        ("count", group) => Some(pooled(logs, group, span)? as f64),
+        ("percent" | "low" | "high", group) => share(first, group, scale, span, logs)?,
+        ("beyond", _) => {
+            let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.0.outcome == Outcome::Referenced);
+            let beyond = own.filter(|row| row.0.evaluation.m3_position > Field::PositionRadius.of(&row.0));
+            Some(beyond.filter(|row| Field::PositionRadius.of(&row.0).is_some()).count() as f64)
+        }
+        ("sum", fields) => {
+            let (above, below) = fields.split_once(" by ")?;
+            let (above, below) = (Field::named(above)?, Field::named(below)?);
+            let sum = |field: Field| rows(log, span).filter_map(|row| field.of(&row.0)).sum::<f64>();
+            Some(sum(above) / sum(below))
+        }
+        ("rms" | "bound" | "ratio" | "within", of) => totals(first, of, log)?.map(|value| value * scale),
+        ("mean", "nees of judged") => totals(first, rest, log)?,
+        ("value", of) => single(of, span, log)?.map(|value| value * scale),
+        (place, of) if place.starts_with("place-") => located(place, of, span, log)?,
+        ("all", of) => {
+            let field = Field::named(of.strip_suffix(" of attempted")?)?;
+            let known = rows(log, span).any(|row| found(&row.0) && field.of(&row.0).is_some());
+            let mut values: Vec<f64> = rows(log, span).map(|row| error(&row.0, field)).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len().saturating_sub(1) / 2).filter(|_| known).map(|value| value * scale)
+        }
+        (name, of) => {
+            let (field, group) = of.split_once(" of ")?;
+            let values = match Field::named(field) {
+                Some(field) => {
+                    let own = rows(log, span).filter(|row| group == "attempted" || found(&row.0));
+                    own.filter_map(|row| value(row, field)).collect()
+                }
+                None => log.sample(span).filter_map(|frame| stage(&frame.times, field)).collect(),
+            };
+            statistic(name, values)?.map(|value| value * scale)
+        }
+    })
+}
+
+fn value(row: Row<'_>, field: Field) -> Option<f64> {
+    if field == Field::Candidates { Some(row.1 as f64) } else { field.of(&row.0) }
+}
+
+fn found(row: &TargetRecord) -> bool {
+    row.outcome == Outcome::Referenced && row.evaluation.wrong != Some(true)
+}
+
+fn error(row: &TargetRecord, field: Field) -> f64 {
+    if found(row) { field.of(row).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
+}
+
+fn at(log: &Log, span: [u64; 2]) -> Option<&super::logs::Seen> {
+    log.frames.iter().find(|frame| frame.stamp_ns == span[0])
+}
+
+fn stage(times: &FrameTimes, name: &str) -> Option<f64> {
+    match name {
+        "detect_ms" => times.detect_ms,
+        "locate_ms" => times.locate_ms,
+        "describe_ms" => times.describe_ms,
+        "match_ms" => times.match_ms,
+        "refine_ms" => times.refine_ms,
+        "triangulate_ms" => times.triangulate_ms,
+        _ => None,
+    }
+}
+
+fn statistic(name: &str, mut values: Vec<f64>) -> Option<Option<f64>> {
+    let n = values.len();
+    let known = n > 0;
+    Some(match name {
+        "sampled" => Some(n as f64),
+        "mean" => known.then(|| values.iter().sum::<f64>() / n as f64),
+        "median" => known.then(|| quantile(&mut values, 0.5)),
+        _ => {
+            let p: f64 = name.strip_prefix('q')?.parse().ok()?;
+            known.then(|| quantile(&mut values, p / 100.0))
+        }
+    })
+}
+
+/// How many there are of `group`, in all logs together.
+fn pooled(logs: &[&Log], group: &str, span: [u64; 2]) -> Option<usize> {
+    logs.iter().map(|log| counted(log, group, span)).sum()
+}
+
+fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
+    if let Some(totals) = &log.totals {
+        let n = match group {
+            "frames" => totals.frames,
+            "fixed-frames" => totals.referenced_frames,
+            "wrong-frames" => totals.wrong_frames,
+            "attempted" => totals.attempted,
+            "found" => totals.found,
+            "wrong" => totals.wrong,
+            "unjudged" => totals.unjudged,
+            "refused" => totals.refused(),
+            "judged" => totals.judged,
+            _ => totals.reasons.get(group.strip_prefix("refused:")?).copied().unwrap_or(0),
+        };
+        return usize::try_from(n).ok();
+    }
+    let is = |of: fn(&TargetRecord) -> bool| rows(log, span).filter(|row| of(&row.0)).count();
+    let frames =
+        |of: fn(&TargetRecord) -> bool| log.sample(span).filter(|f| f.rows.iter().any(|row| of(&row.0))).count();
+    let fixed = |row: &TargetRecord| row.outcome == Outcome::Referenced;
+    let wrong = |row: &TargetRecord| row.outcome == Outcome::Referenced && row.evaluation.wrong == Some(true);
+    Some(match group {
+        "frames" => log.sample(span).count(),
+        "fixed-frames" => frames(fixed),
+        "wrong-frames" => frames(wrong),
+        "attempted" => rows(log, span).count(),
+        "found" => is(found),
+        "wrong" => is(wrong),
+        "unjudged" => is(|row| found(row) && row.evaluation.wrong.is_none()),
+        "refused" => is(|row| row.outcome != Outcome::Referenced),
+        _ => {
+            let reason = group.strip_prefix("refused:")?;
+            let of = |row: Row<'_>| {
+                if row.0.reason.is_empty() { row.0.outcome.name() == reason } else { row.0.reason == reason }
+            };
+            rows(log, span).filter(|row| row.0.outcome != Outcome::Referenced && of(row)).count()
+        }
+    })
+}
+
+/// A share of attempts in percent, or an end of its interval.
+fn share(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    let group = group.strip_suffix(" of attempted")?;
+    let (k, n) = match group.split_once("<=") {
+        Some((field, bound)) => {
+            let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
+            let all = || logs.iter().flat_map(|log| rows(log, span));
+            (all().filter(|row| error(&row.0, field) <= bound).count(), all().count())
+        }
+        None => (pooled(logs, group, span)?, pooled(logs, "attempted", span)?),
+    };
+    let (low, high) = clopper_pearson(k, n, 0.95);
+    let value = match which {
+        "percent" => 100.0 * k as f64 / n as f64,
+        "low" => 100.0 * low,
+        _ => 100.0 * high,
+    };
+    Some((n > 0).then_some(value))
+}
+
+/// `nees from A to B of found`.
+fn histogram(which: &str, range: &str, span: [u64; 2], logs: &[&Log]) -> Option<f64> {
+    let (from, to) = range.strip_prefix("nees from ")?.strip_suffix(" of found")?.split_once(" to ")?;
+    let (from, to): (f64, f64) = (from.parse().ok()?, to.parse().ok()?);
+    let found = logs.iter().flat_map(|log| rows(log, span)).filter(|row| found(&row.0));
+    let all: Vec<f64> = found.filter_map(|row| row.0.evaluation.nees).collect();
+    let inside = all.iter().filter(|nees| **nees >= from && **nees < to).count();
+    // The last column is as wide as all others in the drawing.
+    let width = if to.is_finite() { to - from } else { 1.5 };
+    Some(if which == "count" { inside as f64 } else { inside as f64 / all.len() as f64 / width })
+}
+
+/// Root mean squares over all frames, logged or not.
+fn totals(which: &str, of: &str, log: &Log) -> Option<Option<f64>> {
+    let totals = log.totals.as_ref()?;
+    let rms = |squares: f64| (squares / totals.judged as f64).sqrt();
+    let [m2, m2_bound, m3, m3_bound] =
+        [totals.m2_squares, totals.m2_bound_squares, totals.m3_squares, totals.m3_bound_squares].map(rms);
+    let nees = totals.nees_count as f64;
+    Some(Some(match (which, of.strip_suffix(" of judged")?) {
+        ("rms", "m2_rms") => m2,
+        ("rms", "m3_position") => m3,
+        ("bound", "m2_bound") => m2_bound,
+        ("bound", "m3_bound") => m3_bound,
+        ("ratio", "m2_rms") => m2 / m2_bound,
+        ("ratio", "m3_position") => m3 / m3_bound,
+        ("mean", "nees") => totals.nees_sum / nees,
+        ("within", "nees") => totals.nees_within as f64 / nees,
+        _ => return None,
+    }))
+}
+
+/// `FIELD of OBJECT at FRAME`.
+fn single(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let (field, rest) = of.split_once(" of ")?;
+    let (object, number) = rest.rsplit_once(" at ")?;
+    let (field, number): (Field, u64) = (Field::named(field)?, number.parse().ok()?);
+    let frame = log.frames.iter().find(|frame| frame.number == number && frame.stamp_ns == span[0])?;
+    let row = frame.rows.iter().find(|row| row.0.object == object)?;
+    Some(value(row, field))
+}
+
+/// `truth of  at FRAME`, `fix of OBJECT at FRAME`: one coordinate.
+fn located(axis: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let axis = ["place-x", "place-y", "place-z"].iter().position(|name| *name == axis)?;
+    let (what, rest) = of.split_once(" of ")?;
+    let object = rest.rsplit_once(" at ")?.0;
+    let frame = at(log, span)?;
+    Some(match what {
+        "truth" => Some(frame.truth?[axis]),
+        _ => Some(frame.rows.iter().find(|row| row.0.object == object)?.2[axis]),
+    })
+}
+
+/// Something about paired logs: first and second in turn.
+fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Option<f64>> {
+    let conditions = over.starts_with("conditions");
+    let pairs = |logs: &[&Log]| if conditions { medians(logs, span) } else { errors(logs[0], logs[1], span) };
+    if what == "holm" {
+        let size: usize = over.rsplit(' ').next()?.parse().ok()?;
+        let raw = logs.chunks(size.max(2)).map(|logs| Statistics::of(&pairs(logs), conditions).p);
+        return Some(holm(&raw.collect::<Vec<_>>()).first().copied());
+    }
+    let pairs = pairs(logs);
+    let statistics = Statistics::of(&pairs, conditions);
+    let real = |value: f64| if conditions { value.exp() } else { value * 1e3 };
+    Some(Some(match what {
+        "pairs" => pairs.len() as f64,
+        "difference" => real(statistics.difference),
+        "difference-low" => real(statistics.interval.0),
+        "difference-high" => real(statistics.interval.1),
+        "effect" => statistics.effect,
+        "alone-first" => statistics.alone[0] as f64,
+        "alone-second" => statistics.alone[1] as f64,
+        "mcnemar" => mcnemar(statistics.alone[0], statistics.alone[1]),
+        _ => return None,
+    }))
+}
+
+fn errors(first: &Log, second: &Log, span: [u64; 2]) -> Vec<(f64, f64)> {
+    let of = |log: &Log| -> BTreeMap<(u64, String), f64> {
+        let rows = log.sample(span).flat_map(|frame| frame.rows.iter().map(move |row| (frame.number, row)));
+        rows.map(|(number, row)| ((number, row.0.object.clone()), error(&row.0, Field::M2))).collect()
+    };
+    let second = of(second);
+    of(first).into_iter().filter_map(|(key, error)| Some((error, *second.get(&key)?))).collect()
+}
+
+/// The logarithms of the medians over all attempts.
+fn medians(logs: &[&Log], span: [u64; 2]) -> Vec<(f64, f64)> {
+    let of = |log: &Log| {
+        let all = answer("all m2_rms of attempted", span, &[log]).flatten();
+        all.unwrap_or(f64::INFINITY).ln()
+    };
+    logs.chunks_exact(2).map(|pair| (of(pair[0]), of(pair[1]))).collect()
+}

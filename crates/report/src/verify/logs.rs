@@ -1,0 +1,112 @@
+//! The logs that keys name, read once each.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+};
+
+use seafix_log::{FrameTimes, Outcome, Reader, TargetRecord, Totals, TrialHeader};
+
+use crate::{ReportError, disparity, place};
+
+/// The logs of a run.
+pub(super) struct Logs {
+    folder: PathBuf,
+    read: HashMap<String, Log>,
+}
+
+/// One log: its records without clouds, candidates and images.
+pub(super) struct Log {
+    pub(super) header: TrialHeader,
+    pub(super) frames: Vec<Seen>,
+    pub(super) totals: Option<Totals>,
+    /// Squared errors of disparities, and how many.
+    pub(super) disparity: (f64, usize),
+}
+
+/// One frame.
+pub(super) struct Seen {
+    pub(super) number: u64,
+    pub(super) stamp_ns: u64,
+    pub(super) times: FrameTimes,
+    pub(super) truth: Option<[f64; 3]>,
+    /// Key points, points, candidates, identified, used.
+    pub(super) marks: [usize; 5],
+    /// Attempts, with the number of their candidates and where they put the camera.
+    pub(super) rows: Vec<(TargetRecord, usize, [f64; 3])>,
+}
+
+impl Logs {
+    pub(super) fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), read: HashMap::new() }
+    }
+
+    /// The log of this name; `None` where the folder has no such file.
+    pub(super) fn get(&mut self, name: &str) -> Result<Option<&Log>, ReportError> {
+        if !self.read.contains_key(name) {
+            // A key names a file of this folder, never one elsewhere.
+            if name.contains(['/', '\\']) || !self.folder.join(name).is_file() {
+                return Ok(None);
+            }
+            self.read.insert(name.to_owned(), Log::read(&self.folder.join(name))?);
+        }
+        Ok(self.read.get(name))
+    }
+}
+
+impl Logs {
+    /// The log of this name, where it has been read.
+    pub(super) fn known(&self, name: &str) -> Option<&Log> {
+        self.read.get(name)
+    }
+}
+
+impl Log {
+    fn read(path: &Path) -> Result<Self, ReportError> {
+        let mut reader = Reader::open(path)?.without_images();
+        let header = reader.header().clone();
+        let (mut frames, mut disparity) = (Vec::new(), (0.0, 0));
+        while let Some(frame) = reader.next().transpose()? {
+            for error in disparity::errors(&header, &frame) {
+                disparity = (disparity.0 + error * error, disparity.1 + 1);
+            }
+            let fixes = || frame.targets.iter().filter(|row| row.outcome == Outcome::Referenced);
+            let mut candidates: Vec<u32> = frame.targets.iter().flat_map(|row| row.candidates.concat()).collect();
+            candidates.sort_unstable();
+            candidates.dedup();
+            let marks = [
+                frame.key_points.len(),
+                frame.cloud.len(),
+                candidates.len(),
+                fixes().map(|row| row.pairs.len()).sum(),
+                fixes().map(|row| row.used.len()).sum(),
+            ];
+            let rows = frame.targets.into_iter().filter(TargetRecord::attempted).map(|mut row| {
+                let lists = std::mem::take(&mut row.candidates);
+                (row.pairs, row.used, row.alternatives) = Default::default();
+                let at = place::estimate(&header, &row);
+                (row, lists.iter().map(Vec::len).sum(), at)
+            });
+            frames.push(Seen {
+                number: frame.frame,
+                stamp_ns: frame.stamp_ns,
+                times: frame.times,
+                truth: frame
+                    .truth
+                    .as_ref()
+                    .map(|truth| truth.world_from_camera.map(|row| row[3]))
+                    .map(|[x, y, z, _]| [x, y, z]),
+                marks,
+                rows: rows.collect(),
+            });
+        }
+        let totals = reader.totals().cloned();
+        Ok(Self { header, frames, totals, disparity })
+    }
+
+    /// The frames that were logged whatever came of them, within the stamps.
+    pub(super) fn sample(&self, [from, to]: [u64; 2]) -> impl Iterator<Item = &Seen> {
+        let every = self.totals.as_ref().map_or(1, |totals| totals.every.max(1));
+        self.frames.iter().filter(move |frame| frame.number % every == 0 && (from..=to).contains(&frame.stamp_ns))
+    }
+}

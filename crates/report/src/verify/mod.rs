@@ -1,0 +1,128 @@
+//! Every printed number, computed again from the logs.
+
+mod evaluate;
+mod logs;
+
+use std::{fs, path::Path};
+
+use crate::{Forms, Key, Number, ReportError, Summary, format, run::Run, write::files};
+use evaluate::evaluate;
+use logs::Logs;
+
+/// What a verification found.
+#[derive(Debug, Default)]
+pub struct Verified {
+    /// Numbers that were computed again.
+    pub numbers: usize,
+    /// Those that are printed otherwise.
+    pub mismatches: Vec<Mismatch>,
+    /// Files that differ from those that the logs make, numbers or not.
+    pub changed: Vec<String>,
+}
+
+/// A number that is not what the logs say.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mismatch {
+    /// The file it is printed in.
+    pub file: String,
+    /// Where it comes from: what, topic, stamps, logs.
+    pub key: String,
+    /// As it is printed.
+    pub printed: String,
+    /// What the logs say; why nothing, where they say nothing.
+    pub logged: String,
+}
+
+impl Verified {
+    /// Whether the report says what the logs say.
+    pub fn holds(&self) -> bool {
+        self.mismatches.is_empty() && self.changed.is_empty()
+    }
+}
+
+/// Reads the printed numbers of the report in `folder` with their keys, computes each again from the messages of the
+/// logs in `run_dir`, to the last digit printed, and compares every file with what the logs make of it now.
+///
+/// The numbers are computed apart from those that write reports: what a key says, by the definitions.
+///
+/// # Errors
+/// [`ReportError`] when there is no report, or a log cannot be read.
+pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
+    let mut verified = Verified::default();
+    let mut logs = Logs::new(run_dir);
+    let read = |name: &str| {
+        let path = folder.join(name);
+        fs::read(&path).map_err(|source| ReportError::Io { doing: "read", path, source })
+    };
+    let page = "report.html";
+    for (key, printed) in of_page(&String::from_utf8_lossy(&read(page)?)) {
+        verified.check(page, &key, &printed, &mut logs)?;
+    }
+    let run = Run::read(run_dir)?;
+    let summary = Summary::of(&run);
+    let exists = |name: &str| folder.join(name).exists();
+    let forms = Forms { html: true, latex: exists("report.tex"), pdf: exists("report.pdf") };
+    for (name, bytes) in files(&run, &summary, forms)? {
+        let there = read(&name).unwrap_or_default();
+        if name.ends_with(".json") {
+            for (key, printed) in of_table(&there) {
+                verified.check(&name, &key, &printed, &mut logs)?;
+            }
+        }
+        if there != bytes {
+            verified.changed.push(name);
+        }
+    }
+    Ok(verified)
+}
+
+impl Verified {
+    fn check(&mut self, file: &str, key: &str, printed: &str, logs: &mut Logs) -> Result<(), ReportError> {
+        self.numbers += 1;
+        let logged = match Key::parse(key) {
+            Some(parsed) => match evaluate(&parsed, logs)? {
+                Ok(value) => again(&parsed, value, printed),
+                Err(why) => why,
+            },
+            None => "its key cannot be read".to_owned(),
+        };
+        if logged != printed {
+            let mismatch = Mismatch { file: file.to_owned(), key: key.to_owned(), printed: printed.to_owned(), logged };
+            self.mismatches.push(mismatch);
+        }
+        Ok(())
+    }
+}
+
+/// A value as it would be printed, with as many decimals.
+fn again(key: &Key, value: Option<f64>, printed: &str) -> String {
+    if key.what == "stamp" {
+        return key.span[0].to_string();
+    }
+    format::number(value, Number::decimals(printed))
+}
+
+/// Keys and texts of all numbers of a page.
+fn of_page(page: &str) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    for part in page.split("<data ").skip(1) {
+        let title = part.split_once("title=\"").and_then(|(_, rest)| rest.split_once('"'));
+        let Some((key, rest)) = title else { continue };
+        let text = rest.split_once('>').and_then(|(_, rest)| rest.split_once("</data>"));
+        found.extend(text.map(|(text, _)| (unescape(key), unescape(text))));
+    }
+    found
+}
+
+fn unescape(text: &str) -> String {
+    let signs = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&#39;", "'"), ("&amp;", "&")];
+    signs.iter().fold(text.to_owned(), |text, (written, sign)| text.replace(written, sign))
+}
+
+/// Keys and texts of all numbers of a table in JSON.
+fn of_table(bytes: &[u8]) -> Vec<(String, String)> {
+    let Ok(table) = serde_json::from_slice::<serde_json::Value>(bytes) else { return Vec::new() };
+    let rows = table["rows"].as_array().cloned().unwrap_or_default();
+    let cells = rows.iter().filter_map(|row| row.as_array()).flatten();
+    cells.filter_map(|cell| Some((cell["key"].as_str()?.to_owned(), cell["text"].as_str()?.to_owned()))).collect()
+}

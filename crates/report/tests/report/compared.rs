@@ -1,0 +1,50 @@
+//! Runs side by side, where that says something (B56).
+
+use std::path::{Path, PathBuf};
+
+use seafix_log::Writer;
+use seafix_report::{ReportError, compare};
+
+use crate::made_up::{frame, header};
+
+/// A run of one trial: its errors are those of `solver`.
+fn run(folder: &Path, name: &str, solver: &str, seed: u64) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::create_dir_all(&path).unwrap();
+    let mut header = header(1, 3.0, solver);
+    header.axes.clear();
+    header.seeds = vec![("experiment".to_owned(), seed)];
+    let mut writer = Writer::create(&path.join("001.mcap"), &header).unwrap();
+    for number in 0..36 {
+        let mut frame = frame(&header, number, 3.0);
+        frame.images = None;
+        writer.frame(&frame).unwrap();
+    }
+    writer.finish().unwrap();
+    path
+}
+
+#[test]
+fn runs_of_the_same_data_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let (first, second) = (run(folder.path(), "a", "triad", 1), run(folder.path(), "b", "kabsch", 1));
+    let compared = compare(&[first.clone(), second], false, Some(folder.path())).unwrap();
+    assert!(compared.differ && compared.table.contains("significant"), "{}", compared.table);
+    assert!(compared.page.unwrap().exists());
+    let again = run(folder.path(), "c", "triad", 1);
+    let compared = compare(&[first, again], false, None).unwrap();
+    assert!(!compared.differ && compared.table.contains("p 1.0000, not significant"), "{}", compared.table);
+}
+
+#[test]
+fn runs_of_other_data_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = [run(folder.path(), "a", "triad", 1), run(folder.path(), "b", "kabsch", 2)];
+    match compare(&runs, false, None) {
+        Err(ReportError::Incomparable { differences, .. }) => {
+            assert_eq!(differences, ["seeds: experiment 1 against experiment 2"]);
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(compare(&runs, true, None).is_ok());
+}

@@ -1,0 +1,202 @@
+//! A made-up run whose results are known.
+
+use std::path::Path;
+
+use seafix_log::{
+    Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, ModelPoint, Outcome,
+    Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TargetTimes, TrialHeader, TruthRecord, Writer,
+};
+
+const EYE: [[f64; 4]; 4] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+pub(crate) const SIZE: [u32; 2] = [512, 384];
+const F: f64 = 250.0;
+pub(crate) const NAME: &str = "<script>alert('x')</script>&\" 50%_a \\input{x} =cmd|x \u{1b}[31m";
+
+/// Numbers between −0.5 and 0.5 that look random and are the same everywhere.
+pub(crate) fn noise(seed: u64) -> f64 {
+    let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+}
+
+pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
+    let camera =
+        CameraRecord { size: SIZE, matrix: [[F, 0.0, 255.5], [0.0, F, 191.5], [0.0, 0.0, 1.0]], distortion: vec![] };
+    let mut right_from_left = EYE;
+    right_from_left[0][3] = -0.25;
+    let component = |stage: &str, name: &str, summary: &str, source: &str| Component {
+        stage: stage.to_owned(),
+        name: name.to_owned(),
+        summary: summary.to_owned(),
+        source: source.to_owned(),
+        settings: vec![("threshold".to_owned(), "0.001".to_owned()), ("limit".to_owned(), "600".to_owned())],
+    };
+    TrialHeader {
+        run: "virtual-direct".to_owned(),
+        trial: format!("{index:03}-distance-{distance}-solver-{solver}"),
+        title: format!("virtual direct {NAME}"),
+        question: "How accurate is a direct fix on one object from 2 to 5 m?".to_owned(),
+        command: "cargo run --release -- run experiments/virtual-direct.toml".to_owned(),
+        axes: vec![
+            Axis { key: "source.distance".to_owned(), value: format!("{distance:.1}") },
+            Axis { key: "pipeline.solver".to_owned(), value: solver.to_owned() },
+        ],
+        components: vec![
+            component("detector", "harris", "corners with sub-pixel peaks", "Harris and Stephens 1988"),
+            component("search", "maximum-clique", "the largest coherent set, one-to-one, mirror images refused", ""),
+            component("solver", solver, "a rigid motion from points", "Kabsch 1976"),
+        ],
+        configuration: format!("seed = 1\n[pipeline]\nsolver = \"{solver}\"\n"),
+        site: "format = \"seafix-site/1\"\n".to_owned(),
+        source: "virtual-images".to_owned(),
+        rig: RigRecord {
+            left: camera.clone(),
+            right: camera,
+            right_from_left,
+            rectified: true,
+            right_from_left_rotation: None,
+        },
+        body_from_camera: EYE,
+        world_from_site: Some(EYE),
+        targets: vec![TargetModel {
+            id: format!("manifold {NAME}"),
+            site_from_object: Some(EYE),
+            points: (0..9)
+                .map(|i| ModelPoint {
+                    id: format!("M{i}"),
+                    at: [0.45 * f64::from(i % 3) - 0.45, 0.35 * f64::from(i / 3) - 0.35, 0.1 * noise(i as u64)],
+                    sigma: 0.001,
+                })
+                .collect(),
+            alert_limit: 0.05,
+        }],
+        prior_position_sigma: Some(0.1),
+        prior_attitude_sigma: Some(0.5_f64.to_radians()),
+        pixel_sigma: Some(0.25),
+        seeds: vec![("experiment".to_owned(), 1)],
+        versions: vec![("seafix".to_owned(), "0.1.0".to_owned())],
+    }
+}
+
+/// Frame `number` at `distance`; every sixth is refused, one in all the run is wrong.
+pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
+    let target = &header.targets[0];
+    let mut world_from_camera = EYE;
+    world_from_camera[2][3] = -distance;
+    let see = |p: [f64; 3], seed: u64| {
+        let z = p[2] + distance;
+        let at = |shift: f64, s: u64| {
+            [F * (p[0] - shift) / z + 255.5 + 0.4 * noise(s), F * p[1] / z + 191.5 + 0.4 * noise(s + 7)]
+        };
+        PixelPair { left: at(0.0, seed), right: at(0.25, seed + 1) }
+    };
+    let seed = 10_000 * number + (distance * 10.0) as u64;
+    let covariance = [[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-4]];
+    let cloud: Vec<CloudPoint> = (0..40)
+        .map(|i| {
+            let at = match target.points.get(i) {
+                Some(point) => point.at,
+                None => [2.0 * noise(seed + i as u64), 1.6 * noise(seed + 60 + i as u64), 0.3],
+            };
+            let pixels = Some(see(at, seed + 13 * i as u64));
+            CloudPoint { at: [at[0], at[1], at[2] + distance], covariance, pixels }
+        })
+        .collect();
+    let image = |side: usize| {
+        let mut pixels: Vec<u8> = (0..SIZE[0] * SIZE[1])
+            .map(|i| {
+                let (x, y) = (f64::from(i % SIZE[0]), f64::from(i / SIZE[0]));
+                (90.0 + 25.0 * (x / 23.0).sin() * (y / 17.0).cos() + 14.0 * noise(u64::from(i) + seed)) as u8
+            })
+            .collect();
+        for point in &cloud {
+            let seen = point.pixels.map(|pixels| if side == 0 { pixels.left } else { pixels.right }).unwrap();
+            for (dx, dy) in (-9..9).flat_map(|dx| (-9..9).map(move |dy| (dx, dy))) {
+                let (x, y) = (seen[0] as i64 + dx, seen[1] as i64 + dy);
+                if (0..i64::from(SIZE[0])).contains(&x) && (0..i64::from(SIZE[1])).contains(&y) && (dx < 0) == (dy < 0)
+                {
+                    pixels[(y * i64::from(SIZE[0]) + x) as usize] = 190;
+                }
+            }
+        }
+        GreyImage { width: SIZE[0], height: SIZE[1], pixels }
+    };
+    let solver = &header.components[2].name;
+    let worse = if solver == "triad" { 2.0 } else { 1.0 };
+    let refused = number % 6 == 5;
+    let wrong = number == 3 && distance > 4.5 && solver == "triad";
+    let mut row = TargetRecord::refused(
+        &target.id,
+        "maximum-clique",
+        solver,
+        if number % 12 == 5 { "chance" } else { "too-few" },
+    );
+    row.candidates = (0..9).map(|i| vec![i, 9 + i, 20 + i]).collect();
+    row.times = TargetTimes {
+        candidates_ms: Some(0.05),
+        search_ms: Some(0.4 + 0.1 * noise(seed)),
+        solve_ms: (!refused).then_some(0.012),
+        total_ms: Some(120.0 + 10.0 * noise(seed)),
+    };
+    row.evaluation = Evaluation { wrong: Some(false), visible: Some(9), identified: Some(2), ..Evaluation::default() };
+    if !refused {
+        let scale = worse * 0.001 * distance * distance * (1.0 + noise(seed + 3));
+        row.outcome = Outcome::Referenced;
+        row.reason.clear();
+        row.object_from_camera = Some(world_from_camera);
+        row.covariance = Some(std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e-5 } else { 0.0 })));
+        row.pairs = (0..7).map(|i| Pair { model: i, cloud: i }).collect();
+        row.used = if solver == "triad" { vec![0, 2, 6] } else { (0..7).collect() };
+        row.evaluation = Evaluation {
+            wrong: Some(wrong),
+            wrong_pairs: Some(wrong),
+            visible: Some(9),
+            identified: Some(7),
+            correct_pairs: Some(7),
+            m1_rms: Some(scale),
+            m1_unused_rms: (solver == "triad").then_some(1.3 * scale),
+            m2_rms: Some(if wrong { 0.4 } else { 1.4 * scale }),
+            m3_position: Some(4.0 * scale),
+            m3_attitude: Some(1.1 * scale),
+            nees: Some(6.0 + 4.0 * noise(seed + 4)),
+            ..Evaluation::default()
+        };
+    }
+    FrameRecord {
+        frame: number,
+        stamp_ns: number * 100_000_000,
+        images: Some([image(0), image(1)]),
+        key_points: cloud.iter().filter_map(|point| point.pixels).map(|pixels| pixels.left).collect(),
+        cloud,
+        prior: Some(PriorRecord { world_from_camera }),
+        truth: Some(TruthRecord {
+            world_from_camera,
+            world_from_object: vec![(target.id.clone(), EYE)],
+            visible: vec![],
+        }),
+        targets: vec![row],
+        times: FrameTimes {
+            detect_ms: Some(60.0),
+            locate_ms: Some(9.0),
+            describe_ms: Some(31.0),
+            match_ms: Some(6.0),
+            refine_ms: Some(4.0),
+            triangulate_ms: Some(0.3),
+        },
+        inputs: None,
+    }
+}
+
+pub(crate) fn write_run(folder: &Path, distances: &[f64]) {
+    let mut index = 0;
+    for &distance in distances {
+        for solver in ["triad", "kabsch"] {
+            index += 1;
+            let header = header(index, distance, solver);
+            let mut writer = Writer::create(&folder.join(format!("{}.mcap", header.trial)), &header).unwrap();
+            (0..12).for_each(|number| writer.frame(&frame(&header, number, distance)).unwrap());
+            writer.finish().unwrap();
+        }
+    }
+}

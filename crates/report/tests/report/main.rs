@@ -1,0 +1,9 @@
+//! Reports on runs whose results are known.
+
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+mod compared;
+mod harmless;
+mod made_up;
+mod paper;
+mod verified;

@@ -1,0 +1,81 @@
+//! Every number is that of the log (P66), every attempt is in every table once (P67).
+
+use std::{fs, path::Path};
+
+use seafix_log::read;
+use seafix_report::{Forms, Verified, report, summary, verify};
+
+use crate::made_up::write_run;
+
+fn made(folder: &Path) -> Verified {
+    write_run(folder, &[2.0, 5.0]);
+    report(folder, &folder.join("report"), Forms::ALL).unwrap();
+    verify(folder, &folder.join("report")).unwrap()
+}
+
+#[test]
+fn all_numbers_are_computed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let verified = made(folder.path());
+    assert!(verified.holds(), "{verified:#?}");
+    assert!(verified.numbers > 500, "{}", verified.numbers);
+    // All cells of the tables of numbers carry a key: a bare number is none.
+    let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    let bare =
+        page.split("<td class=\"n\">").skip(1).filter(|cell| cell.starts_with(|c: char| c.is_ascii_digit())).count();
+    let axes = 4; // the distance stands in the tables of results
+    assert_eq!(bare % axes, 0, "numbers of the header alone stand without a key");
+}
+
+#[test]
+fn a_changed_digit_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    made(folder.path());
+    let page = folder.path().join("report/report.html");
+    let text = fs::read_to_string(&page).unwrap();
+    let at = text.find("title=\"median m2_rms of found in mm").unwrap();
+    let digit = at + text[at..].find("</data>").unwrap() - 1;
+    let mut bytes = text.into_bytes();
+    bytes[digit] = if bytes[digit] == b'9' { b'8' } else { bytes[digit] + 1 };
+    fs::write(&page, bytes).unwrap();
+    let verified = verify(folder.path(), &folder.path().join("report")).unwrap();
+    assert_eq!(verified.mismatches.len(), 1, "{verified:#?}");
+    let wrong = &verified.mismatches[0];
+    assert!(wrong.key.contains("/metrics/evaluation; 0..1100000000 ns; 001-"), "{wrong:?}");
+    assert_eq!(verified.changed, ["report.html"]);
+}
+
+#[test]
+fn another_log_is_noticed() {
+    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    made(folder.path());
+    write_run(other.path(), &[2.1, 5.0]);
+    let name = |path: &Path| {
+        fs::read_dir(path)
+            .unwrap()
+            .flatten()
+            .map(|e| e.path())
+            .filter(|p| p.extension().is_some_and(|e| e == "mcap"))
+            .min()
+            .unwrap()
+    };
+    fs::copy(name(other.path()), name(folder.path())).unwrap();
+    let verified = verify(folder.path(), &folder.path().join("report")).unwrap();
+    assert!(!verified.mismatches.is_empty() && !verified.holds());
+}
+
+#[test]
+fn outcomes_add_up_and_every_attempt_counts_once() {
+    let folder = tempfile::tempdir().unwrap();
+    write_run(folder.path(), &[2.0, 5.0]);
+    let summary = summary(folder.path()).unwrap();
+    report(folder.path(), &folder.path().join("report"), Forms::ALL).unwrap();
+    for row in &summary.rows {
+        let log = read(&folder.path().join(format!("{}.mcap", row.trial))).unwrap();
+        let attempts = log.frames.iter().flat_map(|frame| &frame.targets).filter(|target| target.attempted()).count();
+        assert_eq!(row.found + row.refused + row.wrong, attempts);
+        assert_eq!(row.reasons.values().sum::<usize>(), row.refused);
+    }
+    let table = fs::read_to_string(folder.path().join("report/tables/outcomes.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + summary.rows.len());
+}
