@@ -2,7 +2,7 @@
 
 use seafix_component::{Listing, Registry};
 use seafix_experiment::source::SOURCES;
-use seafix_navigation::ODOMETRIES;
+use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
 use seafix_referencing::{SEARCHES, SOLVERS};
 use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS};
 
@@ -25,6 +25,8 @@ pub(crate) fn kinds() -> Vec<Kind> {
         kind("searches", &SEARCHES),
         kind("solvers", &SOLVERS),
         kind("odometries", &ODOMETRIES),
+        kind("policies", &POLICIES),
+        kind("fusions", &FUSIONS),
     ]
 }
 

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use seafix_component::{BuildError, Choice, Fault, line_of};
+use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Axis, Pipeline, Place, Stages,
+    Axis, Helm, Navigation, Pipeline, Place, Stages,
     dataset::hex,
     pipeline::PipelineError,
     read_text,
@@ -29,6 +30,9 @@ pub struct Experiment {
     /// The way from a frame to a fix.
     #[serde(default)]
     pub pipeline: Pipeline,
+    /// The way from fix to fix; without it every frame is by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub navigation: Option<Navigation>,
     /// What varies; the grid of all its values gives the trials.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vary: Vec<Axis>,
@@ -42,6 +46,7 @@ impl Experiment {
             seed: 0,
             source: Choice::named("dataset").with("path", folder.to_string_lossy().into_owned()),
             pipeline: Pipeline::default(),
+            navigation: None,
             vary: Vec::new(),
         }
     }
@@ -55,7 +60,8 @@ impl Experiment {
     fn resolved(&self) -> Result<Self, Unfit> {
         let source = SOURCES.resolve(&self.source).map_err(|error| Unfit::new(&["source"], error))?;
         let pipeline = self.pipeline.resolved().map_err(Unfit::pipeline)?;
-        Ok(Self { source, pipeline, ..self.clone() })
+        let navigation = self.navigation.as_ref().map(Navigation::resolved).transpose().map_err(Unfit::navigation)?;
+        Ok(Self { source, pipeline, navigation, ..self.clone() })
     }
 }
 
@@ -87,6 +93,8 @@ pub struct Trial {
     pub source: Box<dyn Source>,
     /// Its pipeline.
     pub stages: Stages,
+    /// What navigates between its fixes, where anything does.
+    pub helm: Option<Helm>,
 }
 
 /// A setting that no component can be built from, and its path in the file.
@@ -103,7 +111,15 @@ impl Unfit {
     }
 
     fn pipeline(error: PipelineError) -> Self {
-        let path = ["pipeline".to_owned(), error.setting.to_owned()].into_iter().chain(error.key).collect();
+        Self::below("pipeline", error)
+    }
+
+    fn navigation(error: PipelineError) -> Self {
+        Self::below("navigation", error)
+    }
+
+    fn below(table: &str, error: PipelineError) -> Self {
+        let path = [table.to_owned(), error.setting.to_owned()].into_iter().chain(error.key).collect();
         Self { path, message: error.message }
     }
 }
@@ -200,7 +216,14 @@ impl Plan {
                     format!("solver `{solver}` needs pixels, which source `{source}` has not; use `mahalanobis`");
                 return Err(in_cell(what, &["pipeline".to_owned(), "solver".to_owned()]));
             }
-            trials.push(Trial { name: vary::name(index + 1, &cell), cell, resolved: trial, source, stages });
+            let helm = trial.navigation.as_ref().map(Navigation::build).transpose();
+            let helm =
+                helm.map_err(|error| in_cell(error.message, &["navigation".to_owned(), error.setting.to_owned()]))?;
+            if helm.is_some() && trial.pipeline.target != TargetKind::Object {
+                let what = "navigation goes from object to object; use target = \"object\"".to_owned();
+                return Err(in_cell(what, &["pipeline".to_owned(), "target".to_owned()]));
+            }
+            trials.push(Trial { name: vary::name(index + 1, &cell), cell, resolved: trial, source, stages, helm });
         }
         let settings: String = settings.iter().map(|setting| format!(" --set '{setting}'")).collect();
         let command = format!("cargo run --release -- run {}{settings}", file.display());

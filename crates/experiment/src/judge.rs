@@ -5,10 +5,11 @@ use seafix_evaluation::{
     alert_limit, attitude_error, nees, position_error, residual_rms, transfer_bound, transfer_rms,
 };
 use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform, World};
-use seafix_log::{Evaluation, FrameRecord, TruthRecord, VisiblePoint};
+use seafix_log::{Evaluation, FrameRecord, NavigationErrors, TruthRecord, VisiblePoint};
+use seafix_navigation::Navigated;
 use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
 
-use crate::{Sighting, exact, source::Truth};
+use crate::{Sighting, exact, navigate::Underway, source::Truth};
 
 /// A pair is correct when its cloud point shows within this distance (px) of the true projections.
 const CORRECT_PX: f64 = 2.0;
@@ -27,7 +28,7 @@ struct TrueTarget<'a> {
 /// Fills in what only truth can tell: the truth itself and the evaluation of every attempt.
 pub(crate) fn judge(
     record: &mut FrameRecord,
-    sighting: &Sighting,
+    (sighting, underway): (&Sighting, Option<&Underway>),
     truth: &Truth,
     site: &Site,
     targets: &[Target],
@@ -57,6 +58,9 @@ pub(crate) fn judge(
     if let Some(inputs) = &mut record.inputs {
         inputs.truth = Some(exact::truth(truth, site));
     }
+    if let (Some(underway), Some(row)) = (underway, &mut record.navigation) {
+        row.errors = errors(underway, &known, truth);
+    }
     for (attempt, row) in sighting.attempts.iter().zip(record.targets.iter_mut()) {
         let Some(known) = &known[attempt.target] else { continue };
         let identified = row.evaluation.identified;
@@ -74,6 +78,35 @@ pub(crate) fn judge(
             evaluate(&mut row.evaluation, fix, known, sighting, truth, rig);
         }
     }
+}
+
+/// How the navigated poses compare with truth, each relative to its own object.
+fn errors(underway: &Underway, known: &[Option<TrueTarget<'_>>], truth: &Truth) -> NavigationErrors {
+    let mut errors = NavigationErrors::default();
+    let of = |navigated: &Navigated| {
+        let known = known[navigated.object].as_ref()?;
+        Some((
+            known,
+            navigated.standing.object_from_camera,
+            known.world_from_object.inverse() * truth.world_from_camera,
+        ))
+    };
+    if let Some(navigated) = &underway.pose
+        && let Some((known, estimate, true_pose)) = of(navigated)
+    {
+        let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
+        let sum: Vector3<f64> = known.points.iter().map(|point| point.coords).sum();
+        let centroid = Point::from(sum / known.points.len() as f64);
+        errors.m2_rms = transfer_rms(&estimate, &true_pose, &model);
+        errors.m3_position = Some(position_error(&estimate, &true_pose));
+        errors.m3_attitude = Some(attitude_error(&estimate, &true_pose));
+        errors.nees = nees(&estimate, &true_pose, &navigated.standing.covariance, &centroid);
+    }
+    if let Some((_, estimate, true_pose)) = underway.unreferenced.as_ref().and_then(of) {
+        errors.unreferenced_m3_position = Some(position_error(&estimate, &true_pose));
+        errors.unreferenced_m3_attitude = Some(attitude_error(&estimate, &true_pose));
+    }
+    errors
 }
 
 fn true_target<'a>(

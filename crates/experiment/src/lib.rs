@@ -12,6 +12,7 @@ mod experiment;
 mod joint;
 mod judge;
 mod manifest;
+mod navigate;
 mod pipeline;
 mod record;
 mod replay;
@@ -25,6 +26,7 @@ mod vary;
 
 pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
+pub use navigate::{Helm, Navigation};
 pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
 pub use replay::{Replay, ReplayFrom};
 pub use results::COLUMNS;

@@ -7,8 +7,8 @@ use seafix_component::{BuildError, Choice, Fault, Registry, in_range};
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
-    Acceptance, Candidates, Gate, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target, TargetKind,
-    Tolerance, candidates, judge, problem_file::CoherenceProblem,
+    Acceptance, Candidates, Gate, Outcome, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target,
+    TargetKind, Tolerance, candidates, judge, problem_file::CoherenceProblem,
 };
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, Refine, Triangulator,
@@ -154,11 +154,11 @@ fn fits(setting: &'static str, check: Result<(), String>) -> Result<(), Pipeline
     check.map_err(|message| PipelineError { setting, key: None, message: format!("{setting}: {message}") })
 }
 
-fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice, PipelineError> {
+pub(crate) fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice, PipelineError> {
     registry.resolve(choice).map_err(|error| in_pipeline(registry, &error))
 }
 
-fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Box<T>, PipelineError> {
+pub(crate) fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Box<T>, PipelineError> {
     registry.build(choice).map_err(|error| in_pipeline(registry, &error))
 }
 
@@ -191,8 +191,8 @@ pub struct Stages {
     settings: Pipeline,
 }
 
-/// Everything the pipeline made of one sight.
-#[derive(Debug)]
+/// Everything the pipeline made of one sight; nothing, where none was to be made.
+#[derive(Debug, Default)]
 pub struct Sighting {
     /// Key points of the left image.
     pub keypoints: Vec<Keypoint>,
@@ -232,19 +232,30 @@ impl Stages {
     /// The way from one sight to fixes, in the paper's order: key points, matches, cloud; then for
     /// each target in view candidates (Stage 1), the search (Stage 2) and the solution.
     pub fn reference(&self, sight: &Sight, targets: &[Target], rig: &StereoRig, rng: &mut dyn Rng) -> Sighting {
+        self.reference_from(sight, targets, &sight.rough(targets), rig, rng)
+    }
+
+    /// The same from what is known before of the pose relative to each target.
+    pub(crate) fn reference_from(
+        &self,
+        sight: &Sight,
+        targets: &[Target],
+        priors: &[Option<Prior>],
+        rig: &StereoRig,
+        rng: &mut dyn Rng,
+    ) -> Sighting {
         let start = Instant::now();
         let (keypoints, cloud, times) = self.cloud(&sight.eyes, rig);
         let common = milliseconds(start);
         let attempts = targets
             .iter()
+            .zip(priors)
             .enumerate()
-            .filter_map(|(index, target)| {
+            .filter_map(|(index, (target, prior))| {
                 let mut attempt = match &sight.told {
                     Told::Problem(object, problem) if *object == index => self.answer(index, target, problem, rng),
                     Told::Problem(..) => return None,
                     told => {
-                        let world = sight.prior.as_ref();
-                        let prior = world.and_then(|world| target.prior(&world.world_from_camera, &world.covariance));
                         let in_view = in_view(target, prior.as_ref(), rig)?;
                         self.attempt(index, target, &cloud, told, prior.as_ref(), &in_view, rig, rng)
                     }
@@ -254,6 +265,37 @@ impl Stages {
             })
             .collect();
         Sighting { keypoints, cloud, attempts, times }
+    }
+
+    /// Seeks once more, from other priors, what was not found.
+    pub(crate) fn again(
+        &self,
+        sighting: &mut Sighting,
+        sight: &Sight,
+        targets: &[Target],
+        priors: &[Option<Prior>],
+        rig: &StereoRig,
+        rng: &mut dyn Rng,
+    ) {
+        for attempt in &mut sighting.attempts {
+            let (index, prior) = (attempt.target, priors[attempt.target].as_ref());
+            if matches!(attempt.answer.outcome, Outcome::Referenced(_)) || prior.is_none() {
+                continue;
+            }
+            let Some(in_view) = in_view(&targets[index], prior, rig) else { continue };
+            let mut other =
+                self.attempt(index, &targets[index], &sighting.cloud, &sight.told, prior, &in_view, rig, rng);
+            if matches!(other.answer.outcome, Outcome::Referenced(_)) {
+                let spent = milliseconds(other.started);
+                other.times.total_ms = attempt.times.total_ms.map(|before| before + spent);
+                *attempt = other;
+            }
+        }
+    }
+
+    /// Whether enough of `target` should be in view for a fix, by what is known of the pose; without that it may be.
+    pub(crate) fn shows(target: &Target, prior: &Option<Prior>, rig: &StereoRig) -> bool {
+        in_view(target, prior.as_ref(), rig).is_some()
     }
 
     fn cloud(&self, eyes: &Eyes, rig: &StereoRig) -> (Vec<Keypoint>, Vec<MeasuredPoint>, FrameTimes) {
@@ -271,6 +313,7 @@ impl Stages {
             match_ms: Some(look.times.match_ms),
             refine_ms: Some(look.times.refine_ms),
             triangulate_ms: Some(look.times.triangulate_ms),
+            odometry_ms: None,
         };
         (look.keypoints()[0].to_vec(), look.cloud, times)
     }

@@ -5,8 +5,8 @@ use seafix_component::Registry;
 use seafix_evaluation::alert_limit;
 use seafix_geometry::{Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
-    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, GreyImage, ModelPoint, Outcome as Logged,
-    Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
+    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, ModelPoint,
+    Outcome as Logged, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
 };
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
@@ -14,6 +14,7 @@ use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
 use crate::{
     Attempt, Pipeline, Place, Plan, Sighting, Trial, exact,
     manifest::Git,
+    navigate::Underway,
     source::{Eyes, Passage, Sight},
 };
 
@@ -70,13 +71,24 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
 }
 
 /// What one frame gave, without truth.
-pub(crate) fn frame(number: u64, sight: &Sight, sighting: &Sighting, trial: &Trial, targets: &[Target]) -> FrameRecord {
+pub(crate) fn frame(
+    number: u64,
+    sight: &Sight,
+    sighting: &Sighting,
+    underway: Option<&Underway>,
+    trial: &Trial,
+    targets: &[Target],
+) -> FrameRecord {
     let pipeline = trial.stages.settings();
     let (search, solver) = (&pipeline.search.name, &pipeline.solver.name);
     let mut attempts: Vec<TargetRecord> =
         sighting.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
     if attempts.is_empty() {
-        let reason = if sighting.cloud.is_empty() { "no-data" } else { "nothing-in-view" };
+        let reason = match underway {
+            Some(underway) if !underway.record.due => "not-due",
+            _ if sighting.cloud.is_empty() => "no-data",
+            _ => "nothing-in-view",
+        };
         attempts.push(TargetRecord::not_attempted(search, solver, reason));
     }
     FrameRecord {
@@ -99,7 +111,8 @@ pub(crate) fn frame(number: u64, sight: &Sight, sighting: &Sighting, trial: &Tri
         prior: sight.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() }),
         truth: None,
         targets: attempts,
-        times: sighting.times,
+        times: FrameTimes { odometry_ms: underway.map(|underway| underway.odometry_ms), ..sighting.times },
+        navigation: underway.map(|underway| Box::new(underway.record.clone())),
         inputs: Some(Box::new(exact::inputs(sight, &sighting.cloud))),
     }
 }

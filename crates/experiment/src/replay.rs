@@ -66,7 +66,8 @@ impl Replay {
         let clouds = match self.from {
             ReplayFrom::Clouds => true,
             ReplayFrom::Images => false,
-            ReplayFrom::Suited => same_eyes(&logged.pipeline, &changed.pipeline),
+            // Odometry needs the images.
+            ReplayFrom::Suited => changed.navigation.is_none() && same_eyes(&logged.pipeline, &changed.pipeline),
         };
         let read = if clouds { "clouds" } else { "images" };
         let file = log.canonicalize().unwrap_or_else(|_| log.to_owned());

@@ -77,3 +77,49 @@ fn methods_are_compared_on_the_same_noise() {
         assert_eq!((&triad.cloud, &triad.prior, &triad.truth), (&kabsch.cloud, &kabsch.prior, &kabsch.truth));
     }
 }
+
+/// Five pairs of a dive, a fifth of a second apart, a fix every half second.
+const VOYAGE: &str = "question = 'Does the way between fixes hold?'\n\
+    [source]\nname = 'dive'\nframes = 5\nrate = 5.0\nstart = 30.4\n\
+    rig.size = [512, 384]\nrig.focal = 250.0\nwater.attenuation = 0.15\n\
+    [navigation]\npolicy = { name = 'interval', seconds = 0.5 }\n";
+
+/// A fix at the first pair and when half a second has passed; between them odometry carries the pose, and it stays right.
+#[test]
+fn a_pose_is_carried_between_fixes() {
+    let folder = TempDir::new().unwrap();
+    let log = logs(folder.path(), VOYAGE, &[], 2).remove(0);
+    let known: Vec<_> = log.frames.iter().map(|frame| frame.navigation.as_ref().unwrap()).collect();
+    let tried: Vec<bool> = known.iter().map(|known| known.due).collect();
+    assert_eq!(tried, [true, false, false, true, false], "{known:#?}");
+    for (frame, known) in log.frames.iter().zip(&known) {
+        assert_eq!(known.due, frame.targets[0].reason != "not-due");
+        let state = if known.due { "referenced" } else { "dead reckoning" };
+        assert_eq!(known.state, state, "{known:#?}");
+        assert_eq!(known.odometry.motion.is_some(), frame.frame > 0);
+        // Both are carried from the first fix; after the second they differ.
+        let (m3, alone) = (known.errors.m3_position.unwrap(), known.errors.unreferenced_m3_position.unwrap());
+        assert!(m3 < 0.03 && alone < 0.03, "frame {}: {m3} {alone}", frame.frame);
+        assert_eq!(m3 == alone, frame.frame < 3);
+    }
+    // Nothing depends on the number of threads.
+    assert_eq!(log, logs(folder.path(), VOYAGE, &[], 1).remove(0));
+}
+
+#[test]
+fn settings_of_navigation_are_checked() {
+    let folder = TempDir::new().unwrap();
+    let said = |experiment: &str| {
+        let file = folder.path().join("e.toml");
+        fs::write(&file, experiment).unwrap();
+        match Plan::read(&file, &[]) {
+            Err(faults) => faults[0].to_string(),
+            Ok(plan) => run(&plan, &Options::into(folder.path().join("run")), &Silent).unwrap_err().to_string(),
+        }
+    };
+    let dive = "question = 'why'\nsource = 'dive'\n";
+    assert!(said(&format!("{dive}[navigation]\npolicy = 'intervals'\n")).contains("interval"));
+    assert!(said(&format!("{dive}[pipeline]\ntarget = 'joint'\n[navigation]\n")).contains("target = \"object\""));
+    let points = "question = 'why'\nsource = 'virtual-points'\n[navigation]\n";
+    assert!(said(points).contains("navigation needs images"), "{}", said(points));
+}

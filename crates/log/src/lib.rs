@@ -29,7 +29,7 @@
 //! | `/metrics/timing` | `seafix.v1.Timing` | one a frame |
 //! | `/metrics/totals` | `seafix.v1.Totals` | once, last: what all frames add up to, logged or not |
 //! | `/referencing/inputs` | `seafix.v1.Inputs` | one a frame: what the method was given, to the last bit |
-//! | `/referencing/frame` | `seafix.v1.Frame` | one a frame, its last: cloud, key points, prior, truth |
+//! | `/referencing/frame` | `seafix.v1.Frame` | one a frame, its last: cloud, key points, prior, truth, navigation |
 //! | `/camera/left/image`, `/camera/right/image` | `foxglove.CompressedImage` | PNG, lossless; the only copy of the images |
 //! | `/camera/left/calibration`, `/camera/right/calibration` | `foxglove.CameraCalibration` | once |
 //! | `/camera/left/annotations`, `/camera/right/annotations` | `foxglove.ImageAnnotations` | key points, candidates, identified points |
@@ -73,9 +73,9 @@ pub use png::encode_png;
 pub use read::{Reader, TrialLog, read};
 pub use record::{
     Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, Evaluation, ExactPose, FrameRecord,
-    FrameTimes, GreyImage, Inputs, Matrix3, Matrix4, Matrix6, ModelPoint, Outcome, Pair, PixelPair, PriorRecord,
-    ProblemRecord, RigRecord, SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState,
-    TruthRecord, VisiblePoint,
+    FrameTimes, GreyImage, Inputs, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord, NavigationErrors,
+    NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord, ProblemRecord, RigRecord, SitePoint,
+    TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
 };
 pub use recording::{Entry, Recording, Topic};
 pub use recover::{Recovered, recover};

@@ -87,6 +87,7 @@ pub struct Navigator<'a> {
     policy: &'a dyn Policy,
     fusion: &'a dyn Fusion,
     places: Vec<Place>,
+    names: Vec<String>,
     known: Option<Navigated>,
     doubts: Vec<Option<Doubt>>,
     /// With how many other objects each has agreed.
@@ -106,6 +107,7 @@ impl<'a> Navigator<'a> {
             policy,
             fusion,
             places,
+            names: (0..n).map(|index| format!("object {index}")).collect(),
             known: None,
             doubts: vec![None; n],
             agreed: vec![Vec::new(); n],
@@ -115,6 +117,13 @@ impl<'a> Navigator<'a> {
             metres: f64::INFINITY,
             changes: Vec::new(),
         }
+    }
+
+    /// The same, its objects called by these names in what it says.
+    #[must_use]
+    pub fn with_names(mut self, names: Vec<String>) -> Self {
+        self.names = names;
+        self
     }
 
     /// What the pose rests on.
@@ -180,7 +189,7 @@ impl<'a> Navigator<'a> {
     pub fn fix(&mut self, fix: &Navigated) -> Event {
         let object = fix.object;
         let Some(known) = self.known else {
-            self.take(*fix, format!("first fix, at object {object}"));
+            self.take(*fix, format!("first fix, at {}", self.names[object]));
             return Event::Taken;
         };
         match self.fusion.take(&known.passed_to(object, &self.places).standing, &fix.standing) {
@@ -189,7 +198,7 @@ impl<'a> Navigator<'a> {
                     self.agree(object, known.object);
                 }
                 self.doubts[object] = None;
-                self.take(Navigated { object, standing: pose }, format!("fix at object {object}"));
+                self.take(Navigated { object, standing: pose }, format!("fix at {}", self.names[object]));
                 Event::Taken
             }
             Err(contradiction) => self.doubt(&known, fix, contradiction),
@@ -207,7 +216,8 @@ impl<'a> Navigator<'a> {
             return Event::Doubted(contradiction);
         }
         if object == known.object {
-            self.take(*fix, format!("{VOTES} fixes at object {object} agree with each other, not with what was known"));
+            let why = format!("{VOTES} fixes at {} agree with each other, not with what was known", self.names[object]);
+            self.take(*fix, why);
             return Event::Relocated;
         }
         // Which of the two stands elsewhere? The one that no other object confirms.
@@ -222,7 +232,8 @@ impl<'a> Navigator<'a> {
         self.agreed[moved].clear();
         self.agreed.iter_mut().for_each(|others| others.retain(|&other| other != moved));
         let (shift, turn) = (old_from_new.translation().norm(), so3::angle(&old_from_new.rotation()).to_degrees());
-        self.take(*fix, format!("object {moved} stands {shift:.3} m and {turn:.2}° from where it was surveyed"));
+        let name = &self.names[moved];
+        self.take(*fix, format!("{name} stands {shift:.3} m and {turn:.2}° from where it was surveyed"));
         Event::Displaced(Box::new(Displacement { object: moved, old_from_new, place }))
     }
 

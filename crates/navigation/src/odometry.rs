@@ -4,7 +4,7 @@ use seafix_component::{Registry, entry};
 use seafix_geometry::StereoRig;
 use seafix_vision::{Image, Threads};
 
-use crate::{Journey, Stereo};
+use crate::{Journey, Outcome, Stereo, Waypoint};
 
 /// The two images of one instant.
 #[derive(Debug, Clone, Copy)]
@@ -38,12 +38,15 @@ pub trait Odometry: Send + Sync + std::fmt::Debug {
 }
 
 /// An odometry at work: pairs go in, in order of time, poses come out.
-pub trait Reckoning {
-    /// Takes the next pair.
+pub trait Reckoning: Send {
+    /// Takes the next pair; what became of it, as far as is known by now.
     ///
     /// # Errors
     /// [`NotAfter`] when it is not the next; nothing changes then.
-    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<(), NotAfter>;
+    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<Outcome, NotAfter>;
+
+    /// The last waypoint and the number of its segment: what one that navigates needs of the journey.
+    fn latest(&self) -> Option<(usize, Waypoint)>;
 
     /// All that is known by now: later pairs may still improve poses and explain outcomes.
     fn journey(&self) -> Journey;

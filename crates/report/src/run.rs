@@ -48,8 +48,8 @@ pub(crate) struct Frame {
     pub(crate) stamp_ns: u64,
     /// Where the left camera really was in the world (m).
     pub(crate) truth: Option<[f64; 3]>,
-    /// Times of the stages that serve all targets, in the order of [`crate::FRAME_STAGES`] (ms); NaN where none.
-    pub(crate) times: [f64; 6],
+    /// Times of the stages that serve all targets, in the order of [`crate::StageTimes`] (ms); NaN where none.
+    pub(crate) times: [f64; 7],
     rows: (u32, u32),
 }
 
@@ -158,6 +158,7 @@ impl Trial {
                 times.match_ms,
                 times.refine_ms,
                 times.triangulate_ms,
+                times.odometry_ms,
             ]
             .map(|time| time.unwrap_or(f64::NAN)),
             rows: (first, self.rows.len() as u32),

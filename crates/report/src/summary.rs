@@ -138,7 +138,7 @@ impl Spread {
     }
 }
 
-/// Median times (ms): of the first six a frame, of the others an attempt; `None` where a stage did not run.
+/// Median times (ms): of the first seven a frame, of the others an attempt; `None` where a stage did not run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StageTimes {
     /// Detection, both images.
@@ -153,6 +153,8 @@ pub struct StageTimes {
     pub refine_ms: Option<f64>,
     /// Triangulation.
     pub triangulate_ms: Option<f64>,
+    /// Odometry.
+    pub odometry_ms: Option<f64>,
     /// Choosing candidates.
     pub candidates_ms: Option<f64>,
     /// Search.
@@ -165,7 +167,7 @@ pub struct StageTimes {
 
 impl StageTimes {
     /// The stages and their times, in the order of the method.
-    pub fn stages(&self) -> [(&'static str, Option<f64>); 10] {
+    pub fn stages(&self) -> [(&'static str, Option<f64>); 11] {
         [
             ("detect", self.detect_ms),
             ("locate", self.locate_ms),
@@ -173,6 +175,7 @@ impl StageTimes {
             ("match", self.match_ms),
             ("refine", self.refine_ms),
             ("triangulate", self.triangulate_ms),
+            ("odometry", self.odometry_ms),
             ("candidates", self.candidates_ms),
             ("search", self.search_ms),
             ("solve", self.solve_ms),
@@ -307,6 +310,7 @@ fn times(trial: &Trial) -> StageTimes {
         match_ms: frames(3),
         refine_ms: frames(4),
         triangulate_ms: frames(5),
+        odometry_ms: frames(6),
         candidates_ms: attempts(Field::CandidatesTime),
         search_ms: attempts(Field::SearchTime),
         solve_ms: attempts(Field::SolveTime),

@@ -1,6 +1,6 @@
 //! The columns of the table of results: one row a trial, frame and attempted target.
 
-use seafix_log::{FrameRecord, TargetRecord};
+use seafix_log::{FrameRecord, NavigationRecord, TargetRecord};
 
 /// One row: an attempt, its frame and its trial.
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +14,10 @@ impl<'a> Row<'a> {
     /// The rows of one frame.
     pub(crate) fn of(trial: &'a str, frame: &'a FrameRecord) -> impl Iterator<Item = Self> {
         frame.targets.iter().map(move |target| Self { trial, frame, target })
+    }
+
+    fn navigation(&self) -> Option<&'a NavigationRecord> {
+        self.frame.navigation.as_deref()
     }
 }
 
@@ -87,4 +91,12 @@ pub static COLUMNS: &[Column] = columns![
     Real "search_ms" = |r: &Row<'_>| r.target.times.search_ms,
     Real "solve_ms" = |r: &Row<'_>| r.target.times.solve_ms,
     Real "total_ms" = |r: &Row<'_>| r.target.times.total_ms,
+    Real "odometry_ms" = |r: &Row<'_>| r.frame.times.odometry_ms,
+    Text "navigation" = |r: &Row<'_>| r.navigation().map_or_else(String::new, |known| known.state.clone()),
+    Text "navigated_object" = |r: &Row<'_>| r.navigation().and_then(|known| known.pose.as_ref()).map_or_else(String::new, |pose| pose.object.clone()),
+    Real "navigated_m2_rms" = |r: &Row<'_>| r.navigation()?.errors.m2_rms,
+    Real "navigated_m3_position" = |r: &Row<'_>| r.navigation()?.errors.m3_position,
+    Real "navigated_m3_attitude" = |r: &Row<'_>| r.navigation()?.errors.m3_attitude,
+    Real "navigated_nees" = |r: &Row<'_>| r.navigation()?.errors.nees,
+    Real "unreferenced_m3_position" = |r: &Row<'_>| r.navigation()?.errors.unreferenced_m3_position,
 ];

@@ -70,6 +70,10 @@ fn size(group: &Group<'_>) -> usize {
     /// The most rows, over all trials.
     const ROWS: usize = 32_768;
     let frames = group.passage.frames();
+    if group.navigates() {
+        // What is known after a frame is carried to the next: one piece.
+        return frames.max(1);
+    }
     let (least, most) = if group.passage.images() { (1, 8) } else { (16, 8192) };
     let size = (frames / 64).clamp(least, most).min(ROWS / group.trials.len().min(ROWS)).max(1);
     size.max(4 * group.looks_back())

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use seafix_component::Fault;
 use seafix_log::{FrameRecord, TrialHeader};
 use seafix_referencing::{Glimpse, Target};
@@ -11,6 +12,7 @@ use super::RunError;
 use crate::{
     Plan, Sighting, Trial,
     judge::judge,
+    navigate::{Underway, Voyage},
     record,
     source::{Eyes, Passage, Sight},
 };
@@ -31,7 +33,8 @@ pub(crate) struct Group<'a> {
 /// What every trial of a group made of one frame, each object by itself.
 pub(super) struct Looked {
     sight: Sight,
-    sightings: Vec<Sighting>,
+    /// Of each trial, what it saw, and what it knew then if it navigates.
+    sightings: Vec<(Sighting, Option<Underway>)>,
     /// Of each trial, what a joint fix takes from it.
     pub(super) glimpses: Vec<Glimpse>,
 }
@@ -63,6 +66,9 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
         for trial in &group.trials {
             match group.passage.site().targets(trial.stages.settings().target) {
                 Ok(targets) => {
+                    if trial.helm.is_some() {
+                        faults.extend(unnavigable(&*group.passage, &targets));
+                    }
                     group.headers.push(record::header(plan, trial, &*group.passage, &targets));
                     group.targets.push(targets);
                 }
@@ -74,24 +80,66 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
     if faults.is_empty() { Ok(groups) } else { Err(RunError::Input(faults)) }
 }
 
+/// Why no trial can navigate through `passage`.
+fn unnavigable(passage: &dyn Passage, targets: &[Target]) -> Option<Fault> {
+    let fault = |what: &str, remedy: &str| {
+        Some(Fault::new(format!("navigation {what}"), Path::new(passage.name())).remedy(remedy))
+    };
+    if !passage.images() {
+        return fault("needs images, and this source gives points", "leave [navigation] out");
+    }
+    let lost = targets.iter().find(|target| target.world_from_object.is_none())?;
+    let what = format!("needs to know where every object stands; `{}` has no place in the world", lost.name);
+    fault(&what, "add its `base_in_world` to the site, or leave [navigation] out")
+}
+
 impl Group<'_> {
     /// How many frames before its own the answer to a frame looks back on.
     pub(super) fn looks_back(&self) -> usize {
         self.trials.iter().map(|trial| trial.stages.looks_back()).max().unwrap_or(0)
     }
 
-    /// One frame through every trial. The sight is made once; every trial does all of its own work on it, so that times
-    /// are its own.
-    pub(super) fn look(&self, index: usize) -> Result<Looked, Fault> {
+    /// Whether what any trial knows after a frame is carried to the next.
+    pub(super) fn navigates(&self) -> bool {
+        self.trials.iter().any(|trial| trial.helm.is_some())
+    }
+
+    /// Sets out with every trial that navigates.
+    pub(super) fn voyages(&self) -> Vec<Option<Voyage<'_>>> {
         let rig = self.passage.rig();
-        let sight = self.passage.sight(index)?;
-        let (mut sightings, mut glimpses) = (Vec::new(), Vec::new());
-        for (trial, targets) in self.trials.iter().zip(&self.targets) {
-            let mut stream = Stream::new(trial.resolved.seed, 0, self.passage.number(index), Purpose::Search);
-            let sighting = trial.stages.reference(&sight, targets, rig, stream.rng());
-            glimpses.push(trial.stages.glimpse(&sighting, targets, rig));
-            sightings.push(sighting);
-        }
+        let trials = self.trials.iter().zip(&self.targets);
+        trials
+            .map(|(trial, targets)| {
+                let helm = trial.helm.as_ref()?;
+                Some(Voyage::begin(helm, &trial.stages, targets, rig))
+            })
+            .collect()
+    }
+
+    /// One frame through every trial. The sight is made once; every trial does all of its own work on it, so that times
+    /// are its own. `voyages` are the trials' ways until here.
+    pub(super) fn look(&self, index: usize, voyages: &mut [Option<Voyage<'_>>]) -> Result<Looked, Fault> {
+        let (passage, number) = (&*self.passage, self.passage.number(index));
+        let sight = passage.sight(index)?;
+        let look = |((trial, targets), voyage): ((&&Trial, &Vec<Target>), &mut Option<Voyage<'_>>)| {
+            let mut stream = Stream::new(trial.resolved.seed, 0, number, Purpose::Search);
+            match voyage {
+                None => Ok((trial.stages.reference(&sight, targets, passage.rig(), stream.rng()), None)),
+                Some(voyage) => voyage.advance(&sight, stream.rng()).map(|(seen, known)| (seen, Some(known))),
+            }
+        };
+        let trials = self.trials.iter().zip(&self.targets);
+        // Where frames must wait for each other, trials need not.
+        let sightings: Result<Vec<_>, String> = match self.navigates() {
+            true => self.trials.par_iter().zip(&self.targets).zip(voyages).map(look).collect(),
+            false => trials.zip(voyages).map(look).collect(),
+        };
+        let sightings =
+            sightings.map_err(|what| Fault::new(what, Path::new(passage.name())).value(format!("frame {number}")))?;
+        let trials = self.trials.iter().zip(&self.targets).zip(&sightings);
+        let glimpses = trials
+            .map(|((trial, targets), (sighting, _))| trial.stages.glimpse(sighting, targets, passage.rig()))
+            .collect();
         Ok(Looked { sight, sightings, glimpses })
     }
 
@@ -103,16 +151,18 @@ impl Group<'_> {
         let sightings = looked.sightings.into_iter().enumerate();
         sightings
             .zip(self.trials.iter().zip(&self.targets))
-            .map(|((which, mut sighting), (trial, targets))| {
+            .map(|((which, (mut sighting, underway)), (trial, targets))| {
                 if let Some((own, before)) = glimpses.split_last() {
                     let back = before.len().saturating_sub(trial.stages.looks_back());
                     let before: Vec<&Glimpse> = before[back..].iter().map(|all| &all[which]).collect();
                     trial.stages.join(&mut sighting, &before, &own[which], targets, passage.rig());
                 }
-                let mut record = record::frame(passage.number(index), &looked.sight, &sighting, trial, targets);
+                let mut record =
+                    record::frame(passage.number(index), &looked.sight, &sighting, underway.as_ref(), trial, targets);
                 if let Some(truth) = &truth {
                     let kind = trial.stages.settings().target;
-                    judge(&mut record, &sighting, truth, passage.site(), targets, kind, passage.rig());
+                    let made = (&sighting, underway.as_ref());
+                    judge(&mut record, made, truth, passage.site(), targets, kind, passage.rig());
                 }
                 record
             })

@@ -28,7 +28,7 @@ pub(super) fn work(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<bool, RunError> {
-    let threads = options.threads.min(pieces.len()).max(1);
+    let threads = options.threads.max(1);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
         let fault = Fault::new(format!("no threads ({error})"), std::path::Path::new("the machine"));
         RunError::Output(fault.value(threads).remedy("ask for fewer with --threads"))
@@ -36,7 +36,7 @@ pub(super) fn work(
     let (next, halted, failure) = (AtomicUsize::new(0), AtomicBool::new(false), Mutex::new(None));
     let stops = || halted.load(Ordering::Relaxed) || observer.stops();
     pool.scope(|scope| {
-        for _ in 0..threads {
+        for _ in 0..threads.min(pieces.len()) {
             scope.spawn(|_| {
                 while let Some(piece) = pieces.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !stops()) {
                     match make(&groups[piece.group], piece, store, options.timed, observer, &stops) {
@@ -82,16 +82,17 @@ fn make(
         outputs.push(Output { trial: trial.name.clone(), log, thinned: piece.thinned(), table: Table::default() });
     }
     let back = group.looks_back();
+    let mut voyages = group.voyages();
     let mut glimpses: Vec<Vec<Glimpse>> = Vec::new();
     for index in piece.first.saturating_sub(back)..piece.first {
-        glimpses.push(group.look(index).map_err(input)?.glimpses);
+        glimpses.push(group.look(index, &mut voyages).map_err(input)?.glimpses);
     }
     for index in piece.first..piece.end {
         if stops() {
             draft.abandon(outputs)?;
             return Ok(false);
         }
-        let mut looked = group.look(index).map_err(input)?;
+        let mut looked = group.look(index, &mut voyages).map_err(input)?;
         glimpses.push(std::mem::take(&mut looked.glimpses));
         let records = group.record(index, looked, &glimpses);
         glimpses.drain(..glimpses.len().saturating_sub(back));

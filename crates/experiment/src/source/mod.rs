@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 use seafix_component::{Fault, Registry, entry};
 use seafix_evaluation::Solved;
 use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
-use seafix_referencing::{Site, problem_file::CoherenceProblem};
+use seafix_referencing::{Prior, Site, Target, problem_file::CoherenceProblem};
 use seafix_simulation::optics::Port;
 use seafix_vision::Image;
 
@@ -50,6 +50,17 @@ pub struct Sight {
     pub prior: Option<WorldPrior>,
     /// What is told beside what the cameras gave.
     pub told: Told,
+}
+
+impl Sight {
+    /// The rough pose relative to each target; `None` where there is none, or no world.
+    pub(crate) fn rough(&self, targets: &[Target]) -> Vec<Option<Prior>> {
+        let prior = |target: &Target| {
+            let world = self.prior.as_ref()?;
+            target.prior(&world.world_from_camera, &world.covariance)
+        };
+        targets.iter().map(prior).collect()
+    }
 }
 
 /// What a method is told of one instant beside what the cameras gave and the rough pose in the world.

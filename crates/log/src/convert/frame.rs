@@ -1,6 +1,9 @@
 //! A frame without its images, results and times, which are messages of their own.
 
-use super::{Malformed, flat, matrix};
+use super::{
+    Malformed, flat, matrix,
+    navigation::{navigation_message, navigation_record},
+};
 use crate::{CloudPoint, FrameRecord, PixelPair, PriorRecord, TruthRecord, VisiblePoint, proto};
 
 /// The message that closes `frame`.
@@ -14,6 +17,7 @@ pub(crate) fn frame_message(frame: &FrameRecord) -> proto::Frame {
         cloud: frame.cloud.iter().map(point_message).collect(),
         prior: frame.prior.as_ref().map(|prior| proto::Prior { world_from_camera: flat(&prior.world_from_camera) }),
         truth: frame.truth.as_ref().map(truth_message),
+        navigation: frame.navigation.as_deref().map(navigation_message),
     }
 }
 
@@ -50,6 +54,7 @@ pub(crate) fn frame_record(message: proto::Frame) -> Result<FrameRecord, Malform
         cloud: message.cloud.into_iter().map(point_record).collect::<Result<_, _>>()?,
         prior: message.prior.map(prior).transpose()?,
         truth: message.truth.map(truth_record).transpose()?,
+        navigation: message.navigation.map(navigation_record).transpose()?.map(Box::new),
         ..FrameRecord::default()
     })
 }

@@ -3,6 +3,7 @@
 mod frame;
 mod header;
 mod inputs;
+mod navigation;
 mod result;
 mod totals;
 

@@ -151,7 +151,8 @@ pub(crate) fn evaluation_record(message: &proto::Evaluation) -> Evaluation {
 
 /// The message that holds all times of `frame`.
 pub(crate) fn timing_message(frame: &FrameRecord) -> proto::Timing {
-    let FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = frame.times;
+    let FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms } =
+        frame.times;
     let target = |target: &TargetRecord| {
         let TargetTimes { candidates_ms, search_ms, solve_ms, total_ms } = target.times;
         proto::TargetTiming { object: target.object.clone(), candidates_ms, search_ms, solve_ms, total_ms }
@@ -165,19 +166,21 @@ pub(crate) fn timing_message(frame: &FrameRecord) -> proto::Timing {
         match_ms,
         refine_ms,
         triangulate_ms,
+        odometry_ms,
         targets: frame.targets.iter().map(target).collect(),
     }
 }
 
 /// The times that `message` holds: of the frame, and of each target.
 pub(crate) fn target_times(message: &proto::Timing) -> (FrameTimes, Vec<TargetTimes>) {
-    let proto::Timing { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, .. } = *message;
+    let proto::Timing { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms, .. } =
+        *message;
     let target = |timing: &proto::TargetTiming| TargetTimes {
         candidates_ms: timing.candidates_ms,
         search_ms: timing.search_ms,
         solve_ms: timing.solve_ms,
         total_ms: timing.total_ms,
     };
-    let times = FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms };
+    let times = FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms };
     (times, message.targets.iter().map(target).collect())
 }

@@ -23,6 +23,9 @@ pub struct Frame {
     pub prior: ::core::option::Option<Prior>,
     #[prost(message, optional, tag = "8")]
     pub truth: ::core::option::Option<Truth>,
+    /// Where the trial navigates between fixes.
+    #[prost(message, optional, tag = "9")]
+    pub navigation: ::core::option::Option<Navigation>,
 }
 /// One triangulated point, frame of the left camera.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -75,6 +78,70 @@ pub struct VisiblePoint {
     /// Index into the target's points.
     #[prost(uint32, tag = "2")]
     pub point: u32,
+}
+/// What a navigator knew after a pair, and what it did.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Navigation {
+    /// "rough", "searching", "referenced" or "dead reckoning".
+    #[prost(string, tag = "1")]
+    pub state: ::prost::alloc::string::String,
+    /// Whether a fix was tried.
+    #[prost(bool, tag = "2")]
+    pub due: bool,
+    #[prost(message, optional, tag = "3")]
+    pub pose: ::core::option::Option<Navigated>,
+    /// The first fix carried here by odometry alone.
+    #[prost(message, optional, tag = "4")]
+    pub unreferenced: ::core::option::Option<Navigated>,
+    #[prost(message, optional, tag = "5")]
+    pub odometry: ::core::option::Option<OdometryStep>,
+    /// What happened, in words.
+    #[prost(string, repeated, tag = "6")]
+    pub events: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    #[prost(message, optional, tag = "7")]
+    pub errors: ::core::option::Option<NavigationErrors>,
+}
+/// The left camera relative to an object.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Navigated {
+    #[prost(string, tag = "1")]
+    pub object: ::prost::alloc::string::String,
+    /// 4 x 4.
+    #[prost(double, repeated, tag = "2")]
+    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
+    /// 6 x 6, rotation first.
+    #[prost(double, repeated, tag = "3")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+}
+/// What the odometry made of a pair.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct OdometryStep {
+    /// Why no motion to this pair is known; empty where one is, and at the beginning.
+    #[prost(string, tag = "1")]
+    pub lost: ::prost::alloc::string::String,
+    /// 4 x 4, the motion from the pair it knew before: earlier_from_later; empty where none is known.
+    #[prost(double, repeated, tag = "2")]
+    pub motion: ::prost::alloc::vec::Vec<f64>,
+    /// 6 x 6, rotation first; empty likewise.
+    #[prost(double, repeated, tag = "3")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+}
+/// How the navigated poses compare with truth; as in Evaluation.
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct NavigationErrors {
+    #[prost(double, optional, tag = "1")]
+    pub m2_rms: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "2")]
+    pub m3_position: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "3")]
+    pub m3_attitude: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    pub nees: ::core::option::Option<f64>,
+    /// Of the first fix carried by odometry alone.
+    #[prost(double, optional, tag = "5")]
+    pub unreferenced_m3_position: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "6")]
+    pub unreferenced_m3_attitude: ::core::option::Option<f64>,
 }
 /// What is the same for every frame of a trial. Topic /run/header, once, before all else.
 /// Metres, radians, seconds, pixels (centre of the first pixel: 0, 0). Matrices are written row by row,
@@ -492,6 +559,8 @@ pub struct Timing {
     pub locate_ms: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "9")]
     pub refine_ms: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "10")]
+    pub odometry_ms: ::core::option::Option<f64>,
 }
 /// Times of the stages that serve one target (ms).
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -1,6 +1,6 @@
 //! What one stereo pair gave.
 
-use super::{Inputs, Matrix3, Matrix4, TargetRecord};
+use super::{Inputs, Matrix3, Matrix4, NavigationRecord, TargetRecord};
 
 /// One frame: what was seen, what was known, and what came of every attempted target.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,6 +26,8 @@ pub struct FrameRecord {
     pub times: FrameTimes,
     /// What the method was given, to the last bit; `None` in logs that are older than it.
     pub inputs: Option<Box<Inputs>>,
+    /// What the navigator knew, where the trial navigates between fixes.
+    pub navigation: Option<Box<NavigationRecord>>,
 }
 
 /// An 8-bit grey image.
@@ -101,4 +103,6 @@ pub struct FrameTimes {
     pub refine_ms: Option<f64>,
     /// Triangulation.
     pub triangulate_ms: Option<f64>,
+    /// Odometry, its own cloud included.
+    pub odometry_ms: Option<f64>,
 }

@@ -143,8 +143,37 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
             match_ms: Some(0.0),
             refine_ms: Some(2.5),
             triangulate_ms: Some(1.0),
+            odometry_ms: Some(60.0),
         },
         inputs: (number % 4 != 3).then(|| Box::new(inputs(number))),
+        navigation: (number > 0).then(|| Box::new(navigation(number))),
+    }
+}
+
+/// What the navigator knew after frame `number`: in turn with and without everything that may be missing.
+fn navigation(number: u64) -> NavigationRecord {
+    let odd = number % 2 == 1;
+    let covariance =
+        std::array::from_fn(|r| std::array::from_fn(|c| if r == c { 0.01 } else { 1e-4 * (r + c) as f64 }));
+    let pose = NavigatedRecord { object: "A".to_owned(), object_from_camera: at(1.0 / 3.0, 0.1, -2.0), covariance };
+    NavigationRecord {
+        state: "dead reckoning".to_owned(),
+        due: odd,
+        pose: odd.then(|| pose.clone()),
+        unreferenced: (!odd).then_some(pose),
+        odometry: OdometryStep {
+            lost: if odd { "the left image shows nothing".to_owned() } else { String::new() },
+            motion: (!odd).then(|| (at(0.1, 0.0, 1.0 / 7.0), covariance)),
+        },
+        events: vec!["fix at object A".to_owned(); number as usize % 3],
+        errors: NavigationErrors {
+            m2_rms: odd.then_some(0.01),
+            m3_position: odd.then_some(1.0 / 3.0),
+            m3_attitude: (!odd).then_some(0.0),
+            nees: Some(6.0),
+            unreferenced_m3_position: odd.then_some(0.1),
+            unreferenced_m3_attitude: (!odd).then_some(0.2),
+        },
     }
 }
 

@@ -6,13 +6,13 @@ use seafix_vision::{Descriptors, Image, Keypoint, Look, Match, View, Workspace};
 use super::Stages;
 use crate::StereoPair;
 
-/// One pair: its images and its measured points, each with its key point and descriptor.
+/// One pair.
 #[derive(Debug)]
 pub(super) struct Seen {
     pub(super) stamp_ns: u64,
     /// As the filters leave them.
     pub(super) images: [Image; 2],
-    /// As they came: what a frozen camera repeats.
+    /// Its measured points, each with its key point and descriptor.
     pub(super) cloud: Vec<MeasuredPoint>,
     keypoints: Vec<Keypoint>,
     descriptors: Descriptors,

@@ -6,6 +6,8 @@ mod landmark;
 mod look;
 mod pose;
 mod reckoning;
+mod taken;
+mod times;
 mod unusable;
 mod window;
 

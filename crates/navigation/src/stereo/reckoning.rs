@@ -1,6 +1,6 @@
 //! The odometry at work.
 
-use std::{collections::HashMap, time::Instant};
+use std::time::Instant;
 
 use nalgebra::{Matrix4, Vector4};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -15,6 +15,8 @@ use super::{
     landmark::{Landmark, Sighting},
     look::Seen,
     pose::refine,
+    taken::Taken,
+    times::Times,
     unusable::unusable,
     window::adjust,
 };
@@ -79,25 +81,8 @@ struct Step {
     sightings: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
 }
 
-/// Milliseconds of each stage.
-#[derive(Debug, Default)]
-struct Times(Vec<(&'static str, f64)>);
-
-impl Times {
-    fn add(&mut self, stage: &'static str, ms: f64) {
-        match self.0.iter_mut().find(|(name, _)| *name == stage) {
-            Some((_, sum)) => *sum += ms,
-            None => self.0.push((stage, ms)),
-        }
-    }
-
-    fn since(&mut self, stage: &'static str, start: Instant) {
-        self.add(stage, start.elapsed().as_secs_f64() * 1e3);
-    }
-}
-
 impl Reckoning for StereoReckoning<'_> {
-    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<(), NotAfter> {
+    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<Outcome, NotAfter> {
         if let Some(before_ns) = self.before_ns.filter(|before| *before >= pair.stamp_ns) {
             return Err(NotAfter { pair: self.outcomes.len(), stamp_ns: pair.stamp_ns, before_ns });
         }
@@ -106,8 +91,8 @@ impl Reckoning for StereoReckoning<'_> {
         let images = [pair.left, pair.right];
         let before = self.raw.as_ref().map(|[left, right]| [left, right]);
         if let Some(lost) = unusable(images, before) {
-            self.outcomes.push(Outcome::Skipped(lost));
-            return Ok(());
+            self.outcomes.push(Outcome::Skipped(lost.clone()));
+            return Ok(Outcome::Skipped(lost));
         }
         match &mut self.raw {
             Some(raw) => raw.iter_mut().zip(images).for_each(|(raw, image)| raw.copy_from(image)),
@@ -121,16 +106,17 @@ impl Reckoning for StereoReckoning<'_> {
         stages.into_iter().for_each(|(stage, ms)| self.times.add(stage, ms));
         self.times.add("keep", start.elapsed().as_secs_f64() * 1e3 - known);
         self.take(seen);
-        Ok(())
+        Ok(self.outcomes.last().cloned().expect("every pair has an outcome"))
+    }
+
+    fn latest(&self) -> Option<(usize, Waypoint)> {
+        let number = self.segments.len().checked_sub(1)?;
+        Some((number, self.waypoint(self.segments[number].poses.last()?)))
     }
 
     fn journey(&self) -> Journey {
         let segments = self.segments.iter().map(|stretch| {
-            let poses = stretch.poses.iter().map(|pose| Waypoint {
-                stamp_ns: pose.stamp_ns,
-                world_from_camera: self.frames[pose.frame].world_from_camera * pose.frame_from_camera,
-                local: pose.local,
-            });
+            let poses = stretch.poses.iter().map(|pose| self.waypoint(pose));
             Segment { broken: stretch.broken.clone(), poses: poses.collect() }
         });
         Journey { segments: segments.collect(), outcomes: self.outcomes.clone(), times: self.times.0.clone() }
@@ -217,10 +203,17 @@ impl<'a> StereoReckoning<'a> {
         Outcome::Began
     }
 
+    fn waypoint(&self, pose: &Relative) -> Waypoint {
+        Waypoint {
+            stamp_ns: pose.stamp_ns,
+            world_from_camera: self.frames[pose.frame].world_from_camera * pose.frame_from_camera,
+            local: pose.local,
+        }
+    }
+
     /// Where the last waypoint is; the first is where the world begins.
     fn world_from_last(&self) -> Transform<World, Camera> {
-        let last = self.segments.last().and_then(|segment| segment.poses.last());
-        last.map_or_else(Transform::identity, |pose| self.frames[pose.frame].world_from_camera * pose.frame_from_camera)
+        self.latest().map_or_else(Transform::identity, |(_, waypoint)| waypoint.world_from_camera)
     }
 
     /// The way from `last` to `seen`.
@@ -390,35 +383,5 @@ impl<'a> StereoReckoning<'a> {
             let linked = landmark.views.len() > 1 && landmark.views.last().is_some_and(|view| view.frame > oldest);
             landmark.at.z > 0.0 && (frames[landmark.anchor].image.is_some() || linked)
         });
-    }
-}
-
-/// Places that are taken.
-struct Taken {
-    apart: f64,
-    cells: HashMap<[i64; 2], Vec<[f64; 2]>>,
-}
-
-impl Taken {
-    fn new(apart: f64) -> Self {
-        Self { apart, cells: HashMap::new() }
-    }
-
-    fn cell(&self, at: [f64; 2]) -> [i64; 2] {
-        at.map(|x| (x / self.apart).floor() as i64)
-    }
-
-    fn insert(&mut self, at: [f64; 2]) {
-        self.cells.entry(self.cell(at)).or_default().push(at);
-    }
-
-    fn free(&self, at: [f64; 2]) -> bool {
-        let [column, row] = self.cell(at);
-        let near = |other: &[f64; 2]| {
-            let (u, v) = (other[0] - at[0], other[1] - at[1]);
-            u * u + v * v < self.apart * self.apart
-        };
-        let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| [column + x, row + y]));
-        !around.filter_map(|cell| self.cells.get(&cell)).flatten().any(near)
     }
 }

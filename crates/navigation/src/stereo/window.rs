@@ -18,14 +18,8 @@ const LEAST_GAIN: f64 = 1e-4;
 /// the least Σ ρ(rᵀ S⁻¹ r) over all sightings, ρ Cauchy's loss. The landmarks are eliminated first (Schur complement).
 /// Key frames before `first` stand as they are and hold the rest.
 ///
-/// Sightings that do not agree in the end are dropped. Returns the covariance of the last pose relative to those that
-/// stand, if one is determined.
-pub(super) fn adjust(
-    rig: &StereoRig,
-    frames: &mut [KeyFrame],
-    landmarks: &mut [Landmark],
-    first: usize,
-) -> Option<Matrix6<f64>> {
+/// Sightings that do not agree in the end are dropped.
+pub(super) fn adjust(rig: &StereoRig, frames: &mut [KeyFrame], landmarks: &mut [Landmark], first: usize) {
     let count = frames.len() - first;
     let active: Vec<usize> = (0..landmarks.len())
         .filter(|&index| {
@@ -34,10 +28,10 @@ pub(super) fn adjust(
         })
         .collect();
     if active.is_empty() || count == 0 {
-        return None;
+        return;
     }
     let mut damping = 1e-6;
-    let mut here = Equations::of(rig, frames, landmarks, &active, first)?;
+    let Some(mut here) = Equations::of(rig, frames, landmarks, &active, first) else { return };
     for _ in 0..STEPS {
         let Some((steps, moves)) = here.solve(damping) else {
             damping = f64::max(10.0 * damping, 1e-6);
@@ -79,7 +73,6 @@ pub(super) fn adjust(
             landmarks[index].covariance = inverse.inverse();
         }
     }
-    here.last_covariance()
 }
 
 /// Drops sightings that do not agree.
@@ -247,15 +240,5 @@ impl Equations {
         });
         let moves = moves.collect();
         Some((steps, moves))
-    }
-
-    /// The covariance of the last pose.
-    fn last_covariance(&self) -> Option<Matrix6<f64>> {
-        let normal = self.reduced(0.0)?.normal;
-        let last = normal.nrows() - 6;
-        let mut unit = DMatrix::zeros(normal.nrows(), 6);
-        unit.fixed_view_mut::<6, 6>(last, 0).copy_from(&Matrix6::identity());
-        let columns = normal.cholesky()?.solve(&unit);
-        Some(columns.fixed_view::<6, 6>(last, 0).into_owned())
     }
 }

@@ -2,7 +2,7 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
-use super::{Glimpse, JointFix, Member, Standing, joint_fix};
+use super::{Glimpse, JointFix, Member, Placement, joint_fix};
 use crate::{Degenerate, candidates::chi_square};
 
 /// The camera relative to an object, and its covariance.
@@ -47,7 +47,7 @@ pub fn joint_fixes(
     // Written so that a NaN is refused too.
     while !(fix.chi2 <= limit(&fix)) {
         let held: Vec<usize> = (0..members.len())
-            .filter(|&o| members[o].standing != Standing::Displaced && glimpses.iter().any(|g| seen(o, g)))
+            .filter(|&o| members[o].placement != Placement::Displaced && glimpses.iter().any(|g| seen(o, g)))
             .collect();
         // One object must stand where it is said to: nothing else relates the camera to the site.
         if held.len() < 2 {
@@ -55,14 +55,14 @@ pub fn joint_fixes(
         }
         let without = |&object: &usize| {
             let mut fewer = members.clone();
-            fewer[object].standing = Standing::Displaced;
+            fewer[object].placement = Placement::Displaced;
             Some((object, joint_fix(rig, &fewer, glimpses).ok()?))
         };
         let Some((object, better)) = held.iter().filter_map(without).min_by(|(_, a), (_, b)| a.chi2.total_cmp(&b.chi2))
         else {
             return Ok(None);
         };
-        members[object].standing = Standing::Displaced;
+        members[object].placement = Placement::Displaced;
         displaced.push(object);
         fix = better;
     }

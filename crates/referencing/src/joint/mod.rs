@@ -26,7 +26,7 @@ use system::{State, System};
     clippy::large_enum_variant,
     reason = "one an object: a survey's thirty-six numbers are little beside its points"
 )]
-pub enum Standing {
+pub enum Placement {
     /// It stands where it is said to: of the object whose frame is the site's, by definition.
     Exact,
     /// It stands there with this covariance of η in `site_from_object_true = site_from_object · Exp(η)`.
@@ -41,7 +41,7 @@ pub struct Member {
     /// Where it is said to stand: its frame in the site's.
     pub site_from_object: Transform<Object, Object>,
     /// How well that is known.
-    pub standing: Standing,
+    pub placement: Placement,
 }
 
 /// What one instant saw: points with the index of their object, model places in that object's frame.

@@ -4,7 +4,7 @@ use faer::{Mat, Side, linalg::solvers::Solve};
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, StereoRig, Transform, so3::skew};
 
-use super::{Glimpse, Member, Standing};
+use super::{Glimpse, Member, Placement};
 use crate::{
     Observation,
     solve::{PixelTarget, Sightings, Term},
@@ -57,11 +57,11 @@ impl<'a> System<'a> {
         let mut surveys = Vec::with_capacity(members.len());
         for (object, member) in members.iter().enumerate() {
             // What nobody sees is neither estimated nor a motion that nothing determines.
-            let open = member.standing != Standing::Exact && seen(object);
+            let open = member.placement != Placement::Exact && seen(object);
             unknowns.push(open.then_some(blocks));
             blocks += usize::from(open);
-            surveys.push(match member.standing {
-                Standing::Surveyed(covariance) if open => Some(covariance.matrix.cholesky()?.inverse()),
+            surveys.push(match member.placement {
+                Placement::Surveyed(covariance) if open => Some(covariance.matrix.cholesky()?.inverse()),
                 _ => None,
             });
         }
@@ -236,8 +236,8 @@ mod tests {
             let survey = Covariance6::isotropic(2e-2, 3e-2);
             let members: Vec<Member> = said
                 .iter()
-                .zip([Standing::Exact, Standing::Surveyed(survey), Standing::Displaced])
-                .map(|(&site_from_object, standing)| Member { site_from_object, standing })
+                .zip([Placement::Exact, Placement::Surveyed(survey), Placement::Displaced])
+                .map(|(&site_from_object, placement)| Member { site_from_object, placement })
                 .collect();
             let seen = [0, 1].map(|k| glimpse(&rig, &said, k, 1.0, &mut rng));
             let system = System::new(&rig, &members, &seen).unwrap();

@@ -62,7 +62,7 @@ fn one_object_alone_is_the_fix_of_one_object() {
     let data = Observations { points: seen.points.iter().map(|(_, p)| *p).collect(), rig: Some(&rig) };
     let expected = StereoReprojection::default().solve(&data).unwrap();
     let covariance = StereoReprojection::default().covariance(&data, &expected).unwrap();
-    let member = Member { site_from_object: standing(0.0, 0.0), standing: Standing::Exact };
+    let member = Member { site_from_object: standing(0.0, 0.0), placement: Placement::Exact };
     let fix = joint_fix(&rig, &[member], &[seen]).unwrap();
     let (pose, own) = &fix.site_from_camera[0];
     assert!(expected.error_to(pose).amax() < 1e-10);
@@ -75,26 +75,26 @@ fn a_displaced_object_is_found_where_it_is() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(2));
     let (said, truly) = (standing(0.8, 0.0), standing(0.86, 0.05));
     let seen = [0, 1].map(|k| glimpse(&rig, &[standing(0.0, 0.0), truly], k, 0.0, &mut rng));
-    let members = |standing_of_second| {
+    let members = |of_second| {
         [
-            Member { site_from_object: standing(0.0, 0.0), standing: Standing::Exact },
-            Member { site_from_object: said, standing: standing_of_second },
+            Member { site_from_object: standing(0.0, 0.0), placement: Placement::Exact },
+            Member { site_from_object: said, placement: of_second },
         ]
     };
-    let fix = joint_fix(&rig, &members(Standing::Displaced), &seen).unwrap();
+    let fix = joint_fix(&rig, &members(Placement::Displaced), &seen).unwrap();
     assert!(fix.chi2 < 1e-8, "{}", fix.chi2);
     assert!(truly.error_to(&fix.site_from_object[1].0).amax() < 1e-8);
     for k in [0, 1] {
         assert!(instant(k).error_to(&fix.site_from_camera[k].0).amax() < 1e-8);
     }
     // Believed to stand where it was surveyed, it spoils the fix, and χ² says so.
-    let misled = joint_fix(&rig, &members(Standing::Exact), &seen).unwrap();
+    let misled = joint_fix(&rig, &members(Placement::Exact), &seen).unwrap();
     assert!(misled.chi2 > 100.0 * misled.freedom as f64, "{}", misled.chi2);
     // Alone in view and displaced, it says nothing of the site.
     let alone = Glimpse { points: seen[0].points.iter().filter(|(object, _)| *object == 1).copied().collect() };
-    assert_eq!(joint_fix(&rig, &members(Standing::Displaced), &[alone]), Err(Degenerate::Singular));
+    assert_eq!(joint_fix(&rig, &members(Placement::Displaced), &[alone]), Err(Degenerate::Singular));
     let few = Glimpse { points: seen[0].points[..2].to_vec() };
-    let refused = joint_fix(&rig, &members(Standing::Exact), &[few]);
+    let refused = joint_fix(&rig, &members(Placement::Exact), &[few]);
     assert_eq!(refused, Err(Degenerate::TooFew { found: 2, needed: 3 }));
 }
 
@@ -119,7 +119,7 @@ fn a_survey_is_one_error_an_object() {
             .enumerate()
             .map(|(o, &site_from_object)| Member {
                 site_from_object,
-                standing: if o == 0 { Standing::Exact } else { Standing::Surveyed(survey) },
+                placement: if o == 0 { Placement::Exact } else { Placement::Surveyed(survey) },
             })
             .collect();
         let fix = joint_fix(&rig, &members, &seen).unwrap();
@@ -144,7 +144,7 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
     let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
     let members: Vec<Member> = said
         .iter()
-        .map(|&site_from_object| Member { site_from_object, standing: Standing::Surveyed(survey) })
+        .map(|&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) })
         .collect();
     let draws = 300;
     let (mut nees, mut joint, mut alone) = ([0.0; 3], [0.0; 3], [0.0; 3]);
@@ -176,7 +176,7 @@ fn a_survey_that_the_images_contradict_is_given_up() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(5));
     let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
     let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
-    let member = |&site_from_object| Member { site_from_object, standing: Standing::Surveyed(survey) };
+    let member = |&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) };
     let members: Vec<Member> = said.iter().map(member).collect();
     let mut truly = said;
     truly[1] = standing(0.86, 0.05);

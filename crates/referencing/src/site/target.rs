@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, World};
 use serde::{Deserialize, Serialize};
 
 use super::{Congruence, ModelPoint, Shell, Site, SiteObject, congruence};
-use crate::{Member, Prior, PriorBound, Standing};
+use crate::{Member, Placement, Prior, PriorBound};
 
 /// What is searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -91,14 +91,14 @@ impl Target {
     /// nothing but the images says where it stands.
     pub fn member(&self) -> Member {
         let site_from_object = self.world_from_object.map_or_else(Transform::identity, |place| place.relabel());
-        let standing = match (self.world_from_object, &self.survey) {
-            (None, _) => Standing::Displaced,
+        let placement = match (self.world_from_object, &self.survey) {
+            (None, _) => Placement::Displaced,
             (Some(_), Some(survey)) if survey.matrix.trace() > 0.0 => {
-                Standing::Surveyed(Covariance6::new(survey.matrix))
+                Placement::Surveyed(Covariance6::new(survey.matrix))
             }
-            (Some(_), _) => Standing::Exact,
+            (Some(_), _) => Placement::Exact,
         };
-        Member { site_from_object, standing }
+        Member { site_from_object, placement }
     }
 
     /// The min–max shell of its points in its own frame.

@@ -133,6 +133,7 @@ fn stage(times: &FrameTimes, name: &str) -> Option<f64> {
         "match_ms" => times.match_ms,
         "refine_ms" => times.refine_ms,
         "triangulate_ms" => times.triangulate_ms,
+        "odometry_ms" => times.odometry_ms,
         _ => None,
     }
 }

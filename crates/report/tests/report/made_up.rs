@@ -183,8 +183,10 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
             match_ms: Some(6.0),
             refine_ms: Some(4.0),
             triangulate_ms: Some(0.3),
+            odometry_ms: None,
         },
         inputs: None,
+        navigation: None,
     }
 }
 

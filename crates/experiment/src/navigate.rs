@@ -1,0 +1,259 @@
+//! Between fixes: odometry, when to take the next fix, and what becomes of the pose then.
+
+use std::time::Instant;
+
+use rand::Rng;
+use seafix_component::Choice;
+use seafix_geometry::{Covariance6, Object, StereoRig};
+use seafix_log::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
+use seafix_navigation::{
+    Event, FUSIONS, Fusion, Navigated, Navigator, ODOMETRIES, Odometry, Outcome as Followed, POLICIES, Place, Policy,
+    Reckoning, Standing, State, StereoPair,
+};
+use seafix_referencing::{Outcome, Prior, PriorBound, Target};
+use seafix_vision::Threads;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    PipelineError, Sighting, Stages,
+    pipeline::{build, milliseconds, resolve},
+    record::rows6,
+    source::{Eyes, Sight},
+};
+
+/// The settings of the way from fix to fix.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Navigation {
+    /// Carries the last fix along.
+    pub odometry: Choice,
+    /// When a fix is tried.
+    pub policy: Choice,
+    /// What becomes of the navigated pose when a fix comes.
+    pub fusion: Choice,
+}
+
+impl Default for Navigation {
+    fn default() -> Self {
+        Self { odometry: Choice::named("stereo"), policy: Choice::named("every-frame"), fusion: Choice::named("fuse") }
+    }
+}
+
+impl Navigation {
+    /// The same with every setting of its components written out.
+    ///
+    /// # Errors
+    /// [`PipelineError`] names the setting.
+    pub fn resolved(&self) -> Result<Self, PipelineError> {
+        Ok(Self {
+            odometry: resolve(&ODOMETRIES, &self.odometry)?,
+            policy: resolve(&POLICIES, &self.policy)?,
+            fusion: resolve(&FUSIONS, &self.fusion)?,
+        })
+    }
+
+    /// Ready to work.
+    ///
+    /// # Errors
+    /// [`PipelineError`] names the setting.
+    pub fn build(&self) -> Result<Helm, PipelineError> {
+        Ok(Helm {
+            odometry: build(&ODOMETRIES, &self.odometry)?,
+            policy: build(&POLICIES, &self.policy)?,
+            fusion: build(&FUSIONS, &self.fusion)?,
+        })
+    }
+}
+
+/// The components between fixes, built.
+#[derive(Debug)]
+pub struct Helm {
+    odometry: Box<dyn Odometry>,
+    policy: Box<dyn Policy>,
+    fusion: Box<dyn Fusion>,
+}
+
+/// A trial's way through the frames of a passage, in their order.
+pub(crate) struct Voyage<'a> {
+    stages: &'a Stages,
+    targets: &'a [Target],
+    rig: &'a StereoRig,
+    reckoning: Box<dyn Reckoning + 'a>,
+    navigator: Navigator<'a>,
+    /// Changes of the navigator's state that have been told.
+    told: usize,
+    /// The pair that the odometry knew last: when, and in which segment.
+    last: Option<(u64, usize)>,
+    /// The first fix, carried along by odometry alone.
+    unreferenced: Unreferenced,
+}
+
+/// The first fix, carried along by odometry alone.
+enum Unreferenced {
+    Awaited,
+    Carried(Navigated),
+    Lost,
+}
+
+/// What a trial that navigates knew after a frame.
+pub(crate) struct Underway {
+    pub(crate) record: NavigationRecord,
+    /// The navigated pose.
+    pub(crate) pose: Option<Navigated>,
+    /// The first fix carried here by odometry alone.
+    pub(crate) unreferenced: Option<Navigated>,
+    pub(crate) odometry_ms: f64,
+}
+
+impl<'a> Voyage<'a> {
+    /// Sets out; every target stands somewhere in the world.
+    pub(crate) fn begin(helm: &'a Helm, stages: &'a Stages, targets: &'a [Target], rig: &'a StereoRig) -> Self {
+        let names = targets.iter().map(|target| target.name.clone()).collect();
+        let navigator = Navigator::new(places(targets), &*helm.policy, &*helm.fusion).with_names(names);
+        Self {
+            stages,
+            targets,
+            rig,
+            reckoning: helm.odometry.begin(rig, Threads::One),
+            navigator,
+            told: 0,
+            last: None,
+            unreferenced: Unreferenced::Awaited,
+        }
+    }
+
+    /// The next frame: the last fix is carried along, and another is taken where one is due.
+    ///
+    /// # Errors
+    /// A sentence: the frame is no stereo pair, or not after the one before.
+    pub(crate) fn advance(&mut self, sight: &Sight, rng: &mut dyn Rng) -> Result<(Sighting, Underway), String> {
+        let Eyes::Pair(left, right) = &sight.eyes else { return Err("a frame without images".to_owned()) };
+        let start = Instant::now();
+        let pair = StereoPair { stamp_ns: sight.stamp_ns, left, right };
+        let followed = self.reckoning.advance(&pair).map_err(|error| error.to_string())?;
+        let odometry_ms = milliseconds(start);
+        let mut events = Vec::new();
+        let odometry = self.carry(sight, &followed, &mut events);
+
+        // Where the odometry is not, neither is the navigator: a fix would have no place in the order of motions.
+        let here = self.last.is_some_and(|(stamp_ns, _)| stamp_ns == sight.stamp_ns);
+        let rough = sight.rough(self.targets);
+        let priors = self.priors(&rough);
+        let in_view = || self.targets.iter().zip(&priors).any(|(target, prior)| Stages::shows(target, prior, self.rig));
+        let in_view = here && in_view();
+        let due = here && self.navigator.due(in_view);
+        let sighting = match due {
+            true => self.look(sight, &priors, &rough, rng),
+            false => Sighting::default(),
+        };
+        self.fix(&sighting, &mut events);
+        self.tell(&mut events);
+        let pose = self.navigator.pose().filter(|_| here).copied();
+        let unreferenced = match &self.unreferenced {
+            Unreferenced::Carried(pose) if here => Some(*pose),
+            _ => None,
+        };
+        let record = NavigationRecord {
+            state: (if here { self.navigator.state() } else { State::Rough }).to_string(),
+            due,
+            pose: pose.map(|pose| self.record(&pose)),
+            unreferenced: unreferenced.map(|pose| self.record(&pose)),
+            odometry,
+            events,
+            errors: NavigationErrors::default(),
+        };
+        Ok((sighting, Underway { record, pose, unreferenced, odometry_ms }))
+    }
+
+    /// Carries the pose to this frame where the odometry knows the way.
+    fn carry(&mut self, sight: &Sight, followed: &Followed, events: &mut Vec<String>) -> OdometryStep {
+        let now = self.reckoning.latest().filter(|(_, waypoint)| waypoint.stamp_ns == sight.stamp_ns);
+        let (Some((segment, waypoint)), false) = (now, matches!(followed, Followed::Skipped(_))) else {
+            let lost = match followed {
+                Followed::Skipped(lost) => lost.to_string(),
+                Followed::Began | Followed::Followed { .. } => String::new(),
+            };
+            events.push(format!("no motion to this pair: {lost}"));
+            return OdometryStep { lost, motion: None };
+        };
+        let before = self.last.replace((sight.stamp_ns, segment));
+        let Some((stamp_ns, left)) = before else { return OdometryStep::default() };
+        let seconds = (sight.stamp_ns - stamp_ns) as f64 * 1e-9;
+        let motion = waypoint.local.filter(|_| left == segment);
+        self.navigator.advance(seconds, motion.as_ref());
+        self.unreferenced = match (std::mem::replace(&mut self.unreferenced, Unreferenced::Lost), &motion) {
+            (Unreferenced::Awaited, _) => Unreferenced::Awaited,
+            (Unreferenced::Carried(pose), Some(motion)) => Unreferenced::Carried(pose.after(motion)),
+            _ => Unreferenced::Lost,
+        };
+        let Some(motion) = motion else {
+            return OdometryStep { lost: "a new segment begins: the way here is unknown".to_owned(), motion: None };
+        };
+        OdometryStep { lost: String::new(), motion: Some((motion.motion.rows(), rows6(&motion.covariance.matrix))) }
+    }
+
+    /// What is known before a fix: the navigated pose, passed to each object; else the rough one.
+    fn priors(&self, rough: &[Option<Prior>]) -> Vec<Option<Prior>> {
+        let known = |index| {
+            let Standing { object_from_camera, covariance } = self.navigator.pose_at(index)?.standing;
+            Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) })
+        };
+        rough.iter().enumerate().map(|(index, rough)| known(index).or_else(|| rough.clone())).collect()
+    }
+
+    /// Attempts every object in view where it is believed to be. What stands elsewhere than surveyed is not found there:
+    /// the rough pose then says where to look once more.
+    fn look(&self, sight: &Sight, priors: &[Option<Prior>], rough: &[Option<Prior>], rng: &mut dyn Rng) -> Sighting {
+        let mut sighting = self.stages.reference_from(sight, self.targets, priors, self.rig, rng);
+        if self.navigator.pose().is_some() {
+            self.stages.again(&mut sighting, sight, self.targets, rough, self.rig, rng);
+        }
+        sighting
+    }
+
+    /// Gives the fixes to the navigator.
+    fn fix(&mut self, sighting: &Sighting, events: &mut Vec<String>) {
+        for attempt in &sighting.attempts {
+            let Outcome::Referenced(fix) = &attempt.answer.outcome else { continue };
+            let standing = Standing { object_from_camera: fix.object_from_camera, covariance: fix.covariance };
+            let fix = Navigated { object: attempt.target, standing };
+            let name = &self.targets[attempt.target].name;
+            match self.navigator.fix(&fix) {
+                Event::Taken => events.push(format!("fix at {name} taken")),
+                Event::Doubted(why) => events.push(format!("fix at {name} doubted: {why}")),
+                Event::Relocated => events.push(format!("fixes at {name} overrule what was known")),
+                Event::Displaced(found) => {
+                    let shift = found.old_from_new.translation().norm();
+                    events.push(format!("{} stands {shift:.3} m from its place", self.targets[found.object].name));
+                }
+            }
+            if matches!(self.unreferenced, Unreferenced::Awaited) {
+                self.unreferenced = Unreferenced::Carried(fix);
+            }
+        }
+    }
+
+    fn tell(&mut self, events: &mut Vec<String>) {
+        let changes = self.navigator.changes();
+        let new = &changes[self.told..];
+        events.extend(new.iter().map(|change| format!("{} → {}: {}", change.from, change.to, change.why)));
+        self.told = changes.len();
+    }
+
+    fn record(&self, pose: &Navigated) -> NavigatedRecord {
+        NavigatedRecord {
+            object: self.targets[pose.object].name.clone(),
+            object_from_camera: pose.standing.object_from_camera.rows(),
+            covariance: rows6(&pose.standing.covariance.matrix),
+        }
+    }
+}
+
+/// Where the objects stand by the survey.
+fn places(targets: &[Target]) -> Vec<Place> {
+    let place = |target: &Target| Place {
+        world_from_object: target.world_from_object.expect("checked when the source was opened"),
+        covariance: target.survey.unwrap_or_else(|| Covariance6::<_, Object>::new(nalgebra::Matrix6::zeros())),
+    };
+    targets.iter().map(place).collect()
+}

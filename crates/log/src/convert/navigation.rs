@@ -1,0 +1,71 @@
+//! What a navigator knew.
+
+use super::{Malformed, flat, matrix, matrix_if_any};
+use crate::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, proto};
+
+/// The message that holds `navigation`.
+pub(super) fn navigation_message(navigation: &NavigationRecord) -> proto::Navigation {
+    let NavigationErrors { m2_rms, m3_position, m3_attitude, nees, unreferenced_m3_position, unreferenced_m3_attitude } =
+        navigation.errors;
+    let motion = navigation.odometry.motion.as_ref();
+    proto::Navigation {
+        state: navigation.state.clone(),
+        due: navigation.due,
+        pose: navigation.pose.as_ref().map(navigated_message),
+        unreferenced: navigation.unreferenced.as_ref().map(navigated_message),
+        odometry: Some(proto::OdometryStep {
+            lost: navigation.odometry.lost.clone(),
+            motion: motion.map_or_else(Vec::new, |(motion, _)| flat(motion)),
+            covariance: motion.map_or_else(Vec::new, |(_, covariance)| flat(covariance)),
+        }),
+        events: navigation.events.clone(),
+        errors: Some(proto::NavigationErrors {
+            m2_rms,
+            m3_position,
+            m3_attitude,
+            nees,
+            unreferenced_m3_position,
+            unreferenced_m3_attitude,
+        }),
+    }
+}
+
+fn navigated_message(navigated: &NavigatedRecord) -> proto::Navigated {
+    proto::Navigated {
+        object: navigated.object.clone(),
+        object_from_camera: flat(&navigated.object_from_camera),
+        covariance: flat(&navigated.covariance),
+    }
+}
+
+/// The record that `message` holds.
+pub(super) fn navigation_record(message: proto::Navigation) -> Result<NavigationRecord, Malformed> {
+    let odometry = message.odometry.unwrap_or_default();
+    let errors = message.errors.unwrap_or_default();
+    let motion = matrix_if_any("navigation.odometry.motion", &odometry.motion)?;
+    let covariance = matrix_if_any("navigation.odometry.covariance", &odometry.covariance)?;
+    Ok(NavigationRecord {
+        state: message.state,
+        due: message.due,
+        pose: message.pose.map(navigated_record).transpose()?,
+        unreferenced: message.unreferenced.map(navigated_record).transpose()?,
+        odometry: OdometryStep { lost: odometry.lost, motion: motion.zip(covariance) },
+        events: message.events,
+        errors: NavigationErrors {
+            m2_rms: errors.m2_rms,
+            m3_position: errors.m3_position,
+            m3_attitude: errors.m3_attitude,
+            nees: errors.nees,
+            unreferenced_m3_position: errors.unreferenced_m3_position,
+            unreferenced_m3_attitude: errors.unreferenced_m3_attitude,
+        },
+    })
+}
+
+fn navigated_record(message: proto::Navigated) -> Result<NavigatedRecord, Malformed> {
+    Ok(NavigatedRecord {
+        object: message.object,
+        object_from_camera: matrix("navigation.object_from_camera", &message.object_from_camera)?,
+        covariance: matrix("navigation.covariance", &message.covariance)?,
+    })
+}
