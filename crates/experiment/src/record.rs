@@ -8,11 +8,12 @@ use seafix_log::{
     Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, ModelPoint,
     Outcome as Logged, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
 };
+use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
 
 use crate::{
-    Attempt, Pipeline, Place, Plan, Sighting, Trial, exact,
+    Attempt, Experiment, Place, Plan, Sighting, Trial, exact,
     manifest::Git,
     navigate::Underway,
     source::{Eyes, Passage, Sight},
@@ -38,7 +39,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
                 value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
             })
             .collect(),
-        components: components(pipeline, passage.images()),
+        components: components(&trial.resolved, passage.images()),
         configuration: toml::to_string(&trial.resolved).expect("a resolved experiment is plain values"),
         site: site.to_toml(),
         source: passage.name().to_owned(),
@@ -158,7 +159,8 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
 }
 
 /// The components that did some work: a cloud that came without images was not looked at.
-fn components(pipeline: &Pipeline, images: bool) -> Vec<Component> {
+fn components(experiment: &Experiment, images: bool) -> Vec<Component> {
+    let pipeline = &experiment.pipeline;
     let front = [
         component(&DETECTORS, &pipeline.detector),
         component(&LOCATORS, &pipeline.locator),
@@ -166,7 +168,14 @@ fn components(pipeline: &Pipeline, images: bool) -> Vec<Component> {
         component(&MATCHERS, &pipeline.matcher),
     ];
     let back = [component(&SEARCHES, &pipeline.search), component(&SOLVERS, &pipeline.solver)];
-    front.into_iter().filter(|_| images).chain(back).collect()
+    let between = experiment.navigation.iter().flat_map(|navigation| {
+        [
+            component(&ODOMETRIES, &navigation.odometry),
+            component(&POLICIES, &navigation.policy),
+            component(&FUSIONS, &navigation.fusion),
+        ]
+    });
+    front.into_iter().filter(|_| images).chain(back).chain(between).collect()
 }
 
 fn versions() -> Vec<(String, String)> {

@@ -21,6 +21,7 @@ mod paper;
 mod place;
 mod print;
 mod run;
+mod sailed;
 mod summary;
 mod terminal;
 mod verify;

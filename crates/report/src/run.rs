@@ -8,7 +8,10 @@ use std::{
 use seafix_log::{FrameRecord, LogError, Outcome, Reader, TargetRecord, Totals, TrialHeader};
 use sha2::{Digest, Sha256};
 
-use crate::{Field, ReportError, disparity, place};
+use crate::{
+    Field, ReportError, disparity, place,
+    sailed::{Counted, Sailed},
+};
 
 /// All trials of a run, in the order of their names.
 #[derive(Debug)]
@@ -51,6 +54,15 @@ pub(crate) struct Frame {
     /// Times of the stages that serve all targets, in the order of [`crate::StageTimes`] (ms); NaN where none.
     pub(crate) times: [f64; 7],
     rows: (u32, u32),
+    /// What the navigator knew, where the trial navigates.
+    pub(crate) sailed: Option<Underway>,
+}
+
+/// What a navigator knew after a frame.
+#[derive(Debug)]
+pub(crate) struct Underway {
+    counted: [bool; Counted::ALL.len()],
+    values: [f64; Sailed::ALL.len()],
 }
 
 /// One attempt at one target.
@@ -162,6 +174,10 @@ impl Trial {
             ]
             .map(|time| time.unwrap_or(f64::NAN)),
             rows: (first, self.rows.len() as u32),
+            sailed: frame.navigation.as_deref().map(|record| Underway {
+                counted: Counted::ALL.map(|counted| counted.holds(record)),
+                values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
+            }),
         });
     }
 
@@ -230,6 +246,18 @@ impl Trial {
             of_stage("search").unwrap_or_else(|| self.named[0].clone()),
             of_stage("solver").unwrap_or_else(|| self.named[1].clone()),
         ]
+    }
+}
+
+impl Underway {
+    /// The value of a quantity; `None` where nothing is known.
+    pub(crate) fn get(&self, quantity: Sailed) -> Option<f64> {
+        Some(self.values[quantity as usize]).filter(|value| !value.is_nan())
+    }
+
+    /// Whether its frame is one of these.
+    pub(crate) fn is(&self, counted: Counted) -> bool {
+        self.counted[counted as usize]
     }
 }
 

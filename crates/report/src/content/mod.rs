@@ -7,6 +7,7 @@ mod failures;
 mod figures;
 mod limits;
 mod method;
+mod navigation;
 mod protocol;
 mod reproduce;
 mod results;
@@ -40,6 +41,7 @@ pub(crate) fn document(run: &Run, summary: &Summary) -> Result<Document, ReportE
             Some(data::section(run, summary)),
             Some(protocol::section(run, &comparisons)),
             Some(results::section(run, summary, &comparisons)),
+            navigation::section(run, summary),
             significance::section(run, &comparisons),
             ablation::section(run, summary),
             Some(failures),

@@ -1,6 +1,6 @@
 //! Numbers about trials, with their keys.
 
-use crate::{Field, Key, Number, format, run::Trial};
+use crate::{Field, Key, Number, format, run::Trial, sailed::Sailed};
 
 /// What a quantity is printed in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,6 +64,35 @@ pub(super) fn statistic(
 ) -> Number {
     let what = format!("{name} {} of {group}{}", field.name(), unit.suffix());
     Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, field.topic(), what))
+}
+
+/// A statistic of what the navigator knew, over the frames that have it.
+pub(super) fn sailed(
+    trial: &Trial,
+    name: &str,
+    quantity: Sailed,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let what = format!("{name} {} of navigated{}", quantity.name(), unit.suffix());
+    Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/referencing/frame", what))
+}
+
+/// What the navigator knew after one frame.
+pub(super) fn sailed_at(
+    trial: &Trial,
+    (frame, stamp_ns): (u64, u64),
+    quantity: Sailed,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let key = Key {
+        what: format!("value {} of  at {frame}{}", quantity.name(), unit.suffix()),
+        topic: "/referencing/frame".to_owned(),
+        span: [stamp_ns; 2],
+        logs: vec![trial.file()],
+    };
+    Number::new(value.map(|value| value * unit.scale()), decimals, key)
 }
 
 /// One attempt's quantity.

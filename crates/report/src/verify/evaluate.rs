@@ -6,7 +6,11 @@ use seafix_evaluation::{clopper_pearson, holm, mcnemar, quantile};
 use seafix_log::{FrameTimes, Outcome, TargetRecord};
 
 use super::logs::{Log, Logs};
-use crate::{Field, Key, ReportError, paired::Statistics};
+use crate::{
+    Field, Key, ReportError,
+    paired::Statistics,
+    sailed::{Counted, Sailed},
+};
 
 /// The value of a key, or why there is none.
 type Answer = Result<Option<f64>, String>;
@@ -42,7 +46,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     };
     let (first, rest) = what.split_once(' ').unwrap_or((what, ""));
     let log = logs.first()?;
-    if matches!(first, "least" | "greatest" | "middle") {
+    if matches!(first, "least" | "greatest" | "middle") && !rest.ends_with(" of navigated") {
         let each: Option<Vec<Option<f64>>> = logs.iter().map(|log| answer(rest, span, &[log])).collect();
         let mut each: Vec<f64> = each?.into_iter().flatten().map(|value| value * scale).collect();
         return Some(match first {
@@ -71,6 +75,10 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         }
         ("disparity", _) => (log.disparity.1 > 0).then(|| (log.disparity.0 / log.disparity.1 as f64).sqrt()),
         ("count" | "density", range) if range.contains(" from ") => histogram(first, range, span, logs),
+        ("count", group) if Counted::ALL.iter().any(|counted| counted.name() == group) => {
+            let counted = Counted::ALL.into_iter().find(|counted| counted.name() == group)?;
+            Some(log.sample(span).filter_map(|f| f.navigation.as_deref()).filter(|n| counted.holds(n)).count() as f64)
+        }
         ("count", group) => Some(pooled(logs, group, span)? as f64),
         ("percent" | "low" | "high", group) => share(first, group, scale, span, logs)?,
         ("beyond", _) => {
@@ -83,6 +91,12 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let (above, below) = (Field::named(above)?, Field::named(below)?);
             let sum = |field: Field| rows(log, span).filter_map(|row| field.of(&row.0)).sum::<f64>();
             Some(sum(above) / sum(below))
+        }
+        ("rms", of) if of.ends_with(" of navigated") => {
+            let quantity = Sailed::named(of.strip_suffix(" of navigated")?)?;
+            let values = log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?));
+            let (n, sum) = values.fold((0, 0.0), |(n, sum), v| (n + 1, sum + v * v));
+            (n > 0).then(|| (sum / f64::from(n)).sqrt() * scale)
         }
         ("rms" | "bound" | "ratio" | "within", of) => totals(first, of, log)?.map(|value| value * scale),
         ("mean", "nees of judged") => totals(first, rest, log)?,
@@ -101,6 +115,10 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
                 Some(field) => {
                     let own = rows(log, span).filter(|row| group == "attempted" || found(&row.0));
                     own.filter_map(|row| value(row, field)).collect()
+                }
+                None if Sailed::named(field).is_some() => {
+                    let quantity = Sailed::named(field)?;
+                    log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?)).collect()
                 }
                 None => log.sample(span).filter_map(|frame| stage(&frame.times, field)).collect(),
             };
@@ -143,6 +161,8 @@ fn statistic(name: &str, mut values: Vec<f64>) -> Option<Option<f64>> {
     let known = n > 0;
     Some(match name {
         "sampled" => Some(n as f64),
+        "last" => values.last().copied(),
+        "greatest" => values.iter().copied().reduce(f64::max),
         "mean" => known.then(|| values.iter().sum::<f64>() / n as f64),
         "median" => known.then(|| quantile(&mut values, 0.5)),
         _ => {
@@ -253,8 +273,12 @@ fn totals(which: &str, of: &str, log: &Log) -> Option<Option<f64>> {
 fn single(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let (field, rest) = of.split_once(" of ")?;
     let (object, number) = rest.rsplit_once(" at ")?;
-    let (field, number): (Field, u64) = (Field::named(field)?, number.parse().ok()?);
+    let number: u64 = number.parse().ok()?;
     let frame = log.frames.iter().find(|frame| frame.number == number && frame.stamp_ns == span[0])?;
+    if let Some(quantity) = Sailed::named(field) {
+        return Some(quantity.of(frame.navigation.as_deref()?));
+    }
+    let field = Field::named(field)?;
     let row = frame.rows.iter().find(|row| row.0.object == object)?;
     Some(value(row, field))
 }

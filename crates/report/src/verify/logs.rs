@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_log::{FrameTimes, Outcome, Reader, TargetRecord, Totals, TrialHeader};
+use seafix_log::{FrameTimes, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader};
 
 use crate::{ReportError, disparity, place};
 
@@ -30,6 +30,7 @@ pub(super) struct Seen {
     pub(super) stamp_ns: u64,
     pub(super) times: FrameTimes,
     pub(super) truth: Option<[f64; 3]>,
+    pub(super) navigation: Option<Box<NavigationRecord>>,
     /// Key points, points, candidates, identified, used.
     pub(super) marks: [usize; 5],
     /// Attempts, with the number of their candidates and where they put the camera.
@@ -91,6 +92,7 @@ impl Log {
                 number: frame.frame,
                 stamp_ns: frame.stamp_ns,
                 times: frame.times,
+                navigation: frame.navigation,
                 truth: frame
                     .truth
                     .as_ref()

@@ -5,6 +5,7 @@ mod consistency;
 mod frames;
 mod grid;
 mod recall;
+mod sawtooth;
 mod way;
 
 use crate::{
@@ -17,6 +18,7 @@ use crate::{
 use super::{data::baseline, distinct};
 
 pub(super) use consistency::search_cost;
+pub(super) use sawtooth::figure as sawtooth;
 
 /// Those that show results.
 pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {

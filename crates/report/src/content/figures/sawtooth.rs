@@ -1,0 +1,88 @@
+//! How the error grows between fixes, and what it would be without them.
+
+use super::{caption, figure as finish};
+use crate::{
+    content::tell::{self, Unit},
+    document::{Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    run::{Run, Trial},
+    sailed::{Counted, Sailed},
+};
+
+/// At most so many trials, one above the other.
+const PANELS: usize = 4;
+
+/// Error of the camera's position over time: navigated, and the first fix carried by odometry alone; a mark at every fix.
+/// The gaps are stretches without a pose.
+pub(crate) fn figure(run: &Run) -> Option<Figure> {
+    let trials: Vec<&Trial> =
+        run.trials.iter().filter(|trial| trial.sample().any(|frame| frame.sailed.is_some())).take(PANELS).collect();
+    let heads = [
+        Head::words("trial"),
+        Head::numbers("frame"),
+        Head::numbers("navigated m3 (mm)"),
+        Head::numbers("without further fixes, m3 (mm)"),
+        Head::words("fixed"),
+    ];
+    let mut data = Table::new("sawtooth", text!["Every point of the figure of the error between fixes."], heads.into());
+    let mut panels = Vec::new();
+    for trial in trials {
+        let start = trial.span()[0];
+        let (mut runs, mut alone, mut fixes) = (vec![Vec::new()], vec![Vec::new()], Vec::new());
+        for frame in trial.sample() {
+            let Some(sailed) = &frame.sailed else { continue };
+            let seconds = (frame.stamp_ns - start) as f64 * 1e-9;
+            let value = |quantity| sailed.get(quantity).map(|metres| [seconds, metres * 1e3]);
+            for (quantity, lines) in [(Sailed::Position, &mut runs), (Sailed::AlonePosition, &mut alone)] {
+                match (value(quantity), lines.last_mut()) {
+                    (Some(point), Some(line)) => line.push(point),
+                    (None, Some(line)) if !line.is_empty() => lines.push(Vec::new()),
+                    _ => {}
+                }
+            }
+            let fixed = sailed.is(Counted::Referenced);
+            fixes.extend(value(Sailed::Position).filter(|_| fixed));
+            let told = |quantity| {
+                let place = (frame.number, frame.stamp_ns);
+                tell::sailed_at(trial, place, quantity, sailed.get(quantity), (Unit::Millimetres, 3)).into()
+            };
+            data.line(
+                false,
+                vec![
+                    trial.header.trial.clone().into(),
+                    tell::frame(trial, frame.number, frame.stamp_ns).into(),
+                    told(Sailed::Position),
+                    told(Sailed::AlonePosition),
+                    (if fixed { "yes" } else { "" }).into(),
+                ],
+            );
+        }
+        let lines = |lines: Vec<Vec<[f64; 2]>>, series: usize| {
+            lines.into_iter().filter(|line| line.len() > 1).map(move |points| Layer::Line { series, points })
+        };
+        let few = fixes.len() * 4 < trial.count();
+        let mut layers: Vec<Layer> = lines(alone, 1).chain(lines(runs, 0)).collect();
+        // Where nearly every frame has a fix, marks would hide the line.
+        layers.extend(few.then_some(Layer::Marks { series: 2, points: fixes, radius: 1.8 }));
+        panels.push(Panel {
+            title: trial.header.axes.iter().map(|axis| axis.value.clone()).collect::<Vec<_>>().join(", "),
+            x: Axis::linear("time (s)"),
+            y: Axis::logarithmic("m3 (mm)"),
+            layers,
+            ..Panel::default()
+        });
+    }
+    let chart = Chart {
+        panels,
+        columns: 1,
+        page: true,
+        shape: 0.3,
+        legend: vec![
+            Entry::line("navigated", 0),
+            Entry::line("first fix carried by odometry alone", 1),
+            Entry::mark("a fix", 2),
+        ],
+    };
+    let said = "Error of the camera’s position relative to the object it was fixed at, between fixes and without further ones. Where a line is broken no pose was known.";
+    finish("sawtooth", caption(said, run), &chart, data)
+}

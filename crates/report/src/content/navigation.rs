@@ -1,0 +1,71 @@
+//! The way from fix to fix: how far off the navigated pose was.
+
+use super::{
+    results,
+    tell::{self, Unit},
+};
+use crate::{
+    Key, Number, Summary,
+    document::{Block, Head, Section, Table, text},
+    run::{Run, Trial},
+    sailed::{Counted, Sailed},
+};
+
+/// The section, where any trial navigates.
+pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+    let sails = |trial: &Trial| trial.sample().any(|frame| frame.sailed.is_some());
+    if !run.trials.iter().any(sails) {
+        return None;
+    }
+    let caption = text![
+        "The navigated pose, relative to the object of the last fix, at every frame that has one. Tried, fixed: frames at which a fix was due, and those with one; lost: frames to which the odometry knew no motion. The last three columns: the first fix, carried along by odometry alone."
+    ];
+    let mut above = results::blank(summary, 5);
+    above.extend([Head::over(4, "m3 (mm)"), Head::over(1, "m2 (mm)"), Head::over(1, "NEES")]);
+    above.push(Head::over(3, "without further fixes: m3 (mm)"));
+    let mut below = results::heads(summary);
+    below.extend(["frames", "with pose", "tried", "fixed", "lost"].map(Head::numbers));
+    below.extend(["rms", "median", "p95", "most"].map(Head::numbers));
+    below.extend(["p95", "mean", "median", "p95", "at the end"].map(Head::numbers));
+    let mut table = Table { id: "navigation".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        if !sails(trial) {
+            continue;
+        }
+        let mut line = results::cells(row);
+        for counted in [Counted::Sailed, Counted::Navigated, Counted::Tried, Counted::Referenced, Counted::Lost] {
+            line.push(count(trial, counted).into());
+        }
+        for name in ["rms", "median", "q95", "greatest"] {
+            line.push(statistic(trial, name, Sailed::Position, Unit::Millimetres).into());
+        }
+        line.push(statistic(trial, "q95", Sailed::M2, Unit::Millimetres).into());
+        line.push(statistic(trial, "mean", Sailed::Nees, Unit::Plain).into());
+        for name in ["median", "q95", "last"] {
+            line.push(statistic(trial, name, Sailed::AlonePosition, Unit::Millimetres).into());
+        }
+        table.line(results::breaks(summary, index), line);
+    }
+    let figure = super::figures::sawtooth(run).map(Block::Figure);
+    Some(Section::new("Navigation").with([Block::Table(table)]).with(figure))
+}
+
+fn count(trial: &Trial, counted: Counted) -> Number {
+    let n = trial.sample().filter_map(|frame| frame.sailed.as_ref()).filter(|sailed| sailed.is(counted)).count();
+    Number::count(n, Key::of(trial, "/referencing/frame", format!("count {}", counted.name())))
+}
+
+fn statistic(trial: &Trial, name: &str, quantity: Sailed, unit: Unit) -> Number {
+    let mut values: Vec<f64> = trial.sample().filter_map(|frame| frame.sailed.as_ref()?.get(quantity)).collect();
+    let n = values.len() as f64;
+    let value = match name {
+        "last" => values.last().copied(),
+        "greatest" => values.iter().copied().reduce(f64::max),
+        _ if values.is_empty() => None,
+        "mean" => Some(values.iter().sum::<f64>() / n),
+        "rms" => Some((values.iter().map(|v| v * v).sum::<f64>() / n).sqrt()),
+        "median" => Some(seafix_evaluation::quantile(&mut values, 0.5)),
+        _ => Some(seafix_evaluation::quantile(&mut values, 0.95)),
+    };
+    tell::sailed(trial, name, quantity, value, (unit, 1))
+}
