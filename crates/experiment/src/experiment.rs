@@ -11,7 +11,7 @@ use crate::{
     Axis, Helm, Navigation, Pipeline, Place, Stages,
     dataset::hex,
     pipeline::PipelineError,
-    read_text,
+    read, read_text,
     source::{SOURCES, Source},
     vary,
 };
@@ -25,6 +25,9 @@ pub struct Experiment {
     /// The seed that every random number of the experiment comes from.
     #[serde(default)]
     pub seed: u64,
+    /// The whole is done so many times, with seeds of their own: every method sees the same frames each time.
+    #[serde(default = "once", skip_serializing_if = "is_once")]
+    pub repetitions: u32,
     /// Where the frames come from.
     pub source: Choice,
     /// The way from a frame to a fix.
@@ -38,12 +41,36 @@ pub struct Experiment {
     pub vary: Vec<Axis>,
 }
 
+fn once() -> u32 {
+    1
+}
+
+fn is_once(repetitions: &u32) -> bool {
+    *repetitions == 1
+}
+
 impl Experiment {
+    /// What varies: the seed first, where the whole is repeated.
+    fn axes(&self) -> Vec<Axis> {
+        let seeds = (0..u64::from(self.repetitions)).map(|k| toml::Value::Integer((self.seed + k) as i64)).collect();
+        let repeated = (self.repetitions > 1).then(|| Axis::listed("seed", seeds));
+        repeated.into_iter().chain(self.vary.iter().cloned()).collect()
+    }
+
+    /// Every setting that nothing can be built from.
+    fn unfit(&self) -> Vec<Unfit> {
+        let source = SOURCES.resolve(&self.source).err().map(|error| Unfit::new(&["source"], error));
+        let pipeline = self.pipeline.unfit().into_iter().map(Unfit::pipeline);
+        let navigation = self.navigation.iter().flat_map(Navigation::unfit).map(Unfit::navigation);
+        source.into_iter().chain(pipeline).chain(navigation).collect()
+    }
+
     /// The experiment that a data set alone is: exactly one pipeline, the default.
     pub fn of_dataset(folder: &Path, name: &str) -> Self {
         Self {
             question: format!("How well does the default pipeline reference {name}?"),
             seed: 0,
+            repetitions: 1,
             source: Choice::named("dataset").with("path", folder.to_string_lossy().into_owned()),
             pipeline: Pipeline::default(),
             navigation: None,
@@ -146,8 +173,7 @@ impl Plan {
             return Self::resolve(experiment, &name, Path::new(""), path, "", settings);
         }
         let text = read_text(path).map_err(|fault| vec![fault])?;
-        let experiment: Experiment =
-            toml::from_str(&text).map_err(|error| vec![Fault::in_toml(path, &text, &error)])?;
+        let experiment = read::experiment(path, &text)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::resolve(changed(experiment, settings)?, &name, folder, path, &text, settings)
     }
@@ -164,23 +190,32 @@ impl Plan {
         let fault = |path: &[&str], what: &str| Fault::new(what, file).on_line(line_of(text, path));
         let unfit = |unfit: Unfit| {
             let path: Vec<&str> = unfit.path.iter().map(String::as_str).collect();
-            vec![fault(&path, &unfit.message)]
+            fault(&path, &unfit.message)
         };
         let mut faults = vary::check(&experiment.vary, fault);
+        faults.extend(experiment.unfit().into_iter().map(unfit));
         if experiment.question.trim().is_empty() {
             faults.push(fault(&["question"], "no question").remedy("say in one sentence what the experiment asks"));
         }
-        if experiment.seed > i64::MAX as u64 {
+        if experiment.seed > i64::MAX as u64 - u64::from(experiment.repetitions) {
             faults.push(fault(&["seed"], "a seed too large").remedy("TOML holds integers up to 2^63 - 1"));
+        }
+        if experiment.repetitions == 0 {
+            faults.push(fault(&["repetitions"], "no repetition").remedy("1 does it once"));
+        }
+        if experiment.repetitions > 1 && experiment.vary.iter().any(|axis| axis.key == "seed") {
+            let remedy = "leave out one of repetitions and the axis `seed`";
+            faults.push(fault(&["repetitions"], "the seed varies already").remedy(remedy));
         }
         if !faults.is_empty() {
             return Err(faults);
         }
-        let base = Experiment { vary: Vec::new(), ..experiment.resolved().map_err(unfit)? };
+        let base = experiment.resolved().map_err(|error| vec![unfit(error)])?;
+        let base = Experiment { vary: Vec::new(), repetitions: 1, ..base };
         let base = toml::Table::try_from(&base).expect("an experiment is a table of plain values");
 
         let mut trials = Vec::new();
-        for (index, cell) in vary::grid(&experiment.vary).into_iter().enumerate() {
+        for (index, cell) in vary::grid(&experiment.axes()).into_iter().enumerate() {
             // A fault in one point of the grid belongs to the line of the axis whose key it is in.
             let in_cell = |message: String, path: &[String]| {
                 let at = path.join(".");

@@ -52,6 +52,16 @@ impl Navigation {
         })
     }
 
+    /// Every setting that it cannot be built with.
+    pub(crate) fn unfit(&self) -> Vec<PipelineError> {
+        let parts = [
+            build(&ODOMETRIES, &self.odometry).map(drop),
+            build(&POLICIES, &self.policy).map(drop),
+            build(&FUSIONS, &self.fusion).map(drop),
+        ];
+        parts.into_iter().filter_map(Result::err).collect()
+    }
+
     /// Ready to work.
     ///
     /// # Errors

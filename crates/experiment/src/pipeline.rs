@@ -114,6 +114,26 @@ impl Pipeline {
         vary::changed(&self.resolved().unwrap_or_else(|_| self.clone()), settings, "detector.sigma=1.5")
     }
 
+    /// Every setting that it cannot be built with.
+    pub(crate) fn unfit(&self) -> Vec<PipelineError> {
+        let parts = [
+            each_filter(&self.filters, build).map(drop),
+            build(&DETECTORS, &self.detector).map(drop),
+            build(&LOCATORS, &self.locator).map(drop),
+            build(&DESCRIPTORS, &self.descriptor).map(drop),
+            build(&MATCHERS, &self.matcher).map(drop),
+            build(&SEARCHES, &self.search).map(drop),
+            build(&SOLVERS, &self.solver).map(drop),
+            fits("refine", self.refine.check()),
+            fits("triangulation", self.triangulation.check()),
+            fits("gate", self.gate.check()),
+            fits("tolerance", self.tolerance.check()),
+            fits("acceptance", self.acceptance.check()),
+            fits("window", in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000")),
+        ];
+        parts.into_iter().filter_map(Result::err).collect()
+    }
+
     /// The part of it between two images and a cloud, ready to work.
     ///
     /// # Errors

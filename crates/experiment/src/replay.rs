@@ -51,7 +51,7 @@ impl Replay {
         }
         let own = |names: &[String], key: &str| {
             let values = names.iter().map(|name| toml::Value::from(name.as_str())).collect();
-            (names.len() > 1).then(|| Axis { key: key.to_owned(), values, cases: Vec::new() })
+            (names.len() > 1).then(|| Axis::listed(key, values))
         };
         for (names, choice) in
             [(&self.searches, &mut changed.pipeline.search), (&self.solvers, &mut changed.pipeline.solver)]

@@ -5,18 +5,30 @@ use std::path::Path;
 use seafix_component::Fault;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-/// One thing that varies over an experiment, written `[[vary]]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+use crate::range::Range;
+
+/// One thing that varies over an experiment, written `[[vary]]`: exactly one of the ways to list its places.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Axis {
-    /// The setting, as a dotted path: `source.distance`, `pipeline.solver`; with `cases`, only what the axis is called.
+    /// The setting, as a dotted path: `source.distance`, `pipeline.solver`; with `cases` and `zip`, only what the axis is
+    /// called.
     pub key: String,
     /// Its values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<toml::Value>,
-    /// Instead of values: several settings that vary together, under a name.
+    /// Numbers at equal steps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<Range>,
+    /// Numbers at equal ratios.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_range: Option<Range>,
+    /// Several settings that vary together, under a name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cases: Vec<Case>,
+    /// Lists of equal length, each by the dotted path of its setting: all first values go together, all second, …
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub zip: toml::Table,
 }
 
 /// Settings that go together.
@@ -41,7 +53,12 @@ pub struct Place {
 }
 
 impl Axis {
-    fn places(&self) -> impl Iterator<Item = Place> {
+    /// An axis of listed values.
+    pub(crate) fn listed(key: &str, values: Vec<toml::Value>) -> Self {
+        Self { key: key.to_owned(), values, ..Self::default() }
+    }
+
+    fn places(&self) -> Vec<Place> {
         let one = |value: &toml::Value| Place {
             key: self.key.clone(),
             value: value.clone(),
@@ -52,13 +69,30 @@ impl Axis {
             value: case.label.clone().into(),
             set: case.set.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
         };
-        self.values.iter().map(one).chain(self.cases.iter().map(several))
+        let ranges = self.range.iter().flat_map(Range::even).chain(self.log_range.iter().flat_map(Range::geometric));
+        let numbers: Vec<toml::Value> = ranges.collect();
+        let listed = self.values.iter().chain(&numbers).map(one);
+        listed.chain(self.cases.iter().map(several)).chain(self.zipped()).collect()
+    }
+
+    fn zipped(&self) -> Vec<Place> {
+        let lists: Vec<(&String, &[toml::Value])> =
+            self.zip.iter().filter_map(|(key, list)| Some((key, list.as_array()?.as_slice()))).collect();
+        let length = lists.iter().map(|(_, list)| list.len()).min().unwrap_or(0);
+        let place = |k: usize| {
+            let set: Vec<(String, toml::Value)> =
+                lists.iter().map(|(key, list)| ((*key).clone(), list[k].clone())).collect();
+            let words = set.iter().map(|(_, value)| value.as_str().map_or_else(|| value.to_string(), str::to_owned));
+            Place { key: self.key.clone(), value: words.collect::<Vec<_>>().join(", ").into(), set }
+        };
+        (0..length).map(place).collect()
     }
 
     /// Whether one of its settings is at this path, above it or below.
     pub(crate) fn touches(&self, path: &str) -> bool {
         let near = |key: &str| key.starts_with(path) || path.starts_with(key);
-        near(&self.key) || self.cases.iter().any(|case| case.set.keys().any(|key| near(key)))
+        near(&self.key)
+            || self.cases.iter().flat_map(|case| case.set.keys()).chain(self.zip.keys()).any(|key| near(key))
     }
 }
 
@@ -71,7 +105,7 @@ pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
         cells
             .iter()
             .flat_map(|cell| {
-                axis.places().map(move |place| {
+                axis.places().into_iter().map(move |place| {
                     let mut longer = cell.clone();
                     longer.push(place);
                     longer
@@ -147,17 +181,33 @@ pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], &str) -> Fault) -> Ve
     let mut faults = Vec::new();
     for (index, axis) in axes.iter().enumerate() {
         let place = index.to_string();
-        match (axis.values.is_empty(), axis.cases.is_empty()) {
-            (true, true) => {
+        let given: Vec<&str> = [
+            ("values", !axis.values.is_empty()),
+            ("range", axis.range.is_some()),
+            ("log-range", axis.log_range.is_some()),
+            ("cases", !axis.cases.is_empty()),
+            ("zip", !axis.zip.is_empty()),
+        ]
+        .into_iter()
+        .filter_map(|(name, given)| given.then_some(name))
+        .collect();
+        match given[..] {
+            [] => {
                 let fault = fault(&["vary", &place, "values"], "an axis without values");
-                faults.push(fault.remedy("list at least one value, or one case"));
+                faults.push(fault.remedy("give values, range, log-range, cases or zip"));
             }
-            (false, false) => {
-                let fault = fault(&["vary", &place, "cases"], "an axis with values and cases");
-                faults.push(fault.remedy("make them two axes, or write the values as cases"));
+            [_] => {}
+            [.., last] => {
+                let what = format!("an axis with {}", given.join(" and "));
+                faults.push(fault(&["vary", &place, last], &what).remedy("make them axes of their own"));
             }
-            _ => {}
         }
+        for (name, range, log) in [("range", &axis.range, false), ("log-range", &axis.log_range, true)] {
+            if let Some(Err(what)) = range.as_ref().map(|range| range.check(log)) {
+                faults.push(fault(&["vary", &place, name], &what));
+            }
+        }
+        faults.extend(zip_fault(axis).map(|what| fault(&["vary", &place, "zip"], &what)));
         let labels: Vec<&str> = axis.cases.iter().map(|case| case.label.as_str()).collect();
         if let Some(twice) = (1..labels.len()).find(|&k| labels[..k].contains(&labels[k])) {
             let fault = fault(&["vary", &place, "cases"], "two cases of one name").value(labels[twice]);
@@ -174,12 +224,24 @@ pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], &str) -> Fault) -> Ve
     faults
 }
 
+/// Why the lists of an axis cannot go together.
+fn zip_fault(axis: &Axis) -> Option<String> {
+    let mut lengths = axis.zip.iter().map(|(key, list)| (key, list.as_array().map(Vec::len)));
+    let first = lengths.next()?;
+    std::iter::once(first).chain(lengths).find_map(|(key, length)| match (length, first.1) {
+        (None, _) => Some(format!("`{key}` is no list; give one value for each place")),
+        (Some(0), _) => Some(format!("`{key}` has no values")),
+        (Some(n), Some(m)) if n != m => Some(format!("`{}` has {m} values and `{key}` {n}; give as many", first.0)),
+        _ => None,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn axis(key: &str, values: &[i64]) -> Axis {
-        Axis { key: key.to_owned(), values: values.iter().map(|&v| v.into()).collect(), cases: Vec::new() }
+        Axis::listed(key, values.iter().map(|&v| v.into()).collect())
     }
 
     #[test]
@@ -189,6 +251,22 @@ mod tests {
             cells.iter().map(|cell| cell.iter().map(|place| place.value.as_integer().unwrap()).collect()).collect();
         assert_eq!(values, [[1, 3], [1, 4], [2, 3], [2, 4]]);
         assert_eq!(grid(&[]), [Vec::new()]);
+    }
+
+    #[test]
+    fn lists_that_go_together_are_one_axis() {
+        let axis: Axis = toml::from_str("key = 'camera'\nzip = { 'a.b' = [1, 2], c = ['x', 'y'] }").unwrap();
+        let places = axis.places();
+        assert_eq!(places[1].value.as_str(), Some("2, y"));
+        assert_eq!(places[1].set, [("a.b".to_owned(), 2.into()), ("c".to_owned(), "y".into())]);
+        let faults = |text: &str| {
+            let axis: Axis = toml::from_str(text).unwrap();
+            check(&[axis], |_, what| Fault::new(what, Path::new("e.toml")))
+        };
+        assert!(faults("key = 'k'\nzip = { a = [1], b = [1, 2] }")[0].what.contains("give as many"));
+        assert!(faults("key = 'k'\nzip = { a = 1 }")[0].what.contains("no list"));
+        assert!(faults("key = 'k'\nvalues = [1]\nrange = { from = 0, to = 1 }").len() == 1);
+        assert!(faults("key = 'k'\nlog-range = { from = 0, to = 1, count = 3 }")[0].what.contains("above zero"));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum, builder::PossibleValue};
 use seafix_evaluation::trajectory::{
     Alignment, Delta, Leg, Pose, Relation, Summary, align, ape, associate, drift, pairs, path_lengths, rpe,
 };
-use seafix_experiment::trajectory::{Format, Trajectory};
+use seafix_experiment::trajectory::{Format, Trajectory, Way};
 use serde_json::{Value, json};
 
 use crate::{
@@ -19,10 +19,13 @@ const MOSTLY: f64 = 0.9;
 
 #[derive(Debug, Args)]
 pub(crate) struct Eval {
-    /// The trajectory to measure against: TUM, KITTI or EuRoC.
+    /// The trajectory to measure against: TUM, KITTI or EuRoC; or a log (.mcap), for its truth.
     reference: PathBuf,
-    /// The trajectory to judge.
-    estimate: PathBuf,
+    /// The trajectory to judge; left out, a way of the log.
+    estimate: Option<PathBuf>,
+    /// Which way of a log is judged.
+    #[arg(long, value_enum, default_value = "odometry")]
+    way: LoggedWay,
     /// Lay the estimate on the reference first (Umeyama).
     #[arg(short, long)]
     align: bool,
@@ -105,6 +108,33 @@ enum Unit {
     R,
 }
 
+/// A way that a log holds.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum LoggedWay {
+    /// By odometry alone.
+    Odometry,
+    /// By the navigated pose and the survey.
+    Navigated,
+}
+
+impl From<LoggedWay> for Way {
+    fn from(way: LoggedWay) -> Self {
+        match way {
+            LoggedWay::Odometry => Self::Odometry,
+            LoggedWay::Navigated => Self::Navigated,
+        }
+    }
+}
+
+fn is_log(file: &Path) -> bool {
+    file.extension().is_some_and(|ending| ending == "mcap")
+}
+
+fn read(file: &Path, way: Way) -> Result<Trajectory, Failure> {
+    let read = if is_log(file) { Trajectory::of_log(file, way) } else { Trajectory::read(file) };
+    read.map_err(|fault| Failure::new(INPUT, fault))
+}
+
 /// The poses that belong together.
 struct Matched {
     reference: Vec<Pose>,
@@ -144,7 +174,7 @@ impl Eval {
             alignment,
         };
         if matched.covered < MOSTLY {
-            let (reference, estimate) = (self.reference.display(), self.estimate.display());
+            let (reference, estimate) = (self.reference.display(), self.estimate().display());
             let covered = 100.0 * matched.covered;
             tell(&format!(
                 "warning: {estimate} covers {covered:.1} % of the time of {reference}; errors speak for that part"
@@ -155,7 +185,7 @@ impl Eval {
             tell(&format!(
                 "warning: only {n} poses matched, of {a} in {} and {b} in {}; check --t-offset and --t-max-diff",
                 self.reference.display(),
-                self.estimate.display()
+                self.estimate().display()
             ));
         }
         if let Some(file) = &self.out {
@@ -163,6 +193,11 @@ impl Eval {
         }
         print(&if self.json { self.machine(&matched, &found) } else { self.people(&matched, &found) })?;
         Ok(DONE)
+    }
+
+    /// The file with what is judged.
+    fn estimate(&self) -> &Path {
+        self.estimate.as_ref().unwrap_or(&self.reference)
     }
 
     fn delta(&self) -> Result<Delta, Failure> {
@@ -199,11 +234,13 @@ impl Eval {
             Failure::new(USAGE, format!("--t-max-diff {}: give seconds, not negative", self.t_max_diff))
         })?;
         let offset = nanoseconds("--t-offset", self.t_offset)?;
-        let read = |file: &Path| Trajectory::read(file).map_err(|fault| Failure::new(INPUT, fault));
-        let (reference, estimate) = (read(&self.reference)?, read(&self.estimate)?);
+        if self.estimate.is_none() && !is_log(&self.reference) {
+            return Err(Failure::new(USAGE, "no trajectory to judge; give ESTIMATE, or a log for both"));
+        }
+        let (reference, estimate) = (read(&self.reference, Way::True)?, read(self.estimate(), self.way.into())?);
         let of = (reference.poses.len(), estimate.poses.len());
         let refuse = |what: String| {
-            let (a, b) = (self.reference.display(), self.estimate.display());
+            let (a, b) = (self.reference.display(), self.estimate().display());
             Err(Failure::new(INPUT, format!("{what} in {a} and {b}")))
         };
         let (belong, stamps) = match (&reference.stamps, &estimate.stamps) {
@@ -248,7 +285,7 @@ impl Eval {
         }
         let n = self.n_to_align.unwrap_or(usize::MAX).min(matched.reference.len());
         let found = align(&matched.reference[..n], &matched.estimate[..n], self.scale).map_err(|why| {
-            let (a, b) = (self.reference.display(), self.estimate.display());
+            let (a, b) = (self.reference.display(), self.estimate().display());
             Failure::new(INPUT, format!("no alignment of {b} with {a}: {why}"))
         })?;
         Ok(Some(if self.align { found } else { Alignment { scale: found.scale, ..Alignment::IDENTITY } }))
@@ -264,7 +301,7 @@ impl Eval {
             self.reference.display(),
             100.0 * n as f64 / matched.of.1 as f64,
             matched.of.1,
-            self.estimate.display(),
+            self.estimate().display(),
         );
         text += &match &found.alignment {
             None => "alignment  none\n".to_owned(),

@@ -1,7 +1,8 @@
-//! Trajectory files: TUM, KITTI and EuRoC, told apart by what they contain.
+//! Trajectory files: TUM, KITTI and EuRoC, told apart by what they contain; and the ways in logs.
 
 mod euroc;
 mod kitti;
+mod log;
 mod tum;
 
 use std::path::Path;
@@ -9,6 +10,8 @@ use std::path::Path;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use seafix_component::{Fault, read_text};
 use seafix_evaluation::trajectory::Pose;
+
+pub use log::Way;
 
 /// The poses of a body along its way, as a file holds them.
 #[derive(Debug, Clone, PartialEq)]

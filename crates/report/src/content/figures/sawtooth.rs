@@ -72,6 +72,12 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
             ..Panel::default()
         });
     }
+    // One scale for all: they are there to be compared.
+    let values = panels.iter().flat_map(|panel| &panel.layers).flat_map(Layer::reach).map(|point| point[1]);
+    let [low, high] = values.filter(|v| *v > 0.0).fold([f64::INFINITY, 0.0_f64], |[l, h], v| [l.min(v), h.max(v)]);
+    if low < high {
+        panels.iter_mut().for_each(|panel| panel.y.range = Some([low * 0.9, high * 1.1]));
+    }
     let chart = Chart {
         panels,
         columns: 1,

@@ -1,0 +1,140 @@
+//! Numbers at equal steps or ratios, for an axis.
+
+use serde::{Deserialize, Serialize};
+
+/// Numbers from one end to the other, both included.
+///
+/// ```
+/// let range: seafix_experiment::Range = toml::from_str("from = 1\nto = 5\nstep = 2").unwrap();
+/// assert_eq!(range.even().collect::<Vec<_>>(), [1.into(), 3.into(), 5.into()]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// The first.
+    pub from: Number,
+    /// The last; with `step`, none is beyond it.
+    pub to: Number,
+    /// How many there are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub count: Option<usize>,
+    /// Instead of that, the way from one to the next.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<Number>,
+}
+
+/// A number as a TOML file has it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Number {
+    /// A whole one; from whole numbers at whole steps come whole numbers.
+    Whole(i64),
+    /// Any other.
+    Real(f64),
+}
+
+impl Number {
+    fn real(self) -> f64 {
+        match self {
+            Self::Whole(whole) => whole as f64,
+            Self::Real(real) => real,
+        }
+    }
+
+    fn is_whole(self) -> bool {
+        matches!(self, Self::Whole(_))
+    }
+}
+
+/// More are a mistake.
+const MOST: usize = 10_000;
+
+impl Range {
+    /// At equal steps.
+    pub fn even(&self) -> impl Iterator<Item = toml::Value> + use<> {
+        let (from, to) = (self.from.real(), self.to.real());
+        let steps = match self.step {
+            // A last step that rounding makes too long still counts.
+            Some(step) => ((to - from) / step.real() + 1e-9).floor() as usize,
+            None => self.count.unwrap_or(2).saturating_sub(1),
+        };
+        let step = self.step.map_or((to - from) / steps.max(1) as f64, Number::real);
+        let whole = self.from.is_whole() && self.step.map_or(step.fract() == 0.0, Number::is_whole);
+        (0..=steps).map(move |k| {
+            let value = from + step * k as f64;
+            if whole { toml::Value::Integer(value as i64) } else { toml::Value::Float(rounded(value, 12)) }
+        })
+    }
+
+    /// At equal ratios, rounded to six digits.
+    pub fn geometric(&self) -> impl Iterator<Item = toml::Value> + use<> {
+        let (from, to) = (self.from.real().ln(), self.to.real().ln());
+        let steps = self.count.unwrap_or(2).saturating_sub(1);
+        (0..=steps)
+            .map(move |k| toml::Value::Float(rounded((from + (to - from) * k as f64 / steps.max(1) as f64).exp(), 6)))
+    }
+
+    /// Whether it can be, as one of ratios or of steps.
+    pub(crate) fn check(&self, ratios: bool) -> Result<(), String> {
+        let (from, to) = (self.from.real(), self.to.real());
+        let refuse = |what: &str| Err(what.to_owned());
+        if !(from.is_finite() && to.is_finite()) || from == to {
+            return refuse("a range from a number to itself or to none; give two ends");
+        }
+        if ratios && !(from > 0.0 && to > 0.0) {
+            return refuse("a log-range that touches zero; give two ends above zero");
+        }
+        match (self.count, self.step) {
+            (Some(count), None) if (2..=MOST).contains(&count) => Ok(()),
+            (Some(_), None) => refuse("a range of too few or too many numbers; give a count from 2 to 10000"),
+            (None, Some(_)) if ratios => refuse("a log-range with a step; give a count"),
+            (None, Some(step)) => {
+                let steps = (to - from) / step.real();
+                if steps >= 1.0 && steps < MOST as f64 {
+                    Ok(())
+                } else {
+                    refuse("a step that does not lead from one end to the other in 1 to 10000 steps")
+                }
+            }
+            _ => refuse("a range with a count and a step, or with neither; give one of them"),
+        }
+    }
+}
+
+/// A number with so many digits that count.
+fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn range(text: &str) -> Range {
+        toml::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn both_ends_are_in_it() {
+        let values = |text: &str| range(text).even().map(|v| v.to_string()).collect::<Vec<_>>().join(" ");
+        assert_eq!(values("from = 0.1\nto = 0.5\ncount = 5"), "0.1 0.2 0.3 0.4 0.5");
+        assert_eq!(values("from = 0.0\nto = 0.3\nstep = 0.1"), "0.0 0.1 0.2 0.3");
+        assert_eq!(values("from = 10\nto = 4\nstep = -2"), "10 8 6 4");
+        assert_eq!(values("from = 0\nto = 1\ncount = 3"), "0.0 0.5 1.0");
+        let ratios: Vec<_> = range("from = 0.05\nto = 0.8\ncount = 5").geometric().collect();
+        assert_eq!(ratios, [0.05, 0.1, 0.2, 0.4, 0.8].map(toml::Value::Float));
+    }
+
+    #[test]
+    fn what_leads_nowhere_is_refused() {
+        for wrong in [
+            "from = 1\nto = 1\ncount = 2",
+            "from = 0\nto = 1",
+            "from = 0\nto = 1\nstep = -1",
+            "from = 0\nto = 1\ncount = 1",
+        ] {
+            assert!(range(wrong).check(false).is_err(), "{wrong}");
+        }
+        assert!(range("from = 0\nto = 1\ncount = 3").check(true).is_err());
+    }
+}
