@@ -94,15 +94,10 @@ pub(crate) struct Voyage<'a> {
     told: usize,
     /// The pair that the odometry knew last: when, and in which segment.
     last: Option<(u64, usize)>,
-    /// The first fix, carried along by odometry alone.
-    unreferenced: Unreferenced,
-}
-
-/// The first fix, carried along by odometry alone.
-enum Unreferenced {
-    Awaited,
-    Carried(Navigated),
-    Lost,
+    /// Whether there has been a fix.
+    fixed: bool,
+    /// The first fix, carried along by odometry alone, until the way is lost.
+    unreferenced: Option<Navigated>,
 }
 
 /// What a trial that navigates knew after a frame.
@@ -128,7 +123,8 @@ impl<'a> Voyage<'a> {
             navigator,
             told: 0,
             last: None,
-            unreferenced: Unreferenced::Awaited,
+            fixed: false,
+            unreferenced: None,
         }
     }
 
@@ -159,10 +155,7 @@ impl<'a> Voyage<'a> {
         self.fix(&sighting, &mut events);
         self.tell(&mut events);
         let pose = self.navigator.pose().filter(|_| here).copied();
-        let unreferenced = match &self.unreferenced {
-            Unreferenced::Carried(pose) if here => Some(*pose),
-            _ => None,
-        };
+        let unreferenced = self.unreferenced.filter(|_| here);
         let record = NavigationRecord {
             state: (if here { self.navigator.state() } else { State::Rough }).to_string(),
             due,
@@ -191,11 +184,7 @@ impl<'a> Voyage<'a> {
         let seconds = (sight.stamp_ns - stamp_ns) as f64 * 1e-9;
         let motion = waypoint.local.filter(|_| left == segment);
         self.navigator.advance(seconds, motion.as_ref());
-        self.unreferenced = match (std::mem::replace(&mut self.unreferenced, Unreferenced::Lost), &motion) {
-            (Unreferenced::Awaited, _) => Unreferenced::Awaited,
-            (Unreferenced::Carried(pose), Some(motion)) => Unreferenced::Carried(pose.after(motion)),
-            _ => Unreferenced::Lost,
-        };
+        self.unreferenced = self.unreferenced.zip(motion).map(|(pose, motion)| pose.after(&motion));
         let Some(motion) = motion else {
             return OdometryStep { lost: "a new segment begins: the way here is unknown".to_owned(), motion: None };
         };
@@ -237,8 +226,8 @@ impl<'a> Voyage<'a> {
                     events.push(format!("{} stands {shift:.3} m from its place", self.targets[found.object].name));
                 }
             }
-            if matches!(self.unreferenced, Unreferenced::Awaited) {
-                self.unreferenced = Unreferenced::Carried(fix);
+            if !std::mem::replace(&mut self.fixed, true) {
+                self.unreferenced = Some(fix);
             }
         }
     }

@@ -13,10 +13,7 @@ use prost_reflect::{DescriptorPool, DynamicMessage};
 fn every_message_decodes_under_its_own_descriptor() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.mcap");
-    let mut writer = seafix_log::Writer::create(&path, &synthetic::header()).unwrap();
-    (0..4).for_each(|number| writer.frame(&synthetic::frame(number)).unwrap());
-    writer.totals(&seafix_log::Totals::default()).unwrap();
-    writer.finish().unwrap();
+    synthetic::write(&path, 4);
     let bytes = std::fs::read(&path).unwrap();
     let (mut topics, mut last) = (BTreeSet::new(), 0);
     for message in mcap::MessageStream::new(&bytes).unwrap() {

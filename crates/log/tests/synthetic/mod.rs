@@ -206,9 +206,10 @@ fn inputs(number: u64) -> Inputs {
     }
 }
 
-/// Writes a trial of `frames` frames to `path`.
+/// Writes a trial of `frames` frames to `path`, and what they add up to.
 pub(crate) fn write(path: &std::path::Path, frames: u64) {
     let mut writer = Writer::create(path, &header()).unwrap();
     (0..frames).for_each(|number| writer.frame(&frame(number)).unwrap());
+    writer.totals(&Totals { every: 1, frames, ..Totals::default() }).unwrap();
     writer.finish().unwrap();
 }
