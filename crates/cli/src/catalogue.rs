@@ -34,6 +34,11 @@ fn kind<T: ?Sized>(plural: &'static str, registry: &Registry<T>) -> Kind {
     Kind { singular: registry.kind(), plural, listings: registry.listings() }
 }
 
+/// The kind of this name, in the singular.
+pub(crate) fn kind_of(singular: &str) -> Kind {
+    kinds().into_iter().find(|kind| kind.singular == singular).expect("every kind of component is in the catalogue")
+}
+
 /// The README's tables, between its markers.
 pub(crate) fn markdown() -> String {
     let mut text = String::new();

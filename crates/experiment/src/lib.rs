@@ -33,6 +33,6 @@ pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
 pub use range::{Number, Range};
 pub use replay::{Replay, ReplayFrom};
 pub use results::COLUMNS;
-pub use run::{Existing, Finished, Observer, Options, RunError, Shard, Silent, merge, run};
+pub use run::{Estimate, Existing, Finished, Observer, Options, RunError, Shard, Silent, estimate, merge, run};
 pub use seafix_component::read_text;
 pub use vary::{Axis, Case, Place, changed};

@@ -219,6 +219,7 @@ impl<'a> Voyage<'a> {
             let name = &self.targets[attempt.target].name;
             match self.navigator.fix(&fix) {
                 Event::Taken => events.push(format!("fix at {name} taken")),
+                Event::Left => events.push(format!("fix at {name} left: the last one, carried here, is better known")),
                 Event::Doubted(why) => events.push(format!("fix at {name} doubted: {why}")),
                 Event::Relocated => events.push(format!("fixes at {name} overrule what was known")),
                 Event::Displaced(found) => {

@@ -15,7 +15,7 @@ mod policy;
 mod stereo;
 
 pub use chain::{Standing, by_world};
-pub use fusion::{Contradiction, FUSIONS, Fuse, Fusion, Replace};
+pub use fusion::{Contradiction, FUSIONS, Fuse, Fusion, Intersect, Replace};
 pub use journey::{Journey, Local, Lost, Outcome, Segment, Side, Waypoint};
 pub use navigated::{Navigated, Place};
 pub use navigator::{Change, Displacement, Event, Navigator, State};

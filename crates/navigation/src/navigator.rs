@@ -39,6 +39,8 @@ impl fmt::Display for State {
 pub enum Event {
     /// It was taken.
     Taken,
+    /// It is of another object, and so poor that the pose stays relative to the one before.
+    Left,
     /// It contradicts what is known and waits for others that say the same.
     Doubted(Contradiction),
     /// It and those before it agree with each other and not with what was known of the same object.
@@ -196,6 +198,10 @@ impl<'a> Navigator<'a> {
             Ok(pose) => {
                 if object != known.object {
                     self.agree(object, known.object);
+                    if !self.fusion.passes(&known.standing, &pose) {
+                        self.doubts[object] = None;
+                        return Event::Left;
+                    }
                 }
                 self.doubts[object] = None;
                 self.take(Navigated { object, standing: pose }, format!("fix at {}", self.names[object]));

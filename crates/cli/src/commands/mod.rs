@@ -22,6 +22,7 @@ mod recover;
 mod replay;
 mod report;
 mod run;
+mod schema;
 mod show;
 mod solve;
 
@@ -61,6 +62,12 @@ pub(crate) enum Command {
         /// The component's name.
         name: String,
     },
+    /// Print the JSON schema of a file format, for editors that complete as one types.
+    Schema {
+        /// Which format.
+        #[arg(value_enum)]
+        of: schema::Format,
+    },
     /// Save what is sound of a log that was cut off or damaged.
     Recover(recover::Recover),
     /// Run a search and a solver on the logged inputs of another run.
@@ -88,6 +95,7 @@ impl Command {
             Self::Check { paths, limits } => check::execute(paths, limits.of_images()),
             Self::List(command) => command.execute(),
             Self::Show { name } => show::execute(name),
+            Self::Schema { of } => schema::execute(*of),
             Self::Recover(command) => command.execute(),
             Self::Replay(command) => command.execute(),
             Self::Report(command) => command.execute(),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use seafix_experiment::{Existing, Options, Plan, Shard, run};
+use seafix_experiment::{Estimate, Existing, Options, Plan, Shard, estimate, run};
 use seafix_report::{Forms, report};
 
 use crate::{
@@ -24,6 +24,9 @@ pub(crate) struct Run {
     /// Make only the k-th of n parts of the run; `seafix merge` joins them.
     #[arg(long, value_name = "K/N", requires = "out")]
     shard: Option<Shard>,
+    /// Say what it would take, by trying a few frames of every source, and write nothing.
+    #[arg(long, conflicts_with_all = ["out", "shard"])]
+    dry_run: bool,
     /// Log no durations: two runs of one experiment then have the same bytes.
     #[arg(long)]
     untimed: bool,
@@ -62,6 +65,9 @@ impl Place {
 impl Run {
     pub(crate) fn execute(&self) -> Ended {
         let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
+        if self.dry_run {
+            return print(&told(&plan, &estimate(&plan)?, self.place.options().threads)).map(|()| DONE);
+        }
         let options = Options { shard: self.shard, timed: !self.untimed, ..self.place.options() };
         let progress = Progress::new();
         signals::listen();
@@ -74,6 +80,28 @@ impl Run {
             None => tell_of(&finished)?,
         }
         Ok(DONE)
+    }
+}
+
+/// Trials, frames, disk and time, in words.
+fn told(plan: &Plan, estimate: &Estimate, threads: usize) -> String {
+    let lines = plan.trials.iter().zip(&estimate.frames);
+    let mut text: String = lines.map(|(trial, frames)| format!("{:60} {frames:>9} frames\n", trial.name)).collect();
+    let frames: usize = estimate.frames.iter().sum();
+    text += &format!(
+        "{} trials, {frames} frames, about {} MB of log (twice that while it is joined), about {} on {threads} threads\n",
+        plan.trials.len(),
+        estimate.bytes.div_ceil(1_000_000),
+        duration(estimate.work.as_secs_f64() / threads as f64),
+    );
+    text + &format!("{} frames of every source were tried; nothing was written\n", estimate.tried)
+}
+
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 90.0 => format!("{s:.0} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
     }
 }
 

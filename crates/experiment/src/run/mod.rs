@@ -12,6 +12,7 @@ use seafix_log::LogError;
 
 mod assemble;
 mod cut;
+mod estimate;
 mod folder;
 mod group;
 mod merge;
@@ -19,6 +20,7 @@ mod options;
 mod store;
 mod work;
 
+pub use estimate::{Estimate, estimate};
 pub use merge::merge;
 pub use options::{Existing, Options, Shard};
 

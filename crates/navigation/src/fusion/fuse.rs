@@ -1,12 +1,12 @@
 //! Fix and odometry, each by its information.
 
-use nalgebra::{Matrix3, Matrix6, Vector6};
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Covariance6, so3::skew};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{Contradiction, Fusion};
+use super::{
+    Contradiction, Fusion,
+    join::{gate, joined},
+};
 use crate::Standing;
 
 /// Gates a fix by its innovation, then joins both by their information.
@@ -41,69 +41,15 @@ impl Component for Fuse {
 
 impl Fusion for Fuse {
     fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
-        let six = ChiSquared::new(6.0).expect("six degrees of freedom");
-        let limit = six.inverse_cdf(self.confidence);
-        let innovation = known.object_from_camera.error_to(&fix.object_from_camera);
-        let fix_here = carried_back(&fix.covariance.matrix, &innovation);
-        let nis = (known.covariance.matrix + fix_here)
-            .cholesky()
-            .map_or(f64::INFINITY, |sum| innovation.dot(&sum.solve(&innovation)));
-        if !(nis <= limit) {
-            return Err(Contradiction { nis, limit });
-        }
-        Ok(joined(known, fix).unwrap_or(*fix))
+        gate(known, fix, self.confidence)?;
+        Ok(joined(known, fix, [1.0; 2]).unwrap_or(*fix))
     }
-}
-
-/// Two rounds settle it: an innovation within the gate is a few standard deviations.
-const ROUNDS: usize = 3;
-
-/// The pose with the least ‖log(T_known⁻¹ T)‖² + ‖log(T_fix⁻¹ T)‖², each in its own metric; `None` where a
-/// covariance is singular.
-fn joined(known: &Standing, fix: &Standing) -> Option<Standing> {
-    let (known_information, fix_information) =
-        (known.covariance.matrix.try_inverse()?, fix.covariance.matrix.try_inverse()?);
-    let mut pose = known.object_from_camera;
-    let mut information = known_information;
-    for _ in 0..ROUNDS {
-        let mut gradient = Vector6::zeros();
-        information = Matrix6::zeros();
-        for (from, weight) in
-            [(&known.object_from_camera, &known_information), (&fix.object_from_camera, &fix_information)]
-        {
-            let residual = from.error_to(&pose);
-            let jacobian = right_jacobian_inverse(&residual);
-            gradient += jacobian.transpose() * weight * residual;
-            information += jacobian.transpose() * weight * jacobian;
-        }
-        pose = pose.perturbed(&-(information.cholesky()?.solve(&gradient))).renormalized();
-    }
-    let covariance = Covariance6::new(information.cholesky()?.inverse());
-    Some(Standing { object_from_camera: pose, covariance })
-}
-
-/// The covariance of η in Exp(r) Exp(η) = Exp(r + J_r(r)⁻¹ η), as one of the sum.
-fn carried_back(covariance: &Matrix6<f64>, r: &Vector6<f64>) -> Matrix6<f64> {
-    let jacobian = right_jacobian_inverse(r);
-    jacobian * covariance * jacobian.transpose()
-}
-
-/// J_r(ξ)⁻¹ = I + ad/2 + ad²/12 − ad⁴/720 + …, ad = \[\[φ\]×, 0; \[ρ\]×, \[φ\]×\].
-fn right_jacobian_inverse(xi: &Vector6<f64>) -> Matrix6<f64> {
-    let turn: Matrix3<f64> = skew(&xi.fixed_rows::<3>(0).into_owned());
-    let shift: Matrix3<f64> = skew(&xi.fixed_rows::<3>(3).into_owned());
-    let mut ad = Matrix6::zeros();
-    ad.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-    ad.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
-    ad.fixed_view_mut::<3, 3>(3, 0).copy_from(&shift);
-    let square = ad * ad;
-    Matrix6::identity() + ad * 0.5 + square * (1.0 / 12.0) - square * square * (1.0 / 720.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use seafix_geometry::{Camera, Object, Transform};
+    use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
     fn at(xi: [f64; 6], sigma: f64) -> Standing {
         let object_from_camera = Transform::<Object, Camera>::exp(&xi.into());

@@ -1,6 +1,8 @@
 //! What becomes of the navigated pose when a fix comes.
 
 mod fuse;
+mod intersect;
+mod join;
 mod replace;
 
 use seafix_component::{Registry, entry};
@@ -8,6 +10,7 @@ use seafix_component::{Registry, entry};
 use crate::Standing;
 
 pub use fuse::Fuse;
+pub use intersect::Intersect;
 pub use replace::Replace;
 
 /// A fix that contradicts what was known.
@@ -27,7 +30,13 @@ pub trait Fusion: Send + Sync + std::fmt::Debug {
     /// # Errors
     /// [`Contradiction`] when the fix is not to be believed.
     fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction>;
+
+    /// Whether the pose passes to another object: `there` is what would be known relative to it, `here` what is known
+    /// relative to the object of the last fix. A glimpse of an object at the edge of the image is a fix, but a poor one.
+    fn passes(&self, here: &Standing, there: &Standing) -> bool {
+        there.covariance.position_sigma() <= here.covariance.position_sigma()
+    }
 }
 
 /// All fusions.
-pub static FUSIONS: Registry<dyn Fusion> = Registry::new("fusion", &[entry!(Fuse), entry!(Replace)]);
+pub static FUSIONS: Registry<dyn Fusion> = Registry::new("fusion", &[entry!(Fuse), entry!(Intersect), entry!(Replace)]);

@@ -1,0 +1,123 @@
+//! `seafix schema`.
+
+use clap::ValueEnum;
+use seafix_experiment::{Navigation, Pipeline};
+use serde_json::{Map, Value, json};
+
+use crate::{
+    catalogue::kind_of,
+    exit::{DONE, Ended},
+    terminal::print,
+};
+
+/// The formats that have a schema.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Format {
+    /// An experiment file.
+    Experiment,
+}
+
+pub(crate) fn execute(of: Format) -> Ended {
+    let schema = match of {
+        Format::Experiment => experiment(),
+    };
+    print(&format!("{schema:#}\n"))?;
+    Ok(DONE)
+}
+
+/// What an experiment file may hold. Components and their settings are those of the registries, with their defaults.
+fn experiment() -> Value {
+    let said = |what: &str, kind: &str| json!({ "type": kind, "description": what });
+    let mut pipeline = properties(&toml::Table::try_from(Pipeline::default()).expect("settings are a table"));
+    for stage in ["detector", "locator", "descriptor", "matcher", "search", "solver"] {
+        pipeline.insert(stage.to_owned(), component(stage));
+    }
+    pipeline.insert("filters".to_owned(), json!({ "type": "array", "items": component("filter") }));
+    pipeline.insert("target".to_owned(), json!({ "enum": ["object", "joint", "site"], "default": "object" }));
+    let mut navigation = properties(&toml::Table::try_from(Navigation::default()).expect("settings are a table"));
+    for part in ["odometry", "policy", "fusion"] {
+        navigation.insert(part.to_owned(), component(part));
+    }
+    let range = json!({
+        "type": "object",
+        "properties": {
+            "from": { "type": "number" }, "to": { "type": "number" },
+            "count": { "type": "integer", "minimum": 2 }, "step": { "type": "number" },
+        },
+        "required": ["from", "to"],
+        "additionalProperties": false,
+    });
+    let case = json!({
+        "type": "object",
+        "properties": { "label": { "type": "string" }, "set": { "type": "object" } },
+        "required": ["label", "set"],
+        "additionalProperties": false,
+    });
+    let axis = json!({
+        "type": "object",
+        "description": "one thing that varies; the grid of all gives the trials",
+        "properties": {
+            "key": said("the setting, as a dotted path; with cases and zip, what the axis is called", "string"),
+            "values": said("its values", "array"),
+            "range": range, "log-range": range,
+            "cases": { "type": "array", "items": case, "description": "settings that vary together, under a name" },
+            "zip": said("lists of equal length, by the paths of their settings", "object"),
+        },
+        "required": ["key"],
+        "additionalProperties": false,
+    });
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "seafix experiment",
+        "type": "object",
+        "properties": {
+            "question": said("what it asks, in one English sentence", "string"),
+            "seed": { "type": "integer", "minimum": 0, "default": 0 },
+            "repetitions": { "type": "integer", "minimum": 1, "default": 1 },
+            "base": said("a file whose settings hold where this one has none of its own", "string"),
+            "source": component("source"),
+            "pipeline": { "type": "object", "properties": pipeline, "additionalProperties": false },
+            "navigation": { "type": "object", "properties": navigation, "additionalProperties": false },
+            "vary": { "type": "array", "items": axis },
+        },
+        "additionalProperties": false,
+    })
+}
+
+/// A component by its name alone, or a table with its name and settings.
+fn component(kind: &str) -> Value {
+    let kind = kind_of(kind);
+    let names: Vec<Value> =
+        kind.listings.iter().map(|one| json!({ "const": one.name, "description": one.summary })).collect();
+    let tables: Vec<Value> = kind
+        .listings
+        .iter()
+        .map(|one| {
+            let mut settings = properties(&one.defaults);
+            settings.insert("name".to_owned(), json!({ "const": one.name }));
+            // Settings without a default value are not known here.
+            json!({ "type": "object", "description": one.summary, "properties": settings, "required": ["name"] })
+        })
+        .collect();
+    json!({ "anyOf": names.into_iter().chain(tables).collect::<Vec<_>>() })
+}
+
+fn properties(defaults: &toml::Table) -> Map<String, Value> {
+    defaults.iter().map(|(key, value)| (key.clone(), setting(value))).collect()
+}
+
+/// What a setting may be, by its default.
+fn setting(default: &toml::Value) -> Value {
+    match default {
+        // Settings of several forms are tables or words; a component is either.
+        toml::Value::Table(table) => {
+            json!({ "type": ["object", "string"], "properties": properties(table) })
+        }
+        toml::Value::String(text) => json!({ "type": ["string", "object"], "default": text }),
+        toml::Value::Integer(number) => json!({ "type": "integer", "default": number }),
+        toml::Value::Float(number) => json!({ "type": "number", "default": number }),
+        toml::Value::Boolean(flag) => json!({ "type": "boolean", "default": flag }),
+        toml::Value::Array(_) => json!({ "type": "array" }),
+        toml::Value::Datetime(_) => json!({ "type": "string" }),
+    }
+}
