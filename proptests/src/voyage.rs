@@ -16,6 +16,8 @@ pub struct Voyage {
     pub fix: (f64, f64),
     /// The same of an object's surveyed place.
     pub survey: (f64, f64),
+    /// Which share of a fix's variance is common to all fixes of one object: its model's.
+    pub shared: f64,
     /// The way of one step (m).
     pub step: f64,
     /// Standard deviation of the change of heading in a step (rad); 0 goes straight on.
@@ -24,7 +26,15 @@ pub struct Voyage {
 
 impl Default for Voyage {
     fn default() -> Self {
-        Self { objects: 5, odometry: (1e-4, 1e-3), fix: (1e-3, 5e-3), survey: (2e-3, 5e-3), step: 0.3, meander: 0.02 }
+        Self {
+            objects: 5,
+            odometry: (1e-4, 1e-3),
+            fix: (1e-3, 5e-3),
+            survey: (2e-3, 5e-3),
+            shared: 0.0,
+            step: 0.3,
+            meander: 0.02,
+        }
     }
 }
 
@@ -40,12 +50,16 @@ pub struct Sailing<'a> {
     /// Where the camera truly is.
     pub world_from_camera: Transform<World, Camera>,
     heading: f64,
+    /// Of each object, what all its fixes err by.
+    common: Vec<Vector6<f64>>,
 }
 
 impl Voyage {
     /// The voyage number `number`.
     pub fn set_out(&self, number: u64) -> Sailing<'_> {
         let mut stream = Stream::new(1, number, 0, Purpose::Points);
+        let mut apart = Stream::new(1, number, 1, Purpose::Points);
+        let common = (0..self.objects).map(|_| normal6(&mut apart, self.fix) * self.shared.sqrt()).collect();
         let (mut world_from_object, mut surveyed) = (Vec::new(), Vec::new());
         for i in 0..self.objects {
             let turn = so3::exp(&(Vector3::new(0.0, 0.0, stream.between(-3.0, 3.0))));
@@ -59,7 +73,7 @@ impl Voyage {
         }
         let down = so3::exp(&Vector3::new(0.0, 0.0, 0.3));
         let world_from_camera = Transform::new(down, Vector3::new(0.0, 0.0, 37.0));
-        Sailing { settings: self, stream, world_from_object, surveyed, world_from_camera, heading: 0.0 }
+        Sailing { settings: self, stream, world_from_object, surveyed, world_from_camera, heading: 0.0, common }
     }
 }
 
@@ -83,7 +97,8 @@ impl Sailing<'_> {
     /// A fix at an object.
     pub fn fix(&mut self, object: usize) -> Navigated {
         let (attitude, position) = self.settings.fix;
-        let error = Transform::<Camera, Camera>::exp(&normal6(&mut self.stream, self.settings.fix));
+        let own = normal6(&mut self.stream, self.settings.fix) * (1.0 - self.settings.shared).sqrt();
+        let error = Transform::<Camera, Camera>::exp(&(own + self.common[object]));
         let object_from_camera = self.truth(object) * error.inverse();
         let covariance = Covariance6::isotropic(attitude, position);
         Navigated { object, standing: Standing { object_from_camera, covariance } }

@@ -32,9 +32,12 @@ pub trait Fusion: Send + Sync + std::fmt::Debug {
     fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction>;
 
     /// Whether the pose passes to another object: `there` is what would be known relative to it, `here` what is known
-    /// relative to the object of the last fix. A glimpse of an object at the edge of the image is a fix, but a poor one.
+    /// relative to the object of the last fix. The object ahead is the one that counts, but a glimpse of it at the edge of
+    /// the image is a fix far worse than the pose carried here.
     fn passes(&self, here: &Standing, there: &Standing) -> bool {
-        there.covariance.position_sigma() <= here.covariance.position_sigma()
+        /// So many times less certain is far worse.
+        const POOR: f64 = 2.0;
+        there.covariance.position_sigma() <= POOR * here.covariance.position_sigma()
     }
 }
 
