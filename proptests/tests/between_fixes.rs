@@ -129,7 +129,7 @@ fn the_navigated_pose_errs_as_much_as_it_says() {
 /// Mean NEES in the end of 100 dives that stay at one object, with a fix a second for a minute.
 fn stayed(fusion: &str, shared: f64) -> f64 {
     let voyage = Voyage { objects: 1, shared, ..Voyage::default() };
-    let (policy, fusion) = (Interval { seconds: 1.0 }, FUSIONS.build(&Choice::named(fusion)).unwrap());
+    let (policy, fusion) = (Interval { seconds: 1.0 }, FUSIONS.build(&Choice::named(fusion)).expect("it is listed"));
     let mut sum = 0.0;
     for number in 0..100 {
         let mut sailing = voyage.set_out(number);
@@ -138,7 +138,7 @@ fn stayed(fusion: &str, shared: f64) -> f64 {
             navigator.advance(1.0, Some(&sailing.step()));
             navigator.fix(&sailing.fix(0));
         }
-        sum += sailing.nees(navigator.pose().unwrap());
+        sum += sailing.nees(navigator.pose().expect("it has fixes"));
     }
     sum / 100.0
 }

@@ -265,7 +265,7 @@ mod tests {
         };
         assert!(faults("key = 'k'\nzip = { a = [1], b = [1, 2] }")[0].what.contains("give as many"));
         assert!(faults("key = 'k'\nzip = { a = 1 }")[0].what.contains("no list"));
-        assert!(faults("key = 'k'\nvalues = [1]\nrange = { from = 0, to = 1 }").len() == 1);
+        assert!(faults("key = 'k'\nvalues = [1]\nrange = { from = 0, to = 1, count = 2 }").len() == 1);
         assert!(faults("key = 'k'\nlog-range = { from = 0, to = 1, count = 3 }")[0].what.contains("above zero"));
     }
 

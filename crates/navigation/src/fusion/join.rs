@@ -63,3 +63,22 @@ fn right_jacobian_inverse(xi: &Vector6<f64>) -> Matrix6<f64> {
     let square = ad * ad;
     Matrix6::identity() + ad * 0.5 + square * (1.0 / 12.0) - square * square * (1.0 / 720.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_geometry::{Camera, Transform};
+
+    #[test]
+    fn the_jacobian_meets_differences() {
+        let xi = Vector6::from([0.3, -0.2, 0.4, 0.5, -0.6, 0.7]);
+        let start = Transform::<Camera, Camera>::exp(&xi);
+        let jacobian = right_jacobian_inverse(&xi);
+        for i in 0..6 {
+            let mut step = Vector6::zeros();
+            step[i] = 1e-6;
+            let slope = (start.perturbed(&step).log() - start.perturbed(&-step).log()) / 2e-6;
+            assert!((slope - jacobian.column(i)).norm() < 1e-4, "{i}");
+        }
+    }
+}
