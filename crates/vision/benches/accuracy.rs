@@ -5,12 +5,17 @@
 
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 
+#[path = "common/random.rs"]
+mod random;
+
 use cpu_time::ThreadTime;
 use nalgebra::{SMatrix, SVector};
 use seafix_geometry::Pixel;
 use seafix_vision::{
     Corner, CornerFit, Detector, Harris, Image, Junction, Keypoint, LCorner, Locator, Workspace, XCorner,
 };
+
+use random::Random;
 
 /// Blur (px), and grey levels either side of the middle one.
 const BLUR: f64 = 0.8;
@@ -206,21 +211,4 @@ fn pixels(scene: &Parameters, chequer: bool, left: usize, top: usize, side: usiz
         dark + difference * lit / all
     };
     (0..side * side).map(pixel).collect()
-}
-
-/// Splitmix64.
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
-    }
 }

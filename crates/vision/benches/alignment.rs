@@ -8,28 +8,16 @@
 
 #![allow(clippy::print_stdout, reason = "a program that prints a table")]
 
+#[path = "common/random.rs"]
+mod random;
+
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 use seafix_geometry::{Pinhole, Pixel, StereoRig, Transform};
 use seafix_vision::{Image, Pair, Place, Refine, Warp, Weight};
 
-/// Random numbers (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (2.0 * PI * self.uniform()).cos()
-    }
-}
+use random::Random;
 
 const BLUR: f64 = 0.8;
 const CONTRAST: f64 = 60.0;

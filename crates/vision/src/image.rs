@@ -88,3 +88,13 @@ impl Image {
         self.pixels.iter().map(|p| p.round().clamp(0.0, 255.0) as u8).collect()
     }
 }
+
+/// Noise of whole grey levels, the same every time.
+#[cfg(test)]
+pub(crate) fn rough(width: usize, height: usize) -> Image {
+    let value = |i: usize| {
+        let h = (i as u32).wrapping_mul(0x9E37_79B1);
+        ((h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 24) as f32
+    };
+    Image::new(width, height, (0..width * height).map(value).collect()).unwrap()
+}

@@ -92,6 +92,8 @@ fn same(name: &str, a: &[Keypoint], b: &[Keypoint], tolerance: f64) {
 
 /// P55. Sides of 16 n + 1 px, so that a pyramid or a coarser grid falls on the same pixels; of 16 n px
 /// for detectors that bin pixels.
+///
+/// Seen to fail when the gradient down the image counts a tenth more than that across.
 #[test]
 fn a_quarter_turn_of_the_image_turns_the_points() {
     for (width, height) in [(161, 129), (160, 128)] {
@@ -125,11 +127,14 @@ fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
 }
 
 /// P55, away from the border: a point's surroundings, ten times its scale, are in both images.
+///
+/// Seen to fail when rows of the response that are kept for the next ones are moved by one.
 #[test]
 fn a_shift_by_whole_pixels_shifts_the_points() {
-    let (size, shift) = ([193, 161], [16, 32]);
+    // Down by another number than that of the rows which are worked on at a time.
+    let (size, shift) = ([193, 177], [32, 16]);
     every("gaussian", |name, detector| {
-        let big = shown(name, 209, 193);
+        let big = shown(name, 225, 193);
         let (one, other) = (cut(&big, [0, 0], size), cut(&big, shift, size));
         let mut all = detector.detect(&one);
         all.iter_mut().for_each(|p| p.at = Pixel { u: p.at.u - shift[0] as f64, v: p.at.v - shift[1] as f64 });
@@ -149,6 +154,8 @@ fn a_shift_by_whole_pixels_shifts_the_points() {
 }
 
 /// P56: 40 grey levels more, nothing clips.
+///
+/// Seen to fail when one pixel of the gradient's six counts a thousandth more.
 #[test]
 fn more_light_everywhere_changes_nothing() {
     every("gaussian", |name, detector| {
@@ -160,6 +167,8 @@ fn more_light_everywhere_changes_nothing() {
 }
 
 /// P57.
+///
+/// Seen to fail when the size of the image is not compared with the operator's.
 #[test]
 fn an_image_without_structure_has_no_point() {
     every("gaussian", |name, detector| {
@@ -172,6 +181,7 @@ fn an_image_without_structure_has_no_point() {
     });
 }
 
+/// Seen to fail when an image may be as small as one margin of the operator.
 #[test]
 fn any_size_and_any_finite_values_are_an_image() {
     every("gaussian", |name, detector| {
@@ -208,6 +218,7 @@ fn threads_and_memory_change_no_bit() {
     }
 }
 
+/// Seen to fail when one more stays.
 #[test]
 fn the_budget_is_kept() {
     for listing in DETECTORS.listings().iter().filter(|listing| listing.defaults.contains_key("features")) {

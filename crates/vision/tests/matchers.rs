@@ -159,6 +159,8 @@ fn left_to_right_to_left_returns_the_same_pairs() {
 }
 
 /// The same bits on one thread and on many, in a new workspace and in a used one.
+///
+/// Seen to fail when the nearest of the pair before stay.
 #[test]
 fn threads_and_memory_change_no_bit() {
     let [first, second, _] = rigs();
@@ -180,6 +182,8 @@ fn threads_and_memory_change_no_bit() {
 
 /// Nothing matches nothing, one key point none or one, and where the lens model has no direction there is no match;
 /// descriptors of different kinds or lengths match nothing.
+///
+/// Seen to fail when everything is thought to have a nearest.
 #[test]
 fn few_points_and_none() {
     let [rig, ..] = rigs();

@@ -3,7 +3,10 @@
 use nalgebra::{Matrix2, Vector2};
 use seafix_geometry::Pixel;
 
-use super::{Aligner, Refine, Rules, Translation, Warp, warp};
+use super::{
+    Aligned, Aligner, Refine, Rules, Translation, Warp,
+    warp::{Affine, Slanted},
+};
 use crate::{Image, Track, Workspace};
 
 /// A place of one image that is expected somewhere in another.
@@ -54,29 +57,27 @@ impl Refine {
     }
 
     fn follow(&self, from: &Image, to: &Image, expected: &Expected, aligner: &mut Aligner) -> Option<Track> {
-        let rules = self.rules();
+        self.lay_over(from, to, expected, aligner).map(Track::from)
+    }
+
+    /// The window around the place, laid over the second image as these settings say.
+    pub(super) fn lay_over(
+        &self,
+        from: &Image,
+        to: &Image,
+        expected: &Expected,
+        aligner: &mut Aligner,
+    ) -> Option<Aligned> {
+        let Self { window, weight, warp, reach, least_correlation, iterations, .. } = *self;
+        let rules =
+            Rules { window, weight, reach, least_correlation, iterations, precision: Rules::FINE, beyond: false };
         let vector = |pixel: &Pixel| Vector2::new(pixel.u, pixel.v);
         let (place, start) = (vector(&expected.place), vector(&expected.start));
         let begin = (&start, &expected.shape);
-        let found = match self.warp {
+        match warp {
             Warp::Translation => aligner.align(from, to, &place, begin, &rules, &Translation),
-            Warp::Slanted => aligner.align(from, to, &place, begin, &rules, &warp::Slanted(expected.along)),
-            Warp::Affine => aligner.align(from, to, &place, begin, &rules, &warp::Affine),
-        }?;
-        let at = Pixel { u: found.at.x, v: found.at.y };
-        Some(Track { at, covariance: found.covariance, correlation: found.correlation })
-    }
-
-    /// When an alignment is believed.
-    pub(super) fn rules(&self) -> Rules {
-        Rules {
-            half: self.window / 2,
-            weight: self.weight,
-            reach: self.reach,
-            least_correlation: self.least_correlation,
-            iterations: self.iterations,
-            precision: Rules::FINE,
-            beyond: false,
+            Warp::Slanted => aligner.align(from, to, &place, begin, &rules, &Slanted(expected.along)),
+            Warp::Affine => aligner.align(from, to, &place, begin, &rules, &Affine),
         }
     }
 }

@@ -14,8 +14,8 @@ use crate::Image;
 /// When an alignment is believed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rules {
-    /// Half of the window's side (px).
-    pub(crate) half: usize,
+    /// Side of the window (px), odd.
+    pub(crate) window: usize,
     /// How its pixels count.
     pub(crate) weight: Weight,
     /// How far the place may move (px).
@@ -77,7 +77,7 @@ impl Aligner {
         if !(possible(centre) && possible(start)) {
             return None;
         }
-        self.grid.place(centre, rules.half, rules.weight);
+        self.grid.place(centre, rules.window / 2, rules.weight);
         let normal = self.template.take(left, &self.grid, rules.beyond, model)?;
         let begun = shape.try_inverse()?;
         let (mut at, mut shape, start) = (*start, *shape, start);
@@ -118,7 +118,7 @@ impl Aligner {
     ) {
         correlations.clear();
         correlations.resize(places.len(), -1.0);
-        self.grid.place(centre, rules.half, rules.weight);
+        self.grid.place(centre, rules.window / 2, rules.weight);
         if self.template.take(left, &self.grid, rules.beyond, &Translation).is_none() {
             return;
         }

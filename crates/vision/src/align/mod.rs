@@ -9,7 +9,7 @@ mod spline;
 mod warp;
 mod window;
 
-use nalgebra::{Matrix4, Vector2};
+use nalgebra::Matrix4;
 use seafix_component::in_range;
 use seafix_geometry::{Pixel, StereoPixels, StereoRig, UncertainPixels};
 use serde::{Deserialize, Serialize};
@@ -148,15 +148,9 @@ impl Refine {
         pair: &StereoPixels,
         aligner: &mut Aligner,
     ) -> Option<Aligned> {
-        let rules = self.rules();
-        let local = Local::new(rig, pair, self.window as f64 / 2.0);
-        let centre = Vector2::new(pair.left.u, pair.left.v);
-        let start = (&Vector2::new(pair.right.u, pair.right.v), &local.shape);
-        match self.warp {
-            Warp::Translation => aligner.align(left, right, &centre, start, &rules, &Translation),
-            Warp::Slanted => aligner.align(left, right, &centre, start, &rules, &warp::Slanted(local.epipolar)),
-            Warp::Affine => aligner.align(left, right, &centre, start, &rules, &warp::Affine),
-        }
+        let Local { shape, epipolar } = Local::new(rig, pair, self.window as f64 / 2.0);
+        let expected = Expected { place: pair.left, start: pair.right, shape, along: epipolar };
+        self.lay_over(left, right, &expected, aligner)
     }
 }
 
@@ -193,7 +187,7 @@ fn together(left: &Place, aligned: &Aligned) -> UncertainPixels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix2, UnitQuaternion, Vector3};
+    use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
     use seafix_geometry::{Pinhole, Transform};
 
     /// Waves, seen `shift` px further to the right and half of that down, with other light and contrast.

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use seafix_component::in_range;
 use seafix_geometry::Pixel;
 
 use super::{
@@ -47,6 +48,15 @@ struct Band {
 const ROWS: usize = 32;
 
 impl Corners {
+    /// Whether the settings can be.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let Self { tensor: Tensor { sigma, .. }, quality, budget: Budget { features, cells, .. }, .. } = *self;
+        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
+        in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
+        in_range(features > 0, "features", features, "at least 1")?;
+        in_range(cells > 0, "cells", cells, "at least 1")
+    }
+
     /// Replaces `found` by the corners, strongest first.
     pub(super) fn find(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {
         let threads = work.threads();

@@ -67,26 +67,23 @@ impl Component for Harris {
         "Harris and Stephens, A combined corner and edge detector, Alvey Vision Conference, 1988";
 
     fn check(&self) -> Result<(), String> {
-        let Self { window: _, sigma, k, quality, radius: _, features, selection: _, cells } = *self;
-        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
         // From k = 1/4 on no response is positive.
-        in_range((0.0..0.25).contains(&k), "k", k, "a number from 0 to below 0.25")?;
-        in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
-        in_range(features > 0, "features", features, "at least 1")?;
-        in_range(cells > 0, "cells", cells, "at least 1")
+        in_range((0.0..0.25).contains(&self.k), "k", self.k, "a number from 0 to below 0.25")?;
+        self.corners().check()
+    }
+}
+
+impl Harris {
+    fn corners(&self) -> Corners {
+        let Self { window, sigma, k, quality, radius, features, selection, cells } = *self;
+        let tensor = Tensor { window, sigma, measure: Measure::Harris { k: k as f32 } };
+        Corners { tensor, quality, radius, budget: Budget { features, selection, cells } }
     }
 }
 
 impl Detector for Harris {
     fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {
-        let measure = Measure::Harris { k: self.k as f32 };
-        let corners = Corners {
-            tensor: Tensor { window: self.window, sigma: self.sigma, measure },
-            quality: self.quality,
-            radius: self.radius,
-            budget: Budget { features: self.features, selection: self.selection, cells: self.cells },
-        };
-        corners.find(image, work, found);
+        self.corners().find(image, work, found);
     }
 }
 

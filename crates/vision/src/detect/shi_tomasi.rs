@@ -1,6 +1,6 @@
 //! Shi and Tomasi's corner detector.
 
-use seafix_component::{Component, in_range};
+use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -61,23 +61,21 @@ impl Component for ShiTomasi {
     const SOURCE: &'static str = "Shi and Tomasi, Good features to track, CVPR 1994";
 
     fn check(&self) -> Result<(), String> {
-        let Self { window: _, sigma, quality, radius: _, features, selection: _, cells } = *self;
-        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
-        in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
-        in_range(features > 0, "features", features, "at least 1")?;
-        in_range(cells > 0, "cells", cells, "at least 1")
+        self.corners().check()
+    }
+}
+
+impl ShiTomasi {
+    fn corners(&self) -> Corners {
+        let Self { window, sigma, quality, radius, features, selection, cells } = *self;
+        let tensor = Tensor { window, sigma, measure: Measure::LeastEigenvalue };
+        Corners { tensor, quality, radius, budget: Budget { features, selection, cells } }
     }
 }
 
 impl Detector for ShiTomasi {
     fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {
-        let corners = Corners {
-            tensor: Tensor { window: self.window, sigma: self.sigma, measure: Measure::LeastEigenvalue },
-            quality: self.quality,
-            radius: self.radius,
-            budget: Budget { features: self.features, selection: self.selection, cells: self.cells },
-        };
-        corners.find(image, work, found);
+        self.corners().find(image, work, found);
     }
 }
 

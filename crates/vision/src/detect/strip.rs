@@ -165,14 +165,7 @@ fn smooth_symmetric<'a, const N: usize>(
 mod tests {
     use super::super::tensor::Window;
     use super::*;
-
-    fn rough(width: usize, height: usize) -> Image {
-        let value = |i: usize| {
-            let h = (i as u32).wrapping_mul(0x9E37_79B1);
-            ((h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 24) as f32
-        };
-        Image::new(width, height, (0..width * height).map(value).collect()).unwrap()
-    }
+    use crate::image::rough;
 
     #[test]
     fn every_instruction_set_gives_the_same_bits() {

@@ -137,14 +137,7 @@ impl Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn rough(width: usize, height: usize) -> Image {
-        let value = |i: usize| {
-            let h = (i as u32).wrapping_mul(0x9E37_79B1);
-            ((h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 24) as f32
-        };
-        Image::new(width, height, (0..width * height).map(value).collect()).unwrap()
-    }
+    use crate::image::rough;
 
     /// The response at every pixel, so many rows at a time.
     fn response(tensor: &Tensor, image: &Image, rows: usize) -> (Vec<f32>, f32) {

@@ -104,14 +104,7 @@ fn sums(template: &[f32], patch: &[[f32; LANES + WIDEST - 1]]) -> [[f32; LANES];
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn rough(width: usize, height: usize) -> Image {
-        let value = |i: usize| {
-            let h = (i as u32).wrapping_mul(0x9E37_79B1);
-            ((h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 24) as f32
-        };
-        Image::new(width, height, (0..width * height).map(value).collect()).unwrap()
-    }
+    use crate::image::rough;
 
     #[test]
     fn it_is_the_definition() {

@@ -51,6 +51,13 @@ pub struct Track {
     pub correlation: f64,
 }
 
+impl From<Aligned> for Track {
+    fn from(aligned: Aligned) -> Self {
+        let Aligned { at, shape: _, covariance, correlation } = aligned;
+        Self { at: Pixel { u: at.x, v: at.y }, covariance, correlation }
+    }
+}
+
 impl Default for Tracker {
     fn default() -> Self {
         Self {
@@ -120,15 +127,8 @@ impl Tracker {
 
     /// When an alignment on the finest level is believed.
     pub(crate) fn rules(&self) -> Rules {
-        Rules {
-            half: self.window / 2,
-            weight: self.weight,
-            reach: self.reach,
-            least_correlation: self.least_correlation,
-            iterations: self.iterations,
-            precision: Rules::FINE,
-            beyond: false,
-        }
+        let Self { window, weight, reach, least_correlation, iterations, .. } = *self;
+        Rules { window, weight, reach, least_correlation, iterations, precision: Rules::FINE, beyond: false }
     }
 
     /// One place, there and back.
@@ -151,9 +151,7 @@ impl Tracker {
         start: &Pixel,
         aligner: &mut Aligner,
     ) -> Option<Track> {
-        let found = self.follow(levels, &vector(place), &vector(start), aligner)?;
-        let at = Pixel { u: found.at.x, v: found.at.y };
-        Some(Track { at, covariance: found.covariance, correlation: found.correlation })
+        self.follow(levels, &vector(place), &vector(start), aligner).map(Track::from)
     }
 
     /// Whether the way back, which begins as wrong as the way there did, ends at `place`.
