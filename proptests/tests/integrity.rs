@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use seafix_evaluation::{attitude_error, position_error};
 use seafix_geometry::{MeasuredPoint, Object, Pixel, Point, StereoPixels, UncertainPixels, UncertainPoint};
 use seafix_referencing::{
-    Acceptance, Candidates, Correspondence, Identification, ModelPoint, Outcome, Problem, Protection,
-    StereoReprojection, Tolerance, judge,
+    Acceptance, Candidates, Correspondence, ModelPoint, Outcome, Problem, Protection, StereoReprojection, Tolerance,
+    judge_named,
 };
 use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
 
@@ -136,17 +136,7 @@ fn fix(placed: &Placed, cloud: &[MeasuredPoint], acceptance: &Acceptance) -> Opt
     let candidates = Candidates { lists: (0..model.len()).map(|i| vec![i]).collect() };
     let problem =
         Problem { model: &model, cloud, candidates: &candidates, tolerance: Tolerance::Sigmas(3.0), prior: None };
-    let found = Identification {
-        size_bound: pairs.len(),
-        pairs,
-        rivals: Vec::new(),
-        rivals_complete: true,
-        optimal: true,
-        tests: 0,
-        undecided: None,
-        belief: None,
-    };
-    let attempt = judge(&problem, Ok(found), &StereoReprojection::default(), acceptance, Some(&placed.rig));
+    let attempt = judge_named(&problem, pairs, &StereoReprojection::default(), acceptance, Some(&placed.rig));
     let Outcome::Referenced(reference) = attempt.outcome else { return None };
     let truth = &placed.object_from_camera;
     Some(Fix {
@@ -185,7 +175,7 @@ fn most(drawn: u64, risk: f64) -> u64 {
 #[test]
 #[ignore = "minutes"]
 fn a_million_fixes_keep_their_levels() {
-    let acceptance = Acceptance { chance_budget: f64::MAX, ..Acceptance::default() };
+    let acceptance = Acceptance::default();
     million(&acceptance);
 }
 
@@ -193,7 +183,7 @@ fn a_million_fixes_keep_their_levels() {
 #[test]
 #[ignore = "minutes"]
 fn a_million_fixes_keep_their_levels_under_two_wrong_matches() {
-    million(&Acceptance { chance_budget: f64::MAX, two_wrong_rate: 0.02, ..Acceptance::default() });
+    million(&Acceptance { two_wrong_rate: 0.02, ..Acceptance::default() });
 }
 
 fn million(acceptance: &Acceptance) {
@@ -226,7 +216,7 @@ fn million(acceptance: &Acceptance) {
 /// P71, short: 20 000 draws at risk 1e-3, and no level for three points.
 #[test]
 fn levels_hold() {
-    let acceptance = Acceptance { chance_budget: f64::MAX, risk: 1e-3, ..Acceptance::default() };
+    let acceptance = Acceptance { risk: 1e-3, ..Acceptance::default() };
     let all = trial(40, &acceptance);
     assert_eq!(all.unmonitored, 0, "three points are unavailable");
     assert!(all.available * 2 > all.drawn, "{} of {} have a level", all.available, all.drawn);
@@ -237,7 +227,7 @@ fn levels_hold() {
 /// P71 under two wrong matches, short: 10 000 draws at risk 1e-3, two wrong in one of ten and one in another.
 #[test]
 fn levels_hold_under_two_wrong_matches() {
-    let acceptance = Acceptance { chance_budget: f64::MAX, risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() };
+    let acceptance = Acceptance { risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() };
     let all = trial(20, &acceptance);
     assert_eq!(all.unmonitored, 0, "three points are unavailable");
     assert!(all.available * 3 > all.drawn, "{} of {} have a level", all.available, all.drawn);

@@ -7,8 +7,8 @@ use seafix_component::{BuildError, Choice, Fault, Registry, in_range};
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
-    Acceptance, Candidates, Gate, Outcome, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver, Target,
-    TargetKind, Tolerance, candidates, judge, problem_file::CoherenceProblem,
+    Acceptance, Candidates, Correspondence, Gate, Outcome, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver,
+    Target, TargetKind, Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem,
 };
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, Refine, Triangulator,
@@ -46,7 +46,7 @@ pub struct Pipeline {
     pub gate: Gate,
     /// When two distances agree.
     pub tolerance: Tolerance,
-    /// Stage 2: the search.
+    /// Stage 2: the search. Of points that say which ones they are none is asked for.
     pub search: Choice,
     /// The solver.
     pub solver: Choice,
@@ -352,11 +352,18 @@ impl Stages {
     ) -> Attempt {
         let started = Instant::now();
         let settings = &self.settings;
-        let (candidates, stage1) = timed(|| match told {
-            Told::Names(names) => named(names, index, target),
-            _ => candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)),
-        });
         let tolerance = settings.tolerance;
+        if let Told::Names(names) = told {
+            let (pairs, stage1) = timed(|| named(names, index, target));
+            let candidates =
+                Candidates::from_pairs(target.points.len(), pairs.iter().map(|pair| (pair.model, pair.cloud)));
+            let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
+            let judged = || judge_named(&problem, pairs, &*self.solver, &settings.acceptance, Some(rig));
+            let (answer, solution) = timed(judged);
+            let times = TargetTimes { candidates_ms: Some(stage1), solve_ms: Some(solution), ..TargetTimes::default() };
+            return Attempt { target: index, candidates, answer, times, started };
+        }
+        let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)));
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
         let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, &settings.acceptance, Some(rig)));
@@ -391,10 +398,15 @@ impl Stages {
     }
 }
 
-/// What points that say which ones they are may be: of an object its own, of the site those of all its objects.
-fn named(names: &[(usize, usize)], index: usize, target: &Target) -> Candidates {
-    let pairs = names.iter().enumerate().filter_map(|(cloud, &name)| Some((target.place_of(index, name)?, cloud)));
-    Candidates::from_pairs(target.points.len(), pairs)
+/// The pairs of points that say which ones they are, in the order of the model: of an object its own, of the site those
+/// of all its objects.
+fn named(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Correspondence> {
+    let pair = |(cloud, &name)| Some(Correspondence { model: target.place_of(index, name)?, cloud });
+    let mut pairs: Vec<Correspondence> = names.iter().enumerate().filter_map(pair).collect();
+    pairs.sort_unstable();
+    // Of two that say the same the first is believed.
+    pairs.dedup_by_key(|pair| pair.model);
+    pairs
 }
 
 /// Which points of `target` may be in view: predicted in both images, or out of them by no more than

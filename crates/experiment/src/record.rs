@@ -16,8 +16,11 @@ use crate::{
     Attempt, Experiment, Place, Plan, Sighting, Trial, exact,
     manifest::Git,
     navigate::Underway,
-    source::{Eyes, Passage, Sight},
+    source::{Eyes, Passage, Sight, Told},
 };
+
+/// What stands for the search where every point says which one it is.
+const NAMED: &str = "named";
 
 /// What is the same for every frame of `trial`.
 pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets: &[Target]) -> TrialHeader {
@@ -39,7 +42,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
                 value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
             })
             .collect(),
-        components: components(&trial.resolved, passage.images()),
+        components: components(&trial.resolved, passage),
         configuration: toml::to_string(&trial.resolved).expect("a resolved experiment is plain values"),
         site: site.to_toml(),
         source: passage.name().to_owned(),
@@ -81,7 +84,8 @@ pub(crate) fn frame(
     targets: &[Target],
 ) -> FrameRecord {
     let pipeline = trial.stages.settings();
-    let (search, solver) = (&pipeline.search.name, &pipeline.solver.name);
+    let search = if matches!(sight.told, Told::Names(_)) { NAMED } else { &pipeline.search.name };
+    let solver = &pipeline.solver.name;
     let mut attempts: Vec<TargetRecord> =
         sighting.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
     if attempts.is_empty() {
@@ -158,8 +162,9 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
     record
 }
 
-/// The components that did some work: a cloud that came without images was not looked at.
-fn components(experiment: &Experiment, images: bool) -> Vec<Component> {
+/// The components that did some work: a cloud that came without images was not looked at, points that say which ones they
+/// are were not searched.
+fn components(experiment: &Experiment, passage: &dyn Passage) -> Vec<Component> {
     let pipeline = &experiment.pipeline;
     let front = [
         component(&DETECTORS, &pipeline.detector),
@@ -167,7 +172,17 @@ fn components(experiment: &Experiment, images: bool) -> Vec<Component> {
         component(&DESCRIPTORS, &pipeline.descriptor),
         component(&MATCHERS, &pipeline.matcher),
     ];
-    let back = [component(&SEARCHES, &pipeline.search), component(&SOLVERS, &pipeline.solver)];
+    let search = match passage.named() {
+        false => component(&SEARCHES, &pipeline.search),
+        true => Component {
+            stage: SEARCHES.kind().to_owned(),
+            name: NAMED.to_owned(),
+            summary: "none: every point says which one it is".to_owned(),
+            source: String::new(),
+            settings: Vec::new(),
+        },
+    };
+    let back = [search, component(&SOLVERS, &pipeline.solver)];
     let between = experiment.navigation.iter().flat_map(|navigation| {
         [
             component(&ODOMETRIES, &navigation.odometry),
@@ -175,7 +190,7 @@ fn components(experiment: &Experiment, images: bool) -> Vec<Component> {
             component(&FUSIONS, &navigation.fusion),
         ]
     });
-    front.into_iter().filter(|_| images).chain(back).chain(between).collect()
+    front.into_iter().filter(|_| passage.images()).chain(back).chain(between).collect()
 }
 
 fn versions() -> Vec<(String, String)> {

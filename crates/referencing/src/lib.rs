@@ -24,8 +24,8 @@ pub use joint::{Glimpse, JointFix, JointFixes, Member, Placement, RelativePose, 
 pub use observations::{Observation, Observations};
 pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
 pub use reference::{
-    Acceptance, Alternative, Attempt, Integrity, Outcome, Protection, Redundancy, Reference, Refusal, judge, reference,
-    rms_apart,
+    Acceptance, Alternative, Attempt, Integrity, Outcome, Protection, Redundancy, Reference, Refusal, judge,
+    judge_named, reference, rms_apart,
 };
 pub use search::{
     Belief, Explanation, Identification, MaximumClique, RigidConsensus, SEARCHES, Samples, Search, Shares,

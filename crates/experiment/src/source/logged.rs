@@ -20,6 +20,7 @@ pub(super) struct Logged {
     rig: StereoRig,
     body_from_camera: Transform<Body, Camera>,
     images: bool,
+    named: bool,
     numbers: Vec<u64>,
     warnings: Vec<Fault>,
     path: String,
@@ -47,12 +48,13 @@ impl Logged {
             .map_err(|error| one(Fault::new(format!("body_from_camera: {error}"), path)))?;
         let mut warnings = Vec::new();
         let (mut numbers, mut exact) = (Vec::with_capacity(frames.len()), true);
-        let mut posed = false;
+        let (mut posed, mut named) = (false, true);
         for place in 0..frames.len() {
             let frame = frames.frame(place, false).map_err(|error| one(fault(path, &error)))?;
             numbers.push(frame.frame);
             exact &= frame.inputs.as_ref().is_some_and(|inputs| !images || inputs.exact_images);
             posed |= frame.inputs.as_ref().is_some_and(|inputs| inputs.problem.is_some());
+            named &= frame.inputs.as_ref().is_some_and(|inputs| inputs.names.is_some());
         }
         if !exact {
             let what =
@@ -67,6 +69,7 @@ impl Logged {
             rig,
             body_from_camera,
             images,
+            named,
             numbers,
             warnings,
             path: path.display().to_string(),
@@ -146,6 +149,10 @@ impl Passage for Logged {
 
     fn images(&self) -> bool {
         self.images
+    }
+
+    fn named(&self) -> bool {
+        self.named
     }
 
     fn frames(&self) -> usize {

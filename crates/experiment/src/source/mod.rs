@@ -69,8 +69,8 @@ pub enum Told {
     /// Nothing.
     #[default]
     Nothing,
-    /// Which feature point each point of the cloud says it is, as (object, point) indices: nothing else is then a
-    /// candidate.
+    /// Which feature point each point of the cloud says it is, as (object, point) indices, no two the same: nothing is
+    /// searched then.
     Names(Vec<(usize, usize)>),
     /// An identification problem about the object of this index, its tolerance, candidates and rough pose included:
     /// only that object is attempted, and the pipeline's `gate` and `tolerance` have no say.
@@ -141,6 +141,10 @@ pub trait Passage: Send + Sync {
     fn body_from_camera(&self) -> Transform<Body, Camera>;
     /// Whether it gives images rather than clouds.
     fn images(&self) -> bool;
+    /// Whether every point says which one it is, so that nothing is searched.
+    fn named(&self) -> bool {
+        false
+    }
     /// How many instants there are.
     fn frames(&self) -> usize;
     /// The number of instant `index`: it seeds what a method draws, and names the frame in logs.

@@ -204,6 +204,10 @@ impl Passage for Layouts {
         false
     }
 
+    fn named(&self) -> bool {
+        self.settings.named
+    }
+
     fn frames(&self) -> usize {
         self.settings.frames
     }

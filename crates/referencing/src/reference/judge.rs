@@ -22,6 +22,8 @@ pub(super) struct Judge<'a> {
     pub(super) alert_limit: f64,
     /// Pairs of the largest set that is judged.
     pub(super) largest: usize,
+    /// Whether a search found the sets, so that chance may have made them.
+    pub(super) searched: bool,
     pub(super) rig: Option<&'a StereoRig>,
 }
 
@@ -35,6 +37,9 @@ impl Judge<'_> {
     }
 
     pub(super) fn chance(&self, pairs: &[Correspondence]) -> Result<(), Refusal> {
+        if !self.searched {
+            return Ok(());
+        }
         let (expected, budget) = (expected_sets(self.problem, pairs), self.acceptance.chance_budget);
         // Written so that a NaN is refused too.
         if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size: pairs.len(), expected, budget }) }

@@ -4,8 +4,8 @@ use rand::Rng;
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use crate::{
-    Identification, ModelPoint, Problem, Search, Shell, Solver, Unidentified, chance::expected_sets_as_good,
-    site::diameter,
+    Correspondence, Identification, ModelPoint, Problem, Search, Shell, Solver, Unidentified,
+    chance::expected_sets_as_good, site::diameter,
 };
 
 mod acceptance;
@@ -53,7 +53,7 @@ pub fn judge(
     };
     let alert_limit = alert_limit(problem.model, acceptance);
     let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
-    let judge = Judge { problem, solver, acceptance, alert_limit, largest, rig };
+    let judge = Judge { problem, solver, acceptance, alert_limit, largest, searched: true, rig };
     let likely = judge.size(&found.pairs).and_then(|()| match found.belief {
         Some(_) => Ok(()),
         None => judge.chance(&found.pairs),
@@ -80,6 +80,34 @@ pub fn judge(
         size_bound: Some(found.size_bound),
         tests: Some(found.tests),
         identified: found.pairs,
+    }
+}
+
+/// The same of pairs that no search found, because every measured point said which model point it is: nothing speaks for
+/// chance, and there are no rivals. The tests of residuals, precision and prior are those of every set.
+pub fn judge_named(
+    problem: &Problem<'_>,
+    pairs: Vec<Correspondence>,
+    solver: &dyn Solver,
+    acceptance: &Acceptance,
+    rig: Option<&StereoRig>,
+) -> Attempt {
+    let alert_limit = alert_limit(problem.model, acceptance);
+    let judge = Judge { problem, solver, acceptance, alert_limit, largest: pairs.len(), searched: false, rig };
+    let size_bound = pairs.len();
+    let found = Identification::unproved(pairs, size_bound, 0);
+    let (outcome, runner_up) = match judge.size(&found.pairs) {
+        Ok(()) => judge.poses(&found),
+        Err(refusal) => (Outcome::Unidentified(refusal), None),
+    };
+    Attempt {
+        outcome,
+        identified: found.pairs,
+        runner_up,
+        optimal: false,
+        size_bound: None,
+        expected_chance_sets: None,
+        tests: None,
     }
 }
 

@@ -20,10 +20,19 @@ pub(super) fn section(run: &Run) -> Section {
             "The source gives no images, so nothing is detected, described or matched: the cloud comes from it as it is"
         }
     };
+    let named = run.trials.iter().all(|trial| trial.method()[0] == "named");
+    let middle = match named {
+        true => {
+            "; every point says which one it is, so that nothing is searched, and for each target the solver computes the pose "
+        }
+        false => {
+            "; for each target, the prior selects candidates, the search finds a structurally coherent set among them, and the solver computes the pose "
+        }
+    };
     let [h, c, p, e] = ["H", "C", "P", "p"].map(italic);
     let algorithm = text![
         begin,
-        "; for each target, the prior selects candidates, the search finds a structurally coherent set among them, and the solver computes the pose ",
+        middle,
         h.clone(),
         " that carries its points ",
         c.clone(),
