@@ -170,10 +170,9 @@ fn most(drawn: u64, risk: f64) -> u64 {
 }
 
 /// P71 over 1 000 000 draws at risk 1e-4: at most 130 violations, each of position and of attitude. Writes the counts of
-/// a Stanford diagram where `STANFORD` names a file:
-/// `cargo test --release -p seafix-proptests --test integrity -- --ignored --nocapture`.
+/// a Stanford diagram where `STANFORD` names a file.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "a million fixes, minutes: cargo test --release --workspace --test integrity -- --ignored --nocapture --exact a_million_fixes_keep_their_levels"]
 fn a_million_fixes_keep_their_levels() {
     let acceptance = Acceptance::default();
     million(&acceptance);
@@ -181,7 +180,7 @@ fn a_million_fixes_keep_their_levels() {
 
 /// The same where two wrong matches happen besides, in two of a hundred draws, and the settings say so.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "a million fixes, minutes: cargo test --release --workspace --test integrity -- --ignored --nocapture two_wrong"]
 fn a_million_fixes_keep_their_levels_under_two_wrong_matches() {
     million(&Acceptance { two_wrong_rate: 0.02, ..Acceptance::default() });
 }

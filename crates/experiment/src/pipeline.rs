@@ -7,8 +7,8 @@ use seafix_component::{BuildError, Choice, Fault, Registry, in_range};
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
-    Acceptance, Candidates, Correspondence, Gate, Outcome, Prior, PriorBound, Problem, SEARCHES, SOLVERS, Search, Solver,
-    Target, TargetKind, Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem,
+    Acceptance, Candidates, Correspondence, Gate, ModelPoint, Outcome, Prior, PriorBound, Problem, SEARCHES, SOLVERS,
+    Search, Solver, Target, TargetKind, Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem,
 };
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, Refine, Triangulator,
@@ -276,8 +276,11 @@ impl Stages {
                     Told::Problem(object, problem) if *object == index => self.answer(index, target, problem, rng),
                     Told::Problem(..) => return None,
                     told => {
-                        let in_view = in_view(target, prior.as_ref(), rig)?;
-                        self.attempt(index, target, &cloud, told, prior.as_ref(), &in_view, rig, rng)
+                        let prior = prior.as_ref();
+                        match told {
+                            Told::Names(names) => self.named(index, target, &cloud, names, prior, rig)?,
+                            _ => self.attempt(index, target, &cloud, prior, &in_view(target, prior, rig)?, rig, rng),
+                        }
                     }
                 };
                 attempt.times.total_ms = Some(common + milliseconds(attempt.started));
@@ -344,7 +347,6 @@ impl Stages {
         index: usize,
         target: &Target,
         cloud: &[MeasuredPoint],
-        told: &Told,
         prior: Option<&Prior>,
         in_view: &[bool],
         rig: &StereoRig,
@@ -353,16 +355,6 @@ impl Stages {
         let started = Instant::now();
         let settings = &self.settings;
         let tolerance = settings.tolerance;
-        if let Told::Names(names) = told {
-            let (pairs, stage1) = timed(|| named(names, index, target));
-            let candidates =
-                Candidates::from_pairs(target.points.len(), pairs.iter().map(|pair| (pair.model, pair.cloud)));
-            let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
-            let judged = || judge_named(&problem, pairs, &*self.solver, &settings.acceptance, Some(rig));
-            let (answer, solution) = timed(judged);
-            let times = TargetTimes { candidates_ms: Some(stage1), solve_ms: Some(solution), ..TargetTimes::default() };
-            return Attempt { target: index, candidates, answer, times, started };
-        }
         let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)));
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
@@ -374,6 +366,30 @@ impl Stages {
             total_ms: None,
         };
         Attempt { target: index, candidates, answer, times, started }
+    }
+
+    /// The answer where every point says which one it is; `None` of a target that no point belongs to.
+    fn named(
+        &self,
+        index: usize,
+        target: &Target,
+        cloud: &[MeasuredPoint],
+        names: &[(usize, usize)],
+        prior: Option<&Prior>,
+        rig: &StereoRig,
+    ) -> Option<Attempt> {
+        let started = Instant::now();
+        let (pairs, stage1) = timed(|| named(names, index, target));
+        if pairs.is_empty() {
+            return None;
+        }
+        let places = pairs.iter().map(|pair| (pair.model, pair.cloud));
+        let candidates = Candidates::from_pairs(target.points.len(), places);
+        let Pipeline { tolerance, acceptance, .. } = &self.settings;
+        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+        let (answer, solution) = timed(|| judge_named(&problem, pairs, &*self.solver, acceptance, Some(rig)));
+        let times = TargetTimes { candidates_ms: Some(stage1), solve_ms: Some(solution), ..TargetTimes::default() };
+        Some(Attempt { target: index, candidates, answer, times, started })
     }
 
     /// The answer to a problem that states its own candidates, tolerance and rough pose.
@@ -417,26 +433,27 @@ fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Ve
     const BACK: f64 = -0.2;
     let Some(prior) = prior else { return Some(vec![true; target.points.len()]) };
     let camera_from_object = prior.object_from_camera.inverse();
-    let focal = rig.left().focal()[0];
-    let mut inside = 0;
-    let mask = target
-        .points
-        .iter()
-        .map(|point| {
-            let at = camera_from_object * point.at;
-            let faces = point.normal.is_none_or(|normal| {
-                let sight = prior.object_from_camera.translation() - point.at.coords;
-                normal.normalize().dot(&sight.normalize()) > BACK
-            });
-            let spread = match &prior.bound {
-                PriorBound::Gaussian(covariance) => covariance.of_point(&at).trace().sqrt(),
-                PriorBound::Box(half) => *half,
-            };
-            inside += usize::from(faces && rig.sees(&at, 0.0).is_some());
-            faces && rig.sees(&at, -3.0 * focal * spread / at.coords.z).is_some()
+    let faces = |point: &ModelPoint| {
+        point.normal.is_none_or(|normal| {
+            let sight = prior.object_from_camera.translation() - point.at.coords;
+            normal.normalize().dot(&sight.normalize()) > BACK
         })
-        .collect();
-    (inside >= 3).then_some(mask)
+    };
+    let inside = |point: &ModelPoint| faces(point) && rig.sees(&(camera_from_object * point.at), 0.0).is_some();
+    // Most targets of a large site are nowhere near: that is known before any covariance is.
+    if target.points.iter().filter(|point| inside(point)).take(3).count() < 3 {
+        return None;
+    }
+    let focal = rig.left().focal()[0];
+    let near = |point: &ModelPoint| {
+        let at = camera_from_object * point.at;
+        let spread = match &prior.bound {
+            PriorBound::Gaussian(covariance) => covariance.of_point(&at).trace().sqrt(),
+            PriorBound::Box(half) => *half,
+        };
+        rig.sees(&at, -3.0 * focal * spread / at.coords.z).is_some()
+    };
+    Some(target.points.iter().map(|point| inside(point) || faces(point) && near(point)).collect())
 }
 
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {

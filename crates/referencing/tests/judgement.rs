@@ -5,9 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint};
 use seafix_referencing::{
-    Acceptance, Attempt, Candidates, Correspondence, Identification, Kabsch, Mahalanobis, MaximumClique, ModelPoint,
-    Outcome, Prior, PriorBound, Problem, Refusal, Search, StructuralCoherence, Tolerance, Unidentified, judge,
-    reference,
+    Acceptance, Attempt, Candidates, Correspondence, Kabsch, Mahalanobis, MaximumClique, ModelPoint, Outcome, Prior,
+    PriorBound, Problem, Refusal, Search, StructuralCoherence, Tolerance, Unidentified, judge, judge_named, reference,
 };
 
 const SIGMA: f64 = 0.005;
@@ -385,18 +384,35 @@ fn named(places: &[[f64; 3]]) -> Outcome {
     let tolerance = Tolerance::Sigmas(4.0);
     let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
     let pairs: Vec<Correspondence> = (0..model.len()).map(|i| Correspondence { model: i, cloud: i }).collect();
-    let found = Identification {
-        size_bound: pairs.len(),
-        pairs,
-        rivals: Vec::new(),
-        rivals_complete: true,
-        optimal: true,
-        tests: 0,
-        undecided: None,
-        belief: None,
+    judge_named(&problem, pairs, &Mahalanobis::default(), &Acceptance::default(), None).outcome
+}
+
+/// Points that say which ones they are need no search and owe chance nothing, but the residuals are tested all the same:
+/// five points that nobody would believe to be found among a thousand candidates are a fix, and five of which one says
+/// the wrong name are none, or one without it.
+#[test]
+fn named_points_are_tested_for_their_residuals_alone() {
+    let (model, mut rng) = (model_of(&MODEL[..5]), ChaCha8Rng::seed_from_u64(4));
+    let cloud = cloud_of(&model, &mut rng);
+    let candidates = Candidates::all(5, 5);
+    let strict = Acceptance { chance_budget: 1e-300, ..Acceptance::default() };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Sigmas(4.0),
+        prior: None,
     };
-    let acceptance = Acceptance { chance_budget: f64::MAX, ..Acceptance::default() };
-    judge(&problem, Ok(found), &Mahalanobis::default(), &acceptance, None).outcome
+    let said = |names: [usize; 5]| -> Vec<Correspondence> {
+        (0..5).map(|i| Correspondence { model: i, cloud: names[i] }).collect()
+    };
+    let found = judge_named(&problem, said([0, 1, 2, 3, 4]), &Kabsch::default(), &strict, None);
+    assert!(matches!(found.outcome, Outcome::Referenced(_)), "{:?}", found.outcome);
+    assert_eq!((found.expected_chance_sets, found.tests, found.optimal), (None, None, false));
+    let exchanged = judge_named(&problem, said([1, 0, 2, 3, 4]), &Kabsch::default(), &strict, None);
+    assert_eq!(exchanged.outcome.reason(), Some("gate"), "{:?}", exchanged.outcome);
+    let few = judge_named(&problem, said([0, 1, 2, 3, 4])[..2].to_vec(), &Kabsch::default(), &strict, None);
+    assert_eq!(few.outcome.reason(), Some("too-few"));
 }
 
 /// One disparity for all points of a model with relief: no rigid motion lays it flat, and χ² says so. Of a plate that

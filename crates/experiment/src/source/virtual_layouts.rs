@@ -276,6 +276,23 @@ mod tests {
         }
     }
 
+    /// Layouts stand in a row, and a camera may look along it: what is a kilometre away and has no point in the cloud is
+    /// not attempted. When every target in the view of the prior was, 40 frames had 124 refusals besides their 40 fixes.
+    #[test]
+    fn of_all_layouts_that_is_attempted_whose_points_are_there() {
+        let settings = VirtualLayouts { layouts: 20, frames: 20, ..VirtualLayouts::default() };
+        let passage = settings.open(1, Path::new(".")).unwrap();
+        let pipeline =
+            crate::Pipeline { solver: seafix_component::Choice::named("kabsch"), ..crate::Pipeline::default() };
+        let (stages, targets) = (pipeline.build().unwrap(), passage.site().targets(pipeline.target).unwrap());
+        let mut rng = Stream::new(1, 0, 0, Purpose::Search);
+        for index in 0..20 {
+            let found = stages.reference(&passage.sight(index).unwrap(), &targets, passage.rig(), rng.rng());
+            let attempted: Vec<usize> = found.attempts.iter().map(|attempt| attempt.target).collect();
+            assert_eq!(attempted, [index % 20]);
+        }
+    }
+
     #[test]
     fn a_layout_may_be_several_objects_that_a_survey_misplaces() {
         let settings = VirtualLayouts {

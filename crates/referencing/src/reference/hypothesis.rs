@@ -1,6 +1,6 @@
 //! A set of pairs with the pose it leads to.
 
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use super::{Alternative, Refusal};
 use crate::{Correspondence, Degenerate, solve::likelihood::Likelihood};
@@ -14,6 +14,8 @@ pub(super) struct Hypothesis {
     pub(super) likelihood: Likelihood,
     /// As [`Alternative::score`].
     pub(super) score: f64,
+    /// The covariance of `pose`, once it was asked for.
+    pub(super) covariance: Option<Covariance6<Object, Camera>>,
 }
 
 impl Hypothesis {

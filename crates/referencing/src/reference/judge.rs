@@ -105,13 +105,13 @@ impl Judge<'_> {
 
     /// Puts a hypothesis whose residuals pass to those that stand or to those refused, and then says why.
     /// One that only repeats a likelier pose is not looked at: it could change nothing.
-    fn admit(&self, hypothesis: Hypothesis, stand: &mut Stand) -> Option<Fallen> {
+    fn admit(&self, mut hypothesis: Hypothesis, stand: &mut Stand) -> Option<Fallen> {
         let repeats =
             |known: &Hypothesis| known.score >= hypothesis.score && !self.apart(&known.pose, &hypothesis.pose);
         if stand.passed.iter().any(repeats) {
             return None;
         }
-        match self.precise_and_near(&hypothesis) {
+        match self.precise_and_near(&mut hypothesis) {
             Ok(()) => {
                 stand.passed.push(hypothesis);
                 None
@@ -139,7 +139,8 @@ impl Judge<'_> {
             _ => 0.0,
         };
         let fewer = self.largest.saturating_sub(pairs.len()) as f64 * chi_square(3, self.acceptance.confidence);
-        Ok(Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score: -0.5 * (likelihood.cost + fewer + prior) })
+        let score = -0.5 * (likelihood.cost + fewer + prior);
+        Ok(Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score, covariance: None })
     }
 
     /// Whether a rigid motion explains the set within its noise.
@@ -151,9 +152,10 @@ impl Judge<'_> {
     }
 
     /// Whether precision and prior let the pose pass.
-    fn precise_and_near(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
+    fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let data = self.observations(&hypothesis.pairs);
         let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
+        hypothesis.covariance = Some(covariance);
         let (rms, limit) = (self.predicted_rms(hypothesis, &covariance), self.alert_limit);
         // Written so that a NaN is refused too.
         if !(2.0 * rms <= limit) {
@@ -208,7 +210,8 @@ impl Judge<'_> {
 
     fn fix(&self, hypothesis: Hypothesis) -> Outcome {
         let data = self.observations(&hypothesis.pairs);
-        let covariance = match self.solver.covariance(&data, &hypothesis.pose) {
+        let known = hypothesis.covariance.map_or_else(|| self.solver.covariance(&data, &hypothesis.pose), Ok);
+        let covariance = match known {
             Ok(covariance) => covariance,
             Err(why) => return Outcome::Degenerate(why),
         };

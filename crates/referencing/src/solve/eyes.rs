@@ -8,7 +8,8 @@ use seafix_geometry::{Camera, Frame, Pinhole, Point, RightCamera, StereoRig};
 pub(super) struct Eyes<'a> {
     left: Eye<'a>,
     right: Eye<'a>,
-    turn: Matrix3<f64>,
+    /// The right camera's rotation; `None` of a rectified rig, which has none.
+    turn: Option<Matrix3<f64>>,
     step: Vector3<f64>,
 }
 
@@ -22,10 +23,11 @@ struct Eye<'a> {
 impl<'a> Eyes<'a> {
     pub(super) fn of(rig: &'a StereoRig) -> Self {
         let pose = rig.right_from_left();
+        let turn = pose.rotation_matrix();
         Self {
             left: Eye::of(rig.left()),
             right: Eye::of(rig.right()),
-            turn: pose.rotation_matrix(),
+            turn: (turn != Matrix3::identity()).then_some(turn),
             step: pose.translation(),
         }
     }
@@ -35,8 +37,13 @@ impl<'a> Eyes<'a> {
     #[inline]
     pub(super) fn look(&self, at: &Vector3<f64>) -> Option<(Vector4<f64>, Matrix4x3<f64>)> {
         let ([ul, vl], [jul, jvl]) = self.left.look::<Camera>(at)?;
-        let ([ur, vr], by_right) = self.right.look::<RightCamera>(&(self.turn * at + self.step))?;
-        let [jur, jvr] = by_right.map(|row| self.turn.tr_mul(&row));
+        let ([ur, vr], [jur, jvr]) = match &self.turn {
+            None => self.right.look::<RightCamera>(&(at + self.step))?,
+            Some(turn) => {
+                let (pixel, by_right) = self.right.look::<RightCamera>(&(turn * at + self.step))?;
+                (pixel, by_right.map(|row| turn.tr_mul(&row)))
+            }
+        };
         #[rustfmt::skip]
         let j = Matrix4x3::new(
             jul.x, jul.y, jul.z,
@@ -83,13 +90,15 @@ mod tests {
     fn they_see_what_the_rig_sees() {
         for distortion in [&[][..], &[-0.1, 0.02, 1e-3, -5e-4]] {
             let camera = Pinhole::new([1024, 768], [500.0, 510.0], [511.5, 383.5], distortion).unwrap();
-            let right_from_left = Transform::exp(&Vector6::new(0.02, -0.05, 0.01, -0.25, 0.01, 0.02));
-            let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
-            let at = Vector3::new(0.4, -0.3, 2.5);
-            let (seen, j) = Eyes::of(&rig).look(&at).unwrap();
-            let (expected, by_point) = rig.project_with_jacobian(&Point::from(at)).unwrap();
-            assert!((seen - expected.coordinates()).amax() < 1e-10 && (j - by_point).amax() < 1e-10);
-            assert!(Eyes::of(&rig).look(&-at).is_none());
+            for turn in [[0.02, -0.05, 0.01], [0.0; 3]] {
+                let right_from_left = Transform::exp(&Vector6::new(turn[0], turn[1], turn[2], -0.25, 0.01, 0.02));
+                let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
+                let at = Vector3::new(0.4, -0.3, 2.5);
+                let (seen, j) = Eyes::of(&rig).look(&at).unwrap();
+                let (expected, by_point) = rig.project_with_jacobian(&Point::from(at)).unwrap();
+                assert!((seen - expected.coordinates()).amax() < 1e-10 && (j - by_point).amax() < 1e-10);
+                assert!(Eyes::of(&rig).look(&-at).is_none());
+            }
         }
     }
 }

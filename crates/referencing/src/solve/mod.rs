@@ -33,6 +33,7 @@ mod tests;
 mod triad;
 mod umeyama;
 mod weighted_kabsch;
+mod whitened;
 
 pub(crate) use descent::Term;
 pub(crate) use gnc_tls::GncTls;

@@ -17,15 +17,16 @@ impl Normal {
         let w = information;
         let (x, y, z) = (at.x, at.y, at.z);
         // [p]× W, row by row.
-        let lever = Matrix3::from_rows(&[
-            w.row(2) * y - w.row(1) * z,
-            w.row(0) * z - w.row(2) * x,
-            w.row(1) * x - w.row(0) * y,
-        ]);
-        // −L [p]×: each row is the cross product p × row.
-        let (a, b, c) = (lever.column(0), lever.column(1), lever.column(2));
-        self.turn += Matrix3::from_columns(&[c * y - b * z, a * z - c * x, b * x - a * y]);
-        self.mixed += lever;
+        let lever = |i: usize| {
+            let (w0, w1, w2) = (w[(0, i)], w[(1, i)], w[(2, i)]);
+            [w2 * y - w1 * z, w0 * z - w2 * x, w1 * x - w0 * y]
+        };
+        let (a, b, c) = (lever(0), lever(1), lever(2));
+        // −L [p]×, symmetric: each row is the cross product p × row.
+        let (xx, xy, xz) = (c[0] * y - b[0] * z, a[0] * z - c[0] * x, b[0] * x - a[0] * y);
+        let (yy, yz, zz) = (a[1] * z - c[1] * x, b[1] * x - a[1] * y, b[2] * x - a[2] * y);
+        self.turn += Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        self.mixed += Matrix3::from_columns(&[a.into(), b.into(), c.into()]);
         self.shift += w;
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use seafix_geometry::StereoRig;
 use smallvec::SmallVec;
 
-use super::{descent::Term, eyes::Eyes, mahalanobis::information};
+use super::{descent::Term, eyes::Eyes, mahalanobis::information, whitened::Whitener};
 use crate::Observation;
 
 /// Up to so many points are kept without allocating.
@@ -28,8 +28,8 @@ pub(crate) struct Sightings<'a> {
 }
 
 enum Sighting {
-    /// Pixels with the inverse of their covariance, and of that with the model's error as the measured point shows it.
-    Seen { at: Vector4<f64>, weight: Matrix4<f64>, frozen: Matrix4<f64>, model_variance: f64 },
+    /// Pixels with their weights, and those with the model's error besides as the measured point shows it.
+    Seen { at: Vector4<f64>, weight: Whitener, frozen: Whitener, model_variance: f64 },
     /// A point without pixels, with the information on it.
     Bare { at: Vector3<f64>, information: Matrix3<f64> },
 }
@@ -59,7 +59,7 @@ impl<'a> Sightings<'a> {
             return Some(Sighting::Bare { at: point.measured.at.coords, information: information(point) });
         };
         let noise = pixels.covariance + Matrix4::identity() * (FLOOR * FLOOR);
-        let weight = noise.try_inverse()?;
+        let weight = Whitener::of(&noise)?;
         let model_variance = point.model_sigma * point.model_sigma;
         let (mut at, mut frozen) = (pixels.at.coordinates(), weight);
         if target == Target::Triangulated || model_variance > 0.0 {
@@ -68,7 +68,7 @@ impl<'a> Sightings<'a> {
                 at = seen;
             }
             if model_variance > 0.0 {
-                frozen = (noise + j * j.transpose() * model_variance).try_inverse()?;
+                frozen = Whitener::of(&(noise + j * j.transpose() * model_variance))?;
             }
         }
         Some(Sighting::Seen { at, weight, frozen, model_variance })
@@ -106,11 +106,8 @@ impl<'a> Sightings<'a> {
     }
 
     #[inline]
-    fn seen(&self, at: &Vector4<f64>, weight: &Matrix4<f64>, place: &Vector3<f64>) -> Option<Term> {
+    fn seen(&self, at: &Vector4<f64>, weight: &Whitener, place: &Vector3<f64>) -> Option<Term> {
         let (expected, j) = self.eyes.look(place)?;
-        let r = at - expected;
-        let weighted = weight * j;
-        let information = weighted.tr_mul(&j);
-        Some(Term { information, pull: weighted.tr_mul(&r), cost: r.dot(&(weight * r)) })
+        Some(weight.term(&j, &(at - expected)))
     }
 }

@@ -59,7 +59,7 @@ const MOST_WEIGHED: usize = 40;
 impl Solver for Triad {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         let three = self.three(data)?;
-        pose(&three.map(|i| data.points[i]))
+        pose(&three.map(|i| &data.points[i]))
     }
 
     fn used(&self, data: &Observations<'_>) -> Vec<usize> {
@@ -81,7 +81,8 @@ impl Triad {
     /// The three points the pose rests on, ascending.
     fn three(&self, data: &Observations<'_>) -> Result<[usize; 3], Degenerate> {
         seen(data, 3)?;
-        let wide = |three: [usize; 3]| least_sine(&three.map(|i| &data.points[i])) >= self.least_sine;
+        let least = self.least_sine * self.least_sine;
+        let wide = |three: [usize; 3]| least_sine_squared(&three.map(|i| &data.points[i])) >= least;
         if self.choose == Choose::LargestArea
             && let Some(three) = largest(&data.points).filter(|&three| wide(three))
         {
@@ -107,8 +108,8 @@ impl Triad {
 
     /// That no triangle is wide enough, with the widest.
     fn line(&self, data: &Observations<'_>) -> Degenerate {
-        let sines = triangles(data.points.len()).map(|three| least_sine(&three.map(|i| &data.points[i])));
-        Degenerate::Collinear { ratio: sines.fold(0.0, f64::max), least: self.least_sine }
+        let sines = triangles(data.points.len()).map(|three| least_sine_squared(&three.map(|i| &data.points[i])));
+        Degenerate::Collinear { ratio: sines.fold(0.0, f64::max).sqrt(), least: self.least_sine }
     }
 }
 
@@ -189,12 +190,11 @@ fn first_greatest(values: &[f64]) -> (usize, f64) {
 }
 
 /// Eq. (3)–(5): the axes of both auxiliary frames laid on each other, R = M_object M_cameraᵀ, and P1 on C1.
-fn pose(points: &[Observation; 3]) -> Result<Transform<Object, Camera>, Degenerate> {
-    let [c1, c2, c3] = points.map(|point| point.measured.at.coords);
-    let [p1, p2, p3] = points.map(|point| point.model.coords);
-    let rotation = axes(&p1, &p2, &p3)? * axes(&c1, &c2, &c3)?.transpose();
-    let rotation = Transform::<Object, Camera>::from_axes(&rotation, Vector3::zeros()).rotation();
-    Ok(Transform::new(rotation, p1 - rotation * c1))
+fn pose(points: &[&Observation; 3]) -> Result<Transform<Object, Camera>, Degenerate> {
+    let [c1, c2, c3] = points.map(|point| &point.measured.at.coords);
+    let [p1, p2, p3] = points.map(|point| &point.model.coords);
+    let rotation = axes(p1, p2, p3)? * axes(c1, c2, c3)?.transpose();
+    Ok(Transform::from_axes(&rotation, p1 - rotation * c1))
 }
 
 /// The axes of [`seafix_geometry::triad`] as the columns of a matrix.
@@ -202,13 +202,13 @@ fn axes(p1: &Vector3<f64>, p2: &Vector3<f64>, p3: &Vector3<f64>) -> Result<Matri
     const LEAST_SINE: f64 = 1e-9;
     let (a, b) = (p2 - p1, p3 - p1);
     let normal = a.cross(&b);
-    let (length, size) = (b.norm(), normal.norm());
-    let ratio = size / (a.norm() * length);
+    let (length, size, sides) = (b.norm_squared(), normal.norm_squared(), a.norm_squared() * b.norm_squared());
     // Written so that a NaN (coincident points) is refused too.
-    if !(ratio >= LEAST_SINE) {
+    if !(size >= LEAST_SINE * LEAST_SINE * sides && size > 0.0) {
+        let ratio = (size / sides).sqrt();
         return Err(Degenerate::Collinear { ratio: if ratio.is_nan() { 0.0 } else { ratio }, least: LEAST_SINE });
     }
-    let (x, z) = (b / length, normal / size);
+    let (x, z) = (b * (1.0 / length.sqrt()), normal * (1.0 / size.sqrt()));
     Ok(Matrix3::from_columns(&[x, z.cross(&x), z]))
 }
 
@@ -218,12 +218,12 @@ fn covariance_of(
     at: &Transform<Object, Camera>,
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
     let three = Observations { points: points.to_vec(), rig: data.rig };
-    let solve = |moved: &Observations<'_>| pose(&[moved.points[0], moved.points[1], moved.points[2]]);
+    let solve = |moved: &Observations<'_>| pose(&[&moved.points[0], &moved.points[1], &moved.points[2]]);
     numerical::covariance(solve, &three, at)
 }
 
-/// The sine of the smallest angle, in the model or as measured, whichever is smaller.
-fn least_sine(points: &[&Observation; 3]) -> f64 {
+/// The square of the sine of the smallest angle, in the model or as measured, whichever is smaller.
+fn least_sine_squared(points: &[&Observation; 3]) -> f64 {
     let of = |p: [Vector3<f64>; 3]| {
         let sides = [(p[1] - p[0]), (p[2] - p[1]), (p[0] - p[2])];
         let square = sides[0].cross(&sides[1]).norm_squared();
@@ -231,7 +231,7 @@ fn least_sine(points: &[&Observation; 3]) -> f64 {
         // The smallest angle lies between the two longest sides.
         square / (a * b).max(b * c).max(c * a)
     };
-    of(points.map(|point| point.model.coords)).min(of(points.map(|point| point.measured.at.coords))).sqrt()
+    of(points.map(|point| point.model.coords)).min(of(points.map(|point| point.measured.at.coords)))
 }
 
 /// Four times the square of the area of the model's triangle (m⁴).
@@ -241,7 +241,7 @@ fn square_area(points: &[&Observation; 3]) -> f64 {
 
 /// The variance (m²) that the pose from these three gives all identified points, summed.
 fn predicted_error(points: &[Observation; 3], data: &Observations<'_>) -> Result<f64, Degenerate> {
-    let at = pose(points)?;
+    let at = pose(&points.each_ref())?;
     let covariance = covariance_of(points, data, &at)?;
     Ok(data.points.iter().map(|point| covariance.of_point(&point.measured.at).trace()).sum())
 }

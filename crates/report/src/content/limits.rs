@@ -92,7 +92,7 @@ fn over_noise(run: &Run, summary: &Summary) -> Option<Figure> {
     }
     share_axes(&mut panels);
     let entries = methods.iter().enumerate().map(|(series, name)| Entry::both(name.clone(), series));
-    let columns = if panels.len() > 24 { 6 } else { panels.len().clamp(1, 4) };
+    let columns = columns(&places);
     let rows = panels.len().div_ceil(columns);
     for (index, panel) in panels.iter_mut().enumerate() {
         if index % columns == 0 {
@@ -117,6 +117,14 @@ fn over_noise(run: &Run, summary: &Summary) -> Option<Figure> {
         drawing: chart.draw()?,
         data,
     })
+}
+
+/// How many panels stand side by side: as many as the longest of their titles lets, up to six.
+fn columns(titles: &[String]) -> usize {
+    /// Letters of a title across the page, a gap of two between panels included.
+    const ACROSS: usize = 120;
+    let longest = titles.iter().map(|title| title.chars().count()).max().unwrap_or(0);
+    (ACROSS / (longest + 2)).clamp(1, 6).min(titles.len().max(1))
 }
 
 /// The same ends for all panels.
