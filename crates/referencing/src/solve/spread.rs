@@ -55,9 +55,20 @@ pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degen
 /// Refuses what [`finite`] refuses and, where a rig is given, points that it cannot have seen, or too far away to be
 /// measured by it.
 pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
-    finite(data, needed)?;
+    // Sound points, which nearly all are, are known in one pass: what is not finite leaves no finite sum.
+    let (mut sum, mut front) = (0.0, true);
+    for point in &data.points {
+        let (seen, known) = (&point.measured.at.coords, &point.model.coords);
+        sum += (seen.x + seen.y + seen.z) + (known.x + known.y + known.z);
+        front &= seen.z > 0.0;
+    }
+    if data.points.len() < needed || !sum.is_finite() {
+        finite(data, needed)?;
+    }
     if data.rig.is_some() {
-        in_front(data)?;
+        if !front {
+            in_front(data)?;
+        }
         near(data)?;
     }
     Ok(())
