@@ -305,9 +305,13 @@ impl Stages {
             if matches!(attempt.answer.outcome, Outcome::Referenced(_)) || prior.is_none() {
                 continue;
             }
-            let Some(in_view) = in_view(&targets[index], prior, rig) else { continue };
-            let mut other =
-                self.attempt(index, &targets[index], &sighting.cloud, &sight.told, prior, &in_view, rig, rng);
+            let (target, cloud) = (&targets[index], &sighting.cloud);
+            let again = match &sight.told {
+                Told::Names(names) => self.named(index, target, cloud, names, prior, rig),
+                _ => in_view(target, prior, rig)
+                    .map(|in_view| self.attempt(index, target, cloud, prior, &in_view, rig, rng)),
+            };
+            let Some(mut other) = again else { continue };
             if matches!(other.answer.outcome, Outcome::Referenced(_)) {
                 let spent = milliseconds(other.started);
                 other.times.total_ms = attempt.times.total_ms.map(|before| before + spent);
