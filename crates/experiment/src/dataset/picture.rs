@@ -286,6 +286,20 @@ mod tests {
         assert!(read("a.jpg", &encoded(&samples, ExtendedColorType::L8, ImageFormat::Png), [8, 6], 16).is_ok());
     }
 
+    /// Pixels that are stored coarse to fine: 8×6 of them, each 5 more than the one before, by Adam7's seven passes.
+    #[test]
+    fn an_interlaced_image_is_put_in_order() {
+        let bytes = [
+            137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 8, 0, 0, 0, 6, 8, 0, 0, 0, 1, 172,
+            105, 176, 177, 0, 0, 0, 71, 73, 68, 65, 84, 120, 1, 1, 60, 0, 195, 255, 0, 0, 0, 20, 0, 160, 180, 0, 10,
+            30, 0, 170, 190, 0, 80, 90, 100, 110, 0, 5, 15, 25, 35, 0, 85, 95, 105, 115, 0, 165, 175, 185, 195, 0, 40,
+            45, 50, 55, 60, 65, 70, 75, 0, 120, 125, 130, 135, 140, 145, 150, 155, 0, 200, 205, 210, 215, 220, 225,
+            230, 235, 238, 81, 22, 9, 215, 91, 7, 20, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130,
+        ];
+        let found = read("a.png", &bytes, [8, 6], 8).unwrap();
+        assert!(found.pixels().iter().enumerate().all(|(i, value)| *value == i as f32 * 5.0));
+    }
+
     #[test]
     fn the_limits_are_the_caller_s() {
         let samples: Vec<u8> = (0..48).collect();
