@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Axis, Helm, Navigation, Pipeline, Place, Stages,
+    Axis, Helm, Logging, Navigation, Pipeline, Place, Stages,
     dataset::hex,
     pipeline::PipelineError,
     read, read_text,
@@ -36,6 +36,9 @@ pub struct Experiment {
     /// The way from fix to fix; without it every frame is by itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub navigation: Option<Navigation>,
+    /// What is logged besides the results.
+    #[serde(default, skip_serializing_if = "Logging::is_default")]
+    pub log: Logging,
     /// What varies; the grid of all its values gives the trials.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vary: Vec<Axis>,
@@ -74,6 +77,7 @@ impl Experiment {
             source: Choice::named("dataset").with("path", folder.to_string_lossy().into_owned()),
             pipeline: Pipeline::default(),
             navigation: None,
+            log: Logging::default(),
             vary: Vec::new(),
         }
     }

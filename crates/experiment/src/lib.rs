@@ -11,6 +11,7 @@ mod exact;
 mod experiment;
 mod joint;
 mod judge;
+mod logging;
 mod manifest;
 mod navigate;
 mod pipeline;
@@ -28,6 +29,7 @@ mod vary;
 
 pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
+pub use logging::{ImagesLogged, Logging};
 pub use navigate::{Helm, Navigation};
 pub use pipeline::{Attempt, Pipeline, PipelineError, Sighting, Stages};
 pub use range::{Number, Range};

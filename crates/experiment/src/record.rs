@@ -13,7 +13,7 @@ use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, Tar
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
 
 use crate::{
-    Attempt, Experiment, Place, Plan, Sighting, Trial, exact,
+    Attempt, Experiment, ImagesLogged, Place, Plan, Sighting, Trial, exact,
     manifest::Git,
     navigate::Underway,
     source::{Eyes, Passage, Sight, Told},
@@ -96,11 +96,16 @@ pub(crate) fn frame(
         };
         attempts.push(TargetRecord::not_attempted(search, solver, reason));
     }
+    let mut inputs = exact::inputs(sight, &sighting.cloud);
+    inputs.exact_images &= trial.resolved.log.images == ImagesLogged::All;
     FrameRecord {
         frame: number,
         stamp_ns: sight.stamp_ns,
         images: match &sight.eyes {
-            Eyes::Pair(left, right) => Some([grey(left), grey(right)]),
+            Eyes::Pair(left, right) => {
+                let level = trial.resolved.log.images;
+                level.logged(grey(left)).zip(level.logged(grey(right))).map(<[GreyImage; 2]>::from)
+            }
             Eyes::Points(_) => None,
         },
         key_points: sighting.keypoints.iter().map(|keypoint| uv(&keypoint.at)).collect(),
@@ -118,7 +123,7 @@ pub(crate) fn frame(
         targets: attempts,
         times: FrameTimes { odometry_ms: underway.map(|underway| underway.odometry_ms), ..sighting.times },
         navigation: underway.map(|underway| Box::new(underway.record.clone())),
-        inputs: Some(Box::new(exact::inputs(sight, &sighting.cloud))),
+        inputs: Some(Box::new(inputs)),
     }
 }
 

@@ -123,3 +123,20 @@ fn settings_of_navigation_are_checked() {
     let points = "question = 'why'\nsource = 'virtual-points'\n[navigation]\n";
     assert!(said(points).contains("navigation needs images"), "{}", said(points));
 }
+
+/// What is logged of images changes no result.
+#[test]
+fn images_may_be_left_out_of_the_log() {
+    let folder = TempDir::new().unwrap();
+    let level = |images: &str| {
+        let settings = ["source.frames=1", &format!("log.images={images}")];
+        logs(folder.path(), "question = 'why'\nsource = 'virtual-images'\n", &settings, 1).remove(0).frames.remove(0)
+    };
+    let [all, small, none] = ["all", "thumbnails", "none"].map(level);
+    let size = |frame: &FrameRecord| frame.images.as_ref().map(|[left, _]| [left.width, left.height]);
+    assert_eq!([size(&all), size(&small), size(&none)], [Some([1024, 768]), Some([256, 192]), None]);
+    for frame in [small, none] {
+        assert_eq!((&frame.targets, &frame.cloud), (&all.targets, &all.cloud));
+        assert!(!frame.inputs.unwrap().exact_images);
+    }
+}

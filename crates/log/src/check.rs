@@ -38,7 +38,10 @@ pub(crate) fn frame(header: &TrialHeader, frame: &FrameRecord, last: Option<u64>
     if let Some(images) = &frame.images {
         for (image, camera) in images.iter().zip([&header.rig.left, &header.rig.right]) {
             let size = [image.width, image.height];
-            if size != camera.size || image.pixels.len() as u64 != u64::from(image.width) * u64::from(image.height) {
+            // A thumbnail is smaller by one factor.
+            let factor = camera.size[0] / image.width.max(1);
+            let fits = factor > 0 && size == camera.size.map(|side| (side / factor).max(1));
+            if !fits || image.pixels.len() as u64 != u64::from(image.width) * u64::from(image.height) {
                 return Err(format!(
                     "an image of {} x {} px with {} bytes; the camera has {} x {} px",
                     size[0],

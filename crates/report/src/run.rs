@@ -31,8 +31,10 @@ pub(crate) struct Trial {
     pub(crate) frames: Vec<Frame>,
     /// What all frames add up to, logged or not; `None` where the log does not say.
     pub(crate) totals: Option<Totals>,
-    /// Whether the log has images, or no frame at all; without images the points came as they are.
+    /// Whether images were looked at, or no frame at all; without images the points came as they are.
     pub(crate) images: bool,
+    /// Whether the log has its images.
+    pub(crate) pictures: bool,
     /// The errors of the disparities of correctly identified points, where truth tells: their squares' sum (px²) and
     /// how many there are.
     pub(crate) disparity: (f64, usize),
@@ -118,6 +120,7 @@ impl Trial {
             frames: Vec::new(),
             totals: None,
             images: false,
+            pictures: false,
             disparity: (0.0, 0),
             named: Default::default(),
             digest: Vec::new(),
@@ -130,7 +133,9 @@ impl Trial {
             results(&mut digest, &frame);
         }
         trial.digest = digest.finalize().to_vec();
-        trial.images = reader.has_images() || trial.frames.is_empty();
+        // A detector is named where there were images, logged or not.
+        trial.images = trial.frames.is_empty() || trial.header.components.iter().any(|c| c.stage == "detector");
+        trial.pictures = reader.has_images();
         trial.totals = reader.totals().cloned();
         trial.frames.shrink_to_fit();
         trial.rows.shrink_to_fit();

@@ -78,6 +78,11 @@ fn experiment() -> Value {
             "source": component("source"),
             "pipeline": { "type": "object", "properties": pipeline, "additionalProperties": false },
             "navigation": { "type": "object", "properties": navigation, "additionalProperties": false },
+            "log": {
+                "type": "object",
+                "properties": { "images": { "enum": ["all", "thumbnails", "none"], "default": "all" } },
+                "additionalProperties": false,
+            },
             "vary": { "type": "array", "items": axis },
         },
         "additionalProperties": false,

@@ -10,7 +10,7 @@ use seafix_simulation::{Purpose, Stream};
 
 use super::RunError;
 use crate::{
-    Plan, Sighting, Trial,
+    ImagesLogged, Plan, Sighting, Trial,
     judge::judge,
     navigate::{Underway, Voyage},
     record,
@@ -52,7 +52,7 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
             continue;
         }
         match trial.source.open(trial.resolved.seed, &plan.folder) {
-            Ok(passage) => match frame_bytes(&*passage) {
+            Ok(passage) => match frame_bytes(&*passage, trial.resolved.log.images) {
                 Ok(frame_bytes) => {
                     let (targets, headers) = (Vec::new(), Vec::new());
                     groups.push(Group { passage, trials: vec![trial], targets, headers, frame_bytes });
@@ -170,14 +170,17 @@ impl Group<'_> {
     }
 }
 
-/// About how much log (bytes) one frame of a passage takes, by its first. Images, losslessly compressed to some 0.7 of
-/// their size, are nearly all of it where there are any.
-fn frame_bytes(passage: &dyn Passage) -> Result<u64, Fault> {
+/// About how much log (bytes) one frame of a passage takes for one trial, by its first. Images, losslessly compressed to
+/// some 0.7 of their size, are nearly all of it where they are logged.
+fn frame_bytes(passage: &dyn Passage, level: ImagesLogged) -> Result<u64, Fault> {
     const CLOUD_BYTES: f64 = 150e3;
     if passage.images() {
-        let pixels = [passage.rig().left(), passage.rig().right()]
-            .map(|camera| f64::from(camera.size()[0]) * f64::from(camera.size()[1]));
-        return Ok((0.7 * (pixels[0] + pixels[1]) + CLOUD_BYTES) as u64);
+        let pixels = [passage.rig().left(), passage.rig().right()].map(|camera| {
+            let factor = f64::from(level.factor(camera.size()[0]));
+            f64::from(camera.size()[0]) * f64::from(camera.size()[1]) / (factor * factor)
+        });
+        let share = if level == ImagesLogged::None { 0.0 } else { 0.7 };
+        return Ok((share * (pixels[0] + pixels[1]) + CLOUD_BYTES) as u64);
     }
     let points = match passage.sight(0)?.eyes {
         Eyes::Points(cloud) => cloud.len(),

@@ -192,6 +192,10 @@ impl Passage for Logged {
             None => self.old_prior(&frame).map_err(broken)?,
         };
         let eyes = match &frame.images {
+            Some([left, _]) if left.width != self.rig.left().size()[0] => {
+                let fault = broken("an image that was logged as a thumbnail".to_owned());
+                return Err(fault.remedy("read the clouds, or log the images of the run"));
+            }
             Some([left, right]) => Eyes::Pair(image(left).map_err(broken)?, image(right).map_err(broken)?),
             None => Eyes::Points(cloud),
         };

@@ -32,7 +32,7 @@ pub(super) fn section(run: &Run) -> Result<(Option<Block>, Section), ReportError
     let mut pictures: BTreeMap<(usize, u64), Marked> = BTreeMap::new();
     for (trial, stamps) in wanted {
         let small = run.trials[trial].frames.len() <= SEARCHED;
-        if run.trials[trial].images && small {
+        if run.trials[trial].pictures && small {
             pictures.extend(
                 draw_picture(&run.trials[trial], &stamps)?.into_iter().map(|marked| ((trial, marked.stamp_ns), marked)),
             );
@@ -92,7 +92,7 @@ fn worst(run: &Run) -> Vec<Case<'_>> {
 /// The frame with most identified points among those that have images and whose fixes are right.
 fn best(run: &Run) -> Option<(usize, u64)> {
     let mut best: Option<(u32, usize, u64)> = None;
-    for (index, trial) in run.trials.iter().enumerate().filter(|(_, trial)| trial.images) {
+    for (index, trial) in run.trials.iter().enumerate().filter(|(_, trial)| trial.pictures) {
         for frame in &trial.frames {
             let points: u32 = trial.attempts_of(frame).filter(|row| row.found()).map(|row| row.points).sum();
             let wrong = trial.attempts_of(frame).any(Attempt::wrong);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use image::{Rgb, RgbImage, codecs::jpeg::JpegEncoder, imageops};
+use image::{GrayImage, Rgb, RgbImage, codecs::jpeg::JpegEncoder, imageops};
 use nalgebra::{Matrix4, Point3};
 use seafix_log::{CameraRecord, FrameRecord, GreyImage, Outcome, Reader, TargetRecord, TrialHeader};
 
@@ -46,12 +46,12 @@ pub(crate) fn draw(trial: &Trial, stamps: &[u64]) -> Result<Vec<Marked>, ReportE
 
 impl Marked {
     fn draw(header: &TrialHeader, frame: &FrameRecord, images: &[GreyImage; 2]) -> Self {
-        let [left, right] = images;
+        let [left, right] = [0, 1].map(|side| full(&images[side], [&header.rig.left, &header.rig.right][side].size));
         let offset = f64::from(left.width + GAP);
         let size = [left.width + GAP + right.width, left.height.max(right.height)];
         let mut canvas = RgbImage::from_pixel(size[0], size[1], Rgb(WHITE));
-        copy(&mut canvas, left, 0);
-        copy(&mut canvas, right, left.width + GAP);
+        copy(&mut canvas, &left, 0);
+        copy(&mut canvas, &right, left.width + GAP);
 
         let scale = (f64::from(left.width) / 1024.0).max(0.5);
         let places = |cloud: u32| {
@@ -158,6 +158,16 @@ fn seen(camera: &CameraRecord, at: Point3<f64>, half: f64, offset: f64) -> Optio
         let centre = [k[0][0] * at.x / at.z + k[0][2] + offset, k[1][1] * at.y / at.z + k[1][2]];
         (centre, [k[0][0] * half / at.z, k[1][1] * half / at.z])
     })
+}
+
+/// A thumbnail as large as the camera's image, so that marks lie where they belong.
+fn full(image: &GreyImage, [width, height]: [u32; 2]) -> GreyImage {
+    if [image.width, image.height] == [width, height] {
+        return image.clone();
+    }
+    let small = GrayImage::from_raw(image.width, image.height, image.pixels.clone()).unwrap_or_default();
+    let large = imageops::resize(&small, width, height, imageops::FilterType::Triangle);
+    GreyImage { width, height, pixels: large.into_raw() }
 }
 
 fn copy(canvas: &mut RgbImage, image: &GreyImage, offset: u32) {

@@ -32,7 +32,7 @@ pub(super) struct Look {
 /// All looks, each made when it is first seen.
 #[derive(Debug, Clone)]
 pub(crate) struct Looks {
-    looks: [OnceLock<Box<Look>>; 6],
+    looks: [OnceLock<Box<Look>>; 7],
     seed: u32,
 }
 
@@ -220,6 +220,13 @@ fn look(texture: Texture, seed: u32) -> Look {
         Texture::Rock => Look {
             fine: tile(0.0017, &[(9, 0.14), (21, 0.15), (53, 0.14), (127, 0.10)], 1),
             coarse: tile(0.0053, &[(13, 0.14), (37, 0.10)], 2),
+        },
+        Texture::Concrete => Look {
+            fine: Tile::new(0.0009, |x, y| {
+                let grain = sum(&[(13, 0.05), (31, 0.06), (71, 0.07), (151, 0.09), (331, 0.10)], x, y, seed);
+                (1.0 + grain + 0.5 * pebbles(x, y, 41, seed ^ 0xA5A5)).max(0.2)
+            }),
+            coarse: tile(0.0057, &[(5, 0.08), (13, 0.08), (31, 0.08), (73, 0.06)], 4),
         },
         Texture::Growth => Look {
             fine: Tile::new(0.0015, |x, y| {

@@ -66,6 +66,8 @@ pub enum Texture {
     Rock,
     /// Soft growth.
     Growth,
+    /// A rough floor: grain down to some millimetres, cracks of shade over metres.
+    Concrete,
 }
 
 /// What a surface is made of.
