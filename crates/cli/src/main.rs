@@ -6,6 +6,7 @@ use clap::Parser;
 
 mod catalogue;
 mod commands;
+mod executor;
 mod exit;
 mod ply;
 mod signals;

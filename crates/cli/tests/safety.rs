@@ -346,3 +346,17 @@ fn neither_threads_nor_shards_change_a_byte() {
         }
     }
 }
+
+#[test]
+fn a_sweep_is_the_run() {
+    let folder = experiment(60);
+    let folder = folder.path();
+    assert!(run(folder, "whole", &[]).output().unwrap().status.success());
+    let sweep = ["sweep", "e.toml", "--shards", "3", "--untimed", "--out", "swept"];
+    let (code, error) = ended(&seafix(folder, &sweep).output().unwrap());
+    assert_eq!(code, Some(0), "{error}");
+    same(&folder.join("whole"), &folder.join("swept"));
+    assert!(!folder.join("swept-shards").exists());
+    let (code, error) = ended(&seafix(folder, &sweep).output().unwrap());
+    assert!(code == Some(4) && error.contains("swept is there already"), "{error}");
+}

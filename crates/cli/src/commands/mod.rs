@@ -25,12 +25,15 @@ mod run;
 mod schema;
 mod show;
 mod solve;
+mod sweep;
 
 /// What `seafix` can do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Run an experiment, or the default pipeline on a data set: logs, results and a report.
     Run(run::Run),
+    /// Run an experiment in shards, here or on a cluster, and join them.
+    Sweep(sweep::Sweep),
     /// Join the shards of a run into the run.
     Merge(merge::Merge),
     /// Solve coherence problems (coherence-problem/1), one result each.
@@ -84,6 +87,7 @@ impl Command {
     pub(crate) fn execute(&self) -> Ended {
         match self {
             Self::Run(command) => command.execute(),
+            Self::Sweep(command) => command.execute(),
             Self::Merge(command) => command.execute(),
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),

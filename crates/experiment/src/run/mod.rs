@@ -109,14 +109,15 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     let mine: Vec<&Piece> = pieces.iter().filter(|piece| options.takes(piece.number)).collect();
     let frames = |pieces: &[&Piece]| pieces.iter().map(|piece| piece.frames() * groups[piece.group].trials.len()).sum();
     observer.begins(frames(&mine), cut::bytes(&groups, &mine), &claim.folder);
-    let store = Store::open(&claim.folder)?;
     if let Some(finished) = claim.finished {
         if options.shard.is_none() {
-            store.remove()?;
+            Store::of(&claim.folder).remove()?;
         }
         return Ok(Finished { folder: claim.folder, rows: finished.rows });
     }
+    // First: a folder without it holds no run.
     manifest.write(&claim.folder, "running")?;
+    let store = Store::open(&claim.folder)?;
     let (made, missing): (Vec<&Piece>, Vec<&Piece>) =
         mine.into_iter().partition(|piece| store.sound(piece.number).is_some());
     if !made.is_empty() {

@@ -94,7 +94,8 @@ impl Default for Stereo {
         let deep = 1e4;
         Self {
             filters: Vec::new(),
-            detector: Choice::named("harris").with("sigma", 2.0).with("features", 1000),
+            // Bright corners in view shall not hide the faint texture of the ground: their responses differ by ten million.
+            detector: Choice::named("harris").with("sigma", 2.0).with("features", 1000).with("quality", 1e-7),
             locator: Choice::named("peak"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band").with("max-depth", deep),

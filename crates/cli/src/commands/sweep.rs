@@ -1,0 +1,162 @@
+//! `seafix sweep`.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use clap::{Args, ValueEnum};
+use seafix_experiment::{Existing, Options, Plan, merge};
+
+use super::run::tell_of;
+use crate::{
+    executor::{Array, Executor, HyperQueue, Local, Slurm},
+    exit::{DONE, Ended, Failure, OUTPUT, USAGE},
+    signals,
+    terminal::{Progress, tell},
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Sweep {
+    /// An experiment file.
+    experiment: PathBuf,
+    /// Change a setting of the experiment: a dotted key and a TOML value, `source.frames=3`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Into how many shards the run is dealt.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    shards: u32,
+    /// Who runs them.
+    #[arg(long, value_enum, default_value = "local")]
+    executor: Engine,
+    /// The folder of the run; its shards lie in DIR-shards until they are merged. The same command goes on with them.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Threads of each shard.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// Log no durations: two runs of one experiment then have the same bytes.
+    #[arg(long)]
+    untimed: bool,
+}
+
+/// The engines that are known.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Engine {
+    /// This machine.
+    Local,
+    /// A job array of Slurm.
+    Slurm,
+    /// A task array of HyperQueue.
+    Hyperqueue,
+}
+
+impl Engine {
+    fn executor(self) -> Box<dyn Executor> {
+        match self {
+            Self::Local => Box::new(Local),
+            Self::Slurm => Box::new(Slurm),
+            Self::Hyperqueue => Box::new(HyperQueue),
+        }
+    }
+}
+
+impl Sweep {
+    pub(crate) fn execute(&self) -> Ended {
+        let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
+        let executor = self.executor.executor();
+        let refuse = |path: &Path, error: std::io::Error| {
+            Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()))
+        };
+        if self.out.exists() && fs::read_dir(&self.out).map_or(true, |mut entries| entries.next().is_some()) {
+            let what = format!("{} is there already; name another folder", self.out.display());
+            return Err(Failure::new(OUTPUT, what));
+        }
+        let shards = absolute(&self.shards_folder())?;
+        let logs = shards.join("logs");
+        fs::create_dir_all(&logs).map_err(|error| refuse(&logs, error))?;
+        let script = shards.join("shard.sh");
+        fs::write(&script, self.script(&shards, executor.variable())?).map_err(|error| refuse(&script, error))?;
+        let (tasks, threads) = (self.shards as usize, usize::from(self.threads));
+        tell(&format!("{tasks} shards of {} into {}", plan.name, shards.display()));
+        signals::listen();
+        let ran = executor.run(&Array { script, tasks, threads, name: format!("seafix-{}", plan.name), logs });
+        signals::end_at_once();
+        ran?;
+        if signals::came() {
+            return Err(Failure::new(signals::exit_code(), "interrupted; the same command goes on where it ended"));
+        }
+        self.merge(&shards)
+    }
+
+    fn shards_folder(&self) -> PathBuf {
+        let mut name = self.out.as_os_str().to_owned();
+        name.push("-shards");
+        PathBuf::from(name)
+    }
+
+    /// What each task does: its shard, or what is missing of it.
+    fn script(&self, shards: &Path, variable: &str) -> Result<String, Failure> {
+        let program = std::env::current_exe()
+            .map_err(|error| Failure::new(OUTPUT, format!("nobody knows where seafix lies: {error}")))?;
+        // From the same folder, so that the run's log says the same command.
+        let here =
+            std::env::current_dir().map_err(|error| Failure::new(OUTPUT, format!("no folder to run in: {error}")))?;
+        let set: String = self.set.iter().map(|setting| format!(" --set {}", quoted(setting))).collect();
+        Ok(format!(
+            "#!/bin/sh\n# One shard of a sweep; {variable} says which.\ncd {} || exit 4\nexec {} run {}{set} --shard \"${variable}/{}\" --out {}/\"${variable}\" --resume --threads {}{}\n",
+            quoted(&here.to_string_lossy()),
+            quoted(&program.to_string_lossy()),
+            quoted(&self.experiment.to_string_lossy()),
+            self.shards,
+            quoted(&shards.to_string_lossy()),
+            self.threads,
+            if self.untimed { " --untimed" } else { "" },
+        ))
+    }
+
+    fn merge(&self, shards: &Path) -> Ended {
+        let folders: Vec<PathBuf> = (1..=self.shards).map(|k| shards.join(k.to_string())).collect();
+        let whole = |folder: &PathBuf| {
+            fs::read_to_string(folder.join("manifest.json")).is_ok_and(|text| text.contains("\"state\": \"shard\""))
+        };
+        let missing: Vec<String> =
+            (1..=self.shards).zip(&folders).filter(|(_, folder)| !whole(folder)).map(|(k, _)| k.to_string()).collect();
+        if !missing.is_empty() {
+            let what = format!(
+                "shards {} did not end; what they said is in {}; the same command goes on with them",
+                missing.join(", "),
+                shards.join("logs").display()
+            );
+            return Err(Failure::new(OUTPUT, what));
+        }
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let options = Options { existing: Existing::Refuse, threads: cores, ..Options::into(&self.out) };
+        let progress = Progress::new();
+        let finished = merge(&folders, &options, &progress);
+        progress.end();
+        tell_of(&finished?)?;
+        fs::remove_dir_all(shards)
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot remove {}: {error}", shards.display())))?;
+        Ok(DONE)
+    }
+}
+
+fn absolute(path: &Path) -> Result<PathBuf, Failure> {
+    std::path::absolute(path).map_err(|error| Failure::new(OUTPUT, format!("{}: {error}", path.display())))
+}
+
+/// A word for the shell, whatever is in it.
+fn quoted(word: &str) -> String {
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_harmless_in_the_shell() {
+        assert_eq!(quoted("a b$(c)'d"), r"'a b$(c)'\''d'");
+    }
+}
