@@ -26,6 +26,9 @@ pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Resul
         bytes.extend([grey; 3]);
         bytes.extend((point.position.covariance.trace().sqrt() as f32).to_le_bytes());
     }
+    if path.exists() && !path.is_file() {
+        return Err(Fault::new("the output is no file", path).remedy("name a file, new or to be replaced"));
+    }
     let mut partial = path.as_os_str().to_owned();
     partial.push(".partial");
     std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|error| {

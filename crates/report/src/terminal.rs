@@ -69,7 +69,7 @@ impl fmt::Display for Summary {
         }
         writeln!(f)?;
         times.write(f)?;
-        write!(f, "Median milliseconds; the first six stages a frame, the others a target.")
+        write!(f, "Median milliseconds; the first seven stages a frame, the others a target.")
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
 
 pub(super) fn section(run: &Run, summary: &Summary) -> Section {
     let caption = text![
-        "Time (ms), medians: of the first six stages a frame, of the others an attempted target; total is from the images, or the points where there are none, to the answer about one target; p95 is its 95 % quantile. Wall clock: it differs from run to run and from machine to machine."
+        "Time (ms), medians: of the first seven stages a frame, of the others an attempted target; total is from the images, or the points where there are none, to the answer about one target; p95 is its 95 % quantile. Wall clock: it differs from run to run and from machine to machine."
     ];
     let stages: Vec<&str> = summary
         .rows

@@ -15,12 +15,12 @@ pub(super) struct Residual {
     pub(super) fractions: Option<[f64; 2]>,
     /// Σ w².
     pub(super) squared_weights: f64,
+    /// The variance of rounding: no noise is less (squares of grey levels).
+    pub(super) rounding: f64,
 }
 
 /// The prior pulls deformations towards none; they are about this great, one standard deviation.
 const SLOPE: f64 = 0.15;
-/// Rounding to whole grey levels errs by this variance.
-const ROUNDING: f64 = 1.0 / 12.0;
 
 /// The covariance of the aligned place (px²), in the pixels of the left image; `None` if noise makes up all
 /// that the window shows.
@@ -37,7 +37,7 @@ pub(super) fn covariance<const P: usize>(normal: &Normal<P>, residual: &Residual
     let kept = residual.fractions.map_or(MEAN_KEPT * MEAN_KEPT, |[x, y]| kept(x) * kept(y));
     let free = 1.0 - (P + 2) as f64 * residual.squared_weights;
     let noise = residual.energy / (left + kept * right) / free.max(0.1);
-    let noise = noise.max(ROUNDING);
+    let noise = noise.max(residual.rounding);
     let signal: SMatrix<f64, P, P> = normal.information - normal.noise * (noise * left);
     let prior = normal.prior(residual.energy);
     let inverse = (signal + prior).cholesky()?.inverse();

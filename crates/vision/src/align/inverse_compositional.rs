@@ -57,6 +57,8 @@ pub(crate) struct Aligner {
     grid: Grid,
     template: Template,
     spline: Spline,
+    /// The variance of rounding in the right image (squares of grey levels).
+    rounding: f64,
     across: Vec<f32>,
     patch: Vec<f32>,
 }
@@ -180,6 +182,7 @@ impl Aligner {
         let fill = (self.grid.columns - self.grid.side) as f64;
         let whole = |x: f64| x.floor() as isize;
         let (start, end) = ([whole(first.x) - 2, whole(first.y) - 2], [whole(last.x + fill) + 5, whole(last.y) + 5]);
+        self.rounding = image.rounding();
         self.spline.load(image, start, end);
     }
 
@@ -205,7 +208,7 @@ impl Aligner {
         if !covers(&self.spline) {
             self.load(right, at, shape)?;
         }
-        let Self { grid, template, spline, across, patch } = self;
+        let Self { grid, template, spline, across, patch, rounding: _ } = self;
         if *shape == Matrix2::identity() {
             let first = [at.x + grid.first[0], at.y + grid.first[1]];
             spline.grid(first, grid.columns, grid.side, across, patch);
@@ -241,6 +244,7 @@ impl Aligner {
             variance: found.variance,
             fractions: whole.then(|| [0, 1].map(|i| (at[i] + self.grid.first[i]).rem_euclid(1.0))),
             squared_weights: f64::from(squares),
+            rounding: self.rounding,
         }
     }
 }

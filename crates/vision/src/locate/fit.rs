@@ -80,8 +80,6 @@ const MOVES: usize = 3;
 const BLUR: [f64; 2] = [0.3, 3.0];
 /// Sine of the least angle between the edges.
 const PARALLEL: f64 = 0.3;
-/// The variance of an error of rounding to 8 bits: no residual is believed to be less.
-const ROUNDING: f64 = 1.0 / 12.0;
 
 impl Fitter {
     /// The corner near `keypoint` that explains the pixels best among `shapes`; `None` where none does well
@@ -129,7 +127,7 @@ impl Fitter {
             let may_move = moved < MOVES && trial.at[..2].iter().any(|c| c.abs() > ASIDE);
             if sane && length < SHORT && damping == 0.0 && !may_move {
                 best.squares = promised;
-                return self.judge(settings, keypoint, &trial, &best);
+                return self.judge(settings, keypoint, image.rounding(), &trial, &best);
             }
             let next = if sane { Some(self.pixels.normal(&trial)) } else { None };
             let Some(next) = next.filter(|next| next.squares <= best.squares * (1.0 + 1e-5)) else {
@@ -165,7 +163,14 @@ impl Fitter {
     }
 
     /// The corner, if it is believed.
-    fn judge(&self, settings: &CornerFit, keypoint: &Keypoint, model: &Model, normal: &Normal) -> Option<Place> {
+    fn judge(
+        &self,
+        settings: &CornerFit,
+        keypoint: &Keypoint,
+        rounding: f64,
+        model: &Model,
+        normal: &Normal,
+    ) -> Option<Place> {
         let [x, y] = self.middle.map(|x| x as f64);
         let at = Pixel { u: x + model.at[0], v: y + model.at[1] };
         let difference = model.at[6].abs() * if model.shape == Shape::Crossing { 2.0 } else { 1.0 };
@@ -175,7 +180,8 @@ impl Fitter {
             && explained >= settings.explained;
         let freedom = (settings.window * settings.window - PARAMETERS) as f64;
         let inverse = factor(normal, 0.0)?.inverse();
-        let covariance = inverse.fixed_view::<2, 2>(0, 0) * (normal.squares / freedom).max(ROUNDING);
+        // No residual is believed to be less than rounding.
+        let covariance = inverse.fixed_view::<2, 2>(0, 0) * (normal.squares / freedom).max(rounding);
         let covariance = Matrix2::new(covariance[(0, 0)], covariance[(0, 1)], covariance[(0, 1)], covariance[(1, 1)]);
         (believed && covariance.trace() < 0.25).then_some(Place { at, covariance })
     }
