@@ -142,7 +142,7 @@ fn a_run_that_is_killed_and_resumed_has_the_same_bytes() {
 
 /// `cargo test --release --workspace --test safety -- --ignored two_hundred --nocapture`
 #[test]
-#[ignore = "200 runs"]
+#[ignore = "200 runs, a quarter of an hour: cargo test --release --workspace --test safety -- --ignored two_hundred"]
 fn two_hundred_kills() {
     kill(200, 2000);
 }
@@ -312,7 +312,7 @@ fn a_full_disk_is_said_and_nothing_is_lost() {
 
 /// `cargo test --release --workspace --test safety -- --ignored every_write --nocapture`
 #[test]
-#[ignore = "several hundred runs"]
+#[ignore = "several hundred runs, minutes: cargo test --release --workspace --test safety -- --ignored every_write"]
 fn every_write_fails_in_turn() {
     fail(|_| true);
 }

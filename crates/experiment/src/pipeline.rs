@@ -238,6 +238,20 @@ pub struct Attempt {
     started: Instant,
 }
 
+impl Attempt {
+    /// `times` (ms) are those of candidates, search and solution.
+    fn new(
+        target: usize,
+        candidates: Candidates,
+        answer: seafix_referencing::Attempt,
+        [candidates_ms, search_ms, solve_ms]: [Option<f64>; 3],
+        started: Instant,
+    ) -> Self {
+        let times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms: None };
+        Self { target, candidates, answer, times, started }
+    }
+}
+
 impl Stages {
     /// Whether its solver works on pixels, and on nothing else.
     pub fn needs_pixels(&self) -> bool {
@@ -363,13 +377,7 @@ impl Stages {
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
         let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, &settings.acceptance, Some(rig)));
-        let times = TargetTimes {
-            candidates_ms: Some(stage1),
-            search_ms: Some(stage2),
-            solve_ms: Some(solution),
-            total_ms: None,
-        };
-        Attempt { target: index, candidates, answer, times, started }
+        Attempt::new(index, candidates, answer, [Some(stage1), Some(stage2), Some(solution)], started)
     }
 
     /// The answer where every point says which one it is; `None` of a target that no point belongs to.
@@ -392,8 +400,7 @@ impl Stages {
         let Pipeline { tolerance, acceptance, .. } = &self.settings;
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
         let (answer, solution) = timed(|| judge_named(&problem, pairs, &*self.solver, acceptance, Some(rig)));
-        let times = TargetTimes { candidates_ms: Some(stage1), solve_ms: Some(solution), ..TargetTimes::default() };
-        Some(Attempt { target: index, candidates, answer, times, started })
+        Some(Attempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], started))
     }
 
     /// The answer to a problem that states its own candidates, tolerance and rough pose.
@@ -408,13 +415,7 @@ impl Stages {
         let posed = Problem { model: &target.points, cloud: &problem.cloud, candidates: &candidates, tolerance, prior };
         let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
         let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
-        let times = TargetTimes {
-            candidates_ms: Some(stage1),
-            search_ms: Some(stage2),
-            solve_ms: Some(solution),
-            total_ms: None,
-        };
-        Attempt { target: index, candidates, answer, times, started }
+        Attempt::new(index, candidates, answer, [Some(stage1), Some(stage2), Some(solution)], started)
     }
 }
 

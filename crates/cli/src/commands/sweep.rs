@@ -7,6 +7,7 @@ use std::{
 
 use clap::{Args, ValueEnum};
 use seafix_experiment::{Existing, Options, Plan, merge};
+use serde_json::Value;
 
 use super::run::tell_of;
 use crate::{
@@ -118,7 +119,8 @@ impl Sweep {
     fn merge(&self, shards: &Path) -> Ended {
         let folders: Vec<PathBuf> = (1..=self.shards).map(|k| shards.join(k.to_string())).collect();
         let whole = |folder: &PathBuf| {
-            fs::read_to_string(folder.join("manifest.json")).is_ok_and(|text| text.contains("\"state\": \"shard\""))
+            let text = fs::read_to_string(folder.join("manifest.json")).unwrap_or_default();
+            serde_json::from_str::<Value>(&text).is_ok_and(|manifest| manifest["state"] == "shard")
         };
         let missing: Vec<String> =
             (1..=self.shards).zip(&folders).filter(|(_, folder)| !whole(folder)).map(|(k, _)| k.to_string()).collect();

@@ -36,7 +36,7 @@ pub fn estimate(plan: &Plan) -> Result<Estimate, RunError> {
         let tried = TRIED.min(count);
         for k in 0..tried {
             // The first frames where one follows from the other, else some over the whole way.
-            let index = if group.navigates() { k } else { k * (count - 1) / tried.max(2).saturating_sub(1) };
+            let index = if group.navigates() { k } else { k * (count - 1) / (tried - 1).max(1) };
             let looked = group.look(index.min(count - 1), &mut voyages).map_err(input)?;
             group.record(index.min(count - 1), looked, &[]);
         }
