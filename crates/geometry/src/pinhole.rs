@@ -80,6 +80,9 @@ impl Distortion {
     /// folds back and means nothing.
     fn monotone_radius(&self) -> f64 {
         const FAR: f64 = 10.0; // 84 degrees off the axis
+        if *self == Self::default() {
+            return f64::INFINITY;
+        }
         let slope = |r: f64| {
             let (rho, d) = self.radial(r * r);
             rho + 2.0 * d * r * r

@@ -17,6 +17,7 @@ mod export;
 mod limits;
 mod list;
 mod merge;
+mod model;
 mod odometry;
 mod recover;
 mod replay;
@@ -40,6 +41,8 @@ pub(crate) enum Command {
     Solve(solve::Solve),
     /// Make the cloud of measured points of one stereo pair.
     Cloud(cloud::Cloud),
+    /// Make a model of an object from points that were marked by hand in one stereo pair.
+    Model(model::Model),
     /// Follow a stereo rig through a data set: poses relative to the first.
     Odometry(odometry::Odometer),
     /// Draw identification problems with truth (coherence-problem/1).
@@ -91,6 +94,7 @@ impl Command {
             Self::Merge(command) => command.execute(),
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),
+            Self::Model(command) => command.execute(),
             Self::Odometry(command) => command.execute(),
             Self::Draw(command) => command.execute(),
             Self::Compare(command) => command.execute(),

@@ -11,7 +11,7 @@ mod kitti;
 mod open;
 mod pairing;
 mod picture;
-mod tables;
+pub(crate) mod tables;
 pub mod tum;
 mod write;
 

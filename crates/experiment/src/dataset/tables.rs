@@ -86,7 +86,7 @@ pub(super) fn covariances(text: &str, file: &Path) -> Table<(u64, Covariance6<Wo
 }
 
 /// Data lines with exactly the columns of `header`, and their line numbers.
-fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Table<(usize, [&'a str; N])> {
+pub(crate) fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Table<(usize, [&'a str; N])> {
     let expected = header.join(",");
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     match lines.next() {
@@ -141,7 +141,7 @@ fn wide_rows<'a>(text: &'a str, file: &Path, head: &str, count: usize) -> Table<
         .collect()
 }
 
-fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<T, Fault> {
+pub(crate) fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<T, Fault> {
     word.parse()
         .map_err(|_| Fault::new("not a number", file).on_line(line).value(word).remedy("give a plain decimal number"))
 }

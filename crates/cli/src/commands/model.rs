@@ -1,0 +1,169 @@
+//! `seafix model`.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use seafix_component::Fault;
+use seafix_experiment::{
+    HandModel, HandPoint, ModelByHand, Pipeline,
+    dataset::{read_image, read_rig},
+    read_text,
+};
+use serde_json::{Value, json};
+
+use super::limits::Limits;
+use crate::{
+    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
+    terminal::{print, tell},
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Model {
+    /// The left image.
+    left: PathBuf,
+    /// The right image.
+    right: PathBuf,
+    /// The rig that took them: a dataset.toml, of which only the rig and `bits` are read.
+    #[arg(long, value_name = "DATASET.toml")]
+    rig: PathBuf,
+    /// What was marked: lines id,left_u,left_v,right_u,right_v below that header (px); an empty right place is sought.
+    #[arg(long, value_name = "CLICKS.csv")]
+    points: PathBuf,
+    /// The name of the object.
+    #[arg(long, default_value = "object")]
+    id: String,
+    /// P1, P2 and P3 of the object's frame: origin, the side of -y, the x axis [default: the widest triangle].
+    #[arg(long, value_name = "P1,P2,P3", value_delimiter = ',', num_args = 1)]
+    base: Vec<String>,
+    /// How far a mark may be from its corner (px).
+    #[arg(long, default_value_t = 4.0)]
+    reach: f64,
+    /// Standard deviation of a mark at which no corner is found (px).
+    #[arg(long, default_value_t = 1.0)]
+    mark_sigma: f64,
+    /// Change a setting of the pipeline: a dotted key and a TOML value, `locator.name="junction"`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    #[command(flatten)]
+    limits: Limits,
+    /// One JSON object, for programs: every point with its covariance.
+    #[arg(long)]
+    json: bool,
+    /// Write the site (seafix-site/1) here; without it, it is printed.
+    #[arg(long, value_name = "SITE.toml")]
+    out: Option<PathBuf>,
+}
+
+impl Model {
+    pub(crate) fn execute(&self) -> Ended {
+        let usage = |message: String| Failure::new(USAGE, message);
+        let input = |fault: Fault| Failure::new(INPUT, fault);
+        for (name, value, most) in [("reach", self.reach, 100.0), ("mark-sigma", self.mark_sigma, 100.0)] {
+            if !(value > 0.0 && value <= most) {
+                return Err(usage(format!("--{name} {value}: more than 0, at most {most} (px)")));
+            }
+        }
+        let base = match &self.base[..] {
+            [] => None,
+            [p1, p2, p3] => Some([p1, p2, p3].map(String::clone)),
+            other => return Err(usage(format!("--base {}: three ids, separated by commas", other.join(",")))),
+        };
+        let pipeline = Pipeline::default().changed(&self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
+        let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
+        let (rig, bits) = read_rig(&self.rig).map_err(input)?;
+        let limits = self.limits.of_images();
+        let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
+        let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
+        let text = read_text(&self.points).map_err(input)?;
+        let (reach, mark_sigma, object) = (self.reach, self.mark_sigma, self.id.clone());
+        let by_hand = ModelByHand { front_end: &front_end, reach, mark_sigma, object, base };
+        let model = by_hand.model([&left, &right], &rig, &text, &self.points).map_err(input)?;
+        let site = model.site.to_toml();
+        if let Some(path) = &self.out {
+            write(path, &site)?;
+        }
+        match (self.json, &self.out) {
+            (true, _) => print(&machines(&model))?,
+            (false, Some(_)) => print(&people(&model))?,
+            (false, None) => {
+                people(&model).lines().for_each(tell);
+                print(&site)?;
+            }
+        }
+        Ok(DONE)
+    }
+}
+
+/// Writes the whole file or nothing.
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let partial = PathBuf::from(format!("{}.partial", path.display()));
+    let failed = |error: std::io::Error| {
+        let fault = Fault::new(format!("cannot be written ({error})"), path);
+        Failure::new(OUTPUT, fault.remedy("choose another file with --out, or make room and rights for it"))
+    };
+    fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
+        let _ = fs::remove_file(&partial);
+        failed(error)
+    })
+}
+
+/// How a point was found, in two words.
+fn found(point: &HandPoint) -> [&'static str; 2] {
+    let left = if point.corner { "corner" } else { "as marked" };
+    let right = match (point.aligned, point.mark.right.is_some()) {
+        (true, true) => "aligned",
+        (true, false) => "sought",
+        (false, true) => "as marked",
+        (false, false) => "sought, not aligned",
+    };
+    [left, right]
+}
+
+/// For people: each point, how it was found, and how well it is known.
+fn people(model: &HandModel) -> String {
+    let mut text = format!(
+        "{:16} {:>9} {:>9} {:>9}  {:>7} {:>7}  {:9} right\n",
+        "point", "x mm", "y mm", "z mm", "σ mm", "depth m", "left"
+    );
+    for point in &model.points {
+        let [x, y, z] = <[f64; 3]>::from(point.at.coords * 1e3);
+        let [left, right] = found(point);
+        let (sigma, depth) = (point.sigma() * 1e3, point.measured.position.at.coords.z);
+        let id = &point.mark.id;
+        text += &format!("{id:16} {x:9.1} {y:9.1} {z:9.1}  {sigma:7.2} {depth:7.3}  {left:9} {right}\n");
+    }
+    let object = &model.site.objects[0];
+    let base = object.base.map(|index| object.points[index].id.clone());
+    text + &format!("{} points; the frame is that of {}\n", model.points.len(), base.join(", "))
+}
+
+/// For programs: everything.
+fn machines(model: &HandModel) -> String {
+    let point = |point: &HandPoint| -> Value {
+        let [left, right] = found(point);
+        json!({
+            "id": point.mark.id,
+            "at": <[f64; 3]>::from(point.at.coords),
+            "covariance": <[[f64; 3]; 3]>::from(point.covariance),
+            "sigma": point.sigma(),
+            "camera": <[f64; 3]>::from(point.measured.position.at.coords),
+            "pixels": point.measured.pixels.map(|pixels| [
+                [pixels.at.left.u, pixels.at.left.v],
+                [pixels.at.right.u, pixels.at.right.v],
+            ]),
+            "left": left,
+            "right": right,
+        })
+    };
+    let object = &model.site.objects[0];
+    let value = json!({
+        "object": object.id,
+        "base": object.base.map(|index| &object.points[index].id),
+        "object_from_camera": model.object_from_camera.rows(),
+        "points": model.points.iter().map(point).collect::<Vec<_>>(),
+    });
+    value.to_string() + "\n"
+}

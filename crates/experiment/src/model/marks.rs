@@ -1,0 +1,89 @@
+//! What an operator marked in a stereo pair: `id,left_u,left_v,right_u,right_v`.
+
+use std::{collections::HashMap, path::Path};
+
+use seafix_component::Fault;
+use seafix_geometry::Pixel;
+
+use crate::dataset::tables::{number, rows};
+
+/// A feature point that an operator marked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    /// The line of the file.
+    pub line: usize,
+    /// The point's name.
+    pub id: String,
+    /// Where the left image shows it, to a few pixels.
+    pub left: Pixel,
+    /// Where the right image shows it; `None`: it is to be sought.
+    pub right: Option<Pixel>,
+}
+
+/// The marks of `text`, the content of `file`, in images of these sizes (px).
+///
+/// # Errors
+/// The first line that is wrong.
+pub(super) fn read(text: &str, file: &Path, sizes: [[u32; 2]; 2]) -> Result<Vec<Mark>, Fault> {
+    let mut marks: Vec<Mark> = Vec::new();
+    let mut known: HashMap<String, usize> = HashMap::new();
+    for (line, [id, left_u, left_v, right_u, right_v]) in
+        rows(text, file, ["id", "left_u", "left_v", "right_u", "right_v"])?
+    {
+        let fault = |what: &str| Fault::new(what, file).on_line(line);
+        if id.is_empty() {
+            return Err(fault("a mark without a name").remedy("give every point its id"));
+        }
+        if let Some(first) = known.insert(id.to_owned(), line) {
+            return Err(fault("a point is marked twice")
+                .value(format!("`{id}`"))
+                .remedy(format!("it is already on line {first}; give each its own id")));
+        }
+        let pixel = |u: &str, v: &str, [width, height]: [u32; 2], side: &str| {
+            let at = Pixel { u: number(u, line, file)?, v: number(v, line, file)? };
+            let [right, bottom] = [width, height].map(|n| f64::from(n) - 0.5);
+            let inside = (-0.5..=right).contains(&at.u) && (-0.5..=bottom).contains(&at.v);
+            if inside {
+                return Ok(at);
+            }
+            Err(fault(&format!("a mark outside the {side} image"))
+                .value(format!("`{id}` at {u}, {v}"))
+                .remedy(format!("the image has {width}×{height} pixels; the first has its centre at 0, 0")))
+        };
+        let right = match [right_u, right_v] {
+            ["", ""] => None,
+            [u, v] => Some(pixel(u, v, sizes[1], "right")?),
+        };
+        marks.push(Mark { line, id: id.to_owned(), left: pixel(left_u, left_v, sizes[0], "left")?, right });
+    }
+    if marks.len() < 3 {
+        return Err(Fault::new("too few marks for a model", file)
+            .value(marks.len())
+            .remedy("mark at least three points that are not on a line"));
+    }
+    Ok(marks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(lines: &str) -> String {
+        let text = format!("id,left_u,left_v,right_u,right_v\n{lines}");
+        read(&text, Path::new("clicks.csv"), [[640, 480]; 2]).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn marks_are_read_and_what_is_wrong_is_told_with_its_line() {
+        let text = "id,left_u,left_v,right_u,right_v\nA,1,2,3,4.5\nB,639.5,0,,\nC,-0.5,9,8,7\n";
+        let marks = read(text, Path::new("clicks.csv"), [[640, 480]; 2]).unwrap();
+        assert_eq!(marks[0].right, Some(Pixel { u: 3.0, v: 4.5 }));
+        assert_eq!((marks[1].line, marks[1].right), (3, None));
+        assert!(message("A,1,2,3,4\nA,1,2,3,4\n").starts_with("a point is marked twice in clicks.csv:3: `A`"));
+        assert!(message("A,640,2,3,4\n").starts_with("a mark outside the left image in clicks.csv:2: `A` at 640, 2"));
+        assert!(message("A,1,2,3,NaN\n").starts_with("a mark outside the right image"));
+        assert!(message("A,1,2,3,\n").starts_with("not a number in clicks.csv:2"));
+        assert!(message(",1,2,3,4\n").starts_with("a mark without a name"));
+        assert!(message("A,1,2,3,4\n").starts_with("too few marks for a model in clicks.csv: 1"));
+    }
+}
