@@ -317,34 +317,53 @@ fn every_write_fails_in_turn() {
     fail(|_| true);
 }
 
-#[test]
-fn neither_threads_nor_shards_change_a_byte() {
-    let folder = experiment(200);
+/// Runs on so many threads, and in so many shards that are merged, `repeats` times each: all have the bytes of one run.
+fn spread(repeats: usize, frames: usize, cases: &[(usize, &str)]) {
+    let folder = experiment(frames);
     let folder = folder.path();
     assert!(run(folder, "whole", &["--threads", "1"]).output().unwrap().status.success());
-    for threads in ["2", "8"] {
-        assert!(run(folder, threads, &["--threads", threads]).output().unwrap().status.success());
-        same(&folder.join("whole"), &folder.join(threads));
-    }
-    for (shards, threads) in [(1, "8"), (3, "2"), (7, "1")] {
-        let names: Vec<String> = (1..=shards).map(|k| format!("shards-{shards}/{k}")).collect();
-        for (k, name) in names.iter().enumerate() {
-            let shard = format!("{}/{shards}", k + 1);
-            let (code, error) = ended(&run(folder, name, &["--shard", &shard, "--threads", threads]).output().unwrap());
-            assert_eq!(code, Some(0), "{error}");
+    let merge = |names: &[String], out: &str| {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        ended(&seafix(folder, &[&["merge", "--out", out], &names[..]].concat()).output().unwrap())
+    };
+    for repeat in 0..repeats {
+        for &(shards, threads) in cases {
+            let own = format!("{repeat}-{shards}-{threads}");
+            assert!(run(folder, &own, &["--threads", threads]).output().unwrap().status.success());
+            same(&folder.join("whole"), &folder.join(&own));
+            let names: Vec<String> = (1..=shards).map(|k| format!("{own}-shards/{k}")).collect();
+            for (k, name) in names.iter().enumerate() {
+                let shard = format!("{}/{shards}", k + 1);
+                let shard = run(folder, name, &["--shard", &shard, "--threads", threads]).output().unwrap();
+                let (code, error) = ended(&shard);
+                assert_eq!(code, Some(0), "{error}");
+            }
+            let merged = format!("{own}-merged");
+            assert_eq!(merge(&names, &merged).0, Some(0));
+            same(&folder.join("whole"), &folder.join(&merged));
+            if shards > 1 {
+                let (code, error) = merge(&names[1..], "fewer");
+                assert!(code == Some(3) && error.contains("pieces are missing"), "{error}");
+            }
+            for done in [own.clone(), merged, format!("{own}-shards")] {
+                fs::remove_dir_all(folder.join(done)).unwrap();
+            }
         }
-        let merged = format!("merged-{shards}");
-        let merge = |names: &[String], out: &str| {
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            ended(&seafix(folder, &[&["merge", "--out", out], &names[..]].concat()).output().unwrap())
-        };
-        assert_eq!(merge(&names, &merged).0, Some(0));
-        same(&folder.join("whole"), &folder.join(&merged));
-        if shards > 1 {
-            let (code, error) = merge(&names[1..], "fewer");
-            assert!(code == Some(3) && error.contains("pieces are missing"), "{error}");
-        }
     }
+}
+
+#[test]
+fn neither_threads_nor_shards_change_a_byte() {
+    spread(1, 200, &[(1, "8"), (3, "2"), (7, "1")]);
+}
+
+/// `cargo test --release --workspace --test safety -- --ignored twenty_repeats --nocapture`
+#[test]
+#[ignore = "1020 runs, minutes: cargo test --release --workspace --test safety -- --ignored twenty_repeats"]
+fn twenty_repeats_change_no_byte() {
+    let threads = ["1", "2", "8"];
+    let cases: Vec<_> = [1, 3, 7].iter().flat_map(|&shards| threads.map(|threads| (shards, threads))).collect();
+    spread(20, 1000, &cases);
 }
 
 #[test]
