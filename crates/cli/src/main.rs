@@ -11,6 +11,7 @@ mod exit;
 mod ply;
 mod signals;
 mod terminal;
+mod whole;
 
 /// Positions of an underwater vehicle relative to a known structure, from stereo images.
 #[derive(Debug, Parser)]

@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
-use seafix_component::Fault;
 use seafix_geometry::MeasuredPoint;
 use seafix_vision::Image;
+
+use crate::{exit::Failure, whole};
 
 /// Writes `cloud` as binary PLY: position (m, left camera's axes), the grey of the left image there,
 /// and the standard deviation of the position (m, √ of the covariance's trace).
 ///
 /// # Errors
 /// The file cannot be written; what had its name before stays.
-pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Result<(), Fault> {
+pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Result<(), Failure> {
     let mut bytes = format!(
         "ply\nformat binary_little_endian 1.0\ncomment left camera: x right, y down, z forward; metres\n\
          element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
@@ -26,14 +27,7 @@ pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Resul
         bytes.extend([grey; 3]);
         bytes.extend((point.position.covariance.trace().sqrt() as f32).to_le_bytes());
     }
-    if path.exists() && !path.is_file() {
-        return Err(Fault::new("the output is no file", path).remedy("name a file, new or to be replaced"));
-    }
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|error| {
-        Fault::new(format!("cannot write ({error})"), path).remedy("check the folder and its permissions")
-    })
+    whole::write(path, bytes)
 }
 
 /// The grey value of the pixel nearest to (u, v).

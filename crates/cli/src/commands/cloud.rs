@@ -78,7 +78,7 @@ impl Cloud {
             .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
         let (look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
         if let Some(path) = &self.out {
-            ply::write(path, &look.cloud, &left).map_err(|fault| Failure::new(OUTPUT, fault))?;
+            ply::write(path, &look.cloud, &left)?;
         }
         let pipeline = pipeline.resolved().map_err(|error| Failure::new(USAGE, error))?;
         print(&if self.json { self.machines(&look, &times, &pipeline) } else { self.people(&look, &times) })?;

@@ -1,9 +1,6 @@
 //! `seafix draw`.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::PathBuf};
 
 use clap::Args;
 use seafix_simulation::families::{Drawn, Family, Presence};
@@ -11,6 +8,7 @@ use seafix_simulation::families::{Drawn, Family, Presence};
 use crate::{
     exit::{DONE, Ended, Failure, OUTPUT},
     terminal::print,
+    whole,
 };
 
 #[derive(Debug, Args)]
@@ -45,8 +43,8 @@ impl Draw {
         for number in self.first..self.first + self.count {
             let drawn = Drawn::new(self.family, self.seed, number, presence);
             let file = |end: &str| self.out.join(format!("{}{end}", drawn.problem.id));
-            write(&file(".json"), serde_json::to_string(&drawn.problem))?;
-            write(&file(".truth.json"), serde_json::to_string(&drawn.truth))?;
+            whole::write(&file(".json"), text(serde_json::to_string(&drawn.problem)))?;
+            whole::write(&file(".truth.json"), text(serde_json::to_string(&drawn.truth)))?;
         }
         let problems = if self.count == 1 { "problem" } else { "problems" };
         print(&format!("{} {problems} and their truth in {}\n", self.count, self.out.display()))?;
@@ -54,10 +52,6 @@ impl Draw {
     }
 }
 
-/// A file is whole when it has its name.
-fn write(file: &Path, content: serde_json::Result<String>) -> Result<(), Failure> {
-    let partial = file.with_extension("json.partial");
-    let text = content.expect("a problem is plain data");
-    let written = fs::write(&partial, text).and_then(|()| fs::rename(&partial, file));
-    written.map_err(|error| Failure::new(OUTPUT, format!("{}: {error}", file.display())))
+fn text(content: serde_json::Result<String>) -> String {
+    content.expect("a problem is plain data")
 }

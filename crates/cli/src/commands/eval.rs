@@ -10,8 +10,9 @@ use seafix_experiment::trajectory::{Format, Trajectory, Way};
 use serde_json::{Value, json};
 
 use crate::{
-    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
+    exit::{DONE, Ended, Failure, INPUT, USAGE},
     terminal::{print, tell},
+    whole,
 };
 
 /// Below this share of matched poses the statistics come with a warning.
@@ -189,7 +190,8 @@ impl Eval {
             ));
         }
         if let Some(file) = &self.out {
-            write(file, &Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone() })?;
+            let way = Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone() };
+            whole::write(file, way.print(Format::of_name(file)))?;
         }
         print(&if self.json { self.machine(&matched, &found) } else { self.people(&matched, &found) })?;
         Ok(DONE)
@@ -438,13 +440,4 @@ fn significant(x: f64) -> String {
     } else {
         format!("{x:.4e}")
     }
-}
-
-/// A file is whole when it has its name.
-fn write(file: &Path, trajectory: &Trajectory) -> Result<(), Failure> {
-    let mut partial = file.as_os_str().to_owned();
-    partial.push(".partial");
-    let written = std::fs::write(&partial, trajectory.print(Format::of_name(file)));
-    let renamed = written.and_then(|()| std::fs::rename(&partial, file));
-    renamed.map_err(|error| Failure::new(OUTPUT, format!("{}: {error}", file.display())))
 }

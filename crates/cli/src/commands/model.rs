@@ -1,9 +1,6 @@
 //! `seafix model`.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::PathBuf;
 
 use clap::Args;
 use seafix_component::Fault;
@@ -16,8 +13,9 @@ use serde_json::{Value, json};
 
 use super::limits::Limits;
 use crate::{
-    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
+    exit::{DONE, Ended, Failure, INPUT, USAGE},
     terminal::{print, tell},
+    whole,
 };
 
 #[derive(Debug, Args)]
@@ -83,7 +81,7 @@ impl Model {
         let model = by_hand.model([&left, &right], &rig, &text, &self.points).map_err(input)?;
         let site = model.site.to_toml();
         if let Some(path) = &self.out {
-            write(path, &site)?;
+            whole::write(path, &site)?;
         }
         match (self.json, &self.out) {
             (true, _) => print(&machines(&model))?,
@@ -95,19 +93,6 @@ impl Model {
         }
         Ok(DONE)
     }
-}
-
-/// Writes the whole file or nothing.
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let partial = PathBuf::from(format!("{}.partial", path.display()));
-    let failed = |error: std::io::Error| {
-        let fault = Fault::new(format!("cannot be written ({error})"), path);
-        Failure::new(OUTPUT, fault.remedy("choose another file with --out, or make room and rights for it"))
-    };
-    fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
-        let _ = fs::remove_file(&partial);
-        failed(error)
-    })
 }
 
 /// How a point was found, in two words.

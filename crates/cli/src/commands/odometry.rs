@@ -2,7 +2,6 @@
 
 use std::{
     collections::HashSet,
-    fs,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -21,6 +20,7 @@ use serde_json::{Value, json};
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
     terminal::{Progress, print, tell},
+    whole::Whole,
 };
 
 #[derive(Debug, Args)]
@@ -68,7 +68,7 @@ impl Odometer {
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
         // A file that cannot be written shall not be found out after the work.
-        let out = self.out.as_deref().map(Out::begin).transpose()?;
+        let out = self.out.as_deref().map(Whole::begin).transpose()?;
         if let Some(fault) = swapped_at_first(&dataset) {
             return Err(Failure::new(INPUT, fault));
         }
@@ -79,7 +79,7 @@ impl Odometer {
         let warnings = trip.warnings();
         warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
         if let Some(out) = out {
-            out.finish(&poses(&trip.journey))?;
+            out.finish(poses(&trip.journey))?;
         }
         print(&if self.json { machines(&trip, &warnings, &settings) } else { people(&trip) })?;
         Ok(DONE)
@@ -224,44 +224,6 @@ fn poses(journey: &Journey) -> String {
         text += &tum::print(&stamped);
     }
     text
-}
-
-/// A file that has its name only when it is whole; what was begun and not finished is removed.
-struct Out<'a> {
-    path: &'a Path,
-    partial: PathBuf,
-}
-
-impl<'a> Out<'a> {
-    /// Finds out whether the file can be written.
-    fn begin(path: &'a Path) -> Result<Self, Failure> {
-        if path.is_dir() {
-            let fault = Fault::new("a folder, not a file", path).remedy("name a file to write the poses to");
-            return Err(Failure::new(OUTPUT, fault));
-        }
-        let mut partial = path.as_os_str().to_owned();
-        partial.push(".partial");
-        let partial = PathBuf::from(partial);
-        fs::write(&partial, "").map_err(|error| Self::failed(path, &error))?;
-        Ok(Self { path, partial })
-    }
-
-    fn finish(self, text: &str) -> Result<(), Failure> {
-        let done = fs::write(&self.partial, text).and_then(|()| fs::rename(&self.partial, self.path));
-        done.map_err(|error| Self::failed(self.path, &error))
-    }
-
-    fn failed(path: &Path, error: &std::io::Error) -> Failure {
-        let fault = Fault::new(format!("cannot write ({error})"), path).remedy("check the folder and the space left");
-        Failure::new(OUTPUT, fault)
-    }
-}
-
-impl Drop for Out<'_> {
-    fn drop(&mut self) {
-        // After a rename there is none.
-        let _ = fs::remove_file(&self.partial);
-    }
 }
 
 /// `1 pair`, `2 pairs`.

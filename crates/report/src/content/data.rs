@@ -7,7 +7,7 @@ use super::distinct;
 use crate::{
     Number, Summary,
     document::{Block, Cell, Head, Section, Table, Text, code, text},
-    format::number,
+    format::{number, trimmed},
     run::Run,
 };
 
@@ -135,7 +135,7 @@ fn prior(header: &TrialHeader) -> String {
         (None, None) => "none".to_owned(),
         (position, attitude) => format!(
             "{} m per world axis, {}° per camera axis",
-            position.map_or("–".to_owned(), |s| s.to_string()),
+            position.map_or("–".to_owned(), trimmed),
             number(attitude.map(f64::to_degrees), 2)
         ),
     }
