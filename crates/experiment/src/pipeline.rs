@@ -9,6 +9,7 @@ use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
     Acceptance, Candidates, Correspondence, Gate, ModelPoint, Outcome, Prior, PriorBound, Problem, SEARCHES, SOLVERS,
     Search, Solver, Target, TargetKind, Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem,
+    until_found,
 };
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, Refine, Triangulator,
@@ -44,6 +45,8 @@ pub struct Pipeline {
     pub triangulation: Triangulator,
     /// Stage 1: the shells.
     pub gate: Gate,
+    /// Whether shells grow where nothing is found in them, and then vanish: an object may have been displaced.
+    pub widen: bool,
     /// When two distances agree.
     pub tolerance: Tolerance,
     /// Stage 2: the search. Of points that say which ones they are none is asked for.
@@ -67,6 +70,7 @@ impl Default for Pipeline {
             refine: Refine::default(),
             triangulation: Triangulator::default(),
             gate: Gate::default(),
+            widen: false,
             tolerance: Tolerance::Sigmas(3.0),
             search: Choice::named("rigid-consensus"),
             solver: Choice::named("stereo-reprojection"),
@@ -371,13 +375,31 @@ impl Stages {
         rng: &mut dyn Rng,
     ) -> Attempt {
         let started = Instant::now();
-        let settings = &self.settings;
-        let tolerance = settings.tolerance;
-        let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, &settings.gate, Some(in_view)));
-        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance, prior };
-        let (found, stage2) = timed(|| self.search.search(&problem, rng));
-        let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, &settings.acceptance, Some(rig)));
-        Attempt::new(index, candidates, answer, [Some(stage1), Some(stage2), Some(solution)], started)
+        let Pipeline { gate, tolerance, acceptance, widen, .. } = &self.settings;
+        let points = &target.points;
+        let mut times = [0.0; 3];
+        let mut seek = |prior: Option<&Prior>, in_view: &[bool]| {
+            let (candidates, stage1) = timed(|| candidates(points, cloud, prior, gate, Some(in_view)));
+            let problem = Problem { model: points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+            let (found, stage2) = timed(|| self.search.search(&problem, rng));
+            let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, acceptance, Some(rig)));
+            times.iter_mut().zip([stage1, stage2, solution]).for_each(|(sum, spent)| *sum += spent);
+            (candidates, answer)
+        };
+        let (mut candidates, mut answer) = seek(prior, in_view);
+        if *widen {
+            let mut wider = Candidates::default();
+            answer = until_found(answer, prior, |prior| {
+                let in_view = crate::pipeline::in_view(target, prior, rig).unwrap_or_else(|| vec![true; points.len()]);
+                let (listed, answer) = seek(prior, &in_view);
+                wider = listed;
+                answer
+            });
+            if !matches!(answer.outcome, Outcome::Unidentified(_)) && !wider.lists.is_empty() {
+                candidates = wider;
+            }
+        }
+        Attempt::new(index, candidates, answer, times.map(Some), started)
     }
 
     /// The answer where every point says which one it is; `None` of a target that no point belongs to.

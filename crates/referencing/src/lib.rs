@@ -25,10 +25,10 @@ pub use observations::{Observation, Observations};
 pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
 pub use reference::{
     Acceptance, Alternative, Attempt, Integrity, Outcome, Protection, Redundancy, Reference, Refusal, judge,
-    judge_named, reference, rms_apart,
+    judge_named, reference, rms_apart, until_found, wider,
 };
 pub use search::{
-    Belief, Explanation, Identification, MaximumClique, RigidConsensus, SEARCHES, Samples, Search, Shares,
+    Belief, Explanation, Identification, LookAlike, MaximumClique, RigidConsensus, SEARCHES, Samples, Search, Shares,
     StructuralCoherence, Unidentified,
 };
 pub use site::{Congruence, Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};

@@ -30,6 +30,9 @@ pub(crate) struct Solve {
     /// How many problems are worked on at a time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
+    /// Where nothing is found in the shells, look in larger ones, then everywhere: the object may have been displaced.
+    #[arg(long)]
+    widen: bool,
     /// One JSON object a line, for programs.
     #[arg(long)]
     json: bool,
@@ -45,8 +48,12 @@ impl Solve {
             return Err(Failure::new(USAGE, format!("{what}; use `mahalanobis`")));
         }
         let acceptance = Acceptance::default();
-        let method =
-            Method { search: (&self.search, &*search), solver: (&self.solver, &*solver), acceptance: &acceptance };
+        let method = Method {
+            search: (&self.search, &*search),
+            solver: (&self.solver, &*solver),
+            acceptance: &acceptance,
+            widen: self.widen,
+        };
         let solve = |path: &PathBuf| {
             // Every problem has the same stream: its answer depends on no other.
             solve_file(path, &method, Stream::new(0, 0, 0, Purpose::Search).rng())

@@ -50,8 +50,10 @@ const SAMPLES_A_POINT: usize = 4;
 const MOST_SAMPLES: usize = 250;
 const LEAST_SAMPLES: usize = 16;
 const MOST_WORK: usize = 8_000;
-/// Expectations below this are not refined.
+/// Expectations below these are not refined: after so many samples, and after the first of many points.
 const IMPOSSIBLE: f64 = 1e-7;
+const HOPELESS: f64 = 1e-30;
+const FIRST_SAMPLES: usize = 2;
 
 /// The confidence of the χ² test that sets must pass.
 const CONFIDENCE: f64 = 0.999;
@@ -135,7 +137,9 @@ fn expected_of_size(
         sum += shape.fit_probability(subsets.next(&mut sequence), &mut sequence);
         taken += 1;
         // How impossible the impossible is need not be known well.
-        if taken == LEAST_SAMPLES && libm::exp(ln_scale) * sum < IMPOSSIBLE {
+        let expected = libm::exp(ln_scale) * sum;
+        let hopeless = taken == FIRST_SAMPLES && sum > 0.0 && expected < HOPELESS;
+        if hopeless || (taken == LEAST_SAMPLES && expected < IMPOSSIBLE) {
             break;
         }
     }

@@ -18,6 +18,8 @@ pub struct Method<'a> {
     pub solver: (&'a str, &'a dyn Solver),
     /// When an answer is believed.
     pub acceptance: &'a Acceptance,
+    /// Whether the object is sought further off where it is not found ([`CoherenceProblem::attempt_widened`]).
+    pub widen: bool,
 }
 
 /// A pose that was not the answer, as it is printed.
@@ -142,7 +144,11 @@ pub enum Line {
 /// The answer to a problem that came from `file`.
 pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng: &mut dyn Rng) -> Answer {
     let start = Instant::now();
-    let attempt = problem.attempt(method.search.1, method.solver.1, method.acceptance, rng);
+    let (search, solver) = (method.search.1, method.solver.1);
+    let attempt = match method.widen {
+        true => problem.attempt_widened(search, solver, method.acceptance, rng),
+        false => problem.attempt(search, solver, method.acceptance, rng),
+    };
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
     let reference = match &attempt.outcome {
         Outcome::Referenced(reference) => Some(reference),

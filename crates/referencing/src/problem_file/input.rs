@@ -10,13 +10,17 @@ use serde::Deserialize;
 
 use crate::{
     Acceptance, Attempt, Candidates, Gate, ModelPoint, Prior, PriorBound, Problem, Search, Shell, Solver, Tolerance,
-    Unidentified, candidates, reference, site::diameter,
+    Unidentified, candidates, reference, site::diameter, until_found,
 };
 
 /// The format this reader understands.
 pub const FORMAT: &str = "coherence-problem/1";
 /// More candidate pairs than this are not listed: no search could use them.
 const MOST_CANDIDATES: usize = 4_000_000;
+
+/// Larger files, and clouds of more points, are refused: with them a problem takes less than 500 MB.
+const MOST_BYTES: u64 = 48 << 20;
+const MOST_POINTS: usize = 500_000;
 
 /// An identification problem, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,6 +85,10 @@ impl CoherenceProblem {
             return Err(fault("unknown format").value(format!("`{}`", raw.format)).remedy(remedy));
         }
         for (name, rows) in [("model", &raw.model), ("cloud", &raw.cloud)] {
+            if rows.len() > MOST_POINTS {
+                let remedy = format!("at most {MOST_POINTS} are taken; thin the points out");
+                return Err(fault(&format!("too many points in `{name}`")).value(rows.len()).remedy(remedy));
+            }
             if let Some(index) = rows.iter().position(|row| !row.iter().all(|x| x.is_finite())) {
                 let what = format!("{name} point {index} is not finite");
                 return Err(fault(&what).value(format!("{:?}", rows[index])).remedy("give finite numbers, in metres"));
@@ -187,6 +195,23 @@ impl CoherenceProblem {
     }
 }
 
+impl CoherenceProblem {
+    /// The same, and where nothing is found in the shells, in larger ones, then without: the object may have been
+    /// displaced.
+    pub fn attempt_widened(
+        &self,
+        search: &dyn Search,
+        solver: &dyn Solver,
+        acceptance: &Acceptance,
+        rng: &mut dyn Rng,
+    ) -> Attempt {
+        let first = self.attempt(search, solver, acceptance, rng);
+        until_found(first, self.prior.as_ref(), |prior| {
+            Self { prior: prior.cloned(), ..self.clone() }.attempt(search, solver, acceptance, rng)
+        })
+    }
+}
+
 impl RawPrior {
     fn checked(&self, file: &Path) -> Result<Prior, Fault> {
         let matrix = Matrix4::from_fn(|row, column| self.t_cam_obj[row][column]);
@@ -224,7 +249,12 @@ fn json(file: &Path, error: &serde_json::Error) -> Fault {
 /// The problem in a file.
 ///
 /// # Errors
-/// As [`read_text`], or [`CoherenceProblem::parse`] refuses it.
+/// As [`read_text`], the file has more than 48 MiB, or [`CoherenceProblem::parse`] refuses it.
 pub fn read(file: &Path) -> Result<CoherenceProblem, Fault> {
+    let bytes = std::fs::metadata(file).map_or(0, |about| about.len());
+    if bytes > MOST_BYTES {
+        let remedy = format!("at most {} MiB are read; thin the points out", MOST_BYTES >> 20);
+        return Err(Fault::new("the problem is too large", file).value(format!("{bytes} bytes")).remedy(remedy));
+    }
     CoherenceProblem::parse(&read_text(file)?, file)
 }

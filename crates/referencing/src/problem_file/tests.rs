@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::*;
-use crate::{Acceptance, Kabsch, MaximumClique};
+use crate::{Acceptance, Kabsch, MaximumClique, RigidConsensus};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_component::Fault;
@@ -30,6 +30,7 @@ fn solved(text: &str) -> serde_json::Value {
         search: ("maximum-clique", &MaximumClique::default()),
         solver: ("kabsch", &Kabsch::default()),
         acceptance: &Acceptance::default(),
+        widen: false,
     };
     let answer = answer(&parse(text).unwrap(), Path::new("p.json"), &method, &mut ChaCha8Rng::seed_from_u64(0));
     serde_json::to_value(Line::Answer(Box::new(answer))).unwrap()
@@ -107,8 +108,45 @@ fn a_file_that_is_not_there_is_a_line() {
         search: ("maximum-clique", &MaximumClique::default()),
         solver: ("kabsch", &Kabsch::default()),
         acceptance: &Acceptance::default(),
+        widen: false,
     };
     let line = solve_file(Path::new("no/such/file.json"), &method, &mut ChaCha8Rng::seed_from_u64(0));
     assert!(matches!(&line, Line::Failed { error, .. } if error.starts_with("cannot read (")), "{line:?}");
     assert!(serde_json::to_value(&line).unwrap().get("error").is_some());
+}
+
+/// A displaced object: its shells hold nothing, those twice as large hold it, or none do and every point is looked at.
+/// Seen to fail when the shells do not grow, and when they do not vanish.
+#[test]
+fn a_displaced_object_is_found_in_larger_shells_or_without() {
+    let outcome = |x: &str, widen: bool| {
+        let text = GOOD.replace("0.05],[0,1,0,0]", &format!("{x}],[0,1,0,0]"));
+        let method = Method {
+            search: ("rigid-consensus", &RigidConsensus::default()),
+            solver: ("kabsch", &Kabsch::default()),
+            acceptance: &Acceptance::default(),
+            widen,
+        };
+        let rng = &mut ChaCha8Rng::seed_from_u64(0);
+        answer(&parse(&text).unwrap(), Path::new("p.json"), &method, rng).outcome
+    };
+    assert_eq!(outcome("0.05", false), "referenced");
+    for x in ["0.15", "0.35", "5.0"] {
+        assert_eq!((outcome(x, false), outcome(x, true)), ("unidentified", "referenced"), "{x} m beside");
+    }
+}
+
+/// B36. A cloud of ten million points is refused by the size of its file before a byte of it is read, and one of more points
+/// than are taken by their number.
+#[test]
+fn a_cloud_too_large_to_hold_is_refused() {
+    let file = std::env::temp_dir().join(format!("seafix-ten-million-{}.json", std::process::id()));
+    // Ten million points of twenty bytes; the file has a length and no content.
+    std::fs::File::create(&file).and_then(|empty| empty.set_len(200_000_000)).unwrap();
+    let refused = read(&file).expect_err("it is too large").to_string();
+    std::fs::remove_file(&file).unwrap();
+    assert!(refused.starts_with("the problem is too large in ") && refused.contains("48 MiB"), "{refused}");
+    let points = "[0,0,3],".repeat(500_001);
+    let refused = parse(&GOOD.replace("[-0.5,0.25,3.5]]", &format!("{points}[0,0,3]]"))).unwrap_err().to_string();
+    assert!(refused.starts_with("too many points in `cloud` in p.json: 500006; at most 500000"), "{refused}");
 }

@@ -12,8 +12,13 @@ pub struct Acceptance {
     /// Largest expected number of chance sets of the found size (a-contrario acceptance), for searches that
     /// count.
     pub chance_budget: f64,
-    /// Largest probability, by a search that weighs evidence, that the object is not there at all.
+    /// Largest probability, by a search that weighs evidence, that the object is not there at all; of a model of eight
+    /// points. Of one of n points (n + 1)/9 times as much, a hundredth at most: its evidence comes about by chance so much
+    /// more seldom.
     pub absence: f64,
+    /// Without a prior: largest expected number of chance sets as good as the one found with which a pose is believed whose
+    /// object is absent with a probability of more than that, but of a hundredth at most.
+    pub rare: f64,
     /// Largest probability, by a search that weighs evidence, that a present object is elsewhere.
     pub doubt: f64,
     /// Confidence of the χ² tests of residuals and prior: a true set fails with one minus this.
@@ -38,6 +43,7 @@ impl Default for Acceptance {
             least_points: 3,
             chance_budget: 1e-3,
             absence: 2e-5,
+            rare: 3e-5,
             doubt: 0.05,
             confidence: 0.999,
             alert_limit: 0.10,
@@ -60,7 +66,7 @@ impl Acceptance {
             // Written so that a NaN is refused too.
             let budget = self.chance_budget > 0.0 && self.chance_budget.is_finite();
             in_range(budget, "chance-budget", self.chance_budget, "a positive number")?;
-            for (name, value) in [("absence", self.absence), ("doubt", self.doubt)] {
+            for (name, value) in [("absence", self.absence), ("rare", self.rare), ("doubt", self.doubt)] {
                 in_range(value > 0.0 && value < 1.0, name, value, "a probability between 0 and 1")?;
             }
             let confident = self.confidence > 0.0 && self.confidence < 1.0;

@@ -16,11 +16,13 @@ mod judge;
 mod outcome;
 mod refusal;
 mod weighed;
+mod widened;
 
 pub use acceptance::Acceptance;
 pub use integrity::{Integrity, Protection, Redundancy};
 pub use outcome::{Alternative, Attempt, Outcome, Reference};
 pub use refusal::Refusal;
+pub use widened::{until_found, wider};
 
 use judge::Judge;
 

@@ -1,7 +1,7 @@
 //! What is believed of a search that weighs evidence.
 
 use super::{Alternative, Outcome, Refusal, judge::Judge};
-use crate::{Belief, Explanation, Identification};
+use crate::{Belief, Explanation, Identification, Shares, chance::expected_sets_as_good};
 
 impl Judge<'_> {
     /// The pose of a search that weighs evidence: believed when little speaks for no object at all, little
@@ -10,9 +10,9 @@ impl Judge<'_> {
         let shares = belief.shares(self.problem.model, self.alert_limit);
         let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
         let runner_up = elsewhere.first().map(|other| other.alternative());
-        let limit = self.acceptance.absence;
+        let limit = self.absence_limit();
         // Written so that a NaN is refused too.
-        if !(shares.absent <= limit) {
+        if !(shares.absent <= limit || self.rare(found, belief, &shares)) {
             return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
         }
         if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
@@ -20,7 +20,7 @@ impl Judge<'_> {
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
         }
         if let (Some(best), Some(copy)) =
-            (belief.explanations.first(), belief.copy(self.problem.model, self.alert_limit, limit))
+            (belief.explanations.first(), belief.copy(self.problem.model, self.alert_limit, limit.max(shares.absent)))
         {
             return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
         }
@@ -39,4 +39,34 @@ impl Judge<'_> {
         }
         (outcome, runner_up)
     }
+
+    /// The largest probability of absence with which a pose is believed.
+    ///
+    /// Every number of visible points is equally likely beforehand, so that of a larger model each has less, and a cloud
+    /// without the object shows a stated evidence the more seldom.
+    fn absence_limit(&self) -> f64 {
+        let larger = (self.problem.model.len() + 1) as f64 / STATED_FOR;
+        let stated = self.acceptance.absence;
+        (stated * larger.max(1.0)).min(IMPROBABLE.max(stated))
+    }
+
+    /// Whether chance gives sets as good so rarely that the pose is believed although absence is not as improbable as it
+    /// should be.
+    ///
+    /// The probability of absence takes every number of visible points to be equally likely, which of a large model makes
+    /// few visible ones improbable beforehand; chance is counted without. Where the cloud is crowded it gives more. Of a
+    /// pattern that looks like the object it says nothing, nor of clutter in shells that lies on edges like the object's.
+    fn rare(&self, found: &Identification, belief: &Belief, shares: &Shares) -> bool {
+        let known = self.problem.prior.is_some();
+        if known || !(shares.absent <= IMPROBABLE && shares.alike <= self.acceptance.absence) {
+            return false;
+        }
+        let crowd = belief.explanations.first().map_or(0.0, |best| best.ln_crowd);
+        expected_sets_as_good(self.problem, &found.pairs) * libm::exp(crowd) <= self.acceptance.rare
+    }
 }
+
+/// An object is not believed whose absence is more probable than this.
+const IMPROBABLE: f64 = 0.01;
+/// The number of points, and one, of the models that [`Acceptance::absence`](super::Acceptance::absence) is stated for.
+const STATED_FOR: f64 = 9.0;

@@ -2,6 +2,7 @@
 
 use seafix_geometry::{Camera, Object, Transform};
 
+use super::LookAlike;
 use crate::{Alternative, Correspondence, ModelPoint, rms_apart};
 
 /// Explanations less likely than the best by this much (nats) are not listed: a share of 0.05 %.
@@ -16,6 +17,8 @@ pub struct Explanation {
     pub object_from_camera: Transform<Object, Camera>,
     /// ln of the probability of the data given a pose about here, over that given no object at all (nats).
     pub ln_evidence: f64,
+    /// By how much evenly spread clutter would have made that more (nats): the pairs lie where the cloud is crowded.
+    pub ln_crowd: f64,
 }
 
 impl Explanation {
@@ -33,6 +36,8 @@ pub struct Belief {
     /// What the cloud shows beside the likeliest: poses that explain nearly as many of the points which it leaves, the
     /// likeliest first.
     pub beside: Vec<Explanation>,
+    /// What a pattern that goes on beyond the object explains of the cloud; `None` of an object without one.
+    pub look_alike: Option<LookAlike>,
 }
 
 /// How the belief is shared out.
@@ -44,6 +49,8 @@ pub struct Shares {
     pub elsewhere: f64,
     /// That the object is not there.
     pub absent: f64,
+    /// The part of that in which a pattern is there that looks like it.
+    pub alike: f64,
 }
 
 impl Belief {
@@ -77,12 +84,13 @@ impl Belief {
 
     /// The posterior probabilities: P_m = Λ_m/(1 + Σ Λ), Λ the evidence, presence and absence being
     /// equally likely beforehand; poses within `limit` (m, RMS over the model points) of the likeliest count
-    /// as one with it.
+    /// as one with it. A pattern like the object's, alone or around the object, is as likely beforehand.
     pub fn shares(&self, model: &[ModelPoint], limit: f64) -> Shares {
         let Some(best) = self.explanations.first() else {
-            return Shares { likeliest: 0.0, elsewhere: 0.0, absent: 1.0 };
+            return Shares { likeliest: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0 };
         };
-        let most = best.ln_evidence.max(0.0);
+        let pattern = self.look_alike.unwrap_or(LookAlike { alone: f64::NEG_INFINITY, around: f64::NEG_INFINITY });
+        let most = best.ln_evidence.max(0.0).max(pattern.alone).max(pattern.around);
         let (mut likeliest, mut elsewhere) = (0.0, 0.0);
         for other in &self.explanations {
             let share = libm::exp(other.ln_evidence - most);
@@ -92,8 +100,10 @@ impl Belief {
                 elsewhere += share;
             }
         }
-        let absent = libm::exp(-most);
+        likeliest += libm::exp(pattern.around - most);
+        let alike = libm::exp(pattern.alone - most);
+        let absent = libm::exp(-most) + alike;
         let all = likeliest + elsewhere + absent;
-        Shares { likeliest: likeliest / all, elsewhere: elsewhere / all, absent: absent / all }
+        Shares { likeliest: likeliest / all, elsewhere: elsewhere / all, absent: absent / all, alike: alike / all }
     }
 }

@@ -35,6 +35,7 @@ mod volumes;
 mod weighted_clique;
 
 pub use belief::{Belief, Explanation, Shares};
+pub use consensus::LookAlike;
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]
 pub(crate) use orientation::mirrored;

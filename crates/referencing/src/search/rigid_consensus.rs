@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Belief, Explanation, Identification, NEEDED, Search, Unidentified, bounded,
-    consensus::{Graph, Mode, Rough, Seeds, Swept, Terms, mirror_image},
+    consensus::{Crowd, Graph, Mode, Pattern, Rough, Seeds, Swept, Terms, mirror_image},
     grow::{feasible, grow, most_possible},
     orientation::Sense,
 };
@@ -25,6 +25,10 @@ use crate::Problem;
 /// box), ρ_i the density of cloud points where model point i is predicted, and B(k) = k! (n − k)!/(n + 1)!
 /// the share of one set of k visible points when every number from 0 to n is equally likely. So a pose with
 /// fewer but closer points, or nearer to the prior, can outweigh one with more.
+///
+/// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
+/// a box, in clumps), ρ_i is the density of the nearest points instead. And beside the object and clutter alone stand two
+/// more explanations: a pattern that the object repeats in part goes on, with the object in it or without.
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
@@ -78,23 +82,41 @@ impl Search for RigidConsensus {
         let graph = Graph::of(problem, &rough);
         let terms = Terms::of(problem, &rough, &graph);
         let parts = (&terms, &rough, &graph);
-        let swept = Seeds::new(parts, &BTreeSet::new(), (NEEDED, -FLOOR), self.budget).sweep();
+        let mut swept = Seeds::new(problem.model, parts, &BTreeSet::new(), (NEEDED, -FLOOR), self.budget).sweep();
         let mut tests = graph.tests + swept.tests;
+        let mut crowd = Crowd::default();
+        let mut weighed = |swept: &mut Swept| {
+            // What is not likely even in evenly spread clutter is refused whatever the clutter is like.
+            if swept.modes.first().is_none_or(|best| best.ln_evidence < STRONG) {
+                return;
+            }
+            for mode in &mut swept.modes {
+                mode.ln_crowd = crowd.cost(problem, &terms, &graph, mode);
+                mode.ln_evidence -= mode.ln_crowd;
+            }
+            let by =
+                |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
+            swept.modes.sort_by(by);
+        };
+        weighed(&mut swept);
         let ended = |best: usize, tests| Unidentified::Budget { budget: self.budget, best, bound, tests };
         let Some(best) = swept.modes.first() else {
             return Err(if swept.complete { nothing } else { ended(0, tests) });
         };
-        if let Some(image) = mirror_image(&terms, &rough, &graph, best) {
+        if let Some(image) = mirror_image(problem.model, parts, best) {
             return Err(Unidentified::Mirrored { best: image.members.len() });
         }
         // A second copy of the object in what is left of the cloud.
+        let mut look_alike = None;
         let mut beside = Swept { modes: Vec::new(), complete: true, tests: 0 };
         if best.ln_evidence >= STRONG {
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
             let left = self.budget.saturating_sub(swept.tests);
-            beside = Seeds::new(parts, &taken, (least, STRONG), left).sweep();
+            beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
+            weighed(&mut beside);
             tests += beside.tests;
+            look_alike = Pattern::of(problem.model).map(|pattern| pattern.look_alike(problem, &terms, &graph, best));
         }
         let complete = swept.complete && beside.complete;
         // What is returned is coherent throughout: of twenty true points some two are usually further from each
@@ -108,6 +130,7 @@ impl Search for RigidConsensus {
             pairs: mode.pairs(&graph),
             object_from_camera: mode.motion.transform().inverse(),
             ln_evidence: mode.ln_evidence,
+            ln_crowd: mode.ln_crowd,
         };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
         Ok(Identification {
@@ -118,7 +141,7 @@ impl Search for RigidConsensus {
             size_bound: bound,
             tests,
             undecided: (!complete).then(|| ended(pairs.len(), tests)),
-            belief: Some(Belief { explanations: explain(&swept), beside: explain(&beside) }),
+            belief: Some(Belief { explanations: explain(&swept), beside: explain(&beside), look_alike }),
             pairs,
         })
     }

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, World};
 use serde::{Deserialize, Serialize};
 
@@ -119,17 +119,28 @@ impl Target {
 }
 
 /// The greatest distance between two of the points (m); 0 of fewer than two.
+///
+/// The points furthest from the middle are looked at first: two of them are no further apart than both are from it, so
+/// that of thousands of points a few suffice.
 pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
-    // Side by side, and no root but the last: a model may have ten thousand points.
-    let column = |axis: usize| points.iter().map(|point| point.at.coords[axis]).collect::<Vec<f64>>();
-    let [x, y, z] = [0, 1, 2].map(column);
+    let middle = points.iter().map(|point| point.at.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;
+    let mut far: Vec<(f64, &Vector3<f64>)> =
+        points.iter().map(|point| ((point.at.coords - middle).norm(), &point.at.coords)).collect();
+    far.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
     let mut most = 0.0f64;
-    for i in 0..points.len() {
-        let others = x[..i].iter().zip(&y[..i]).zip(&z[..i]);
-        let squares = others.map(|((a, b), c)| (a - x[i]).powi(2) + (b - y[i]).powi(2) + (c - z[i]).powi(2));
-        most = squares.fold(most, |most, square| if square > most { square } else { most });
+    for (i, (from, a)) in far.iter().enumerate() {
+        // The furthest of the others tells whether any can be further from this one than what is known.
+        if from + far[0].0 <= most {
+            break;
+        }
+        for (other, b) in &far[..i] {
+            if from + other <= most {
+                break;
+            }
+            most = most.max((*a - *b).norm());
+        }
     }
-    most.sqrt()
+    most
 }
 
 /// The targets of a kind; see [`Site::targets`].

@@ -1,7 +1,7 @@
 //! How much better a pose explains the cloud than clutter alone.
 
 use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3, Vector6};
-use seafix_geometry::so3::skew;
+use seafix_geometry::{Camera, UncertainPoint, so3::skew};
 
 use super::{
     Motion,
@@ -35,6 +35,8 @@ pub(in crate::search) struct Terms {
     pub(in crate::search) weight: Vec<Matrix3<f64>>,
     /// ln of the likelihood ratio of a pair without residual.
     pub(in crate::search) gain: Vec<f64>,
+    /// Of each model point: ln of the density of cloud points about its predicted place.
+    pub(in crate::search) ln_density: Vec<f64>,
     /// What one pair says of the motion on average: Jᵀ W J (about the centroid).
     pub(in crate::search) average: Matrix6<f64>,
     /// ln B(k), k = 0…n.
@@ -51,6 +53,7 @@ impl Terms {
             model: Vec::with_capacity(count),
             weight: Vec::with_capacity(count),
             gain: Vec::with_capacity(count),
+            ln_density,
             average: Matrix6::zeros(),
             ln_share: shares(n),
         };
@@ -74,7 +77,7 @@ impl Terms {
             terms.cloud.push(seen.at.coords);
             terms.model.push(known.at.coords);
             terms.weight.push(weight);
-            terms.gain.push(ln_peak - ln_density[pair.model]);
+            terms.gain.push(ln_peak - terms.ln_density[pair.model]);
             terms.average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
         }
         terms.average /= count.max(1) as f64;
@@ -141,6 +144,22 @@ fn shares(n: usize) -> Vec<f64> {
     shares
 }
 
+/// ln B(k) of n points.
+pub(in crate::search) fn ln_share(k: usize, n: usize) -> f64 {
+    let ln_factorial = |k: usize| libm::lgamma(k as f64 + 1.0);
+    ln_factorial(k) + ln_factorial(n - k) - ln_factorial(n + 1)
+}
+
+/// ln of the density of where a point that is at `place` is measured; `None` too far from there.
+pub(in crate::search) fn ln_measured(seen: &UncertainPoint<Camera>, place: &Vector3<f64>) -> Option<f64> {
+    let r = seen.at.coords - place;
+    let far = FAR * seen.covariance.trace();
+    // χ² is at least r²/tr Σ.
+    let (weight, ln_peak) = (r.norm_squared() <= far).then(|| peak(&seen.covariance))?;
+    let d2 = r.dot(&(weight * r));
+    (d2 <= FAR).then(|| ln_peak - 0.5 * d2)
+}
+
 /// A pose with its pairs: a maximum of the posterior density.
 #[derive(Debug, Clone)]
 pub(in crate::search) struct Mode {
@@ -150,6 +169,8 @@ pub(in crate::search) struct Mode {
     /// ln of its evidence against "no object here", by Laplace: the likelihood ratio and the prior density at
     /// the maximum, times the volume (2π)³/√det H that the posterior fills.
     pub(in crate::search) ln_evidence: f64,
+    /// What of it crowded clutter took (nats).
+    pub(in crate::search) ln_crowd: f64,
 }
 
 impl Mode {

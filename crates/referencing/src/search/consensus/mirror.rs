@@ -11,6 +11,7 @@ use super::{
     modes::Climb,
     rough::Rough,
 };
+use crate::ModelPoint;
 
 /// An image must be likelier than the pose by this much (nats): a flat object is its own image.
 const MARGIN: f64 = 3.0;
@@ -20,10 +21,14 @@ const MARGIN: f64 = 3.0;
 ///
 /// The model is reflected in the plane that its members lie in best, and from there the pairs are chosen and the
 /// motion is fitted as for any pose. The prior says nothing of images: both are weighed without.
-pub(in crate::search) fn mirror_image(terms: &Terms, rough: &Rough, graph: &Graph, mode: &Mode) -> Option<Mode> {
+pub(in crate::search) fn mirror_image(
+    model: &[ModelPoint],
+    (terms, rough, graph): (&Terms, &Rough, &Graph),
+    mode: &Mode,
+) -> Option<Mode> {
     let rough = Rough { known: None, centroid: rough.centroid, ln_peak: rough.ln_peak };
     let taken = BTreeSet::new();
-    let climb = Climb { terms, rough: &rough, graph, taken: &taken, compared: Cell::new(0) };
+    let climb = Climb { model, terms, rough: &rough, graph, taken: &taken, compared: Cell::new(0) };
     let count = mode.members.len() as f64;
     let centre = mode.members.iter().map(|&v| terms.model[v]).sum::<Vector3<f64>>() / count;
     let step = |v: &usize| terms.model[*v] - centre;

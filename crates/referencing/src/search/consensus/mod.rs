@@ -2,17 +2,22 @@
 
 mod bits;
 mod bound;
+mod crowd;
 mod graph;
 mod likelihood;
 mod mirror;
 mod modes;
 mod motion;
+mod pattern;
 mod rough;
 mod seeds;
 
+pub(super) use crowd::Crowd;
 pub(super) use graph::Graph;
 pub(super) use likelihood::{Mode, Terms};
 pub(super) use mirror::mirror_image;
 pub(super) use motion::Motion;
+pub use pattern::LookAlike;
+pub(super) use pattern::Pattern;
 pub(super) use rough::Rough;
 pub(super) use seeds::{Seeds, Swept};

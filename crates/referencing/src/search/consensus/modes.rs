@@ -13,6 +13,7 @@ use super::{
     likelihood::{Mode, Terms, fit, ln_volume},
     rough::Rough,
 };
+use crate::ModelPoint;
 
 /// Rounds of choosing pairs and fitting.
 const ROUNDS: usize = 8;
@@ -25,6 +26,7 @@ type Factor = Cholesky<f64, U6>;
 
 /// Finds the modes of one problem.
 pub(in crate::search) struct Climb<'a> {
+    pub(in crate::search) model: &'a [ModelPoint],
     pub(in crate::search) terms: &'a Terms,
     pub(in crate::search) rough: &'a Rough,
     pub(in crate::search) graph: &'a Graph,
@@ -58,10 +60,13 @@ impl Climb<'_> {
             members = chosen;
         }
         let (motion, factor) = fit(self.terms, self.rough, &members, &motion, 4)?;
+        if !self.rough.holds(self.model, &motion, &factor) {
+            return None;
+        }
         let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();
         let score = gains + self.terms.ln_share[members.len()] + self.rough.ln_density(&motion);
         let ln_evidence = score + ln_volume(&factor);
-        ln_evidence.is_finite().then_some(Mode { members, motion, ln_evidence })
+        ln_evidence.is_finite().then_some(Mode { members, motion, ln_evidence, ln_crowd: 0.0 })
     }
 
     /// About the evidence of those members that stay, and of one or two pairs that may join them.

@@ -1,6 +1,6 @@
 //! The rough pose as a density over rigid motions.
 
-use nalgebra::{Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, Rotation3, U6, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::so3::{log, skew};
 
 use super::{
@@ -8,7 +8,7 @@ use super::{
     Motion,
     likelihood::{HALF_LN_2PI, half_ln_det},
 };
-use crate::{Correspondence, Prior, PriorBound, Problem};
+use crate::{Correspondence, ModelPoint, Prior, PriorBound, Problem};
 
 /// A bound of the prior is taken for so many standard deviations: bounds are given so that they hold.
 pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
@@ -35,6 +35,8 @@ pub(in crate::search) struct Known {
     pub(in crate::search) attitude: f64,
     /// Each model point as predicted, and how far it may be from there along each axis (m, one sigma).
     pub(in crate::search) places: Vec<(Vector3<f64>, Vector3<f64>)>,
+    /// Half-size of the box that a pose must leave every model point in, along each camera axis (m).
+    pub(in crate::search) half: Option<f64>,
 }
 
 impl Rough {
@@ -66,7 +68,11 @@ impl Rough {
                 (place, spread.diagonal().map(|variance| (variance + point.sigma * point.sigma).max(0.0).sqrt()))
             })
             .collect();
-        Some(Self { known: Some(Known { motion, information, attitude, places }), centroid, ln_peak })
+        let half = match prior.bound {
+            PriorBound::Box(half) => Some(half),
+            PriorBound::Gaussian(_) => None,
+        };
+        Some(Self { known: Some(Known { motion, information, attitude, places, half }), centroid, ln_peak })
     }
 
     /// η of a motion.
@@ -75,6 +81,33 @@ impl Rough {
         let phi = log(&UnitQuaternion::from_rotation_matrix(&turn));
         let tau = motion.apply(&self.centroid) - known.motion.apply(&self.centroid);
         Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
+    }
+
+    /// Whether the prior's box holds every model point where a motion known with this information puts it, or
+    /// would but for the error of the motion.
+    pub(in crate::search) fn holds(
+        &self,
+        model: &[ModelPoint],
+        motion: &Motion,
+        information: &Cholesky<f64, U6>,
+    ) -> bool {
+        let Some((known, half)) = self.known.as_ref().and_then(|known| Some((known, known.half?))) else { return true };
+        let step = |i: usize| motion.apply(&model[i].at.coords) - known.places[i].0;
+        let mut covariance = None;
+        (0..model.len()).all(|i| {
+            let step = step(i);
+            if step.amax() <= half {
+                return true;
+            }
+            let covariance = covariance.get_or_insert_with(|| information.inverse());
+            let lever = skew(&(motion.apply(&model[i].at.coords) - motion.apply(&self.centroid)));
+            // x = τ − [lever]× φ.
+            let mut j = Matrix3x6::zeros();
+            j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-lever);
+            j.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+            let spread = (j * *covariance * j.transpose()).diagonal();
+            (0..3).all(|axis| step[axis].abs() <= half + BOUND_SIGMAS * spread[axis].max(0.0).sqrt())
+        })
     }
 
     /// ln of the density at a motion.

@@ -13,6 +13,7 @@ use super::{
     modes::Climb,
     rough::Rough,
 };
+use crate::ModelPoint;
 
 /// Poses less likely than the best by this much (nats) are not looked for.
 const MARGIN: f64 = 10.0;
@@ -78,6 +79,7 @@ impl<'a> Seeds<'a> {
     /// Over the vertices whose cloud point is not `taken`, for sets of so many pairs with so much evidence (nats) at
     /// least.
     pub(in crate::search) fn new(
+        model: &'a [ModelPoint],
         (terms, rough, graph): (&'a Terms, &'a Rough, &'a Graph),
         taken: &'a BTreeSet<usize>,
         (least, floor): (usize, f64),
@@ -88,7 +90,7 @@ impl<'a> Seeds<'a> {
         let untaken = |v: &usize| !taken.contains(&graph.vertices[*v].cloud);
         (0..graph.vertices.len()).filter(untaken).for_each(|v| free[v / 64] |= 1 << (v % 64));
         Self {
-            climb: Climb { terms, rough, graph, taken, compared: Cell::new(0) },
+            climb: Climb { model, terms, rough, graph, taken, compared: Cell::new(0) },
             bounds: Bounds::of((terms, rough, graph), least),
             budget,
             spent: 0,

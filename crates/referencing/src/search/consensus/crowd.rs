@@ -1,0 +1,74 @@
+//! Clutter that crowds: where many points are, some lie well for any pose.
+
+use std::collections::BTreeMap;
+
+use super::{
+    graph::Graph,
+    likelihood::{Mode, Terms},
+};
+use crate::Problem;
+
+/// The density about a point is that of so many neighbours, of so many that are looked up.
+const NEIGHBOURS: usize = 3;
+const LOOKED_UP: usize = 8;
+/// So many times the density that was expected may be an accident: one point in 25 has it in evenly spread clutter.
+const CROWDED: f64 = 4.0;
+/// Sets so large are no accident of crowds, and too many to look all up.
+const MOST_MEMBERS: usize = 64;
+
+/// How crowded the cloud is about its points.
+///
+/// The terms of a pose take clutter to be spread evenly in each shell. On the edges of a box, or where it clumps, it is not:
+/// there a pose finds points that fit well much more often, and each says less.
+#[derive(Default)]
+pub(in crate::search) struct Crowd {
+    /// Of the cloud points looked up: their nearest neighbours by the square of the distance (m²), ascending.
+    nearest: BTreeMap<usize, Vec<(f64, usize)>>,
+}
+
+impl Crowd {
+    /// What a mode's evidence is less (nats) where its points lie in crowds.
+    pub(in crate::search) fn cost(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, mode: &Mode) -> f64 {
+        if mode.members.len() > MOST_MEMBERS {
+            return 0.0;
+        }
+        let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
+        let cost = |&v: &usize| {
+            let pair = graph.vertices[v];
+            let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| nearest(problem, pair.cloud));
+            let Some(&(square, _)) = nearest.iter().filter(|(_, j)| !members.contains(j)).nth(NEIGHBOURS - 1) else {
+                return 0.0;
+            };
+            // What is nearer than the noise is one place.
+            let noise = problem.cloud[pair.cloud].position.covariance.trace() / 3.0;
+            let volume = 4.0 / 3.0 * std::f64::consts::PI * square.max(noise).max(f64::MIN_POSITIVE).powf(1.5);
+            // Of candidates that were given without a prior, the others of the cloud are as near as they would be by chance.
+            let even = match problem.prior {
+                Some(_) => terms.ln_density[pair.model],
+                None => {
+                    let own = problem.candidates.lists[pair.model].len().max(1);
+                    terms.ln_density[pair.model] + libm::log(problem.cloud.len() as f64 / own as f64)
+                }
+            };
+            let times = libm::log(NEIGHBOURS as f64 / volume) - even;
+            if times > libm::log(CROWDED) { times } else { 0.0 }
+        };
+        mode.members.iter().map(cost).sum()
+    }
+}
+
+fn nearest(problem: &Problem<'_>, of: usize) -> Vec<(f64, usize)> {
+    let at = &problem.cloud[of].position.at.coords;
+    let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(LOOKED_UP + 1);
+    for (j, point) in problem.cloud.iter().enumerate() {
+        let square = (point.position.at.coords - at).norm_squared();
+        let far = nearest.len() == LOOKED_UP && !(square < nearest[LOOKED_UP - 1].0);
+        if j == of || far || !square.is_finite() {
+            continue;
+        }
+        let place = nearest.partition_point(|(known, _)| *known <= square);
+        nearest.insert(place, (square, j));
+        nearest.truncate(LOOKED_UP);
+    }
+    nearest
+}

@@ -1,0 +1,179 @@
+//! Patterns that repeat by a step: what goes on beyond the object looks like a part of it.
+
+use nalgebra::Vector3;
+
+use super::{
+    graph::Graph,
+    likelihood::{Mode, Terms, ln_measured, ln_share},
+};
+use crate::{ModelPoint, Problem, site::diameter};
+
+/// Of larger models no pattern is looked for: time grows with the cube.
+const MOST_POINTS: usize = 128;
+/// Threes in a row, one step apart, that make a pattern: so many, and this share of the points.
+const LEAST_ROWS: usize = 3;
+const LEAST_SHARE: f64 = 0.25;
+/// What a point may be off its place in a row, as a share of the model's diameter.
+const OFF_SHARE: f64 = 0.015;
+/// A step is no shorter than so many times that.
+const LEAST_STEP: f64 = 3.0;
+/// An object with so many points that do not repeat shows itself by them.
+const TELLING: usize = 3;
+/// Sine of the angle between two steps below which they are one direction.
+const SAME: f64 = 0.3;
+
+/// The points of a model that repeat by a step (a lattice, a ladder, a row of bolts), and where they would go on.
+pub(in crate::search) struct Pattern {
+    /// Whether a model point is one of them.
+    repeats: Vec<bool>,
+    /// The next places beyond the model (object frame).
+    beyond: Vec<Vector3<f64>>,
+}
+
+/// ln of the evidence that the cloud shows such a pattern, against clutter alone (nats).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LookAlike {
+    /// The pattern goes on where the likeliest pose has the object, which is not there.
+    pub alone: f64,
+    /// The pattern goes on, and the object is there.
+    pub around: f64,
+}
+
+impl Pattern {
+    /// `None` of a model without one.
+    pub(in crate::search) fn of(model: &[ModelPoint]) -> Option<Self> {
+        let n = model.len();
+        let least = ((LEAST_SHARE * n as f64).ceil() as usize).max(LEAST_ROWS);
+        if n < LEAST_ROWS + 2 || n > MOST_POINTS {
+            return None;
+        }
+        let at: Vec<Vector3<f64>> = model.iter().map(|point| point.at.coords).collect();
+        let off = OFF_SHARE * diameter(model);
+        let mut along: Vec<&Vector3<f64>> = at.iter().collect();
+        along.sort_by(|a, b| a.x.total_cmp(&b.x));
+        let near = |place: &Vector3<f64>| {
+            let from = along.partition_point(|p| p.x < place.x - off);
+            let mut beside = along[from..].iter().take_while(|p| p.x <= place.x + off);
+            beside.any(|p| (*p - place).norm_squared() <= off * off)
+        };
+        // Every point between two others: the steps to it, each once.
+        let mut steps: Vec<Vector3<f64>> = Vec::new();
+        for a in 0..n {
+            for c in 0..a {
+                let step = (at[a] - at[c]) / 2.0;
+                if step.norm() >= LEAST_STEP * off && near(&(at[c] + step)) {
+                    steps.push(if forward(&step) { step } else { -step });
+                }
+            }
+        }
+        let alike = |step: &Vector3<f64>| steps.iter().filter(|other| (*other - step).norm() <= off).count();
+        let mut common: Vec<&Vector3<f64>> = steps.iter().filter(|step| alike(step) >= least).collect();
+        let by = |a: &Vector3<f64>, b: &Vector3<f64>| a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
+        common.sort_by(|a, b| {
+            a.norm_squared().total_cmp(&b.norm_squared()).then(by(a, b).unwrap_or(std::cmp::Ordering::Equal))
+        });
+        let mut basis: Vec<Vector3<f64>> = Vec::new();
+        for step in common {
+            let rest = basis.iter().fold(*step, |rest, known| rest - known * (rest.dot(known) / known.norm_squared()));
+            if basis.len() < 3 && rest.norm() > SAME * step.norm() {
+                basis.push(*step);
+            }
+        }
+        let mut pattern = Self { repeats: vec![false; n], beyond: Vec::new() };
+        let next = |i: usize| basis.iter().flat_map(|step| [*step, -step]).map(move |step| (i, step));
+        for (i, step) in (0..n).flat_map(next) {
+            if near(&(at[i] + step)) {
+                pattern.repeats[i] = true;
+            }
+        }
+        for (i, step) in (0..n).flat_map(next) {
+            let place = at[i] + step;
+            let known = || pattern.beyond.iter().any(|other| (other - place).norm() <= 2.0 * off);
+            if pattern.repeats[i] && !near(&place) && !known() {
+                pattern.beyond.push(place);
+            }
+        }
+        (!basis.is_empty()).then_some(pattern)
+    }
+
+    /// What the pattern alone, or around the object, explains of the cloud as well as a pose does.
+    ///
+    /// Points of the pattern are as visible within the object as beyond it, all numbers being equally likely; the points
+    /// that do not repeat are the object's alone.
+    pub(in crate::search) fn look_alike(
+        &self,
+        problem: &Problem<'_>,
+        terms: &Terms,
+        graph: &Graph,
+        mode: &Mode,
+    ) -> LookAlike {
+        let repeats = |v: &&usize| self.repeats[graph.vertices[**v].model];
+        let of_pattern: Vec<usize> = mode.members.iter().filter(repeats).copied().collect();
+        let own: f64 = mode.members.iter().filter(|v| !repeats(v)).map(|&v| terms.residual_gain(v, &mode.motion)).sum();
+        let (n, all) = (self.repeats.len(), self.repeats.iter().filter(|&&repeats| repeats).count());
+        let (k, seen) = (mode.members.len(), of_pattern.len());
+        let ln_clutter =
+            of_pattern.iter().map(|&v| terms.ln_density[graph.vertices[v].model]).sum::<f64>() / seen.max(1) as f64;
+        let (mut further, mut gains) = (0, 0.0);
+        for place in self.beyond.iter().map(|place| mode.motion.apply(place)) {
+            let free = problem
+                .cloud
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| mode.members.iter().all(|&v| graph.vertices[v].cloud != *j));
+            let gain = free
+                .filter_map(|(_, point)| ln_measured(&point.position, &place))
+                .map(|ln_density| ln_density - ln_clutter)
+                .fold(0.0, f64::max);
+            gains += gain;
+            further += usize::from(gain > 0.0);
+        }
+        let shown = mode.ln_evidence - ln_share(k, n) - own;
+        let goes_on = gains + ln_share(seen + further, all + self.beyond.len());
+        // Where so many points do not repeat they have to tell the object: the same pattern may end anywhere.
+        let ends = if n - all >= TELLING { ln_share(seen, all) } else { f64::NEG_INFINITY };
+        let alone = shown + goes_on.max(ends);
+        LookAlike { alone, around: alone + own + ln_share(k - seen, n - all) }
+    }
+}
+
+/// One of a step and its reverse.
+fn forward(step: &Vector3<f64>) -> bool {
+    step.iter().copied().find(|x| x.abs() > 1e-9).is_none_or(|x| x > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use seafix_geometry::Point;
+
+    use super::*;
+
+    fn pattern(places: impl IntoIterator<Item = [f64; 3]>) -> Option<(usize, usize)> {
+        let model: Vec<ModelPoint> = places.into_iter().map(|at| ModelPoint::exact("", Point::from(at))).collect();
+        let pattern = Pattern::of(&model)?;
+        Some((pattern.repeats.iter().filter(|&&repeats| repeats).count(), pattern.beyond.len()))
+    }
+
+    fn lattice(columns: u8, rows: u8) -> Vec<[f64; 3]> {
+        let row = |i: u8| (0..rows).map(move |k| [0.25 * f64::from(i), 0.25 * f64::from(k), 0.0]);
+        (0..columns).flat_map(row).collect()
+    }
+
+    #[test]
+    fn a_lattice_repeats_and_goes_on_at_each_side() {
+        let off = [[0.735, 0.66, 0.18], [0.105, 0.56, 0.09], [0.955, 0.09, 0.07], [0.425, 0.15, 0.22]];
+        assert_eq!(pattern(lattice(6, 5).into_iter().chain(off)), Some((30, 22)));
+        // A ladder of six rungs goes on at its two ends.
+        assert_eq!(pattern(lattice(6, 2)), Some((12, 4)));
+    }
+
+    #[test]
+    fn what_does_not_come_three_times_in_a_row_is_no_pattern() {
+        let corners = (0..8u8).map(|c| [0, 1, 2].map(|k| f64::from(c >> k & 1) * [1.0, 1.5, 2.2][k]));
+        assert_eq!(pattern(corners), None);
+        assert_eq!(pattern(lattice(2, 2)), None);
+        let places =
+            [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, -2.0, 0.0], [0.5, 0.0, 1.5], [1.0, 2.2, 0.3], [-1.6, 0.4, 1.0]];
+        assert_eq!(pattern(places), None);
+    }
+}

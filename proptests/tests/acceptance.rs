@@ -1,0 +1,117 @@
+//! What is solved and what is wrongly believed, by how much is asked for.
+
+#![allow(clippy::print_stdout, reason = "the long form prints a table")]
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use seafix_evaluation::Solved;
+use seafix_geometry::{Camera, Object, Point, Transform};
+use seafix_referencing::{Acceptance, Mahalanobis, Outcome, Problem, RigidConsensus, Search, Tolerance, judge};
+use seafix_simulation::families::{Drawn, Family, Presence};
+
+/// Nothing is refused as absent by this much.
+const ANYTHING: f64 = 0.999_999;
+
+/// What came of one drawn problem.
+struct Tried {
+    /// Whether there is an answer to be had.
+    defined: bool,
+    /// The believed probability that the object is not there, of what passes all other tests; 1 of what does not.
+    absent: f64,
+    /// Of that, the part of a pattern that looks like it.
+    alike: f64,
+    /// Of the same, the expected number of chance sets as good, with the crowd about it.
+    chance: f64,
+    /// Whether the default settings believe it.
+    by_default: bool,
+    right: bool,
+    /// Whether the likeliest pose is right, believed or not.
+    likeliest: bool,
+}
+
+fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
+    let drawn = Drawn::new(family, seed, number, presence);
+    let file = drawn.problem.problem();
+    let candidates = file.candidates().expect("few enough to list");
+    let problem = Problem {
+        model: &file.model,
+        cloud: &file.cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Fixed(file.delta),
+        prior: file.prior.as_ref(),
+    };
+    let truth = Transform::<Camera, Object>::from_rows(&drawn.truth.t_cam_obj).expect("it is a rigid motion").inverse();
+    let rule = Solved { ideal_rms: drawn.truth.ideal_tre_rms, putative: file.putative.is_some() };
+    let at: Vec<Point<Object>> = file.model.iter().map(|point| point.at).collect();
+    let acceptance = Acceptance { absence: ANYTHING, ..Acceptance::default() };
+    let found = RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0));
+    let belief = found.as_ref().ok().and_then(|found| found.belief.clone()).unwrap_or_default();
+    let likeliest = belief.explanations.first().is_some_and(|best| rule.holds(&best.object_from_camera, &truth, &at));
+    let (mut absent, mut alike, mut right) = (1.0, 1.0, false);
+    let solver = Mahalanobis::default();
+    let by_default = judge(&problem, found.clone(), &solver, &Acceptance::default(), None);
+    let by_default = matches!(by_default.outcome, Outcome::Referenced(_));
+    let attempt = judge(&problem, found, &solver, &acceptance, None);
+    if let Outcome::Referenced(reference) = attempt.outcome {
+        let shares = belief.shares(&file.model, 0.08);
+        (absent, alike) = (shares.absent, shares.alike);
+        right = rule.holds(&reference.object_from_camera, &truth, &at);
+    }
+    let crowd = belief.explanations.first().map_or(0.0, |best| best.ln_crowd);
+    let chance = attempt.expected_chance_sets.map_or(f64::INFINITY, |expected| expected * crowd.exp());
+    Tried { defined: drawn.truth.pose_defined, absent, alike, chance, by_default, right, likeliest }
+}
+
+/// Solved (of the defined), wrong (of the answers, object present), and answered although the object is absent, for some
+/// settings of `acceptance.absence`.
+///
+/// `cargo test --release --workspace --test acceptance -- --ignored --nocapture`; `ACCEPTANCE_FAMILIES` (abcdefg),
+/// `ACCEPTANCE_PRESENT` (252) and `ACCEPTANCE_ABSENT` (252) frames each, `ACCEPTANCE_SEED` (21), `ACCEPTANCE_PAIRS` the most
+/// candidate pairs of a problem.
+#[test]
+#[ignore = "prints a table; minutes"]
+fn what_is_solved_depends_on_what_is_believed() {
+    let variable = |name: &str, default: &str| std::env::var(name).unwrap_or_else(|_| default.to_owned());
+    let number = |name: &str, default: &str| -> u64 { variable(name, default).parse().expect("a number") };
+    let (present, absent, seed) =
+        (number("ACCEPTANCE_PRESENT", "252"), number("ACCEPTANCE_ABSENT", "252"), number("ACCEPTANCE_SEED", "21"));
+    let most = number("ACCEPTANCE_PAIRS", "4000000");
+    println!(
+        "| family | believed | solved % | wrong of answers | absent frames answered | likeliest right % |\n|---|---|---|---|---|---|"
+    );
+    for name in variable("ACCEPTANCE_FAMILIES", "abcdefg").chars() {
+        let family: Family = name.to_string().parse().expect("a family");
+        let small = |k: &u64| {
+            let problem = Drawn::new(family, seed, *k, Presence::Present).problem.problem();
+            problem.candidates().is_ok_and(|candidates| candidates.pairs() as u64 <= most)
+        };
+        let all = |count: u64, presence: Presence| -> Vec<Tried> {
+            (0..).filter(small).take(count as usize).map(|k| tried(family, seed, k, presence)).collect()
+        };
+        let (with, without) = (all(present, Presence::Present), all(absent, Presence::Absent));
+        let defined = with.iter().filter(|one| one.defined).count();
+        let likeliest = with.iter().filter(|one| one.defined && one.likeliest).count();
+        let row = |what: String, answered: &dyn Fn(&Tried) -> bool| {
+            let given: Vec<&Tried> = with.iter().filter(|one| answered(one)).collect();
+            let right = given.iter().filter(|one| one.right).count();
+            let false_answers = without.iter().filter(|one| answered(one)).count();
+            println!(
+                "| {name} | {what} | {:.1} | {}/{} | {false_answers}/{} | {:.1} |",
+                100.0 * right as f64 / defined.max(1) as f64,
+                given.len() - right,
+                given.len(),
+                without.len(),
+                100.0 * likeliest as f64 / defined.max(1) as f64,
+            );
+        };
+        row("default".to_owned(), &|one| one.by_default);
+        for absence in [0.5, 0.1, 1e-2, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 1e-6] {
+            row(format!("{absence:.0e}"), &|one| one.absent <= absence);
+        }
+        // The default, or the expected number of chance sets and a bound of the probability of absence.
+        for (chance, absence) in [(1e-4, 1e-2), (3e-5, 1e-2), (1e-5, 1e-2), (3e-5, 5e-4), (1e-5, 5e-4)] {
+            let rare = |one: &Tried| one.chance <= chance && one.absent <= absence && one.alike <= 2e-5;
+            row(format!("{chance:.0e} sets, {absence:.0e}"), &|one| one.by_default || rare(one));
+        }
+    }
+}
