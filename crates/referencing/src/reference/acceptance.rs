@@ -16,8 +16,8 @@ pub struct Acceptance {
     /// points. Of one of n points (n + 1)/9 times as much, a hundredth at most: its evidence comes about by chance so much
     /// more seldom.
     pub absence: f64,
-    /// Without a prior: largest expected number of chance sets as good as the one found with which a pose is believed whose
-    /// object is absent with a probability of more than that, but of a hundredth at most.
+    /// Of putative pairs without a prior: largest expected number of chance sets as good as the one found with which a pose is
+    /// believed whose object is absent with a probability of more than that, but of a twentieth at most.
     pub rare: f64,
     /// Largest probability, by a search that weighs evidence, that a present object is elsewhere.
     pub doubt: f64,

@@ -1,7 +1,7 @@
 //! What is believed of a search that weighs evidence.
 
 use super::{Alternative, Outcome, Refusal, judge::Judge};
-use crate::{Belief, Explanation, Identification, Shares, chance::expected_sets_as_good};
+use crate::{Belief, Explanation, Identification, Problem, Shares, chance::expected_sets_as_good};
 
 impl Judge<'_> {
     /// The pose of a search that weighs evidence: believed when little speaks for no object at all, little
@@ -12,7 +12,7 @@ impl Judge<'_> {
         let runner_up = elsewhere.first().map(|other| other.alternative());
         let limit = self.absence_limit();
         // Written so that a NaN is refused too.
-        if !(shares.absent <= limit || self.rare(found, belief, &shares)) {
+        if !(shares.absent <= limit || self.rare(found, &shares)) {
             return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
         }
         if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
@@ -47,26 +47,29 @@ impl Judge<'_> {
     fn absence_limit(&self) -> f64 {
         let larger = (self.problem.model.len() + 1) as f64 / STATED_FOR;
         let stated = self.acceptance.absence;
-        (stated * larger.max(1.0)).min(IMPROBABLE.max(stated))
+        (stated * larger.max(1.0)).min(MOST_ABSENCE.max(stated))
     }
 
     /// Whether chance gives sets as good so rarely that the pose is believed although absence is not as improbable as it
     /// should be.
     ///
     /// The probability of absence takes every number of visible points to be equally likely, which of a large model makes
-    /// few visible ones improbable beforehand; chance is counted without. Where the cloud is crowded it gives more. Of a
-    /// pattern that looks like the object it says nothing, nor of clutter in shells that lies on edges like the object's.
-    fn rare(&self, found: &Identification, belief: &Belief, shares: &Shares) -> bool {
-        let known = self.problem.prior.is_some();
-        if known || !(shares.absent <= IMPROBABLE && shares.alike <= self.acceptance.absence) {
-            return false;
-        }
-        let crowd = belief.explanations.first().map_or(0.0, |best| best.ln_crowd);
-        expected_sets_as_good(self.problem, &found.pairs) * libm::exp(crowd) <= self.acceptance.rare
+    /// few visible ones improbable beforehand; chance is counted without. Only of putative pairs is its count good enough
+    /// for that: partners that were shuffled lie wherever the cloud does, crowded or not, while clutter in shells lies on
+    /// edges that look like the object's.
+    fn rare(&self, found: &Identification, shares: &Shares) -> bool {
+        let Problem { cloud, candidates, prior, .. } = self.problem;
+        let putative = prior.is_none() && candidates.lists.iter().any(|list| list.len() < cloud.len());
+        putative
+            && shares.absent <= IMPROBABLE
+            && shares.alike <= self.acceptance.absence
+            && expected_sets_as_good(self.problem, &found.pairs) <= self.acceptance.rare
     }
 }
 
 /// An object is not believed whose absence is more probable than this.
-const IMPROBABLE: f64 = 0.01;
+const IMPROBABLE: f64 = 0.05;
+/// The greatest limit of the probability of absence, whatever the model.
+const MOST_ABSENCE: f64 = 0.01;
 /// The number of points, and one, of the models that [`Acceptance::absence`](super::Acceptance::absence) is stated for.
 const STATED_FOR: f64 = 9.0;

@@ -157,7 +157,7 @@ pub(in crate::search) fn ln_measured(seen: &UncertainPoint<Camera>, place: &Vect
     // χ² is at least r²/tr Σ.
     let (weight, ln_peak) = (r.norm_squared() <= far).then(|| peak(&seen.covariance))?;
     let d2 = r.dot(&(weight * r));
-    (d2 <= FAR).then(|| ln_peak - 0.5 * d2)
+    (d2 <= FAR).then_some(ln_peak - 0.5 * d2)
 }
 
 /// A pose with its pairs: a maximum of the posterior density.

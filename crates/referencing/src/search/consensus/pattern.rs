@@ -44,7 +44,7 @@ impl Pattern {
     pub(in crate::search) fn of(model: &[ModelPoint]) -> Option<Self> {
         let n = model.len();
         let least = ((LEAST_SHARE * n as f64).ceil() as usize).max(LEAST_ROWS);
-        if n < LEAST_ROWS + 2 || n > MOST_POINTS {
+        if !(LEAST_ROWS + 2..=MOST_POINTS).contains(&n) {
             return None;
         }
         let at: Vec<Vector3<f64>> = model.iter().map(|point| point.at.coords).collect();
