@@ -48,8 +48,7 @@ fn referenced(family: Family, seed: u64, number: u64, presence: Presence) -> boo
 /// Where the object is not there, no pose is given: 300 frames at the paper's scale, some at a site's, and some where the
 /// lattice that the object is a part of goes on about its place.
 ///
-/// Seen to fail when a pattern like the object's is not thought of (4 of the 60 lattices), and when clutter is taken to be
-/// spread evenly.
+/// Seen to fail when few expected chance sets are enough for a pose in shells: of a lattice they say nothing.
 #[test]
 fn no_object_no_pose() {
     for (family, frames) in [(Family::A, 300), (Family::E, 60), (Family::F, 12)] {

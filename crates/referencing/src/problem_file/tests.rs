@@ -116,7 +116,6 @@ fn a_file_that_is_not_there_is_a_line() {
 }
 
 /// A displaced object: its shells hold nothing, those twice as large hold it, or none do and every point is looked at.
-/// Seen to fail when the shells do not grow, and when they do not vanish.
 #[test]
 fn a_displaced_object_is_found_in_larger_shells_or_without() {
     let outcome = |x: &str, widen: bool| {
