@@ -4,7 +4,7 @@ use seafix_component::{Listing, Registry};
 use seafix_experiment::source::SOURCES;
 use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
 use seafix_referencing::{SEARCHES, SOLVERS};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
 
 /// One kind of component: its plural and its components.
 pub(crate) struct Kind {
@@ -22,6 +22,8 @@ pub(crate) fn kinds() -> Vec<Kind> {
         kind("locators", &LOCATORS),
         kind("descriptors", &DESCRIPTORS),
         kind("matchers", &MATCHERS),
+        kind("refinements", &REFINEMENTS),
+        kind("triangulators", &TRIANGULATORS),
         kind("searches", &SEARCHES),
         kind("solvers", &SOLVERS),
         kind("odometries", &ODOMETRIES),

@@ -70,9 +70,9 @@ impl Sample {
         let sample = Self { folder: TempDir::new().unwrap() };
         sample.put("dataset.toml", DATASET);
         sample.put("site.toml", SITE);
-        sample.put("frames.csv", "stamp_ns,left,right\n1000000000,a.pgm,a.pgm\n");
+        sample.put("frames.csv", "stamp_ns,left,right\n1000000000,a.pgm,b.pgm\n");
         sample.put("prior.tum", "1.0 0 0 -3 0 0 0 1\n");
-        sample.put("a.pgm", &pgm(64, 48));
+        sample.put("a.pgm", &pgm(64, 48)).put("b.pgm", &other(64, 48));
         sample
     }
 
@@ -103,6 +103,12 @@ impl Sample {
 /// A plain image in the text form of PGM.
 fn pgm(width: usize, height: usize) -> String {
     let pixels: Vec<String> = (0..width * height).map(|i| ((i * 7919) % 251).to_string()).collect();
+    format!("P2\n{width} {height}\n255\n{}\n", pixels.join("\n"))
+}
+
+/// Another image of noise.
+fn other(width: usize, height: usize) -> String {
+    let pixels: Vec<String> = (0..width * height).map(|i| ((i * i * 31 + i * 457) % 241).to_string()).collect();
     format!("P2\n{width} {height}\n255\n{}\n", pixels.join("\n"))
 }
 
@@ -158,21 +164,13 @@ fn a_coordinate_that_is_no_number() {
 
 #[test]
 fn images_of_another_size() {
-    Sample::new()
-        .put("a.pgm", &pgm(32, 48))
-        .change("frames.csv", "a.pgm,a.pgm", "a.pgm,b.pgm")
-        .put("b.pgm", &pgm(64, 48))
-        .refused(3, &["a.pgm", "32×48, calibrated 64×48"]);
+    Sample::new().put("a.pgm", &pgm(32, 48)).refused(3, &["a.pgm", "32×48, calibrated 64×48"]);
 }
 
 #[test]
 fn pairs_of_another_size_are_left_out_and_counted() {
     let sample = Sample::new();
-    sample.put("b.pgm", &pgm(64, 48)).put("c.pgm", &pgm(32, 48)).change(
-        "frames.csv",
-        "a.pgm,a.pgm",
-        "a.pgm,b.pgm\n2000000000,a.pgm,c.pgm",
-    );
+    sample.put("c.pgm", &pgm(32, 48)).change("frames.csv", "a.pgm,b.pgm", "a.pgm,b.pgm\n2000000000,a.pgm,c.pgm");
     let run = |name: &str, more: &[&str]| {
         let out = sample.path(name);
         let given = ["run", sample.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()];
@@ -197,7 +195,6 @@ fn pairs_of_another_size_are_left_out_and_counted() {
 fn a_truncated_image() {
     let sample = Sample::new();
     fs::write(sample.path("a.pgm"), b"\x89PNG\r\n\x1a\n\0\0").unwrap();
-    sample.change("frames.csv", "a.pgm,a.pgm", "a.pgm,b.pgm").put("b.pgm", &pgm(64, 48));
     sample.refused(3, &["a.pgm", "PNG, JPEG and PNM"]);
 }
 
@@ -217,7 +214,7 @@ fn a_missing_file() {
 
 #[test]
 fn a_path_that_leads_out() {
-    Sample::new().change("frames.csv", "a.pgm,a.pgm", "../a.pgm,a.pgm").refused(3, &["frames.csv:2", "leads out"]);
+    Sample::new().change("frames.csv", "a.pgm,b.pgm", "../a.pgm,b.pgm").refused(3, &["frames.csv:2", "leads out"]);
 }
 
 /// Each of these changes of the description is refused with its own words.
@@ -241,7 +238,7 @@ fn cameras_that_cannot_be() {
     let left = |numbers: &str| format!("[rig.left]\nsize = [64, 48]\n{numbers}\n\n[rig.right]");
     let sound = left("fx = 50.0\nfy = 50.0\ncx = 31.5\ncy = 23.5");
     for (numbers, parts) in [
-        ("fx = 0.0\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["fx = 0", "positive number of pixels"]),
+        ("fx = 0.0\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["dataset.toml:13: fx = 0; ", "positive number of pixels"]),
         ("fx = 50.0\nfy = -50.0\ncx = 31.5\ncy = 23.5", ["fy = -50", "positive number of pixels"]),
         ("fx = nan\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["fx = NaN", "positive number of pixels"]),
         ("fx = 50.0\nfy = 50.0\ncx = 64.5\ncy = 23.5", ["cx = 64.5", "must lie in the image"]),
@@ -277,7 +274,6 @@ fn a_quaternion_off_unit_length() {
 /// One image of the sample replaced by these bytes.
 fn with_image(bytes: &[u8]) -> Sample {
     let sample = Sample::new();
-    sample.change("frames.csv", "a.pgm,a.pgm", "a.pgm,b.pgm").put("b.pgm", &pgm(64, 48));
     fs::write(sample.path("a.pgm"), bytes).unwrap();
     sample
 }
@@ -319,6 +315,59 @@ fn the_limits_of_images_are_settings() {
         (check(&[]), check(&["--max-pixels", "3072"]), check(&["--max-pixels", "3071"])),
         (Some(0), Some(0), Some(1))
     );
+}
+
+/// What `check` says of the sample, and its exit code.
+fn checked(sample: &Sample) -> (Option<i32>, String) {
+    let output = Command::cargo_bin("seafix").unwrap().arg("check").arg(sample.folder.path()).output().unwrap();
+    (output.status.code(), String::from_utf8(output.stdout).unwrap())
+}
+
+/// Seen to fail when pairs are decoded and not compared: check said the set was in order.
+#[test]
+fn one_image_for_both_cameras() {
+    let sample = Sample::new();
+    let (code, said) = checked(&sample);
+    assert!(code == Some(0) && said.contains("in order"), "{said}");
+    fs::copy(sample.path("a.pgm"), sample.path("b.pgm")).unwrap();
+    let (code, said) = checked(&sample);
+    let told = said.contains("left and right images that are the same in") && said.contains("1 of 1 pairs");
+    assert!(code == Some(1) && told && !said.contains("in order"), "{said}");
+    sample.refused(3, &["a.pgm", "left and right images that are the same", "one image twice has no depth"]);
+    // Two images of nothing are alike and no mistake.
+    let dark = format!("P2\n64 48\n255\n{}", "9\n".repeat(64 * 48));
+    sample.put("a.pgm", &dark).put("b.pgm", &dark);
+    assert_eq!(checked(&sample).0, Some(0));
+}
+
+/// Seen to fail when the decoder's samples are taken as they come.
+#[test]
+fn samples_above_maxval() {
+    let text = pgm(64, 48).replacen("255", "100", 1);
+    let line = 4 + (0..64 * 48).position(|i| (i * 7919) % 251 > 100).unwrap();
+    with_image(text.as_bytes()).refused(3, &[&format!("a.pgm:{line}: "), "MAXVAL is 100; write the image again"]);
+    let mut bytes = b"P5 64 48 200\n".to_vec();
+    bytes.extend([7; 64 * 48]);
+    let at = bytes.len() - 60;
+    bytes[at] = 201;
+    with_image(&bytes).refused(3, &["a sample above MAXVAL", "a.pgm: 201 at (4, 47), MAXVAL is 200"]);
+}
+
+/// Seen to fail when a path is read to its end, whatever is there.
+#[test]
+#[cfg(unix)]
+fn what_has_no_end_is_not_read() {
+    let text = fs::read_to_string(Sample::new().path("dataset.toml")).unwrap();
+    let folder = TempDir::new().unwrap();
+    let rig = folder.path().join("dataset.toml");
+    fs::write(&rig, text).unwrap();
+    let pipe = folder.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [Path::new("/dev/zero"), &pipe, folder.path()] {
+        let (path, rig) = (path.to_str().unwrap(), rig.to_str().unwrap());
+        refused(&["cloud", path, path, "--rig", rig], 3, &[path, "a path that is no file", "; name a file"]);
+    }
+    refused(&["cloud", "a.pgm", "a.pgm", "--rig", "/dev/zero"], 3, &["/dev/zero", "text file too large"]);
 }
 
 fn experiment(text: &str) -> (TempDir, String) {
@@ -438,12 +487,12 @@ fn check_lists_everything_at_once() {
             "fx = -1.0\nfy = 50.0\ncx = 31.5\ncy = 23.5\n\n[rig.right]",
         )
         .change("prior.tum", "0 0 0 1", "0 0 0 2")
-        .change("frames.csv", "a.pgm,a.pgm", "b.pgm,a.pgm");
+        .change("frames.csv", "a.pgm,b.pgm", "c.pgm,a.pgm");
     let output =
         Command::cargo_bin("seafix").unwrap().args(["check", sample.folder.path().to_str().unwrap()]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{text}");
-    for part in ["fx = -1", "prior.tum:1", "b.pgm"] {
+    for part in ["fx = -1", "prior.tum:1", "c.pgm"] {
         assert!(text.contains(part), "no `{part}` in {text}");
     }
 }

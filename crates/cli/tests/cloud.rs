@@ -8,6 +8,7 @@ use std::{
 };
 
 use assert_cmd::Command;
+use seafix_experiment::dataset::{ImageLimits, read_image, write_png};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -93,6 +94,75 @@ fn images_that_changed_places_are_refused() {
     command.arg("cloud").args([sample(pair[1]), sample(pair[0])]).arg("--rig").arg(sample("dataset.toml"));
     let said = String::from_utf8(command.assert().code(3).get_output().stderr.clone()).unwrap();
     assert!(said.contains("left and right images that have changed places") && said.lines().count() == 1, "{said}");
+}
+
+/// The cloud of two of the sample's images with a changed rig; what it says on standard error.
+fn said(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("dataset.toml");
+    fs::write(&file, rig(fs::read_to_string(sample("dataset.toml")).unwrap())).unwrap();
+    let mut command = Command::cargo_bin("seafix").unwrap();
+    command.arg("cloud").args(images.map(sample)).arg("--rig").arg(&file);
+    String::from_utf8(command.assert().code(code).get_output().stderr.clone()).unwrap()
+}
+
+/// Seen to fail when the two images are not compared: there were 17 points.
+#[test]
+fn one_image_twice_is_refused() {
+    let said = said(["left000.png", "left000.png"], |rig| rig, 3);
+    assert!(said.contains("left and right images that are the same") && said.lines().count() == 1, "{said}");
+}
+
+/// Images that were not made by their rig are told by their epipolar distances, and a rig that is called rectified and is
+/// not by its numbers.
+///
+/// Seen to fail when matches are sought along the rig's lines, which are all near them.
+#[test]
+fn rows_that_do_not_correspond_are_told() {
+    let images = ["left000.png", "right000.png"];
+    assert_eq!(said(images, |rig| rig, 0), "");
+    // The right camera looks 20 rows lower than it says.
+    let lower = |rig: String| {
+        let (left, right) = rig.split_once("[rig.right]").unwrap();
+        format!("{left}[rig.right]{}", right.replace("cy = 383.5", "cy = 403.5"))
+    };
+    let told = said(images, lower, 0);
+    assert!(told.contains("warning: a rig that is called rectified and is not in "), "{told}");
+    // As above, but the numbers hold the rows for equal.
+    let upright =
+        |rig: String| rig.replace("-0.25]", "0.0]").replacen("0.0, 1.0, 0.0, 0.0]", "0.0, 1.0, 0.0, -0.25]", 1);
+    let told = said(images, upright, 0);
+    let parts = [
+        "a rig that the images contradict in ",
+        "lie within 3 px of the same columns, rms ",
+        " px; give the calibration",
+    ];
+    assert!(parts.iter().all(|part| told.contains(part)), "{told}");
+}
+
+/// Seen to fail when a cloud of no point is nothing to speak of.
+#[test]
+fn key_points_that_come_to_nothing_are_told() {
+    let images = [sample("right000.png"), sample("left000.png")];
+    let run = |images: &[PathBuf; 2]| {
+        let mut command = Command::cargo_bin("seafix").unwrap();
+        // Too few corners to say that the images have changed places.
+        command.arg("cloud").args(images).arg("--rig").arg(sample("dataset.toml"));
+        String::from_utf8(command.output().unwrap().stderr).unwrap()
+    };
+    assert!(run(&images).contains("changed places"));
+    let folder = TempDir::new().unwrap();
+    let few = images.map(|image| {
+        // All dark but for a small part of the image.
+        let name = folder.path().join(image.file_name().unwrap());
+        let mut grey = read_image(&image, [1024, 768], 16, ImageLimits::default()).unwrap();
+        let seen = |i: usize| (440..560).contains(&(i % 1024)) && (330..400).contains(&(i / 1024));
+        grey.pixels_mut().iter_mut().enumerate().filter(|(i, _)| !seen(*i)).for_each(|(_, pixel)| *pixel = 40.0);
+        write_png(&name, &grey, 8).unwrap();
+        name
+    });
+    let told = run(&few);
+    assert!(told.contains("warning: ") && told.contains("exchanged") && told.contains(" 0 matches"), "{told}");
 }
 
 #[test]

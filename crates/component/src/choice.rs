@@ -28,18 +28,33 @@ impl Choice {
     }
 }
 
+impl Choice {
+    fn read<E: serde::de::Error>(value: toml::Value, unnamed: Option<&str>) -> Result<Self, E> {
+        match value {
+            toml::Value::String(name) => Ok(Self::named(&name)),
+            toml::Value::Table(mut settings) => match (settings.remove("name"), unnamed) {
+                (Some(toml::Value::String(name)), _) => Ok(Self { name, settings }),
+                (Some(other), _) => Err(E::custom(format!("`name` must be a string, found {other}"))),
+                (None, Some(name)) => Ok(Self { name: name.to_owned(), settings }),
+                (None, None) => Err(E::custom("a component's table needs a `name`")),
+            },
+            other => Err(E::custom(format!("a component is a name or a table with a `name`, found {other}"))),
+        }
+    }
+
+    /// A choice whose table need not say a name: without one its settings are those of `unnamed`. For a stage that had
+    /// settings before it had a choice.
+    ///
+    /// # Errors
+    /// What is neither a name nor a table.
+    pub fn deserialize_or<'de, D: Deserializer<'de>>(deserializer: D, unnamed: &str) -> Result<Self, D::Error> {
+        Self::read(toml::Value::deserialize(deserializer)?, Some(unnamed))
+    }
+}
+
 impl<'de> Deserialize<'de> for Choice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        use serde::de::Error;
-        match toml::Value::deserialize(deserializer)? {
-            toml::Value::String(name) => Ok(Self::named(&name)),
-            toml::Value::Table(mut settings) => match settings.remove("name") {
-                Some(toml::Value::String(name)) => Ok(Self { name, settings }),
-                Some(other) => Err(D::Error::custom(format!("`name` must be a string, found {other}"))),
-                None => Err(D::Error::custom("a component's table needs a `name`")),
-            },
-            other => Err(D::Error::custom(format!("a component is a name or a table with a `name`, found {other}"))),
-        }
+        Self::read(toml::Value::deserialize(deserializer)?, None)
     }
 }
 
@@ -65,6 +80,19 @@ mod tests {
         assert_eq!(b, Choice::named("triad").with("least-sine", 0.2));
         let printed = toml::to_string(&b).unwrap();
         assert_eq!(toml::from_str::<Choice>(&printed).unwrap(), b);
+    }
+
+    /// Seen to fail when such a table is refused as any other is.
+    #[test]
+    fn a_stage_that_was_no_choice_keeps_its_settings() {
+        let read = |text: &str| {
+            let table: toml::Table = toml::from_str(text).unwrap();
+            Choice::deserialize_or(table["a"].clone(), "direct").map_err(|error| error.to_string())
+        };
+        assert_eq!(read("a = { window = 15 }").unwrap(), Choice::named("direct").with("window", 15));
+        assert_eq!(read("a = { name = 'none' }").unwrap(), Choice::named("none"));
+        assert_eq!(read("a = 'none'").unwrap(), Choice::named("none"));
+        assert!(read("a = 3").is_err());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Text files as people write them.
 
-use std::path::Path;
+use std::{io::Read, path::Path};
 
 use crate::Fault;
 
@@ -13,13 +13,15 @@ pub fn read_text(path: &Path) -> Result<String, Fault> {
     let unreadable = |error: std::io::Error| {
         Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
     };
-    let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    if size > LIMIT {
+    let mut bytes = Vec::new();
+    // A device has no size before it is read, and no end.
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    file.take(LIMIT + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > LIMIT {
         return Err(Fault::new("text file too large", path)
-            .value(format!("{size} bytes"))
+            .value(format!("more than {LIMIT} bytes"))
             .remedy(format!("at most {LIMIT} bytes are read")));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy("save the file as UTF-8")

@@ -12,7 +12,8 @@ use seafix_referencing::{
     until_found,
 };
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, Refine, Triangulator,
+    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, Keypoint, LOCATORS, Look, MATCHERS, REFINEMENTS, TRIANGULATORS,
+    read_refinement, read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
@@ -39,10 +40,12 @@ pub struct Pipeline {
     pub descriptor: Choice,
     /// Pairs left with right.
     pub matcher: Choice,
-    /// Aligns each pair between the views.
-    pub refine: Refine,
-    /// Turns pairs into points.
-    pub triangulation: Triangulator,
+    /// Says more exactly where the right image shows each left place. Settings without a name are those of `direct`.
+    #[serde(deserialize_with = "read_refinement")]
+    pub refine: Choice,
+    /// Turns pairs into points. Settings without a name are those of `optimal`.
+    #[serde(deserialize_with = "read_triangulator")]
+    pub triangulation: Choice,
     /// Stage 1: the shells.
     pub gate: Gate,
     /// Whether shells grow where nothing is found in them, and then vanish: an object may have been displaced.
@@ -67,8 +70,8 @@ impl Default for Pipeline {
             locator: Choice::named("corner"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band"),
-            refine: Refine::default(),
-            triangulation: Triangulator::default(),
+            refine: Choice::named("direct"),
+            triangulation: Choice::named("optimal"),
             gate: Gate::default(),
             widen: false,
             tolerance: Tolerance::Sigmas(3.0),
@@ -103,6 +106,8 @@ impl Pipeline {
             descriptor: resolve(&DESCRIPTORS, &self.descriptor)?,
             matcher: resolve(&MATCHERS, &self.matcher)?,
             locator: resolve(&LOCATORS, &self.locator)?,
+            refine: resolve(&REFINEMENTS, &self.refine)?,
+            triangulation: resolve(&TRIANGULATORS, &self.triangulation)?,
             search: resolve(&SEARCHES, &self.search)?,
             solver: resolve(&SOLVERS, &self.solver)?,
             ..self.clone()
@@ -126,10 +131,10 @@ impl Pipeline {
             build(&LOCATORS, &self.locator).map(drop),
             build(&DESCRIPTORS, &self.descriptor).map(drop),
             build(&MATCHERS, &self.matcher).map(drop),
+            build(&REFINEMENTS, &self.refine).map(drop),
+            build(&TRIANGULATORS, &self.triangulation).map(drop),
             build(&SEARCHES, &self.search).map(drop),
             build(&SOLVERS, &self.solver).map(drop),
-            fits("refine", self.refine.check()),
-            fits("triangulation", self.triangulation.check()),
             fits("gate", self.gate.check()),
             fits("tolerance", self.tolerance.check()),
             fits("acceptance", self.acceptance.check()),
@@ -138,21 +143,25 @@ impl Pipeline {
         parts.into_iter().filter_map(Result::err).collect()
     }
 
+    /// Standard deviation of the coordinates of a key point that no corner was fitted to (px); none of a pipeline that
+    /// cannot be built.
+    pub(crate) fn pixel_sigma(&self) -> Option<f64> {
+        build(&TRIANGULATORS, &self.triangulation).ok().map(|triangulator| triangulator.rules().sigma_px)
+    }
+
     /// The part of it between two images and a cloud, ready to work.
     ///
     /// # Errors
     /// [`PipelineError`] names the setting.
     pub fn front_end(&self) -> Result<FrontEnd, PipelineError> {
-        fits("refine", self.refine.check())?;
-        fits("triangulation", self.triangulation.check())?;
         Ok(FrontEnd {
             filters: each_filter(&self.filters, build)?,
             detector: build(&DETECTORS, &self.detector)?,
             descriptor: build(&DESCRIPTORS, &self.descriptor)?,
             matcher: build(&MATCHERS, &self.matcher)?,
             locator: build(&LOCATORS, &self.locator)?,
-            refine: self.refine.clone(),
-            triangulator: self.triangulation.clone(),
+            refinement: build(&REFINEMENTS, &self.refine)?,
+            triangulator: build(&TRIANGULATORS, &self.triangulation)?,
         })
     }
 
@@ -203,7 +212,13 @@ fn each_filter<T>(
 
 fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {
     let key = error.key().filter(|&key| key != "name").map(str::to_owned);
-    PipelineError { setting: registry.kind(), key, message: error.to_string() }
+    // Two stages had their names before they were components.
+    let setting = match registry.kind() {
+        "refinement" => "refine",
+        "triangulator" => "triangulation",
+        kind => kind,
+    };
+    PipelineError { setting, key, message: error.to_string() }
 }
 
 /// A pipeline, built.

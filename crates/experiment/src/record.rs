@@ -68,7 +68,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
             .collect(),
         prior_position_sigma: prior.map(|(position, _)| position),
         prior_attitude_sigma: prior.map(|(_, attitude)| attitude),
-        pixel_sigma: passage.pixel_sigma().or(Some(pipeline.triangulation.sigma_px)),
+        pixel_sigma: passage.pixel_sigma().or_else(|| pipeline.pixel_sigma()),
         seeds: vec![("experiment".to_owned(), trial.resolved.seed)],
         versions: versions(),
     }

@@ -18,6 +18,7 @@
 //!   `object_from_camera` ξ lives in the camera frame ([`Covariance6`]).
 //! - Elementary functions come from `libm`: the same bits on every platform.
 
+mod closed_form;
 mod covariance;
 mod frame;
 mod measured;

@@ -216,7 +216,7 @@ impl StereoRig {
     }
 
     /// The midpoint of the closest approach of the two rays.
-    fn midpoint(&self, seen: &StereoPixels) -> Result<Point<Camera>, Untriangulable> {
+    pub(crate) fn midpoint(&self, seen: &StereoPixels) -> Result<Point<Camera>, Untriangulable> {
         let l = self.left.normalize(&seen.left).ok_or(Untriangulable::OutsideLens)?.push(1.0);
         let r = self.right.normalize(&seen.right).ok_or(Untriangulable::OutsideLens)?.push(1.0);
         let left_from_right = self.right_from_left.inverse();

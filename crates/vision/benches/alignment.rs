@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 use seafix_geometry::{Pinhole, Pixel, StereoRig, Transform};
-use seafix_vision::{Image, Pair, Place, Refine, Warp, Weight};
+use seafix_vision::{Direct, Image, Pair, Place, Refinement, Warp, Weight, ZnccParabola};
 
 use random::Random;
 
@@ -114,7 +114,7 @@ fn rig() -> StereoRig {
 }
 
 /// `trials` pairs, seen with this slope of the disparity along each axis.
-fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -> Sums {
+fn measure(kind: Kind, slope: f64, noise: f64, refinement: &dyn Refinement, window: usize, trials: usize) -> Sums {
     let (mut sums, rig) = (Sums::default(), rig());
     for trial in 0..trials {
         let mut random = Random(trial as u64 * 7919 + 17);
@@ -132,7 +132,7 @@ fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -
         let pixel = |v: &Vector2<f64>| Pixel { u: v.x, v: v.y };
         let [l, r] = [&left_at, &start].map(|at| Place::independent(pixel(at), 0.15));
         sums.count += 1;
-        let [pair] = refine.align(&[Pair { left: l, right: r }], &left, &right, &rig)[..] else {
+        let [pair] = refinement.refine(&[Pair { left: l, right: r }], &left, &right, &rig)[..] else {
             sums.failed += 1;
             continue;
         };
@@ -145,7 +145,7 @@ fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -
             pair.covariance.fixed_view::<2, 2>(2, 2) - common.transpose() * place.try_inverse().expect("L") * common;
         sums.normalised += (error.transpose() * own.try_inverse().expect("A") * error).x;
         sums.predicted += own.trace();
-        let half = (refine.window / 2) as isize;
+        let half = (window / 2) as isize;
         let mut information = Matrix2::zeros();
         for y in -half..=half {
             for x in -half..=half {
@@ -163,36 +163,59 @@ fn measure(kind: Kind, slope: f64, noise: f64, refine: &Refine, trials: usize) -
 fn main() {
     let trials = std::env::args().filter_map(|a| a.parse().ok()).next().unwrap_or(400);
     println!("scene    slope noise window   warp         weight     RMS px  bound   ratio  predicted  NEES/2  failed");
-    let row = |kind: Kind, slope: f64, noise: f64, refine: &Refine| {
-        let sums = measure(kind, slope, noise, refine, trials);
+    let print = |kind: Kind,
+                 slope: f64,
+                 noise: f64,
+                 refinement: &dyn Refinement,
+                 window: usize,
+                 [warp, weight]: [String; 2]| {
+        let sums = measure(kind, slope, noise, refinement, window, trials);
         let n = (sums.count - sums.failed).max(1) as f64;
         let rms = |sum: f64| (sum / (2.0 * n)).sqrt();
         let (error, bound) = (rms(sums.squares), rms(sums.bound));
         println!(
             "{:<8} {slope:5.2} {noise:4.0} {:5}    {:<12} {:<9} {error:.4}  {bound:.4}  {:.3}   {:.4}     {:.2}    {}",
             format!("{kind:?}"),
-            refine.window,
-            format!("{:?}", refine.warp),
-            format!("{:?}", refine.weight),
+            window,
+            warp,
+            weight,
             error / bound,
             rms(sums.predicted),
             sums.normalised / (2.0 * n),
             sums.failed
         );
     };
-    let uniform = Refine { window: 21, weight: Weight::Uniform, ..Refine::default() };
+    let row = |kind: Kind, slope: f64, noise: f64, direct: &Direct| {
+        let words = [format!("{:?}", direct.warp), format!("{:?}", direct.weight)];
+        print(kind, slope, noise, direct, direct.window, words);
+    };
+    let uniform = Direct { window: 21, weight: Weight::Uniform, ..Direct::default() };
     for kind in [Kind::X, Kind::L, Kind::Gravel] {
         for noise in [0.0, 2.0, 5.0] {
-            for refine in [&uniform, &Refine::default()] {
+            for refine in [&uniform, &Direct::default()] {
                 row(kind, 0.0, noise, refine);
             }
+            row(kind, 0.0, noise, &Direct { warp: Warp::AsSeen, ..Direct::default() });
         }
     }
     for slope in [0.05, 0.15] {
-        for warp in [Warp::Translation, Warp::Slanted, Warp::Affine] {
-            row(Kind::Gravel, slope, 2.0, &Refine { warp, ..uniform.clone() });
+        for warp in [Warp::Translation, Warp::Slanted, Warp::AsSeen, Warp::Affine] {
+            row(Kind::Gravel, slope, 2.0, &Direct { warp, ..uniform.clone() });
+        }
+        for kind in [Kind::X, Kind::L, Kind::Gravel] {
+            for warp in [Warp::Translation, Warp::Slanted, Warp::AsSeen] {
+                row(kind, slope, 2.0, &Direct { warp, ..Direct::default() });
+            }
         }
     }
-    row(Kind::X, 0.15, 2.0, &Refine { warp: Warp::Slanted, ..uniform.clone() });
-    row(Kind::L, 0.15, 2.0, &Refine { warp: Warp::Slanted, ..uniform.clone() });
+    row(Kind::X, 0.15, 2.0, &Direct { warp: Warp::Slanted, ..uniform.clone() });
+    row(Kind::L, 0.15, 2.0, &Direct { warp: Warp::Slanted, ..uniform.clone() });
+    let parabola = ZnccParabola { window: 21, ..ZnccParabola::default() };
+    for (kind, slope, noise) in [Kind::X, Kind::L, Kind::Gravel]
+        .into_iter()
+        .flat_map(|kind| [0.0, 2.0, 5.0].map(|noise| (kind, 0.0, noise)))
+        .chain([(Kind::Gravel, 0.05, 2.0), (Kind::Gravel, 0.15, 2.0)])
+    {
+        print(kind, slope, noise, &parabola, parabola.window, ["parabola".to_owned(), "Uniform".to_owned()]);
+    }
 }

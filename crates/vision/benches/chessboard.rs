@@ -17,7 +17,7 @@ use common::peer::{OPENCV, Peer, floats};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use seafix_component::Choice;
 use seafix_geometry::{Pinhole, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FrontEnd, LOCATORS, Look, MATCHERS, Refine, Triangulator, Warp};
+use seafix_vision::{DESCRIPTORS, DETECTORS, Direct, FrontEnd, LOCATORS, Look, MATCHERS, Optimal, Warp};
 use serde_json::{Value, json};
 
 /// How near to OpenCV's corner ours has to be (px).
@@ -49,9 +49,12 @@ fn main() {
         "corners", "matched", "wrong", "3D RMS mm", "disparity − peer", "calibrated: l, r, stereo", "3D RMS mm"
     );
     let pairs = corners.as_object().expect("pairs by name");
-    for (name, warp) in
-        [("OpenCV's", None), ("ours", Some(Warp::Translation)), ("ours, slanted windows", Some(Warp::Slanted))]
-    {
+    for (name, warp) in [
+        ("OpenCV's", None),
+        ("ours", Some(Warp::Translation)),
+        ("ours, slanted windows", Some(Warp::Slanted)),
+        ("ours, windows as seen", Some(Warp::AsSeen)),
+    ] {
         let boards: Vec<Board> = pairs
             .iter()
             .map(|(pair, at)| {
@@ -96,8 +99,8 @@ fn front_end(warp: Warp) -> FrontEnd {
         locator: LOCATORS.build(&plain("corner")).expect("a locator"),
         descriptor: DESCRIPTORS.build(&plain("surf")).expect("a descriptor"),
         matcher: MATCHERS.build(&plain("epipolar-band")).expect("a matcher"),
-        refine: Refine { warp, ..Refine::default() },
-        triangulator: Triangulator::default(),
+        refinement: Box::new(Direct { warp, ..Direct::default() }),
+        triangulator: Box::new(Optimal::default()),
     }
 }
 

@@ -5,8 +5,8 @@ use std::time::Instant;
 use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels};
 
 use crate::{
-    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Locator, Match, Matcher, Pair, Place, Refine, Threads,
-    Triangulator, View, Workspace,
+    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Locator, Match, Matcher, Pair, Place, Refinement,
+    Threads, Triangulator, View, Workspace,
 };
 
 /// The stages between two images and a cloud.
@@ -22,10 +22,10 @@ pub struct FrontEnd {
     pub descriptor: Box<dyn Descriptor>,
     /// Pairs left with right.
     pub matcher: Box<dyn Matcher>,
-    /// Aligns each pair between the views.
-    pub refine: Refine,
+    /// Says more exactly where the right image shows each left place.
+    pub refinement: Box<dyn Refinement>,
     /// Turns pairs into points.
-    pub triangulator: Triangulator,
+    pub triangulator: Box<dyn Triangulator>,
 }
 
 /// What the front end made of one pair of images, and the memory it made it in.
@@ -150,7 +150,7 @@ impl FrontEnd {
         let left = View { image: left, keypoints: &l.keypoints, descriptors: &l.descriptors };
         let right = View { image: right, keypoints: &r.keypoints, descriptors: &r.descriptors };
         times.match_ms = timed(|| self.matcher.match_into(&left, &right, rig, work, matches));
-        let sigma = self.triangulator.sigma_px;
+        let sigma = self.triangulator.rules().sigma_px;
         times.refine_ms = timed(|| {
             pairs.clear();
             let pair = |found: &Match| {
@@ -159,7 +159,7 @@ impl FrontEnd {
                 Pair { left: place, right: Place::independent(found.right, sigma) }
             };
             pairs.extend(matches.iter().map(pair));
-            self.refine.align_into(pairs, left.image, right.image, rig, work, pixels);
+            self.refinement.refine_into(pairs, left.image, right.image, rig, work, pixels);
         });
         times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
     }

@@ -2,7 +2,7 @@
 //!
 //! [`Filter`]s prepare the images, where that is asked for. A [`Detector`] finds corners in each
 //! image, a [`Locator`] says where exactly they are, a [`Descriptor`] describes their surroundings, a
-//! [`Matcher`] pairs left with right, [`Refine`] aligns each pair between the views and leaves out those that do not
+//! [`Matcher`] pairs left with right, a [`Refinement`] aligns each pair between the views and leaves out those that do not
 //! align, and a [`Triangulator`] turns the pairs that pass the epipolar test into
 //! [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
 //!
@@ -10,7 +10,6 @@
 //! and 255 the white of an 8-bit image.
 
 mod align;
-mod cloud;
 mod describe;
 mod detect;
 mod filter;
@@ -19,13 +18,16 @@ mod gaussian;
 mod image;
 mod locate;
 mod matching;
+mod off_lines;
 mod scale_space;
 mod swapped;
 mod track;
+mod triangulate;
 mod workspace;
 
-pub use align::{Expected, Refine, Unaligned, Warp, Weight};
-pub use cloud::Triangulator;
+pub use align::{
+    Direct, Expected, REFINEMENTS, Refinement, Unaligned, Unrefined, Warp, Weight, ZnccParabola, read_refinement,
+};
 pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Sift, Surf, Table, ZnccPatch};
 pub use detect::{
     DETECTORS, Detector, Dog, Fast, FastHessian, FittedCorners, Harris, Keypoint, LCorners, Selection, ShiTomasi,
@@ -36,6 +38,8 @@ pub use front_end::{FrontEnd, Look, StageTimes};
 pub use image::{BadImage, Image};
 pub use locate::{Corner, CornerFit, Junction, LCorner, LOCATORS, Locator, Pair, Peak, Place, XCorner};
 pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View, ZnccBand};
+pub use off_lines::OffLines;
 pub use swapped::Sides;
 pub use track::{Pyramid, Track, Tracker};
+pub use triangulate::{Linear, Midpoint, Optimal, PointRules, TRIANGULATORS, Triangulator, read_triangulator};
 pub use workspace::{Threads, Workspace};

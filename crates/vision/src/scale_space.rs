@@ -1,5 +1,7 @@
 //! The Gaussian scale space of an image.
 
+use std::ops::Range;
+
 use crate::{
     Image, Threads,
     gaussian::{half_kernel_into, smooth_into},
@@ -25,19 +27,35 @@ const LEAST_SIDE: usize = 16;
 /// (x, y) · 2^o in the image.
 ///
 /// Levels are made when they are first asked for and kept: a descriptor that follows the detector on
-/// the same image finds them. They depend on the image alone. About 32 bytes a pixel are held, 130
-/// with octave −1.
+/// the same image finds them. They depend on the image alone. Octaves of more than [`MOST_WHOLE`] pixels are not kept but
+/// made again in strips of rows ([`sweep`](Self::sweep)), so that an image of 64 Mpx takes 0.7 GB, not 7: below, about 32
+/// bytes a pixel are held, 130 with octave −1.
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct ScaleSpace {
     image: Option<Image>,
-    /// From octave −1 on.
+    /// From octave −1 on; of those that are not kept whole only the first level, from octave 1 on.
     octaves: Vec<Octave>,
+    strip: Octave,
     kernel: Vec<f32>,
     rows: Vec<Vec<f32>>,
     doubled: Vec<f32>,
+    /// Pixels of the largest octave that is kept whole.
+    most_whole: usize,
 }
+
+impl Default for ScaleSpace {
+    fn default() -> Self {
+        Self::keeping(MOST_WHOLE)
+    }
+}
+
+/// Pixels of the largest octave that is kept whole: 200 MB.
+const MOST_WHOLE: usize = 8 << 20;
+/// Rows on either side of a strip: those that the edge of the strip changes, up to the last level 48, and those that an
+/// extremum (12) or a descriptor (40) looks at beyond its own.
+const MARGIN: usize = 96;
 
 /// An image's levels at one resolution.
 #[derive(Debug, Default)]
@@ -46,6 +64,15 @@ pub(crate) struct Octave {
     levels: [Vec<f32>; LEVELS],
     /// How many levels are made.
     made: usize,
+}
+
+/// Some rows of an octave with their surroundings.
+#[derive(Debug, Clone)]
+pub(crate) struct Strip {
+    /// The rows, as the octave counts them.
+    pub(crate) rows: Range<usize>,
+    /// The octave's row at which the levels begin.
+    pub(crate) first: usize,
 }
 
 impl Octave {
@@ -90,56 +117,141 @@ impl ScaleSpace {
         self.octaves.iter_mut().for_each(|octave| octave.made = 0);
     }
 
-    /// An octave of the image with its levels made up to `level`.
+    /// An empty one that keeps octaves of so many pixels at most.
+    pub(crate) fn keeping(most_whole: usize) -> Self {
+        Self {
+            image: None,
+            octaves: Vec::new(),
+            strip: Octave::default(),
+            kernel: Vec::new(),
+            rows: Vec::new(),
+            doubled: Vec::new(),
+            most_whole,
+        }
+    }
+
+    /// Width and height of an octave.
+    fn size(&self, octave: i32) -> [usize; 2] {
+        let image = self.image.as_ref().expect("an image was looked at");
+        let side = |n: usize| if octave < 0 { 2 * n } else { n.div_ceil(1 << octave) };
+        [image.width(), image.height()].map(side)
+    }
+
+    /// Whether an octave is kept whole; of the others there are strips.
+    pub(crate) fn keeps(&self, octave: i32) -> bool {
+        self.size(octave).iter().product::<usize>() <= self.most_whole
+    }
+
+    /// Shows `look` an octave with its levels made up to `level`: whole if it is kept, or else strip by strip, each with
+    /// enough rows around it that nothing in it depends on the strips.
     ///
     /// # Panics
     /// When there is no image.
+    pub(crate) fn sweep(&mut self, octave: i32, level: usize, threads: Threads, mut look: impl FnMut(&Octave, Strip)) {
+        let [width, height] = self.size(octave);
+        if self.keeps(octave) {
+            return look(self.octave(octave, level, threads), Strip { rows: 0..height, first: 0 });
+        }
+        if octave > 0 {
+            self.begin(octave, threads);
+        }
+        let next = index(octave + 1);
+        if self.octaves.len() <= next {
+            self.octaves.resize_with(next + 1, Octave::default);
+        }
+        // The next octave begins with a level of this one.
+        let begins = octave >= 0 && self.octaves[next].made == 0;
+        if begins {
+            self.octaves[next].levels[0].clear();
+        }
+        let level = if begins { level.max(INTERVALS) } else { level };
+        // As many rows as are kept of other octaves, yet not lost among their surroundings; even, as the doubled ones are.
+        let step = (self.most_whole / width).saturating_sub(2 * MARGIN).max(2 * MARGIN) & !1;
+        for begin in (0..height).step_by(step) {
+            let rows = begin..(begin + step).min(height);
+            let first = rows.start.saturating_sub(MARGIN);
+            self.make(octave, first..(rows.end + MARGIN).min(height), level, threads);
+            look(&self.strip, Strip { rows: rows.clone(), first });
+            if begins {
+                let inner = &self.strip.levels[INTERVALS][(rows.start - first) * width..(rows.end - first) * width];
+                halve(inner, width, &mut self.octaves[next].levels[0]);
+            }
+        }
+        if begins {
+            (self.octaves[next].width, self.octaves[next].made) = (width.div_ceil(2), 1);
+        }
+    }
+
+    /// Makes these rows of an octave in the strip.
+    fn make(&mut self, octave: i32, rows: Range<usize>, level: usize, threads: Threads) {
+        let [width, _] = self.size(octave);
+        let Self { image, octaves, strip, kernel, rows: scratch, doubled, .. } = self;
+        let image = image.as_ref().expect("an image was looked at");
+        strip.width = width;
+        let part = rows.start * width..rows.end * width;
+        if octave > 0 {
+            strip.levels[0].clear();
+            strip.levels[0].extend_from_slice(&octaves[index(octave)].levels[0][part]);
+        } else {
+            let pixels = if octave < 0 {
+                double(image, rows.start / 2..rows.end / 2, doubled);
+                &doubled[..]
+            } else {
+                &image.pixels()[part]
+            };
+            first_kernel(octave, kernel);
+            smooth_into(pixels, width, kernel, threads, scratch, &mut strip.levels[0]);
+        }
+        strip.made = 1;
+        strip.smooth(level, kernel, threads, scratch);
+    }
+
+    /// An octave of the image with its levels made up to `level`.
+    ///
+    /// # Panics
+    /// When there is no image, or the octave is not kept.
     pub(crate) fn octave(&mut self, octave: i32, level: usize, threads: Threads) -> &Octave {
+        assert!(self.keeps(octave), "an octave that is not kept has strips");
         let index = index(octave);
         if self.octaves.len() <= index {
             self.octaves.resize_with(index + 1, Octave::default);
         }
-        if self.octaves[index].made == 0 {
-            self.begin(octave, threads);
-        }
+        self.begin(octave, threads);
         let Self { octaves, kernel, rows, .. } = self;
-        let Octave { width, levels, made } = &mut octaves[index];
-        while *made <= level {
-            let [from, to] = [*made - 1, *made].map(|level| sigma(0, level as f64));
-            half_kernel_into(libm::sqrt(to * to - from * from), CUT, kernel);
-            let (below, above) = levels.split_at_mut(*made);
-            smooth_into(&below[*made - 1], *width, kernel, threads, rows, &mut above[0]);
-            *made += 1;
-        }
+        octaves[index].smooth(level, kernel, threads, rows);
         &octaves[index]
-    }
-
-    /// An octave that [`octave`](Self::octave) has made.
-    pub(crate) fn made(&self, octave: i32) -> &Octave {
-        &self.octaves[index(octave)]
     }
 
     /// Makes the first level of an octave.
     fn begin(&mut self, octave: i32, threads: Threads) {
         let index = index(octave);
+        if self.octaves.get(index).is_some_and(|octave| octave.made > 0) {
+            return;
+        }
+        if octave > 0 && !self.keeps(octave - 1) {
+            return self.sweep(octave - 1, INTERVALS, threads, |_, _| ());
+        }
         if octave > 0 {
             self.octave(octave - 1, INTERVALS, threads);
+            if self.octaves.len() <= index {
+                self.octaves.resize_with(index + 1, Octave::default);
+            }
             let (finer, coarser) = self.octaves.split_at_mut(index);
             let (finer, coarser) = (&finer[index - 1], &mut coarser[0]);
+            coarser.levels[0].clear();
             coarser.width = halve(&finer.levels[INTERVALS], finer.width, &mut coarser.levels[0]);
             coarser.made = 1;
             return;
         }
-        let Self { image, octaves, kernel, rows, doubled } = self;
+        let Self { image, octaves, kernel, rows, doubled, .. } = self;
         let image = image.as_ref().expect("an image was looked at");
-        let (pixels, pixel) = if octave < 0 {
-            double(image, doubled);
-            (&doubled[..], 0.5)
+        let pixels = if octave < 0 {
+            double(image, 0..image.height(), doubled);
+            &doubled[..]
         } else {
-            (image.pixels(), 1.0)
+            image.pixels()
         };
-        let known = IMAGE_SIGMA / pixel;
-        half_kernel_into(libm::sqrt(SIGMA * SIGMA - known * known), CUT, kernel);
+        first_kernel(octave, kernel);
         let Octave { width, levels, made } = &mut octaves[index];
         *width = if octave < 0 { 2 * image.width() } else { image.width() };
         smooth_into(pixels, *width, kernel, threads, rows, &mut levels[0]);
@@ -147,25 +259,44 @@ impl ScaleSpace {
     }
 }
 
+impl Octave {
+    /// Makes the levels up to `level` from the first.
+    fn smooth(&mut self, level: usize, kernel: &mut Vec<f32>, threads: Threads, rows: &mut Vec<Vec<f32>>) {
+        let Self { width, levels, made } = self;
+        while *made <= level {
+            let [from, to] = [*made - 1, *made].map(|level| sigma(0, level as f64));
+            half_kernel_into(libm::sqrt(to * to - from * from), CUT, kernel);
+            let (below, above) = levels.split_at_mut(*made);
+            smooth_into(&below[*made - 1], *width, kernel, threads, rows, &mut above[0]);
+            *made += 1;
+        }
+    }
+}
+
+/// What the first level of octave −1 or 0 is smoothed with: an image has some blur before.
+fn first_kernel(octave: i32, kernel: &mut Vec<f32>) {
+    let known = IMAGE_SIGMA / if octave < 0 { 0.5 } else { 1.0 };
+    half_kernel_into(libm::sqrt(SIGMA * SIGMA - known * known), CUT, kernel);
+}
+
 /// Where an octave is kept.
 fn index(octave: i32) -> usize {
     (octave + 1) as usize
 }
 
-/// Every second pixel of every second row; returns the new width.
+/// Adds every second pixel of every second row to `out`; returns the new width.
 fn halve(pixels: &[f32], width: usize, out: &mut Vec<f32>) -> usize {
-    out.clear();
     for row in pixels.chunks_exact(width).step_by(2) {
         out.extend(row.iter().step_by(2));
     }
     width.div_ceil(2)
 }
 
-/// Twice the pixels along each side, linear between: pixel (x, y) lies at (x/2, y/2) of the image.
-fn double(image: &Image, out: &mut Vec<f32>) {
+/// Twice the pixels of these rows along each side, linear between: pixel (x, y) lies at (x/2, y/2) of the image.
+fn double(image: &Image, rows: Range<usize>, out: &mut Vec<f32>) {
     let (width, height) = (image.width(), image.height());
-    out.resize(4 * width * height, 0.0);
-    for (y, rows) in out.chunks_exact_mut(4 * width).enumerate() {
+    out.resize(4 * width * rows.len(), 0.0);
+    for (y, rows) in rows.zip(out.chunks_exact_mut(4 * width)) {
         let (here, next) = (image.row(y), image.row((y + 1).min(height - 1)));
         let (even, odd) = rows.split_at_mut(2 * width);
         for (x, (even, odd)) in even.chunks_exact_mut(2).zip(odd.chunks_exact_mut(2)).enumerate() {
@@ -222,7 +353,37 @@ mod tests {
         assert_ne!(space.octave(1, 5, Threads::One).level(4), fresh);
         space.look_at(&b);
         assert_eq!(space.octave(1, 4, Threads::Pool).level(4), fresh);
-        assert_eq!(space.made(1).height(), 60);
+        assert_eq!(space.octave(1, 4, Threads::One).height(), 60);
+    }
+
+    /// Seen to fail when the margin of a strip is 24 rows.
+    #[test]
+    fn strips_show_what_the_whole_does() {
+        let value = |i: usize| ((i * 7919 + i / 90 * 31) % 251) as f32;
+        let image = Image::new(90, 700, (0..90 * 700).map(value).collect()).unwrap();
+        let (mut whole, mut strips) = (ScaleSpace::default(), ScaleSpace::keeping(2000));
+        whole.look_at(&image);
+        strips.look_at(&image);
+        for octave in [1, -1, 0, 2, 3] {
+            let level = LEVELS - 1;
+            let expected = whole.octave(octave, level, Threads::One);
+            let (mut seen, mut count) = (0, 0);
+            strips.sweep(octave, level, Threads::One, |found, Strip { rows, first }| {
+                assert_eq!(rows.start, seen);
+                let width = found.width();
+                // What lies this far beyond a strip is still looked at.
+                let near = rows.start.saturating_sub(48)..(rows.end + 48).min(expected.height());
+                for level in 0..=level {
+                    let of = |octave: &Octave, first: usize| {
+                        octave.level(level)[(near.start - first) * width..(near.end - first) * width].to_vec()
+                    };
+                    assert!(of(found, first) == of(expected, 0), "octave {octave}, level {level}, rows {rows:?}");
+                }
+                (seen, count) = (rows.end, count + 1);
+            });
+            assert_eq!(seen, expected.height());
+            assert_eq!(count > 1, !strips.keeps(octave) && expected.height() > 200, "octave {octave}");
+        }
     }
 
     #[test]

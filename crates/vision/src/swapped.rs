@@ -11,6 +11,8 @@ pub struct Sides {
     pub given: usize,
     /// The left image seen by the right camera.
     pub exchanged: usize,
+    /// Key points of whichever image has fewer: with many of them a pair of images has matches.
+    pub keypoints: usize,
 }
 
 /// Fewer matches say nothing about the order of the images.
@@ -35,7 +37,11 @@ impl Sides {
             let beaten = |m: &&Match| other.iter().any(|o| o.left == m.left && o.distance < m.distance);
             found.iter().filter(|m| !beaten(m)).count()
         };
-        Self { given: better(&given, &exchanged), exchanged: better(&exchanged, &given) }
+        Self {
+            given: better(&given, &exchanged),
+            exchanged: better(&exchanged, &given),
+            keypoints: left.keypoints.len().min(right.keypoints.len()),
+        }
     }
 
     /// What two images say by their corners, found and described with the defaults.
@@ -52,6 +58,11 @@ impl Sides {
         self.given + self.exchanged >= FEW
     }
 
+    /// Whether key points found no, or hardly any, partners: too few matches to tell, and fewer than one key point in twenty has one.
+    pub fn are_strangers(&self) -> bool {
+        self.keypoints > 0 && !self.can_tell() && 20 * self.given < self.keypoints
+    }
+
     /// Whether the images have changed places: more than nine in ten of at least twenty matches say so.
     pub fn are_swapped(&self) -> bool {
         self.can_tell() && 10 * self.exchanged > 9 * (self.given + self.exchanged)
@@ -62,6 +73,10 @@ impl std::ops::Add for Sides {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        Self { given: self.given + other.given, exchanged: self.exchanged + other.exchanged }
+        Self {
+            given: self.given + other.given,
+            exchanged: self.exchanged + other.exchanged,
+            keypoints: self.keypoints + other.keypoints,
+        }
     }
 }

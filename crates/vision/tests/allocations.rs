@@ -5,13 +5,13 @@ mod scenes;
 use std::alloc::System;
 
 use seafix_component::Choice;
-use seafix_vision::{DESCRIPTORS, DETECTORS, FrontEnd, LOCATORS, Look, MATCHERS, Refine, Threads, Triangulator};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FrontEnd, LOCATORS, Look, MATCHERS, REFINEMENTS, TRIANGULATORS, Threads};
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
 #[global_allocator]
 static ALLOCATIONS: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Every listed detector, locator, descriptor and matcher in a pipeline of defaults: the third look at a pair of
+/// Every listed detector, locator, descriptor, matcher, refinement and triangulator in a pipeline of defaults: the third look at a pair of
 /// images, whose memory the first two have made, allocates nothing.
 ///
 /// Seen to fail when the band's pairs are collected into a new vector.
@@ -19,13 +19,15 @@ static ALLOCATIONS: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 fn a_warm_pair_allocates_nothing() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);
     let [left, right] = scenes::images(&rig, 60.0, 0.0);
-    let default = ["harris", "corner", "surf", "epipolar-band"];
+    let default = ["harris", "corner", "surf", "epipolar-band", "direct", "optimal"];
     let mut pipelines = Vec::new();
     let names = [
         DETECTORS.names().collect::<Vec<_>>(),
         LOCATORS.names().collect(),
         DESCRIPTORS.names().collect(),
         MATCHERS.names().collect(),
+        REFINEMENTS.names().collect(),
+        TRIANGULATORS.names().collect(),
     ];
     for (stage, names) in names.into_iter().enumerate() {
         for name in names {
@@ -35,15 +37,15 @@ fn a_warm_pair_allocates_nothing() {
         }
     }
     for pipeline in pipelines {
-        let [detector, locator, descriptor, matcher] = pipeline.map(Choice::named);
+        let [detector, locator, descriptor, matcher, refinement, triangulator] = pipeline.map(Choice::named);
         let front_end = FrontEnd {
             filters: Vec::new(),
             detector: DETECTORS.build(&detector).expect("a detector"),
             locator: LOCATORS.build(&locator).expect("a locator"),
             descriptor: DESCRIPTORS.build(&descriptor).expect("a descriptor"),
             matcher: MATCHERS.build(&matcher).expect("a matcher"),
-            refine: Refine::default(),
-            triangulator: Triangulator::default(),
+            refinement: REFINEMENTS.build(&refinement).expect("a refinement"),
+            triangulator: TRIANGULATORS.build(&triangulator).expect("a triangulator"),
         };
         let mut look = Look::new(Threads::One);
         (0..2).for_each(|_| front_end.look(&left, &right, &rig, &mut look));

@@ -7,17 +7,17 @@ use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
 use seafix_experiment::{
     Pipeline,
-    dataset::{read_image, read_rig, swapped_fault},
+    dataset::{DescribedRig, are_twins, read_image, read_rig, strangers, swapped_fault, twins_fault},
 };
 use seafix_geometry::StereoRig;
-use seafix_vision::{FrontEnd, Image, Look, Sides, StageTimes, Threads};
+use seafix_vision::{FrontEnd, Image, Look, OffLines, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
 use super::limits::Limits;
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
     ply,
-    terminal::print,
+    terminal::{print, tell},
 };
 
 #[derive(Debug, Args)]
@@ -65,23 +65,40 @@ impl Cloud {
         let pipeline = self.pipeline()?;
         let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
         let input = |fault: Fault| Failure::new(INPUT, fault);
-        let (rig, bits) = read_rig(&self.rig).map_err(input)?;
+        let DescribedRig { file, rig, bits, warning } = read_rig(&self.rig).map_err(input)?;
         let limits = self.limits.of_images();
         let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
-        if let Some(fault) = swapped_fault(Sides::of_images(&left, &right, &rig), &self.left) {
+        if are_twins(&left, &right) {
+            return Err(Failure::new(INPUT, twins_fault(&self.left, &self.right)));
+        }
+        let sides = Sides::of_images(&left, &right, &rig);
+        if let Some(fault) = swapped_fault(sides, &self.left) {
             return Err(Failure::new(INPUT, fault));
         }
+        let off_lines = off_lines_warning(OffLines::of_images(&left, &right, &rig), &rig, &file);
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
         let (look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
+        let warnings: Vec<Fault> = warning
+            .into_iter()
+            .chain(off_lines)
+            .chain(
+                strangers(sides, &self.left).or_else(|| nothing(&front_end, &look, [&left, &right], &rig, &self.left)),
+            )
+            .collect();
+        warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
         if let Some(path) = &self.out {
             ply::write(path, &look.cloud, &left)?;
         }
         let pipeline = pipeline.resolved().map_err(|error| Failure::new(USAGE, error))?;
-        print(&if self.json { self.machines(&look, &times, &pipeline) } else { self.people(&look, &times) })?;
+        print(&if self.json {
+            self.machines(&look, &times, &pipeline, &warnings)
+        } else {
+            self.people(&look, &times)
+        })?;
         Ok(DONE)
     }
 
@@ -136,7 +153,7 @@ impl Cloud {
     }
 
     /// For programs: everything.
-    fn machines(&self, look: &Look, times: &[StageTimes], pipeline: &Pipeline) -> String {
+    fn machines(&self, look: &Look, times: &[StageTimes], pipeline: &Pipeline, warnings: &[Fault]) -> String {
         let points: Vec<Value> = look.cloud.iter().map(point).collect();
         let times: serde_json::Map<String, Value> = summary(times)
             .into_iter()
@@ -151,6 +168,7 @@ impl Cloud {
             "times_ms": times,
             "repeats": self.repeat,
             "threads": self.threads,
+            "warnings": warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "pipeline": {
                 "filters": pipeline.filters,
                 "detector": pipeline.detector,
@@ -163,6 +181,57 @@ impl Cloud {
         });
         value.to_string() + "\n"
     }
+}
+
+/// A word where images and rig do not belong together.
+fn off_lines_warning(off: OffLines, rig: &StereoRig, file: &Path) -> Option<Fault> {
+    let lines = if rig.is_rectified() {
+        "the same rows"
+    } else if rig.is_rectified_upright() {
+        "the same columns"
+    } else {
+        "their epipolar lines"
+    };
+    off.contradict().then(|| {
+        let OffLines { matches, near, rms_px } = off;
+        Fault::new("a rig that the images contradict", file)
+            .value(format!(
+                "{near} of {matches} matches lie within {} px of {lines}, rms {rms_px:.1} px",
+                OffLines::NEAR
+            ))
+            .remedy("give the calibration of these images; images that are not rectified need their own rig")
+    })
+}
+
+/// A word where key points came to no point, and what the exchanged images would give.
+fn nothing(
+    front_end: &FrontEnd,
+    look: &Look,
+    [left, right]: [&Image; 2],
+    rig: &StereoRig,
+    file: &Path,
+) -> Option<Fault> {
+    let [in_left, in_right] = look.keypoints().map(<[_]>::len);
+    if !look.cloud.is_empty() || in_left == 0 || in_right == 0 {
+        return None;
+    }
+    let mut exchanged = Look::new(Threads::One);
+    front_end.look(right, left, rig, &mut exchanged);
+    let (matches, points) = (exchanged.matches.len(), exchanged.cloud.len());
+    let remedy = if points > 0 {
+        "exchange the images if they have changed places"
+    } else {
+        "see whether both show one scene, and whether the rig is theirs"
+    };
+    Some(
+        Fault::new("key points and no point", file)
+            .value(format!(
+                "{in_left} and {in_right} key points, {} matches; with left and right exchanged {matches} matches, \
+                 {points} points",
+                look.matches.len()
+            ))
+            .remedy(remedy),
+    )
 }
 
 /// The least and the median time of every stage and of the whole, `total` (ms).

@@ -11,8 +11,8 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct List {
-    /// Only this kind: sources, filters, detectors, descriptors, matchers, searches, solvers, odometries, policies or
-    /// fusions.
+    /// Only this kind: sources, filters, detectors, locators, descriptors, matchers, refinements, triangulators,
+    /// searches, solvers, odometries, policies or fusions.
     kind: Option<String>,
     /// As the tables of the README.
     #[arg(long, conflicts_with = "kind")]

@@ -6,7 +6,7 @@ use clap::Args;
 use seafix_component::Fault;
 use seafix_experiment::{
     HandModel, HandPoint, ModelByHand, Pipeline,
-    dataset::{read_image, read_rig},
+    dataset::{DescribedRig, read_image, read_rig},
     read_text,
 };
 use serde_json::{Value, json};
@@ -71,7 +71,7 @@ impl Model {
         };
         let pipeline = Pipeline::default().changed(&self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
         let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
-        let (rig, bits) = read_rig(&self.rig).map_err(input)?;
+        let DescribedRig { rig, bits, .. } = read_rig(&self.rig).map_err(input)?;
         let limits = self.limits.of_images();
         let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;

@@ -32,6 +32,9 @@ fn experiment() -> Value {
     for stage in ["detector", "locator", "descriptor", "matcher", "search", "solver"] {
         pipeline.insert(stage.to_owned(), component(stage));
     }
+    for (stage, kind) in [("refine", "refinement"), ("triangulation", "triangulator")] {
+        pipeline.insert(stage.to_owned(), with_default(kind));
+    }
     pipeline.insert("filters".to_owned(), json!({ "type": "array", "items": component("filter") }));
     pipeline.insert("target".to_owned(), json!({ "enum": ["object", "joint", "site"], "default": "object" }));
     let mut navigation = properties(&toml::Table::try_from(Navigation::default()).expect("settings are a table"));
@@ -91,6 +94,15 @@ fn experiment() -> Value {
 
 /// A component by its name alone, or a table with its name and settings.
 fn component(kind: &str) -> Value {
+    component_with(kind, &["name"])
+}
+
+/// The same where a table without a name holds the settings of the default.
+fn with_default(kind: &str) -> Value {
+    component_with(kind, &[])
+}
+
+fn component_with(kind: &str, required: &[&str]) -> Value {
     let kind = kind_of(kind);
     let names: Vec<Value> =
         kind.listings.iter().map(|one| json!({ "const": one.name, "description": one.summary })).collect();
@@ -101,7 +113,7 @@ fn component(kind: &str) -> Value {
             let mut settings = properties(&one.defaults);
             settings.insert("name".to_owned(), json!({ "const": one.name }));
             // Settings without a default value are not known here.
-            json!({ "type": "object", "description": one.summary, "properties": settings, "required": ["name"] })
+            json!({ "type": "object", "description": one.summary, "properties": settings, "required": required })
         })
         .collect();
     json!({ "anyOf": names.into_iter().chain(tables).collect::<Vec<_>>() })

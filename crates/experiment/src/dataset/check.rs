@@ -6,11 +6,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use rayon::prelude::*;
 use seafix_component::Fault;
-use seafix_vision::Sides;
+use seafix_vision::{Image, Sides};
 use sha2::{Digest, Sha256};
 
-use super::{Dataset, ImageLimits, folder::inside};
+use super::{Dataset, ImageLimits, folder::inside, picture::regular};
 
 /// Reads the data set in `folder` and every file it names: decodes the images, compares their sizes
 /// with the calibration and, where hashes are given, every file with its hash.
@@ -21,13 +22,63 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
         Ok(dataset) => Dataset { limits, ..dataset },
         Err(faults) => return (faults, Vec::new()),
     };
-    let mut faults: Vec<Fault> = dataset.frames.iter().filter_map(|frame| dataset.pair(frame).err()).collect();
-    faults.dedup();
+    let (mut faults, twins) = look_through(&dataset);
+    faults.extend(twins.fault(&dataset));
     faults.extend(hash_faults(&dataset));
+    let mut warnings = dataset.warnings.clone();
     if faults.is_empty() {
-        faults.extend(swapped(&dataset));
+        let (sides, table) = (sides(&dataset), dataset.folder.join(&dataset.table));
+        faults.extend(swapped_fault(sides, &table));
+        warnings.extend(strangers(sides, &table));
     }
-    (faults, dataset.warnings)
+    (faults, warnings)
+}
+
+/// Pairs whose two images are the same, pixel by pixel.
+#[derive(Debug, Default)]
+pub(crate) struct Twins {
+    count: usize,
+    first: Option<(PathBuf, PathBuf)>,
+}
+
+/// Decodes all images of the data set: what is wrong with them, and which pairs are one image twice.
+pub(crate) fn look_through(dataset: &Dataset) -> (Vec<Fault>, Twins) {
+    let seen: Vec<(Option<Fault>, bool)> = dataset
+        .frames
+        .par_iter()
+        .map(|frame| match dataset.pair(frame) {
+            Err(fault) => (Some(fault), false),
+            Ok((left, right)) => (None, are_twins(&left, &right)),
+        })
+        .collect();
+    let mut twins = Twins { count: seen.iter().filter(|(_, twin)| *twin).count(), first: None };
+    let first = seen.iter().position(|(_, twin)| *twin).map(|first| &dataset.frames[first]);
+    twins.first = first.map(|frame| (frame.left.clone(), frame.right.clone()));
+    let mut faults: Vec<Fault> = seen.into_iter().filter_map(|(fault, _)| fault).collect();
+    faults.dedup();
+    (faults, twins)
+}
+
+/// Whether two images are one: cameras apart never see the same, unless there is nothing to see.
+pub fn are_twins(left: &Image, right: &Image) -> bool {
+    let flat = || left.pixels().iter().all(|pixel| *pixel == left.pixels()[0]);
+    left == right && !flat()
+}
+
+/// What is wrong with the pair of these two files where they hold one image.
+pub fn twins_fault(left: &Path, right: &Path) -> Fault {
+    Fault::new("left and right images that are the same", left)
+        .value(format!("the pixels of {}", right.display()))
+        .remedy("give the image of the other camera; one image twice has no depth")
+}
+
+impl Twins {
+    pub(crate) fn fault(&self, dataset: &Dataset) -> Option<Fault> {
+        let (left, right) = self.first.as_ref()?;
+        let fault = twins_fault(left, right);
+        let value = format!("{}, and so {} of {} pairs", fault.value, self.count, dataset.frames.len());
+        Some(fault.value(value))
+    }
 }
 
 /// Frames whose images are looked at for their order.
@@ -35,10 +86,15 @@ const LOOKED_AT: usize = 3;
 
 /// Left and right images that have changed places, as three frames from the whole length of the set show.
 pub(crate) fn swapped(dataset: &Dataset) -> Option<Fault> {
+    swapped_fault(sides(dataset), &dataset.folder.join(&dataset.table))
+}
+
+/// What three frames from the whole length of the set say of the order of their images.
+fn sides(dataset: &Dataset) -> Sides {
     let step = dataset.frames.len().div_ceil(LOOKED_AT).max(1);
     let pairs = dataset.frames.iter().step_by(step).filter_map(|frame| dataset.pair(frame).ok());
     let sides = pairs.map(|(left, right)| Sides::of_images(&left, &right, &dataset.rig));
-    swapped_fault(sides.fold(Sides::default(), Sides::add), &dataset.folder.join(&dataset.table))
+    sides.fold(Sides::default(), Sides::add)
 }
 
 /// The same by the first pairs that can tell, for a set whose images need not all be good: the first that speaks for
@@ -64,6 +120,21 @@ pub fn swapped_fault(sides: Sides, file: &Path) -> Option<Fault> {
     })
 }
 
+/// A word where key points have hardly any partners, and what the exchanged images would give.
+pub fn strangers(sides: Sides, file: &Path) -> Option<Fault> {
+    sides.are_strangers().then(|| {
+        let Sides { given, exchanged, keypoints } = sides;
+        let remedy = if exchanged > given {
+            "exchange the images if they have changed places"
+        } else {
+            "see whether both show one scene, and whether the rig is theirs"
+        };
+        Fault::new("images with key points and hardly a match", file)
+            .value(format!("{keypoints} key points, {given} matches; {exchanged} with left and right exchanged"))
+            .remedy(remedy)
+    })
+}
+
 /// Files that are not those whose hashes the description has.
 pub(crate) fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
     let file = dataset.folder.join("dataset.toml");
@@ -85,7 +156,7 @@ pub(crate) fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
 /// The SHA-256 of a file in hexadecimal.
 pub(crate) fn sha256(path: &Path) -> Result<String, Fault> {
     let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), path);
-    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    let mut file = regular(path)?;
     let (mut hasher, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
     loop {
         match file.read(&mut buffer).map_err(unreadable)? {

@@ -130,9 +130,30 @@ impl Description {
 
     /// The rig, or what is wrong with it in `file`, whose text is `source`.
     pub(super) fn build_rig(&self, file: &Path, source: &str) -> Result<StereoRig, Fault> {
-        self.rig.build().map_err(|(path, what)| {
-            let path: Vec<&str> = std::iter::once("rig").chain(path).collect();
-            Fault::new(what, file).on_line(line_of(source, &path))
+        self.rig.build().map_err(|(path, said)| {
+            // Said as `fx = -1; a focal length is …`: the value, and what it should be.
+            let (value, remedy) = said.split_once("; ").unwrap_or((&said, ""));
+            let key = value.split([' ', '[']).next().filter(|key| CAMERA_KEYS.contains(key));
+            let part = match path[..] {
+                ["right_from_left"] => "a pose of the right camera".to_owned(),
+                [side, "port"] => format!("a {side} port"),
+                _ => format!("a {} camera", path[0]),
+            };
+            let path: Vec<&str> = std::iter::once("rig").chain(path).chain(key).collect();
+            Fault::new(format!("{part} that cannot be"), file)
+                .on_line(line_of(source, &path))
+                .value(value)
+                .remedy(if remedy.is_empty() { "correct the calibration" } else { remedy })
+        })
+    }
+
+    /// A warning where `rig` is called rectified and is not.
+    pub(super) fn not_rectified(&self, rig: &StereoRig, file: &Path, source: &str) -> Option<Fault> {
+        let odd = self.rig.rectified && !rig.is_rectified() && !rig.is_rectified_upright();
+        odd.then(|| {
+            Fault::new("a rig that is called rectified and is not", file)
+                .on_line(line_of(source, &["rig", "rectified"]))
+                .remedy("the numbers of the two cameras decide, not the word")
         })
     }
 
@@ -152,6 +173,9 @@ impl Description {
         }
     }
 }
+
+/// Those of a camera's keys whose values are checked.
+const CAMERA_KEYS: [&str; 6] = ["size", "fx", "fy", "cx", "cy", "distortion"];
 
 impl CameraNumbers {
     pub(super) fn of(camera: &Pinhole, port: Option<&CalibratedPort>) -> Self {
@@ -182,10 +206,10 @@ impl Rig {
     fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
         let camera = |side: &'static str, c: &CameraNumbers| {
             if let Some(port) = &c.port {
-                port.build().map_err(|what| (vec![side, "port"], format!("{side} port: {what}")))?;
+                port.build().map_err(|what| (vec![side, "port"], what))?;
             }
             Pinhole::new(c.size, [c.fx, c.fy], [c.cx, c.cy], &c.distortion)
-                .map_err(|error| (vec![side], format!("{side} camera: {error}")))
+                .map_err(|error| (vec![side], error.to_string()))
         };
         let (left, right) = (camera("left", &self.left)?, camera("right", &self.right)?);
         let right_from_left = Transform::from_rows(&self.right_from_left)

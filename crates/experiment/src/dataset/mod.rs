@@ -11,14 +11,15 @@ mod kitti;
 mod open;
 mod pairing;
 mod picture;
+mod pnm;
 pub(crate) mod tables;
 pub mod tum;
 mod write;
 
-pub use check::{check, swapped_at_first, swapped_fault};
-pub(crate) use check::{hash_faults, hex, input_hashes, sha256, swapped};
+pub use check::{are_twins, check, strangers, swapped_at_first, swapped_fault, twins_fault};
+pub(crate) use check::{hash_faults, hex, input_hashes, look_through, sha256, swapped};
 pub use kitti::Cameras;
-pub use open::{Dataset, DatasetFrame, is_one, read_rig};
+pub use open::{Dataset, DatasetFrame, DescribedRig, is_one, read_rig};
 pub(crate) use pairing::{SAME_INSTANT_NS, left_out, pairs};
 pub use picture::{ImageLimits, read_image, write_png};
 pub(crate) use picture::{decode_image, image_of_samples};

@@ -141,16 +141,30 @@ pub fn is_one(folder: &Path) -> bool {
     folder.join("dataset.toml").exists() || euroc::home(folder).is_some() || kitti::is_one(folder)
 }
 
-/// The rig that a data set's description, the file or its folder, has, and the depth of its images of
-/// 16 bits; nothing else the description names is looked at.
+/// What a description says of the rig and its images.
+#[derive(Debug)]
+pub struct DescribedRig {
+    /// The description.
+    pub file: PathBuf,
+    /// The rig.
+    pub rig: StereoRig,
+    /// Depth of the pixels in images of 16 bits.
+    pub bits: u8,
+    /// A rig that is called rectified and is not.
+    pub warning: Option<Fault>,
+}
+
+/// The rig that a data set's description, the file or its folder, has; nothing else the description names is looked at.
 ///
 /// # Errors
 /// No such file, or what is wrong with it.
-pub fn read_rig(path: &Path) -> Result<(StereoRig, u8), Fault> {
+pub fn read_rig(path: &Path) -> Result<DescribedRig, Fault> {
     let file = if path.is_dir() { path.join("dataset.toml") } else { path.to_owned() };
     let source = read_text(&file)?;
     let described: Description = toml::from_str(&source).map_err(|error| Fault::in_toml(&file, &source, &error))?;
-    Ok((described.build_rig(&file, &source)?, described.depth(&file, &source)?))
+    let rig = described.build_rig(&file, &source)?;
+    let bits = described.depth(&file, &source)?;
+    Ok(DescribedRig { warning: described.not_rectified(&rig, &file, &source), file, rig, bits })
 }
 
 impl Dataset {
@@ -259,17 +273,7 @@ impl Reader<'_> {
         }
         let mut warnings = std::mem::take(&mut self.warnings);
         warnings.extend(site.iter().flat_map(|site| site.warnings.clone()));
-        if let Ok(rig) = &rig
-            && d.rig.rectified
-            && !rig.is_rectified()
-            && !rig.is_rectified_upright()
-        {
-            warnings.push(
-                Fault::new("a rig that is called rectified and is not", self.file)
-                    .on_line(line_of(self.source, &["rig", "rectified"]))
-                    .remedy("the numbers of the two cameras decide, not the word"),
-            );
-        }
+        warnings.extend(rig.as_ref().ok().and_then(|rig| d.not_rectified(rig, self.file, self.source)));
         for (name, given, found) in [
             ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count()),
             ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count()),

@@ -1,6 +1,10 @@
 //! Image files in and out.
 
-use std::{io::Cursor, path::Path};
+use std::{
+    fs::File,
+    io::{Cursor, Read},
+    path::Path,
+};
 
 use image::{
     DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits,
@@ -10,7 +14,7 @@ use seafix_component::Fault;
 use seafix_log::encode_png;
 use seafix_vision::Image;
 
-use super::encoded::objection;
+use super::{encoded::objection, pnm};
 use crate::record::grey;
 
 /// How large an image may be before it is refused: checked before anything of that size is made.
@@ -38,14 +42,38 @@ impl Default for ImageLimits {
 /// beyond the depth, a size other than expected or beyond `limits` (checked from the header, before
 /// anything is decoded).
 pub fn read_image(path: &Path, expected: [u32; 2], bits: u8, limits: ImageLimits) -> Result<Image, Fault> {
-    let unreadable =
-        |error| Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions");
-    let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    if size > limits.bytes {
-        let remedy = format!("at most {} bytes are read; `max-bytes` allows more", limits.bytes);
+    let mut bytes = Vec::new();
+    // A file may grow while it is read, and some have no size before.
+    let read = regular(path)?.take(limits.bytes.saturating_add(1)).read_to_end(&mut bytes);
+    read.map_err(|error| unreadable(path, &error))?;
+    if bytes.len() as u64 > limits.bytes {
+        let remedy = format!("at most {} bytes are read; {} allows more", limits.bytes, allows("max-bytes"));
+        let size = std::fs::metadata(path).map_or(0, |metadata| metadata.len()).max(bytes.len() as u64);
         return Err(Fault::new("an image file too large", path).value(format!("{size} bytes")).remedy(remedy));
     }
-    decode_image(&std::fs::read(path).map_err(unreadable)?, path, expected, bits, limits)
+    decode_image(&bytes, path, expected, bits, limits)
+}
+
+/// The file at `path`, open; devices, pipes and folders are not opened.
+///
+/// # Errors
+/// What is there instead, or why it cannot be read.
+pub(super) fn regular(path: &Path) -> Result<File, Fault> {
+    let kind = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.file_type();
+    if !kind.is_file() {
+        let kind = if kind.is_dir() { "a folder" } else { "a device, pipe or socket" };
+        return Err(Fault::new("a path that is no file", path).value(kind).remedy("name a file"));
+    }
+    File::open(path).map_err(|error| unreadable(path, &error))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Fault {
+    Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
+}
+
+/// How a limit is changed: by an option of a command or, in an experiment, by a setting of the source.
+fn allows(limit: &str) -> String {
+    format!("`--{limit}`, in an experiment `source.{limit}`,")
 }
 
 /// The same of the bytes of such a file; faults name `path`.
@@ -59,35 +87,38 @@ pub(crate) fn decode_image(
     bits: u8,
     limits: ImageLimits,
 ) -> Result<Image, Fault> {
-    let unreadable = |error| Fault::new(format!("cannot read ({error})"), path);
-    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(unreadable);
+    let reader =
+        || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| unreadable(path, &error));
     let (width, height) = reader()?.into_dimensions().map_err(|error| damaged(path, &error))?;
     check_size(path, [width, height], expected, limits)?;
     if let Some((what, remedy)) = objection(bytes) {
         return Err(Fault::new(what, path).remedy(remedy));
     }
+    let white = pnm::white(bytes, [width, height]).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
     let mut reader = reader()?;
     let mut memory = Limits::default();
     memory.max_alloc = Some(limits.bytes);
     reader.limits(memory);
     let decoded = reader.decode().map_err(|error| damaged(path, &error))?;
-    let pixels = grey_levels(&decoded, bits).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
+    let pixels = grey_levels(&decoded, bits, white).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
 }
 
 /// The image of samples as a camera gave them, row by row: grey, or red, green and blue; `white` is the greatest.
 pub(crate) fn image_of_samples(samples: &[u16], [width, height]: [u32; 2], white: u16) -> Result<Image, Fault> {
     let channels = samples.len() / (width as usize * height as usize).max(1);
-    let pixels = levels_of(samples, channels.max(1), white, 0)?;
+    let pixels = levels_of(samples, channels.max(1), width as usize, white, 0)?;
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), Path::new("")))
 }
 
 /// `expected` is the size that the calibration has.
 fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits: ImageLimits) -> Result<(), Fault> {
     if u64::from(width) * u64::from(height) > limits.pixels {
-        return Err(Fault::new("an image too large", path)
-            .value(format!("{width}×{height}"))
-            .remedy(format!("at most {} pixels are read; `max-pixels` allows more", limits.pixels)));
+        return Err(Fault::new("an image too large", path).value(format!("{width}×{height}")).remedy(format!(
+            "at most {} pixels are read; {} allows more",
+            limits.pixels,
+            allows("max-pixels")
+        )));
     }
     if [width, height] != expected {
         return Err(misfit(path, [width, height], expected));
@@ -103,38 +134,43 @@ fn misfit(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
 
 /// The fault of an image whose header declares another size than `expected`; none where there is no header to read.
 pub(super) fn size_fault(path: &Path, expected: [u32; 2]) -> Option<Fault> {
-    let (width, height) = ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_dimensions().ok()?;
+    let file = std::io::BufReader::new(regular(path).ok()?);
+    let (width, height) = ImageReader::new(file).with_guessed_format().ok()?.into_dimensions().ok()?;
     ([width, height] != expected).then(|| misfit(path, [width, height], expected))
 }
 
 /// Rec. 709's weights of red, green and blue, in ten thousandths.
 const LUMA: [u32; 3] = [2126, 7152, 722];
 
-/// The brightness of every pixel, 0 to 255.
-fn grey_levels(decoded: &DynamicImage, bits: u8) -> Result<Vec<f32>, Fault> {
+/// The brightness of every pixel, 0 to 255; `white` is the greatest value that the file itself says it has.
+fn grey_levels(decoded: &DynamicImage, bits: u8, white: Option<u16>) -> Result<Vec<f32>, Fault> {
     let color = decoded.color();
-    let channels = usize::from(color.channel_count());
+    let (channels, width) = (usize::from(color.channel_count()), decoded.width() as usize);
     let bytes = decoded.as_bytes();
     if usize::from(color.bytes_per_pixel()) == channels {
         let samples: Vec<u16> = bytes.iter().map(|&byte| byte.into()).collect();
-        return levels_of(&samples, channels, u8::MAX.into(), u8::MAX.into());
+        return levels_of(&samples, channels, width, white.unwrap_or(u8::MAX.into()), u8::MAX.into());
     }
     let samples: Vec<u16> = bytes.chunks_exact(2).map(|pair| u16::from_ne_bytes([pair[0], pair[1]])).collect();
-    let white = ((1_u32 << bits.min(16)) - 1) as u16;
-    levels_of(&samples, channels, white, u16::MAX)
+    let deep = ((1_u32 << bits.min(16)) - 1) as u16;
+    levels_of(&samples, channels, width, white.map_or(deep, |white| white.min(deep)), u16::MAX)
 }
 
-fn levels_of(samples: &[u16], channels: usize, white: u16, opaque: u16) -> Result<Vec<f32>, Fault> {
+fn levels_of(samples: &[u16], channels: usize, width: usize, white: u16, opaque: u16) -> Result<Vec<f32>, Fault> {
     let here = Path::new("");
     let colours = if channels > 2 { 3 } else { 1 };
     let pixels = samples.chunks_exact(channels);
     if pixels.clone().any(|pixel| pixel[colours..].iter().any(|&alpha| alpha < opaque)) {
         return Err(Fault::new("an image with transparent pixels", here).remedy("give it without an alpha channel"));
     }
-    if let Some(most) = pixels.clone().flat_map(|pixel| &pixel[..colours]).filter(|&&value| value > white).max() {
+    if pixels.clone().any(|pixel| pixel[..colours].iter().any(|&value| value > white)) {
+        let greatest = |pixel: &[u16]| pixel[..colours].iter().copied().max().unwrap_or(0);
+        let all = pixels.clone().map(greatest).enumerate();
+        let (at, most) = all.max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).unwrap_or_default();
+        let (x, y, least) = (at % width.max(1), at / width.max(1), if most < 4096 { 12 } else { 16 });
         return Err(Fault::new("a pixel beyond the depth", here)
-            .value(format!("{most}, white is {white}"))
-            .remedy("correct `bits` of dataset.toml"));
+            .value(format!("{most} at ({x}, {y}), white is {white}"))
+            .remedy(format!("its images have more bits than `bits` of dataset.toml says; give bits = {least}")));
     }
     // Integers up to here: a grey pixel comes out the same whether it is stored as grey or as colour.
     let whole = f64::from(LUMA.iter().sum::<u32>()) * f64::from(white);
@@ -231,7 +267,7 @@ mod tests {
         assert_eq!(found.pixels()[0], 255.0);
         assert_eq!(found.pixels()[47], (4048.0 * 255.0 / 4095.0_f64) as f32);
         let said = read("a", &twelve, [8, 6], 8).unwrap_err();
-        assert!(said.contains("4095, white is 255; correct `bits`"), "{said}");
+        assert!(said.contains("4095 at (0, 0), white is 255; ") && said.contains("give bits = 12"), "{said}");
     }
 
     #[test]
@@ -308,9 +344,17 @@ mod tests {
         let enough = png.len() as u64 + 48;
         assert!(limited(48, enough).is_ok());
         let said = limited(47, enough).unwrap_err();
-        assert!(said.contains("8×6; at most 47 pixels are read; `max-pixels` allows more"), "{said}");
+        assert!(
+            said.contains(
+                "8×6; at most 47 pixels are read; `--max-pixels`, in an experiment `source.max-pixels`, allows more"
+            ),
+            "{said}"
+        );
         let said = limited(48, png.len() as u64 - 1).unwrap_err();
-        assert!(said.contains("bytes are read; `max-bytes` allows more"), "{said}");
+        assert!(
+            said.contains("bytes are read; `--max-bytes`, in an experiment `source.max-bytes`, allows more"),
+            "{said}"
+        );
         // A small file that decodes to much more than it takes.
         let flat = encoded(&[0; 48], ExtendedColorType::L8, ImageFormat::Png);
         assert!(within(ImageLimits { pixels: 48, bytes: 40 }, "a.png", &flat, [8, 6], 16).is_err());

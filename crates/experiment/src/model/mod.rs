@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 use seafix_component::{Choice, Fault, nearest};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Pixel, Point, StereoRig, Transform, triad};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
-use seafix_vision::{Descriptors, FrontEnd, Image, Keypoint, MATCHERS, Pair, Place, Refine, View};
+use seafix_vision::{Descriptors, FrontEnd, Image, Keypoint, MATCHERS, Pair, Place, Refinement, Unrefined, View};
 
 pub use marks::Mark;
 
@@ -140,8 +140,8 @@ impl ModelByHand<'_> {
             }
         };
         let pair = Pair { left: place, right: start };
-        let aligned = self.front_end.refine.align(&[pair], left, right, rig).first().copied();
-        let unaligned = || Refine { refine: false, ..Refine::default() }.align(&[pair], left, right, rig)[0];
+        let aligned = self.front_end.refinement.refine(&[pair], left, right, rig).first().copied();
+        let unaligned = || Unrefined::default().refine(&[pair], left, right, rig)[0];
         let pixels = aligned.unwrap_or_else(unaligned);
         let mut cloud = Vec::new();
         self.front_end.triangulator.triangulate_into(&[pixels], rig, &mut cloud);

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use rayon::prelude::*;
 use seafix_component::{Component, Fault, in_range};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
@@ -10,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{CalibratedPort, Eyes, Passage, Sight, Source, Told, Truth, WorldPrior};
 use crate::{
-    dataset::{Dataset, ImageLimits, hash_faults, input_hashes, swapped},
+    dataset::{Dataset, ImageLimits, hash_faults, input_hashes, look_through, swapped},
     read_text,
 };
 
@@ -81,9 +80,8 @@ impl Recorded {
             return Err(vec![fault.remedy("a fix needs a known object: add `site = \"site.toml\"`")]);
         };
         // Every image is decoded once before anything is written: a damaged one shall not end a run midway.
-        let mut faults: Vec<Fault> =
-            dataset.frames.par_iter().flat_map_iter(|frame| dataset.pair(frame).err()).collect();
-        faults.dedup();
+        let (mut faults, twins) = look_through(&dataset);
+        faults.extend(twins.fault(&dataset));
         faults.extend(hash_faults(&dataset));
         if faults.is_empty() {
             faults.extend(swapped(&dataset));

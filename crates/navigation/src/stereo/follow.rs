@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use seafix_geometry::{Camera, Pixel, StereoRig, Transform, World};
-use seafix_vision::{Expected, Image, Refine, Track, Workspace};
+use seafix_vision::{Direct, Expected, Image, Track, Workspace};
 
 use super::{
     landmark::{LEAST, Landmark, project},
@@ -35,7 +35,7 @@ const MOST_STRETCH: f64 = 3.0;
 /// Seeks landmarks where `world_from_camera` expects them.
 #[expect(clippy::too_many_arguments, reason = "one call site; each is a different thing")]
 pub(super) fn follow(
-    refine: &Refine,
+    refine: &Direct,
     rig: &StereoRig,
     frames: &[KeyFrame],
     landmarks: &[Landmark],

@@ -15,8 +15,8 @@ use seafix_component::{Choice, Component, in_range};
 use seafix_geometry::StereoRig;
 use seafix_referencing::{SOLVERS, Solver};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptor, FILTERS, FrontEnd, LOCATORS, MATCHERS, Matcher, Refine, Threads, Triangulator,
-    Warp,
+    DESCRIPTORS, DETECTORS, Descriptor, Direct, FILTERS, FrontEnd, LOCATORS, MATCHERS, Matcher, REFINEMENTS,
+    TRIANGULATORS, Threads, Warp, read_refinement, read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
@@ -52,9 +52,11 @@ pub struct Stereo {
     /// Pairs left with right.
     pub matcher: Choice,
     /// Aligns each pair between the cameras.
-    pub refine: Refine,
+    #[serde(deserialize_with = "read_refinement")]
+    pub refine: Choice,
     /// Turns pairs into points.
-    pub triangulation: Triangulator,
+    #[serde(deserialize_with = "read_triangulator")]
+    pub triangulation: Choice,
     /// Pairs points with those of the pair before; the rig plays no part.
     pub between: Choice,
     /// The motion of three points, for the consensus.
@@ -70,7 +72,7 @@ pub struct Stereo {
     /// Fewer points that agree are no consensus.
     pub least_points: usize,
     /// How landmarks are found again in new images.
-    pub follow: Refine,
+    pub follow: Direct,
     /// At most so many landmarks are sought in a pair.
     pub landmarks: usize,
     /// A landmark begins no nearer to another (px).
@@ -99,8 +101,8 @@ impl Default for Stereo {
             locator: Choice::named("peak"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band").with("max-depth", deep),
-            refine: Refine { warp: Warp::Slanted, ..Refine::default() },
-            triangulation: Triangulator { max_depth: deep, ..Triangulator::default() },
+            refine: Choice::named("direct").with("warp", "slanted"),
+            triangulation: Choice::named("optimal").with("max-depth", deep),
             between: Choice::named("mutual-ratio"),
             minimal: Choice::named("p3p-stereo"),
             solver: Choice::named("stereo-reprojection"),
@@ -108,7 +110,7 @@ impl Default for Stereo {
             confidence: 0.999,
             draws: 300,
             least_points: 15,
-            follow: Refine { reach: 4.0, warp: Warp::Slanted, ..Refine::default() },
+            follow: Direct { reach: 4.0, warp: Warp::Slanted, ..Direct::default() },
             landmarks: 500,
             apart_px: 8.0,
             keyframe_share: 0.7,
@@ -129,9 +131,7 @@ impl Component for Stereo {
 
     fn check(&self) -> Result<(), String> {
         self.stages()?;
-        self.refine.check().map_err(|said| format!("refine.{said}"))?;
         self.follow.check().map_err(|said| format!("follow.{said}"))?;
-        self.triangulation.check().map_err(|said| format!("triangulation.{said}"))?;
         let positive = |name, x: f64, what| in_range(x > 0.0 && x.is_finite(), name, x, what);
         positive("consensus-px", self.consensus_px, "a positive number of pixels")?;
         let confident = self.confidence > 0.0 && self.confidence < 1.0;
@@ -172,8 +172,8 @@ impl Stereo {
                 locator: LOCATORS.build(&self.locator).map_err(said)?,
                 descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
                 matcher: MATCHERS.build(&self.matcher).map_err(said)?,
-                refine: self.refine.clone(),
-                triangulator: self.triangulation.clone(),
+                refinement: REFINEMENTS.build(&self.refine).map_err(said)?,
+                triangulator: TRIANGULATORS.build(&self.triangulation).map_err(said)?,
             },
             descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
             between: MATCHERS.build(&self.between).map_err(said)?,

@@ -226,7 +226,7 @@ impl<'a> StereoReckoning<'a> {
         let rough = self.rough(seen, last, seconds)?;
         let start = Instant::now();
         let mut guess = last.world_from_camera * rough;
-        let calibration = settings.triangulation.calibration_px;
+        let calibration = self.stages.front_end.triangulator.rules().calibration_px;
         let images = [&seen.images[0], &seen.images[1]];
         let followed = follow(
             &settings.follow,
@@ -359,7 +359,9 @@ impl<'a> StereoReckoning<'a> {
             if count >= settings.landmarks || !taken.free([left.u, left.v]) {
                 continue;
             }
-            if let Some(landmark) = Landmark::begin(id, &pixels, settings.triangulation.calibration_px, self.rig) {
+            if let Some(landmark) =
+                Landmark::begin(id, &pixels, self.stages.front_end.triangulator.rules().calibration_px, self.rig)
+            {
                 taken.insert([left.u, left.v]);
                 self.landmarks.push(landmark);
                 count += 1;

@@ -3,8 +3,8 @@
 use seafix_component::{Choice, Registry};
 use seafix_geometry::{Pixel, StereoRig};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptors, FrontEnd, Image, Keypoint, LOCATORS, Look, MATCHERS, Match, Matcher, Pair,
-    Place, Refine, Table, Threads, Triangulator, View, Workspace,
+    DESCRIPTORS, DETECTORS, Descriptors, Direct, FrontEnd, Image, Keypoint, LOCATORS, Look, MATCHERS, Match, Matcher,
+    Optimal, Pair, Place, Refinement, Table, Threads, View, Warp, Workspace,
 };
 use serde_json::{Value, json};
 
@@ -229,11 +229,17 @@ impl Scene {
         let guess = flat(&mut self.matches.iter().map(|m| m.right));
         let aside = json!({"do": "lucas_kanade", "points": points, "guess": guess, "window": 21});
         let nothing = json!({"do": "lucas_kanade", "points": points, "window": 21});
-        let wide = || Refine { window: 21, ..Refine::default() };
+        let wide = || Direct { window: 21, ..Direct::default() };
         let list = [
             ("refine 1000, window 21; LK from nothing", wide(), nothing.clone(), Some(1.0 / 3.0)),
             ("refine 1000, window 21; LK from matches", wide(), aside, None),
-            ("refine 1000, default; LK from nothing", Refine::default(), nothing, None),
+            ("refine 1000, default; LK from nothing", Direct::default(), nothing.clone(), None),
+            (
+                "refine 1000, default window as seen; LK from nothing",
+                Direct { warp: Warp::AsSeen, ..Direct::default() },
+                nothing,
+                None,
+            ),
         ];
         let stages = list.into_iter().map(|(name, refine, request, at_most)| {
             let mut pixels = Vec::new();
@@ -243,7 +249,7 @@ impl Scene {
             };
             let pairs: Vec<Pair> = self.matches.iter().map(pair).collect();
             let ours = with_memory(move |work| {
-                refine.align_into(&pairs, &self.images[0], &self.images[1], &self.rig, work, &mut pixels);
+                refine.refine_into(&pairs, &self.images[0], &self.images[1], &self.rig, work, &mut pixels);
             });
             Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours }
         });
@@ -269,8 +275,8 @@ impl Scene {
                 descriptor: listed(&DESCRIPTORS, &Choice::named("surf")).expect("a descriptor"),
                 matcher: MATCHERS.build(&Choice::named("epipolar-band")).expect("a matcher"),
                 locator: LOCATORS.build(&Choice::named(locator)).expect("a locator"),
-                refine: Refine::default(),
-                triangulator: Triangulator::default(),
+                refinement: Box::new(Direct::default()),
+                triangulator: Box::new(Optimal::default()),
             };
             let mut looks = [Threads::One, Threads::Pool].map(Look::new);
             Stage {

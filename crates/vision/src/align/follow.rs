@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use seafix_geometry::Pixel;
 
 use super::{
-    Aligned, Aligner, Refine, Rules, Translation, Warp,
+    Aligned, Aligner, Direct, Rules, Translation, Warp,
     warp::{Affine, Slanted},
 };
 use crate::{Image, Track, Workspace};
@@ -31,7 +31,7 @@ struct Memory {
 /// Places that are aligned one after the other.
 const PIECE: usize = 32;
 
-impl Refine {
+impl Direct {
     /// Replaces `found` by where `to` shows each of the `expected` places of `from`, in their order; `None` where it
     /// does not, or not well enough.
     ///
@@ -77,6 +77,7 @@ impl Refine {
         match warp {
             Warp::Translation => aligner.align(from, to, &place, begin, &rules, &Translation),
             Warp::Slanted => aligner.align(from, to, &place, begin, &rules, &Slanted(expected.along)),
+            Warp::AsSeen => aligner.align_as_seen(from, to, &place, begin, &rules, &Slanted(expected.along)),
             Warp::Affine => aligner.align(from, to, &place, begin, &rules, &Affine),
         }
     }
@@ -105,7 +106,7 @@ mod tests {
         let to = Image::new(240, 180, pixels).unwrap();
         let truth =
             |p: &Pixel| Pixel { u: centre[0] + scale * (p.u - centre[0]), v: centre[1] + scale * (p.v - centre[1]) };
-        let refine = Refine { window: 15, reach: 3.0, ..Refine::default() };
+        let refine = Direct { window: 15, reach: 3.0, ..Direct::default() };
         let errors = |shape: Matrix2<f64>| {
             let places: Vec<Pixel> = (0..30)
                 .map(|i| Pixel { u: 70.5 + 20.0 * f64::from(i % 6), v: 50.25 + 20.0 * f64::from(i / 6) })

@@ -1,15 +1,16 @@
 //! Inverse-compositional Gauss–Newton on windows of zero mean and unit variance.
 
 use nalgebra::{Matrix2, SVector, Vector2};
+use seafix_geometry::Pixel;
 
 use super::{
-    covariance::{Residual, covariance},
+    covariance::{Residual, covariance, slant},
     lanes::{dot, dot3},
     spline::Spline,
-    warp::{Model, Translation},
+    warp::{Model, Slanted, Translation},
     window::{Grid, LEAST_VARIANCE, Normal, Template, Weight},
 };
-use crate::Image;
+use crate::{Image, Place};
 
 /// When an alignment is believed.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +52,13 @@ pub(crate) struct Aligned {
     pub(crate) correlation: f64,
 }
 
+impl Aligned {
+    /// The place with its covariance, given the left one.
+    pub(super) fn place(&self) -> Place {
+        Place { at: Pixel { u: self.at.x, v: self.at.y }, covariance: self.covariance }
+    }
+}
+
 /// Memory to align in, used again for every match.
 #[derive(Debug, Default)]
 pub(crate) struct Aligner {
@@ -74,6 +82,60 @@ impl Aligner {
         rules: &Rules,
         model: &impl Model<P>,
     ) -> Option<Aligned> {
+        let normal = self.take(left, [centre, start], rules, model)?;
+        let (at, shape) = self.descend(right, start, (start, shape), shape, &normal, rules, model)?;
+        let found = self.compare::<P>(right, &at, &shape, rules)?;
+        self.judge(&at, &shape, &normal, &found, rules)
+    }
+
+    /// As [`align`](Self::align) by what only moves, unless that leaves a slant which cannot be chance: then as a slanted
+    /// window is.
+    ///
+    /// The test is that of Rao's score: where the moving window ended, the derivative by the slant, freed of what moving
+    /// would do, is as great as noise makes it, χ² of two degrees of freedom. Where the slanted window finds no end, the
+    /// moving one's place stays, and the error that the slant makes there comes to its covariance.
+    pub(super) fn align_as_seen(
+        &mut self,
+        left: &Image,
+        right: &Image,
+        centre: &Vector2<f64>,
+        begin: (&Vector2<f64>, &Matrix2<f64>),
+        rules: &Rules,
+        model: &Slanted,
+    ) -> Option<Aligned> {
+        let (start, begun) = begin;
+        let slanted = self.take(left, [centre, start], rules, model)?;
+        let moving = slanted.moving();
+        let Some((at, shape)) = self.descend(right, start, begin, begun, &moving, rules, &Translation) else {
+            let (at, shape) = self.descend(right, start, begin, begun, &slanted, rules, model)?;
+            let found = self.compare::<4>(right, &at, &shape, rules)?;
+            return self.judge(&at, &shape, &slanted, &found, rules);
+        };
+        let found = self.compare::<4>(right, &at, &shape, rules)?;
+        let residual = self.residual(&at, &shape, &found);
+        let slant = slant(&slanted, &found.gradient, &residual);
+        let moved = self.judge(&at, &shape, &moving, &found.moving(), rules);
+        let Some(off) = slant else { return moved };
+        let followed = self.descend(right, start, (&at, &shape), begun, &slanted, rules, model);
+        let followed = followed.and_then(|(at, shape)| {
+            let again = self.compare::<4>(right, &at, &shape, rules)?;
+            let better = again.correlation >= found.correlation;
+            self.judge(&at, &shape, &slanted, &again, rules).filter(|_| better)
+        });
+        followed.or_else(|| {
+            let off = shape * off;
+            moved.map(|moved| Aligned { covariance: moved.covariance + off * off.transpose(), ..moved })
+        })
+    }
+
+    /// Takes the template around `centre`.
+    fn take<const P: usize>(
+        &mut self,
+        left: &Image,
+        [centre, start]: [&Vector2<f64>; 2],
+        rules: &Rules,
+        model: &impl Model<P>,
+    ) -> Option<Normal<P>> {
         // Far outside there is nothing, and numbers too great for whole ones.
         let possible = |at: &Vector2<f64>| at.iter().all(|x| x.abs() < 1e9);
         if !(possible(centre) && possible(start)) {
@@ -81,10 +143,26 @@ impl Aligner {
         }
         self.grid.place(centre, rules.window / 2, rules.weight);
         let normal = self.template.take(left, &self.grid, rules.beyond, model)?;
-        let begun = shape.try_inverse()?;
-        let (mut at, mut shape, start) = (*start, *shape, start);
         self.patch.resize(self.grid.weights.len(), 0.0);
-        self.load(right, &at, &shape)?;
+        self.spline.forget();
+        Some(normal)
+    }
+
+    /// Where the steps from `at` and `shape` end, no further from `start` than they may go; `begun` is the shape that no
+    /// deformation is counted from.
+    #[expect(clippy::too_many_arguments, reason = "two call sites; each is a different thing")]
+    fn descend<const P: usize>(
+        &mut self,
+        right: &Image,
+        start: &Vector2<f64>,
+        (at, shape): (&Vector2<f64>, &Matrix2<f64>),
+        begun: &Matrix2<f64>,
+        normal: &Normal<P>,
+        rules: &Rules,
+        model: &impl Model<P>,
+    ) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        let begun = begun.try_inverse()?;
+        let (mut at, mut shape) = (*at, *shape);
         for _ in 0..rules.iterations {
             let found = self.compare::<P>(right, &at, &shape, rules)?;
             let prior = normal.prior(2.0 * (1.0 - found.correlation));
@@ -101,7 +179,7 @@ impl Aligner {
                 return None;
             }
             if moved.norm() < rules.precision {
-                return self.judge(right, &at, &shape, &normal, rules);
+                return Some((at, shape));
             }
         }
         None
@@ -142,18 +220,17 @@ impl Aligner {
 
     /// The alignment that ended here, if it is believed.
     fn judge<const P: usize>(
-        &mut self,
-        right: &Image,
+        &self,
         at: &Vector2<f64>,
         shape: &Matrix2<f64>,
         normal: &Normal<P>,
+        found: &Found<P>,
         rules: &Rules,
     ) -> Option<Aligned> {
-        let found = self.compare::<P>(right, at, shape, rules)?;
         if !(found.correlation >= rules.least_correlation) {
             return None;
         }
-        let own = covariance(normal, &self.residual(at, shape, &found))?;
+        let own = covariance(normal, &self.residual(at, shape, found))?;
         let covariance = shape * own * shape.transpose();
         // What is known worse than the start is not found.
         let known = covariance.trace() <= rules.reach * rules.reach;
@@ -257,6 +334,14 @@ struct Found<const P: usize> {
     variance: f64,
     /// Correlation of the windows.
     correlation: f64,
+}
+
+impl Found<4> {
+    /// Of its gradient the part by moving.
+    fn moving(&self) -> Found<2> {
+        let Self { gradient, variance, correlation } = *self;
+        Found { gradient: gradient.fixed_rows::<2>(0).into(), variance, correlation }
+    }
 }
 
 /// Variance of the patch, after its mean was subtracted, its product with T̃ and with the columns of J̃.

@@ -1,65 +1,66 @@
-//! Alignment of matched places between the two images.
+//! Refinement of matched places between the two images.
 
 mod covariance;
+mod direct;
 mod follow;
 mod inverse_compositional;
 mod lanes;
 mod local;
 mod spline;
+mod unrefined;
 mod warp;
 mod window;
+mod zncc_parabola;
 
-use nalgebra::Matrix4;
-use seafix_component::in_range;
-use seafix_geometry::{Pixel, StereoPixels, StereoRig, UncertainPixels};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Matrix2, Matrix4};
+use seafix_component::{Choice, Component, Registry, entry};
+use seafix_geometry::{StereoPixels, StereoRig, UncertainPixels};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{Image, Pair, Place, Workspace};
+pub use direct::Direct;
 pub use follow::Expected;
 pub(crate) use inverse_compositional::{Aligned, Aligner, Rules};
-use local::Local;
+pub use unrefined::Unrefined;
 pub(crate) use warp::Translation;
 pub use warp::Warp;
 pub use window::Weight;
+pub use zncc_parabola::ZnccParabola;
 
-/// How the right place of a match is aligned to the left one.
+/// Says more exactly where the right image shows the left place of each match, and how well that is known.
 ///
-/// Both detectors err; the error of the disparity is what the depth suffers from. The window around
-/// the left place, T, is laid over the right image, I, by the map W(x) = c + A x that minimises
-/// Σ w (Ĩ(W(x)) − T̃(x))², where ˜ means: mean subtracted, scaled to unit variance (so this maximises
-/// the zero-normalised cross correlation). The right place becomes c. A begins as what a surface parallel to
-/// the left image would show, and stays so, or follows the surface ([`Warp`]).
-/// Inverse-compositional Gauss–Newton: the derivatives are those of T, computed once, on whole pixels, so that
-/// noise in them has no preferred direction; I is interpolated by a cubic spline.
+/// Both detectors err; the error of the disparity is what the depth suffers from.
+pub trait Refinement: Send + Sync + std::fmt::Debug {
+    /// Replaces `pixels` by the refined places of `pairs`, in their order, with their joint covariance; those that are
+    /// left out are missing.
+    fn refine_into(
+        &self,
+        pairs: &[Pair],
+        left: &Image,
+        right: &Image,
+        rig: &StereoRig,
+        work: &mut Workspace,
+        pixels: &mut Vec<UncertainPixels>,
+    );
+
+    /// The refined places of `pairs`, in their order.
+    fn refine(&self, pairs: &[Pair], left: &Image, right: &Image, rig: &StereoRig) -> Vec<UncertainPixels> {
+        let mut pixels = Vec::new();
+        self.refine_into(pairs, left, right, rig, &mut Workspace::default(), &mut pixels);
+        pixels
+    }
+}
+
+/// All refinements.
+pub static REFINEMENTS: Registry<dyn Refinement> =
+    Registry::new("refinement", &[entry!(Direct), entry!(Unrefined), entry!(ZnccParabola)]);
+
+/// Reads the choice of a refinement; settings without a name are those of `direct`.
 ///
-/// The place found in the left image errs by L, and the right one with it: only the error A of the alignment, which
-/// follows from the gradients and the residual, comes between them ([`UncertainPixels`]).
-///
-/// Where it does not converge, or ends far from where it began, or the windows remain unlike, or the
-/// place would be known no better than `reach`, the pair is most often a false match: it is left out, or the detectors'
-/// places stay, with independent errors ([`Unaligned`]).
-///
-/// Source: Baker and Matthews, *Lucas–Kanade 20 years on*, IJCV 2004; interpolation: Unser, *Splines: a
-/// perfect fit for signal and image processing*, 1999.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Refine {
-    /// Whether to align at all.
-    pub refine: bool,
-    /// Side of the window (px), odd, 3 to 201.
-    pub window: usize,
-    /// How the pixels of the window count.
-    pub weight: Weight,
-    /// How the window may deform.
-    pub warp: Warp,
-    /// How far the alignment may move the right place (px).
-    pub reach: f64,
-    /// The least zero-normalised cross correlation of the aligned windows.
-    pub least_correlation: f64,
-    /// The greatest number of iterations.
-    pub iterations: usize,
-    /// What becomes of a pair that could not be aligned.
-    pub unaligned: Unaligned,
+/// # Errors
+/// What is neither a name nor a table.
+pub fn read_refinement<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Choice, D::Error> {
+    Choice::deserialize_or(deserializer, Direct::NAME)
 }
 
 /// What becomes of a pair that could not be aligned.
@@ -73,96 +74,6 @@ pub enum Unaligned {
     Drop,
 }
 
-impl Default for Refine {
-    fn default() -> Self {
-        Self {
-            refine: true,
-            window: 11,
-            weight: Weight::Gaussian,
-            warp: Warp::Translation,
-            reach: 1.5,
-            least_correlation: 0.8,
-            iterations: 20,
-            unaligned: Unaligned::Drop,
-        }
-    }
-}
-
-impl Refine {
-    /// Whether the settings can be.
-    ///
-    /// # Errors
-    /// The setting that is out of its range, its value, and the range.
-    pub fn check(&self) -> Result<(), String> {
-        let Self { refine: _, window, weight: _, warp: _, reach, least_correlation, iterations, unaligned: _ } = *self;
-        let odd = window % 2 == 1 && (3..=201).contains(&window);
-        in_range(odd, "window", window, "an odd number of pixels from 3 to 201")?;
-        in_range(reach > 0.0 && reach <= 100.0, "reach", reach, "more than 0, at most 100 (px)")?;
-        let correlated = (-1.0..=1.0).contains(&least_correlation);
-        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
-        in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
-    }
-
-    /// Replaces `pixels` by the places of `pairs`, in their order, aligned as these settings say; those that are left
-    /// out are missing.
-    pub fn align_into(
-        &self,
-        pairs: &[Pair],
-        left: &Image,
-        right: &Image,
-        rig: &StereoRig,
-        work: &mut Workspace,
-        pixels: &mut Vec<UncertainPixels>,
-    ) {
-        pixels.clear();
-        if !self.refine {
-            return pixels.extend(pairs.iter().map(apart));
-        }
-        let threads = work.threads();
-        let Memory { aligners, aligned } = work.get();
-        aligned.clear();
-        aligned.resize(pairs.len(), None);
-        threads.pieces(aligned, PIECE, aligners, |index, piece, aligner| {
-            for (aligned, pair) in piece.iter_mut().zip(&pairs[index * PIECE..]) {
-                let at = StereoPixels { left: pair.left.at, right: pair.right.at };
-                let found = self.align_pair(left, right, rig, &at, aligner);
-                *aligned = found.map(|found| together(&pair.left, &found));
-            }
-        });
-        let stays = |pair| (self.unaligned == Unaligned::Keep).then(|| apart(pair));
-        pixels.extend(aligned.iter().zip(pairs).filter_map(|(aligned, pair)| aligned.or_else(|| stays(pair))));
-    }
-
-    /// The places of `pairs`, aligned, in their order.
-    pub fn align(&self, pairs: &[Pair], left: &Image, right: &Image, rig: &StereoRig) -> Vec<UncertainPixels> {
-        let mut pixels = Vec::new();
-        self.align_into(pairs, left, right, rig, &mut Workspace::default(), &mut pixels);
-        pixels
-    }
-
-    fn align_pair(
-        &self,
-        left: &Image,
-        right: &Image,
-        rig: &StereoRig,
-        pair: &StereoPixels,
-        aligner: &mut Aligner,
-    ) -> Option<Aligned> {
-        let Local { shape, epipolar } = Local::new(rig, pair, self.window as f64 / 2.0);
-        let expected = Expected { place: pair.left, start: pair.right, shape, along: epipolar };
-        self.lay_over(left, right, &expected, aligner)
-    }
-}
-
-/// Matches that are aligned one after the other.
-const PIECE: usize = 64;
-
-#[derive(Debug, Default)]
-struct Memory {
-    aligners: Vec<Aligner>,
-    aligned: Vec<Option<UncertainPixels>>,
-}
-
 /// Two places found each for itself.
 fn apart(pair: &Pair) -> UncertainPixels {
     let mut covariance = Matrix4::zeros();
@@ -171,137 +82,15 @@ fn apart(pair: &Pair) -> UncertainPixels {
     UncertainPixels { at: StereoPixels { left: pair.left.at, right: pair.right.at }, covariance }
 }
 
-/// A place found in the left image and aligned to the right one, which errs with it.
-fn together(left: &Place, aligned: &Aligned) -> UncertainPixels {
+/// A place found in the left image and aligned to the right one, which errs with it: `right` is known so well relative to
+/// the left place, and moves by `shape` when that does.
+fn together(left: &Place, right: &Place, shape: &Matrix2<f64>) -> UncertainPixels {
     let place = left.covariance;
-    let across = place * aligned.shape.transpose();
+    let across = place * shape.transpose();
     let mut covariance = Matrix4::zeros();
     covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&place);
     covariance.fixed_view_mut::<2, 2>(0, 2).copy_from(&across);
     covariance.fixed_view_mut::<2, 2>(2, 0).copy_from(&across.transpose());
-    covariance.fixed_view_mut::<2, 2>(2, 2).copy_from(&(aligned.shape * across + aligned.covariance));
-    let right = Pixel { u: aligned.at.x, v: aligned.at.y };
-    UncertainPixels { at: StereoPixels { left: left.at, right }, covariance }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
-    use seafix_geometry::{Pinhole, Transform};
-
-    /// Waves, seen `shift` px further to the right and half of that down, with other light and contrast.
-    fn waves(shift: f64, contrast: f64, light: f64) -> Image {
-        let value = |i: usize| {
-            let (x, y) = ((i % 60) as f64 - shift, (i / 60) as f64 - 0.5 * shift);
-            light + contrast * (libm::sin(0.5 * x + 0.2 * y) + libm::cos(0.6 * y - 0.3 * x) + libm::sin(0.9 * x))
-        };
-        Image::new(60, 60, (0..3600).map(|i| value(i) as f32).collect()).unwrap()
-    }
-
-    /// f = 500 px, side by side, 0.25 m.
-    fn rig() -> StereoRig {
-        let camera = Pinhole::new([60, 60], [500.0; 2], [29.5; 2], &[]).unwrap();
-        let step = Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0));
-        StereoRig::new(camera, camera, step).unwrap()
-    }
-
-    fn pairs([left, right]: &[Image; 2], at: Pixel, start: Pixel, refine: &Refine) -> UncertainPixels {
-        let pair = Pair { left: Place::independent(at, 0.15), right: Place::independent(start, 0.15) };
-        refine.align(&[pair], left, right, &rig())[0]
-    }
-
-    fn aligned(right: &Image, at: Pixel, start: Pixel, refine: &Refine) -> StereoPixels {
-        pairs(&[waves(0.0, 30.0, 120.0), right.clone()], at, start, refine).at
-    }
-
-    #[test]
-    fn a_shift_is_found_under_other_light() {
-        let right = waves(0.62, 20.0, 80.0);
-        for warp in [Warp::Translation, Warp::Slanted, Warp::Affine] {
-            let refine = Refine { warp, ..Refine::default() };
-            let at = Pixel { u: 30.3, v: 28.8 };
-            let pair = aligned(&right, at, Pixel { u: 30.0, v: 29.5 }, &refine);
-            assert_eq!(pair.left, at);
-            assert!(pair.right.distance(&Pixel { u: 30.92, v: 29.11 }) < 0.03, "{warp:?}: {pair:?}");
-        }
-    }
-
-    #[test]
-    fn the_right_place_errs_with_the_left_one_and_a_little_more() {
-        let images = [waves(0.0, 30.0, 120.0), waves(0.62, 20.0, 80.0)];
-        let pair = pairs(&images, Pixel { u: 30.3, v: 28.8 }, Pixel { u: 30.0, v: 29.5 }, &Refine::default());
-        let block = |i, j| pair.covariance.fixed_view::<2, 2>(i, j).into_owned();
-        let place = Matrix2::identity() * 0.15f64.powi(2);
-        assert_eq!([block(0, 0), block(0, 2), block(2, 0)], [place; 3]);
-        let own = block(2, 2) - place;
-        assert!(own.cholesky().is_some() && own.trace().sqrt() < 0.03, "{own}");
-    }
-
-    #[test]
-    fn errors_are_as_great_as_the_covariance_says() {
-        let mut state = 7_u64;
-        let mut random = || {
-            // Twelve uniform numbers make a normal one.
-            let sum: f64 = (0..12)
-                .map(|_| {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                    (state >> 40) as f64 / (1 << 24) as f64
-                })
-                .sum();
-            sum - 6.0
-        };
-        let trials = 300;
-        for warp in [Warp::Translation, Warp::Affine] {
-            let refine = Refine { window: 15, warp, ..Refine::default() };
-            let mut sum = 0.0;
-            for trial in 0..trials {
-                let shift = (trial as f64 * 0.618).fract();
-                let noisy = |image: Image, random: &mut dyn FnMut() -> f64| {
-                    let pixels = image.pixels().iter().map(|p| p + 3.0 * random() as f32).collect();
-                    Image::new(60, 60, pixels).unwrap()
-                };
-                let images =
-                    [noisy(waves(0.0, 20.0, 120.0), &mut random), noisy(waves(shift, 20.0, 120.0), &mut random)];
-                let at = Pixel { u: 30.0 + random() / 4.0, v: 30.0 + random() / 4.0 };
-                let truth = Vector2::new(at.u + shift, at.v + 0.5 * shift);
-                let start = Pixel { u: truth.x + 0.2, v: truth.y - 0.2 };
-                let pair = pairs(&images, at, start, &refine);
-                let (left, cross) =
-                    (pair.covariance.fixed_view::<2, 2>(0, 0), pair.covariance.fixed_view::<2, 2>(2, 0));
-                assert_ne!(cross[(0, 0)], 0.0, "not aligned");
-                let own =
-                    pair.covariance.fixed_view::<2, 2>(2, 2) - cross * left.try_inverse().unwrap() * cross.transpose();
-                let error = Vector2::new(pair.at.right.u, pair.at.right.v) - truth;
-                sum += (error.transpose() * own.try_inverse().unwrap() * error).x;
-            }
-            // χ² of two degrees of freedom: the mean of 300 is known to 0.12.
-            let mean = sum / f64::from(trials);
-            assert!((1.7..2.3).contains(&mean), "{warp:?}: {mean}");
-        }
-    }
-
-    #[test]
-    fn where_it_cannot_align_the_places_stay_or_the_pair_is_left_out() {
-        let at = Pixel { u: 30.0, v: 30.0 };
-        let start = Pixel { u: 30.4, v: 30.1 };
-        let right = waves(0.62, 20.0, 80.0);
-        let off = Refine { refine: false, ..Refine::default() };
-        assert_eq!(aligned(&right, at, start, &off).right, start);
-        let flat = Image::new(60, 60, vec![90.0; 3600]).unwrap();
-        let tiny = Image::new(1, 1, vec![90.0]).unwrap();
-        let (border, far) = (Pixel { u: 2.0, v: 30.0 }, Pixel { u: 34.0, v: 30.0 });
-        for (why, image, at, start) in [
-            ("nothing to align to", &flat, at, start),
-            ("an image too small", &tiny, at, start),
-            ("a window cut off", &right, border, start),
-            ("too far to reach", &right, at, far),
-        ] {
-            let keep = Refine { unaligned: Unaligned::Keep, ..Refine::default() };
-            assert_eq!(aligned(image, at, start, &keep).right, start, "{why}");
-            let pair = Pair { left: Place::independent(at, 0.15), right: Place::independent(start, 0.15) };
-            let left = waves(0.0, 30.0, 120.0);
-            assert_eq!(Refine::default().align(&[pair], &left, image, &rig()), [], "{why}");
-        }
-    }
+    covariance.fixed_view_mut::<2, 2>(2, 2).copy_from(&(shape * across + right.covariance));
+    UncertainPixels { at: StereoPixels { left: left.at, right: right.at }, covariance }
 }

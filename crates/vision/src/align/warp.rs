@@ -13,6 +13,9 @@ pub enum Warp {
     /// As a plane is seen by both cameras, to first order: along the epipolar line, by an amount that
     /// changes from place to place; four parameters.
     Slanted,
+    /// As the images show it: by moving alone, and slanted where the moving window ends with a residual that only a slant
+    /// explains.
+    AsSeen,
     /// Any way, to first order; six parameters. At the corners of boxes, with another surface behind, they
     /// are noisier than two.
     Affine,

@@ -110,6 +110,20 @@ impl<const P: usize> Normal<P> {
     }
 }
 
+impl Normal<4> {
+    /// What is left of a slanted window's where the window only moves.
+    pub(super) fn moving(&self) -> Normal<2> {
+        let part = |all: &SMatrix<f64, 4, 4>| all.fixed_view::<2, 2>(0, 0).into_owned();
+        Normal {
+            information: part(&self.information),
+            noise: part(&self.noise),
+            spread: part(&self.spread),
+            noise_spread: part(&self.noise_spread),
+            variance: self.variance,
+        }
+    }
+}
+
 /// Below a hundredth of a grey level there is nothing to align.
 pub(super) const LEAST_VARIANCE: f64 = 1e-4;
 

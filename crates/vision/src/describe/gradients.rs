@@ -55,9 +55,16 @@ pub(super) struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    pub(super) fn new(levels: &'a Octave, octave: i32, level: usize, keypoint: &Keypoint, scale: f64) -> Self {
+    /// The levels begin at row `first` of the octave.
+    pub(super) fn new(
+        levels: &'a Octave,
+        (octave, first): (i32, usize),
+        level: usize,
+        keypoint: &Keypoint,
+        scale: f64,
+    ) -> Self {
         let pixel = libm::exp2(f64::from(octave));
-        let at = [keypoint.at.u, keypoint.at.v].map(|x| (x / pixel) as f32);
+        let at = [(keypoint.at.u / pixel) as f32, (keypoint.at.v / pixel - first as f64) as f32];
         Self { pixels: levels.level(level), width: levels.width(), at, sigma: scale.max(0.1) / pixel }
     }
 

@@ -1,6 +1,6 @@
 //! Corners by the structure tensor: what the detectors that rest on it share.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use seafix_component::in_range;
 use seafix_geometry::Pixel;
@@ -44,14 +44,19 @@ struct Band {
     found: Vec<(Keypoint, [f64; 2])>,
 }
 
+/// A window narrower than a pixel's neighbours holds one gradient, which is no corner's.
+pub(super) const SIGMAS: RangeInclusive<f64> = 0.3..=100.0;
+/// Corners this far apart are a handful in an image; the disc around each takes memory and time.
+pub(super) const MOST_RADIUS: usize = 1000;
 /// Rows whose corners are sought at a time.
 const ROWS: usize = 32;
 
 impl Corners {
     /// Whether the settings can be.
     pub(super) fn check(&self) -> Result<(), String> {
-        let Self { tensor: Tensor { sigma, .. }, quality, budget: Budget { features, cells, .. }, .. } = *self;
-        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
+        let Self { tensor: Tensor { sigma, .. }, quality, radius, budget: Budget { features, cells, .. } } = *self;
+        in_range(SIGMAS.contains(&sigma), "sigma", sigma, "a number from 0.3 to 100 (px)")?;
+        in_range(radius <= MOST_RADIUS, "radius", radius, "at most 1000 (px)")?;
         in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
         in_range(features > 0, "features", features, "at least 1")?;
         in_range(cells > 0, "cells", cells, "at least 1")

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Detector, Keypoint, Selection,
+    corners::MOST_RADIUS,
     peaks::{self, Peaks},
     select::{self, Budget},
 };
@@ -51,8 +52,9 @@ impl Component for Fast {
     const SOURCE: &'static str = "Rosten and Drummond, Machine learning for high-speed corner detection, ECCV 2006";
 
     fn check(&self) -> Result<(), String> {
-        let Self { threshold, subpixel: _, radius: _, features, selection: _, cells } = *self;
+        let Self { threshold, subpixel: _, radius, features, selection: _, cells } = *self;
         in_range((0.0..f64::INFINITY).contains(&threshold), "threshold", threshold, "0 or more (grey levels)")?;
+        in_range(radius <= MOST_RADIUS, "radius", radius, "at most 1000 (px)")?;
         in_range(features > 0, "features", features, "at least 1")?;
         in_range(cells > 0, "cells", cells, "at least 1")
     }

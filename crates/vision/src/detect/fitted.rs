@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Detector, Keypoint, Selection, Window,
-    corners::Corners,
+    corners::{Corners, SIGMAS},
     select::{self, Budget},
     tensor::{Measure, Tensor},
 };
@@ -70,7 +70,7 @@ struct Scratch {
 impl FittedCorners {
     fn check(&self) -> Result<(), String> {
         let Self { sigma, quality, candidates, ref fit, features, selection: _, cells } = *self;
-        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")?;
+        in_range(SIGMAS.contains(&sigma), "sigma", sigma, "a number from 0.3 to 100 (px)")?;
         in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
         in_range(candidates > 0, "candidates", candidates, "at least 1")?;
         in_range(features > 0, "features", features, "at least 1")?;

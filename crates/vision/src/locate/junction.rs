@@ -42,7 +42,7 @@ impl Component for Junction {
 
     fn check(&self) -> Result<(), String> {
         let Self { sigma } = *self;
-        in_range(sigma > 0.0 && sigma <= 100.0, "sigma", sigma, "more than 0, at most 100 (px)")
+        in_range((0.3..=100.0).contains(&sigma), "sigma", sigma, "a number from 0.3 to 100 (px)")
     }
 }
 

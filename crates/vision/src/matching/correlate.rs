@@ -5,13 +5,13 @@ use multiversion::multiversion;
 use crate::Image;
 
 /// Windows compared at once, beside each other.
-pub(super) const LANES: usize = 16;
+pub(crate) const LANES: usize = 16;
 /// The greatest side of a window.
-pub(super) const WIDEST: usize = 51;
+pub(crate) const WIDEST: usize = 51;
 
 /// A window of one image, ready to be compared with those of another.
 #[derive(Debug, Default)]
-pub(super) struct Template {
+pub(crate) struct Template {
     half: usize,
     /// Row by row, less their mean, of unit length.
     values: Vec<f32>,
@@ -22,7 +22,7 @@ pub(super) struct Template {
 
 impl Template {
     /// The window of (2 `half` + 1)² pixels around (x, y); `None` if it leaves the image or is flat.
-    pub(super) fn take(&mut self, image: &Image, [x, y]: [usize; 2], half: usize) -> Option<()> {
+    pub(crate) fn take(&mut self, image: &Image, [x, y]: [usize; 2], half: usize) -> Option<()> {
         if !fits(image, [x, y], half) {
             return None;
         }
@@ -41,7 +41,7 @@ impl Template {
 
     /// Its correlations with the windows around (x, y) and the next pixels of that row; −1 for those that leave the
     /// image or are flat.
-    pub(super) fn compare(&mut self, image: &Image, [x, y]: [usize; 2]) -> [f32; LANES] {
+    pub(crate) fn compare(&mut self, image: &Image, [x, y]: [usize; 2]) -> [f32; LANES] {
         let half = self.half;
         if !fits(image, [x, y], half) {
             return [-1.0; LANES];

@@ -1,7 +1,7 @@
 //! Matchers: which key point of the right image is which of the left.
 
 mod along;
-mod correlate;
+pub(crate) mod correlate;
 mod curve;
 mod epipolar;
 mod epipolar_band;

@@ -1,0 +1,37 @@
+//! No refinement.
+
+use seafix_component::Component;
+use seafix_geometry::{StereoRig, UncertainPixels};
+use serde::{Deserialize, Serialize};
+
+use super::{Refinement, apart};
+use crate::{Image, Pair, Workspace};
+
+/// Leaves both places where detector, locator and matcher put them.
+///
+/// They err independently, each as it was found: a fitted corner as its fit says, any other by the `sigma-px` of the
+/// triangulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Unrefined {}
+
+impl Component for Unrefined {
+    const NAME: &'static str = "none";
+    const SUMMARY: &'static str = "leaves every match where it was found, with independent errors";
+    const SOURCE: &'static str = "common usage";
+}
+
+impl Refinement for Unrefined {
+    fn refine_into(
+        &self,
+        pairs: &[Pair],
+        _: &Image,
+        _: &Image,
+        _: &StereoRig,
+        _: &mut Workspace,
+        pixels: &mut Vec<UncertainPixels>,
+    ) {
+        pixels.clear();
+        pixels.extend(pairs.iter().map(apart));
+    }
+}

@@ -1,0 +1,146 @@
+//! Whole pixels compared by correlation, and the paraboloid through the nine best.
+
+use nalgebra::Matrix2;
+use seafix_component::{Component, in_range};
+use seafix_geometry::{Pixel, StereoRig, UncertainPixels};
+use serde::{Deserialize, Serialize};
+
+use super::{Refinement, Unaligned, apart, together};
+use crate::{
+    Image, Pair, Place, Workspace,
+    detect::vertex,
+    matching::correlate::{Template, WIDEST},
+};
+
+/// What most stereo programs do: the window around the left place is compared with those around the whole pixels near
+/// the right place, by zero-normalised cross correlation c, and the right place becomes the vertex of the
+/// paraboloid through the nine correlations around the greatest.
+///
+/// With n pixels in the window and H = −∂²c the covariance is 2 (1 − c) / n · H⁻¹, as of any least-squares fit, and
+/// `floor-px`² besides: correlations are no paraboloid, which pulls the vertex towards whole pixels, and windows are
+/// not deformed, whatever the rig. That error is the same in every frame, so that no number of pixels averages it.
+///
+/// Where the best is at the edge of the search, or less than `least-correlation`, the pair is most often a false match.
+///
+/// Source: Tian and Huhns, *Algorithms for subpixel registration*, CVGIP 1986; its bias: Shimizu and Okutomi,
+/// *Precise sub-pixel estimation on area-based matching*, ICCV 2001.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ZnccParabola {
+    /// Side of the window (px), odd, 3 to 51.
+    pub window: usize,
+    /// How far around the right place is searched (whole px along each axis), 1 to 7.
+    pub reach: usize,
+    /// The least zero-normalised cross correlation.
+    pub least_correlation: f64,
+    /// Standard deviation of what the paraboloid is off by (px).
+    pub floor_px: f64,
+    /// What becomes of a pair that could not be aligned.
+    pub unaligned: Unaligned,
+}
+
+impl Default for ZnccParabola {
+    fn default() -> Self {
+        Self { window: 11, reach: 2, least_correlation: 0.8, floor_px: 0.05, unaligned: Unaligned::Drop }
+    }
+}
+
+impl Component for ZnccParabola {
+    const NAME: &'static str = "zncc-parabola";
+    const SUMMARY: &'static str = "the vertex of the paraboloid through nine correlations of whole pixels";
+    const SOURCE: &'static str = "Tian and Huhns, Algorithms for subpixel registration, CVGIP 1986";
+
+    fn check(&self) -> Result<(), String> {
+        let Self { window, reach, least_correlation, floor_px, unaligned: _ } = *self;
+        let odd = window % 2 == 1 && (3..=WIDEST).contains(&window);
+        in_range(odd, "window", window, "an odd number of pixels from 3 to 51")?;
+        in_range((1..=MOST_REACH).contains(&reach), "reach", reach, "a number from 1 to 7 (px)")?;
+        let correlated = (-1.0..=1.0).contains(&least_correlation);
+        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
+        in_range((0.0..=10.0).contains(&floor_px), "floor-px", floor_px, "a number from 0 to 10 (px)")
+    }
+}
+
+/// A row of the search and one pixel beyond either end are compared at once.
+const MOST_REACH: usize = 7;
+/// Matches that are refined one after the other.
+const PIECE: usize = 64;
+
+#[derive(Debug, Default)]
+struct Memory {
+    templates: Vec<Template>,
+    refined: Vec<Option<UncertainPixels>>,
+}
+
+impl Refinement for ZnccParabola {
+    fn refine_into(
+        &self,
+        pairs: &[Pair],
+        left: &Image,
+        right: &Image,
+        _: &StereoRig,
+        work: &mut Workspace,
+        pixels: &mut Vec<UncertainPixels>,
+    ) {
+        let threads = work.threads();
+        let Memory { templates, refined } = work.get();
+        refined.clear();
+        refined.resize(pairs.len(), None);
+        threads.pieces(refined, PIECE, templates, |index, piece, template| {
+            for (refined, pair) in piece.iter_mut().zip(&pairs[index * PIECE..]) {
+                let found = self.place(left, right, pair, template);
+                *refined = found.map(|found| together(&pair.left, &found, &Matrix2::identity()));
+            }
+        });
+        pixels.clear();
+        let stays = |pair| (self.unaligned == Unaligned::Keep).then(|| apart(pair));
+        pixels.extend(refined.iter().zip(pairs).filter_map(|(refined, pair)| refined.or_else(|| stays(pair))));
+    }
+}
+
+impl ZnccParabola {
+    /// Where the right image shows the left place, given that.
+    fn place(&self, left: &Image, right: &Image, pair: &Pair, template: &mut Template) -> Option<Place> {
+        let whole = |at: f64| (0.0..1e9).contains(&at.round()).then(|| at.round() as usize);
+        let begin = [whole(pair.left.at.u)?, whole(pair.left.at.v)?];
+        // The left place lies beside its pixel; the right one lies beside another by as much.
+        let beside = [pair.left.at.u - begin[0] as f64, pair.left.at.v - begin[1] as f64];
+        let around = [whole(pair.right.at.u - beside[0])?, whole(pair.right.at.v - beside[1])?];
+        template.take(left, begin, self.window / 2)?;
+        // Nine are needed around the best: one pixel more than the search.
+        let (wide, side) = (self.reach + 1, 2 * self.reach + 3);
+        let corner = [around[0].checked_sub(wide)?, around[1].checked_sub(wide)?];
+        let mut rows = [[-1.0_f32; 2 * MOST_REACH + 3]; 2 * MOST_REACH + 3];
+        for (y, row) in rows[..side].iter_mut().enumerate() {
+            // Sixteen at once, and perhaps one more.
+            let mut compare = |x: usize| template.compare(right, [corner[0] + x, corner[1] + y]);
+            for (x, correlation) in compare(0).into_iter().enumerate().take(side) {
+                row[x] = correlation;
+            }
+            if side > 16 {
+                row[16] = compare(16)[0];
+            }
+        }
+        let inner = (1..side - 1).flat_map(|y| (1..side - 1).map(move |x| [x, y]));
+        let [x, y] = inner.max_by(|a, b| rows[a[1]][a[0]].total_cmp(&rows[b[1]][b[0]]).then(b.cmp(a)))?;
+        let nine = [y - 1, y, y + 1].map(|y| [rows[y][x - 1], rows[y][x], rows[y][x + 1]]);
+        let correlation = f64::from(nine[1][1]);
+        let peaks = nine.iter().flatten().all(|c| *c > -1.0 && f64::from(*c) <= correlation);
+        if !peaks || correlation < self.least_correlation {
+            return None;
+        }
+        let [dx, dy] = vertex(nine);
+        let at = |i: usize, step: f64| (corner[i] + [x, y][i]) as f64 + step + beside[i];
+        Some(Place { at: Pixel { u: at(0, dx), v: at(1, dy) }, covariance: self.covariance(nine)? })
+    }
+
+    fn covariance(&self, nine: [[f32; 3]; 3]) -> Option<Matrix2<f64>> {
+        let [[nw, n, ne], [w, centre, e], [sw, s, se]] = nine.map(|row| row.map(f64::from));
+        let across = -0.25 * ((se + nw) - (ne + sw));
+        let curvature = Matrix2::new(2.0 * centre - e - w, across, across, 2.0 * centre - n - s);
+        let inverse = curvature.cholesky()?.inverse();
+        let pixels = (self.window * self.window) as f64;
+        let noise = 2.0 * (1.0 - centre).max(0.0) / pixels;
+        Some(inverse * noise + Matrix2::identity() * (self.floor_px * self.floor_px))
+    }
+}
