@@ -238,7 +238,7 @@ fn cameras_that_cannot_be() {
     let left = |numbers: &str| format!("[rig.left]\nsize = [64, 48]\n{numbers}\n\n[rig.right]");
     let sound = left("fx = 50.0\nfy = 50.0\ncx = 31.5\ncy = 23.5");
     for (numbers, parts) in [
-        ("fx = 0.0\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["dataset.toml:13: fx = 0; ", "positive number of pixels"]),
+        ("fx = 0.0\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["dataset.toml:14: fx = 0; ", "positive number of pixels"]),
         ("fx = 50.0\nfy = -50.0\ncx = 31.5\ncy = 23.5", ["fy = -50", "positive number of pixels"]),
         ("fx = nan\nfy = 50.0\ncx = 31.5\ncy = 23.5", ["fx = NaN", "positive number of pixels"]),
         ("fx = 50.0\nfy = 50.0\ncx = 64.5\ncy = 23.5", ["cx = 64.5", "must lie in the image"]),

@@ -55,17 +55,20 @@ impl StereoRig {
         let r = self.right().normalize(&seen.right).ok_or(Untriangulable::OutsideLens)?;
         let (rotation, t) = (self.right_from_left().rotation_matrix(), self.right_from_left().translation());
         let row = |i: usize| rotation.row(i).transpose();
-        let (mut normal, mut right_side) = (Matrix3::zeros(), Vector3::zeros());
-        for (a, b) in [
+        let equations = [
             (Vector3::new(-1.0, 0.0, l.x), 0.0),
             (Vector3::new(0.0, -1.0, l.y), 0.0),
             (row(2) * r.x - row(0), t.x - r.x * t.z),
             (row(2) * r.y - row(1), t.y - r.y * t.z),
-        ] {
-            normal += a * a.transpose();
-            right_side += a * b;
+        ];
+        let normal: Matrix3<f64> = equations.iter().map(|(a, _)| a * a.transpose()).sum();
+        let inverse = normal.try_inverse().ok_or(Untriangulable::Parallel)?;
+        let mut point = Point::origin();
+        // Normal equations square the rounding of nearly parallel rays; what is left is solved for again.
+        for _ in 0..3 {
+            let left: Vector3<f64> = equations.iter().map(|(a, b)| a * (b - a.dot(&point.coords))).sum();
+            point = point + inverse * left;
         }
-        let point = Point::from(normal.try_inverse().ok_or(Untriangulable::Parallel)? * right_side);
         let depth = f64::min(point.coords.z, (*self.right_from_left() * point).coords.z);
         if depth > 0.0 { Ok(point) } else { Err(Untriangulable::Behind(depth)) }
     }

@@ -222,14 +222,14 @@ impl StereoRig {
         let left_from_right = self.right_from_left.inverse();
         let (a, b) = (l.normalize(), left_from_right.rotation() * r.normalize());
         let t = left_from_right.translation();
-        // Minimise |s a − (t + u b)|: normal equations of two unknowns.
-        let ab = a.dot(&b);
-        let determinant = 1.0 - ab * ab;
+        // Minimise |s a − (t + u b)|: across both rays n = a × b, and nothing cancels where they are nearly parallel.
+        let n = a.cross(&b);
+        let determinant = n.norm_squared();
         if !(determinant > 1e-14) {
             return Err(Untriangulable::Parallel);
         }
-        let s = (t.dot(&a) - ab * t.dot(&b)) / determinant;
-        let u = (ab * t.dot(&a) - t.dot(&b)) / determinant;
+        let s = t.cross(&b).dot(&n) / determinant;
+        let u = t.cross(&a).dot(&n) / determinant;
         if !(s > 0.0 && u > 0.0) {
             return Err(Untriangulable::Behind(s.min(u)));
         }

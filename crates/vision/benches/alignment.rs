@@ -189,13 +189,13 @@ fn main() {
         let words = [format!("{:?}", direct.warp), format!("{:?}", direct.weight)];
         print(kind, slope, noise, direct, direct.window, words);
     };
-    let uniform = Direct { window: 21, weight: Weight::Uniform, ..Direct::default() };
+    let moving = Direct { warp: Warp::Translation, ..Direct::default() };
+    let uniform = Direct { window: 21, weight: Weight::Uniform, ..moving.clone() };
     for kind in [Kind::X, Kind::L, Kind::Gravel] {
         for noise in [0.0, 2.0, 5.0] {
-            for refine in [&uniform, &Direct::default()] {
+            for refine in [&uniform, &moving, &Direct::default()] {
                 row(kind, 0.0, noise, refine);
             }
-            row(kind, 0.0, noise, &Direct { warp: Warp::AsSeen, ..Direct::default() });
         }
     }
     for slope in [0.05, 0.15] {
@@ -210,12 +210,16 @@ fn main() {
     }
     row(Kind::X, 0.15, 2.0, &Direct { warp: Warp::Slanted, ..uniform.clone() });
     row(Kind::L, 0.15, 2.0, &Direct { warp: Warp::Slanted, ..uniform.clone() });
-    let parabola = ZnccParabola { window: 21, ..ZnccParabola::default() };
-    for (kind, slope, noise) in [Kind::X, Kind::L, Kind::Gravel]
-        .into_iter()
-        .flat_map(|kind| [0.0, 2.0, 5.0].map(|noise| (kind, 0.0, noise)))
-        .chain([(Kind::Gravel, 0.05, 2.0), (Kind::Gravel, 0.15, 2.0)])
-    {
-        print(kind, slope, noise, &parabola, parabola.window, ["parabola".to_owned(), "Uniform".to_owned()]);
+    let wide = ZnccParabola { window: 21, ..ZnccParabola::default() };
+    for parabola in [&wide, &ZnccParabola::default()] {
+        let words = || ["parabola".to_owned(), "Uniform".to_owned()];
+        for kind in [Kind::X, Kind::L, Kind::Gravel] {
+            for noise in [0.0, 2.0, 5.0] {
+                print(kind, 0.0, noise, parabola, parabola.window, words());
+            }
+        }
+        for slope in [0.05, 0.15] {
+            print(Kind::Gravel, slope, 2.0, parabola, parabola.window, words());
+        }
     }
 }

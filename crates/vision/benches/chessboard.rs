@@ -51,7 +51,7 @@ fn main() {
     let pairs = corners.as_object().expect("pairs by name");
     for (name, warp) in [
         ("OpenCV's", None),
-        ("ours", Some(Warp::Translation)),
+        ("ours, windows that only move", Some(Warp::Translation)),
         ("ours, slanted windows", Some(Warp::Slanted)),
         ("ours, windows as seen", Some(Warp::AsSeen)),
     ] {

@@ -229,14 +229,14 @@ impl Scene {
         let guess = flat(&mut self.matches.iter().map(|m| m.right));
         let aside = json!({"do": "lucas_kanade", "points": points, "guess": guess, "window": 21});
         let nothing = json!({"do": "lucas_kanade", "points": points, "window": 21});
-        let wide = || Direct { window: 21, ..Direct::default() };
+        let wide = || Direct { window: 21, warp: Warp::Translation, ..Direct::default() };
         let list = [
             ("refine 1000, window 21; LK from nothing", wide(), nothing.clone(), Some(1.0 / 3.0)),
             ("refine 1000, window 21; LK from matches", wide(), aside, None),
             ("refine 1000, default; LK from nothing", Direct::default(), nothing.clone(), None),
             (
-                "refine 1000, default window as seen; LK from nothing",
-                Direct { warp: Warp::AsSeen, ..Direct::default() },
+                "refine 1000, window that only moves; LK from nothing",
+                Direct { warp: Warp::Translation, ..Direct::default() },
                 nothing,
                 None,
             ),

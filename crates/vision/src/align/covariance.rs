@@ -48,14 +48,32 @@ pub(super) fn covariance<const P: usize>(normal: &Normal<P>, residual: &Residual
     Some((place + place.transpose()) * 0.5)
 }
 
-/// How far a moving window was put off by a slant that its end shows (px, of the left image), where that slant cannot be
-/// chance: Rao's score exceeds what noise makes of it in 99 of 100 windows.
+/// The slant that the end of a moving window shows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slant {
+    /// How far it puts the moving window off (px, of the left image).
+    pub(super) off: Vector2<f64>,
+    /// Rao's score: χ² of two degrees of freedom where there is no slant.
+    score: f64,
+}
+
+impl Slant {
+    /// Whether it cannot be chance: 95 of 100 windows without a slant have a smaller score.
+    pub(super) fn is_seen(&self) -> bool {
+        self.score > 5.99
+    }
+
+    /// The share of it that is no noise: without a slant the score is 2 in the mean.
+    pub(super) fn share(&self) -> f64 {
+        (1.0 - 2.0 / self.score).max(0.0).sqrt()
+    }
+}
+
+/// The slant at the end of a moving window; none where noise makes up all that the window shows.
 ///
 /// With g the gradient of the four parameters and G their information, u = g_s − G_sm G_mm⁻¹ g_m is the slant's own part;
 /// its covariance is σ² (1/s_T² + 1/s_I²) T (Σ w² J̃ᵀJ̃) Tᵀ with T = (−G_sm G_mm⁻¹, 1).
-pub(super) fn slant(normal: &Normal<4>, gradient: &Vector4<f64>, residual: &Residual) -> Option<Vector2<f64>> {
-    /// χ² of two degrees of freedom, 99 %.
-    const CHANCE: f64 = 9.21;
+pub(super) fn slant(normal: &Normal<4>, gradient: &Vector4<f64>, residual: &Residual) -> Option<Slant> {
     let block = |all: &Matrix4<f64>, i, j| all.fixed_view::<2, 2>(i, j).into_owned();
     let within = block(&normal.information, 0, 0).try_inverse()?;
     let across = block(&normal.information, 2, 0) * within;
@@ -65,12 +83,12 @@ pub(super) fn slant(normal: &Normal<4>, gradient: &Vector4<f64>, residual: &Resi
         - block(&normal.spread, 2, 0) * across.transpose()
         + across * block(&normal.spread, 0, 0) * across.transpose();
     let free = (1.0 - 6.0 * residual.squared_weights).max(0.1);
-    let scaled = (1.0 / normal.variance + 1.0 / residual.variance) * residual.rounding;
-    let noise = (residual.energy / free).max(scaled);
-    let score = own.dot(&((spread * noise).cholesky()?.solve(&own)));
+    let rounding = (1.0 / normal.variance + 1.0 / residual.variance) * residual.rounding;
+    let noise = (residual.energy / free).max(rounding);
+    let score = (spread * noise).cholesky().map_or(0.0, |factor| own.dot(&factor.solve(&own)));
     let information = block(&normal.information, 2, 2) - across * block(&normal.information, 0, 2);
     let slope = (information + block(&normal.prior(residual.energy), 2, 2)).try_inverse()? * own;
-    (score > CHANCE).then(|| across.transpose() * slope)
+    Some(Slant { off: across.transpose() * slope, score })
 }
 
 /// Σ_k η(t − k)², η the cardinal cubic spline: what interpolation at the fraction t keeps of the variance of white

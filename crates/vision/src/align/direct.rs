@@ -53,7 +53,7 @@ impl Default for Direct {
             refine: true,
             window: 11,
             weight: Weight::Gaussian,
-            warp: Warp::Translation,
+            warp: Warp::AsSeen,
             reach: 1.5,
             least_correlation: 0.8,
             iterations: 20,

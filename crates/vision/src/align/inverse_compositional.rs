@@ -37,6 +37,8 @@ const MOST_AT_ONCE: f64 = 20_000.0;
 impl Rules {
     /// Far below what any window tells.
     pub(crate) const FINE: f64 = 3e-3;
+    /// Where one more step comes: it is a tenth of this.
+    const COARSE: f64 = 1e-2;
 }
 
 /// Where the window was found.
@@ -83,8 +85,7 @@ impl Aligner {
         model: &impl Model<P>,
     ) -> Option<Aligned> {
         let normal = self.take(left, [centre, start], rules, model)?;
-        let (at, shape) = self.descend(right, start, (start, shape), shape, &normal, rules, model)?;
-        let found = self.compare::<P>(right, &at, &shape, rules)?;
+        let (at, shape, found) = self.descend(right, start, (start, shape), None, &normal, rules, model)?;
         self.judge(&at, &shape, &normal, &found, rules)
     }
 
@@ -92,8 +93,9 @@ impl Aligner {
     /// window is.
     ///
     /// The test is that of Rao's score: where the moving window ended, the derivative by the slant, freed of what moving
-    /// would do, is as great as noise makes it, χ² of two degrees of freedom. Where the slanted window finds no end, the
-    /// moving one's place stays, and the error that the slant makes there comes to its covariance.
+    /// would do, is as great as noise makes it, χ² of two degrees of freedom. Where the moving one's place stays, because the
+    /// slant may be chance or the slanted window finds no end, the error that the slant would make there comes to its
+    /// covariance.
     pub(super) fn align_as_seen(
         &mut self,
         left: &Image,
@@ -103,29 +105,34 @@ impl Aligner {
         rules: &Rules,
         model: &Slanted,
     ) -> Option<Aligned> {
-        let (start, begun) = begin;
+        let start = begin.0;
+        // A comparison follows that all steps share: its own is the last.
+        let coarse = Rules { precision: Rules::COARSE, ..*rules };
         let slanted = self.take(left, [centre, start], rules, model)?;
         let moving = slanted.moving();
-        let Some((at, shape)) = self.descend(right, start, begin, begun, &moving, rules, &Translation) else {
-            let (at, shape) = self.descend(right, start, begin, begun, &slanted, rules, model)?;
-            let found = self.compare::<4>(right, &at, &shape, rules)?;
+        let Some((at, shape, _)) = self.descend(right, start, begin, None, &moving, &coarse, &Translation) else {
+            let (at, shape, found) = self.descend(right, start, begin, None, &slanted, rules, model)?;
             return self.judge(&at, &shape, &slanted, &found, rules);
         };
         let found = self.compare::<4>(right, &at, &shape, rules)?;
         let residual = self.residual(&at, &shape, &found);
-        let slant = slant(&slanted, &found.gradient, &residual);
-        let moved = self.judge(&at, &shape, &moving, &found.moving(), rules);
-        let Some(off) = slant else { return moved };
-        let followed = self.descend(right, start, (&at, &shape), begun, &slanted, rules, model);
-        let followed = followed.and_then(|(at, shape)| {
-            let again = self.compare::<4>(right, &at, &shape, rules)?;
-            let better = again.correlation >= found.correlation;
+        let slant = slant(&slanted, &found.gradient, &residual)?;
+        let (alike, plain) = (found.correlation, found.moving());
+        let stays = |aligner: &Self| {
+            let last = moving.information.cholesky()?.solve(&plain.gradient);
+            let moved = aligner.judge(&(at - shape * last), &shape, &moving, &plain, rules)?;
+            let off = shape * slant.off * slant.share();
+            Some(Aligned { covariance: moved.covariance + off * off.transpose(), ..moved })
+        };
+        if !slant.is_seen() {
+            return stays(self);
+        }
+        let followed = self.descend(right, start, (&at, &shape), Some(found), &slanted, &coarse, model);
+        let followed = followed.and_then(|(at, shape, again)| {
+            let better = again.correlation >= alike;
             self.judge(&at, &shape, &slanted, &again, rules).filter(|_| better)
         });
-        followed.or_else(|| {
-            let off = shape * off;
-            moved.map(|moved| Aligned { covariance: moved.covariance + off * off.transpose(), ..moved })
-        })
+        followed.or_else(|| stays(self))
     }
 
     /// Takes the template around `centre`.
@@ -148,23 +155,26 @@ impl Aligner {
         Some(normal)
     }
 
-    /// Where the steps from `at` and `shape` end, no further from `start` than they may go; `begun` is the shape that no
-    /// deformation is counted from.
+    /// Where the steps from `at` and `shape` end, no further from `start` than they may go, and the comparison before the
+    /// last step, which is too short to change it; `known` is that at the beginning, if it was made.
     #[expect(clippy::too_many_arguments, reason = "two call sites; each is a different thing")]
     fn descend<const P: usize>(
         &mut self,
         right: &Image,
         start: &Vector2<f64>,
         (at, shape): (&Vector2<f64>, &Matrix2<f64>),
-        begun: &Matrix2<f64>,
+        mut known: Option<Found<P>>,
         normal: &Normal<P>,
         rules: &Rules,
         model: &impl Model<P>,
-    ) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        let begun = begun.try_inverse()?;
+    ) -> Option<(Vector2<f64>, Matrix2<f64>, Found<P>)> {
+        let begun = shape.try_inverse()?;
         let (mut at, mut shape) = (*at, *shape);
         for _ in 0..rules.iterations {
-            let found = self.compare::<P>(right, &at, &shape, rules)?;
+            let (found, fresh) = match known.take() {
+                Some(found) => (found, false),
+                None => (self.compare::<P>(right, &at, &shape, rules)?, true),
+            };
             let prior = normal.prior(2.0 * (1.0 - found.correlation));
             let deformed = SVector::from(model.parameters(&(begun * shape - Matrix2::identity())));
             let step = (normal.information + prior).cholesky()?.solve(&(found.gradient + prior * deformed));
@@ -178,8 +188,9 @@ impl Aligner {
             if !((at - start).norm() <= rules.reach) {
                 return None;
             }
-            if moved.norm() < rules.precision {
-                return Some((at, shape));
+            // A first slant may turn the window about its middle, which does not move.
+            if fresh && moved.norm() < rules.precision {
+                return Some((at, shape, found));
             }
         }
         None
@@ -289,6 +300,11 @@ impl Aligner {
         if *shape == Matrix2::identity() {
             let first = [at.x + grid.first[0], at.y + grid.first[1]];
             spline.grid(first, grid.columns, grid.side, across, patch);
+        } else if shape[(1, 0)] == 0.0 && shape[(1, 1)] == 1.0 {
+            let [x, y] = grid.first;
+            let first = [at.x + shape[(0, 0)] * x + shape[(0, 1)] * y, at.y + y];
+            let steps = [shape[(0, 0)], shape[(0, 1)]];
+            spline.sheared(first, steps, grid.columns, across, patch);
         } else {
             let corner = spline.corner();
             let base = [at.x - corner[0] as f64, at.y - corner[1] as f64];

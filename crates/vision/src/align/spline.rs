@@ -83,6 +83,24 @@ impl Spline {
         separable(&self.coefficients[first..], self.width, [wx, wy], columns, across, &mut out[..columns * rows]);
     }
 
+    /// The values on a grid that is stretched and sheared along its rows: pixel i of row j lies at
+    /// `at` + (`step` i + `drift` j, j). `columns` is a multiple of 8; values where the spline is not known mean nothing.
+    pub(super) fn sheared(
+        &self,
+        at: [f64; 2],
+        [step, drift]: [f64; 2],
+        columns: usize,
+        across: &mut Vec<f32>,
+        out: &mut [f32],
+    ) {
+        let (y, ty) = split(at[1] - self.corner[1] as f64);
+        let begin = at[0] - self.corner[0] as f64;
+        across.resize(self.width.max(across.len()), 0.0);
+        let rows = &self.coefficients[(y - 1) * self.width..];
+        let line = [begin as f32, step as f32, drift as f32];
+        shear(rows, weights(ty), line, columns, &mut across[..self.width], out);
+    }
+
     /// The value at a place that the spline covers.
     pub(super) fn at(&self, place: [f32; 2]) -> f32 {
         let (x, y) = (place[0] as usize, place[1] as usize);
@@ -195,6 +213,48 @@ fn separable(
     }
 }
 
+/// A sheared grid: down the four rows of coefficients, then at each place along the row.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn shear(
+    coefficients: &[f32],
+    wy: [f32; 4],
+    [begin, step, drift]: [f32; 3],
+    columns: usize,
+    across: &mut [f32],
+    out: &mut [f32],
+) {
+    const LANES: usize = 8;
+    let width = across.len();
+    let most = (width - 3) as f32;
+    for (j, out) in out.chunks_exact_mut(columns).enumerate() {
+        let row = |k: usize| &coefficients[(j + k) * width..][..width];
+        let (a, b, c, d) = (row(0), row(1), row(2), row(3));
+        for i in 0..width {
+            across[i] = wy[0] * a[i] + wy[1] * b[i] + (wy[2] * c[i] + wy[3] * d[i]);
+        }
+        let begin = begin + drift * j as f32;
+        for (block, out) in out.chunks_exact_mut(LANES).enumerate() {
+            let (mut whole, mut part) = ([0_i32; LANES], [0.0_f32; LANES]);
+            for i in 0..LANES {
+                let x = (begin + step * (block * LANES + i) as f32).clamp(1.0, most);
+                whole[i] = x as i32;
+                part[i] = x - whole[i] as f32;
+            }
+            let mut w = [[0.0_f32; LANES]; 4];
+            for i in 0..LANES {
+                let all = weights(part[i]);
+                for k in 0..4 {
+                    w[k][i] = all[k];
+                }
+            }
+            for i in 0..LANES {
+                let c = &across[whole[i] as usize - 1..][..4];
+                out[i] = w[0][i] * c[0] + w[1][i] * c[1] + (w[2][i] * c[2] + w[3][i] * c[3]);
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -219,6 +279,25 @@ mod tests {
         spline.grid([11.3, 8.6], 8, 3, &mut across, &mut out[..24]);
         assert!((f64::from(out[9]) - value(12.3, 9.6)).abs() < 0.15);
         assert!((out[9] - spline.at([12.3 + 1.0, 9.6 + 1.0])).abs() < 1e-3);
+    }
+
+    /// Seen to fail when rows drift by the step.
+    #[test]
+    fn a_sheared_grid_is_made_sample_by_sample() {
+        let image = Image::new(30, 20, (0..600).map(|i| ((i * 7919) % 251) as f32).collect()).unwrap();
+        let mut spline = Spline::default();
+        spline.load(&image, [-1, -1], [31, 21]);
+        let (mut out, mut across) = (vec![0.0; 16 * 5], Vec::new());
+        for (step, drift) in [(1.1, 0.2), (0.8, -0.3), (-0.9, 0.1)] {
+            let begin = if step > 0.0 { 5.3 } else { 20.4 };
+            spline.sheared([begin, 6.7], [step, drift], 16, &mut across, &mut out);
+            for (j, i) in (0..5).flat_map(|j| (0..12).map(move |i| (j, i))) {
+                let place = [begin + step * f64::from(i) + drift * f64::from(j), 6.7 + f64::from(j)];
+                let expected = spline.at(place.map(|x| (x + 1.0) as f32));
+                let found = out[(16 * j + i) as usize];
+                assert!((found - expected).abs() < 0.02, "{step} {drift}, ({i}, {j}): {found}, not {expected}");
+            }
+        }
     }
 
     #[test]

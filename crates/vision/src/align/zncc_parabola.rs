@@ -41,7 +41,7 @@ pub struct ZnccParabola {
 
 impl Default for ZnccParabola {
     fn default() -> Self {
-        Self { window: 11, reach: 2, least_correlation: 0.8, floor_px: 0.05, unaligned: Unaligned::Drop }
+        Self { window: 11, reach: 2, least_correlation: 0.8, floor_px: 0.02, unaligned: Unaligned::Drop }
     }
 }
 
