@@ -90,7 +90,7 @@ mod tests {
 
     /// Turned, one camera before the other, behind a lens.
     fn rig() -> StereoRig {
-        let camera = Pinhole::new([1024, 768], [500.0, 505.0], [511.5, 383.5], &[-0.1, 0.02]).unwrap();
+        let camera = Pinhole::new([1024, 768], [500.0, 505.0], [511.5, 383.5], &[-0.1, 0.02, 0.0, 0.0]).unwrap();
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.03, -0.12, 0.05));
         StereoRig::new(camera, camera, Transform::new(turn, Vector3::new(-0.3, 0.05, 0.08))).unwrap()
     }

@@ -180,8 +180,9 @@ mod tests {
 
     #[test]
     fn the_right_place_errs_with_the_left_one_and_a_little_more() {
+        let moving = Direct { warp: Warp::Translation, ..Direct::default() };
         let images = [waves(0.0, 30.0, 120.0), waves(0.62, 20.0, 80.0)];
-        let pair = pairs(&images, Pixel { u: 30.3, v: 28.8 }, Pixel { u: 30.0, v: 29.5 }, &Direct::default());
+        let pair = pairs(&images, Pixel { u: 30.3, v: 28.8 }, Pixel { u: 30.0, v: 29.5 }, &moving);
         let block = |i, j| pair.covariance.fixed_view::<2, 2>(i, j).into_owned();
         let place = Matrix2::identity() * 0.15f64.powi(2);
         assert_eq!([block(0, 0), block(0, 2), block(2, 0)], [place; 3]);
