@@ -28,7 +28,7 @@ const LEAST_SIDE: usize = 16;
 ///
 /// Levels are made when they are first asked for and kept: a descriptor that follows the detector on
 /// the same image finds them. They depend on the image alone. Octaves of more than [`MOST_WHOLE`] pixels are not kept but
-/// made again in strips of rows ([`sweep`](Self::sweep)), so that an image of 64 Mpx takes 0.7 GB, not 7: below, about 32
+/// made again in strips of rows ([`sweep`](Self::sweep)), so that 64 Mpx take no 7 GB: below, about 32
 /// bytes a pixel are held, 130 with octave −1.
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.

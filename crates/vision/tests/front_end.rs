@@ -114,7 +114,6 @@ fn alignment_finds_the_place_for_every_rig() {
 /// the normalised error squared is about one in the median, which is .45 for χ² of one degree of freedom, and they are
 /// better than what the matcher said.
 ///
-/// Seen to fail when the paraboloid's `floor-px` is left out (median 8), and when its step is turned round.
 #[test]
 fn every_refinement_errs_as_it_says() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);
