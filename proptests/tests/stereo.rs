@@ -46,7 +46,8 @@ fn returns_to_the_point(rig: &StereoRig, places: &[(f64, f64, f64)], seen: &Cell
 /// P48. Project, then triangulate: ≤ 1e-9 m for Z ≤ 20 m and f b ≥ 50 px m; reprojection ≤ 1e-9 px;
 /// rectified rigs, every listed triangulator.
 ///
-/// Seen to fail when the right camera is displaced the other way in the ray's closest approach, or in the linear equations.
+/// Seen to fail when the right camera is displaced the other way in the ray's closest approach, with the cosine's square
+/// in it, where nearly parallel rays cancel, and with the linear equations solved once.
 #[test]
 fn triangulation_undoes_projection() {
     let seen = Cell::new(0);

@@ -71,7 +71,6 @@ fn the_budget_is_kept() {
     assert_eq!(all["pipeline"]["detector"]["features"], 50);
 }
 
-/// Seen to fail when a table without a name is refused.
 #[test]
 fn refinement_and_triangulation_are_chosen_by_name() {
     let chosen = json(&["--set", "refine=none", "--set", "triangulation=midpoint"]);
@@ -131,8 +130,6 @@ fn one_image_twice_is_refused() {
 
 /// Images that were not made by their rig are told by their epipolar distances, and a rig that is called rectified and is
 /// not by its numbers.
-///
-/// Seen to fail when matches are sought along the rig's lines, which are all near them.
 #[test]
 fn rows_that_do_not_correspond_are_told() {
     let images = ["left000.png", "right000.png"];
@@ -156,7 +153,6 @@ fn rows_that_do_not_correspond_are_told() {
     assert!(parts.iter().all(|part| told.contains(part)), "{told}");
 }
 
-/// Seen to fail when a cloud of no point is nothing to speak of.
 #[test]
 fn key_points_that_come_to_nothing_are_told() {
     let images = [sample("right000.png"), sample("left000.png")];

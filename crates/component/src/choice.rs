@@ -82,7 +82,6 @@ mod tests {
         assert_eq!(toml::from_str::<Choice>(&printed).unwrap(), b);
     }
 
-    /// Seen to fail when such a table is refused as any other is.
     #[test]
     fn a_stage_that_was_no_choice_keeps_its_settings() {
         let read = |text: &str| {

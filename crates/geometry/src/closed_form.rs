@@ -95,7 +95,6 @@ mod tests {
         StereoRig::new(camera, camera, Transform::new(turn, Vector3::new(-0.3, 0.05, 0.08))).unwrap()
     }
 
-    /// Seen to fail when the right camera's turn is forgotten in one of them.
     #[test]
     fn they_agree_where_the_pixels_do() {
         let rig = rig();

@@ -356,7 +356,6 @@ mod tests {
         assert_eq!(space.octave(1, 4, Threads::One).height(), 60);
     }
 
-    /// Seen to fail when the margin of a strip is 24 rows.
     #[test]
     fn strips_show_what_the_whole_does() {
         let value = |i: usize| ((i * 7919 + i / 90 * 31) % 251) as f32;

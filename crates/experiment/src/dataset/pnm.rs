@@ -114,7 +114,6 @@ mod tests {
         white(bytes, [3, 2]).map_err(|fault| fault.to_string())
     }
 
-    /// Seen to fail when the scan begins a sample late, and when it looks at the first row alone.
     #[test]
     fn the_first_sample_above_maxval_is_named() {
         let right: [&[u8]; 6] = [

@@ -281,7 +281,6 @@ mod tests {
         assert!((out[9] - spline.at([12.3 + 1.0, 9.6 + 1.0])).abs() < 1e-3);
     }
 
-    /// Seen to fail when rows drift by the step.
     #[test]
     fn a_sheared_grid_is_made_sample_by_sample() {
         let image = Image::new(30, 20, (0..600).map(|i| ((i * 7919) % 251) as f32).collect()).unwrap();

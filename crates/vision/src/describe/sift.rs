@@ -207,7 +207,6 @@ mod tests {
         assert_eq!((level(0.0, 2), level(f64::NAN, 2)), ((-1, 1), (-1, 1)));
     }
 
-    /// Seen to fail when the surroundings of a strip are not shown.
     #[test]
     fn strips_change_no_descriptor() {
         let image = image(80, 600, waves);

@@ -214,7 +214,6 @@ mod tests {
         Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
     }
 
-    /// Seen to fail when a strip's key points keep the rows of the strip.
     #[test]
     fn strips_change_no_key_point() {
         let image = texture(80, 600);
