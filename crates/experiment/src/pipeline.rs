@@ -184,7 +184,12 @@ impl Pipeline {
 }
 
 fn fits(setting: &'static str, check: Result<(), String>) -> Result<(), PipelineError> {
-    check.map_err(|message| PipelineError { setting, key: None, message: format!("{setting}: {message}") })
+    // Some checks say by themselves whose they are.
+    let named = |message: String| match message.starts_with(&format!("{setting}: ")) {
+        true => message,
+        false => format!("{setting}: {message}"),
+    };
+    check.map_err(|message| PipelineError { setting, key: None, message: named(message) })
 }
 
 pub(crate) fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice, PipelineError> {

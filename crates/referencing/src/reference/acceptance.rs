@@ -29,6 +29,9 @@ pub struct Acceptance {
     pub alert_limit: f64,
     /// The share of the model's diameter that limits it where that is less.
     pub alert_share: f64,
+    /// A pose whose attitude may be off by as much (rad) by its own covariance, two standard deviations of its worst axis,
+    /// is none.
+    pub attitude_limit: f64,
     /// With what probability a protection level may be exceeded.
     pub risk: f64,
     /// Share of believed sets that hold one wrong match, as protection levels assume it.
@@ -48,6 +51,7 @@ impl Default for Acceptance {
             confidence: 0.999,
             alert_limit: 0.10,
             alert_share: 0.05,
+            attitude_limit: 0.07,
             risk: 1e-4,
             wrong_match_rate: 0.1,
             two_wrong_rate: 0.0,
@@ -75,6 +79,8 @@ impl Acceptance {
             in_range(alert, "alert-limit", self.alert_limit, "a positive number of metres")?;
             let share = self.alert_share > 0.0 && self.alert_share.is_finite();
             in_range(share, "alert-share", self.alert_share, "a positive number")?;
+            let turn = self.attitude_limit > 0.0 && self.attitude_limit.is_finite();
+            in_range(turn, "attitude-limit", self.attitude_limit, "a positive angle (rad)")?;
             let risk = self.risk > 0.0 && self.risk < 1.0;
             in_range(risk, "risk", self.risk, "a probability between 0 and 1")?;
             let rate = self.wrong_match_rate > 0.0 && self.wrong_match_rate <= 1.0;

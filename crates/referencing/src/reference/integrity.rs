@@ -49,9 +49,9 @@ pub struct Integrity {
     /// The χ² that a true set exceeds with one minus the confidence.
     pub chi2_limit: f64,
     /// Solution separation: the farthest that the position moves (m) when one point is left out; `None` with fewer
-    /// than four points.
+    /// than four points, or where one cannot be spared.
     pub separation: Option<f64>,
-    /// The same when two points are left out; `None` with fewer than five points, or where
+    /// The same when two points are left out; `None` with fewer than five points, where two cannot be spared, or where
     /// [`Acceptance::two_wrong_rate`] is nought.
     pub separation_two: Option<f64>,
     /// Protection levels at [`Acceptance::risk`]; `None` where nothing can vouch for the fix (three points, or a point
@@ -62,7 +62,7 @@ pub struct Integrity {
 /// How far the fix moves when points are left out, and what that protects.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Separation {
-    /// Farthest move of the position (m) without one point; `None` with fewer than four.
+    /// Farthest move of the position (m) without one point; `None` with fewer than four, or where one cannot be spared.
     pub(super) one: Option<f64>,
     /// Without two; `None` with fewer than five, or where two wrong matches are not assumed to happen.
     pub(super) two: Option<f64>,
@@ -92,14 +92,14 @@ pub(super) fn protection(
     let quiet = radius(0.5 * acceptance.risk);
     let own = Protection { position: quiet * position, attitude: quiet * attitude };
     let Some(deletions) = Deletions::of(data) else {
-        return Separation { one: Some(0.0), ..Separation::default() };
+        return Separation::default();
     };
     let mut watch = Watch { pose, deletions, level: own, spared: true };
     let twice = acceptance.two_wrong_rate > 0.0;
     let share = if twice { 0.25 } else { 0.5 } * acceptance.risk;
     let ones = (0..n).map(|out| vec![out]);
-    let one = Some(watch.farthest(ones, (share / acceptance.wrong_match_rate).min(1.0)));
-    let two = (twice && n >= 5).then(|| {
+    let one = watch.farthest(ones, (share / acceptance.wrong_match_rate).min(1.0));
+    let two = (twice && n >= 5).then_some(()).and_then(|()| {
         let twos = (0..n).flat_map(|i| (i + 1..n).map(move |j| vec![i, j]));
         watch.farthest(twos, (share / acceptance.two_wrong_rate).min(1.0))
     });
@@ -118,19 +118,19 @@ struct Watch<'a> {
 
 impl Watch<'_> {
     /// Raises the levels to what these sets of wrong matches, each as likely as `share` of the risk says, may do; the
-    /// farthest move of the position (m).
-    fn farthest(&mut self, sets: impl Iterator<Item = Vec<usize>>, share: f64) -> f64 {
+    /// farthest move of the position (m), `None` where one of the sets cannot be spared.
+    fn farthest(&mut self, sets: impl Iterator<Item = Vec<usize>>, share: f64) -> Option<f64> {
         let k = radius(share);
-        let mut farthest: f64 = 0.0;
+        let mut farthest = Some(0.0_f64);
         for out in sets {
             let Some((without, certainty)) = self.deletions.without(&out) else {
-                self.spared = false;
+                (self.spared, farthest) = (false, None);
                 continue;
             };
             let moved = (self.pose.translation() - without.translation()).norm();
             let turned = so3::angle(&(self.pose.rotation().inverse() * without.rotation()));
             let (position, attitude) = semi_axes(&certainty);
-            farthest = farthest.max(moved);
+            farthest = farthest.map(|farthest| farthest.max(moved));
             self.level.position = self.level.position.max(moved + k * position);
             self.level.attitude = self.level.attitude.max(turned + k * attitude);
             self.spared &= attitude <= WEAK;
@@ -143,7 +143,7 @@ impl Watch<'_> {
 const WEAK: f64 = 0.035;
 
 /// Greatest standard deviations of position (m) and attitude (rad) over all directions.
-fn semi_axes(covariance: &Covariance6<Object, Camera>) -> (f64, f64) {
+pub(super) fn semi_axes(covariance: &Covariance6<Object, Camera>) -> (f64, f64) {
     let greatest = |first: usize| {
         let block: Matrix3<f64> = covariance.matrix.fixed_view::<3, 3>(first, first).into();
         SymmetricEigen::new(block).eigenvalues.max().max(0.0).sqrt()

@@ -5,7 +5,7 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use super::{
     Acceptance, Alternative, Outcome, Reference, Refusal,
     hypothesis::{Fallen, Hypothesis, by_score},
-    integrity::{Integrity, Redundancy, protection},
+    integrity::{Integrity, Redundancy, protection, semi_axes},
     rms_apart,
 };
 use crate::{
@@ -160,6 +160,10 @@ impl Judge<'_> {
         // Written so that a NaN is refused too.
         if !(2.0 * rms <= limit) {
             return Err(Fallen::Refused(Refusal::Imprecise { rms, limit }));
+        }
+        let ((_, sigma), limit) = (semi_axes(&covariance), self.acceptance.attitude_limit);
+        if !(2.0 * sigma <= limit) {
+            return Err(Fallen::Refused(Refusal::Unturned { sigma, limit }));
         }
         let Some(prior) = self.problem.prior else { return Ok(()) };
         let off = match &prior.bound {

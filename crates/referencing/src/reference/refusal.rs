@@ -52,6 +52,15 @@ pub enum Refusal {
         /// The alert limit (m).
         limit: f64,
     },
+    /// By its own covariance the attitude is hardly determined: points near a line leave a turn about it free, which moves
+    /// no point and yet the vehicle.
+    #[error("the attitude is known to {:.1}° (one sigma, its worst axis); twice that exceeds {:.1}°", .sigma.to_degrees(), .limit.to_degrees())]
+    Unturned {
+        /// Greatest standard deviation over all axes (rad).
+        sigma: f64,
+        /// [`Acceptance::attitude_limit`](crate::Acceptance::attitude_limit) (rad).
+        limit: f64,
+    },
     /// The pose contradicts the prior.
     #[error("the pose is {off:.3} times as far from the prior as the prior allows")]
     Prior {
@@ -68,7 +77,7 @@ impl Refusal {
             Self::TooFew { .. } => "too-few",
             Self::Chance { .. } | Self::Absent { .. } => "chance",
             Self::Residuals { .. } | Self::Prior { .. } => "gate",
-            Self::Imprecise { .. } => "imprecise",
+            Self::Imprecise { .. } | Self::Unturned { .. } => "imprecise",
         }
     }
 }
