@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointRules {
-    /// Standard deviation of the coordinates of a key point that no corner was fitted to (px).
+    /// Standard deviation of the coordinates of a key point that no corner was fitted to (px): the detector's own
+    /// place. It lies inside a corner by a pixel or so, in both images alike, so that directions suffer and disparities do
+    /// not. Of 130 corners in 60 rendered pairs of a dive Harris' maxima were .87 px off an axis (RMS), a fitted corner .16.
     pub sigma_px: f64,
     /// Standard deviation of what the camera model leaves unexplained (px): calibration, lens, housing. It
     /// comes to every coordinate in both images: an alignment may be good to a hundredth of a pixel, the
@@ -24,7 +26,7 @@ pub struct PointRules {
 
 impl Default for PointRules {
     fn default() -> Self {
-        Self { sigma_px: 0.15, calibration_px: 0.15, epipolar_px: 1.5, confidence: 1.0, max_depth: 20.0 }
+        Self { sigma_px: 0.9, calibration_px: 0.15, epipolar_px: 1.5, confidence: 1.0, max_depth: 20.0 }
     }
 }
 
