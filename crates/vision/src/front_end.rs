@@ -150,7 +150,7 @@ impl FrontEnd {
         let left = View { image: left, keypoints: &l.keypoints, descriptors: &l.descriptors };
         let right = View { image: right, keypoints: &r.keypoints, descriptors: &r.descriptors };
         times.match_ms = timed(|| self.matcher.match_into(&left, &right, rig, work, matches));
-        let sigma = self.triangulator.rules().sigma_px;
+        let (sigma, off) = (self.triangulator.rules().sigma_px, self.triangulator.rules().peak_px);
         times.refine_ms = timed(|| {
             pairs.clear();
             let pair = |found: &Match| {
@@ -160,6 +160,14 @@ impl FrontEnd {
             };
             pairs.extend(matches.iter().map(pair));
             self.refinement.refine_into(pairs, left.image, right.image, rig, work, pixels);
+            // Of the pairs, in their order, some are left out.
+            let mut rest = matches.iter().zip(pairs.iter());
+            for seen in pixels.iter_mut() {
+                let own = rest.find(|(_, pair)| pair.left.at == seen.at.left);
+                if own.is_some_and(|(found, _)| l.located[found.left].is_none()) {
+                    off_alike(seen, off);
+                }
+            }
         });
         times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
     }
@@ -196,6 +204,14 @@ impl FrontEnd {
         };
         self.filters.iter().for_each(|filter| filter.apply(kept, work));
         kept
+    }
+}
+
+/// Adds an error of standard deviation `off` (px) that both images share.
+fn off_alike(seen: &mut UncertainPixels, off: f64) {
+    for row in 0..4 {
+        seen.covariance[(row, row)] += off * off;
+        seen.covariance[(row, (row + 2) % 4)] += off * off;
     }
 }
 

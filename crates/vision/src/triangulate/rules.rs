@@ -7,10 +7,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointRules {
-    /// Standard deviation of the coordinates of a key point that no corner was fitted to (px): the detector's own
-    /// place. It lies inside a corner by a pixel or so, in both images alike, so that directions suffer and disparities do
-    /// not. Of 130 corners in 60 rendered pairs of a dive Harris' maxima were .87 px off an axis (RMS), a fitted corner .16.
+    /// Standard deviation of the coordinates of a key point that no corner was fitted to, from image to image (px).
     pub sigma_px: f64,
+    /// How far such a key point lies off the corner that it means, in both images alike (standard deviation, px): directions
+    /// suffer, disparities do not. Of 130 corners in 60 rendered pairs of a dive Harris' maxima were .87 px off an axis
+    /// (RMS), inside the corner most of all; a fitted corner .16.
+    pub peak_px: f64,
     /// Standard deviation of what the camera model leaves unexplained (px): calibration, lens, housing. It
     /// comes to every coordinate in both images: an alignment may be good to a hundredth of a pixel, the
     /// directions that belong to it are not.
@@ -26,7 +28,7 @@ pub struct PointRules {
 
 impl Default for PointRules {
     fn default() -> Self {
-        Self { sigma_px: 0.9, calibration_px: 0.15, epipolar_px: 1.5, confidence: 1.0, max_depth: 20.0 }
+        Self { sigma_px: 0.15, peak_px: 0.9, calibration_px: 0.15, epipolar_px: 1.5, confidence: 1.0, max_depth: 20.0 }
     }
 }
 
@@ -36,8 +38,10 @@ impl PointRules {
     /// # Errors
     /// The setting that is out of its range, its value, and the range.
     pub(super) fn check(&self) -> Result<(), String> {
-        let Self { sigma_px, calibration_px, epipolar_px, confidence, max_depth } = *self;
+        let Self { sigma_px, peak_px, calibration_px, epipolar_px, confidence, max_depth } = *self;
         in_range(sigma_px > 0.0 && sigma_px <= 100.0, "sigma-px", sigma_px, "more than 0, at most 100 (px)")?;
+        let peaked = (0.0..=100.0).contains(&peak_px);
+        in_range(peaked, "peak-px", peak_px, "a number from 0 to 100 (px)")?;
         let calibrated = (0.0..=100.0).contains(&calibration_px);
         in_range(calibrated, "calibration-px", calibration_px, "a number from 0 to 100 (px)")?;
         let band = epipolar_px > 0.0 && epipolar_px <= 1000.0;
