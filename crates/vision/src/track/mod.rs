@@ -16,7 +16,7 @@ use crate::{
 /// Follows places from one image to another, from coarse to fine, and back.
 ///
 /// On each level of a pyramid, the coarsest first, the window around the place is aligned to the other
-/// image as in [`Refine`](crate::Refine), by translation; each level begins where the one before ended. A place is
+/// image as in [`Direct`](crate::Direct), by translation; each level begins where the one before ended. A place is
 /// followed if the finest level is aligned and the way back ends where the way there began.
 ///
 /// Source: Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000; Kalal, Mikolajczyk and
