@@ -247,6 +247,20 @@ fn exchanged_images_are_refused() {
     assert!(said.contains("changed places"), "{said}");
 }
 
+/// Seen to fail when the two images are not compared: a pair without depth was only a pair that could not be followed.
+#[test]
+fn one_image_twice_is_left_out_or_refused() {
+    let passage = Passage::new();
+    passage.put("r3.pgm", view(STEP * 3.0));
+    let all = passage.json(&[]);
+    let why: Vec<&str> = all["left_out"].as_array().unwrap().iter().map(|one| one["why"].as_str().unwrap()).collect();
+    assert!(why.len() == 1 && why[0].contains("left and right images that are the same"), "{why:?}");
+    assert_eq!(Passage::ways(&all).len(), PAIRS - 1);
+    (0..PAIRS).for_each(|pair| passage.put(&format!("r{pair}.pgm"), view(STEP * pair as f64)));
+    let said = passage.refusal(&[], 3);
+    assert!(said.contains("left and right images that are the same") && said.contains("l0.pgm"), "{said}");
+}
+
 #[test]
 fn a_sound_way_is_not_doubted() {
     let all = Passage::new().json(&[]);

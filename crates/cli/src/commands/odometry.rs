@@ -11,10 +11,10 @@ use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
 use seafix_experiment::{
     changed,
-    dataset::{Dataset, swapped_at_first, tum},
+    dataset::{Dataset, DatasetFrame, are_twins, swapped_at_first, tum, twins_fault},
 };
 use seafix_navigation::{Journey, Lost, ODOMETRIES, Odometry, Outcome, Segment, StereoPair};
-use seafix_vision::Threads;
+use seafix_vision::{Image, Threads};
 use serde_json::{Value, json};
 
 use crate::{
@@ -104,7 +104,7 @@ impl Odometer {
         let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
         let mut said = HashSet::new();
         for frame in &dataset.frames {
-            match dataset.pair(frame) {
+            match two_eyes(dataset, frame) {
                 Err(fault) => {
                     let warning = format!("warning: {fault}");
                     if !said.contains(&warning) {
@@ -133,6 +133,12 @@ impl Odometer {
         }
         Ok(Trip { journey: reckoning.journey(), given, unread, odometry_ms })
     }
+}
+
+/// The two images of a frame, which one image twice is not.
+fn two_eyes(dataset: &Dataset, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
+    let (left, right) = dataset.pair(frame)?;
+    if are_twins(&left, &right) { Err(twins_fault(&frame.left, &frame.right)) } else { Ok((left, right)) }
 }
 
 impl Trip {
