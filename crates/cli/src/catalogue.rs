@@ -77,12 +77,35 @@ mod tests {
         readme_says("<!-- components: `seafix list --markdown` -->\n", "<!-- end of components -->", &components);
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/virtual-direct");
         let summary = fs::read_to_string(folder.join("summary.txt")).unwrap();
-        let results = summary.split("\n\n").next().unwrap();
+        let results = summary.split("\n\n").next().unwrap().trim_end();
         readme_says(
             "<!-- reports/virtual-direct/summary.txt -->\n",
             "<!-- end of summary -->",
             &format!("```\n{results}\n```\n"),
         );
+        let found = fs::read_to_string(folder.join("../README.md")).unwrap();
+        readme_says("<!-- reports/README.md -->\n", "<!-- end of reports -->", &gallery(&found));
+    }
+
+    /// The questions and main figures of the page of all reports, two beside each other.
+    fn gallery(found: &str) -> String {
+        let cell = |section: &str| {
+            let (name, text) = section.split_once('\n').unwrap();
+            let question = text.lines().find_map(|line| line.strip_prefix('*')?.strip_suffix('*')).unwrap();
+            let figure =
+                text.lines().find_map(|line| Some(line.strip_prefix("[![")?.split_once("](")?.1.split_once(')')?.0));
+            let link = format!("reports/{name}/report.html");
+            let image = figure.map_or_else(String::new, |figure| {
+                format!("<a href=\"{link}\"><img src=\"reports/{figure}\" width=\"400\" alt=\"The main figure of {name}\"></a><br>")
+            });
+            format!(
+                "<td width=\"50%\" valign=\"top\">{image}<a href=\"{link}\">{}</a></td>",
+                question.replace('\\', "")
+            )
+        };
+        let cells: Vec<String> = found.split("\n## ").skip(1).map(cell).collect();
+        let rows: String = cells.chunks(2).map(|pair| format!("<tr>{}</tr>\n", pair.concat())).collect();
+        format!("<table>\n{rows}</table>\n")
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod commands;
 mod executor;
 mod exit;
 mod ply;
+mod publication;
 mod signals;
 mod terminal;
 mod whole;

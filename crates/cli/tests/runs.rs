@@ -78,3 +78,72 @@ fn a_log_that_was_cut_off_is_saved() {
     let (code, _, error) = seafix(folder, &["recover", "e.toml"]);
     assert!(code == 3 && error.contains("not an MCAP file"), "{error}");
 }
+
+/// All files below a folder.
+fn files(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            found.extend(files(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
+        } else {
+            found.insert(name, fs::read(path).unwrap());
+        }
+    }
+    found
+}
+
+/// Reports that a repository keeps are made again to the last byte, from the logs or from nothing; what was changed in
+/// them, and a sentence of the page that sums them up, is noticed. Seen to fail with durations in the logs.
+#[test]
+fn a_list_of_experiments_is_published_again_to_the_last_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for name in ["a", "b", "gone"] {
+        fs::write(
+            folder.join(format!("{name}.toml")),
+            EXPERIMENT.replace("seed = 3", &format!("seed = {}", name.len())),
+        )
+        .unwrap();
+    }
+    let entry = |name: &str, set: &str| format!("[[report]]\nexperiment = '{name}.toml'\n{set}\n");
+    let list =
+        |entries: &str| fs::write(folder.join("list.toml"), format!("format = 'seafix-reports/1'\n{entries}")).unwrap();
+    let publish = |more: &[&str]| seafix(folder, &[&["publish", "list.toml"], more].concat());
+
+    list(&(entry("a", "set = ['source.frames=3']") + &entry("gone", "")));
+    let (code, out, error) = publish(&[]);
+    assert!(code == 0 && out.contains("reports/README.md"), "{out}{error}");
+    list(&(entry("a", "set = ['source.frames=3']") + &entry("b", "")));
+    assert_eq!(publish(&[]).0, 0);
+    let first = files(&folder.join("reports"));
+    assert!(
+        first.contains_key("b/main.svg") && !first.keys().any(|name| name.starts_with("gone/")),
+        "{:?}",
+        first.keys()
+    );
+    let text = |name: &str| String::from_utf8(first[name].clone()).unwrap();
+    assert!(text("a/report.html").contains("Not the experiment as its file says"));
+    assert!(!text("b/report.html").contains("Not the experiment as its file says"));
+    assert!(text("README.md").contains("[![The main figure of b](b/main.svg)](b/report.html)"));
+    assert!(first.values().map(Vec::len).sum::<usize>() < 1_000_000);
+
+    fs::remove_dir_all(folder.join("reports")).unwrap();
+    assert_eq!(publish(&["--logged"]).0, 0);
+    assert!(files(&folder.join("reports")) == first, "from the logs");
+    assert_eq!(publish(&["--runs", "other", "--out", "again", "--threads", "2"]).0, 0);
+    assert!(files(&folder.join("again")) == first, "from nothing");
+
+    assert_eq!(publish(&["--verify"]).0, 0);
+    for file in ["reports/README.md", "reports/b/summary.txt"] {
+        fs::write(folder.join(file), "found: all").unwrap();
+        let (code, out, _) = publish(&["--verify"]);
+        assert!(code == 1 && out.contains("is not what the logs make"), "{file}: {out}");
+        assert_eq!(publish(&["--logged"]).0, 0);
+    }
+    let (code, _, error) = publish(&["--only", "c"]);
+    assert!(code == 2 && error.contains("`c` is not in list.toml; there are a, b"), "{error}");
+    let (code, out, _) = seafix(folder, &["check", "list.toml"]);
+    assert!(code == 0 && out.contains("in order"), "{out}");
+}

@@ -5,7 +5,7 @@ use std::time::Instant;
 use seafix_geometry::StereoRig;
 use seafix_referencing::{Glimpse, JointFixes, Member, Observations, Outcome, Target, TargetKind, joint_fixes};
 
-use crate::{Sighting, Stages, pipeline::milliseconds};
+use crate::{Sighting, Stages, stages::milliseconds};
 
 impl Stages {
     /// How many frames before its own a frame's answer looks back on.

@@ -177,8 +177,9 @@ impl Manifest {
 pub(crate) const NAME: &str = "manifest.json";
 
 impl Git {
-    /// The checkout this program was built in, as it is now; nothing for a program that was carried
-    /// elsewhere.
+    /// The last commit that changed this program, in the checkout it was built in, as that is now, and whether there are
+    /// changes since; nothing for a program that was carried elsewhere. What else a commit changes, reports for instance,
+    /// leaves runs the same.
     pub(crate) fn here() -> Self {
         static HERE: OnceLock<Git> = OnceLock::new();
         HERE.get_or_init(Self::find).clone()
@@ -195,8 +196,9 @@ impl Git {
             output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
         };
         Self {
-            commit: git(&["rev-parse", "HEAD"]),
-            dirty: git(&["status", "--porcelain"]).map(|changes| !changes.is_empty()),
+            commit: git(&["log", "-1", "--format=%H", "--", ":/crates", ":/Cargo.toml", ":/Cargo.lock"]),
+            dirty: git(&["status", "--porcelain", "--", ":/crates", ":/Cargo.toml", ":/Cargo.lock"])
+                .map(|changes| !changes.is_empty()),
         }
     }
 }

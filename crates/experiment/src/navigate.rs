@@ -16,9 +16,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     PipelineError, Sighting, Stages,
-    pipeline::{build, milliseconds, resolve},
+    pipeline::{build, resolve},
     record::rows6,
     source::{Eyes, Sight},
+    stages::milliseconds,
 };
 
 /// The settings of the way from fix to fix.

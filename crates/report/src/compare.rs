@@ -59,8 +59,8 @@ pub fn compare(folders: &[PathBuf], force: bool, out: Option<&Path>) -> Result<C
     let summary = Summary::of(&run);
     let comparisons = paired::comparisons(&run, &summary);
     let page = out.map(|folder| {
-        let document = content::document(&run, &summary)?;
-        write(folder, "compare.html", print::html(&document).as_bytes())
+        let document = content::document(&run, &summary, false)?;
+        write(folder, "compare.html", print::html(&document, true).as_bytes())
     });
     Ok(Compared {
         table: format!("{summary}\n\n{}", lines(&comparisons)),

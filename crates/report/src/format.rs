@@ -8,7 +8,10 @@ pub(crate) fn short(key: &str) -> &str {
 /// The unit of an axis that has a known one.
 pub(crate) fn unit(key: &str) -> Option<&'static str> {
     match short(key) {
-        "distance" | "baseline" => Some("m"),
+        "distance" | "baseline" | "altitude" | "shift" => Some("m"),
+        "attenuation" => Some("1/m"),
+        "speed" => Some("m/s"),
+        "seconds" => Some("s"),
         "sigma-px" | "sigma_px" | "pixel-sigma" => Some("px"),
         _ => None,
     }

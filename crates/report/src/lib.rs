@@ -15,6 +15,7 @@ mod error;
 mod field;
 mod figure;
 mod format;
+mod index;
 mod number;
 mod paired;
 mod paper;
@@ -29,10 +30,11 @@ mod write;
 
 pub use compare::{Compared, compare};
 pub use error::ReportError;
+pub use index::{index, index_holds};
 pub use paper::PAPER_M1;
 pub use summary::{Limits, Row, Spread, StageTimes, Summary};
 pub use verify::{Mismatch, Verified, verify};
-pub use write::{Forms, Report, index, report};
+pub use write::{Forms, Report, report};
 
 use std::path::Path;
 

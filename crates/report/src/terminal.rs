@@ -12,11 +12,14 @@ impl fmt::Display for Summary {
             .map(|row| row.conditions().map(|axis| format::headed(&axis.key)).collect())
             .unwrap_or_default();
 
+        // Runs without durations say nothing of them.
+        let timed = self.rows.iter().any(|row| row.times.total_ms.is_some());
         let mut results = Table::new(
             ["method"]
                 .into_iter()
                 .chain(conditions.iter().map(String::as_str))
-                .chain(["frames", "n", "found", "refused", "wrong", "m1 mm", "m2 mm", "m3 mm", "m3 deg", "ms"]),
+                .chain(["frames", "n", "found", "refused", "wrong", "m1 mm", "m2 mm", "m3 mm", "m3 deg"])
+                .chain(timed.then_some("ms")),
         );
         let column = |value: fn(&Row) -> Option<Spread>, scale: f64| {
             let medians: Vec<Option<f64>> =
@@ -38,12 +41,16 @@ impl fmt::Display for Summary {
             let counts = [frames, row.attempted.to_string(), row.found.to_string(), row.refused.to_string(), wrong];
             let errors = columns.iter().map(|column| column[index].clone());
             let total = format::number(row.times.total_ms, 1);
-            results.row(leading(row).chain(counts).chain(errors).chain([total]));
+            results.row(leading(row).chain(counts).chain(errors).chain(timed.then_some(total)));
         }
         let paper = format!("{:.0}–{:.0}", PAPER_M1[0] * 1e3, PAPER_M1[1] * 1e3);
         let blank = |n| std::iter::repeat_n(String::new(), n);
         results.row(
-            ["the paper".to_owned()].into_iter().chain(blank(conditions.len() + 5)).chain([paper]).chain(blank(4)),
+            ["the paper".to_owned()]
+                .into_iter()
+                .chain(blank(conditions.len() + 5))
+                .chain([paper])
+                .chain(blank(3 + usize::from(timed))),
         );
         results.write(f)?;
         writeln!(
@@ -60,6 +67,9 @@ impl fmt::Display for Summary {
             )?;
         }
 
+        if !timed {
+            return Ok(());
+        }
         let stages = self.rows.first().map(|row| row.times.stages().map(|(stage, _)| stage));
         let mut times = Table::new(
             ["method"].into_iter().chain(conditions.iter().map(String::as_str)).chain(stages.into_iter().flatten()),

@@ -5,7 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{ReportError, Summary, content, document::Document, print, run::Run};
+use crate::{
+    ReportError, Summary, content,
+    document::{Document, Figure},
+    print,
+    run::Run,
+};
 
 /// Which forms of the paper are written; figures and tables always are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,11 +21,15 @@ pub struct Forms {
     pub latex: bool,
     /// `report.pdf`.
     pub pdf: bool,
+    /// What a repository keeps: a page with few and small pictures, the main figure, short tables as CSV.
+    pub small: bool,
 }
 
 impl Forms {
     /// All forms.
-    pub const ALL: Self = Self { html: true, latex: true, pdf: true };
+    pub const ALL: Self = Self { html: true, latex: true, pdf: true, small: false };
+    /// What a repository keeps.
+    pub const SMALL: Self = Self { html: true, latex: false, pdf: false, small: true };
 }
 
 /// A report that was written.
@@ -33,6 +42,12 @@ pub struct Report {
     /// The results in it, as a table for the terminal.
     pub summary: Summary,
 }
+
+/// So many trials are few.
+const FEW: usize = 8;
+
+/// Longer tables a small report leaves out: `seafix report` makes them of the logs.
+const KEPT_LINES: usize = 200;
 
 /// One file: its name in the folder of the report, and its bytes.
 pub(crate) type File = (String, Vec<u8>);
@@ -60,17 +75,22 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
 
 /// Everything that a report consists of.
 pub(crate) fn files(run: &Run, summary: &Summary, forms: Forms) -> Result<Vec<File>, ReportError> {
-    let document = content::document(run, summary)?;
+    let document = content::document(run, summary, forms.small)?;
     let mut files: Vec<File> = Vec::new();
     let mut add = |name: String, bytes: Vec<u8>| files.push((name, bytes));
     if forms.html {
-        add("report.html".to_owned(), print::html(&document).into_bytes());
+        add("report.html".to_owned(), print::html(&document, !forms.small).into_bytes());
     }
     if forms.latex {
         add("report.tex".to_owned(), print::latex(&document).into_bytes());
     }
     if forms.pdf {
         add("report.pdf".to_owned(), print::pdf(&document));
+    }
+    if forms.small {
+        kept(&document, &mut add);
+        add("summary.txt".to_owned(), summary.to_string().into_bytes());
+        return Ok(files);
     }
     figures(&document, &mut add);
     for picture in document.pictures() {
@@ -84,6 +104,28 @@ pub(crate) fn files(run: &Run, summary: &Summary, forms: Forms) -> Result<Vec<Fi
     Ok(files)
 }
 
+/// Of a small report: the main figure, the picture of a fix, and the tables that people read.
+fn kept(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
+    if let Some(figure) = main_figure(document) {
+        add("main.svg".to_owned(), print::standalone(&figure.drawing).into_bytes());
+    }
+    if let Some(fix) = document.pictures().find(|picture| picture.id == "fix") {
+        add("fix.jpg".to_owned(), fix.jpeg.clone());
+    }
+    for table in document.tables().filter(|table| table.lines.len() <= KEPT_LINES) {
+        add(format!("tables/{}.csv", table.id), print::csv(table).into_bytes());
+    }
+}
+
+/// The figure that shows the answer.
+fn main_figure(document: &Document) -> Option<&Figure> {
+    // Few trials side by side say at once how many fixes there were; of many their errors are the picture.
+    let few = document.figures().any(|figure| figure.id == "rates" && figure.data.lines.len() <= 2 * FEW);
+    let order = ["error-over-noise", "sawtooth"].into_iter().chain(few.then_some("rates"));
+    let mut order = order.chain(["error-over-condition", "success", "rates", "recall"]);
+    order.find_map(|id| document.figures().find(|figure| figure.id == id))
+}
+
 fn figures(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
     for figure in document.figures() {
         add(format!("figures/{}.svg", figure.id), print::standalone(&figure.drawing).into_bytes());
@@ -93,39 +135,6 @@ fn figures(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
         add(format!("tables/{}.csv", table.id), print::csv(table).into_bytes());
         add(format!("tables/{}.json", table.id), print::json(table).into_bytes());
     }
-}
-
-/// Writes `README.md` into `folder`: what the runs found, each with its question, its main figure and its numbers.
-///
-/// # Errors
-/// [`ReportError`] when a log cannot be read, or the file cannot be written.
-pub fn index(runs: &[PathBuf], folder: &Path) -> Result<PathBuf, ReportError> {
-    let mut text = String::from(
-        "# What we found\n\nEach sentence is made from logs by `seafix report`; the reports beside it say how each number came about, \
-         and `seafix report --verify` computes them again. `reports/regenerate` runs the experiments and makes this folder.\n",
-    );
-    for path in runs {
-        let run = Run::read(path)?;
-        let summary = Summary::of(&run);
-        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        let escaped = print::escape_markdown(&name);
-        text += &format!("\n## {escaped}\n\n*{}*\n\n", print::escape_markdown(&run.header().question));
-        let main = [
-            "fix.jpg",
-            "figures/error-over-noise.svg",
-            "figures/forest.svg",
-            "figures/error-over-condition.svg",
-            "figures/recall.svg",
-        ];
-        if let Some(figure) = main.iter().find(|figure| folder.join(&name).join(figure).exists()) {
-            text += &format!("[![The main figure of {escaped}]({name}/{figure})]({name}/report.html)\n\n");
-        }
-        for finding in content::findings(&run, &summary) {
-            text += &format!("- {}\n", print::markdown(&finding));
-        }
-        text += &format!("\n[Report]({name}/report.html), [PDF]({name}/report.pdf), [tables]({name}/tables)\n");
-    }
-    write(folder, "README.md", text.as_bytes())
 }
 
 /// Removes what an earlier report left in `folder` and this one does not write.

@@ -12,6 +12,7 @@ use seafix_referencing::{Site, TargetKind, problem_file};
 
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, INPUT},
+    publication,
     terminal::print,
 };
 
@@ -101,6 +102,7 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
                 Some(format) if format.starts_with("seafix-dataset/") => {
                     dataset::check(path.parent().unwrap_or(Path::new(".")), limits)
                 }
+                Some(format) if format.starts_with("seafix-reports/") => faults(publication::read(path).map(|_| ())),
                 _ => faults(Plan::read(path, &[]).map(|_| ())),
             },
         },

@@ -19,6 +19,7 @@ mod list;
 mod merge;
 mod model;
 mod odometry;
+mod publish;
 mod recover;
 mod replay;
 mod report;
@@ -80,6 +81,8 @@ pub(crate) enum Command {
     Replay(replay::Replayed),
     /// Make the reports of runs again, from their logs alone, or verify them.
     Report(report::Report),
+    /// Run the experiments of a list and keep their reports: what a repository says it found.
+    Publish(publish::Publish),
     /// Make a dive: stereo pairs with truth, visibility and rough poses, as a data set.
     Dive(dive::Dive),
     /// Write the frames of an experiment's source as a data set.
@@ -107,6 +110,7 @@ impl Command {
             Self::Recover(command) => command.execute(),
             Self::Replay(command) => command.execute(),
             Self::Report(command) => command.execute(),
+            Self::Publish(command) => command.execute(),
             Self::Dive(command) => command.execute(),
             Self::Export(command) => command.execute(),
         }

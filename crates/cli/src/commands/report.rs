@@ -43,7 +43,7 @@ impl Report {
         }
         let forms = match (self.html, self.latex, self.pdf) {
             (false, false, false) => Forms::ALL,
-            (html, latex, pdf) => Forms { html, latex, pdf },
+            (html, latex, pdf) => Forms { html, latex, pdf, small: false },
         };
         for (run, folder) in self.runs.iter().zip(&folders) {
             let written = report(run, folder, forms).map_err(failure)?;
@@ -90,7 +90,7 @@ impl Report {
 }
 
 /// What a verification found, for people.
-fn said(verified: &Verified, folder: &str) -> String {
+pub(crate) fn said(verified: &Verified, folder: &str) -> String {
     let mut text = String::new();
     for wrong in &verified.mismatches {
         text += &format!("{}: printed {}, logged {}: {}\n", wrong.file, wrong.printed, wrong.logged, wrong.key);

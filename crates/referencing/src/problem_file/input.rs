@@ -159,16 +159,20 @@ impl CoherenceProblem {
     /// # Errors
     /// There are too many to list.
     pub fn candidates(&self) -> Result<Candidates, Unidentified> {
+        self.candidates_from(self.prior.as_ref())
+    }
+
+    fn candidates_from(&self, prior: Option<&Prior>) -> Result<Candidates, Unidentified> {
         let (n, m) = (self.model.len(), self.cloud.len());
         match &self.putative {
             Some(pairs) => Ok(Candidates::from_pairs(n, pairs.iter().copied())),
-            None if n.saturating_mul(m) > MOST_CANDIDATES && self.prior.is_none() => Err(Unidentified::TooLarge {
+            None if n.saturating_mul(m) > MOST_CANDIDATES && prior.is_none() => Err(Unidentified::TooLarge {
                 size: n.saturating_mul(m),
                 what: "candidate pairs",
                 most: MOST_CANDIDATES,
                 bound: n.min(m),
             }),
-            None => Ok(candidates(&self.model, &self.cloud, self.prior.as_ref(), &Gate::default(), None)),
+            None => Ok(candidates(&self.model, &self.cloud, prior, &Gate::default(), None)),
         }
     }
 
@@ -180,22 +184,9 @@ impl CoherenceProblem {
         acceptance: &Acceptance,
         rng: &mut dyn Rng,
     ) -> Attempt {
-        let candidates = match self.candidates() {
-            Ok(candidates) => candidates,
-            Err(refused) => return Attempt::without(refused),
-        };
-        let problem = Problem {
-            model: &self.model,
-            cloud: &self.cloud,
-            candidates: &candidates,
-            tolerance: Tolerance::Fixed(self.delta),
-            prior: self.prior.as_ref(),
-        };
-        reference(&problem, search, solver, acceptance, None, rng)
+        self.attempt_from(self.prior.as_ref(), (search, solver, acceptance), rng)
     }
-}
 
-impl CoherenceProblem {
     /// The same, and where nothing is found in the shells, in larger ones, then without: the object may have been
     /// displaced.
     pub fn attempt_widened(
@@ -205,10 +196,29 @@ impl CoherenceProblem {
         acceptance: &Acceptance,
         rng: &mut dyn Rng,
     ) -> Attempt {
-        let first = self.attempt(search, solver, acceptance, rng);
-        until_found(first, self.prior.as_ref(), |prior| {
-            Self { prior: prior.cloned(), ..self.clone() }.attempt(search, solver, acceptance, rng)
-        })
+        let method = (search, solver, acceptance);
+        let first = self.attempt_from(self.prior.as_ref(), method, rng);
+        until_found(first, self.prior.as_ref(), |prior| self.attempt_from(prior, method, rng))
+    }
+
+    fn attempt_from(
+        &self,
+        prior: Option<&Prior>,
+        (search, solver, acceptance): (&dyn Search, &dyn Solver, &Acceptance),
+        rng: &mut dyn Rng,
+    ) -> Attempt {
+        let candidates = match self.candidates_from(prior) {
+            Ok(candidates) => candidates,
+            Err(refused) => return Attempt::without(refused),
+        };
+        let problem = Problem {
+            model: &self.model,
+            cloud: &self.cloud,
+            candidates: &candidates,
+            tolerance: Tolerance::Fixed(self.delta),
+            prior,
+        };
+        reference(&problem, search, solver, acceptance, None, rng)
     }
 }
 

@@ -1,18 +1,16 @@
 //! The abstract: the question's answer in numbers.
 
-use super::{
-    distinct,
-    tell::{self, Unit},
-};
+use super::{answer, tell};
 use crate::{
-    Field, Number, PAPER_M1, Row, Spread, Summary,
-    document::{Text, text},
-    format::{decimals, number},
+    Number, PAPER_M1, Row, Summary,
+    document::{Text, bold, code, text},
+    format::number,
+    paired::Comparison,
     paper,
     run::{Run, Trial},
 };
 
-pub(super) fn section(run: &Run, summary: &Summary) -> Vec<Text> {
+pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Vec<Text> {
     let trials: Vec<&Trial> = run.trials.iter().collect();
     let total = |count: fn(&Row) -> usize| summary.rows.iter().map(count).sum::<usize>();
     let pooled =
@@ -46,13 +44,12 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Vec<Text> {
     if total(|row| row.unjudged) > 0 {
         first.extend(text!["No truth judges ", pooled("unjudged", total(|row| row.unjudged)), " of the fixes found."]);
     }
-    let methods = distinct(summary.rows.iter().map(Row::method));
-    let mut texts = vec![first];
-    for method in methods.iter().take(4) {
-        let own = |index: &usize| summary.rows[*index].method() == *method;
-        let rows: Vec<usize> = (0..summary.rows.len()).filter(own).collect();
-        texts.extend(sentence(run, summary, method, &rows));
+    let mut texts: Vec<Text> = changed(run).into_iter().chain([first]).collect();
+    texts.extend(answer::sentences(run, summary, comparisons));
+    if !summary.rows.iter().any(|row| row.solver == "triad") {
+        return texts;
     }
+    // Its own solver is there to be compared.
     let [low, high] = PAPER_M1.map(|m| number(Some(m * 1e3), 0));
     texts.push(text![format!(
         "The paper reports m1 of {low}–{high} mm in its virtual scene at 2–5 m, and neither rates nor the error of the vehicle’s pose ({}).",
@@ -61,40 +58,17 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Vec<Text> {
     texts
 }
 
-/// The medians of one method over its trials: the least and the greatest.
-fn sentence(run: &Run, summary: &Summary, method: &str, rows: &[usize]) -> Option<Text> {
-    let trials: Vec<&Trial> = rows.iter().map(|&index| &run.trials[index]).collect();
-    let range = |field: Field, value: fn(&Row) -> Option<Spread>, (unit, suffix): (Unit, &str)| -> Option<Text> {
-        let medians = rows.iter().filter_map(|&index| value(&summary.rows[index]));
-        let medians: Vec<f64> = medians.map(|spread| spread.median * unit.scale()).collect();
-        let digits = decimals(medians.iter().copied());
-        let [low, high] = medians.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &m| [a.min(m), b.max(m)]);
-        let end = |which: &str, value: f64| {
-            let what = format!(
-                "{which} median {} of found in {}",
-                field.name(),
-                if unit == Unit::Degrees { "deg" } else { "mm" }
-            );
-            Number::new(Some(value), digits, tell::over(&trials, field.topic(), what))
-        };
-        let (first, last) = (end("least", low), end("greatest", high));
-        (!medians.is_empty())
-            .then(|| if first.text == last.text { text![first, suffix] } else { text![first, " to ", last, suffix] })
-    };
-    let metric = (Unit::Millimetres, " mm");
-    let mut said = text![format!("With {method} the medians of the fixes found are m1 ")];
-    said.extend(range(Field::M1, |row| row.m1, metric)?);
-    if let Some(m2) = range(Field::M2, |row| row.m2, metric) {
-        said.push(", m2 ".into());
-        said.extend(m2);
-    }
-    let position = range(Field::Position, |row| row.m3_position, metric);
-    let attitude = range(Field::Attitude, |row| row.m3_attitude, (Unit::Degrees, "°"));
-    if let (Some(position), Some(attitude)) = (position, attitude) {
-        said.push(", camera position ".into());
-        said.extend(position);
-        said.push(" and attitude ".into());
-        said.extend(attitude);
+/// That the run departs from its experiment file, and in what.
+fn changed(run: &Run) -> Option<Text> {
+    let mut settings =
+        run.header().command.split(" --set '").skip(1).filter_map(|rest| rest.split_once('\'')).peekable();
+    settings.peek()?;
+    let mut said = text![bold("Not the experiment as its file says: "), "it was run with "];
+    for (index, (setting, _)) in settings.enumerate() {
+        if index > 0 {
+            said.push(", ".into());
+        }
+        said.push(code(setting));
     }
     said.push(".".into());
     Some(said)

@@ -13,7 +13,7 @@ use crate::{
 
 use super::tell;
 
-pub(super) fn section(run: &Run, summary: &Summary) -> Section {
+pub(super) fn section(run: &Run, summary: &Summary, small: bool) -> Section {
     let of = |say: fn(&TrialHeader) -> String| distinct(run.trials.iter().map(|trial| say(&trial.header))).join("; ");
     let mut table = Table::new(
         "data",
@@ -57,7 +57,15 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Section {
         })],
     );
     line("Seeds", text![of(|header| pairs(header.seeds.iter().map(|(name, seed)| (name, seed.to_string()))))]);
-    line("Versions", text![of(|header| pairs(header.versions.iter().map(|(name, version)| (name, version.clone()))))]);
+    // The commit stands in the manifest: a page that is kept beside the program would differ with every one.
+    let version = |of: fn(&str) -> bool| {
+        distinct(run.trials.iter().map(|trial| {
+            let versions = trial.header.versions.iter().filter(|(name, _)| of(name));
+            pairs(versions.map(|(name, version)| (name, version.clone())))
+        }))
+        .join("; ")
+    };
+    line("Versions", text![if small { version(|name| name != "commit") } else { version(|_| true) }]);
     Section::new("Data").with([Block::Table(table), Block::Table(hashes(run))])
 }
 

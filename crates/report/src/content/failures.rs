@@ -15,6 +15,8 @@ use crate::{
 const LISTED: usize = 10;
 /// Of them refusals at most, so that large errors are seen as well.
 const REFUSALS: usize = 5;
+/// Of so many a small report shows pictures.
+const SHOWN: usize = 2;
 /// Of more frames than this, wanted pictures are looked for in none: reading all images again takes too long.
 const SEARCHED: usize = 200_000;
 
@@ -22,7 +24,7 @@ const SEARCHED: usize = 200_000;
 type Case<'a> = (usize, &'a Frame, &'a Attempt);
 
 /// The picture of the best frame for the head of the report, and the section of the worst.
-pub(super) fn section(run: &Run) -> Result<(Option<Block>, Section), ReportError> {
+pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section), ReportError> {
     let worst = worst(run);
     let best = best(run);
     let mut wanted: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
@@ -38,7 +40,7 @@ pub(super) fn section(run: &Run) -> Result<(Option<Block>, Section), ReportError
             );
         }
     }
-    let first = best.and_then(|best| pictures.get(&best).map(|marked| best_picture(run, best.0, marked)));
+    let first = best.and_then(|best| pictures.get(&best).map(|marked| best_picture(run, best.0, marked, small)));
     let mut section = Section::new("Failures");
     if worst.is_empty() {
         section.say(text!["There is no attempt."]);
@@ -52,7 +54,9 @@ pub(super) fn section(run: &Run) -> Result<(Option<Block>, Section), ReportError
         let hash = source.bytes().fold(7_u64, |hash, byte| hash.wrapping_mul(131).wrapping_add(u64::from(byte)));
         let Some(marked) = pictures.get(&(*index, frame.stamp_ns)).filter(|_| !shown.contains(&hash)) else { continue };
         shown.push(hash);
-        section.add(failure(run, place + 1, (*index, frame, row), marked));
+        if !small || shown.len() <= SHOWN {
+            section.add(failure(run, place + 1, (*index, frame, row), marked, small));
+        }
     }
     Ok((first, section))
 }
@@ -177,7 +181,7 @@ fn marks(trial: &Trial, marked: &Marked) -> Text {
     ]
 }
 
-fn best_picture(run: &Run, index: usize, marked: &Marked) -> Block {
+fn best_picture(run: &Run, index: usize, marked: &Marked, small: bool) -> Block {
     let trial = &run.trials[index];
     let mut caption = text!["Left and right image of one fix: "];
     caption.extend(marks(trial, marked));
@@ -192,16 +196,22 @@ fn best_picture(run: &Run, index: usize, marked: &Marked) -> Block {
         code(trial.file()),
         format!(", stamp {} ns{}{axes}.", marked.stamp_ns, if axes.is_empty() { "" } else { "; " }),
     ]);
+    let (scale, quality) = if small { (to_width(marked, 960.0), 75) } else { (1.0, 88) };
     Block::Picture(Picture {
         id: "fix".to_owned(),
         caption,
         alternative: "Left and right image with key points, candidates and identified points".to_owned(),
-        jpeg: marked.jpeg(1.0, 88),
-        size: marked.size(1.0),
+        jpeg: marked.jpeg(scale, quality),
+        size: marked.size(scale),
     })
 }
 
-fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Marked) -> Block {
+/// The scale at which a picture is at most so wide.
+fn to_width(marked: &Marked, width: f64) -> f64 {
+    (width / f64::from(marked.size(1.0)[0])).min(1.0)
+}
+
+fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Marked, small: bool) -> Block {
     let trial = &run.trials[index];
     let mut caption = text![format!("Line {place} of the table, marks as in Figure 1: ")];
     let judged = if row.wrong() {
@@ -221,12 +231,12 @@ fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Mark
         code(trial.file()),
         format!(", stamp {} ns.", frame.stamp_ns)
     ]);
-    let scale = (960.0 / f64::from(marked.size(1.0)[0])).min(1.0);
+    let (scale, quality) = if small { (to_width(marked, 720.0), 68) } else { (to_width(marked, 960.0), 78) };
     Block::Picture(Picture {
         id: format!("worst-{place}"),
         caption,
         alternative: format!("Left and right image of the attempt in line {place} of the table of the worst"),
-        jpeg: marked.jpeg(scale, 78),
+        jpeg: marked.jpeg(scale, quality),
         size: marked.size(scale),
     })
 }

@@ -2,6 +2,7 @@
 
 mod ablation;
 mod abstract_;
+mod answer;
 mod data;
 mod failures;
 mod figures;
@@ -23,22 +24,23 @@ use crate::{
     run::Run,
 };
 
-/// The report on a run.
-pub(crate) fn document(run: &Run, summary: &Summary) -> Result<Document, ReportError> {
+/// The report on a run; a `small` one has few and small pictures, and nothing that a later version would say otherwise of
+/// the same results.
+pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Document, ReportError> {
     let header = run.header();
     let title = if header.title.is_empty() { &header.run } else { &header.title };
     let comparisons = paired::comparisons(run, summary);
-    let (picture, failures) = failures::section(run)?;
+    let (picture, failures) = failures::section(run, small)?;
     let mut method = method::section(run);
     method.blocks.splice(0..0, picture);
     Ok(Document {
         title: sentence_case(title),
         run: header.run.clone(),
         question: header.question.clone(),
-        summary: abstract_::section(run, summary),
+        summary: abstract_::section(run, summary, &comparisons),
         sections: [
             Some(method),
-            Some(data::section(run, summary)),
+            Some(data::section(run, summary, small)),
             Some(protocol::section(run, &comparisons)),
             Some(results::section(run, summary, &comparisons)),
             navigation::section(run, summary),
@@ -58,7 +60,7 @@ pub(crate) fn document(run: &Run, summary: &Summary) -> Result<Document, ReportE
 
 /// The answer in numbers alone.
 pub(crate) fn findings(run: &Run, summary: &Summary) -> Vec<crate::document::Text> {
-    abstract_::section(run, summary)
+    abstract_::section(run, summary, &paired::comparisons(run, summary))
 }
 
 /// The distinct texts in the order of their first appearance.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     Key, Number, Summary,
-    document::{Block, Head, Section, Table, text},
+    document::{Block, Head, Section, Table, Text, text},
     run::{Run, Trial},
     sailed::{Counted, Sailed},
 };
@@ -48,6 +48,35 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
     }
     let figure = super::figures::sawtooth(run).map(Block::Figure);
     Some(Section::new("Navigation").with([Block::Table(table)]).with(figure))
+}
+
+/// A sentence a trial that navigates; `name` says what the trial at a place is called.
+pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
+    let sails = |trial: &Trial| trial.sample().any(|frame| frame.sailed.is_some());
+    let trials = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial));
+    let sentence = |(index, trial): (usize, &Trial)| {
+        let metres = |name: &str, quantity| statistic(trial, name, quantity, Unit::Millimetres);
+        text![
+            format!("{}: the camera’s position errs by ", name(index)),
+            metres("rms", Sailed::Position),
+            " mm (RMS) over the ",
+            count(trial, Counted::Navigated),
+            " frames with a pose of ",
+            count(trial, Counted::Sailed),
+            ", by less than ",
+            metres("q95", Sailed::Position),
+            " mm in 95 % of them and at most by ",
+            metres("greatest", Sailed::Position),
+            " mm, with fixes at ",
+            count(trial, Counted::Referenced),
+            " of ",
+            count(trial, Counted::Tried),
+            " frames where one was due; the first fix, carried on by odometry alone, ends ",
+            metres("last", Sailed::AlonePosition),
+            " mm off."
+        ]
+    };
+    trials.map(sentence).collect()
 }
 
 fn count(trial: &Trial, counted: Counted) -> Number {

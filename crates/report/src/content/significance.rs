@@ -2,7 +2,7 @@
 
 use crate::{
     Key, Number,
-    document::{Block, Cell, Figure, Head, Section, Span, Table, text},
+    document::{Block, Cell, Figure, Head, Section, Span, Table, Text, text},
     figure::{Axis, Chart, Layer, Panel},
     format::decimals,
     paired::Comparison,
@@ -28,6 +28,41 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
     section.add(Block::Table(table(run, comparisons)));
     section.blocks.extend(forest(run, comparisons).map(Block::Figure));
     Some(section)
+}
+
+/// The surest differences in words, at most so many; that there is none, where some were tested.
+pub(super) fn sentences(run: &Run, comparisons: &[Comparison], most: usize) -> Vec<Text> {
+    let finite = |c: &&Comparison| c.difference.is_finite() && c.interval.0.is_finite() && c.interval.1.is_finite();
+    let mut sure: Vec<&Comparison> = comparisons.iter().filter(|c| c.better().is_some()).filter(finite).collect();
+    sure.sort_by(|a, b| a.holm.total_cmp(&b.holm));
+    if sure.is_empty() && !comparisons.is_empty() {
+        return vec![text!["On the same attempts no difference of m2 is both finite and significant."]];
+    }
+    sure.into_iter().take(most).map(|comparison| sentence(run, comparisons, comparison)).collect()
+}
+
+fn sentence(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> Text {
+    let over = comparison.over_conditions;
+    let real = |value: f64| if over { value.exp() } else { value * 1e3 };
+    let told =
+        |what: &str, value: f64| Number::new(Some(real(value)), if over { 3 } else { 2 }, key(run, comparison, what));
+    let [first, second] = &comparison.names;
+    let begin = match comparison.condition.as_str() {
+        "" => "On the same attempts".to_owned(),
+        condition => format!("At {condition}, on the same attempts"),
+    };
+    let what = if over { "the median ratio of m2" } else { "the median difference of m2" };
+    text![
+        format!("{begin}, {what} of {first} and {second} is "),
+        told("difference", comparison.difference),
+        if over { " [" } else { " mm [" },
+        told("difference-low", comparison.interval.0),
+        ", ",
+        told("difference-high", comparison.interval.1),
+        "], p = ",
+        holm(run, comparisons, comparison),
+        "."
+    ]
 }
 
 /// The key of something about a comparison.

@@ -54,6 +54,8 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
     if seeds.len() == 1 && !recorded {
         items.push(text!["External: one seed. Another one draws other views and noise; the intervals say how far the results may move."]);
     }
-    items.push(text!["Times are wall clock of one machine that may have done other work."]);
+    if summary.rows.iter().any(|row| row.times.total_ms.is_some()) {
+        items.push(text!["Times are wall clock of one machine that may have done other work."]);
+    }
     Section::new("Threats to validity").with([Block::Items(items)])
 }

@@ -28,6 +28,13 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Section {
         .into_iter()
         .filter(|stage| stages.contains(stage))
         .collect();
+    if shown.is_empty() {
+        let mut section = Section::new("Run time");
+        section.say(text![
+            "No durations were logged, so that the run has the same bytes wherever and whenever it is made."
+        ]);
+        return section;
+    }
     let mut heads = results::heads(summary);
     heads.extend(shown.iter().map(|stage| Head::numbers(*stage)));
     heads.push(Head::numbers("total, p95"));

@@ -54,12 +54,23 @@ impl Chart {
         if !any {
             return None;
         }
-        let width = if self.page { PAGE } else { COLUMN };
-        let columns = self.columns.clamp(1, self.panels.len().max(1));
+        let mut drawing = self.on(if self.page { PAGE } else { COLUMN }, self.columns);
+        drawing.narrow = self.page.then(|| Box::new(self.on(COLUMN, 1)));
+        Some(drawing)
+    }
+
+    /// Draws it on a sheet of this width, with so many panels side by side.
+    fn on(&self, width: f64, columns: usize) -> Drawing {
+        let columns = columns.clamp(1, self.panels.len().max(1));
         let cell = width / columns as f64;
         let shape = if self.shape > 0.0 { self.shape } else { 0.72 };
         let titled = self.panels.iter().any(|panel| !panel.title.is_empty());
-        let height = cell * shape + if titled { FONT * 1.7 } else { 0.0 };
+        let mut height = cell * shape + if titled { FONT * 1.7 } else { 0.0 };
+        if self.page && width < PAGE {
+            // As tall as wide drawings are, and two lines for every name beside an axis.
+            let lines = self.panels.iter().map(|panel| panel.y.names.len()).max().unwrap_or(0);
+            height = height.max(cell * 0.6).max(lines as f64 * FONT * 2.7 + FONT * 4.0);
+        }
         let mut drawing = Drawing::default();
         for (index, panel) in self.panels.iter().enumerate() {
             let (column, row) = (index % columns, index / columns);
@@ -67,7 +78,7 @@ impl Chart {
         }
         let below = self.panels.len().div_ceil(columns) as f64 * height;
         drawing.size = [width, self.legend(&mut drawing, width, below)];
-        Some(drawing)
+        drawing
     }
 
     /// The entries in as many columns as fit; gives where the drawing ends.
@@ -117,10 +128,13 @@ impl Panel {
         // Names on the vertical axis need the room of the longest.
         let probe = Scale::new(self.y.clone(), y_ends, [0.0, height]);
         let label = probe.ticks().iter().map(|&tick| width_of(&probe.label(tick), FONT)).fold(0.0, f64::max);
-        let left = x + label + 7.0 + if self.y.label.is_empty() { 2.0 } else { FONT * 1.6 };
+        // Where that would take most of the width, they stand above their places.
+        let room = height / self.y.names.len().max(1) as f64 > 2.2 * FONT;
+        let above = !self.y.names.is_empty() && label > 0.4 * width && room;
+        let left = x + if above { 0.0 } else { label } + 7.0 + if self.y.label.is_empty() { 2.0 } else { FONT * 1.6 };
         let right = x + width - 7.0;
-        // Long names on the horizontal axis are stacked in two levels.
-        let levels = if self.crowded(x_ends, right - left) { 2.0 } else { 1.0 };
+        // Long names on the horizontal axis are stacked in levels.
+        let levels = self.levels(x_ends, right - left);
         let bottom = y + height - 6.0 - FONT * (levels + 0.4) - if self.x.label.is_empty() { 0.0 } else { FONT * 1.4 };
         if self.equal {
             equalise(&mut x_ends, &mut y_ends, (right - left) / (bottom - top));
@@ -134,7 +148,12 @@ impl Panel {
         for tick in scale_y.ticks() {
             let at = scale_y.at(tick);
             drawing.line([[left, at], [right, at]], Stroke::thin(Ink::Grid));
-            drawing.words([left - 4.0, at + 2.6], Anchor::End, Ink::Text, scale_y.label(tick));
+            let (place, anchor) = if above {
+                ([left + 2.0, at - 0.9 * FONT], Anchor::Start)
+            } else {
+                ([left - 4.0, at + 2.6], Anchor::End)
+            };
+            drawing.words(place, anchor, Ink::Text, scale_y.label(tick));
         }
         for (index, tick) in scale_x.ticks().into_iter().enumerate() {
             let at = scale_x.at(tick);
@@ -152,12 +171,15 @@ impl Panel {
         drawing.words([left, y + FONT * 1.1], Anchor::Start, Ink::Text, self.title.clone());
     }
 
-    /// Whether the labels of the horizontal axis would touch.
-    fn crowded(&self, ends: [f64; 2], width: f64) -> bool {
+    /// In how many levels the labels of the horizontal axis must stand so that none touches another.
+    fn levels(&self, ends: [f64; 2], width: f64) -> f64 {
+        const MOST: usize = 6;
         let scale = Scale::new(self.x.clone(), ends, [0.0, width]);
         let ticks = scale.ticks();
         let half = |tick: f64| width_of(&scale.label(tick), FONT) / 2.0;
-        ticks.windows(2).any(|pair| scale.at(pair[1]) - scale.at(pair[0]) < half(pair[0]) + half(pair[1]) + 3.0)
+        let apart = |a: f64, b: f64| scale.at(b) - scale.at(a) >= half(a) + half(b) + 3.0;
+        let free = |levels: usize| ticks.iter().zip(ticks.iter().skip(levels)).all(|(&a, &b)| apart(a, b));
+        (1..MOST).find(|&levels| free(levels)).unwrap_or(MOST) as f64
     }
 }
 

@@ -5,6 +5,8 @@
 pub(crate) struct Drawing {
     pub(crate) size: [f64; 2],
     pub(crate) shapes: Vec<Shape>,
+    /// The same for a sheet half as wide, where this one is as wide as a page: panels below each other.
+    pub(crate) narrow: Option<Box<Drawing>>,
 }
 
 /// One thing drawn.

@@ -9,8 +9,8 @@ use crate::{
     document::{Block, Cell, Document, Figure, Picture, Span, Table},
 };
 
-/// The whole page. Every name out of the logs is escaped by the macro that writes it, or by [`svg::escape`].
-pub(crate) fn html(document: &Document) -> String {
+/// The whole page, with the face of its figures in it, or by faces of the same widths. Every name out of the logs is escaped by the macro that writes it, or by [`svg::escape`].
+pub(crate) fn html(document: &Document, face: bool) -> String {
     let page = markup! {
         (DOCTYPE)
         html lang="en" {
@@ -22,7 +22,7 @@ pub(crate) fn html(document: &Document) -> String {
                 // Without an icon of its own a browser asks the server for one.
                 link rel="icon" href="data:,";
                 title { (plain(&document.title)) }
-                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(font())) (PreEscaped(svg::style())) }
+                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(font(face))) (PreEscaped(svg::style())) }
             }
             body {
                 header {
@@ -46,8 +46,11 @@ pub(crate) fn html(document: &Document) -> String {
     page.into_string()
 }
 
-/// The face of the figures, so that their words are as wide everywhere as they were measured.
-fn font() -> String {
+/// The face of the figures, so that their words are as wide everywhere as they were measured; or the names of its likes.
+fn font(embedded: bool) -> String {
+    if !embedded {
+        return "svg{font-family:\"Liberation Sans\",Arimo,Helvetica,Arial,sans-serif}".to_owned();
+    }
     let face = STANDARD.encode(Font::Sans.loaded().bytes);
     format!(
         "@font-face{{font-family:\"Seafix Sans\";src:url(data:font/ttf;base64,{face}) format(\"truetype\")}}svg{{font-family:\"Seafix Sans\",sans-serif}}"
@@ -105,7 +108,7 @@ fn plain(text: &str) -> String {
 }
 
 fn table(table: &Table) -> Markup {
-    let wide = table.columns() > 7;
+    let wide = wide(table);
     markup! {
         figure.table.wide[wide] id=(table.id) {
             figcaption { (spans(&table.caption)) }
@@ -138,7 +141,14 @@ fn table(table: &Table) -> Markup {
     }
 }
 
+/// Whether a table takes more than the width of the text.
+fn wide(table: &Table) -> bool {
+    table.columns() > 7
+}
+
 fn cells(table: &Table, cells: &[Cell]) -> Markup {
+    // On a narrow sheet every line of a wide table stands by itself, each cell below the name of its column.
+    let names = if wide(table) { table.names() } else { Vec::new() };
     let mut next = 0;
     let mut place = |cell: &Cell| {
         next += cell.width();
@@ -148,7 +158,7 @@ fn cells(table: &Table, cells: &[Cell]) -> Markup {
     markup! {
         @for (place, cell) in placed {
             @let numbers = table.numbers(place) && cell.width() == 1;
-            td.n[numbers].minor[cell.minor].text[cell.prose].word[!numbers && !cell.prose] colspan=[(cell.width() > 1).then(|| cell.width())] {
+            td.n[numbers].minor[cell.minor].text[cell.prose].word[!numbers && !cell.prose] colspan=[(cell.width() > 1).then(|| cell.width())] data-of=[names.get(place)] {
                 (spans(&cell.text))
             }
         }
@@ -159,7 +169,8 @@ fn figure(figure: &Figure) -> Markup {
     let page = figure.drawing.size[0] > 300.0;
     markup! {
         figure.plot.page[page] id=(figure.id) {
-            div.scroll { (PreEscaped(svg::inline(&figure.drawing))) }
+            (PreEscaped(svg::inline(&figure.drawing, if figure.drawing.narrow.is_some() { "broad" } else { "" })))
+            @if let Some(narrow) = &figure.drawing.narrow { (PreEscaped(svg::inline(narrow, "narrow"))) }
             figcaption { (spans(&figure.caption)) }
         }
     }

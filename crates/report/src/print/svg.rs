@@ -19,8 +19,9 @@ pub(crate) fn standalone(drawing: &Drawing) -> String {
 }
 
 /// A part of a page.
-pub(super) fn inline(drawing: &Drawing) -> String {
-    svg(drawing, "role=\"img\"", Colours::Classes)
+pub(super) fn inline(drawing: &Drawing, class: &str) -> String {
+    let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
+    svg(drawing, &format!("role=\"img\"{class}"), Colours::Classes)
 }
 
 fn svg(drawing: &Drawing, attributes: &str, colours: Colours) -> String {

@@ -61,7 +61,7 @@ pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
     let run = Run::read(run_dir)?;
     let summary = Summary::of(&run);
     let exists = |name: &str| folder.join(name).exists();
-    let forms = Forms { html: true, latex: exists("report.tex"), pdf: exists("report.pdf") };
+    let forms = Forms { html: true, latex: exists("report.tex"), pdf: exists("report.pdf"), small: !exists("run.bib") };
     for (name, bytes) in files(&run, &summary, forms)? {
         let there = read(&name).unwrap_or_default();
         if name.ends_with(".json") {

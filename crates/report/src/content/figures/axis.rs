@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// The first condition with numbers that vary.
-pub(super) fn numeric(summary: &Summary) -> Option<String> {
+pub(in crate::content) fn numeric(summary: &Summary) -> Option<String> {
     keys(summary).into_iter().next()
 }
 

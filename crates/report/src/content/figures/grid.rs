@@ -2,57 +2,85 @@
 
 use super::{axis, caption, distinct};
 use crate::{
-    Summary,
+    Row, Summary,
     content::tell,
-    document::{Figure, Head, Table, text},
+    document::{Cell, Figure, Head, Table, text},
     figure::{Axis, Chart, Layer, Panel},
     format::headed,
     run::Run,
 };
 
-/// A heat map a method over the first two conditions with numbers, where every cell is one trial.
+/// A heat map a method over the first two conditions with numbers, or else over the only two axes, where every cell is
+/// one trial.
 pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
-    let keys = axis::keys(summary);
+    let numeric = axis::keys(summary);
+    let keys = if numeric.len() < 2 { varying(summary) } else { numeric };
     let [first, second] = keys.get(..2)? else { return None };
     let others = |index: usize| {
         let row = &summary.rows[index];
-        let others = row.conditions().filter(|axis| axis.key != *first && axis.key != *second);
-        others.fold(row.method(), |name, axis| format!("{name}, {}", axis.value))
+        let others = row.axes.iter().filter(|axis| axis.key != *first && axis.key != *second);
+        let others: Vec<&str> = others.map(|axis| axis.value.as_str()).collect();
+        if others.is_empty() { String::new() } else { others.join(", ") }
     };
     let names = distinct((0..summary.rows.len()).map(others));
-    let ticks = |key: &str| {
-        let mut values: Vec<f64> = summary.rows.iter().filter_map(|row| axis::on(row, key)).collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        values
-    };
-    let (columns, lines) = (ticks(first), ticks(second));
+    let (columns, lines) = (ticks(summary, first), ticks(summary, second));
     if names.len() > 9 || columns.len() * lines.len() * names.len() != summary.rows.len() {
         return None;
     }
-    let heads = vec![
-        Head::words("series"),
-        Head::numbers(headed(first)),
-        Head::numbers(headed(second)),
-        Head::numbers("found (%)"),
-    ];
+    let head = |key: &str| {
+        let numbers = summary.rows.iter().all(|row| axis::on(row, key).is_some());
+        Head { numbers, ..Head::words(headed(key)) }
+    };
+    let heads = vec![Head::words("series"), head(first), head(second), Head::numbers("found (%)")];
     let mut data = Table::new("success", text!["Every cell of the figure of success."], heads);
     let mut panels = Vec::new();
     for name in &names {
         let mut values = Vec::new();
         for (index, row) in summary.rows.iter().enumerate().filter(|(index, _)| others(*index) == *name) {
-            let at = |key: &str, ticks: &[f64]| ticks.iter().position(|tick| Some(*tick) == axis::on(row, key));
+            let at = |key: &str, ticks: &[String]| ticks.iter().position(|tick| *tick == value(row, key));
             let (x, y) = (at(first, &columns)? as f64, at(second, &lines)? as f64);
             let share = row.found as f64 / row.attempted.max(1) as f64;
             let number = tell::percent(&run.trials[index], "found", row.found, row.attempted);
             values.push(([x, y, share], format!("{:.0}", 100.0 * share)));
-            let place = |key: &str| tell::axis(&run.trials[index], key, axis::on(row, key)).into();
+            let place = |key: &str| match axis::on(row, key) {
+                Some(number) => Cell::from(tell::axis(&run.trials[index], key, Some(number))),
+                None => value(row, key).into(),
+            };
             data.line(false, vec![name.clone().into(), place(first), place(second), number.into()]);
         }
-        let labels = |ticks: &[f64]| ticks.iter().map(|tick| crate::format::trimmed(*tick)).collect();
-        let (x, y) = (Axis::named(headed(first), labels(&columns)), Axis::named(headed(second), labels(&lines)));
+        let (x, y) = (Axis::named(headed(first), columns.clone()), Axis::named(headed(second), lines.clone()));
         panels.push(Panel { title: name.clone(), x, y, layers: vec![Layer::Heat { values }], equal: false });
     }
-    let chart = Chart { columns: panels.len().min(3), page: panels.len() > 1, shape: 0.8, panels, legend: Vec::new() };
+    let page = panels.len() > 1 || columns.len() > 6;
+    let shape = (0.16 + 0.06 * lines.len() as f64).clamp(0.3, 0.8);
+    let chart = Chart {
+        columns: panels.len().min(3),
+        page,
+        shape: if panels.len() > 1 { 0.8 } else { shape * if page { 1.0 } else { 1.6 } },
+        panels,
+        legend: Vec::new(),
+    };
     super::figure("success", caption("Share of the attempts found, in %, over two conditions.", run), &chart, data)
+}
+
+/// The axes along which trials differ, where these are two.
+fn varying(summary: &Summary) -> Vec<String> {
+    let axes = summary.rows.first().map(|row| row.axes.clone()).unwrap_or_default();
+    let differs = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
+    let keys: Vec<String> = axes.into_iter().map(|axis| axis.key).filter(differs).collect();
+    if keys.len() == 2 { keys } else { Vec::new() }
+}
+
+fn value(row: &Row, key: &str) -> String {
+    row.axes.iter().find(|axis| axis.key == key).map_or_else(String::new, |axis| axis.value.clone())
+}
+
+/// The values of an axis: numbers by size, words as they come.
+fn ticks(summary: &Summary, key: &str) -> Vec<String> {
+    let mut values = distinct(summary.rows.iter().map(|row| value(row, key)));
+    if summary.rows.iter().all(|row| axis::on(row, key).is_some()) {
+        let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);
+        values.sort_by(|a, b| number(a).total_cmp(&number(b)));
+    }
+    values
 }

@@ -4,6 +4,7 @@ mod axis;
 mod consistency;
 mod frames;
 mod grid;
+mod rates;
 mod recall;
 mod sawtooth;
 mod way;
@@ -17,6 +18,7 @@ use crate::{
 
 use super::{data::baseline, distinct};
 
+pub(super) use axis::numeric;
 pub(super) use consistency::search_cost;
 pub(super) use sawtooth::figure as sawtooth;
 
@@ -26,6 +28,7 @@ pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
         if super::limits::known(summary) { None } else { axis::errors(run, summary).or_else(|| frames::errors(run)) };
     [
         main,
+        rates::figure(run, summary),
         axis::boxes(run, summary),
         recall::figure(run),
         axis::precision_recall(run, summary),

@@ -1,0 +1,113 @@
+//! Which poses belong together, and how one way is laid on the other.
+
+use std::path::Path;
+
+use seafix_evaluation::trajectory::{Alignment, Pose, align, associate};
+use seafix_experiment::trajectory::{Trajectory, Way};
+
+use super::Eval;
+use crate::exit::{Failure, INPUT, USAGE};
+
+/// The poses that belong together.
+pub(super) struct Matched {
+    pub(super) reference: Vec<Pose>,
+    pub(super) estimate: Vec<Pose>,
+    pub(super) stamps: Option<Vec<u64>>,
+    /// How many poses the two files hold.
+    pub(super) of: (usize, usize),
+    /// The share of the reference's time between the first and the last matched pose.
+    pub(super) covered: f64,
+}
+
+impl Matched {
+    /// The share of the shorter trajectory that found its partner.
+    pub(super) fn share(&self) -> f64 {
+        self.reference.len() as f64 / self.of.0.min(self.of.1).max(1) as f64
+    }
+
+    /// How far apart two ways end that begin in one pose (m).
+    pub(super) fn end(&self) -> f64 {
+        let way = |poses: &[Pose]| poses[0].to(&poses[poses.len() - 1]).position;
+        (way(&self.reference) - way(&self.estimate)).norm()
+    }
+}
+
+fn is_log(file: &Path) -> bool {
+    file.extension().is_some_and(|ending| ending == "mcap")
+}
+
+fn read(file: &Path, way: Way) -> Result<Trajectory, Failure> {
+    let read = if is_log(file) { Trajectory::of_log(file, way) } else { Trajectory::read(file) };
+    read.map_err(|fault| Failure::new(INPUT, fault))
+}
+
+impl Eval {
+    pub(super) fn matched(&self) -> Result<Matched, Failure> {
+        let nanoseconds = |name: &str, seconds: f64| {
+            let ns = seconds * 1e9;
+            if !(ns.abs() < 9e18) {
+                return Err(Failure::new(USAGE, format!("{name} {seconds}: give seconds")));
+            }
+            Ok(ns.round() as i64)
+        };
+        let tolerance = u64::try_from(nanoseconds("--t-max-diff", self.t_max_diff)?).map_err(|_| {
+            Failure::new(USAGE, format!("--t-max-diff {}: give seconds, not negative", self.t_max_diff))
+        })?;
+        let offset = nanoseconds("--t-offset", self.t_offset)?;
+        if self.estimate.is_none() && !is_log(&self.reference) {
+            return Err(Failure::new(USAGE, "no trajectory to judge; give ESTIMATE, or a log for both"));
+        }
+        let (reference, estimate) = (read(&self.reference, Way::True)?, read(self.estimate(), self.way.into())?);
+        let of = (reference.poses.len(), estimate.poses.len());
+        let refuse = |what: String| {
+            let (a, b) = (self.reference.display(), self.estimate().display());
+            Err(Failure::new(INPUT, format!("{what} in {a} and {b}")))
+        };
+        let (belong, stamps) = match (&reference.stamps, &estimate.stamps) {
+            (Some(a), Some(b)) => {
+                let belong = associate(a, b, tolerance, offset);
+                let stamps = belong.iter().map(|&(_, j)| b[j]).collect();
+                (belong, Some(stamps))
+            }
+            (a, b) if of.0 == of.1 => ((0..of.0).map(|i| (i, i)).collect(), a.clone().or_else(|| b.clone())),
+            _ => {
+                return refuse(format!(
+                    "{} and {} poses, one of them without stamps; give as many poses, or stamps, to both,",
+                    of.0, of.1
+                ));
+            }
+        };
+        let covered = match (&reference.stamps, belong.first(), belong.last()) {
+            (Some(stamps), Some(first), Some(last)) if stamps.len() > 1 => {
+                let span = |from: usize, to: usize| (stamps[to] - stamps[from]) as f64;
+                span(first.0, last.0) / span(0, stamps.len() - 1)
+            }
+            _ => 1.0,
+        };
+        if belong.len() < 2 {
+            return refuse(format!(
+                "only {} of {} and {} poses belong together; check --t-offset and --t-max-diff,",
+                belong.len(),
+                of.0,
+                of.1
+            ));
+        }
+        let (reference, estimate) = belong.iter().map(|&(i, j)| (reference.poses[i], estimate.poses[j])).unzip();
+        Ok(Matched { reference, estimate, stamps, of, covered })
+    }
+
+    pub(super) fn alignment(&self, matched: &Matched) -> Result<Option<Alignment>, Failure> {
+        if self.align_origin {
+            return Ok(Some(Alignment::onto(&matched.reference[0], &matched.estimate[0])));
+        }
+        if !self.align && !self.scale {
+            return Ok(None);
+        }
+        let n = self.n_to_align.unwrap_or(usize::MAX).min(matched.reference.len());
+        let found = align(&matched.reference[..n], &matched.estimate[..n], self.scale).map_err(|why| {
+            let (a, b) = (self.reference.display(), self.estimate().display());
+            Failure::new(INPUT, format!("no alignment of {b} with {a}: {why}"))
+        })?;
+        Ok(Some(if self.align { found } else { Alignment { scale: found.scale, ..Alignment::IDENTITY } }))
+    }
+}

@@ -1,0 +1,210 @@
+//! `seafix eval`.
+
+mod matched;
+mod told;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum, builder::PossibleValue};
+use seafix_evaluation::trajectory::{Alignment, Delta, Leg, Relation, Summary, ape, drift, pairs, path_lengths, rpe};
+use seafix_experiment::trajectory::{Format, Trajectory, Way};
+
+use crate::{
+    exit::{DONE, Ended, Failure, USAGE},
+    terminal::{print, tell},
+    whole,
+};
+
+/// Below this share of matched poses the statistics come with a warning.
+const MOSTLY: f64 = 0.9;
+
+#[derive(Debug, Args)]
+pub(crate) struct Eval {
+    /// The trajectory to measure against: TUM, KITTI or EuRoC; or a log (.mcap), for its truth.
+    reference: PathBuf,
+    /// The trajectory to judge; left out, a way of the log.
+    estimate: Option<PathBuf>,
+    /// Which way of a log is judged.
+    #[arg(long, value_enum, default_value = "odometry")]
+    way: LoggedWay,
+    /// Lay the estimate on the reference first (Umeyama).
+    #[arg(short, long)]
+    align: bool,
+    /// Correct the scale of the estimate; alone, only the scale.
+    #[arg(short, long)]
+    scale: bool,
+    /// Lay the first matched pose of the estimate on the reference's.
+    #[arg(long, conflicts_with = "align")]
+    align_origin: bool,
+    /// Find the alignment from so many first poses.
+    #[arg(long, value_name = "N")]
+    n_to_align: Option<usize>,
+    /// What of a pose difference counts.
+    #[arg(short, long, default_value = "trans_part")]
+    relation: Name,
+    /// How far apart the poses of a relative error are.
+    #[arg(short, long, default_value_t = 1.0)]
+    delta: f64,
+    /// The unit of the delta: frames, metres, degrees or radians.
+    #[arg(short = 'u', long, default_value = "f")]
+    delta_unit: Unit,
+    /// By which share of the delta a pair of --all-pairs may miss it.
+    #[arg(long, default_value_t = 0.1)]
+    delta_tol: f64,
+    /// Take pairs from every pose on, not only one after the other.
+    #[arg(long)]
+    all_pairs: bool,
+    /// Choose the pairs along the reference instead of the estimate.
+    #[arg(long)]
+    pairs_from_reference: bool,
+    /// Poses further apart in time (s) do not belong together.
+    #[arg(long, default_value_t = 0.01)]
+    t_max_diff: f64,
+    /// Added to the estimate's stamps (s).
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    t_offset: f64,
+    /// The lengths (m) of the stretches over which drift is taken.
+    #[arg(long, value_delimiter = ',', default_value = "5,10,20,40")]
+    segments: Vec<f64>,
+    /// Write the matched, aligned estimate: `.tum`, `.kitti` or `.csv` (EuRoC).
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A relation by its name.
+#[derive(Debug, Clone, Copy)]
+struct Name(Relation);
+
+impl ValueEnum for Name {
+    fn value_variants<'a>() -> &'a [Self] {
+        const NAMES: [Name; 7] = {
+            let mut names = [Name(Relation::Full); 7];
+            let mut i = 0;
+            while i < 7 {
+                names[i] = Name(Relation::ALL[i]);
+                i += 1;
+            }
+            names
+        };
+        &NAMES
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.0.name()))
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum Unit {
+    /// Frames.
+    F,
+    /// Metres of path.
+    M,
+    /// Degrees.
+    D,
+    /// Radians.
+    R,
+}
+
+/// A way that a log holds.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum LoggedWay {
+    /// By odometry alone.
+    Odometry,
+    /// By the navigated pose and the survey.
+    Navigated,
+}
+
+impl From<LoggedWay> for Way {
+    fn from(way: LoggedWay) -> Self {
+        match way {
+            LoggedWay::Odometry => Self::Odometry,
+            LoggedWay::Navigated => Self::Navigated,
+        }
+    }
+}
+
+/// What the errors come to.
+struct Found {
+    ape: Option<Summary>,
+    rpe: Summary,
+    legs: Vec<Leg>,
+    path: f64,
+    /// The distance of the last poses (m), the first laid on each other.
+    end: f64,
+    alignment: Option<Alignment>,
+}
+
+impl Eval {
+    pub(crate) fn execute(&self) -> Ended {
+        let delta = self.delta()?;
+        let mut matched = self.matched()?;
+        let alignment = self.alignment(&matched)?;
+        if let Some(alignment) = &alignment {
+            matched.estimate.iter_mut().for_each(|pose| *pose = alignment.apply(pose));
+        }
+        let Name(relation) = self.relation;
+        let absolute = relation.is_absolute().then(|| ape(&matched.reference, &matched.estimate, relation));
+        let along = if self.pairs_from_reference { &matched.reference } else { &matched.estimate };
+        let pairs = pairs(along, delta, self.all_pairs, self.delta_tol);
+        let found = Found {
+            ape: absolute.map(|errors| Summary::of(&errors)),
+            rpe: Summary::of(&rpe(&matched.reference, &matched.estimate, &pairs, relation)),
+            legs: drift(&matched.reference, &matched.estimate, &self.segments),
+            path: path_lengths(&matched.reference).last().copied().unwrap_or(0.0),
+            end: matched.end(),
+            alignment,
+        };
+        if matched.covered < MOSTLY {
+            let (reference, estimate) = (self.reference.display(), self.estimate().display());
+            let covered = 100.0 * matched.covered;
+            tell(&format!(
+                "warning: {estimate} covers {covered:.1} % of the time of {reference}; errors speak for that part"
+            ));
+        }
+        if matched.share() < MOSTLY {
+            let (n, (a, b)) = (matched.reference.len(), matched.of);
+            tell(&format!(
+                "warning: only {n} poses matched, of {a} in {} and {b} in {}; check --t-offset and --t-max-diff",
+                self.reference.display(),
+                self.estimate().display()
+            ));
+        }
+        if let Some(file) = &self.out {
+            let way = Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone() };
+            whole::write(file, way.print(Format::of_name(file)))?;
+        }
+        print(&if self.json { self.machine(&matched, &found) } else { self.people(&matched, &found) })?;
+        Ok(DONE)
+    }
+
+    /// The file with what is judged.
+    fn estimate(&self) -> &Path {
+        self.estimate.as_ref().unwrap_or(&self.reference)
+    }
+
+    fn delta(&self) -> Result<Delta, Failure> {
+        let refuse = |what: &str| Err(Failure::new(USAGE, format!("--delta {}: {what}", self.delta)));
+        if !(self.delta > 0.0 && self.delta.is_finite()) {
+            return refuse("give a number above zero");
+        }
+        if !(self.delta_tol >= 0.0 && self.delta_tol.is_finite()) {
+            return Err(Failure::new(USAGE, format!("--delta-tol {}: give a share, zero or above", self.delta_tol)));
+        }
+        if let Some(wrong) = self.segments.iter().find(|&&length| !(length > 0.0 && length.is_finite())) {
+            return Err(Failure::new(USAGE, format!("--segments {wrong}: give lengths above zero, in metres")));
+        }
+        match self.delta_unit {
+            Unit::F if self.delta.fract() != 0.0 => refuse("frames are counted in whole numbers"),
+            Unit::F => Ok(Delta::Frames(self.delta as usize)),
+            Unit::M => Ok(Delta::Metres(self.delta)),
+            Unit::D if self.delta > 180.0 => refuse("an angle is at most 180 degrees"),
+            Unit::D => Ok(Delta::Radians(self.delta.to_radians())),
+            Unit::R if self.delta > std::f64::consts::PI => refuse("an angle is at most pi"),
+            Unit::R => Ok(Delta::Radians(self.delta)),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! `seafix publish`.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use seafix_experiment::{Existing, Options, run};
+use seafix_report::{Forms, index, index_holds, report, verify};
+
+use super::report::{failure, said};
+use crate::{
+    exit::{DONE, Ended, FINDINGS, Failure, OUTPUT, USAGE},
+    publication::{self, Published},
+    signals,
+    terminal::{Progress, print, tell},
+};
+
+/// Runs the experiments of a list and reports them into a folder that can be kept beside the program.
+#[derive(Debug, Args)]
+pub(crate) struct Publish {
+    /// The list of experiments (seafix-reports/1).
+    #[arg(default_value = "experiments/reports.toml")]
+    list: PathBuf,
+    /// Where the reports go, a folder each, and README.md, which says what they found.
+    #[arg(long, default_value = "reports")]
+    out: PathBuf,
+    /// Where the runs go, a folder each. Those that are there are gone on with.
+    #[arg(long, default_value = "runs/reports")]
+    runs: PathBuf,
+    /// Of the list only the experiments of these names; README.md is left as it is.
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+    /// Run nothing: report the runs that are there.
+    #[arg(long, conflicts_with_all = ["verify", "overwrite"])]
+    logged: bool,
+    /// Write nothing: compute every printed number again from the logs of the runs, and say what differs.
+    #[arg(long, conflicts_with = "overwrite")]
+    verify: bool,
+    /// Remove the runs that are there first.
+    #[arg(long)]
+    overwrite: bool,
+    /// How many threads work; the answers do not depend on it [default: all cores].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+impl Publish {
+    pub(crate) fn execute(&self) -> Ended {
+        let mut list = publication::read(&self.list).map_err(|faults| Failure::faults(USAGE, &faults))?;
+        if let Some(unknown) = self.only.iter().find(|name| !list.iter().any(|one| one.name == **name)) {
+            let names: Vec<&str> = list.iter().map(|one| one.name.as_str()).collect();
+            let what = format!("`{unknown}` is not in {}; there are {}", self.list.display(), names.join(", "));
+            return Err(Failure::new(USAGE, what));
+        }
+        list.retain(|one| self.only.is_empty() || self.only.contains(&one.name));
+        if self.verify {
+            return self.verify_all(&list);
+        }
+        for one in &list {
+            if !self.logged {
+                self.run(one)?;
+            }
+            let written =
+                report(&self.runs.join(&one.name), &self.out.join(&one.name), Forms::SMALL).map_err(failure)?;
+            tell(&format!("{}: {}", one.name, written.page.display()));
+        }
+        if self.only.is_empty() {
+            self.sweep(&list)?;
+            print(&format!("{}\n", index(&self.folders(&list), &self.out).map_err(failure)?.display()))?;
+        }
+        Ok(DONE)
+    }
+
+    /// Makes a run, or what is missing of it, without durations: the same bytes wherever it is made.
+    fn run(&self, one: &Published) -> Result<(), Failure> {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let options = Options {
+            existing: if self.overwrite { Existing::Overwrite } else { Existing::Resume },
+            threads: self.threads.map_or(cores, usize::from),
+            timed: false,
+            ..Options::into(self.runs.join(&one.name))
+        };
+        let progress = Progress::new();
+        signals::listen();
+        let finished = run(&one.plan, &options, &progress);
+        signals::end_at_once();
+        progress.end();
+        finished?;
+        Ok(())
+    }
+
+    fn folders(&self, list: &[Published]) -> Vec<PathBuf> {
+        list.iter().map(|one| self.runs.join(&one.name)).collect()
+    }
+
+    /// Removes reports of experiments that are no longer in the list.
+    fn sweep(&self, list: &[Published]) -> Result<(), Failure> {
+        let Ok(entries) = fs::read_dir(&self.out) else { return Ok(()) };
+        for path in entries.flatten().map(|entry| entry.path()) {
+            let known = list.iter().any(|one| path.file_name().is_some_and(|name| *name == *one.name));
+            if !known && is_report(&path) {
+                fs::remove_dir_all(&path)
+                    .map_err(|error| Failure::new(OUTPUT, format!("cannot remove {}: {error}", path.display())))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn verify_all(&self, list: &[Published]) -> Ended {
+        let mut holds = true;
+        for one in list {
+            let folder = self.out.join(&one.name);
+            let verified = verify(&self.runs.join(&one.name), &folder).map_err(failure)?;
+            print(&said(&verified, &folder.display().to_string()))?;
+            holds &= verified.holds();
+        }
+        if self.only.is_empty() && !index_holds(&self.folders(list), &self.out).map_err(failure)? {
+            print(&format!("{} is not what the logs make\n", self.out.join("README.md").display()))?;
+            holds = false;
+        }
+        Ok(if holds { DONE } else { FINDINGS })
+    }
+}
+
+/// Whether a folder is a report that this command wrote.
+fn is_report(folder: &Path) -> bool {
+    folder.join("report.html").exists() && folder.join("summary.txt").exists()
+}

@@ -1,0 +1,96 @@
+//! `seafix-reports/1`: which experiments are run and reported into a folder that is kept.
+
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
+
+use seafix_component::Fault;
+use seafix_experiment::{Plan, read_text};
+use serde::Deserialize;
+
+const FORMAT: &str = "seafix-reports/1";
+
+/// The file: its reports, in the order of the page that sums them up.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: String,
+    #[serde(default)]
+    report: Vec<Entry>,
+}
+
+/// One report.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    /// The experiment file, from the folder of this one.
+    experiment: String,
+    /// Settings that change it, `source.frames=60`; its page says so.
+    #[serde(default)]
+    set: Vec<String>,
+}
+
+/// One experiment that is to be run and reported.
+#[derive(Debug)]
+pub(crate) struct Published {
+    /// What its folders are called: the experiment's name.
+    pub(crate) name: String,
+    pub(crate) plan: Plan,
+}
+
+/// Reads the list and every experiment in it.
+///
+/// # Errors
+/// Everything that is wrong with the list and its experiments.
+pub(crate) fn read(path: &Path) -> Result<Vec<Published>, Vec<Fault>> {
+    let text = read_text(path).map_err(|fault| vec![fault])?;
+    let file: File = toml::from_str(&text).map_err(|error| vec![Fault::in_toml(path, &text, &error)])?;
+    let mut faults = Vec::new();
+    if file.format != FORMAT {
+        let fault = Fault::new("another format", path).value(format!("`{}`", file.format));
+        faults.push(fault.remedy(format!("this program reads {FORMAT}")));
+    }
+    if file.report.is_empty() {
+        faults.push(Fault::new("no report", path).remedy("add [[report]] with `experiment = \"FILE.toml\"`"));
+    }
+    let (mut published, mut names) = (Vec::new(), BTreeSet::new());
+    for entry in file.report {
+        let experiment: PathBuf = path.parent().unwrap_or(Path::new("")).join(&entry.experiment);
+        match Plan::read(&experiment, &entry.set) {
+            Ok(plan) if names.insert(plan.name.clone()) => published.push(Published { name: plan.name.clone(), plan }),
+            Ok(plan) => {
+                let fault = Fault::new("two reports of one name", path).value(format!("`{}`", plan.name));
+                faults.push(fault.remedy("rename one of the experiment files"));
+            }
+            Err(more) => faults.extend(more),
+        }
+    }
+    if faults.is_empty() { Ok(published) } else { Err(faults) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_faults_of_a_list_are_told_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        write("a.toml", "question = 'Why?'\nsource = 'virtual-points'\n");
+        let told = |text: &str| {
+            write("list.toml", text);
+            let faults = read(&folder.path().join("list.toml")).map(|all| all.len());
+            faults.map_err(|faults| faults.iter().map(|fault| fault.to_string() + "\n").collect::<String>())
+        };
+        let one = "[[report]]\nexperiment = 'a.toml'\n";
+        assert_eq!(told(&format!("format = 'seafix-reports/1'\n{one}")), Ok(1));
+        let told_of = |text: &str| told(text).unwrap_err();
+        assert!(told_of(&format!("format = 'seafix-reports/1'\n{one}{one}")).contains("two reports of one name"));
+        assert!(told_of(&format!("format = 'seafix-reports/2'\n{one}")).contains("another format"));
+        assert!(told_of("format = 'seafix-reports/1'\n").contains("no report"));
+        assert!(told_of("format = 'seafix-reports/1'\n[[report]]\nexperimnt = 'a.toml'\n").contains("list.toml:3"));
+        let both = told_of("format = 'seafix-reports/0'\n[[report]]\nexperiment = 'b.toml'\n");
+        assert!(both.contains("another format") && both.contains("b.toml"), "{both}");
+    }
+}

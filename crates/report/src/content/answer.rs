@@ -1,0 +1,304 @@
+//! The answer to the question of an experiment: what was found along its axes, one sentence a quantity or a series.
+
+use super::{
+    figures, navigation, significance,
+    tell::{self, Unit},
+};
+use crate::{
+    Field, Number, Row, Spread, Summary,
+    document::{Text, text},
+    format,
+    paired::Comparison,
+    run::{Run, Trial},
+};
+
+/// So many trials are told one by one.
+const TOLD: usize = 9;
+/// So many differences are told.
+const DIFFERENCES: usize = 3;
+
+/// The sentences.
+pub(super) fn sentences(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Vec<Text> {
+    let labels = Labels::of(summary);
+    let mut said = navigation::sentences(run, &|index| labels.of_trial(&summary.rows[index]));
+    if !said.is_empty() {
+        said.extend(wrong(run, summary, &labels));
+        return said;
+    }
+    said = match super::limits::known(summary) {
+        true => limits(run, summary),
+        false if summary.rows.len() == 1 => errors(run, summary),
+        false if labels.told_singly(summary) => one_by_one(run, summary, &labels),
+        false => by_series(run, summary, &labels),
+    };
+    said.extend(wrong(run, summary, &labels));
+    said.extend(significance::sentences(run, comparisons, DIFFERENCES));
+    said
+}
+
+/// What trials and series of them are called.
+struct Labels {
+    /// The condition with numbers, along which a series goes.
+    along: Option<String>,
+    /// The axes that tell series apart.
+    apart: Vec<String>,
+}
+
+impl Labels {
+    fn of(summary: &Summary) -> Self {
+        let along = figures::numeric(summary);
+        let axes = summary.rows.first().map(|row| row.axes.clone()).unwrap_or_default();
+        let varies = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
+        let apart = axes.into_iter().map(|axis| axis.key).filter(|key| Some(key) != along.as_ref() && varies(key));
+        let mut apart: Vec<String> = apart.collect();
+        // Methods on several kinds of problems: a series is a method.
+        if along.is_none() && apart.len() > 1 {
+            let method = |key: &String| matches!(format::short(key), "search" | "solver" | "method");
+            if apart.iter().any(method) {
+                apart.retain(method);
+            }
+        }
+        Self { along, apart }
+    }
+
+    /// What a series is called that `row` belongs to.
+    fn of_series(&self, row: &Row) -> String {
+        let values: Vec<String> = self.apart.iter().map(|key| value(row, key)).collect();
+        if values.is_empty() { row.method() } else { values.join(", ") }
+    }
+
+    /// What a trial is called among all.
+    fn of_trial(&self, row: &Row) -> String {
+        match (&self.along, self.apart.is_empty()) {
+            (Some(key), true) => self.place(row, key),
+            (Some(key), false) => format!("{}, {}", self.of_series(row), self.place(row, key)),
+            (None, _) => {
+                let values: Vec<String> = row.axes.iter().map(|axis| axis.value.clone()).collect();
+                if values.is_empty() { row.method() } else { values.join(", ") }
+            }
+        }
+    }
+
+    fn place(&self, row: &Row, key: &str) -> String {
+        match format::unit(key) {
+            Some(unit) => format!("{} {} {unit}", format::short(key), value(row, key)),
+            None => format!("{} {}", format::short(key), value(row, key)),
+        }
+    }
+
+    /// Whether each trial is worth a word: few, in one series or each a series of its own.
+    fn told_singly(&self, summary: &Summary) -> bool {
+        let series = self.series(summary).len();
+        summary.rows.len() <= TOLD && (series == 1 || series == summary.rows.len())
+    }
+
+    /// The rows of each series, in the order of the run.
+    fn series(&self, summary: &Summary) -> Vec<(String, Vec<usize>)> {
+        let mut series: Vec<(String, Vec<usize>)> = Vec::new();
+        for (index, row) in summary.rows.iter().enumerate() {
+            let name = self.of_series(row);
+            match series.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, members)) => members.push(index),
+                None => series.push((name, vec![index])),
+            }
+        }
+        series
+    }
+}
+
+fn value(row: &Row, key: &str) -> String {
+    row.axes.iter().find(|axis| axis.key == key).map_or_else(String::new, |axis| axis.value.clone())
+}
+
+/// A quantity whose medians are told.
+type Metric = (&'static str, Field, fn(&Row) -> Option<Spread>);
+
+const METRICS: [Metric; 2] = [
+    ("error of the model points (m2)", Field::M2, |row| row.m2),
+    ("error of the camera’s position (m3)", Field::Position, |row| row.m3_position),
+];
+
+/// One sentence a quantity, every trial in it: along the condition, or most first.
+fn one_by_one(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
+    let mut order: Vec<usize> = (0..summary.rows.len()).collect();
+    if labels.along.is_none() {
+        let share = |index: &usize| summary.rows[*index].found as f64 / summary.rows[*index].attempted.max(1) as f64;
+        order.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    }
+    let found = order.iter().map(|&index| {
+        let (row, trial) = (&summary.rows[index], &run.trials[index]);
+        let share = tell::percent(trial, "found", row.found, row.attempted);
+        let n = tell::count(trial, "attempted", row.attempted);
+        (share.value.is_some()).then(|| text![labels.of_trial(row), ": ", share, " % of ", n])
+    });
+    let mut said = vec![list("Found of the attempts", found)];
+    for (name, field, of) in METRICS {
+        let digits = tell::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
+        let medians = order.iter().map(|&index| {
+            let (row, spread) = (&summary.rows[index], of(&summary.rows[index])?);
+            let unit = (Unit::Millimetres, digits);
+            let median = tell::statistic(&run.trials[index], "median", field, "found", Some(spread.median), unit);
+            Some(text![labels.of_trial(row), ": ", median, " mm"])
+        });
+        said.push(list(&format!("Median {name}"), medians));
+    }
+    said.retain(|text| text.len() > 2);
+    said
+}
+
+/// `name — a: 1; b: 2.`
+fn list(name: &str, items: impl Iterator<Item = Option<Text>>) -> Text {
+    let mut said = text![format!("{name} — ")];
+    for (index, item) in items.flatten().enumerate() {
+        if index > 0 {
+            said.push("; ".into());
+        }
+        said.extend(item);
+    }
+    said.push(".".into());
+    said
+}
+
+/// One sentence a series: how many it found, and how its errors go.
+fn by_series(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
+    let series = labels.series(summary).into_iter();
+    series
+        .map(|(name, members)| {
+            let trials: Vec<&Trial> = members.iter().map(|&index| &run.trials[index]).collect();
+            let total = |of: fn(&Row) -> usize| members.iter().map(|&index| of(&summary.rows[index])).sum::<usize>();
+            let pooled = |group: &str, n: usize| {
+                Number::count(n, tell::over(&trials, "/metrics/evaluation", format!("count {group}")))
+            };
+            let (found, attempted) = (total(|row| row.found), total(|row| row.attempted));
+            let key = tell::over(&trials, "/metrics/evaluation", "percent found of attempted".to_owned());
+            let share = (attempted > 0).then(|| 100.0 * found as f64 / attempted as f64);
+            let mut said = text![
+                format!("{name}: "),
+                pooled("found", found),
+                " of ",
+                pooled("attempted", attempted),
+                " found (",
+                Number::new(share, 1, key),
+                " %), ",
+                pooled("wrong", total(|row| row.wrong)),
+                " wrong"
+            ];
+            for metric in METRICS {
+                said.extend(course(run, summary, labels, &members, metric));
+            }
+            said.push(".".into());
+            said
+        })
+        .collect()
+}
+
+/// `; the median error … goes from a mm at 2 to b mm at 5`, or between the least and the greatest.
+fn course(run: &Run, summary: &Summary, labels: &Labels, members: &[usize], (name, field, of): Metric) -> Text {
+    let known: Vec<(usize, f64)> =
+        members.iter().filter_map(|&index| Some((index, of(&summary.rows[index])?.median))).collect();
+    let digits = tell::decimals(known.iter().map(|(_, median)| Some(*median)), Unit::Millimetres);
+    let unit = (Unit::Millimetres, digits);
+    let told = |(index, median): (usize, f64)| {
+        tell::statistic(&run.trials[index], "median", field, "found", Some(median), unit)
+    };
+    let mut ends = match &labels.along {
+        Some(key) => {
+            let place = |index: usize| value(&summary.rows[index], key).parse::<f64>().unwrap_or(0.0);
+            let mut known = known;
+            known.sort_by(|a, b| place(a.0).total_cmp(&place(b.0)));
+            known
+        }
+        None => {
+            let mut known = known;
+            known.sort_by(|a, b| a.1.total_cmp(&b.1));
+            known
+        }
+    };
+    let (Some(last), Some(first)) = (ends.pop(), ends.first().copied()) else {
+        return ends.pop().map_or_else(Vec::new, |one| text![format!("; the median {name} is "), told(one), " mm"]);
+    };
+    match &labels.along {
+        Some(key) => {
+            let at = |index: usize| labels.place(&summary.rows[index], key);
+            text![
+                format!("; the median {name} goes from "),
+                told(first),
+                format!(" mm at {} to ", at(first.0)),
+                told(last),
+                format!(" mm at {}", at(last.0))
+            ]
+        }
+        None => {
+            text![format!("; the median {name} lies between "), told(first), " and ", told(last), " mm"]
+        }
+    }
+}
+
+/// Root mean squares beside their bounds, the closest and the farthest.
+fn limits(run: &Run, summary: &Summary) -> Vec<Text> {
+    let methods = super::distinct(summary.rows.iter().map(Row::method)).into_iter();
+    methods
+        .filter_map(|method| {
+            let own: Vec<usize> = (0..summary.rows.len())
+                .filter(|&index| summary.rows[index].method() == method && summary.rows[index].limits.is_some())
+                .collect();
+            let trials: Vec<&Trial> = own.iter().map(|&index| &run.trials[index]).collect();
+            let ratios = |which: fn(&crate::Limits) -> [f64; 2]| -> Vec<f64> {
+                let limits = own.iter().filter_map(|&index| summary.rows[index].limits);
+                limits.map(|limits| which(&limits)).map(|[rms, bound]| rms / bound).collect()
+            };
+            let ends = |field: Field, ratios: &[f64]| {
+                [("least", f64::min as fn(f64, f64) -> f64), ("greatest", f64::max)].map(|(which, pick)| {
+                    let what = format!("{which} ratio {} of judged", field.name());
+                    Number::new(ratios.iter().copied().reduce(pick), 3, tell::over(&trials, "/metrics/totals", what))
+                })
+            };
+            let [m2_low, m2_high] = ends(Field::M2, &ratios(|limits| limits.m2));
+            let [m3_low, m3_high] = ends(Field::Position, &ratios(|limits| limits.m3));
+            (!own.is_empty()).then(|| {
+                text![
+                    format!("{method}: the root mean square error of the model points is "),
+                    m2_low,
+                    " to ",
+                    m2_high,
+                    " times the Cramér–Rao bound, that of the camera’s position ",
+                    m3_low,
+                    " to ",
+                    m3_high,
+                    " times."
+                ]
+            })
+        })
+        .collect()
+}
+
+/// The medians of the only trial.
+fn errors(run: &Run, summary: &Summary) -> Vec<Text> {
+    let (trial, row) = (&run.trials[0], &summary.rows[0]);
+    let told = METRICS.into_iter().filter_map(|(name, field, of)| {
+        let median = of(row)?.median;
+        let unit = (Unit::Millimetres, tell::decimals([Some(median)].into_iter(), Unit::Millimetres));
+        Some(text![
+            format!("Median {name}: "),
+            tell::statistic(trial, "median", field, "found", Some(median), unit),
+            " mm."
+        ])
+    });
+    told.collect()
+}
+
+/// How many fixes were wrong, and where most of them were.
+fn wrong(run: &Run, summary: &Summary, labels: &Labels) -> Option<Text> {
+    let worst = (0..summary.rows.len()).rev().max_by_key(|&index| summary.rows[index].wrong)?;
+    let (row, trial) = (&summary.rows[worst], &run.trials[worst]);
+    if row.wrong == 0 || summary.rows.len() == 1 {
+        return None;
+    }
+    Some(text![
+        format!("Most wrong fixes were made with {}: ", labels.of_trial(row)),
+        tell::count(trial, "wrong", row.wrong),
+        " of ",
+        tell::count(trial, "attempted", row.attempted),
+        " attempts."
+    ])
+}

@@ -1,0 +1,54 @@
+//! How many attempts were found and how many fixes were wrong, a line a trial.
+
+use super::caption;
+use crate::{
+    Summary,
+    content::tell,
+    document::{Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    run::Run,
+};
+
+/// More lines are no picture.
+const MOST: usize = 36;
+
+/// The shares of the attempts with their exact 95 % intervals.
+pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
+    let n = summary.rows.len();
+    if !(2..=MOST).contains(&n) {
+        return None;
+    }
+    let heads =
+        [Head::words("trial"), Head::words("outcome"), Head::numbers("%"), Head::numbers("low"), Head::numbers("high")];
+    let mut data = Table::new("rates", text!["Every point of the figure of rates."], heads.to_vec());
+    let mut layers = Vec::new();
+    for (series, group) in ["found", "wrong"].into_iter().enumerate() {
+        let (mut spans, mut marks) = (Vec::new(), Vec::new());
+        for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+            let k = if series == 0 { row.found } else { row.wrong };
+            let share = tell::percent(trial, group, k, row.attempted);
+            let [low, high] = tell::interval(trial, group, k, row.attempted);
+            let at = (n - 1 - index) as f64 + if series == 0 { 0.14 } else { -0.14 };
+            if let (Some(share), Some(low), Some(high)) = (share.value, low.value, high.value) {
+                spans.push([at, low, high]);
+                marks.push([share, at]);
+            }
+            let name = Summary::name(run, trial);
+            data.line(false, vec![name.into(), group.into(), share.into(), low.into(), high.into()]);
+        }
+        layers.push(Layer::Spans { series, values: spans });
+        layers.push(Layer::Marks { series, points: marks, radius: 2.2 });
+    }
+    let names = run.trials.iter().rev().map(|trial| Summary::name(run, trial)).collect();
+    let panel = Panel {
+        x: Axis::linear("share of the attempts (%)").within([0.0, 100.0]),
+        y: Axis::named("", names),
+        layers,
+        ..Panel::default()
+    };
+    let shape = ((n as f64 * 15.0 + 34.0) / 482.0).clamp(0.16, 1.2);
+    let legend = vec![Entry::mark("found", 0), Entry::mark("wrong", 1)];
+    let chart = Chart { panels: vec![panel], columns: 1, page: true, shape, legend };
+    let said = "Share of the attempts that were found, and of those that gave a wrong fix, with exact 95 % intervals; what is missing to 100 % was refused.";
+    super::figure("rates", caption(said, run), &chart, data)
+}
