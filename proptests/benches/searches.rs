@@ -16,7 +16,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_component::Choice;
-use seafix_referencing::{Problem, SEARCHES, Tolerance};
+use seafix_proptests::problems::Listed;
+use seafix_referencing::SEARCHES;
 use seafix_simulation::families::{Drawn, Family, Presence};
 
 /// The problem of each family that stands for it: its number, seed 1.
@@ -28,15 +29,8 @@ const LONG: Duration = Duration::from_millis(500);
 
 fn searches(criterion: &mut Criterion) {
     for (family, number) in MEDIUM {
-        let given = Drawn::new(family, 1, number, Presence::Present).problem.problem();
-        let candidates = given.candidates().expect("they can be listed");
-        let problem = Problem {
-            model: &given.model,
-            cloud: &given.cloud,
-            candidates: &candidates,
-            tolerance: Tolerance::Fixed(given.delta),
-            prior: given.prior.as_ref(),
-        };
+        let listed = Listed::new(Drawn::new(family, 1, number, Presence::Present).problem.problem());
+        let problem = listed.problem();
         let mut group = criterion.benchmark_group(format!("search/{}", family.name()));
         for name in SEARCHES.names() {
             let search = SEARCHES.build(&Choice::named(name)).expect("the defaults are in range");

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::{prelude::*, sample::Index};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
-use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, Tolerance};
+use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, Tolerance, problem_file::CoherenceProblem};
 
 use crate::poses::{rotation, vector};
 
@@ -33,6 +33,38 @@ impl Planted {
             candidates: &self.candidates,
             tolerance: self.tolerance,
             prior: None,
+        }
+    }
+}
+
+/// A problem of a file with its candidates listed.
+#[derive(Debug, Clone)]
+pub struct Listed {
+    /// What the file says.
+    pub file: CoherenceProblem,
+    /// Its candidates.
+    pub candidates: Candidates,
+}
+
+impl Listed {
+    /// Lists the candidates.
+    ///
+    /// # Panics
+    /// If there are too many.
+    pub fn new(file: CoherenceProblem) -> Self {
+        let candidates = file.candidates().expect("few enough to list");
+        Self { file, candidates }
+    }
+
+    /// The problem as a search takes it.
+    pub fn problem(&self) -> Problem<'_> {
+        let Self { file, candidates } = self;
+        Problem {
+            model: &file.model,
+            cloud: &file.cloud,
+            candidates,
+            tolerance: Tolerance::Fixed(file.delta),
+            prior: file.prior.as_ref(),
         }
     }
 }

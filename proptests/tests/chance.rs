@@ -205,9 +205,19 @@ fn the_null_model_is_predicted() {
 fn every_bin_is_predicted() {
     for (clutter, name) in [(Clutter::Null, "null"), (Clutter::Family, "family")] {
         let mut all = Bins::default();
-        for (family, frames) in
-            [(Family::A, 30_000), (Family::B, 60), (Family::C, 12), (Family::D, 400), (Family::F, 200), (Family::G, 30)]
-        {
+        for (family, frames) in [
+            (Family::A, 30_000),
+            (Family::B, 60),
+            (Family::C, 12),
+            (Family::D, 400),
+            (Family::E, 24),
+            (Family::F, 200),
+            (Family::G, 30),
+        ] {
+            // Every set of a lattice cannot be listed.
+            if family == Family::E && clutter == Clutter::Family {
+                continue;
+            }
             let of_family = bins(family, (0..1_000_000).filter(small(family)).take(frames), clutter);
             of_family.show(&format!("{name} {}", family.name()));
             all.add(&of_family);

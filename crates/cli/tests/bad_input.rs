@@ -397,6 +397,30 @@ fn an_unknown_setting() {
     refused(&["run", &file], 2, &["e.toml:5", "did you mean `choose`?"]);
 }
 
+/// B32. A type error, a date for a number, a key that comes twice: refused with the line, and nothing is written.
+#[test]
+fn a_setting_of_another_type_or_twice() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("out");
+    for (text, parts) in [
+        (
+            "[pipeline.search]\nname = 'maximum-clique'\nbudget = 'many'\n",
+            ["e.toml:5", "`budget`", "\"many\", expected"],
+        ),
+        ("[pipeline.search]\nname = 'maximum-clique'\nbudget = 2020-01-01\n", ["e.toml:5", "`budget`", "expected u64"]),
+        ("[pipeline.search]\nname = 'maximum-clique'\norientation = 1\n", ["e.toml:5", "`orientation`", "a boolean"]),
+        ("[pipeline.search]\nname = 'icp'\nbudget = 5\nbudget = 6\n", ["e.toml:6", "duplicate key", "budget"]),
+        ("[pipeline]\ntolerance = { fixed = 'wide' }\n", ["e.toml:4", "'wide'", "expected f64"]),
+        ("[pipeline]\nsearch = 7\n", ["e.toml:4", "a name or a table", "7"]),
+        ("[pipeline]\nsearch = 'icp'\nsearch = 'gicp'\n", ["e.toml:5", "duplicate key", "search"]),
+        ("[pipeline]\nsearch = 'icp'\n[pipeline]\n", ["e.toml:5", "duplicate key", "pipeline"]),
+    ] {
+        let (_folder, file) = experiment(&format!("question = 'why'\nsource = 'virtual-points'\n{text}"));
+        refused(&["run", &file, "--out", out.to_str().unwrap()], 2, &parts);
+        assert!(!out.exists(), "{text}");
+    }
+}
+
 #[test]
 fn an_unknown_filter_among_filters() {
     let (_folder, file) = experiment(

@@ -103,6 +103,7 @@ pub fn candidates(
     gate: &Gate,
     in_view: Option<&[bool]>,
 ) -> Candidates {
+    let places = Places::of(if prior.is_some() { cloud } else { &[] });
     let seen = |index: usize| in_view.is_none_or(|mask| mask.get(index).copied().unwrap_or(false));
     let lists = model.iter().enumerate().map(|(index, point)| {
         if !seen(index) {
@@ -111,10 +112,29 @@ pub fn candidates(
         let Some(prior) = prior else {
             return (0..cloud.len()).collect();
         };
-        let shell = shell(point, prior, gate);
-        (0..cloud.len()).filter(|&j| shell.admits(&cloud[j])).collect()
+        match shell(point, prior, gate) {
+            PointShell::Box { centre, half } => places.within(&centre, half),
+            shell => (0..cloud.len()).filter(|&j| shell.admits(&cloud[j])).collect(),
+        }
     });
     Candidates { lists: lists.collect() }
+}
+
+/// Where the points of a cloud are, coordinate by coordinate: every model point looks at all of them.
+struct Places([Vec<f64>; 3]);
+
+impl Places {
+    fn of(cloud: &[MeasuredPoint]) -> Self {
+        Self([0, 1, 2].map(|axis| cloud.iter().map(|point| point.position.at.coords[axis]).collect()))
+    }
+
+    /// The points in a box about a place; its faces belong to it.
+    fn within(&self, centre: &Point<Camera>, half: f64) -> Vec<usize> {
+        let (c, [x, y, z]) = (&centre.coords, &self.0);
+        let across = x.iter().zip(y).zip(z).enumerate();
+        let inside = |x: f64, y: f64, z: f64| (x - c.x).abs().max((y - c.y).abs()).max((z - c.z).abs()) <= half;
+        across.filter(|&(_, ((&x, &y), &z))| inside(x, y, z)).map(|(j, _)| j).collect()
+    }
 }
 
 /// The region about one predicted place in which cloud points are candidates.

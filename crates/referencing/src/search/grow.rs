@@ -54,7 +54,7 @@ pub(super) fn admits(
         for (k, &b) in members[..i].iter().enumerate() {
             let plane = volumes.plane([a, b, next]);
             *tests += k as u64;
-            if members[..k].iter().any(|&c| volumes.refuses(sense, &plane, c)) {
+            if volumes.refuses_one(sense, &plane, &members[..k]) {
                 return false;
             }
         }

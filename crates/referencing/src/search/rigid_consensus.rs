@@ -27,8 +27,9 @@ use crate::Problem;
 /// fewer but closer points, or nearer to the prior, can outweigh one with more.
 ///
 /// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
-/// a box, in clumps), ρ_i is the density of the nearest points instead. And beside the object and clutter alone stand two
-/// more explanations: a pattern that the object repeats in part goes on, with the object in it or without.
+/// a box, in clumps), ρ_i is the density of the nearest points instead, and B(k) Π is summed over the subsets of the pairs:
+/// what fits in a crowd is as likely clutter. And beside the object and clutter alone stand two more explanations: a pattern
+/// that the object repeats in part goes on, with the object in it or without.
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
@@ -91,8 +92,7 @@ impl Search for RigidConsensus {
                 return;
             }
             for mode in &mut swept.modes {
-                mode.ln_crowd = crowd.cost(problem, &terms, &graph, mode);
-                mode.ln_evidence -= mode.ln_crowd;
+                crowd.weigh(problem, &terms, &graph, mode);
             }
             let by =
                 |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));

@@ -43,6 +43,22 @@ impl<'a> Volumes<'a> {
         Plane { three, normals: [0, 1].map(|side| (b[side] - a[side]).cross(&(c[side] - a[side]))) }
     }
 
+    /// Whether the plane's three and one of `others` contradict the sense.
+    pub(super) fn refuses_one(&self, sense: Sense, plane: &Plane, others: &[usize]) -> bool {
+        if sense == Sense::Any {
+            return false;
+        }
+        let (normals, a) = (&plane.normals, &self.at[plane.three[0]]);
+        let sign = if sense == Sense::Proper { 1.0 } else { -1.0 };
+        let clear = |&d: &usize| {
+            let d = &self.at[d];
+            sign * (normals[0].dot(&(d[0] - a[0])) * normals[1].dot(&(d[1] - a[1]))) > self.doubt
+        };
+        // Nearly always all are clear: nothing is decided before the last was looked at.
+        let unclear = others.iter().fold(false, |unclear, d| unclear | !clear(d));
+        unclear && others.iter().any(|&d| self.refuses(sense, plane, d))
+    }
+
     /// Whether the plane's three and `fourth` contradict the sense.
     pub(super) fn refuses(&self, sense: Sense, plane: &Plane, fourth: usize) -> bool {
         let (a, d) = (&self.at[plane.three[0]], &self.at[fourth]);

@@ -74,6 +74,46 @@ impl<'a> Bounds<'a> {
         self.of_set(own + more, gains + self.greatest * more as f64)
     }
 
+    /// Whether the bound of [`with_common`](Self::with_common), of three pairs or more, is `enough`: known before all of it is,
+    /// since it grows with every model point.
+    pub(in crate::search) fn is_enough(
+        &self,
+        (own, gains): (usize, f64),
+        common: &[u64],
+        count: usize,
+        from: usize,
+        enough: f64,
+    ) -> bool {
+        let starts = &self.graph.starts;
+        let most = count.min(starts.len() - 1 - from);
+        if own + most < self.least || self.reach(own, gains, most) < enough {
+            return false;
+        }
+        if self.single {
+            return true;
+        }
+        let (mut k, mut sum) = (own, gains);
+        if k >= self.least && self.of_set(k, sum) >= enough {
+            return true;
+        }
+        let mut last = u32::MAX;
+        let first = starts[from] / 64;
+        for (word, &bits) in common.iter().enumerate().skip(first) {
+            let mut rest = if word == first { bits & (!0 << (starts[from] % 64)) } else { bits };
+            while rest != 0 {
+                let rank = self.graph.rank[word * 64 + rest.trailing_zeros() as usize];
+                rest &= rest - 1;
+                if rank != last {
+                    (k, sum, last) = (k + 1, sum + self.top[rank as usize], rank);
+                    if k >= self.least && self.of_set(k, sum) >= enough {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
     /// The bound of `own` pairs that bring `gains` and of the model points among the `count` pairs of `common`
     /// from rank `from` on; where even a rough bound is below `enough`, the rough one.
     pub(in crate::search) fn with_common(

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     graph::Graph,
     likelihood::{Mode, Terms},
+    visible::ln_visible,
 };
 use crate::Problem;
 
@@ -13,9 +14,6 @@ const NEIGHBOURS: usize = 3;
 const LOOKED_UP: usize = 8;
 /// So many times the density that was expected may be an accident: one point in 25 has it in evenly spread clutter.
 const CROWDED: f64 = 4.0;
-/// Larger sets do not pay for their neighbours, of which a large object has many of its own: of 60 drawn of family b five
-/// more would go without a fix. Crowds without the object made sets of 15 at most in 515 clouds.
-const MOST_MEMBERS: usize = 17;
 
 /// How crowded the cloud is about its points.
 ///
@@ -28,33 +26,45 @@ pub(in crate::search) struct Crowd {
 }
 
 impl Crowd {
-    /// What a mode's evidence is less (nats) where its points lie in crowds.
-    pub(in crate::search) fn cost(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, mode: &Mode) -> f64 {
-        if mode.members.len() > MOST_MEMBERS {
-            return 0.0;
-        }
+    /// Weighs a mode anew, with clutter as dense about each of its points as the cloud is there.
+    ///
+    /// A point in a crowd may say less than nothing for a pose; it is then rather clutter than the object's, and
+    /// the evidence is summed over which of the members are the object's ([`ln_visible`]).
+    pub(in crate::search) fn weigh(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, mode: &mut Mode) {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
-        let cost = |&v: &usize| {
-            let pair = graph.vertices[v];
-            let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| nearest(problem, pair.cloud));
-            let Some(&(square, _)) = nearest.iter().filter(|(_, j)| !members.contains(j)).nth(NEIGHBOURS - 1) else {
-                return 0.0;
-            };
-            // What is nearer than the noise is one place.
-            let noise = problem.cloud[pair.cloud].position.covariance.trace() / 3.0;
-            let volume = 4.0 / 3.0 * std::f64::consts::PI * square.max(noise).max(f64::MIN_POSITIVE).powf(1.5);
-            // Of candidates that were given without a prior, the others of the cloud are as near as they would be by chance.
-            let even = match problem.prior {
-                Some(_) => terms.ln_density[pair.model],
-                None => {
-                    let own = problem.candidates.lists[pair.model].len().max(1);
-                    terms.ln_density[pair.model] + libm::log(problem.cloud.len() as f64 / own as f64)
-                }
-            };
-            let times = libm::log(NEIGHBOURS as f64 / volume) - even;
-            if times > libm::log(CROWDED) { times } else { 0.0 }
+        let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
+        let crowded: Vec<f64> = mode
+            .members
+            .iter()
+            .zip(&even)
+            .map(|(&v, gain)| gain - self.cost(problem, terms, graph, v, &members))
+            .collect();
+        let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_share[even.len()];
+        let (even, crowded) = (ln_visible(&even, &terms.ln_share), ln_visible(&crowded, &terms.ln_share));
+        mode.ln_evidence = of_pose + crowded;
+        mode.ln_crowd = even - crowded;
+    }
+
+    /// By how much the density about the cloud point of a vertex exceeds what was expected (nats).
+    fn cost(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, v: usize, members: &[usize]) -> f64 {
+        let pair = graph.vertices[v];
+        let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| nearest(problem, pair.cloud));
+        let Some(&(square, _)) = nearest.iter().filter(|(_, j)| !members.contains(j)).nth(NEIGHBOURS - 1) else {
+            return 0.0;
         };
-        mode.members.iter().map(cost).sum()
+        // What is nearer than the noise is one place.
+        let noise = problem.cloud[pair.cloud].position.covariance.trace() / 3.0;
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * square.max(noise).max(f64::MIN_POSITIVE).powf(1.5);
+        // Of candidates that were given without a prior, the others of the cloud are as near as they would be by chance.
+        let even = match problem.prior {
+            Some(_) => terms.ln_density[pair.model],
+            None => {
+                let own = problem.candidates.lists[pair.model].len().max(1);
+                terms.ln_density[pair.model] + libm::log(problem.cloud.len() as f64 / own as f64)
+            }
+        };
+        let times = libm::log(NEIGHBOURS as f64 / volume) - even;
+        if times > libm::log(CROWDED) { times } else { 0.0 }
     }
 }
 

@@ -123,9 +123,10 @@ fn compatible(columns: &Columns, a: usize, from: usize, gate: Gate, row: &mut [u
             let (x, y, z) = (mx[k] - here[3], my[k] - here[4], mz[k] - here[5]);
             let known = (x * x + y * y + z * z).sqrt();
             let (x, y, z) = (ox[k] - here[6], oy[k] - here[7], oz[k] - here[8]);
-            let moved = (x * x + y * y + z * z).sqrt();
+            let moved = x * x + y * y + z * z;
             let tolerance = reach + reaches[k];
-            let turned = moved <= gate.turn * known + 2.0 * tolerance;
+            let turn = gate.turn * known + 2.0 * tolerance;
+            let turned = moved <= turn * turn;
             near[k] = u8::from(((known - measured).abs() <= tolerance) & turned);
         }
         *out = packed(&near);

@@ -7,6 +7,7 @@ use super::{
     Motion,
     graph::Graph,
     rough::{Rough, box_volume},
+    six::{factor as factor_of, solve},
 };
 use crate::{Correspondence, Problem, Tolerance};
 
@@ -121,13 +122,17 @@ fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
         let ln_volume = libm::log(box_volume(problem));
         return lists.iter().map(|list| libm::log(list.len().max(1) as f64) - ln_volume).collect();
     };
+    let column = |axis: usize| problem.cloud.iter().map(|point| point.position.at.coords[axis]).collect::<Vec<f64>>();
+    let (x, y, z) = (column(0), column(1), column(2));
     known
         .places
         .iter()
         .map(|(place, spread)| {
             let half = spread * super::rough::BOUND_SIGMAS;
-            let inside = |at: &Vector3<f64>| (0..3).all(|axis| (at[axis] - place[axis]).abs() <= half[axis]);
-            let count = problem.cloud.iter().filter(|point| inside(&point.position.at.coords)).count();
+            let inside = |x: f64, y: f64, z: f64| {
+                ((x - place.x).abs() <= half.x) & ((y - place.y).abs() <= half.y) & ((z - place.z).abs() <= half.z)
+            };
+            let count = x.iter().zip(&y).zip(&z).filter(|((x, y), z)| inside(**x, **y, **z)).count();
             libm::log(count.max(1) as f64)
                 - (half * 2.0).iter().map(|side| libm::log(side.max(f64::MIN_POSITIVE))).sum::<f64>()
         })
@@ -207,6 +212,16 @@ fn information(lever: &Vector3<f64>, w: &Matrix3<f64>) -> Matrix6<f64> {
     h
 }
 
+/// [lever]× w, without the products with its zeros.
+fn crossed(lever: &Vector3<f64>, w: &Matrix3<f64>) -> Matrix3<f64> {
+    let (x, y, z) = (lever.x, lever.y, lever.z);
+    let row = |a: f64, i: usize, b: f64, k: usize| {
+        [a * w[(i, 0)] + b * w[(k, 0)], a * w[(i, 1)] + b * w[(k, 1)], a * w[(i, 2)] + b * w[(k, 2)]]
+    };
+    let (first, second, third) = (row(-z, 1, y, 2), row(z, 0, -x, 2), row(-y, 0, x, 1));
+    Matrix3::from_fn(|i, k| [first, second, third][i][k])
+}
+
 /// The most likely motion of these pairs near one, and the factor of its information.
 pub(in crate::search) fn fit(
     terms: &Terms,
@@ -225,9 +240,15 @@ pub(in crate::search) fn fit(
             let place = motion.apply(&terms.model[v]);
             let (lever, w) = (place - about, terms.weight[v]);
             let pull = w * (terms.cloud[v] - place);
-            let s = skew(&lever);
-            let sw = s * w;
-            turn -= sw * s;
+            let sw = crossed(&lever, &w);
+            // sw · [lever]×.
+            let (x, y, z) = (lever.x, lever.y, lever.z);
+            for i in 0..3 {
+                let row = [sw[(i, 0)], sw[(i, 1)], sw[(i, 2)]];
+                turn[(i, 0)] -= row[1] * z + row[2] * -y;
+                turn[(i, 1)] -= row[0] * -z + row[2] * x;
+                turn[(i, 2)] -= row[0] * y + row[1] * -x;
+            }
             mixed += sw;
             shift += w;
             torque += lever.cross(&pull);
@@ -243,8 +264,8 @@ pub(in crate::search) fn fit(
             h += known.information;
             g -= known.information * rough.step_to(known, &motion);
         }
-        let chol = h.cholesky()?;
-        let step = chol.solve(&g);
+        let chol = factor_of(&h)?;
+        let step = solve(&chol, &g);
         motion = motion.moved(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into(), &about);
         factor = Some(chol);
         // The Newton decrement: the square of the step in standard deviations.

@@ -11,6 +11,8 @@ mod motion;
 mod pattern;
 mod rough;
 mod seeds;
+mod six;
+mod visible;
 
 pub(super) use crowd::Crowd;
 pub(super) use graph::Graph;

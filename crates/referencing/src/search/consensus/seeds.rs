@@ -73,6 +73,8 @@ pub(in crate::search) struct Seeds<'a> {
     /// What two pairs and three have in common.
     common: Vec<u64>,
     third: Vec<u64>,
+    /// The third vertices to follow.
+    thirds: Vec<u64>,
 }
 
 impl<'a> Seeds<'a> {
@@ -101,6 +103,7 @@ impl<'a> Seeds<'a> {
             row: vec![0; words],
             common: vec![0; words],
             third: vec![0; words],
+            thirds: vec![0; words],
         }
     }
 
@@ -193,21 +196,25 @@ impl<'a> Seeds<'a> {
         self.meet(graph.row(a), b, next);
         self.common.iter_mut().zip(&self.free).for_each(|(word, free)| *word &= free);
         // Three members of a mode lead to it again.
+        let mut thirds = std::mem::take(&mut self.thirds);
+        thirds.clone_from(&self.common);
         let likely = self.modes.iter().take(COMPARED);
-        let holding: Vec<&Mode> = likely.filter(|mode| mode.holds(a) && mode.holds(b)).collect();
-        let new = |c: &usize| !holding.iter().any(|mode| mode.holds(*c));
-        let thirds: Vec<usize> = ones(&self.common, graph.starts[next]).filter(new).collect();
-        for c in thirds {
+        for v in likely.filter(|mode| mode.holds(a) && mode.holds(b)).flat_map(|mode| &mode.members) {
+            thirds[v / 64] &= !(1 << (v % 64));
+        }
+        let gains = self.bounds.gain(a) + self.bounds.gain(b);
+        for c in ones(&thirds, graph.starts[next]) {
             let after = graph.rank[c] as usize + 1;
-            let gains = self.bounds.gain(a) + self.bounds.gain(b) + self.bounds.gain(c);
+            let gains = gains + self.bounds.gain(c);
             let start = graph.starts[after];
             self.spent += (self.common.len().saturating_sub(start / 64) + 1) as u64;
             let count = intersect(&self.common, graph.row(c), start, &mut self.third);
-            let bound = self.bounds.with_common((3, gains), &self.third, count, after, self.threshold());
-            if bound >= self.threshold() && !self.known([a, b, c]) {
+            let promising = self.bounds.is_enough((3, gains), &self.third, count, after, self.threshold());
+            if promising && !self.known([a, b, c]) {
                 self.follow([a, b, c], after);
             }
         }
+        self.thirds = thirds;
     }
 
     /// Whether a likely mode holds all three.
