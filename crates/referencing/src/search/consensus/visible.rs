@@ -1,7 +1,7 @@
 //! Which of the points that fit a pose are the object's.
 
 /// No more of the members than so many are left out at once: beyond, what they add is lost.
-const MOST_LEFT_OUT: usize = 128;
+const MOST_LEFT_OUT: usize = 1024;
 
 /// ln Σ_V B(|V|) Π_{i∈V} r_i over the subsets V of the members of a mode, r_i = exp(`gains`[i]) the likelihood ratio of
 /// each and B the share of one set of so many visible points (`ln_share`).
@@ -22,7 +22,7 @@ pub(super) fn ln_visible(gains: &[f64], ln_share: &[f64]) -> f64 {
         left_out[0] *= in_set;
         left_out.truncate(MOST_LEFT_OUT + 1);
         let most = left_out.iter().copied().fold(0.0, f64::max);
-        if most > 1e200 {
+        if most > 0.0 && !(1e-200..1e200).contains(&most) {
             left_out.iter_mut().for_each(|c| *c /= most);
             ln_scale += libm::log(most);
         }
@@ -68,7 +68,7 @@ mod tests {
         let product = 800.0 + shares[20];
         assert!((ln_visible(&sure, &shares) - product).abs() < 1e-9);
         // Ten more in crowds cost what it takes that they are hidden and clutter is there, and not what they lack.
-        let with = |gain: f64| ln_visible(&[&sure[..], &vec![gain; 10]].concat(), &shares);
+        let with = |gain: f64| ln_visible(&[&sure[..], &[gain; 10]].concat(), &shares);
         assert!((with(-30.0) - product).abs() < 1e-9);
         assert!(with(0.0) > with(-30.0) && with(0.0) < with(1.0));
     }
