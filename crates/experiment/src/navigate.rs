@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     PipelineError, Sighting, Stages,
+    odometry_fault::{Motions, OdometryFault},
     pipeline::{build, resolve},
     record::rows6,
     source::{Eyes, Sight},
@@ -32,11 +33,19 @@ pub struct Navigation {
     pub policy: Choice,
     /// What becomes of the navigated pose when a fix comes.
     pub fusion: Choice,
+    /// How the odometry fails, and when.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<OdometryFault>,
 }
 
 impl Default for Navigation {
     fn default() -> Self {
-        Self { odometry: Choice::named("stereo"), policy: Choice::named("every-frame"), fusion: Choice::named("fuse") }
+        Self {
+            odometry: Choice::named("stereo"),
+            policy: Choice::named("every-frame"),
+            fusion: Choice::named("fuse"),
+            faults: Vec::new(),
+        }
     }
 }
 
@@ -50,6 +59,7 @@ impl Navigation {
             odometry: resolve(&ODOMETRIES, &self.odometry)?,
             policy: resolve(&POLICIES, &self.policy)?,
             fusion: resolve(&FUSIONS, &self.fusion)?,
+            faults: self.faults.clone(),
         })
     }
 
@@ -59,8 +69,15 @@ impl Navigation {
             build(&ODOMETRIES, &self.odometry).map(drop),
             build(&POLICIES, &self.policy).map(drop),
             build(&FUSIONS, &self.fusion).map(drop),
+            self.sound(),
         ];
         parts.into_iter().filter_map(Result::err).collect()
+    }
+
+    /// Whether the faults are faults.
+    fn sound(&self) -> Result<(), PipelineError> {
+        let all = self.faults.iter().enumerate().try_for_each(|(k, fault)| fault.check(k));
+        all.map_err(|message| PipelineError { setting: "faults", key: None, message })
     }
 
     /// Ready to work.
@@ -68,10 +85,12 @@ impl Navigation {
     /// # Errors
     /// [`PipelineError`] names the setting.
     pub fn build(&self) -> Result<Helm, PipelineError> {
+        self.sound()?;
         Ok(Helm {
             odometry: build(&ODOMETRIES, &self.odometry)?,
             policy: build(&POLICIES, &self.policy)?,
             fusion: build(&FUSIONS, &self.fusion)?,
+            faults: self.faults.clone(),
         })
     }
 }
@@ -82,6 +101,7 @@ pub struct Helm {
     odometry: Box<dyn Odometry>,
     policy: Box<dyn Policy>,
     fusion: Box<dyn Fusion>,
+    faults: Vec<OdometryFault>,
 }
 
 /// A trial's way through the frames of a passage, in their order.
@@ -91,6 +111,11 @@ pub(crate) struct Voyage<'a> {
     rig: &'a StereoRig,
     reckoning: Box<dyn Reckoning + 'a>,
     navigator: Navigator<'a>,
+    /// How the odometry fails, and its motions on their way through that.
+    faults: &'a [OdometryFault],
+    motions: Motions,
+    /// When the first frame was taken (ns).
+    began: Option<u64>,
     /// Changes of the navigator's state that have been told.
     told: usize,
     /// The pair that the odometry knew last: when, and in which segment.
@@ -122,6 +147,9 @@ impl<'a> Voyage<'a> {
             rig,
             reckoning: helm.odometry.begin(rig, Threads::One),
             navigator,
+            faults: &helm.faults,
+            motions: Motions::default(),
+            began: None,
             told: 0,
             last: None,
             fixed: false,
@@ -171,6 +199,7 @@ impl<'a> Voyage<'a> {
 
     /// Carries the pose to this frame where the odometry knows the way.
     fn carry(&mut self, sight: &Sight, followed: &Followed, events: &mut Vec<String>) -> OdometryStep {
+        let began = *self.began.get_or_insert(sight.stamp_ns);
         let now = self.reckoning.latest().filter(|(_, waypoint)| waypoint.stamp_ns == sight.stamp_ns);
         let (Some((segment, waypoint)), false) = (now, matches!(followed, Followed::Skipped(_))) else {
             let lost = match followed {
@@ -183,11 +212,14 @@ impl<'a> Voyage<'a> {
         let before = self.last.replace((sight.stamp_ns, segment));
         let Some((stamp_ns, left)) = before else { return OdometryStep::default() };
         let seconds = (sight.stamp_ns - stamp_ns) as f64 * 1e-9;
-        let motion = waypoint.local.filter(|_| left == segment);
+        let found = waypoint.local.filter(|_| left == segment);
+        let time = (sight.stamp_ns - began) as f64 * 1e-9;
+        let motion = self.motions.passed(self.faults, time, found);
         self.navigator.advance(seconds, motion.as_ref());
         self.unreferenced = self.unreferenced.zip(motion).map(|(pose, motion)| pose.after(&motion));
         let Some(motion) = motion else {
-            return OdometryStep { lost: "a new segment begins: the way here is unknown".to_owned(), motion: None };
+            let why = if found.is_some() { "it failed" } else { "a new segment begins" };
+            return OdometryStep { lost: format!("{why}: the way here is unknown"), motion: None };
         };
         OdometryStep { lost: String::new(), motion: Some((motion.motion.rows(), rows6(&motion.covariance.matrix))) }
     }

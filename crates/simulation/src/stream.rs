@@ -50,6 +50,8 @@ pub enum Purpose {
     Device,
     /// The particles in the water.
     Snow,
+    /// A question to the transponders on the bed.
+    Transponders,
 }
 
 /// A stream of random numbers, a function of (seed, dive, frame, purpose) alone.

@@ -1,56 +1,15 @@
 //! What is switched on with magnitude 0 is the same, bit for bit, as what is left out; and with a magnitude it shows.
 
-use std::path::Path;
+mod dives;
 
-use seafix_geometry::MeasuredPoint;
+use dives::{base, seen};
 use seafix_simulation::{
-    Imager, Mission, PriorKind, RigPlan,
+    Imager, Mission,
     field::Changes,
     optics::{Lamp, Port, PortKind, Water},
-    sensors::{Device, DeviceFault, FaultKind, Readings},
+    sensors::{Device, DeviceFault, FaultKind},
     vehicle::{Current, Route, RouteKind, Vehicle, VehicleKind},
 };
-use seafix_vision::{Image, Threads};
-
-/// A short, small dive in clear water over the first object, with rough poses from the sensors.
-fn base() -> Mission {
-    Mission {
-        frames: 2,
-        rate: 0.5,
-        start: 3.0,
-        prior: PriorKind::Sensors,
-        rig: RigPlan { size: [128, 96], focal: 62.5, ..RigPlan::default() },
-        water: Water { attenuation: 0.0, snow: 0.0, ..Water::default() },
-        lamps: Lamp::pair(0.25),
-        ..Mission::default()
-    }
-}
-
-/// Everything that a method, or a judge, sees of a dive.
-#[derive(Debug, PartialEq)]
-struct Seen {
-    images: Vec<(Image, Image)>,
-    points: Vec<Vec<MeasuredPoint>>,
-    poses: Vec<String>,
-    readings: Readings,
-    told: String,
-}
-
-fn seen(mission: &Mission) -> Seen {
-    let plan = mission.plan(5, 0, Path::new("")).expect("the mission can be planned");
-    let instants: Vec<_> = (0..plan.len()).map(|k| plan.instant(k)).collect();
-    let pair = |instant: &seafix_simulation::Instant<'_>| {
-        let (left, right, _) = instant.render(Threads::One);
-        (left, right)
-    };
-    Seen {
-        images: instants.iter().map(pair).collect(),
-        points: instants.iter().map(|i| i.points()).collect(),
-        poses: instants.iter().map(|i| format!("{:?} {:?}", i.prior, i.truth())).collect(),
-        readings: plan.readings(),
-        told: format!("{} {:?} {:?}", plan.site().to_toml(), plan.rig(), plan.world_from_object()),
-    }
-}
 
 /// A factor: its name, how it is switched on with magnitude 0, and with one that shows.
 type Factor = (&'static str, fn(&mut Mission), fn(&mut Mission));
@@ -59,7 +18,13 @@ fn fault(device: Device, kind: FaultKind, to: f64, amount: f64) -> DeviceFault {
     DeviceFault { device, kind, from: 1.0, to, amount }
 }
 
-const DEVICES: [Device; 5] = [Device::Images, Device::Acoustic, Device::Doppler, Device::Attitude, Device::Depth];
+const DEVICES: [Device; 6] =
+    [Device::Images, Device::Acoustic, Device::Lbl, Device::Doppler, Device::Attitude, Device::Depth];
+
+/// Four transponders about the site.
+fn transponders() -> Vec<[f64; 3]> {
+    vec![[-50.0, -40.0, 38.0], [60.0, -40.0, 39.0], [55.0, 55.0, 37.0], [-40.0, 60.0, 38.5]]
+}
 
 /// One named object, changed by nothing.
 fn named() -> Changes {
@@ -127,18 +92,27 @@ const FACTORS: &[Factor] = &[
     ("a place of the log", |m| m.sensors.doppler.at = [0.0; 3], |m| m.sensors.doppler.at = [-0.5, 0.0, 0.2]),
     ("a place of the transponder", |m| m.sensors.acoustic.at = [0.0; 3], |m| m.sensors.acoustic.at = [0.0, 0.0, -0.6]),
     ("a place of the gauge", |m| m.sensors.depth.at = [0.0; 3], |m| m.sensors.depth.at = [0.5, 0.0, 0.3]),
+    (
+        "transponders",
+        |m| {
+            m.sensors.lbl.sigma = 9.0;
+            m.sensors.lbl.sound = 0.1;
+            m.sensors.lbl.survey = 9.0;
+        },
+        |m| m.sensors.lbl.transponders = transponders(),
+    ),
     ("an imprecise model", |m| m.model_sigma = 0.001, |m| m.model_sigma = 0.004),
 ];
 
 #[test]
 fn a_factor_of_magnitude_zero_is_a_factor_left_out() {
-    let plain = seen(&base());
+    let plain = seen(&base(), true);
     assert!(plain.poses.iter().any(|pose| pose.contains("VisiblePoint")), "nothing is in view");
     for (name, nothing, something) in FACTORS {
         let with = |change: &fn(&mut Mission)| {
             let mut mission = base();
             change(&mut mission);
-            seen(&mission)
+            seen(&mission, true)
         };
         assert!(with(nothing) == plain, "{name} of magnitude 0 changes something");
         assert!(with(something) != plain, "{name} changes nothing");
@@ -155,7 +129,7 @@ fn while_nothing_moves_no_time_is_seen() {
     };
     let slow =
         |m: &Mission| Mission { imager: Imager { readout_ms: 20.0, sync_ms: 30.0, ..m.imager.clone() }, ..m.clone() };
-    assert!(seen(&slow(&rest)) == seen(&rest));
+    assert!(seen(&slow(&rest), true) == seen(&rest, true));
     let moving = Mission { route: Route { speed: 0.4, ..Route::default() }, ..rest };
-    assert!(seen(&slow(&moving)) != seen(&moving));
+    assert!(seen(&slow(&moving), true) != seen(&moving, true));
 }

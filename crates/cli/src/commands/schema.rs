@@ -41,6 +41,7 @@ fn experiment() -> Value {
     for part in ["odometry", "policy", "fusion"] {
         navigation.insert(part.to_owned(), component(part));
     }
+    navigation.insert("faults".to_owned(), said("how the odometry fails: kind, from, to, amount", "array"));
     let range = json!({
         "type": "object",
         "properties": {

@@ -156,7 +156,8 @@ impl Looked {
         shift(&mut self.v, &spots.v[span], dv);
         looks.at(skin.texture, &self.u, &self.v, footprint, &mut self.own);
         if skin.growth <= 0.0 {
-            out.extend(self.own.iter().map(|own| skin.albedo * own));
+            // A bright grain of a bright surface returns all light, never more.
+            out.extend(self.own.iter().map(|own| (skin.albedo * own).min(1.0)));
             return;
         }
         // Growth begins where a slow pattern is low, and ends in tufts.
@@ -167,7 +168,7 @@ impl Looked {
         let level = 0.34 * (skin.growth * 2.0 - 1.0);
         for ((own, slow), tufts) in self.own.iter().zip(&self.slow).zip(&self.tufts) {
             let cover = if skin.growth >= 1.0 { 1.0 } else { ((level - (slow - 1.0)) * 12.0 + 0.5).clamp(0.0, 1.0) };
-            let own = skin.albedo * own;
+            let own = (skin.albedo * own).min(1.0);
             out.push(own + cover * (GROWTH * tufts - own));
         }
     }

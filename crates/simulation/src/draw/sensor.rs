@@ -307,6 +307,29 @@ mod tests {
     }
 
     #[test]
+    fn a_dark_frame_has_the_read_noise_and_the_dark_signal() {
+        // Without light the variance is K²(σ_read² + σ_dsnu²) + 1/12, and the mean is black; too much light is white,
+        // without noise.
+        let imager = Imager { bits: 12, gain: 8.0, read_noise: 5.0, dsnu: 3.0, black: 20.0, ..quiet() };
+        let (width, height) = (400, 250);
+        let mut image = vec![0.0; (width * height) as usize];
+        let exposure = imager.exposed([&image, &image]);
+        imager.develop(&mut image, exposure, &imager.pattern([width, height], 3), 5, Threads::One);
+        let scale = 4095.0 / 255.0;
+        let n = image.len() as f64;
+        let mean = image.iter().map(|&x| f64::from(x) * scale).sum::<f64>() / n;
+        let variance = image.iter().map(|&x| (f64::from(x) * scale - mean).powi(2)).sum::<f64>() / n;
+        let k = 4095.0 * 8.0 / imager.full_well;
+        let exact = k * k * (25.0 + 9.0) + 1.0 / 12.0;
+        assert!(
+            (variance / exact - 1.0).abs() < 0.02 && (mean - 20.0 * scale).abs() < 0.3,
+            "{variance} {exact} {mean}"
+        );
+        let (white, spread) = grey(&imager, 9.0, 1000);
+        assert_eq!((white, spread), (255.0, 0.0));
+    }
+
+    #[test]
     fn brightness_grows_with_exposure_and_gain_to_white() {
         let mean = |exposure_ms, gain| grey(&Imager { exposure_ms, gain, ..quiet() }, 0.02, 1000).0;
         assert!(mean(1.0, 1.0) < mean(2.0, 1.0) && mean(2.0, 1.0) < mean(2.0, 2.0));

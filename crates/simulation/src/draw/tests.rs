@@ -3,6 +3,11 @@ use seafix_geometry::{Camera, Pinhole, RightCamera, Transform, World};
 use seafix_vision::{Image, Threads, Workspace};
 
 use super::*;
+
+mod light;
+mod projection;
+mod views;
+
 use crate::{
     field::{Changes, Field, SitePlan, built_in},
     optics::{Lamp, Lens, Port, PortKind, Water},
@@ -176,6 +181,10 @@ fn a_refused_port_of_water_is_the_pinhole() {
 
 /// A flat, grey bed at 40 m and nothing else.
 fn plain() -> Field {
+    field(&plain_plan())
+}
+
+fn plain_plan() -> SitePlan {
     let site = r#"
         format = "seafix-site/1"
         name = "plain"
@@ -194,7 +203,7 @@ fn plain() -> Field {
         bed = { depth = 40.0, relief = 0.0, albedo = 0.5, texture = "plain", rocks = 0 }
     "#;
     let path = std::path::Path::new("plain");
-    field(&SitePlan::parse((site, path), (geometry, path)).unwrap())
+    SitePlan::parse((site, path), (geometry, path)).unwrap()
 }
 
 /// The radiance in the middle of a view straight down from `height`, with one lamp in the pupil.

@@ -5,6 +5,7 @@ mod bvh;
 mod change;
 mod check;
 mod clutter;
+mod inside;
 mod mesh;
 mod plan;
 mod random;

@@ -7,26 +7,26 @@ use seafix_geometry::{
 };
 use seafix_vision::{Image, Threads};
 
-use super::{PlannedMission, PriorKind};
+use super::{PlannedMission, PriorKind, glance::Glance};
 use crate::{
     dive::VisiblePoint,
     draw::{Exposure, Rolling, Shot},
     field::FieldPoint,
-    sensors::{Device, DeviceFault, FaultKind, Rough},
-    stream::Purpose,
+    sensors::Rough,
+    stream::{Purpose, Stream},
 };
 
 /// One instant.
 #[derive(Debug, Clone)]
 pub struct Instant<'a> {
-    mission: &'a PlannedMission,
+    pub(super) mission: &'a PlannedMission,
     /// Its number in the mission.
     pub index: usize,
     /// When it was taken (ns since 1970).
     pub stamp_ns: u64,
     /// The rough pose, where one is known, and its covariance.
     pub prior: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
-    time: f64,
+    pub(super) time: f64,
     truth: InstantTruth,
 }
 
@@ -60,9 +60,16 @@ impl<'a> Instant<'a> {
 
     /// The left and the right image: a plain function of the instant, whoever works.
     pub fn render(&self, threads: Threads) -> (Image, Image, Exposure) {
-        let faults = self.mission.settings.faults.iter();
-        let acting = faults.filter(|f| f.device == Device::Images && f.acts(self.time));
-        acting.fold(None, |_, fault| Some(self.failed(fault, threads))).unwrap_or_else(|| self.sound(threads))
+        match self.glance() {
+            Glance::Here => self.sound(threads),
+            Glance::Earlier(then) => then.sound(threads),
+            Glance::Swapped => {
+                let (left, right, exposure) = self.sound(threads);
+                (right, left, exposure)
+            }
+            Glance::Dark => self.without_light(&mut || 0.0),
+            Glance::Garbage(mut stream) => self.without_light(&mut || (stream.bits() >> 56) as f32),
+        }
     }
 
     /// The images of cameras that work.
@@ -71,39 +78,15 @@ impl<'a> Instant<'a> {
         self.mission.with_memory(threads, |work| self.mission.studio.render(&self.mission.field, &shot, work))
     }
 
-    /// The images of cameras that fail.
-    fn failed(&self, fault: &DeviceFault, threads: Threads) -> (Image, Image, Exposure) {
-        let mission = self.mission;
-        let earlier = |time: f64, index: usize| Self::new(mission, index, time.max(0.0)).sound(threads);
-        let blank = |level: &mut dyn FnMut() -> f32| {
-            let [width, height] = mission.cameras.lens.camera().size().map(|n| n as usize);
+    /// Images of these levels.
+    fn without_light(&self, level: &mut dyn FnMut() -> f32) -> (Image, Image, Exposure) {
+        let [width, height] = self.mission.cameras.lens.camera().size().map(|n| n as usize);
+        let mut image = || {
             let pixels = (0..width * height).map(|_| level()).collect();
             Image::new(width, height, pixels).expect("a pixel for each place")
         };
-        let none = Exposure { ms: 0.0, gain: 0.0 };
-        let mut stream = mission.stream(self.index, Purpose::Faults);
-        match fault.kind {
-            FaultKind::Off => (blank(&mut || 0.0), blank(&mut || 0.0), none),
-            FaultKind::Garbage => {
-                let mut any = || (stream.bits() >> 56) as f32;
-                (blank(&mut any), blank(&mut any), none)
-            }
-            FaultKind::Intermittent if stream.unit() < fault.amount => (blank(&mut || 0.0), blank(&mut || 0.0), none),
-            FaultKind::Intermittent => self.sound(threads),
-            FaultKind::Wrong => {
-                let (left, right, exposure) = self.sound(threads);
-                (right, left, exposure)
-            }
-            FaultKind::Stuck => {
-                let first = mission.first_after(fault.from).min(self.index);
-                earlier(mission.time(first), first)
-            }
-            FaultKind::Slow => {
-                let kept = self.index - self.index % 5;
-                earlier(mission.time(kept), kept)
-            }
-            FaultKind::Delayed => earlier(self.time - fault.amount, self.index),
-        }
+        let left = image();
+        (left, image(), Exposure { ms: 0.0, gain: 0.0 })
     }
 
     /// Where the right camera is taken from: later by the error of synchronisation.
@@ -161,6 +144,39 @@ impl<'a> Instant<'a> {
     /// The same view as measured points, without an image: visible feature points with the noise of the
     /// settings, and clutter, triangulated with the told rig, in an order that tells nothing.
     pub fn points(&self) -> Vec<MeasuredPoint> {
+        match self.glance() {
+            Glance::Here => self.sound_points(),
+            Glance::Earlier(then) => then.sound_points(),
+            // Nothing before the cameras has a point to the right in the right image.
+            Glance::Dark | Glance::Swapped => Vec::new(),
+            Glance::Garbage(stream) => self.any_points(stream),
+        }
+    }
+
+    /// Points of nothing: as many false pairs as there is clutter.
+    fn any_points(&self, mut stream: Stream) -> Vec<MeasuredPoint> {
+        let noise = &self.mission.settings.points;
+        let [width, height] = self.mission.cameras.lens.camera().size().map(|n| f64::from(n - 1));
+        let mut pair = || {
+            let (left, v) = (stream.between(0.0, width), stream.between(0.0, height));
+            let right = Pixel { u: stream.between(0.0, left), v };
+            StereoPixels { left: Pixel { u: left, v }, right }
+        };
+        let pairs: Vec<_> = (0..noise.clutter).map(|_| pair()).collect();
+        pairs.into_iter().filter_map(|pixels| self.triangulated(pixels)).collect()
+    }
+
+    /// What the told rig makes of a pair of pixels.
+    fn triangulated(&self, seen: StereoPixels) -> Option<MeasuredPoint> {
+        // A covariance of zero would claim what no camera can know.
+        let pixels = UncertainPixels::independent(seen, self.mission.settings.points.sigma_px.max(1e-3));
+        let found = self.mission.cameras.told.triangulate(&pixels).ok()?;
+        let position = UncertainPoint { at: found.point, covariance: found.covariance };
+        Some(MeasuredPoint { position, pixels: Some(pixels) })
+    }
+
+    /// The points of cameras that work.
+    fn sound_points(&self) -> Vec<MeasuredPoint> {
         let mission = self.mission;
         let noise = &mission.settings.points;
         let mut stream = mission.stream(self.index, Purpose::Points);
@@ -192,11 +208,7 @@ impl<'a> Instant<'a> {
                 v: p.v + noise.sigma_px * stream.normal(),
             };
             let seen = StereoPixels { left: disturbed(&exact.left), right: disturbed(&exact.right) };
-            // A covariance of zero would claim what no camera can know.
-            let pixels = UncertainPixels::independent(seen, noise.sigma_px.max(1e-3));
-            let found = mission.cameras.told.triangulate(&pixels).ok()?;
-            let position = UncertainPoint { at: found.point, covariance: found.covariance };
-            Some(MeasuredPoint { position, pixels: Some(pixels) })
+            self.triangulated(seen)
         };
         pixels.iter().filter_map(measure).collect()
     }

@@ -1,6 +1,7 @@
 //! A mission: one vehicle's passage over one site, with everything that may go wrong as a number.
 
 mod frame;
+mod glance;
 mod plan;
 mod rig;
 mod settings;
@@ -10,5 +11,7 @@ pub use plan::PlannedMission;
 pub use rig::{CALIBRATION_RANGE, CalibrationError, FocalIn, RigPlan};
 pub use settings::{Mission, PriorKind};
 
+#[cfg(test)]
+mod fault_tests;
 #[cfg(test)]
 mod tests;

@@ -221,7 +221,9 @@ impl PlannedMission {
             let time = k as f64 * LOOK;
             let now = places(time);
             for (i, place) in now.iter().enumerate() {
-                let near = self.field.distance(place, clearance.max(1e-6)).is_some();
+                // In the middle of a large body no surface is near.
+                let near =
+                    self.field.distance(place, clearance.max(1e-6)).is_some() || (k == 0 && self.field.encloses(place));
                 // Below the bed, or through a thin body between two looks.
                 let along = before.as_ref().map(|all| place - all[i]);
                 let through = along.zip(before.as_ref()).is_some_and(|(along, all)| {

@@ -1,21 +1,19 @@
-//! Acoustic positioning: USBL from a ship, or LBL among transponders.
+//! Acoustic positioning from a ship: USBL.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Reading, within};
+use super::{Reading, SOUND, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
 };
 
-/// The speed of sound (m/s).
-const SOUND: f64 = 1500.0;
 /// Outliers err by up to this share of the slant range.
 const OUTLIER: f64 = 0.1;
 
 /// Acoustic positions: each world axis errs by σ = `sigma` + `share`·(slant range). USBL has a share (0.5 %
-/// is usual, 0.1 to 2 % are found), LBL a sigma (0.1 to 0.3 m) and no share.
+/// is usual, 0.1 to 2 % are found); a sigma (0.1 to 0.3 m) and no share stand for an LBL that is not looked into.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Acoustic {

@@ -17,6 +17,8 @@ pub enum Device {
     Images,
     /// The acoustic positions.
     Acoustic,
+    /// The ranges to transponders.
+    Lbl,
     /// The Doppler log.
     Doppler,
     /// Gyro and attitude.

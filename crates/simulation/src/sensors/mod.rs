@@ -1,4 +1,4 @@
-//! The vehicle's navigation sensors: acoustic positions, Doppler velocity, rate and attitude, depth.
+//! The vehicle's navigation sensors: acoustic positions and ranges, Doppler velocity, rate and attitude, depth.
 //!
 //! Every reading is a function of (seed, dive, device, number) alone; what a device has wrong for a whole
 //! dive is drawn once. A reading has the time of what it measures and the time at which it is there.
@@ -8,7 +8,9 @@ mod attitude;
 mod depth;
 mod doppler;
 mod fault;
+mod lbl;
 mod prior;
+mod trilateration;
 
 use nalgebra::Vector3;
 use seafix_component::in_range;
@@ -19,7 +21,11 @@ pub use attitude::{AttitudeReading, AttitudeSensor};
 pub use depth::DepthGauge;
 pub use doppler::Doppler;
 pub use fault::{Device, DeviceFault, FaultKind};
+pub use lbl::{Lbl, Ranges};
 pub(crate) use prior::{Navigation, Rough};
+
+/// The speed of sound (m/s).
+const SOUND: f64 = 1500.0;
 
 /// A reading of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,12 +47,23 @@ pub struct AcousticFix {
     pub sigma: f64,
 }
 
+/// A position by the ranges to transponders.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LblFix {
+    /// North, east, down of the place that asks (m).
+    pub at: Vector3<f64>,
+    /// What it says about itself: standard deviation of each axis (m).
+    pub sigma: Vector3<f64>,
+}
+
 /// Everything that the navigation sensors say during a dive, each in order of what it measured. A reading may be
 /// used from its arrival on; errors, latency, losses and faults are in it, truth is not.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Readings {
-    /// Position from USBL or LBL.
+    /// Position from USBL.
     pub acoustic: Vec<Reading<AcousticFix>>,
+    /// Ranges to transponders, and the position that they give with the depth.
+    pub lbl: Vec<Reading<(Ranges, Option<LblFix>)>>,
     /// Velocity over ground of the log's place, body frame (m/s).
     pub doppler: Vec<Reading<Vector3<f64>>>,
     /// Rate of turn (rad/s, body frame) and attitude.
@@ -59,8 +76,10 @@ pub struct Readings {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sensors {
-    /// Position from a ship's transceiver or from transponders on the bed.
+    /// Position from a ship's transceiver.
     pub acoustic: Acoustic,
+    /// Position among transponders on the bed.
+    pub lbl: Lbl,
     /// Velocity over ground.
     pub doppler: Doppler,
     /// Rate of turn and attitude.
@@ -72,6 +91,7 @@ pub struct Sensors {
 impl Sensors {
     pub(crate) fn check(&self) -> Result<(), String> {
         self.acoustic.check()?;
+        self.lbl.check()?;
         self.doppler.check()?;
         self.attitude.check()?;
         self.depth.check()

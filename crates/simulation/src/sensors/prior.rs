@@ -4,8 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Body, Transform, World};
 
 use super::{
-    AcousticFix, AttitudeReading, Reading, Readings, Sensors,
+    AcousticFix, AttitudeReading, LblFix, Ranges, Reading, Readings, Sensors,
     fault::{Device, DeviceFault, failed},
+    trilateration::{Found, Length, trilaterate},
 };
 use crate::{field::Field, vehicle::Track};
 
@@ -17,9 +18,23 @@ const GATE: f64 = 4.0;
 pub(crate) struct Navigation {
     sensors: Sensors,
     fixes: Vec<Reading<Vector3<f64>>>,
+    answers: Vec<Reading<Ranges>>,
+    /// All positions, in order of their times.
+    positions: Vec<Reading<Position>>,
     velocities: Vec<Reading<Vector3<f64>>>,
     attitudes: Vec<Reading<AttitudeReading>>,
     depths: Vec<Reading<f64>>,
+}
+
+/// The place of one part of the vehicle.
+#[derive(Debug, Clone, Copy)]
+struct Position {
+    at: Vector3<f64>,
+    /// Where that part is: body frame (m).
+    lever: Vector3<f64>,
+    /// Variance of its noise, each axis (m²), and the covariance of what errs alike in the next one.
+    noise: Vector3<f64>,
+    common: Matrix3<f64>,
 }
 
 /// A pose with standard deviations: position covariance in the world (m²), attitude each axis (rad).
@@ -44,13 +59,58 @@ impl Navigation {
         until: f64,
         seeds: (u64, u64),
     ) -> Self {
-        Self {
+        let mut all = Self {
             sensors: sensors.clone(),
             fixes: failed(sensors.acoustic.fixes(track, until, seeds), Device::Acoustic, faults, seeds),
+            answers: failed(sensors.lbl.answers(track, until, seeds), Device::Lbl, faults, seeds),
+            positions: Vec::new(),
             velocities: failed(sensors.doppler.readings(track, field, until, seeds), Device::Doppler, faults, seeds),
             attitudes: failed(sensors.attitude.readings(track, until, seeds), Device::Attitude, faults, seeds),
             depths: failed(sensors.depth.readings(track, until, seeds), Device::Depth, faults, seeds),
-        }
+        };
+        all.positions = all.positions();
+        all
+    }
+
+    fn positions(&self) -> Vec<Reading<Position>> {
+        let usbl = self.fixes.iter().map(|fix| {
+            let noise = Vector3::repeat(self.spread(&fix.value).powi(2));
+            let lever = Vector3::from(self.sensors.acoustic.at);
+            let value = Position { at: fix.value, lever, noise, common: Matrix3::zeros() };
+            Reading { time: fix.time, arrival: fix.arrival, value }
+        });
+        let lbl = self.answers.iter().filter_map(|answer| {
+            let Found { at, noise, common } = self.among_transponders(answer)?;
+            let lever = Vector3::from(self.sensors.lbl.at);
+            let value = Position { at, lever, noise: noise.diagonal(), common };
+            Some(Reading { time: answer.time, arrival: answer.arrival, value })
+        });
+        let mut all: Vec<_> = usbl.chain(lbl).collect();
+        all.sort_by(|a, b| a.time.total_cmp(&b.time));
+        all
+    }
+
+    /// The place that asked the transponders, by their answers and the depth gauge.
+    fn among_transponders(&self, answer: &Reading<Ranges>) -> Option<Found> {
+        let lbl = &self.sensors.lbl;
+        let length =
+            |range: f64| Length { value: range, noise: lbl.sigma, common: lbl.survey.hypot(lbl.sound * range) };
+        let places = lbl.transponders.iter().map(|t| Vector3::from(*t));
+        let ranges: Vec<_> =
+            places.clone().zip(answer.value.0).filter_map(|(t, range)| Some((t, length(range?)))).collect();
+        let depth = latest(&self.depths, answer.arrival).map(|said| {
+            let turn = self.turned(said.time).map(|said| said.world_from_body).unwrap_or_default();
+            let between = (turn * (Vector3::from(lbl.at) - Vector3::from(self.sensors.depth.at))).z;
+            let gauge = &self.sensors.depth;
+            // Between reading and question it rises and sinks slowly.
+            let slow = 0.1 * (answer.time - said.time);
+            Length { value: said.value + between, noise: gauge.sigma.hypot(slow), common: gauge.bias }
+        });
+        let middle = places.clone().sum::<Vector3<f64>>() / lbl.transponders.len().max(1) as f64;
+        // Transponders stand on the bed, and the vehicle is above them.
+        let highest = places.map(|t| t.z).fold(f64::INFINITY, f64::min);
+        let start = Vector3::new(middle.x, middle.y, depth.map_or(highest - 3.0, |depth| depth.value));
+        trilaterate(&ranges, depth, start)
     }
 
     /// Everything that was said.
@@ -60,8 +120,14 @@ impl Navigation {
             arrival: fix.arrival,
             value: AcousticFix { at: fix.value, sigma: self.spread(&fix.value) },
         };
+        let lbl = |answer: &Reading<Ranges>| {
+            let fix = self.among_transponders(answer);
+            let fix = fix.map(|f| LblFix { at: f.at, sigma: (f.noise + f.common).diagonal().map(f64::sqrt) });
+            Reading { time: answer.time, arrival: answer.arrival, value: (answer.value, fix) }
+        };
         Readings {
             acoustic: self.fixes.iter().map(fix).collect(),
+            lbl: self.answers.iter().map(lbl).collect(),
             doppler: self.velocities.clone(),
             attitude: self.attitudes.clone(),
             depth: self.depths.clone(),
@@ -79,56 +145,72 @@ impl Navigation {
         self.attitudes.partition_point(|a| a.time <= time).checked_sub(1).map(|k| &self.attitudes[k].value)
     }
 
-    /// The vehicle's place when its transponder was at a fix.
-    fn place(&self, fix: &Reading<Vector3<f64>>) -> Vector3<f64> {
-        let turn = self.turned(fix.time).map(|said| said.world_from_body).unwrap_or_default();
-        fix.value - turn * Vector3::from(self.sensors.acoustic.at)
+    /// The vehicle's place when one of its parts was at a position.
+    fn place(&self, position: &Reading<Position>) -> Vector3<f64> {
+        let turn = self.turned(position.time).map(|said| said.world_from_body).unwrap_or_default();
+        position.value.at - turn * position.value.lever
     }
 
-    /// The pose at a time (s): the acoustic fixes that are there, carried on by Doppler velocity and attitude,
-    /// each new one weighed with what was known; the depth from the gauge. `None` before the first fix.
+    /// The pose at a time (s): the acoustic positions that are there, carried on by Doppler velocity and attitude,
+    /// each new one weighed with what was known; the depth from the gauge. `None` before the first position.
     ///
     /// A Kalman filter of the position and of the drift for each metre travelled, each axis for itself:
-    /// heading and scale err alike all the way, which noise of the steps would not say.
+    /// heading and scale err alike all the way, which noise of the steps would not say. What errs alike in all
+    /// positions is no noise either, and is added in the end.
     pub(crate) fn at(&self, now: f64) -> Option<Rough> {
         let attitude = latest(&self.attitudes, now)?;
-        let mut fixes = self.fixes.iter().filter(|fix| fix.arrival <= now);
-        let first = fixes.next()?;
+        let mut positions = self.positions.iter().filter(|position| position.arrival <= now);
+        let first = positions.next()?;
         let heading = self.sensors.attitude.heading_deg.to_radians();
         let level = self.sensors.attitude.level_deg.to_radians();
         let doppler = &self.sensors.doppler;
         let drift = doppler.scale.powi(2) + heading * heading + level * level;
         let noise = doppler.sigma.powi(2) / doppler.rate;
-        // Position, drift, and their variances: (position, both, drift).
+        // Position, drift, and their variances an axis: (position, both, drift).
         let (mut at, mut slope, mut time) = (self.place(first), Vector3::zeros(), first.time);
-        let mut p = [self.spread(&first.value).powi(2), 0.0, drift];
-        let travel = |at: &mut Vector3<f64>, slope: &Vector3<f64>, p: &mut [f64; 3], from: f64, to: f64| {
+        let mut p = [0, 1, 2].map(|k| [first.value.noise[k], 0.0, drift]);
+        let mut common = first.value.common;
+        let travel = |at: &mut Vector3<f64>, slope: &Vector3<f64>, p: &mut [[f64; 3]; 3], from: f64, to: f64| {
             let (step, length) = self.travelled(from, to);
             *at += step + slope * length;
-            *p = [
-                p[0] + 2.0 * length * p[1] + length * length * p[2] + noise * (to - from).max(0.0),
-                p[1] + length * p[2],
-                p[2],
-            ];
+            for p in p {
+                *p = [
+                    p[0] + 2.0 * length * p[1] + length * length * p[2] + noise * (to - from).max(0.0),
+                    p[1] + length * p[2],
+                    p[2],
+                ];
+            }
         };
-        for fix in fixes {
-            travel(&mut at, &slope, &mut p, time, fix.time);
-            time = fix.time;
-            let total = p[0] + self.spread(&fix.value).powi(2);
-            let miss = self.place(fix) - at;
-            if miss.norm_squared() < GATE * GATE * 3.0 * total {
-                let gains = [p[0] / total, p[1] / total];
-                (at, slope) = (at + miss * gains[0], slope + miss * gains[1]);
-                p = [p[0] * (1.0 - gains[0]), p[1] * (1.0 - gains[0]), p[2] - gains[1] * p[1]];
+        for position in positions {
+            travel(&mut at, &slope, &mut p, time, position.time);
+            time = position.time;
+            let here = &position.value;
+            let total = Vector3::from_fn(|k, _| p[k][0] + here.noise[k]);
+            let miss = self.place(position) - at;
+            // Squares over variances, scaled by the first axis': equal axes lose no digit by it.
+            let allowed = total + here.common.diagonal() + common.diagonal();
+            let scaled = Vector3::from_fn(|k, _| miss[k] * (allowed[0] / allowed[k]));
+            if miss.dot(&scaled) < GATE * GATE * 3.0 * allowed[0] {
+                let before = p;
+                for k in 0..3 {
+                    let gains = [p[k][0] / total[k], p[k][1] / total[k]];
+                    at[k] += miss[k] * gains[0];
+                    slope[k] += miss[k] * gains[1];
+                    p[k] = [p[k][0] * (1.0 - gains[0]), p[k][1] * (1.0 - gains[0]), p[k][2] - gains[1] * p[k][1]];
+                }
+                // No more than this, however alike the two err.
+                let gain = Vector3::from_fn(|k, _| before[k][0] / total[k]).mean();
+                common = common * (1.0 - gain) + here.common * gain;
             }
         }
         travel(&mut at, &slope, &mut p, time, now);
-        let variance = p[0];
-        let mut position = Matrix3::from_diagonal_element(variance);
+        let mut position = Matrix3::from_diagonal(&Vector3::from_fn(|k, _| p[k][0])) + common;
         if let Some(depth) = latest(&self.depths, now) {
             at.z = depth.value - (attitude.value.world_from_body * Vector3::from(self.sensors.depth.at)).z;
             // Between reading and now it rises and sinks slowly.
             let slow = (0.1 * (now - depth.time)).powi(2);
+            position.row_mut(2).fill(0.0);
+            position.column_mut(2).fill(0.0);
             position[(2, 2)] = self.sensors.depth.bias.powi(2) + self.sensors.depth.sigma.powi(2) + slow;
         }
         let sensor = &self.sensors.attitude;

@@ -279,6 +279,24 @@ mod tests {
     }
 
     #[test]
+    fn speed_and_energy_do_not_depend_on_the_step() {
+        let model = Model::hover_200();
+        let push = [60.0, 55.0, 10.0, -10.0, 5.0];
+        // The thrusters push already: their lag is followed step by step, to first order.
+        let begin = Motion { nu: vector(0.8, -0.5, 0.3, 0.2, 0.3, -0.5), thrusts: push.to_vec(), ..still(&model) };
+        let after = |dt, time| run(&model, begin.clone(), &push, Vector3::new(0.1, 0.0, 0.0), dt, time);
+        let (fine, coarse) = (after(0.005, 8.0), after(0.04, 8.0));
+        let energy = |motion: &Motion| model.energy(motion) - model.energy(&still(&model));
+        assert!((energy(&coarse) / energy(&fine) - 1.0).abs() < 1e-5, "{} {}", energy(&coarse), energy(&fine));
+        // Terminal speed of a steady push straight ahead.
+        let ahead = |dt| run(&model, still(&model), &[60.0, 60.0, 0.0, 0.0, 0.0], Vector3::zeros(), dt, 120.0);
+        let (slow, quick) = (ahead(0.01), ahead(0.08));
+        assert!((slow.nu - quick.nu).norm() < 1e-9 * slow.nu.norm() && slow.nu[0] > 0.5, "{} {}", slow.nu, quick.nu);
+        // The attitude stays a rotation.
+        assert!((coarse.turn.quaternion().norm() - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
     fn it_rocks_with_the_period_of_its_righting_lever() {
         let free = Model { linear: Vector6::zeros(), quadratic: Vector6::zeros(), ..Model::hover_200() };
         let tilted = Motion { turn: seafix_geometry::so3::exp(&(Vector3::x() * 0.01)), ..still(&free) };

@@ -1,0 +1,166 @@
+//! A position from ranges to known places, and from the depth.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Steps of the fit, and the step that ends it (m).
+const STEPS: usize = 40;
+const STILL: f64 = 1e-9;
+/// A fit whose weighted squares exceed χ² of its degrees of freedom at 0.1 % has an echo in it.
+const LIMITS: [f64; 6] = [0.0, 10.8, 13.8, 16.3, 18.5, 20.5];
+/// A direction in which a position is known worse than this (m) is not known.
+const UNKNOWN: f64 = 1e3;
+
+/// A measured length with the standard deviation of its noise, and of what errs alike at the next time (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Length {
+    pub(super) value: f64,
+    pub(super) noise: f64,
+    pub(super) common: f64,
+}
+
+impl Length {
+    fn sigma(&self) -> f64 {
+        self.noise.hypot(self.common).max(1e-3)
+    }
+}
+
+/// A position, the covariance of its noise, and of what errs alike in the next one (m²).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    pub(super) at: Vector3<f64>,
+    pub(super) noise: Matrix3<f64>,
+    pub(super) common: Matrix3<f64>,
+}
+
+/// The place (north, east, down) that fits ranges to places, and a depth, by least squares. With more than needed, ranges
+/// that contradict the others are left out, worst first; what stays contradictory, and too little, is no position.
+///
+/// Places at one depth have a mirror image below them: `start` says on which side the vehicle is.
+pub(super) fn trilaterate(
+    ranges: &[(Vector3<f64>, Length)],
+    depth: Option<Length>,
+    start: Vector3<f64>,
+) -> Option<Found> {
+    let mut kept = ranges.to_vec();
+    loop {
+        let free = (kept.len() + usize::from(depth.is_some())).checked_sub(3)?;
+        let (found, cost) = fit(&kept, depth, start)?;
+        if free == 0 || cost <= LIMITS[free.min(LIMITS.len() - 1)] {
+            return Some(found);
+        }
+        // Leaving one out must leave something that could contradict.
+        if free == 1 {
+            return None;
+        }
+        let without = |k: usize| {
+            let rest: Vec<_> = kept.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, r)| *r).collect();
+            fit(&rest, depth, start).map_or(f64::INFINITY, |(_, cost)| cost)
+        };
+        let worst = (0..kept.len()).map(|k| (k, without(k))).min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        kept.remove(worst);
+    }
+}
+
+/// The fit, and its weighted sum of squares.
+fn fit(ranges: &[(Vector3<f64>, Length)], depth: Option<Length>, start: Vector3<f64>) -> Option<(Found, f64)> {
+    // (direction, what is missing, σ, its common part) of each measurement at a place.
+    let rows = |at: &Vector3<f64>| -> Vec<(Vector3<f64>, f64, Length)> {
+        let range = |(place, range): &(Vector3<f64>, Length)| {
+            let way = at - place;
+            let length = way.norm().max(1e-6);
+            (way / length, range.value - length, *range)
+        };
+        let down = depth.map(|depth| (Vector3::z(), depth.value - at.z, depth));
+        ranges.iter().map(range).chain(down).collect()
+    };
+    let cost = |at: &Vector3<f64>| rows(at).iter().map(|(_, miss, l)| (miss / l.sigma()).powi(2)).sum::<f64>();
+    let normal = |at: &Vector3<f64>| {
+        rows(at).iter().fold((Matrix3::zeros(), Vector3::zeros()), |(h, g), (along, miss, length)| {
+            let weight = length.sigma().powi(-2);
+            (h + along * along.transpose() * weight, g + along * (miss * weight))
+        })
+    };
+    let (mut at, mut now, mut damping) = (start, cost(&start), 1e-6);
+    for _ in 0..STEPS {
+        let (h, g) = normal(&at);
+        let damped = h + Matrix3::from_diagonal_element(damping * h.trace());
+        let step = damped.cholesky()?.solve(&g);
+        let (next, then) = (at + step, cost(&(at + step)));
+        if then <= now {
+            (at, now, damping) = (next, then, (damping * 0.1).max(1e-12));
+            if step.norm() < STILL {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+        }
+    }
+    let (h, _) = normal(&at);
+    let whole = h.cholesky()?.inverse();
+    if !(whole.symmetric_eigenvalues().max() < UNKNOWN * UNKNOWN) {
+        return None;
+    }
+    let spread = |share: fn(&Length) -> f64| {
+        let sum = rows(&at).iter().fold(Matrix3::zeros(), |sum, (along, _, length)| {
+            let gain = whole * along * length.sigma().powi(-2);
+            sum + gain * gain.transpose() * share(length).powi(2)
+        });
+        0.5 * (sum + sum.transpose())
+    };
+    Some((Found { at, noise: spread(|l| l.noise.max(1e-3)), common: spread(|l| l.common) }, now))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn around() -> [Vector3<f64>; 5] {
+        [[-60.0, -50.0, 38.0], [70.0, -40.0, 39.0], [55.0, 65.0, 37.0], [-50.0, 60.0, 40.0], [0.0, 90.0, 36.0]]
+            .map(Vector3::from)
+    }
+
+    fn heard(at: &Vector3<f64>, n: usize) -> Vec<(Vector3<f64>, Length)> {
+        let range = |t: &Vector3<f64>| (*t, Length { value: (at - t).norm(), noise: 0.1, common: 0.05 });
+        around()[..n].iter().map(range).collect()
+    }
+
+    #[test]
+    fn exact_ranges_give_the_exact_place() {
+        let at = Vector3::new(12.0, -7.0, 34.5);
+        let depth = Some(Length { value: at.z, noise: 0.02, common: 0.1 });
+        for (n, depth) in [(2, depth), (3, depth), (4, None), (5, depth)] {
+            let start = Vector3::new(0.0, -1.0, 20.0);
+            let found = trilaterate(&heard(&at, n), depth, start).unwrap();
+            assert!((found.at - at).norm() < 1e-6, "{n}: {}", found.at);
+        }
+        assert_eq!(trilaterate(&heard(&at, 1), depth, Vector3::zeros()), None);
+        assert_eq!(trilaterate(&heard(&at, 2), None, Vector3::zeros()), None);
+    }
+
+    #[test]
+    fn an_echo_is_left_out_where_it_can_be_told() {
+        let at = Vector3::new(12.0, -7.0, 34.5);
+        let depth = Some(Length { value: at.z, noise: 0.02, common: 0.1 });
+        for echo in 0..5 {
+            let mut ranges = heard(&at, 5);
+            ranges[echo].1.value += 4.0;
+            let found = trilaterate(&ranges, depth, Vector3::new(0.0, 0.0, 20.0)).unwrap();
+            assert!((found.at - at).norm() < 1e-6, "{echo}: {}", found.at);
+        }
+        // Of three ranges and a depth one is too many, and nothing says which: no position instead of a false one.
+        let mut ranges = heard(&at, 3);
+        ranges[1].1.value += 4.0;
+        assert_eq!(trilaterate(&ranges, depth, Vector3::zeros()), None);
+    }
+
+    #[test]
+    fn places_on_one_line_give_no_position() {
+        let ranges: Vec<_> = [0.0_f64, 40.0, 100.0]
+            .map(|x| (Vector3::new(x, 0.0, 40.0), Length { value: 50.0, noise: 0.1, common: 0.0 }))
+            .into();
+        // On the line itself nothing tells north from south.
+        let depth = Some(Length { value: 40.0, noise: 0.02, common: 0.1 });
+        let on_line: Vec<_> = ranges.iter().map(|(t, l)| (*t, Length { value: (t.x - 30.0).abs(), ..*l })).collect();
+        assert_eq!(trilaterate(&on_line, depth, Vector3::new(20.0, 0.0, 40.0)), None);
+    }
+}
