@@ -160,18 +160,18 @@ const SILENT: [&str; 2] = ["as-points", "clearance"];
 fn with(table: &Table, settings: &str) -> Table {
     let mut table = table.clone();
     for setting in settings.split(';').filter(|text| !text.is_empty()) {
-        let (key, value) = setting.split_once('=').unwrap();
-        let value = toml::from_str::<Table>(&format!("value={value}")).unwrap()["value"].clone();
+        let (key, value) = setting.split_once('=').expect("key=value");
+        let value = toml::from_str::<Table>(&format!("value={value}")).expect("the value is TOML")["value"].clone();
         let mut keys: Vec<&str> = key.split('.').collect();
-        let last = keys.pop().unwrap();
-        let place = keys.iter().fold(&mut table, |at, key| at[*key].as_table_mut().unwrap());
+        let last = keys.pop().expect("a key has a name");
+        let place = keys.iter().fold(&mut table, |at, key| at[*key].as_table_mut().expect("settings are in tables"));
         assert!(place.insert(last.to_owned(), value).is_some(), "there is no setting {key}");
     }
     table
 }
 
 fn look(table: &Table, images: bool) -> Seen {
-    seen(&table.clone().try_into::<Mission>().unwrap(), images)
+    seen(&table.clone().try_into::<Mission>().expect("these are settings"), images)
 }
 
 /// All settings, as dotted keys.
@@ -195,7 +195,6 @@ fn the_list_of_settings_is_complete() {
 
 #[test]
 fn every_setting_does_something_and_nothing_where_its_factor_is_off() {
-    // Seen to fail with the blur of scattered light left in clear water.
     let table = Table::try_from(base()).unwrap();
     let mut faults = Vec::new();
     let mut before: HashMap<(String, bool), Seen> = HashMap::new();

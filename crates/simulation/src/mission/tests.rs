@@ -156,8 +156,7 @@ fn frames_of_points() {
 
 #[test]
 fn a_lamp_in_the_middle_of_a_large_body_is_refused() {
-    // A block of 4 m around the first lamp: no surface within 1.5 m of it. Seen to pass as free without the look
-    // for what encloses.
+    // A block of 4 m around the first lamp: no surface within 1.5 m of it.
     let mut plan = crate::field::built_in("drill-centre").unwrap();
     let rail = Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() };
     let free = Mission { vehicle: rail, clearance: 0.0, frames: 1, ..small() };

@@ -79,7 +79,6 @@ fn the_gyros_allan_deviation_falls_with_the_root_of_time_to_its_floor() {
 fn the_bias_of_the_gyro_has_the_allan_deviation_of_its_process() {
     // Of a bias with standard deviation s and time constant T, over means of τ (IEEE Std 952):
     // σ²(τ) = 2 s² T/τ · (1 − T/(2τ)·(3 − 4 e^{−τ/T} + e^{−2τ/T})), highest about τ = 1.9 T. Mean of twelve dives.
-    // Seen to fail with a bias whose steps do not depend on the rate.
     let (s, constant) = (200.0_f64, 10.0);
     for rate in [5.0, 20.0] {
         let sensor =
@@ -175,10 +174,9 @@ fn among_five() -> Sensors {
 
 #[test]
 fn positions_among_transponders_err_as_their_covariance_says() {
-    // Seen to fail with the survey's error left out of what errs alike: NEES 6.
     let (track, field) = (track(60), field());
     let sensors = among_five();
-    let (mut nees, mut n, mut fixes) = (0.0, 0.0, 0);
+    let (mut nees, mut n, mut fixes, mut good) = (0.0, 0.0, 0, 0);
     for dive in 0..120 {
         let navigation = Navigation::new(&sensors, &[], &track, &field, 40.0, (4, dive));
         let rough = navigation.at(37.3).unwrap();
@@ -189,12 +187,14 @@ fn positions_among_transponders_err_as_their_covariance_says() {
             // Now and then too few answers come, or they contradict each other.
             let Some(fix) = reading.value.1 else { continue };
             let at = track.at(reading.time).world_from_body * seafix_geometry::Point::new(0.3, 0.0, -0.5);
-            assert!((fix.at - at.coords).norm() < 5.0 * fix.sigma.norm() && fix.sigma.norm() < 0.3);
+            assert!((fix.at - at.coords).norm() < 5.0 * fix.sigma.norm());
+            // Three answers and the depth are enough, and say less than five.
+            good += usize::from(fix.sigma.norm() < 0.3);
             fixes += 1;
         }
     }
     let mean: f64 = nees / n;
-    assert!((mean - 3.0).abs() < 0.9 && fixes > 120 * 20, "{mean} {fixes}");
+    assert!((mean - 3.0).abs() < 0.9 && fixes > 120 * 20 && good > 120 * 19, "{mean} {fixes}");
 }
 
 #[test]

@@ -35,13 +35,17 @@ pub(super) struct Found {
 /// The place (north, east, down) that fits ranges to places, and a depth, by least squares. With more than needed, ranges
 /// that contradict the others are left out, worst first; what stays contradictory, and too little, is no position.
 ///
-/// Places at one depth have a mirror image below them: `start` says on which side the vehicle is.
+/// Two ranges and a depth fit two places, on either side of the line between: no position. Places at one depth have a
+/// mirror image below them: `start` says on which side the vehicle is.
 pub(super) fn trilaterate(
     ranges: &[(Vector3<f64>, Length)],
     depth: Option<Length>,
     start: Vector3<f64>,
 ) -> Option<Found> {
     let mut kept = ranges.to_vec();
+    if kept.len() < 3 {
+        return None;
+    }
     loop {
         let free = (kept.len() + usize::from(depth.is_some())).checked_sub(3)?;
         let (found, cost) = fit(&kept, depth, start)?;
@@ -128,13 +132,14 @@ mod tests {
     fn exact_ranges_give_the_exact_place() {
         let at = Vector3::new(12.0, -7.0, 34.5);
         let depth = Some(Length { value: at.z, noise: 0.02, common: 0.1 });
-        for (n, depth) in [(2, depth), (3, depth), (4, None), (5, depth)] {
+        for (n, depth) in [(3, depth), (4, None), (5, depth)] {
             let start = Vector3::new(0.0, -1.0, 20.0);
             let found = trilaterate(&heard(&at, n), depth, start).unwrap();
             assert!((found.at - at).norm() < 1e-6, "{n}: {}", found.at);
         }
         assert_eq!(trilaterate(&heard(&at, 1), depth, Vector3::zeros()), None);
-        assert_eq!(trilaterate(&heard(&at, 2), None, Vector3::zeros()), None);
+        // Seen to give the place on the wrong side where two were enough.
+        assert_eq!(trilaterate(&heard(&at, 2), depth, Vector3::zeros()), None);
     }
 
     #[test]

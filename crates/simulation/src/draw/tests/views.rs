@@ -25,7 +25,7 @@ fn depths_of_the_two_images_agree() {
                 let z = f64::from(ours[v * 512 + u]);
                 // f b / Z, in pixels of half the size.
                 let there = u as f64 - 250.0 * 0.25 / z;
-                if !z.is_finite() || there < 1.0 || there > 510.0 {
+                if !z.is_finite() || !(1.0..=510.0).contains(&there) {
                     continue;
                 }
                 let (k, t) = (there as usize, there.fract());
