@@ -194,6 +194,7 @@ fn the_list_of_settings_is_complete() {
 }
 
 #[test]
+#[ignore = "minutes: cargo test --release --workspace --test settings -- --ignored"]
 fn every_setting_does_something_and_nothing_where_its_factor_is_off() {
     let table = Table::try_from(base()).unwrap();
     let mut faults = Vec::new();
