@@ -95,7 +95,7 @@ fn files(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
 }
 
 /// Reports that a repository keeps are made again to the last byte, from the logs or from nothing; what was changed in
-/// them, and a sentence of the page that sums them up, is noticed. Seen to fail with durations in the logs.
+/// them, and in the page that sums them up, is noticed.
 #[test]
 fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     let folder = tempfile::tempdir().unwrap();

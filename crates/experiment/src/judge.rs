@@ -25,71 +25,75 @@ struct TrueTarget<'a> {
     visible: Option<Vec<bool>>,
 }
 
-/// Fills in what only truth can tell: the truth itself and the evaluation of every attempt.
-pub(crate) fn judge(
-    record: &mut FrameRecord,
-    (sighting, underway): (&Sighting, Option<&Underway>),
-    truth: &Truth,
-    site: &Site,
-    targets: &[Target],
-    kind: TargetKind,
-    rig: &StereoRig,
-) {
-    let known: Vec<Option<TrueTarget<'_>>> = targets
-        .iter()
-        .enumerate()
-        .map(|(index, target)| {
-            let objects = match kind {
-                TargetKind::Object | TargetKind::Joint => vec![index],
-                TargetKind::Site => (0..site.objects.len()).collect(),
-            };
-            true_target(target, &objects, site, truth, kind)
-        })
-        .collect();
-    record.truth = Some(TruthRecord {
-        world_from_camera: truth.world_from_camera.rows(),
-        world_from_object: known
-            .iter()
-            .flatten()
-            .map(|known| (known.target.name.clone(), known.world_from_object.rows()))
-            .collect(),
-        visible: known.iter().flatten().flat_map(visible_points).collect(),
-    });
-    if let Some(inputs) = &mut record.inputs {
-        inputs.truth = Some(exact::truth(truth, site));
-    }
-    if let (Some(underway), Some(row)) = (underway, &mut record.navigation) {
-        row.errors = errors(underway, &known, truth);
-    }
-    for (attempt, row) in sighting.attempts.iter().zip(record.targets.iter_mut()) {
-        let Some(known) = &known[attempt.target] else { continue };
-        let identified = row.evaluation.identified;
-        let visible = count_visible(known, rig);
-        row.evaluation = Evaluation { identified, visible, wrong: Some(false), ..Evaluation::default() };
-        if let Some((_, bound)) =
-            truth.bound.filter(|(object, _)| kind != TargetKind::Site && *object == attempt.target)
-        {
-            let true_pose = known.world_from_object.inverse() * truth.world_from_camera;
-            let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
-            row.evaluation.m2_bound = Some(transfer_bound(&bound, &true_pose, &model));
-            row.evaluation.m3_bound = Some(bound.position_sigma());
+/// What a trial is judged by: the truth of an instant, and what it searches for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Judge<'a> {
+    pub(crate) truth: &'a Truth,
+    pub(crate) site: &'a Site,
+    pub(crate) targets: &'a [Target],
+    pub(crate) kind: TargetKind,
+    pub(crate) rig: &'a StereoRig,
+}
+
+impl<'a> Judge<'a> {
+    /// Fills in the evaluation of every attempt.
+    pub(crate) fn evaluate(&self, record: &mut FrameRecord, sighting: &Sighting, underway: Option<&Underway>) {
+        let Judge { truth, kind, rig, .. } = *self;
+        if let (Some(underway), Some(row)) = (underway, &mut record.navigation) {
+            row.errors = errors(underway, self);
         }
-        if let Outcome::Referenced(fix) = &attempt.answer.outcome {
-            evaluate(&mut row.evaluation, fix, known, sighting, truth, rig);
+        for (attempt, row) in sighting.attempts.iter().zip(record.targets.iter_mut()) {
+            let Some(known) = &self.known(attempt.target) else { continue };
+            let identified = row.evaluation.identified;
+            let visible = count_visible(known, rig);
+            row.evaluation = Evaluation { identified, visible, wrong: Some(false), ..Evaluation::default() };
+            if let Some((_, bound)) =
+                truth.bound.filter(|(object, _)| kind != TargetKind::Site && *object == attempt.target)
+            {
+                let true_pose = known.world_from_object.inverse() * truth.world_from_camera;
+                let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
+                row.evaluation.m2_bound = Some(transfer_bound(&bound, &true_pose, &model));
+                row.evaluation.m3_bound = Some(bound.position_sigma());
+            }
+            if let Outcome::Referenced(fix) = &attempt.answer.outcome {
+                evaluate(&mut row.evaluation, fix, known, sighting, truth, rig);
+            }
         }
+    }
+
+    /// Fills in the truth itself, which only a log holds.
+    pub(crate) fn tell(&self, record: &mut FrameRecord) {
+        let known: Vec<TrueTarget<'_>> = (0..self.targets.len()).filter_map(|index| self.known(index)).collect();
+        record.truth = Some(TruthRecord {
+            world_from_camera: self.truth.world_from_camera.rows(),
+            world_from_object: known
+                .iter()
+                .map(|known| (known.target.name.clone(), known.world_from_object.rows()))
+                .collect(),
+            visible: known.iter().flat_map(visible_points).collect(),
+        });
+        if let Some(inputs) = &mut record.inputs {
+            inputs.truth = Some(exact::truth(self.truth, self.site));
+        }
+    }
+
+    /// The truth about one target.
+    fn known(&self, index: usize) -> Option<TrueTarget<'a>> {
+        let objects = match self.kind {
+            TargetKind::Object | TargetKind::Joint => index..index + 1,
+            TargetKind::Site => 0..self.site.objects.len(),
+        };
+        true_target(&self.targets[index], objects, self.site, self.truth, self.kind)
     }
 }
 
 /// How the navigated poses compare with truth, each relative to its own object.
-fn errors(underway: &Underway, known: &[Option<TrueTarget<'_>>], truth: &Truth) -> NavigationErrors {
+fn errors(underway: &Underway, judge: &Judge<'_>) -> NavigationErrors {
     let mut errors = NavigationErrors::default();
     let of = |navigated: &Navigated| {
-        let known = known[navigated.object].as_ref()?;
-        Some((
-            known,
-            navigated.standing.object_from_camera,
-            known.world_from_object.inverse() * truth.world_from_camera,
-        ))
+        let known = judge.known(navigated.object)?;
+        let true_pose = known.world_from_object.inverse() * judge.truth.world_from_camera;
+        Some((known, navigated.standing.object_from_camera, true_pose))
     };
     if let Some(navigated) = &underway.pose
         && let Some((known, estimate, true_pose)) = of(navigated)
@@ -111,19 +115,19 @@ fn errors(underway: &Underway, known: &[Option<TrueTarget<'_>>], truth: &Truth) 
 
 fn true_target<'a>(
     target: &'a Target,
-    objects: &[usize],
+    objects: std::ops::Range<usize>,
     site: &Site,
     truth: &Truth,
     kind: TargetKind,
 ) -> Option<TrueTarget<'a>> {
     let frame = match kind {
-        TargetKind::Object | TargetKind::Joint => objects[0],
+        TargetKind::Object | TargetKind::Joint => objects.start,
         TargetKind::Site => site.frame,
     };
     let camera_from_world = truth.world_from_camera.inverse();
     let mut points = Vec::with_capacity(target.points.len());
     let mut visible = truth.visible.as_ref().map(|_| Vec::with_capacity(target.points.len()));
-    for &o in objects {
+    for o in objects {
         let camera_from_object = camera_from_world * truth.world_from_object[o]?;
         for (p, point) in site.objects[o].points.iter().enumerate() {
             points.push(camera_from_object * point.at);

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6};
 use seafix_component::Registry;
 use seafix_evaluation::alert_limit;
-use seafix_geometry::{Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
+use seafix_geometry::{MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
     Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, ModelPoint,
     Outcome as Logged, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
@@ -74,7 +74,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
     }
 }
 
-/// What one frame gave, without truth.
+/// What came of one frame, without truth: what the tables of results hold.
 pub(crate) fn frame(
     number: u64,
     sight: &Sight,
@@ -96,35 +96,32 @@ pub(crate) fn frame(
         };
         attempts.push(TargetRecord::not_attempted(search, solver, reason));
     }
-    let mut inputs = exact::inputs(sight, &sighting.cloud);
-    inputs.exact_images &= trial.resolved.log.images == ImagesLogged::All;
     FrameRecord {
         frame: number,
         stamp_ns: sight.stamp_ns,
-        images: match &sight.eyes {
-            Eyes::Pair(left, right) => {
-                let level = trial.resolved.log.images;
-                level.logged(grey(left)).zip(level.logged(grey(right))).map(<[GreyImage; 2]>::from)
-            }
-            Eyes::Points(_) => None,
-        },
-        key_points: sighting.keypoints.iter().map(|keypoint| uv(&keypoint.at)).collect(),
-        cloud: sighting
-            .cloud
-            .iter()
-            .map(|point| CloudPoint {
-                at: point.position.at.coords.into(),
-                covariance: rows3(&point.position.covariance),
-                pixels: point.pixels.map(|pixels| pixel_pair(&pixels.at)),
-            })
-            .collect(),
-        prior: sight.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() }),
-        truth: None,
         targets: attempts,
         times: FrameTimes { odometry_ms: underway.map(|underway| underway.odometry_ms), ..sighting.times },
         navigation: underway.map(|underway| Box::new(underway.record.clone())),
-        inputs: Some(Box::new(inputs)),
+        ..FrameRecord::default()
     }
+}
+
+/// Adds what only a log holds: what was seen, and what the method was given.
+pub(crate) fn complete(record: &mut FrameRecord, sight: &Sight, sighting: &Sighting, images: ImagesLogged) {
+    let mut inputs = exact::inputs(sight, &sighting.cloud);
+    inputs.exact_images &= images == ImagesLogged::All;
+    record.inputs = Some(Box::new(inputs));
+    if let Eyes::Pair(left, right) = &sight.eyes {
+        record.images = images.logged(grey(left)).zip(images.logged(grey(right))).map(<[GreyImage; 2]>::from);
+    }
+    record.key_points = sighting.keypoints.iter().map(|keypoint| uv(&keypoint.at)).collect();
+    let point = |point: &MeasuredPoint| CloudPoint {
+        at: point.position.at.coords.into(),
+        covariance: rows3(&point.position.covariance),
+        pixels: point.pixels.map(|pixels| pixel_pair(&pixels.at)),
+    };
+    record.cloud = sighting.cloud.iter().map(point).collect();
+    record.prior = sight.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() });
 }
 
 /// What came of one target.

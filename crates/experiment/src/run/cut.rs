@@ -47,7 +47,7 @@ pub(super) fn cut(plan: &Plan, groups: &[Group<'_>]) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
     for (place, group) in groups.iter().enumerate() {
         let frames = group.passage.frames();
-        let size = size(group);
+        let size = size(group, groups.len());
         let count = frames.div_ceil(size).max(1);
         let (every, failures) = match group.passage.images() {
             true => (1, 0),
@@ -64,9 +64,10 @@ pub(super) fn cut(plan: &Plan, groups: &[Group<'_>]) -> Vec<Piece> {
     pieces
 }
 
-/// How many frames a piece of `group` has: few enough that some dozen pieces keep all threads busy and that their rows
-/// fit into memory, many enough that their files are no burden, and that what joint fixes look back on is little beside.
-fn size(group: &Group<'_>) -> usize {
+/// How many frames a piece of `group`, one of `groups`, has: few enough that some dozen pieces keep all threads busy and
+/// that their rows fit into memory, many enough that their files, each of which begins with all that is the same for its
+/// trial, are no burden, and that what joint fixes look back on is little beside.
+fn size(group: &Group<'_>, groups: usize) -> usize {
     /// The most rows, over all trials.
     const ROWS: usize = 32_768;
     let frames = group.passage.frames();
@@ -75,8 +76,13 @@ fn size(group: &Group<'_>) -> usize {
         return frames.max(1);
     }
     let (least, most) = if group.passage.images() { (1, 8) } else { (16, 8192) };
-    let size = (frames / 64).clamp(least, most).min(ROWS / group.trials.len().min(ROWS)).max(1);
+    let size = (frames / pieces(groups)).clamp(least, most).min(ROWS / group.trials.len().min(ROWS)).max(1);
     size.max(4 * group.looks_back())
+}
+
+/// Into how many pieces each of so many groups is cut at most: 64, or so many that all groups together have 256.
+fn pieces(groups: usize) -> usize {
+    (256 / groups.max(1)).clamp(2, 64)
 }
 
 /// Of `frames` frames of about `bytes` each, what a log of at most `most` bytes holds: all, or every k-th in half of it
@@ -98,6 +104,11 @@ pub(super) fn bytes(groups: &[Group<'_>], pieces: &[&Piece]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn many_groups_are_cut_into_fewer_pieces_each() {
+        assert_eq!([1, 4, 12, 72, 500].map(pieces), [64, 64, 21, 3, 2]);
+    }
 
     #[test]
     fn few_frames_are_all_logged_and_many_within_the_budget() {

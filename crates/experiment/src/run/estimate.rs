@@ -38,7 +38,7 @@ pub fn estimate(plan: &Plan) -> Result<Estimate, RunError> {
             // The first frames where one follows from the other, else some over the whole way.
             let index = if group.navigates() { k } else { k * (count - 1) / (tried - 1).max(1) };
             let looked = group.look(index.min(count - 1), &mut voyages).map_err(input)?;
-            group.record(index.min(count - 1), looked, &[]);
+            group.record(index.min(count - 1), looked, &[], |_, _| true);
         }
         work += first.elapsed().mul_f64(count as f64 / tried.max(1) as f64);
     }

@@ -11,7 +11,7 @@ use seafix_simulation::{Purpose, Stream};
 use super::RunError;
 use crate::{
     ImagesLogged, Plan, Sighting, Trial,
-    judge::judge,
+    judge::Judge,
     navigate::{Underway, Voyage},
     record,
     source::{Eyes, Passage, Sight},
@@ -144,8 +144,15 @@ impl Group<'_> {
     }
 
     /// The records of one frame, a trial each: what is solved together is joined, then truth is asked. `glimpses` are
-    /// those of the frames before, the last of them the frame's own.
-    pub(super) fn record(&self, index: usize, looked: Looked, glimpses: &[Vec<Glimpse>]) -> Vec<FrameRecord> {
+    /// those of the frames before, the last of them the frame's own. Of a record that `logged` does not want, by the
+    /// trial's place and what tables hold of it, only that is made.
+    pub(super) fn record(
+        &self,
+        index: usize,
+        looked: Looked,
+        glimpses: &[Vec<Glimpse>],
+        mut logged: impl FnMut(usize, &FrameRecord) -> bool,
+    ) -> Vec<FrameRecord> {
         let passage = &*self.passage;
         let truth = passage.truth(index);
         let sightings = looked.sightings.into_iter().enumerate();
@@ -157,12 +164,22 @@ impl Group<'_> {
                     let before: Vec<&Glimpse> = before[back..].iter().map(|all| &all[which]).collect();
                     trial.stages.join(&mut sighting, &before, &own[which], targets, passage.rig());
                 }
-                let mut record =
-                    record::frame(passage.number(index), &looked.sight, &sighting, underway.as_ref(), trial, targets);
-                if let Some(truth) = &truth {
-                    let kind = trial.stages.settings().target;
-                    let made = (&sighting, underway.as_ref());
-                    judge(&mut record, made, truth, passage.site(), targets, kind, passage.rig());
+                let number = passage.number(index);
+                let mut record = record::frame(number, &looked.sight, &sighting, underway.as_ref(), trial, targets);
+                let kind = trial.stages.settings().target;
+                let judge = truth.as_ref().map(|truth| Judge {
+                    truth,
+                    site: passage.site(),
+                    targets,
+                    kind,
+                    rig: passage.rig(),
+                });
+                if let Some(judge) = &judge {
+                    judge.evaluate(&mut record, &sighting, underway.as_ref());
+                }
+                if logged(which, &record) {
+                    record::complete(&mut record, &looked.sight, &sighting, trial.resolved.log.images);
+                    judge.iter().for_each(|judge| judge.tell(&mut record));
                 }
                 record
             })

@@ -94,13 +94,17 @@ fn make(
         }
         let mut looked = group.look(index, &mut voyages).map_err(input)?;
         glimpses.push(std::mem::take(&mut looked.glimpses));
-        let records = group.record(index, looked, &glimpses);
+        let mut kept = vec![false; outputs.len()];
+        let records = group.record(index, looked, &glimpses, |which, record| {
+            kept[which] = outputs[which].thinned.keeps(record);
+            kept[which]
+        });
         glimpses.drain(..glimpses.len().saturating_sub(back));
-        for (mut record, output) in records.into_iter().zip(&mut outputs) {
+        for ((mut record, output), kept) in records.into_iter().zip(&mut outputs).zip(kept) {
             if !timed {
                 forget_times(&mut record);
             }
-            if output.thinned.keeps(&record) {
+            if kept {
                 output.log.frame(&record)?;
             }
             Row::of(&output.trial, &record).for_each(|row| output.table.add(&row));

@@ -6,7 +6,7 @@ use crate::{
     content::tell::{self, Unit},
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
-    format::{headed, short, unit},
+    format::{headed, short},
     run::{Run, Trial},
 };
 
@@ -91,7 +91,7 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
             lines.push(Layer::Marks { series: index, points: line, radius: 2.2 });
         }
         layers.extend(lines);
-        if unit(&key) == Some("m") && short(&key) == "distance" {
+        if ranges(&key) {
             layers.splice(0..0, laws(&ticks, &all));
         }
         if field == Field::M1 {
@@ -103,7 +103,7 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
     }
     let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
     let chart = Chart { panels: drawn, columns: 2, page: true, shape: 0.78, legend };
-    let laws = if short(&key) == "distance" {
+    let laws = if ranges(&key) {
         " Thin grey lines: growth with the distance z and with its square."
     } else {
         ""
@@ -113,6 +113,11 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
         short(&key)
     );
     figure("error-over-condition", caption(&said, run), &chart, data)
+}
+
+/// Whether a condition is how far off the objects are, or nearly so.
+fn ranges(key: &str) -> bool {
+    matches!(short(key), "distance" | "altitude")
 }
 
 /// z and z², through the middle of the values at the least distance.
