@@ -103,11 +103,7 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
     }
     let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
     let chart = Chart { panels: drawn, columns: 2, page: true, shape: 0.78, legend };
-    let laws = if ranges(&key) {
-        " Thin grey lines: growth with the distance z and with its square."
-    } else {
-        ""
-    };
+    let laws = if ranges(&key) { " Thin grey lines: growth with the distance z and with its square." } else { "" };
     let said = format!(
         "Error over {}: medians of the fixes found, bars from the 5 % to the 95 % quantile, moved apart a little; the shaded range is the m1 that the paper reports for its virtual scene at 2–5 m.{laws}",
         short(&key)
