@@ -2,7 +2,7 @@
 
 use seafix_geometry::StereoRig;
 
-use crate::{Descriptor, Detector, EpipolarBand, Harris, Image, Match, Matcher, Surf, View, Workspace};
+use crate::{Descriptor, Detector, EpipolarBand, Harris, Image, Match, Surf, View, Workspace};
 
 /// How many matches two images have as they came and with their places exchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,7 +28,8 @@ impl Sides {
     pub fn of(left: &View<'_>, right: &View<'_>, rig: &StereoRig, work: &mut Workspace) -> Self {
         let mut find = |rig: &StereoRig| {
             let mut found = Vec::new();
-            EpipolarBand::default().match_into(left, right, rig, work, &mut found);
+            // A pattern fits in either order: left out of one alone it would speak for the other.
+            EpipolarBand::default().find([left, right], rig, true, work, &mut found);
             found
         };
         let (given, exchanged) = (find(rig), find(&rig.exchanged()));

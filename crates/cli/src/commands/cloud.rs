@@ -10,7 +10,7 @@ use seafix_experiment::{
     dataset::{DescribedRig, are_twins, read_image, read_rig, strangers, swapped_fault, twins_fault},
 };
 use seafix_geometry::StereoRig;
-use seafix_vision::{FrontEnd, Image, Look, OffLines, Sides, StageTimes, Threads};
+use seafix_vision::{FrontEnd, Image, Keypoint, Look, OffLines, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
 use super::limits::Limits;
@@ -85,6 +85,7 @@ impl Cloud {
         let warnings: Vec<Fault> = warning
             .into_iter()
             .chain(off_lines)
+            .chain(self.blind(&look, [&left, &right]))
             .chain(
                 strangers(sides, &self.left).or_else(|| nothing(&front_end, &look, [&left, &right], &rig, &self.left)),
             )
@@ -129,6 +130,20 @@ impl Cloud {
         });
         let times = times.collect();
         (look, times)
+    }
+
+    /// A word about each image in which there is nothing to find.
+    fn blind(&self, look: &Look, images: [&Image; 2]) -> Vec<Fault> {
+        let of = |((file, image), found): ((&PathBuf, &Image), &[Keypoint])| {
+            let (least, most) = image.pixels().iter().fold((f32::MAX, f32::MIN), |(a, b), &p| (a.min(p), b.max(p)));
+            found.is_empty().then(|| {
+                let [width, height] = [image.width(), image.height()];
+                Fault::new("an image without a key point", file)
+                    .value(format!("{width} x {height} px, grey levels from {least} to {most}"))
+                    .remedy("see whether its camera saw anything, and whether the detector asks for too much")
+            })
+        };
+        [&self.left, &self.right].into_iter().zip(images).zip(look.keypoints()).filter_map(of).collect()
     }
 
     /// For people: how much was found, and how long each stage took.
@@ -203,6 +218,9 @@ fn off_lines_warning(off: OffLines, rig: &StereoRig, file: &Path) -> Option<Faul
     })
 }
 
+/// Fewer points of exchanged images are no reason to exchange them.
+const SOME: usize = 10;
+
 /// A word where key points came to no point, and what the exchanged images would give.
 fn nothing(
     front_end: &FrontEnd,
@@ -218,7 +236,7 @@ fn nothing(
     let mut exchanged = Look::new(Threads::One);
     front_end.look(right, left, rig, &mut exchanged);
     let (matches, points) = (exchanged.matches.len(), exchanged.cloud.len());
-    let remedy = if points > 0 {
+    let remedy = if points >= SOME && 2 * points > matches {
         "exchange the images if they have changed places"
     } else {
         "see whether both show one scene, and whether the rig is theirs"

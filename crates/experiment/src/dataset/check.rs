@@ -120,11 +120,14 @@ pub fn swapped_fault(sides: Sides, file: &Path) -> Option<Fault> {
     })
 }
 
+/// Fewer matches of exchanged images are no reason to exchange them.
+const SOME: usize = 10;
+
 /// A word where key points have hardly any partners, and what the exchanged images would give.
 pub fn strangers(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_strangers().then(|| {
         let Sides { given, exchanged, keypoints } = sides;
-        let remedy = if exchanged > given {
+        let remedy = if exchanged >= SOME && exchanged > 3 * given {
             "exchange the images if they have changed places"
         } else {
             "see whether both show one scene, and whether the rig is theirs"

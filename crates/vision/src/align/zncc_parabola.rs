@@ -33,7 +33,7 @@ pub struct ZnccParabola {
     pub reach: usize,
     /// The least zero-normalised cross correlation.
     pub least_correlation: f64,
-    /// Standard deviation of what the paraboloid is off by (px).
+    /// Standard deviation of what the paraboloid is off by where surfaces slant as those of boxes and walls do (px).
     pub floor_px: f64,
     /// What becomes of a pair that could not be aligned.
     pub unaligned: Unaligned,
@@ -41,7 +41,7 @@ pub struct ZnccParabola {
 
 impl Default for ZnccParabola {
     fn default() -> Self {
-        Self { window: 11, reach: 2, least_correlation: 0.8, floor_px: 0.02, unaligned: Unaligned::Drop }
+        Self { window: 11, reach: 2, least_correlation: 0.8, floor_px: 0.05, unaligned: Unaligned::Drop }
     }
 }
 

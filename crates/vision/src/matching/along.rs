@@ -19,13 +19,15 @@ pub(super) struct Test {
     pub(super) squared_ratio: f32,
     /// How many neighbours support a pair; 0: descriptors alone decide.
     pub(super) neighbours: usize,
+    /// Whether pairs of patterns that repeat themselves stay, which may be a period off.
+    pub(super) patterns: bool,
 }
 
 impl Along {
     /// Visits the pairs that are each other's clearly nearest, with the squared distance of their descriptors, in the
     /// order of the left key points. Only pairs compete that `visit(i, ..)` names for left key point `i`; distance is
     /// that of the descriptors or, with neighbours, the inverse of a pair's supported weight, and then an
-    /// ambiguous pair is left out.
+    /// ambiguous pair is left out unless patterns stay.
     pub(super) fn search(
         &mut self,
         test: Test,
@@ -53,8 +55,9 @@ impl Along {
         pairs.extend(nearest.mutual().filter(|pair| pair.clear(clear)).map(|pair| (pair.left, pair.right)));
         ambiguous.clear();
         ambiguous.resize(pairs.len(), false);
-        if supported && clear < 1.0 {
+        if supported && clear < 1.0 && !test.patterns {
             candidates.ambiguous(pairs, clear, ambiguous);
+            candidates.spread(left, pairs, test.neighbours, ambiguous);
         }
         for (&(i, j), _) in pairs.iter().zip(ambiguous).filter(|(_, ambiguous)| !**ambiguous) {
             accept(i, j, squared(i, j));

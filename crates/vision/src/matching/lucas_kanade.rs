@@ -14,7 +14,8 @@ use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
 /// by zero-normalised cross correlation at every pixel of its epipolar curve between the depths. The best of
 /// these places are followed to the full size and back by the tracker; a pair is the one that correlates best, if it
 /// lies on the epipolar curve. The right places are wherever they are found: right key points play no part.
-/// The distance of a pair is 1 minus the correlation. Of two pairs that end within a pixel the better stays.
+/// The distance of a pair is 1 minus the correlation. Of two pairs that end within a pixel the better stays. Nothing is asked of
+/// the second best place: of a pattern that repeats itself a pair may be a period off.
 ///
 /// Source: Lucas and Kanade, *An iterative image registration technique with an application to stereo vision*, 1981;
 /// Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000.
@@ -35,7 +36,7 @@ pub struct LucasKanade {
 
 impl Default for LucasKanade {
     fn default() -> Self {
-        Self { epipolar_px: 1.0, min_depth: 0.5, max_depth: 50.0, places: 3, tracker: Tracker::default() }
+        Self { epipolar_px: 1.0, min_depth: 0.1, max_depth: 50.0, places: 3, tracker: Tracker::default() }
     }
 }
 

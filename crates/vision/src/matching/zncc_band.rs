@@ -47,7 +47,7 @@ pub struct ZnccBand {
 
 impl Default for ZnccBand {
     fn default() -> Self {
-        Self { window: 11, least_correlation: 0.8, ratio: 0.85, epipolar_px: 1.0, min_depth: 0.5, max_depth: 50.0 }
+        Self { window: 11, least_correlation: 0.8, ratio: 0.85, epipolar_px: 1.0, min_depth: 0.1, max_depth: 50.0 }
     }
 }
 

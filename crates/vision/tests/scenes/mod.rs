@@ -51,8 +51,24 @@ fn noise(x: f64, y: f64) -> f64 {
     2.0 * (row(0) + v * (row(1) - row(0))) - 1.0
 }
 
+/// Cells of about 9 and 4 px, −1 to 1.
+fn texture(x: f64, y: f64) -> f64 {
+    0.6 * noise(x / 0.06, y / 0.06) + 0.4 * noise(x / 0.027 + 50.0, y / 0.027)
+}
+
 /// Both images in 8 bits: texture of ± `contrast` around 110 grey levels, noise of ± `grain` at most.
+#[allow(dead_code, reason = "not every test looks at both")]
 pub(crate) fn images(rig: &StereoRig, contrast: f64, grain: f64) -> [Image; 2] {
+    painted(rig, contrast, grain, texture)
+}
+
+/// The same with a tile of `side` (m) of that texture, over and over.
+#[allow(dead_code, reason = "not every test looks at both")]
+pub(crate) fn tiled(rig: &StereoRig, side: f64) -> [Image; 2] {
+    painted(rig, 60.0, 1.0, |x, y| texture(x.rem_euclid(side), y.rem_euclid(side)))
+}
+
+fn painted(rig: &StereoRig, contrast: f64, grain: f64, paint: impl Fn(f64, f64) -> f64) -> [Image; 2] {
     let back = rig.right_from_left().inverse();
     let eyes = [
         (rig.left(), Vector3::zeros(), UnitQuaternion::identity()),
@@ -65,10 +81,8 @@ pub(crate) fn images(rig: &StereoRig, contrast: f64, grain: f64) -> [Image; 2] {
             let at = Pixel { u: (i % SIZE[0]) as f64, v: (i / SIZE[0]) as f64 };
             let Some(direction) = camera.normalize(&at) else { return 0.0 };
             let p = hit(origin, rotation * direction.push(1.0));
-            // Cells of about 9 and 4 px.
-            let texture = 0.6 * noise(p.x / 0.06, p.y / 0.06) + 0.4 * noise(p.x / 0.027 + 50.0, p.y / 0.027);
             let grain = grain * (2.0 * hash(i as i64 + 7, 1000 * side) - 1.0);
-            (110.0 + contrast * texture + grain).round().clamp(0.0, 255.0) as f32
+            (110.0 + contrast * paint(p.x, p.y) + grain).round().clamp(0.0, 255.0) as f32
         };
         Image::new(SIZE[0], SIZE[1], (0..SIZE[0] * SIZE[1]).map(pixel).collect()).expect("as many as it has")
     })
