@@ -53,7 +53,7 @@ impl Component for Fast {
 
     fn check(&self) -> Result<(), String> {
         let Self { threshold, subpixel: _, radius, features, selection: _, cells } = *self;
-        in_range((0.0..f64::INFINITY).contains(&threshold), "threshold", threshold, "0 or more (grey levels)")?;
+        in_range((0.0..=65535.0).contains(&threshold), "threshold", threshold, "0 to 65535 (grey levels)")?;
         in_range(radius <= MOST_RADIUS, "radius", radius, "at most 1000 (px)")?;
         in_range(features > 0, "features", features, "at least 1")?;
         in_range(cells > 0, "cells", cells, "at least 1")
