@@ -63,7 +63,7 @@ fn changed(run: &Run) -> Option<Text> {
     let mut settings =
         run.header().command.split(" --set '").skip(1).filter_map(|rest| rest.split_once('\'')).peekable();
     settings.peek()?;
-    let mut said = text![bold("Not the experiment as its file says: "), "it was run with "];
+    let mut said = text![bold("Not the experiment as its file says:"), " it was run with "];
     for (index, (setting, _)) in settings.enumerate() {
         if index > 0 {
             said.push(", ".into());
