@@ -5,7 +5,7 @@ use std::time::Instant;
 use seafix_geometry::StereoRig;
 use seafix_referencing::{Glimpse, JointFixes, Member, Observations, Outcome, Target, TargetKind, joint_fixes};
 
-use crate::{Sighting, Stages, stages::milliseconds};
+use crate::{Attempt, Sighting, Stages, stages::milliseconds};
 
 impl Stages {
     /// How many frames before its own a frame's answer looks back on.
@@ -31,7 +31,7 @@ impl Stages {
     }
 
     /// Replaces the pose of every object fixed by itself by that of one fix over all of them and over the `before`
-    /// glimpses. Where the images contradict each other, or determine no joint fix, each keeps its own.
+    /// glimpses. Where the images contradict each other, or determine no joint fix, each keeps its own and is told why.
     pub(crate) fn join(
         &self,
         sighting: &mut Sighting,
@@ -51,8 +51,15 @@ impl Stages {
         let all: Vec<Glimpse> = before.iter().filter(related).copied().chain([own]).cloned().collect();
         let members: Vec<Member> = targets.iter().map(Target::member).collect();
         let confidence = self.settings().acceptance.confidence;
-        let Ok(Some(fixes)) = joint_fixes(rig, &members, &all, confidence) else { return };
-        replace(sighting, &fixes, targets, rig);
+        match joint_fixes(rig, &members, &all, confidence) {
+            Ok(fixes) => replace(sighting, &fixes, targets, rig),
+            Err(why) => {
+                let fixed = |attempt: &&mut Attempt| matches!(attempt.answer.outcome, Outcome::Referenced(_));
+                for attempt in sighting.attempts.iter_mut().filter(fixed) {
+                    attempt.apart = Some(format!("no joint fix, the pose is that of the object alone: {why}"));
+                }
+            }
+        }
         let spent = milliseconds(start);
         for attempt in &mut sighting.attempts {
             for time in [&mut attempt.times.solve_ms, &mut attempt.times.total_ms].into_iter().flatten() {
@@ -76,6 +83,7 @@ fn replace(sighting: &mut Sighting, fixes: &JointFixes, targets: &[Target], rig:
         (fix.object_from_camera, fix.covariance) = (pose, covariance);
         fix.used = (0..fix.pairs.len()).collect();
         let points = &targets[attempt.target].points;
-        fix.residual_rms = Observations::of(&fix.pairs, points, &sighting.cloud, Some(rig)).residual_rms(&pose);
+        let data = Observations::of(&fix.pairs, points, &sighting.cloud, Some(rig));
+        (fix.residuals, fix.residual_rms) = (data.residuals(&pose), data.residual_rms(&pose));
     }
 }

@@ -5,7 +5,7 @@ use seafix_component::Registry;
 use seafix_evaluation::alert_limit;
 use seafix_geometry::{MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
-    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, ModelPoint,
+    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, Integrity, ModelPoint,
     Outcome as Logged, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
 };
 use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
@@ -146,6 +146,8 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
             record.evaluation.identified = Some(fix.pairs.len() as u32);
             record.used = fix.used.iter().map(|&index| index as u32).collect();
             record.residual_rms = Some(fix.residual_rms);
+            record.integrity = Some(integrity(&fix.integrity));
+            record.detail = attempt.apart.clone().unwrap_or_default();
         }
         Outcome::Ambiguous(alternatives) => {
             record.outcome = Logged::Ambiguous;
@@ -162,6 +164,19 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
     record
+}
+
+fn integrity(it: &seafix_referencing::Integrity) -> Integrity {
+    Integrity {
+        redundancy: it.redundancy.name().to_owned(),
+        chi2: it.chi2,
+        freedom: it.freedom as u64,
+        chi2_limit: it.chi2_limit,
+        separation: it.separation,
+        separation_two: it.separation_two,
+        protection_position: it.protection.map(|level| level.position),
+        protection_attitude: it.protection.map(|level| level.attitude),
+    }
 }
 
 /// The components that did some work: a cloud that came without images was not looked at, points that say which ones they

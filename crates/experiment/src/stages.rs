@@ -47,6 +47,8 @@ pub struct Attempt {
     pub candidates: Candidates,
     /// The answer.
     pub answer: seafix_referencing::Attempt,
+    /// Why the joint fix that was asked for did not replace the answer.
+    pub apart: Option<String>,
     /// Times of this target's stages.
     pub times: TargetTimes,
     started: Instant,
@@ -62,7 +64,7 @@ impl Attempt {
         started: Instant,
     ) -> Self {
         let times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms: None };
-        Self { target, candidates, answer, times, started }
+        Self { target, candidates, answer, apart: None, times, started }
     }
 }
 

@@ -73,7 +73,7 @@ pub use png::encode_png;
 pub use read::{Reader, TrialLog, read};
 pub use record::{
     Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, Evaluation, ExactPose, FrameRecord,
-    FrameTimes, GreyImage, Inputs, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord, NavigationErrors,
+    FrameTimes, GreyImage, Inputs, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord, NavigationErrors,
     NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord, ProblemRecord, RigRecord, SitePoint,
     TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
 };

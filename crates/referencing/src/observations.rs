@@ -24,16 +24,30 @@ impl Observation {
         *object_from_camera * self.measured.at - self.model
     }
 
-    /// The covariance (m²) of the residual's noise, camera axes: Σ_measured + σ_model² I.
+    /// The covariance (m²) of the residual's noise, camera axes: Σ_measured + σ_model² I, and the square of
+    /// [`digits`](Self::digits), so that no point is known better than it is written.
     pub fn noise(&self) -> Matrix3<f64> {
-        self.measured.covariance + Matrix3::identity() * (self.model_sigma * self.model_sigma)
+        let digits = self.digits();
+        self.measured.covariance + Matrix3::identity() * (self.model_sigma * self.model_sigma + digits * digits)
     }
 
-    /// Whether every number in it is finite.
+    /// How well its coordinates can be known (m), whatever is said of their noise: a nanometre, and of coordinates beyond a
+    /// thousand kilometres what rounding leaves of them.
+    pub fn digits(&self) -> f64 {
+        const FLOOR: f64 = 1e-9;
+        FLOOR.max(4.0 * f64::EPSILON * self.measured.at.coords.amax().max(self.model.coords.amax()))
+    }
+
+    /// Whether every coordinate in it is finite.
     pub fn is_finite(&self) -> bool {
         // Nought times a number is nought where it is finite and not a number where it is not: six tests in one.
         let (seen, known) = (&self.measured.at.coords, &self.model.coords);
         (seen.x * 0.0 + seen.y * 0.0 + seen.z * 0.0) + (known.x * 0.0 + known.y * 0.0 + known.z * 0.0) == 0.0
+    }
+
+    /// Whether its noise is.
+    pub fn has_finite_noise(&self) -> bool {
+        self.model_sigma.is_finite() && self.measured.covariance.iter().all(|x| x.is_finite())
     }
 }
 
@@ -62,6 +76,11 @@ impl<'a> Observations<'a> {
             Observation { measured: seen.position, pixels: seen.pixels, model: known.at, model_sigma: known.sigma }
         });
         Self { points: points.collect(), rig }
+    }
+
+    /// The residual C·H − P of each point (m).
+    pub fn residuals(&self, object_from_camera: &Transform<Object, Camera>) -> Vec<Vector3<f64>> {
+        self.points.iter().map(|point| point.residual(object_from_camera)).collect()
     }
 
     /// Root mean square of the residuals C·H − P over all points (m): the paper's measure.

@@ -336,8 +336,8 @@ fn leaving_pairs_out_helps_against_nothing_but_residuals() {
     assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Prior { .. })), "{:?}", found.outcome);
 }
 
-/// A pipe: points near a line leave a turn about it free. The model points stay where they are, the vehicle does not. Seen
-/// to fail without the limit: the fix was believed at a standard deviation of 13°.
+/// A pipe: points near a line leave a turn about it free. The model points stay where they are, the vehicle does not. With a
+/// wide limit the fix is believed.
 #[test]
 fn an_attitude_that_points_near_a_line_leave_free_is_refused() {
     let near_line = |i: usize| {
@@ -347,7 +347,7 @@ fn an_attitude_that_points_near_a_line_leave_free_is_refused() {
     let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(4));
     let scene = (model, cloud, Candidates::from_pairs(7, (0..7).map(|i| (i, i))));
     let found = judged(&scene, None, &Acceptance::default(), Vec::new());
-    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Unturned { .. })), "{:?}", found.outcome);
+    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Attitude { .. })), "{:?}", found.outcome);
     let wide = Acceptance { attitude_limit: 10.0, ..Acceptance::default() };
     assert!(matches!(judged(&scene, None, &wide, Vec::new()).outcome, Outcome::Referenced(_)));
 }

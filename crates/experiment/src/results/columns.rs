@@ -1,6 +1,6 @@
 //! The columns of the table of results: one row a trial, frame and attempted target.
 
-use seafix_log::{FrameRecord, NavigationRecord, TargetRecord};
+use seafix_log::{FrameRecord, Integrity, NavigationRecord, TargetRecord};
 
 /// One row: an attempt, its frame and its trial.
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +14,10 @@ impl<'a> Row<'a> {
     /// The rows of one frame.
     pub(crate) fn of(trial: &'a str, frame: &'a FrameRecord) -> impl Iterator<Item = Self> {
         frame.targets.iter().map(move |target| Self { trial, frame, target })
+    }
+
+    fn integrity(&self) -> Option<&'a Integrity> {
+        self.target.integrity.as_ref()
     }
 
     fn navigation(&self) -> Option<&'a NavigationRecord> {
@@ -99,4 +103,12 @@ pub static COLUMNS: &[Column] = columns![
     Real "navigated_m3_attitude" = |r: &Row<'_>| r.navigation()?.errors.m3_attitude,
     Real "navigated_nees" = |r: &Row<'_>| r.navigation()?.errors.nees,
     Real "unreferenced_m3_position" = |r: &Row<'_>| r.navigation()?.errors.unreferenced_m3_position,
+    Text "redundancy" = |r: &Row<'_>| r.integrity().map_or_else(String::new, |it| it.redundancy.clone()),
+    Real "chi2" = |r: &Row<'_>| Some(r.integrity()?.chi2),
+    Whole "chi2_freedom" = |r: &Row<'_>| Some(r.integrity()?.freedom as i64),
+    Real "chi2_limit" = |r: &Row<'_>| Some(r.integrity()?.chi2_limit),
+    Real "separation" = |r: &Row<'_>| r.integrity()?.separation,
+    Real "separation_two" = |r: &Row<'_>| r.integrity()?.separation_two,
+    Real "protection_position" = |r: &Row<'_>| r.integrity()?.protection_position,
+    Real "protection_attitude" = |r: &Row<'_>| r.integrity()?.protection_attitude,
 ];

@@ -1,7 +1,9 @@
 //! What came of the attempts of a frame: results, candidates, evaluations, times.
 
 use super::{Malformed, flat, matrix, matrix_if_any};
-use crate::{Alternative, Evaluation, FrameRecord, FrameTimes, Outcome, Pair, TargetRecord, TargetTimes, proto};
+use crate::{
+    Alternative, Evaluation, FrameRecord, FrameTimes, Integrity, Outcome, Pair, TargetRecord, TargetTimes, proto,
+};
 
 /// The message that holds target `index` of `frame`, without candidates, evaluation and times.
 pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::ReferencingResult {
@@ -31,6 +33,33 @@ pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::Refere
         expected_chance_sets: target.expected_chance_sets,
         tests: target.tests,
         residual_rms: target.residual_rms,
+        integrity: target.integrity.as_ref().map(integrity_message),
+    }
+}
+
+fn integrity_message(it: &Integrity) -> proto::Integrity {
+    proto::Integrity {
+        redundancy: it.redundancy.clone(),
+        chi2: it.chi2,
+        freedom: it.freedom,
+        chi2_limit: it.chi2_limit,
+        separation: it.separation,
+        separation_two: it.separation_two,
+        protection_position: it.protection_position,
+        protection_attitude: it.protection_attitude,
+    }
+}
+
+fn integrity_record(it: proto::Integrity) -> Integrity {
+    Integrity {
+        redundancy: it.redundancy,
+        chi2: it.chi2,
+        freedom: it.freedom,
+        chi2_limit: it.chi2_limit,
+        separation: it.separation,
+        separation_two: it.separation_two,
+        protection_position: it.protection_position,
+        protection_attitude: it.protection_attitude,
     }
 }
 
@@ -84,6 +113,7 @@ pub(crate) fn result_record(
         expected_chance_sets: message.expected_chance_sets,
         tests: message.tests,
         residual_rms: message.residual_rms,
+        integrity: message.integrity.map(integrity_record),
         evaluation: Evaluation::default(),
         times: TargetTimes::default(),
     })

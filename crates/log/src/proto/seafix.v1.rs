@@ -599,7 +599,7 @@ pub struct ReferencingResult {
     /// Why not, in one word; empty when referenced.
     #[prost(string, tag = "8")]
     pub reason: ::prost::alloc::string::String,
-    /// Why not, in a sentence.
+    /// Why not, in a sentence; of a fix, why the joint fix did not replace it.
     #[prost(string, tag = "9")]
     pub detail: ::prost::alloc::string::String,
     /// 4 x 4, p_object = object_from_camera * p_camera; empty unless referenced.
@@ -630,6 +630,36 @@ pub struct ReferencingResult {
     /// Root mean square of C H - P over the pairs (m).
     #[prost(double, optional, tag = "19")]
     pub residual_rms: ::core::option::Option<f64>,
+    /// What supports the fix beyond its covariance; absent unless referenced.
+    #[prost(message, optional, tag = "20")]
+    pub integrity: ::core::option::Option<Integrity>,
+}
+/// What supports a fix beyond its covariance.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Integrity {
+    /// unmonitored (three points), detectable (four) or excludable (five and more).
+    #[prost(string, tag = "1")]
+    pub redundancy: ::prost::alloc::string::String,
+    /// Of the residuals at the most likely pose.
+    #[prost(double, tag = "2")]
+    pub chi2: f64,
+    #[prost(uint64, tag = "3")]
+    pub freedom: u64,
+    /// What chi2 exceeds with one minus the confidence.
+    #[prost(double, tag = "4")]
+    pub chi2_limit: f64,
+    /// How far the position moves at most (m) when one point is left out; absent where one cannot be spared.
+    #[prost(double, optional, tag = "5")]
+    pub separation: ::core::option::Option<f64>,
+    /// The same when two are; absent where two wrong matches are not assumed to happen.
+    #[prost(double, optional, tag = "6")]
+    pub separation_two: ::core::option::Option<f64>,
+    /// Protection levels: radii of the position (m) and of the attitude (rad) that the errors exceed with no more than the
+    /// stated risk; absent where nothing vouches for the fix.
+    #[prost(double, optional, tag = "7")]
+    pub protection_position: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "8")]
+    pub protection_attitude: ::core::option::Option<f64>,
 }
 /// A point of the target and the cloud point believed to be it, by their indices.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]

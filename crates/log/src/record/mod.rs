@@ -11,7 +11,7 @@ pub use frame::{CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, Prior
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SitePoint, TrueState};
 pub use navigation::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
-pub use target::{Alternative, Evaluation, Outcome, Pair, TargetRecord, TargetTimes};
+pub use target::{Alternative, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
 pub use totals::Totals;
 
 /// Three rows of three numbers.

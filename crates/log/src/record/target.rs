@@ -18,7 +18,8 @@ pub struct TargetRecord {
     /// Why not, in one word of the results' vocabulary (`too-few`, `chance`, `budget`, …); empty when
     /// referenced.
     pub reason: String,
-    /// Why not, in a sentence with numbers; empty when referenced.
+    /// Why not, in a sentence with numbers; of a fix, why the joint fix that was asked for did not replace it, and
+    /// empty otherwise.
     pub detail: String,
     /// The estimated pose, when referenced.
     pub object_from_camera: Option<Matrix4>,
@@ -42,6 +43,8 @@ pub struct TargetRecord {
     pub tests: Option<u64>,
     /// Root mean square of C·H − P over the pairs (m).
     pub residual_rms: Option<f64>,
+    /// What supports the fix beyond its covariance, when referenced.
+    pub integrity: Option<Integrity>,
     /// How it compares with truth.
     pub evaluation: Evaluation,
     /// Times of the stages that serve this target alone.
@@ -70,6 +73,7 @@ impl TargetRecord {
             expected_chance_sets: None,
             tests: None,
             residual_rms: None,
+            integrity: None,
             evaluation: Evaluation::default(),
             times: TargetTimes::default(),
         }
@@ -149,6 +153,27 @@ pub struct Alternative {
     pub pairs: Vec<Pair>,
     /// How well it explains the data; larger is better.
     pub score: f64,
+}
+
+/// What supports a fix beyond its covariance.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Integrity {
+    /// `unmonitored` (three points), `detectable` (four), `excludable` (five and more).
+    pub redundancy: String,
+    /// χ² of the residuals at the most likely pose.
+    pub chi2: f64,
+    /// Its degrees of freedom.
+    pub freedom: u64,
+    /// What it exceeds with one minus the confidence.
+    pub chi2_limit: f64,
+    /// How far the position moves at most (m) when one point is left out.
+    pub separation: Option<f64>,
+    /// The same when two are.
+    pub separation_two: Option<f64>,
+    /// The protection level of the position (m).
+    pub protection_position: Option<f64>,
+    /// That of the attitude (rad).
+    pub protection_attitude: Option<f64>,
 }
 
 /// How an attempt compares with truth; `None` where truth or a pose is missing.

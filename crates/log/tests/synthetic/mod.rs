@@ -99,6 +99,16 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
     fixed.expected_chance_sets = Some(1e-4);
     fixed.tests = Some(1234);
     fixed.residual_rms = Some(0.004);
+    fixed.integrity = Some(Integrity {
+        redundancy: "unmonitored".to_owned(),
+        chi2: 2.5 + value(4),
+        freedom: 3,
+        chi2_limit: 16.3,
+        separation: None,
+        separation_two: Some(0.02),
+        protection_position: Some(0.03),
+        protection_attitude: Some(0.004),
+    });
     fixed.evaluation = Evaluation {
         wrong: Some(false),
         wrong_pairs: Some(false),

@@ -23,13 +23,29 @@ pub struct JointFixes {
     pub chi2_limit: f64,
 }
 
+/// Why there is no joint fix.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unjoined {
+    /// The points determine none.
+    #[error(transparent)]
+    Degenerate(#[from] Degenerate),
+    /// No surveys that are given up reconcile the images.
+    #[error(
+        "pixels and surveys together have χ² = {chi2:.1}; at most {limit:.1} is likely, whichever surveys are given up"
+    )]
+    Contradiction {
+        /// χ² with the surveys that were left.
+        chi2: f64,
+        /// What a true fix exceeds with one minus the confidence.
+        limit: f64,
+    },
+}
+
 /// One fix over all `glimpses`, the last of which is asked for; surveys that the images contradict at this `confidence`
 /// are given up, one object after the other: always that without whose survey χ² is least.
 ///
-/// `Ok(None)` when the images contradict each other whatever the surveys are.
-///
 /// # Errors
-/// As [`joint_fix`].
+/// As [`joint_fix`], and where the images contradict each other whatever the surveys are.
 ///
 /// # Panics
 /// As [`joint_fix`].
@@ -38,12 +54,13 @@ pub fn joint_fixes(
     members: &[Member],
     glimpses: &[Glimpse],
     confidence: f64,
-) -> Result<Option<JointFixes>, Degenerate> {
+) -> Result<JointFixes, Unjoined> {
     let mut members = members.to_vec();
     let mut displaced = Vec::new();
     let mut fix = joint_fix(rig, &members, glimpses)?;
     let seen = |object: usize, glimpse: &Glimpse| glimpse.points.iter().any(|(o, _)| *o == object);
     let limit = |fix: &JointFix| chi_square(fix.freedom.max(1), confidence);
+    let contradiction = |fix: &JointFix| Unjoined::Contradiction { chi2: fix.chi2, limit: limit(fix) };
     // Written so that a NaN is refused too.
     while !(fix.chi2 <= limit(&fix)) {
         let held: Vec<usize> = (0..members.len())
@@ -51,7 +68,7 @@ pub fn joint_fixes(
             .collect();
         // One object must stand where it is said to: nothing else relates the camera to the site.
         if held.len() < 2 {
-            return Ok(None);
+            return Err(contradiction(&fix));
         }
         let without = |&object: &usize| {
             let mut fewer = members.clone();
@@ -60,15 +77,16 @@ pub fn joint_fixes(
         };
         let Some((object, better)) = held.iter().filter_map(without).min_by(|(_, a), (_, b)| a.chi2.total_cmp(&b.chi2))
         else {
-            return Ok(None);
+            return Err(contradiction(&fix));
         };
         members[object].placement = Placement::Displaced;
         displaced.push(object);
         fix = better;
     }
-    let (Some(last), instant) = (glimpses.last(), glimpses.len() - 1) else { return Ok(None) };
+    let instant = glimpses.len() - 1; // a fix of none is refused above
+    let last = &glimpses[instant];
     displaced.sort_unstable();
-    Ok(Some(JointFixes {
+    Ok(JointFixes {
         object_from_camera: (0..members.len())
             .map(|object| seen(object, last).then(|| fix.object_from_camera(instant, object)))
             .collect(),
@@ -76,5 +94,5 @@ pub fn joint_fixes(
         chi2: fix.chi2,
         freedom: fix.freedom,
         chi2_limit: limit(&fix),
-    }))
+    })
 }

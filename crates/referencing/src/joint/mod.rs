@@ -17,7 +17,7 @@ use crate::{
     Degenerate, Observation, Observations,
     solve::{least_squares, wide_enough},
 };
-pub use displaced::{JointFixes, RelativePose, joint_fixes};
+pub use displaced::{JointFixes, RelativePose, Unjoined, joint_fixes};
 use system::{State, System};
 
 /// What is known of where an object stands in the site's frame.
@@ -119,7 +119,7 @@ pub fn joint_fix(rig: &StereoRig, members: &[Member], glimpses: &[Glimpse]) -> R
     }
     let start = State { poses, places: members.iter().map(|member| member.site_from_object).collect() };
     let system = System::new(rig, members, glimpses).ok_or(Degenerate::Singular)?;
-    let (state, chi2) = system.minimize(start).ok_or(Degenerate::Singular)?;
+    let (state, chi2) = system.minimize(start)?;
     let covariance = system.covariance(&state).ok_or(Degenerate::Singular)?;
     let block = |at: Option<usize>| {
         at.map_or_else(Matrix6::zeros, |b| Matrix6::from_fn(|i, j| covariance[(6 * b + i, 6 * b + j)]))

@@ -6,8 +6,8 @@ use seafix_geometry::{Camera, Object, StereoRig, Transform, so3::skew};
 
 use super::{Glimpse, Member, Placement};
 use crate::{
-    Observation,
-    solve::{PixelTarget, Sightings, Term},
+    Degenerate, Observation,
+    solve::{PixelTarget, Sightings, Term, converged},
 };
 
 /// All unknowns: the pose of each instant and the place of each object.
@@ -36,11 +36,11 @@ struct Linearized {
 }
 
 /// Steps of one descent.
-const MOST_STEPS: usize = 100;
+const MOST_STEPS: u64 = 100;
 /// Below this decrement the cost has no digits left to tell better from worse.
 const NEAR: f64 = 1e-4;
 /// Below this decrement nothing is left to gain.
-const CONVERGED: f64 = 1e-18;
+const NOTHING: f64 = 1e-18;
 
 impl<'a> System<'a> {
     pub(super) fn new(rig: &'a StereoRig, members: &'a [Member], glimpses: &'a [Glimpse]) -> Option<Self> {
@@ -48,7 +48,7 @@ impl<'a> System<'a> {
         for glimpse in glimpses {
             let points: Vec<Observation> = glimpse.points.iter().map(|(_, point)| *point).collect();
             let mut seen = Sightings::new(rig);
-            seen.see(&points, PixelTarget::Pixels)?;
+            seen.see(&points, PixelTarget::Pixels).ok()?;
             sightings.push(seen);
         }
         let seen = |object: usize| glimpses.iter().any(|glimpse| glimpse.points.iter().any(|(o, _)| *o == object));
@@ -136,10 +136,11 @@ impl<'a> System<'a> {
     }
 
     /// The least cost near a state, and that cost.
-    pub(super) fn minimize(&self, mut state: State) -> Option<(State, f64)> {
-        let (mut here, mut damping) = (self.linearize(&state, false)?, 0.0);
+    pub(super) fn minimize(&self, mut state: State) -> Result<(State, f64), Degenerate> {
+        let at = |state: &State, live: bool| self.linearize(state, live).ok_or(Degenerate::Hidden);
+        let (mut here, mut damping) = (at(&state, false)?, 0.0);
         for _ in 0..MOST_STEPS {
-            let (step, decrement) = here.step(damping)?;
+            let (step, decrement) = here.step(damping).ok_or(Degenerate::Singular)?;
             if damping == 0.0 && decrement <= NEAR {
                 break;
             }
@@ -153,20 +154,20 @@ impl<'a> System<'a> {
                 None => damping = f64::max(1e-4, damping * 10.0),
             }
         }
-        let (mut here, mut last) = (self.linearize(&state, true)?, f64::INFINITY);
-        for _ in 0..MOST_STEPS {
-            let (step, decrement) = here.step(0.0)?;
+        let (mut here, mut last) = (at(&state, true)?, f64::INFINITY);
+        for taken in 0..MOST_STEPS {
+            let (step, decrement) = here.step(0.0).ok_or(Degenerate::Singular)?;
             if !(decrement < last) {
-                break;
+                return converged(taken, last.sqrt()).map(|()| (state, here.cost));
             }
             state = self.moved(&state, &step);
-            here = self.linearize(&state, true)?;
-            if decrement <= CONVERGED {
-                break;
+            here = at(&state, true)?;
+            if decrement <= NOTHING {
+                return Ok((state, here.cost));
             }
             last = decrement;
         }
-        Some((state, here.cost))
+        converged(MOST_STEPS, last.sqrt()).map(|()| (state, here.cost))
     }
 
     /// The inverse of the normal equations at a state.

@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use serde::Serialize;
 
 use super::{CoherenceProblem, read};
-use crate::{Acceptance, Alternative, Correspondence, Integrity, Outcome, Redundancy, Search, Solver};
+use crate::{Acceptance, Alternative, Correspondence, Integrity, Outcome, Search, Solver};
 
 /// The method that answers: what is used, and under which name it is reported.
 #[derive(Debug, Clone, Copy)]
@@ -67,11 +67,7 @@ pub struct Levels {
 impl From<&Integrity> for Support {
     fn from(integrity: &Integrity) -> Self {
         Self {
-            redundancy: match integrity.redundancy {
-                Redundancy::Unmonitored => "unmonitored",
-                Redundancy::Detectable => "detectable",
-                Redundancy::Excludable => "excludable",
-            },
+            redundancy: integrity.redundancy.name(),
             chi2: integrity.chi2,
             freedom: integrity.freedom,
             chi2_limit: integrity.chi2_limit,

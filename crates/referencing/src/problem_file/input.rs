@@ -21,6 +21,8 @@ const MOST_CANDIDATES: usize = 4_000_000;
 /// Larger files, and clouds of more points, are refused: with them a problem takes less than 500 MB.
 const MOST_BYTES: u64 = 48 << 20;
 const MOST_POINTS: usize = 500_000;
+/// A point known worse than this (m) is not known, and the cube of its variance is still a number.
+const MOST_SIGMA: f64 = 1e15;
 
 /// An identification problem, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,9 +96,10 @@ impl CoherenceProblem {
                 return Err(fault(&what).value(format!("{:?}", rows[index])).remedy("give finite numbers, in metres"));
             }
         }
-        let is_sigma = |sigma: f64| sigma >= 0.0 && sigma.is_finite();
+        let is_sigma = |sigma: f64| (0.0..=MOST_SIGMA).contains(&sigma);
+        let of_sigma = || format!("give metres, zero to {MOST_SIGMA:e}");
         if !is_sigma(raw.sigma) {
-            return Err(fault("`sigma` is out of range").value(raw.sigma).remedy("give metres, zero or more"));
+            return Err(fault("`sigma` is out of range").value(raw.sigma).remedy(of_sigma()));
         }
         if let Some(rows) = &raw.sigma_xyz {
             if rows.len() != raw.cloud.len() {
@@ -107,7 +110,7 @@ impl CoherenceProblem {
             }
             if let Some(index) = rows.iter().position(|row| !row.iter().all(|&sigma| is_sigma(sigma))) {
                 let what = format!("row {index} of `sigma_xyz` is out of range");
-                return Err(fault(&what).value(format!("{:?}", rows[index])).remedy("give metres, zero or more"));
+                return Err(fault(&what).value(format!("{:?}", rows[index])).remedy(of_sigma()));
             }
         }
         let model: Vec<ModelPoint> = raw

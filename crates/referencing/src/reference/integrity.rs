@@ -6,7 +6,9 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
 use super::Acceptance;
 use crate::{Observations, candidates::chi_square, solve::deletion::Deletions};
 
-/// What the number of points allows to know of a wrong match.
+/// What the number of points allows to know of a wrong match. A grade of the count alone, as three points are monitored by
+/// nothing whatever they are: whether these very points allow it, four in a row say, is told by the separation
+/// and the protection levels, which are none where a point cannot be spared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Redundancy {
     /// Three points: any three fit, nothing would show.
@@ -24,6 +26,15 @@ impl Redundancy {
             0..=3 => Self::Unmonitored,
             4 => Self::Detectable,
             _ => Self::Excludable,
+        }
+    }
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unmonitored => "unmonitored",
+            Self::Detectable => "detectable",
+            Self::Excludable => "excludable",
         }
     }
 }

@@ -163,7 +163,7 @@ impl Judge<'_> {
         }
         let ((_, sigma), limit) = (semi_axes(&covariance), self.acceptance.attitude_limit);
         if !(2.0 * sigma <= limit) {
-            return Err(Fallen::Refused(Refusal::Unturned { sigma, limit }));
+            return Err(Fallen::Refused(Refusal::Attitude { sigma, limit }));
         }
         let Some(prior) = self.problem.prior else { return Ok(()) };
         let off = match &prior.bound {
@@ -234,6 +234,7 @@ impl Judge<'_> {
             object_from_camera: hypothesis.pose,
             covariance,
             used: self.solver.used(&data),
+            residuals: data.residuals(&hypothesis.pose),
             residual_rms: data.residual_rms(&hypothesis.pose),
             score: hypothesis.score,
             integrity,

@@ -1,6 +1,6 @@
 //! What comes of an attempt: a fix, rivals, or a refusal.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform};
 
 use super::{Integrity, Refusal};
@@ -17,7 +17,9 @@ pub struct Reference {
     pub pairs: Vec<Correspondence>,
     /// The indices into `pairs` of the points the pose rests on (all of them, or the triad's three).
     pub used: Vec<usize>,
-    /// Root mean square of the residuals C·H − P over the pairs (m).
+    /// The residual C·H − P of each of the pairs (m, object frame).
+    pub residuals: Vec<Vector3<f64>>,
+    /// Root mean square of them (m).
     pub residual_rms: f64,
     /// How well it explains the data; larger is better. Of a search that counts: minus half of the χ² of its
     /// residuals and of the prior, and χ²₃(confidence) for each pair fewer than the largest set has (a

@@ -17,7 +17,7 @@ pub enum Refusal {
         needed: usize,
     },
     /// Chance alone would give sets as large.
-    #[error("chance gives {expected:.2e} sets of {size} points; at most {budget:.1e} are accepted")]
+    #[error("{}", chance(.size, .expected, .budget))]
     Chance {
         /// Size of the set.
         size: usize,
@@ -55,7 +55,7 @@ pub enum Refusal {
     /// By its own covariance the attitude is hardly determined: points near a line leave a turn about it free, which moves
     /// no point and yet the vehicle.
     #[error("the attitude is known to {:.1}° (one sigma, its worst axis); twice that exceeds {:.1}°", .sigma.to_degrees(), .limit.to_degrees())]
-    Unturned {
+    Attitude {
         /// Greatest standard deviation over all axes (rad).
         sigma: f64,
         /// [`Acceptance::attitude_limit`](crate::Acceptance::attitude_limit) (rad).
@@ -77,7 +77,17 @@ impl Refusal {
             Self::TooFew { .. } => "too-few",
             Self::Chance { .. } | Self::Absent { .. } => "chance",
             Self::Residuals { .. } | Self::Prior { .. } => "gate",
-            Self::Imprecise { .. } | Self::Unturned { .. } => "imprecise",
+            Self::Imprecise { .. } | Self::Attitude { .. } => "imprecise",
         }
     }
+}
+
+/// The sentence of [`Refusal::Chance`].
+fn chance(size: &usize, expected: &f64, budget: &f64) -> String {
+    if expected.is_nan() {
+        return format!(
+            "how many sets of {size} points chance gives cannot be told: the noise of a point is no number"
+        );
+    }
+    format!("chance gives {expected:.2e} sets of {size} points; at most {budget:.1e} are accepted")
 }

@@ -67,6 +67,9 @@ impl Judge<'_> {
     }
 }
 
+// These three are no settings: they belong to the scale on which `acceptance.absence` and `acceptance.rare` are stated, and were
+// chosen with their defaults on drawn problems. Whoever wants to be stricter or laxer moves those two.
+
 /// An object is not believed whose absence is more probable than this.
 const IMPROBABLE: f64 = 0.05;
 /// The greatest limit of the probability of absence, whatever the model.

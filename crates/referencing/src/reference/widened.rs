@@ -40,7 +40,7 @@ fn nothing(outcome: &Outcome) -> bool {
             | Refusal::Absent { .. }
             | Refusal::Residuals { .. }
             | Refusal::Prior { .. } => true,
-            Refusal::Imprecise { .. } | Refusal::Unturned { .. } => false,
+            Refusal::Imprecise { .. } | Refusal::Attitude { .. } => false,
         },
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::normal::Normal;
+use super::{Degenerate, converged, normal::Normal};
 use crate::Observation;
 
 /// What one point says of the place where a pose puts it, camera axes.
@@ -97,29 +97,37 @@ impl Linearized {
         let decrement = self.gradient.dot(&step);
         decrement.is_finite().then_some((step, decrement))
     }
+
+    fn determined(&self, damping: f64) -> Result<(Vector6<f64>, f64), Degenerate> {
+        self.step(damping).ok_or(Degenerate::Singular)
+    }
 }
 
 /// Below this decrement a step is a ten-thousandth of a millionth of a standard deviation: nothing is left to gain.
-const CONVERGED: f64 = 1e-20;
+const NOTHING: f64 = 1e-20;
 /// Below this decrement the cost has no digits left that could tell better from worse; the steps themselves
 /// must shrink then.
 pub(super) const NEAR: f64 = 1e-4;
 /// Steps of one descent.
-const MOST_STEPS: usize = 60;
+const MOST_STEPS: u64 = 60;
 
 /// The least cost reached from `start` by Levenberg's and Marquardt's damped steps, to where a step is shorter than
 /// √`near` standard deviations. The weights of `term` must not depend on the pose: every step must lower the cost.
 /// (Marquardt, *An algorithm for least-squares estimation of nonlinear parameters*, 1963.) The pose and the normal
 /// equations there.
+///
+/// # Errors
+/// The start puts a point behind a camera, or a motion is undetermined.
 pub(super) fn descend(
     points: &[Observation],
     start: &Transform<Object, Camera>,
     near: f64,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
-) -> Option<(Transform<Object, Camera>, Linearized)> {
-    let (mut pose, mut here, mut damping) = (*start, linearize(points, start, term)?, 0.0);
+) -> Result<(Transform<Object, Camera>, Linearized), Degenerate> {
+    let here = linearize(points, start, term).ok_or(Degenerate::Hidden)?;
+    let (mut pose, mut here, mut damping) = (*start, here, 0.0);
     for _ in 0..MOST_STEPS {
-        let (step, decrement) = here.step(damping)?;
+        let (step, decrement) = here.determined(damping)?;
         if damping == 0.0 && decrement <= near {
             break;
         }
@@ -133,35 +141,39 @@ pub(super) fn descend(
             None => damping = f64::max(1e-4, damping * 10.0),
         }
     }
-    Some((pose, here))
+    Ok((pose, here))
 }
 
 /// The pose at which the steps vanish, from one near it: Gauss's and Newton's steps, of which each must be
 /// shorter than the last. Where the weights of `term` depend on the pose it solves the likelihood's equation
 /// Σ Jᵀ W r = 0 with the weights of its own answer, which no cost measures. `here` is `term` at `start`. The pose, and
 /// the normal equations at it or one vanishing step before.
+///
+/// # Errors
+/// As [`descend`], and steps that do not shrink to nothing.
 pub(super) fn settle(
     points: &[Observation],
     start: Transform<Object, Camera>,
     here: Linearized,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
-) -> Option<(Transform<Object, Camera>, Linearized)> {
+) -> Result<(Transform<Object, Camera>, Linearized), Degenerate> {
     let (mut pose, mut here, mut last) = (start, here, f64::INFINITY);
-    for _ in 0..MOST_STEPS {
-        let (step, decrement) = here.step(0.0)?;
+    for taken in 0..MOST_STEPS {
+        let (step, decrement) = here.determined(0.0)?;
         if !(decrement < last) {
-            break; // rounding is all that is left
+            // Rounding is all that is left, or the steps lead nowhere.
+            return converged(taken, last.sqrt()).map(|()| (pose, here));
         }
         pose = moved(&pose, &step);
         // Steps shrink by a constant factor at least: that the next is nothing is known before it is taken.
         let rate = if last.is_finite() { decrement / last } else { SHRINK };
-        if decrement * rate <= CONVERGED {
-            break;
+        if decrement * rate <= NOTHING {
+            return Ok((pose, here));
         }
         last = decrement;
-        here = linearize(points, &pose, term)?;
+        here = linearize(points, &pose, term).ok_or(Degenerate::Hidden)?;
     }
-    Some((pose, here))
+    converged(MOST_STEPS, last.sqrt()).map(|()| (pose, here))
 }
 
 /// By how much the first decrement is taken to fall.
@@ -180,11 +192,14 @@ fn moved(pose: &Transform<Object, Camera>, step: &Vector6<f64>) -> Transform<Obj
 }
 
 /// [`descend`] to where the cost can no longer tell, then [`settle`].
+///
+/// # Errors
+/// As these.
 pub(super) fn minimize(
     points: &[Observation],
     start: &Transform<Object, Camera>,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
-) -> Option<Transform<Object, Camera>> {
+) -> Result<Transform<Object, Camera>, Degenerate> {
     let (pose, here) = descend(points, start, NEAR, term)?;
-    Some(settle(points, pose, here, term)?.0)
+    Ok(settle(points, pose, here, term)?.0)
 }

@@ -53,7 +53,7 @@ impl Solver for FastLocalMatrix {
         let unweighted = |k: usize, at: &Vector3<f64>| {
             Some(Term::of(Matrix3::identity() / (UNIT * UNIT), &(data.points[k].measured.at.coords - at)))
         };
-        minimize(&data.points, &(object * camera.inverse()), &unweighted).ok_or(Degenerate::Singular)
+        minimize(&data.points, &(object * camera.inverse()), &unweighted)
     }
 
     fn covariance(

@@ -10,6 +10,7 @@ use super::{
     kabsch::fit_weighted,
     sandwich,
     spread::{check, share},
+    weighted_kabsch::variance,
 };
 use crate::Observations;
 
@@ -17,7 +18,9 @@ use crate::Observations;
 /// squares over the points it keeps, which it chooses itself.
 ///
 /// The sum has many minima. A convex one is solved first and bent step by step into it: with μ growing by
-/// `growth`, a point weighs 1 below c²μ/(μ+1), 0 above c²(μ+1)/μ, and (c/d)√(μ(μ+1)) − μ between.
+/// `growth`, a point weighs 1 below c²μ/(μ+1), 0 above c²(μ+1)/μ, and (c/d)√(μ(μ+1)) − μ between. Where that leaves points
+/// out it may have left the wrong ones: up to `triples` sets of three points, all of few, are starts besides, and the
+/// least sum stands.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct GncTls {
@@ -25,13 +28,15 @@ pub(crate) struct GncTls {
     pub(crate) threshold: f64,
     /// By how much μ grows a step.
     pub(crate) growth: f64,
+    /// How many sets of three points are tried where points are left out: 1000 are all of nineteen points.
+    pub(crate) triples: usize,
     /// Second extent of the points over the first below which they count as a line.
     pub(crate) least_ratio: f64,
 }
 
 impl Default for GncTls {
     fn default() -> Self {
-        Self { threshold: 4.5, growth: 1.4, least_ratio: 1e-3 }
+        Self { threshold: 4.5, growth: 1.4, triples: 1000, least_ratio: 1e-3 }
     }
 }
 
@@ -47,10 +52,13 @@ impl Component for GncTls {
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
         let grows = self.growth > 1.0 && self.growth <= 10.0;
         in_range(grows, "growth", self.growth, "a number above 1, at most 10")?;
+        in_range(self.triples <= 100_000, "triples", self.triples, "0 to 100000")?;
         share("least-ratio", self.least_ratio)
     }
 }
 
+/// How often a start may change what it keeps.
+const MOST_TURNS: usize = 10;
 /// Steps of the iteration: μ passes through twenty decades.
 const MOST_STEPS: usize = 200;
 
@@ -81,6 +89,45 @@ impl Solver for GncTls {
 impl GncTls {
     /// The pose and which points it rests on.
     fn keep(&self, data: &Observations<'_>) -> Result<(Transform<Object, Camera>, Vec<bool>), Degenerate> {
+        let (mut pose, mut kept) = self.graduated(data)?;
+        if kept.iter().all(|&kept| kept) {
+            return Ok((pose, kept));
+        }
+        let points = &data.points;
+        let c2 = self.threshold * self.threshold;
+        let sum = |pose: &_| -> f64 {
+            points.iter().map(|point| variance(point) * distance(point, pose).powi(2).min(c2)).sum()
+        };
+        let mut least = sum(&pose);
+        let n = points.len();
+        let all = n * (n - 1) * (n - 2) / 6;
+        // Of more than are tried every so-manieth.
+        let stride = all.div_ceil(self.triples.max(1));
+        let triples = (0..n).flat_map(|i| (i + 1..n).flat_map(move |j| (j + 1..n).map(move |k| [i, j, k])));
+        for three in triples.step_by(stride).take(self.triples) {
+            let mut chosen: Vec<bool> = (0..n).map(|k| three.contains(&k)).collect();
+            for _ in 0..MOST_TURNS {
+                let weights: Vec<f64> = chosen.iter().map(|&kept| f64::from(u8::from(kept))).collect();
+                if !self.determined(data, &weights) {
+                    break;
+                }
+                let other = fit_weighted(points, |k| weights[k]);
+                let next: Vec<bool> = points.iter().map(|point| distance(point, &other).powi(2) <= c2).collect();
+                if next == chosen {
+                    let found = sum(&other);
+                    if found < least * (1.0 - 1e-9) {
+                        (least, pose, kept) = (found, other, next);
+                    }
+                    break;
+                }
+                chosen = next;
+            }
+        }
+        Ok((pose, kept))
+    }
+
+    /// What graduation leads to.
+    fn graduated(&self, data: &Observations<'_>) -> Result<(Transform<Object, Camera>, Vec<bool>), Degenerate> {
         let points = &data.points;
         let c2 = self.threshold * self.threshold;
         let mut pose = fit_weighted(points, |_| 1.0);

@@ -1,12 +1,13 @@
 //! Iteratively reweighted least squares: losses that grow more slowly than the square.
 
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver,
+    Degenerate, Solver, converged,
     kabsch::fit_weighted,
+    resampled, sandwich,
     spread::{check, share},
     weighted_kabsch::variance,
 };
@@ -59,23 +60,41 @@ impl Component for Irls {
 }
 
 /// Steps of the iteration.
-const MOST_STEPS: usize = 200;
-/// Residuals count as no smaller than this (m): the un-squared sum has a corner at zero.
-const CORNER: f64 = 1e-7;
+const MOST_STEPS: u64 = 200;
+/// Residuals count as no smaller than this (standard deviations of the point): the un-squared sum has a corner at zero.
+const CORNER: f64 = 1e-4;
 
 impl Solver for Irls {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         let mut pose = fit_weighted(&data.points, |_| 1.0);
-        for _ in 0..MOST_STEPS {
+        let mut last = f64::INFINITY;
+        for taken in 1..=MOST_STEPS {
             let next = fit_weighted(&data.points, |k| self.weight(&data.points[k], &pose));
-            let step = pose.error_to(&next).amax();
-            pose = next;
-            if step <= 1e-14 {
-                break;
+            let step = pose.error_to(&next);
+            if step.amax() <= 1e-14 {
+                return Ok(next);
             }
+            if taken == MOST_STEPS {
+                // Steps shrink by a constant factor or ever more slowly: what all that would follow add up to.
+                let known = sandwich::covariance(data, &next, |k| self.weight(&data.points[k], &next))?;
+                let length = known.matrix.cholesky().map_or(f64::INFINITY, |c| step.dot(&c.solve(&step)).sqrt());
+                let shrink = step.norm() / last;
+                let off = if shrink < 1.0 { length * shrink / (1.0 - shrink) } else { length * MOST_STEPS as f64 };
+                return converged(taken, off).map(|()| next);
+            }
+            (pose, last) = (next, step.norm());
         }
         Ok(pose)
+    }
+
+    /// That of many draws: with residuals of the size where a loss bends, its derivative at one draw says little.
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        resampled::covariance(|drawn| self.solve(drawn), data, at)
     }
 }
 
@@ -84,7 +103,7 @@ impl Irls {
         match self.loss {
             Loss::Huber => (self.threshold / distance(point, pose)).min(1.0),
             Loss::Cauchy => 1.0 / (1.0 + (distance(point, pose) / self.threshold).powi(2)),
-            Loss::UnSquared => 1.0 / point.residual(pose).norm().max(CORNER),
+            Loss::UnSquared => 1.0 / point.residual(pose).norm().max(CORNER * variance(point).sqrt()),
         }
     }
 }

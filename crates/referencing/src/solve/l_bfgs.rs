@@ -1,6 +1,6 @@
 //! L-BFGS: the likelihood of the pixels, maximised by a library that knows nothing of poses.
 
-use argmin::core::Executor;
+use argmin::core::{Executor, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
 use seafix_component::Component;
 use serde::{Deserialize, Serialize};
@@ -48,15 +48,16 @@ impl Optimiser for LBfgs {
         &self,
         cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
         _best: &'a Best,
-    ) -> Result<(), Degenerate> {
+    ) -> Result<u64, Degenerate> {
         let search = MoreThuenteLineSearch::new().with_c(1e-4, 0.9).map_err(|_| Degenerate::Singular)?;
         let method = LBFGS::new(search, 7).with_tolerance_grad(1e-8).and_then(|m| m.with_tolerance_cost(0.0));
         let method = method.map_err(|_| Degenerate::Singular)?;
-        // An error means that the line search found no lower place: where the digits end. The best seen is the answer.
-        let _ = Executor::new(cost()?, method)
+        // An error means that the line search found no lower place: mostly where the digits end. The best seen is the answer,
+        // if nothing pulls there.
+        let run = Executor::new(cost()?, method)
             .configure(|state| state.param(vec![0.0; 6]).max_iters(self.iterations))
             .timer(false)
             .run();
-        Ok(())
+        Ok(run.map_or(self.iterations, |result| result.state().get_iter()))
     }
 }

@@ -59,11 +59,11 @@ impl Solver for Mahalanobis {
         let Some(rig) = self.rig(data) else {
             let (start, measured) = (kabsch::fit(&data.points), Measured::of(&data.points));
             let term = |k: usize, at: &_| Some(measured.term(k, at));
-            return minimize(&data.points, &start, &term).ok_or(Degenerate::NotFinite);
+            return minimize(&data.points, &start, &term);
         };
         let mut sightings = Sightings::new(rig);
-        sightings.see(&data.points, Target::Triangulated).ok_or(Degenerate::Singular)?;
-        likeliest(data, rig, self.starts, &sightings).ok_or(Degenerate::Singular)
+        sightings.see(&data.points, Target::Triangulated)?;
+        likeliest(data, rig, self.starts, &sightings)
     }
 
     fn covariance(
@@ -88,7 +88,7 @@ impl Mahalanobis {
             return work(&|k, place| Some(measured.term(k, place)));
         };
         let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Triangulated)?;
+        all.see(&data.points, Target::Triangulated).ok()?;
         work(&|k, place| all.live(k, place))
     }
 
@@ -117,8 +117,8 @@ impl<'a> Measured<'a> {
 
 /// (Σ_measured + σ_model² I)⁻¹.
 pub(super) fn information(point: &Observation) -> Matrix3<f64> {
-    /// Coordinates are never better than this (m): exact data would otherwise have infinite weight.
-    const FLOOR: f64 = 1e-9;
-    let noise = point.noise() + Matrix3::identity() * (FLOOR * FLOOR);
-    noise.try_inverse().unwrap_or_else(|| Matrix3::identity() / (noise.trace() / 3.0))
+    let noise = point.noise();
+    // In units of its own size, so that no determinant leaves the range of numbers.
+    let size = noise.trace() / 3.0;
+    (noise / size).try_inverse().unwrap_or_else(Matrix3::identity) / size
 }

@@ -22,9 +22,11 @@ mod numerical;
 mod p3p;
 mod p3p_stereo;
 mod pixel_cost;
+mod resampled;
 mod roots;
 mod sandwich;
 mod sightings;
+mod signs;
 mod spread;
 mod starts;
 mod stereo_reprojection;
@@ -104,6 +106,34 @@ pub enum Degenerate {
     /// A number is not finite.
     #[error("a coordinate is not finite")]
     NotFinite,
+    /// The stated noise of a point is none: not finite, or without an inverse.
+    #[error("the noise of point {index} is no covariance: it must be finite and positive definite")]
+    Noise {
+        /// Its place among the points.
+        index: usize,
+    },
+    /// Every pose that was tried puts a point where a camera that saw it cannot.
+    #[error("no pose that was tried puts every point before both cameras")]
+    Hidden,
+    /// An iteration ended before it was at its minimum.
+    #[error("after {steps} steps the minimum is still {off:.2e} standard deviations away; at most {most} is accepted")]
+    Unconverged {
+        /// Steps that were taken.
+        steps: u64,
+        /// How far the minimum still is (standard deviations of the pose).
+        off: f64,
+        /// The most accepted.
+        most: f64,
+    },
+}
+
+/// The farthest from its minimum (standard deviations of the pose) that an iteration may end: an error that is added
+/// to the noise's own makes it one in twenty thousand larger.
+const CONVERGED: f64 = 0.01;
+
+/// Refuses a pose that is farther from its minimum than [`CONVERGED`], and a distance that is no number.
+pub(crate) fn converged(steps: u64, off: f64) -> Result<(), Degenerate> {
+    if off <= CONVERGED { Ok(()) } else { Err(Degenerate::Unconverged { steps, off, most: CONVERGED }) }
 }
 
 /// Refuses what determines no pose: fewer than three points, numbers that are not finite, points on a line and, seen by a

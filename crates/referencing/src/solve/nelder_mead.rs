@@ -1,6 +1,6 @@
 //! Nelder–Mead: the likelihood of the pixels, maximised without any derivative.
 
-use argmin::core::Executor;
+use argmin::core::{Executor, State};
 use argmin::solver::neldermead;
 use seafix_component::Component;
 use serde::{Deserialize, Serialize};
@@ -50,8 +50,8 @@ impl Optimiser for NelderMead {
         &self,
         cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
         best: &'a Best,
-    ) -> Result<(), Degenerate> {
-        let mut size = 5.0;
+    ) -> Result<u64, Degenerate> {
+        let (mut size, mut taken) = (5.0, 0);
         for _ in 0..MOST_ROUNDS {
             let (before, centre) = best.borrow().clone();
             let corner = |i: usize| {
@@ -63,13 +63,14 @@ impl Optimiser for NelderMead {
             };
             let method = neldermead::NelderMead::new((0..7).map(corner).collect()).with_sd_tolerance(1e-15);
             let method = method.map_err(|_| Degenerate::Singular)?;
-            let _ =
+            let run =
                 Executor::new(cost()?, method).configure(|state| state.max_iters(self.iterations)).timer(false).run();
+            taken += run.map_or(self.iterations, |result| result.state().get_iter());
             if before - best.borrow().0 < 1e-10 {
                 break;
             }
             size = f64::max(0.1, 0.5 * size);
         }
-        Ok(())
+        Ok(taken)
     }
 }

@@ -1,16 +1,31 @@
 //! The covariance of any solver's answer, by central differences through the solver.
 
-use nalgebra::{Matrix4x3, Matrix6, SMatrix, SVector, Vector3, Vector4, Vector6};
+use nalgebra::{Matrix3, Matrix4, Matrix4x3, Matrix6, SMatrix, SVector, Vector3, Vector4, Vector6};
 use seafix_geometry::{Camera, Covariance6, Object, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels};
 
-use super::Degenerate;
+use super::{Degenerate, sightings::PIXEL_FLOOR};
 use crate::{Observation, Observations};
 
-/// The step (m) of the differences: rounding (1e-15 of the coordinates over the step) and the
+/// The longest step (m) of the differences: rounding (1e-15 of the coordinates over the step) and the
 /// third derivative (the step squared) are then both below 1e-9 of the result.
 const STEP: f64 = 1e-5;
 /// The same of pixel coordinates (px).
 const PIXEL_STEP: f64 = 1e-3;
+/// Where noise is less, a step is this share of it: what a solver does beyond its noise is no derivative of what it does
+/// within.
+const SHARE: f64 = 0.1;
+/// The shortest step, over the coordinates that it is added to: rounding then spoils no more than the fifth digit.
+const SHORTEST: f64 = 1e-10;
+
+/// The step for coordinates of this size and noise, at most `longest`.
+fn step(longest: f64, sigma: f64, coordinates: f64) -> f64 {
+    (SHARE * sigma).min(longest).max(SHORTEST * coordinates)
+}
+
+/// The least standard deviation of a coordinate.
+fn least<const N: usize>(covariance: &SMatrix<f64, N, N>) -> f64 {
+    (0..N).map(|i| covariance[(i, i)]).fold(f64::INFINITY, f64::min).max(0.0).sqrt()
+}
 
 /// Σ = Σ_i J_i Σ_i J_iᵀ over every measured point (its covariance) and every model point (σ² I), where
 /// J_i = ∂ξ/∂point_i and ξ is the change of the answer, `solve(moved) = at · Exp(ξ)`.
@@ -26,6 +41,8 @@ pub(super) fn covariance(
     let mut moved = data.clone();
     for i in 0..data.points.len() {
         let original = data.points[i];
+        let digits = original.digits();
+        let reach = original.measured.at.coords.amax().max(original.model.coords.amax());
         let mut answer = |point: Observation| {
             moved.points[i] = point;
             let answer = solve(&moved);
@@ -34,25 +51,30 @@ pub(super) fn covariance(
         };
         match (original.pixels, data.rig.and_then(|rig| by_pixels(rig, &original))) {
             (Some(pixels), Some(by_pixels)) => {
-                let j = jacobian(at, PIXEL_STEP, |step: Vector4<f64>| {
+                let size = step(PIXEL_STEP, least(&pixels.covariance), pixels.at.coordinates().amax());
+                let j = jacobian(at, size, |step: Vector4<f64>| {
                     let mut point = original;
                     point.measured.at = original.measured.at + by_pixels * step;
                     point.pixels = Some(UncertainPixels { at: shifted(&pixels.at, &step), ..pixels });
                     answer(point)
                 })?;
-                sum += j * pixels.covariance * j.transpose();
+                let floor = Matrix4::identity() * (PIXEL_FLOOR * PIXEL_FLOOR);
+                sum += j * (pixels.covariance + floor) * j.transpose();
             }
             _ => {
-                let j = jacobian(at, STEP, |step: Vector3<f64>| {
+                let size = step(STEP, least(&original.measured.covariance).max(digits), reach);
+                let j = jacobian(at, size, |step: Vector3<f64>| {
                     let mut point = original;
                     point.measured.at = original.measured.at + step;
                     answer(point)
                 })?;
-                sum += j * original.measured.covariance * j.transpose();
+                let floor = Matrix3::identity() * (digits * digits);
+                sum += j * (original.measured.covariance + floor) * j.transpose();
             }
         }
         if original.model_sigma > 0.0 {
-            let j = jacobian(at, STEP, |step: Vector3<f64>| {
+            let size = step(STEP, original.model_sigma, reach);
+            let j = jacobian(at, size, |step: Vector3<f64>| {
                 let mut point = original;
                 point.model = original.model + step;
                 answer(point)

@@ -57,7 +57,7 @@ impl Solver for P3pStereo {
         let three = Observations { points: chosen.map(|i| data.points[i]).to_vec(), rig: data.rig };
         check(&three, self.minimum(), self.least_ratio)?;
         let mut sightings = Sightings::new(rig);
-        sightings.see(&three.points, Target::Pixels).ok_or(Degenerate::Singular)?;
+        sightings.see(&three.points, Target::Pixels)?;
         let mut roots = Roots::default();
         for right in [false, true] {
             roots.of_camera(data, rig, chosen, right);
@@ -91,10 +91,10 @@ impl Solver for P3pStereo {
         let rig: &StereoRig = pixels_and_rig(data)?;
         let three = widest(data).map(|i| data.points[i]);
         let mut sightings = Sightings::new(rig);
-        sightings
-            .see(&three, Target::Pixels)
-            .and_then(|()| linearize(&three, at, &|k, place: &_| sightings.live(k, place)))
-            .and_then(|all| all.covariance())
+        sightings.see(&three, Target::Pixels)?;
+        linearize(&three, at, &|k, place: &_| sightings.live(k, place))
+            .ok_or(Degenerate::Hidden)?
+            .covariance()
             .map(Covariance6::new)
             .ok_or(Degenerate::Singular)
     }
@@ -107,7 +107,7 @@ fn refined(
     sightings: &Sightings<'_>,
 ) -> Option<Transform<Object, Camera>> {
     let live = |k: usize, at: &_| sightings.live(k, at);
-    let (near, here) = descend(&three.points, start, NEAR, &|k, at: &_| sightings.frozen(k, at))?;
+    let (near, here) = descend(&three.points, start, NEAR, &|k, at: &_| sightings.frozen(k, at)).ok()?;
     let here = if sightings.weights_move { linearize(&three.points, &near, &live)? } else { here };
-    Some(settle(&three.points, near, here, &live)?.0)
+    Some(settle(&three.points, near, here, &live).ok()?.0)
 }

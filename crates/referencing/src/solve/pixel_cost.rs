@@ -8,7 +8,7 @@ use seafix_component::in_range;
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
 use super::{
-    Degenerate, Solver, StereoReprojection, kabsch,
+    Degenerate, Solver, StereoReprojection, converged, kabsch,
     spread::{check, share},
     stereo_reprojection::pixels_and_rig,
 };
@@ -19,9 +19,12 @@ pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
     /// Iterations at most, and the second extent of the points over the first below which they count as a line.
     fn limits(&self) -> (u64, f64);
 
-    /// Lowers the cost that `cost` makes anew, from `best` on; the best place seen is left there.
-    fn lower<'a>(&self, cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>, best: &'a Best)
-    -> Result<(), Degenerate>;
+    /// Lowers the cost that `cost` makes anew, from `best` on; the best place seen is left there. The iterations it took.
+    fn lower<'a>(
+        &self,
+        cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
+        best: &'a Best,
+    ) -> Result<u64, Degenerate>;
 
     /// What is wrong with the limits.
     fn check_limits(&self) -> Result<(), String> {
@@ -43,8 +46,12 @@ impl<T: Optimiser> Solver for T {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.limits().1)?;
         let (rig, best) = (pixels_and_rig(data)?, RefCell::new((f64::INFINITY, vec![0.0; 6])));
-        self.lower(|| PixelCost::of(data, rig, &best), &best)?;
-        Ok(PixelCost::of(data, rig, &best)?.pose(&best.borrow().1))
+        let start = kabsch::fit(&data.points);
+        let iterations = self.lower(|| PixelCost::of(data, rig, start, &best), &best)?;
+        let pose = PixelCost::of(data, rig, start, &best)?.pose(&best.borrow().1);
+        // Whatever the library says of how it ended: at a minimum nothing pulls.
+        let off = PixelCost::of(data, rig, pose, &best)?.distance();
+        converged(iterations, off).map(|()| pose)
     }
 
     /// That of the likelihood whose maximum this is.
@@ -80,9 +87,13 @@ const UNSEEN: f64 = 1e30;
 const STEP: f64 = 1e-4;
 
 impl<'a> PixelCost<'a> {
-    /// From the unweighted fit.
-    pub(super) fn of(data: &'a Observations<'_>, rig: &'a StereoRig, best: &'a Best) -> Result<Self, Degenerate> {
-        let start = kabsch::fit(&data.points);
+    /// About `start`.
+    fn of(
+        data: &'a Observations<'_>,
+        rig: &'a StereoRig,
+        start: Transform<Object, Camera>,
+        best: &'a Best,
+    ) -> Result<Self, Degenerate> {
         let weight = |point: &Observation| {
             let model = point.model_sigma * point.model_sigma;
             let j = rig.project_with_jacobian(&point.measured.at)?.1;
@@ -109,6 +120,25 @@ impl<'a> PixelCost<'a> {
             information += j.transpose() * weight * j;
         }
         Some(information.cholesky()?.inverse().cholesky()?.l())
+    }
+
+    /// How far the minimum is from the start (standard deviations of the pose): half of the gradient, χ² being the square of
+    /// that distance.
+    fn distance(&self) -> f64 {
+        0.5 * Vector6::from(self.slope(&[0.0; 6])).norm()
+    }
+
+    /// ∂χ²/∂x by central differences.
+    fn slope(&self, x: &[f64]) -> [f64; 6] {
+        let mut moved = x.to_vec();
+        std::array::from_fn(|i| {
+            moved[i] = x[i] + STEP;
+            let plus = self.chi2(&moved);
+            moved[i] = x[i] - STEP;
+            let minus = self.chi2(&moved);
+            moved[i] = x[i];
+            (plus - minus) / (2.0 * STEP)
+        })
     }
 
     /// The pose of six numbers.
@@ -146,15 +176,6 @@ impl Gradient for PixelCost<'_> {
     type Gradient = Vec<f64>;
 
     fn gradient(&self, x: &Self::Param) -> Result<Self::Gradient, Error> {
-        let mut moved = x.clone();
-        let mut by = |i: usize| {
-            moved[i] = x[i] + STEP;
-            let plus = self.chi2(&moved);
-            moved[i] = x[i] - STEP;
-            let minus = self.chi2(&moved);
-            moved[i] = x[i];
-            (plus - minus) / (2.0 * STEP)
-        };
-        Ok((0..6).map(&mut by).collect())
+        Ok(self.slope(x).to_vec())
     }
 }

@@ -37,6 +37,7 @@ fn noise(eyes: Option<&Eyes<'_>>, point: &Observation, place: &Vector3<f64>) -> 
         let (_, j) = eyes?.look(place)?;
         (j.transpose() * point.pixels?.covariance.try_inverse()? * j).try_inverse()
     };
-    let model = Matrix3::identity() * (point.model_sigma * point.model_sigma);
+    let digits = point.digits();
+    let model = Matrix3::identity() * (point.model_sigma * point.model_sigma + digits * digits);
     refitted().unwrap_or(point.measured.covariance) + model
 }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use seafix_geometry::StereoRig;
 use smallvec::SmallVec;
 
-use super::{descent::Term, eyes::Eyes, mahalanobis::information, whitened::Whitener};
+use super::{Degenerate, descent::Term, eyes::Eyes, mahalanobis::information, whitened::Whitener};
 use crate::Observation;
 
 /// Up to so many points are kept without allocating.
@@ -35,7 +35,7 @@ enum Sighting {
 }
 
 /// Pixels are never better known than this (px): exact ones would otherwise have infinite weight.
-const FLOOR: f64 = 1e-6;
+pub(super) const PIXEL_FLOOR: f64 = 1e-6;
 
 impl<'a> Sightings<'a> {
     /// Those of no point yet: [`see`](Self::see) fills them where they stand, for they are large.
@@ -44,34 +44,36 @@ impl<'a> Sightings<'a> {
         Self { eyes: Eyes::of(rig), all: SmallVec::new(), weights_move: false }
     }
 
-    /// `None` where a covariance has no inverse or a point is behind a camera.
-    pub(crate) fn see(&mut self, points: &[Observation], target: Target) -> Option<()> {
-        for point in points {
-            let sighting = self.sighting(point, target)?;
+    /// # Errors
+    /// The first point whose covariance has no inverse, or that a camera cannot see where it was measured.
+    pub(crate) fn see(&mut self, points: &[Observation], target: Target) -> Result<(), Degenerate> {
+        for (index, point) in points.iter().enumerate() {
+            let sighting = self.sighting(point, index, target)?;
             self.weights_move |= matches!(sighting, Sighting::Seen { model_variance, .. } if model_variance > 0.0);
             self.all.push(sighting);
         }
-        Some(())
+        Ok(())
     }
 
-    fn sighting(&self, point: &Observation, target: Target) -> Option<Sighting> {
+    fn sighting(&self, point: &Observation, index: usize, target: Target) -> Result<Sighting, Degenerate> {
         let Some(pixels) = &point.pixels else {
-            return Some(Sighting::Bare { at: point.measured.at.coords, information: information(point) });
+            return Ok(Sighting::Bare { at: point.measured.at.coords, information: information(point) });
         };
-        let noise = pixels.covariance + Matrix4::identity() * (FLOOR * FLOOR);
-        let weight = Whitener::of(&noise)?;
+        let noise = pixels.covariance + Matrix4::identity() * (PIXEL_FLOOR * PIXEL_FLOOR);
+        let weight = Whitener::of(&noise).ok_or(Degenerate::Noise { index })?;
         let model_variance = point.model_sigma * point.model_sigma;
         let (mut at, mut frozen) = (pixels.at.coordinates(), weight);
         if target == Target::Triangulated || model_variance > 0.0 {
-            let (seen, j) = self.eyes.look(&point.measured.at.coords)?;
+            let (seen, j) = self.eyes.look(&point.measured.at.coords).ok_or(Degenerate::Hidden)?;
             if target == Target::Triangulated {
                 at = seen;
             }
             if model_variance > 0.0 {
-                frozen = Whitener::of(&(noise + j * j.transpose() * model_variance))?;
+                frozen =
+                    Whitener::of(&(noise + j * j.transpose() * model_variance)).ok_or(Degenerate::Noise { index })?;
             }
         }
-        Some(Sighting::Seen { at, weight, frozen, model_variance })
+        Ok(Sighting::Seen { at, weight, frozen, model_variance })
     }
 
     /// What the k-th point says, S = Σ_px + σ_model² J Jᵀ with J at the place where the pose puts it.

@@ -43,13 +43,17 @@ pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> +
     if values[2] > 0.0 { (values[1].max(0.0) / values[2]).sqrt() } else { 0.0 }
 }
 
-/// Refuses too few points and numbers that are not finite.
+/// Refuses too few points, and coordinates and noise that are not finite.
 pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
     let found = data.points.len();
     if found < needed {
         return Err(Degenerate::TooFew { found, needed });
     }
-    if data.points.iter().all(Observation::is_finite) { Ok(()) } else { Err(Degenerate::NotFinite) }
+    if !data.points.iter().all(Observation::is_finite) {
+        return Err(Degenerate::NotFinite);
+    }
+    let noise = data.points.iter().position(|point| !point.has_finite_noise());
+    noise.map_or(Ok(()), |index| Err(Degenerate::Noise { index }))
 }
 
 /// Refuses what [`finite`] refuses and, where a rig is given, points that it cannot have seen, or too far away to be
@@ -60,6 +64,7 @@ pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degener
     for point in &data.points {
         let (seen, known) = (&point.measured.at.coords, &point.model.coords);
         sum += (seen.x + seen.y + seen.z) + (known.x + known.y + known.z);
+        sum += point.measured.covariance.trace() + point.model_sigma;
         front &= seen.z > 0.0;
     }
     if data.points.len() < needed || !sum.is_finite() {

@@ -3,6 +3,7 @@
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use super::{
+    Degenerate,
     descent::{Linearized, NEAR, descend, linearize, settle},
     kabsch,
     roots::roots,
@@ -17,29 +18,34 @@ const WEAK: f64 = 0.01;
 /// that three points allow one camera alone; `starts` in all.
 ///
 /// The first answer is doubted when its attitude is weak or its χ² unlikely: other valleys are then looked into.
+///
+/// # Errors
+/// That of the first start, where none leads to a minimum.
 pub(super) fn likeliest(
     data: &Observations<'_>,
     rig: &StereoRig,
     starts: usize,
     sightings: &Sightings<'_>,
-) -> Option<Transform<Object, Camera>> {
+) -> Result<Transform<Object, Camera>, Degenerate> {
     let points = &data.points;
     let (frozen, live) = (|k: usize, at: &_| sightings.frozen(k, at), |k: usize, at: &_| sightings.live(k, at));
     let from = |start: &Transform<Object, Camera>| {
         let (near, here) = descend(points, start, NEAR, &frozen)?;
-        let here = if sightings.weights_move { linearize(points, &near, &live)? } else { here };
+        let here =
+            if sightings.weights_move { linearize(points, &near, &live).ok_or(Degenerate::Hidden)? } else { here };
         settle(points, near, here, &live)
     };
     let first = from(&kabsch::fit(points));
-    if starts == 1 || first.as_ref().is_some_and(|(_, all)| is_clear(all, points.len())) {
+    if starts == 1 || first.as_ref().is_ok_and(|(_, all)| is_clear(all, points.len())) {
         return first.map(|(pose, _)| pose);
     }
     let mut best = first.map(|(pose, all)| (all.cost, pose));
-    for (pose, all) in roots(data, rig).as_slice().iter().take(starts - 1).filter_map(from) {
+    for (pose, all) in roots(data, rig).as_slice().iter().take(starts - 1).filter_map(|root| from(root).ok()) {
         // Two starts in one valley give one cost: of equals the first stands.
-        if best.is_none_or(|(least, _)| all.cost < least * (1.0 - 1e-6)) {
-            best = Some((all.cost, pose));
+        if best.as_ref().is_ok_and(|(least, _)| all.cost >= least * (1.0 - 1e-6)) {
+            continue;
         }
+        best = Ok((all.cost, pose));
     }
     best.map(|(_, pose)| pose)
 }

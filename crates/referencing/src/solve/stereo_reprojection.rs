@@ -56,8 +56,8 @@ impl Solver for StereoReprojection {
         check(data, self.minimum(), self.least_ratio)?;
         let rig = pixels_and_rig(data)?;
         let mut sightings = Sightings::new(rig);
-        sightings.see(&data.points, Target::Pixels).ok_or(Degenerate::Singular)?;
-        likeliest(data, rig, self.starts, &sightings).ok_or(Degenerate::Singular)
+        sightings.see(&data.points, Target::Pixels)?;
+        likeliest(data, rig, self.starts, &sightings)
     }
 
     fn covariance(
@@ -67,9 +67,10 @@ impl Solver for StereoReprojection {
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let rig = pixels_and_rig(data)?;
         let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Pixels)
-            .and_then(|()| linearize(&data.points, at, &|k, place: &_| all.live(k, place)))
-            .and_then(|all| all.covariance())
+        all.see(&data.points, Target::Pixels)?;
+        linearize(&data.points, at, &|k, place: &_| all.live(k, place))
+            .ok_or(Degenerate::Hidden)?
+            .covariance()
             .map(Covariance6::new)
             .ok_or(Degenerate::Singular)
     }

@@ -191,6 +191,47 @@ fn analytic_covariances_are_the_numerical_ones() {
     assert!(differs.is_empty(), "{differs:?}");
 }
 
+/// Steps follow the noise: at a micrometre Huber's loss is least squares within its noise, and the numerical covariance
+/// says so.
+#[test]
+fn numerical_steps_stay_within_the_noise() {
+    let data = seen(&SPREAD, 1e-6);
+    let huber = irls::Irls::default();
+    let numeric = numerical::covariance(|moved| huber.solve(moved), &data, &motion()).unwrap().matrix;
+    let expected = Kabsch::default().covariance(&data, &motion()).unwrap().matrix;
+    assert!((numeric - expected).amax() < 1e-5 * expected.amax(), "{}", (numeric - expected).amax() / expected.amax());
+}
+
+/// Nothing is known better than it is written: noise of nought leaves a covariance that can be inverted, and coordinates of a
+/// hundred thousand kilometres what rounding leaves of them.
+#[test]
+fn no_point_is_known_better_than_its_digits() {
+    for solver in solvers() {
+        let exact = solver.covariance(&seen(&SPREAD, 0.0), &motion()).unwrap().matrix;
+        assert!(exact.cholesky().is_some() && exact.amax() < 1e-15, "{solver:?}: {exact}");
+        let far = Transform::<Object, Camera>::new(motion().rotation(), Vector3::new(0.0, 0.0, -1e8));
+        let mut data = seen(&SPREAD, 0.0);
+        data.points.iter_mut().for_each(|point| point.measured.at = far.inverse() * point.model);
+        let Ok(pose) = solver.solve(&data) else { continue };
+        let known = solver.covariance(&data, &pose).unwrap().matrix;
+        assert!(known[(0, 0)].sqrt() > 1e-8, "{solver:?}: {}", known[(0, 0)].sqrt());
+    }
+}
+
+/// Absurd noise is refused as what it is, or not at all: a coordinate is not blamed for it.
+#[test]
+fn absurd_noise_is_not_blamed_on_coordinates() {
+    for solver in solvers() {
+        let known = solver.solve(&seen(&SPREAD, 1e15)).unwrap();
+        assert!(motion().error_to(&known).amax() < 1e-9, "{solver:?}");
+        for sigma in [1e200, f64::NAN] {
+            let mut data = seen(&SPREAD, 0.01);
+            data.points[3].measured.covariance = Matrix3::identity() * (sigma * sigma);
+            assert_eq!(solver.solve(&data), Err(Degenerate::Noise { index: 3 }), "{solver:?}");
+        }
+    }
+}
+
 #[test]
 fn pixels_are_asked_for_by_name() {
     let data = seen(&SPREAD, 0.01);

@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver, numerical,
+    Degenerate, Solver, numerical, resampled,
     spread::{seen, share},
 };
 use crate::{Observation, Observations};
@@ -66,14 +66,15 @@ impl Solver for Triad {
         self.three(data).map_or(Vec::new(), Vec::from)
     }
 
-    /// The derivatives are those of the three chosen points: another choice under a small step
-    /// would be no derivative.
+    /// That of many draws of the three chosen points: no other averages their depths, and errors of several degrees are no
+    /// longer straight in them.
     fn covariance(
         &self,
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        covariance_of(&self.three(data)?.map(|i| data.points[i]), data, at)
+        let three = self.three(data)?.map(|i| data.points[i]).to_vec();
+        resampled::covariance(of_three, &Observations { points: three, rig: data.rig }, at)
     }
 }
 
@@ -216,14 +217,19 @@ fn axes(p1: &Vector3<f64>, p2: &Vector3<f64>, p3: &Vector3<f64>) -> Result<Matri
     Ok(Matrix3::from_columns(&[x, z.cross(&x), z]))
 }
 
+/// By derivatives: to compare triangles it need not be better.
 fn covariance_of(
     points: &[Observation; 3],
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
     let three = Observations { points: points.to_vec(), rig: data.rig };
-    let solve = |moved: &Observations<'_>| pose(&[&moved.points[0], &moved.points[1], &moved.points[2]]);
-    numerical::covariance(solve, &three, at)
+    numerical::covariance(of_three, &three, at)
+}
+
+/// The pose of three points.
+fn of_three(data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+    pose(&[&data.points[0], &data.points[1], &data.points[2]])
 }
 
 /// The square of the sine of the smallest angle, in the model or as measured, whichever is smaller.

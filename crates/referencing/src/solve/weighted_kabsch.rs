@@ -55,7 +55,5 @@ impl Solver for WeightedKabsch {
 
 /// Mean variance of a residual along an axis (m²).
 pub(super) fn variance(point: &Observation) -> f64 {
-    /// Nothing is known better than this (m).
-    const FLOOR: f64 = 1e-9;
-    point.noise().trace() / 3.0 + FLOOR * FLOOR
+    point.noise().trace() / 3.0
 }

@@ -1,0 +1,134 @@
+//! The covariance of an answer that derivatives do not describe, from what other noise would have shown.
+
+use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector4};
+use seafix_geometry::{
+    Camera, Covariance6, Object, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint,
+};
+
+use super::{
+    Degenerate,
+    irls::distance,
+    sightings::PIXEL_FLOOR,
+    signs::{Signs, rows},
+};
+use crate::{Observation, Observations};
+
+/// The mean of ξξᵀ over answers `at · Exp(ξ)` to the same points with other noise (parametric bootstrap; Efron, Tibshirani,
+/// *An introduction to the bootstrap*, 1993): bias included, and whatever a loss with corners does with noise of its size,
+/// which no derivative at one draw of it tells.
+///
+/// The draws are the rows of [`Signs`], each and its negative: of an answer that is linear in the noise they give the
+/// covariance to the last digit. A point that the noise does not explain is taken
+/// where it was measured, so that it is left out, or pulls, as it did; all others where the pose puts them.
+///
+/// # Errors
+/// Where one of ten draws has no answer, why the first of them has none.
+pub(super) fn covariance(
+    solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
+    data: &Observations<'_>,
+    at: &Transform<Object, Camera>,
+) -> Result<Covariance6<Object, Camera>, Degenerate> {
+    let all: Vec<Source> =
+        data.points.iter().enumerate().map(|(k, p)| Source::of(k, p, data.rig, at)).collect::<Result<_, _>>()?;
+    let numbers = all.iter().map(Source::numbers).sum();
+    let (size, blocks) = rows(numbers, LEAST_PAIRS);
+    let mut sum = Matrix6::zeros();
+    let (mut answered, mut refused) = (0_u32, None);
+    let mut moved = data.clone();
+    for block in 0..blocks {
+        for row in Signs::new(size, block as u64).rows() {
+            for sign in [1.0, -1.0] {
+                let mut noise = row.iter().map(|z| sign * z);
+                let shown = all.iter().zip(&mut moved.points).try_for_each(|(source, point)| {
+                    *point = source.draw(data.rig, &mut noise)?;
+                    Some(())
+                });
+                match shown.ok_or(Degenerate::Hidden).and_then(|()| solve(&moved)) {
+                    Ok(answer) => {
+                        let xi = at.error_to(&answer);
+                        sum += xi * xi.transpose();
+                        answered += 1;
+                    }
+                    Err(why) => refused = refused.or(Some(why)),
+                }
+            }
+        }
+    }
+    let drawn = (2 * size * blocks) as u32;
+    match refused {
+        Some(why) if answered * 10 < drawn * 9 => Err(why),
+        _ => Ok(Covariance6::new(sum / f64::from(answered))),
+    }
+}
+
+/// Draws, each with its negative, at least.
+const LEAST_PAIRS: usize = 128;
+/// A residual (standard deviations of its point) that noise exceeds once in a million where all of it is along one axis; a
+/// pose that weighs all axes alike leaves across the others residuals that no χ² would forgive.
+const UNLIKELY: f64 = 8.5;
+
+/// A point without its noise, and the noise.
+enum Source {
+    Seen { point: Observation, at: Vector4<f64>, pixels: UncertainPixels, root: Matrix4<f64> },
+    Bare { point: Observation, at: Vector3<f64>, root: Matrix3<f64> },
+}
+
+impl Source {
+    fn of(
+        index: usize,
+        point: &Observation,
+        rig: Option<&StereoRig>,
+        pose: &Transform<Object, Camera>,
+    ) -> Result<Self, Degenerate> {
+        let point = *point;
+        let place = pose.inverse() * point.model;
+        let likely = distance(&point, pose) <= UNLIKELY;
+        let why = Degenerate::Noise { index };
+        if let (Some(pixels), Some(rig)) = (point.pixels, rig) {
+            let shown = rig.project(&place).filter(|_| likely).unwrap_or(pixels.at).coordinates();
+            let noise = pixels.covariance + Matrix4::identity() * (PIXEL_FLOOR * PIXEL_FLOOR);
+            let root = noise.cholesky().ok_or(why)?.l();
+            return Ok(Self::Seen { point, at: shown, pixels, root });
+        }
+        let digits = point.digits();
+        let noise = point.measured.covariance + Matrix3::identity() * (digits * digits);
+        let root = noise.cholesky().ok_or(why)?.l();
+        let at = if likely { place.coords } else { point.measured.at.coords };
+        Ok(Self::Bare { point, at, root })
+    }
+
+    fn point(&self) -> &Observation {
+        match self {
+            Self::Seen { point, .. } | Self::Bare { point, .. } => point,
+        }
+    }
+
+    /// How many numbers its noise takes.
+    fn numbers(&self) -> usize {
+        let measured = if matches!(self, Self::Seen { .. }) { 4 } else { 3 };
+        measured + if self.point().model_sigma > 0.0 { 3 } else { 0 }
+    }
+
+    /// The point as other noise would have shown it; `None` where no point can be triangulated.
+    fn draw(&self, rig: Option<&StereoRig>, noise: &mut impl Iterator<Item = f64>) -> Option<Observation> {
+        let mut next = || noise.next().unwrap_or(0.0);
+        let mut drawn = *self.point();
+        match self {
+            Self::Seen { at, pixels, root, .. } => {
+                let [ul, vl, ur, vr] = (at + root * Vector4::from_fn(|_, _| next())).into();
+                let shown = StereoPixels { left: Pixel { u: ul, v: vl }, right: Pixel { u: ur, v: vr } };
+                let seen = UncertainPixels { at: shown, ..*pixels };
+                let found = rig?.triangulate(&seen).ok()?;
+                drawn.measured = UncertainPoint { at: found.point, covariance: found.covariance };
+                drawn.pixels = Some(seen);
+            }
+            Self::Bare { at, root, .. } => {
+                drawn.measured.at = (at + root * Vector3::from_fn(|_, _| next())).into();
+            }
+        }
+        if drawn.model_sigma > 0.0 {
+            drawn.model = drawn.model + Vector3::from_fn(|_, _| next()) * drawn.model_sigma;
+        }
+        Some(drawn)
+    }
+}
