@@ -68,6 +68,7 @@ const LEAST_PAIRS: usize = 128;
 const UNLIKELY: f64 = 8.5;
 
 /// A point without its noise, and the noise.
+#[expect(clippy::large_enum_variant, reason = "one a point, and bare points are the fewer")]
 enum Source {
     Seen { point: Observation, at: Vector4<f64>, pixels: UncertainPixels, root: Matrix4<f64> },
     Bare { point: Observation, at: Vector3<f64>, root: Matrix3<f64> },

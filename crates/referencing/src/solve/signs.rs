@@ -31,7 +31,7 @@ impl Signs {
     /// The k-th row: Hadamard's k-th, twice turned.
     fn row(&self, k: usize) -> Vec<f64> {
         let mut row: Vec<f64> =
-            (0..self.size).map(|j| if (j & k).count_ones() % 2 == 0 { 1.0 } else { -1.0 }).collect();
+            (0..self.size).map(|j| if (j & k).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }).collect();
         for signs in self.signs.chunks_exact(self.size) {
             row.iter_mut().zip(signs).for_each(|(x, sign)| *x *= sign);
             turn(&mut row);

@@ -212,8 +212,9 @@ fn no_point_is_known_better_than_its_digits() {
         let far = Transform::<Object, Camera>::new(motion().rotation(), Vector3::new(0.0, 0.0, -1e8));
         let mut data = seen(&SPREAD, 0.0);
         data.points.iter_mut().for_each(|point| point.measured.at = far.inverse() * point.model);
-        let Ok(pose) = solver.solve(&data) else { continue };
-        let known = solver.covariance(&data, &pose).unwrap().matrix;
+        // A lever of eight digits more than the object leaves some none: they refuse.
+        let known = solver.solve(&data).and_then(|pose| solver.covariance(&data, &pose));
+        let Ok(Covariance6 { matrix: known, .. }) = known else { continue };
         assert!(known[(0, 0)].sqrt() > 1e-8, "{solver:?}: {}", known[(0, 0)].sqrt());
     }
 }
