@@ -1,6 +1,6 @@
 //! Seeded dives over subsea structures: rendered images or noisy points, with exact truth.
 //!
-//! A [`Mission`] is the settings of a dive: [site](field), [water and lamps](optics), cameras, [vehicle](vehicle),
+//! A [`Mission`] is the settings of a dive: [site](field), [water and lamps](optics), cameras, [vehicle],
 //! [navigation sensors](sensors), what has changed since the survey, and what fails. [`Mission::plan`] builds the site and
 //! lets the vehicle go its way; each [`Instant`] of the [`PlannedMission`] has a stamp and a rough pose, [renders](Instant::render)
 //! a stereo pair or gives [points](Instant::points) of the same view; its [truth](Instant::truth) is kept apart.

@@ -68,7 +68,7 @@ fn harris_refuses_what_finds_nothing() {
 fn detectors_refuse_what_finds_nothing() {
     range(&DETECTORS, "shi-tomasi", "sigma", &[0.3, 100.0], &[0.0, 0.01, 0.29, -1.0, 101.0]);
     range(&DETECTORS, "shi-tomasi", "quality", &[0.0, 1.0], &[-0.1, 1.1]);
-    range(&DETECTORS, "fast", "threshold", &[0.0, 1e6], &[-1.0]);
+    range(&DETECTORS, "fast", "threshold", &[0.0, 65535.0], &[-1.0, 1e6]);
     for name in ["fast", "shi-tomasi"] {
         for key in ["features", "cells"] {
             let said = refusal(&DETECTORS, &Choice::named(name).with(key, 0)).unwrap_or_default();
@@ -184,7 +184,7 @@ fn mutual_ratio_refuses_what_matches_nothing() {
 fn lucas_kanade_refuses_what_follows_nothing() {
     range(&MATCHERS, "lucas-kanade", "epipolar-px", &[0.1, 1000.0], &[0.0, -1.0, 1001.0]);
     range(&MATCHERS, "lucas-kanade", "min-depth", &[0.1, 49.0], &[0.0, -0.1]);
-    range(&MATCHERS, "lucas-kanade", "max-depth", &[0.6], &[0.5, 0.0]);
+    range(&MATCHERS, "lucas-kanade", "max-depth", &[0.2], &[0.1, 0.0]);
     assert!(refusal(&MATCHERS, &Choice::named("lucas-kanade").with("places", 0)).is_some());
     for (tracker, key) in [
         (Tracker { window: 4, ..Tracker::default() }, "window"),

@@ -30,14 +30,7 @@ pub(super) fn epipolar_curve(
         near *= 0.5;
         begin = seen(near);
     }
-    let Some(mut begin) = begin else { return };
-    // What begins far beyond the image is not sampled there, or little of the image would be.
-    let [width, height] = rig.right().size().map(f64::from);
-    let (length, reach) = ((begin - end).norm(), 2.0 * width.hypot(height));
-    if length > reach {
-        near = far + (near - far) * reach / length;
-        begin = seen(near).unwrap_or(begin);
-    }
+    let Some(begin) = begin else { return };
     let count = ((begin - end).norm() / step).ceil().min(most);
     let places = (0..=count as usize).map(|i| far + (near - far) * i as f64 / count.max(1.0));
     curve.extend(places.filter_map(seen));
