@@ -7,7 +7,7 @@ use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
 use seafix_experiment::{
     Pipeline,
-    dataset::{DescribedRig, are_twins, read_image, read_rig, strangers, swapped_fault, twins_fault},
+    dataset::{DescribedRig, are_twins, partners_remedy, read_image, read_rig, strangers, swapped_fault, twins_fault},
 };
 use seafix_geometry::StereoRig;
 use seafix_vision::{FrontEnd, Image, Keypoint, Look, OffLines, Sides, StageTimes, Threads};
@@ -218,9 +218,6 @@ fn off_lines_warning(off: OffLines, rig: &StereoRig, file: &Path) -> Option<Faul
     })
 }
 
-/// Fewer points of exchanged images are no reason to exchange them.
-const SOME: usize = 10;
-
 /// A word where key points came to no point, and what the exchanged images would give.
 fn nothing(
     front_end: &FrontEnd,
@@ -236,11 +233,6 @@ fn nothing(
     let mut exchanged = Look::new(Threads::One);
     front_end.look(right, left, rig, &mut exchanged);
     let (matches, points) = (exchanged.matches.len(), exchanged.cloud.len());
-    let remedy = if points >= SOME && 2 * points > matches {
-        "exchange the images if they have changed places"
-    } else {
-        "see whether both show one scene, and whether the rig is theirs"
-    };
     Some(
         Fault::new("key points and no point", file)
             .value(format!(
@@ -248,7 +240,7 @@ fn nothing(
                  {points} points",
                 look.matches.len()
             ))
-            .remedy(remedy),
+            .remedy(partners_remedy(points, 2 * points > matches)),
     )
 }
 

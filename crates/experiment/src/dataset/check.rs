@@ -120,22 +120,24 @@ pub fn swapped_fault(sides: Sides, file: &Path) -> Option<Fault> {
     })
 }
 
-/// Fewer matches of exchanged images are no reason to exchange them.
-const SOME: usize = 10;
-
 /// A word where key points have hardly any partners, and what the exchanged images would give.
 pub fn strangers(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_strangers().then(|| {
         let Sides { given, exchanged, keypoints } = sides;
-        let remedy = if exchanged >= SOME && exchanged > 3 * given {
-            "exchange the images if they have changed places"
-        } else {
-            "see whether both show one scene, and whether the rig is theirs"
-        };
         Fault::new("images with key points and hardly a match", file)
             .value(format!("{keypoints} key points, {given} matches; {exchanged} with left and right exchanged"))
-            .remedy(remedy)
+            .remedy(partners_remedy(exchanged, exchanged > 3 * given))
     })
+}
+
+/// What to do about images whose key points have no partners: exchange them if that gives more than a handful.
+pub fn partners_remedy(exchanged: usize, clearly: bool) -> &'static str {
+    const HANDFUL: usize = 10;
+    if exchanged >= HANDFUL && clearly {
+        "exchange the images if they have changed places"
+    } else {
+        "see whether both show one scene, and whether the rig is theirs"
+    }
 }
 
 /// Files that are not those whose hashes the description has.
