@@ -11,7 +11,7 @@ use seafix_report::{Forms, index, index_holds, report, verify};
 
 use super::report::{failure, said};
 use crate::{
-    exit::{DONE, Ended, FINDINGS, Failure, OUTPUT, USAGE},
+    exit::{DONE, Ended, FINDINGS, Failure, USAGE},
     publication::{self, Published},
     signals,
     terminal::{Progress, print, tell},
@@ -67,7 +67,7 @@ impl Publish {
             tell(&format!("{}: {}", one.name, written.page.display()));
         }
         if self.only.is_empty() {
-            self.sweep(&list)?;
+            self.tell_of_others(&list);
             print(&format!("{}\n", index(&self.folders(&list), &self.out).map_err(failure)?.display()))?;
         }
         Ok(DONE)
@@ -95,17 +95,16 @@ impl Publish {
         list.iter().map(|one| self.runs.join(&one.name)).collect()
     }
 
-    /// Removes reports of experiments that are no longer in the list.
-    fn sweep(&self, list: &[Published]) -> Result<(), Failure> {
-        let Ok(entries) = fs::read_dir(&self.out) else { return Ok(()) };
-        for path in entries.flatten().map(|entry| entry.path()) {
-            let known = list.iter().any(|one| path.file_name().is_some_and(|name| *name == *one.name));
-            if !known && is_report(&path) {
-                fs::remove_dir_all(&path)
-                    .map_err(|error| Failure::new(OUTPUT, format!("cannot remove {}: {error}", path.display())))?;
-            }
+    /// Tells of reports of experiments that are not in the list. They stay: nobody asked for their removal.
+    fn tell_of_others(&self, list: &[Published]) {
+        let Ok(entries) = fs::read_dir(&self.out) else { return };
+        let mut others: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+        others.retain(|path| is_report(path) && !list.iter().any(|one| path.ends_with(&one.name)));
+        others.sort();
+        for path in others {
+            let list = self.list.display();
+            tell(&format!("{}: a report that is not in {list}: remove it if it is not wanted", path.display()));
         }
-        Ok(())
     }
 
     fn verify_all(&self, list: &[Published]) -> Ended {
