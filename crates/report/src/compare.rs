@@ -150,7 +150,7 @@ fn lines(comparisons: &[Comparison]) -> String {
             c.names[0],
             c.names[1],
             c.n,
-            format::number(Some(c.holm), 4)
+            format::probability(c.holm)
         );
         text.extend(line.chars().map(|sign| if sign.is_control() { ' ' } else { sign }));
         text.push('\n');

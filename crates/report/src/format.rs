@@ -41,6 +41,11 @@ pub(crate) fn number(value: Option<f64>, decimals: usize) -> String {
     }
 }
 
+/// A probability: four decimals, and what they would round away as a power of ten.
+pub(crate) fn probability(value: f64) -> String {
+    if value > 0.0 && value < 1e-3 { format!("{value:.1e}").replace('-', "−") } else { number(Some(value), 4) }
+}
+
 /// As many decimals as the smallest of `values` needs for two digits, the same for a whole column.
 pub(crate) fn decimals(values: impl IntoIterator<Item = f64>) -> usize {
     let least = values.into_iter().filter(|x| x.is_finite() && *x > 0.0).fold(f64::INFINITY, f64::min);
@@ -75,5 +80,9 @@ mod tests {
         assert_eq!(decimals([140.0]), 0);
         assert_eq!(number(Some(-0.5), 1), "−0.5");
         assert_eq!(number(Some(f64::INFINITY), 1), "∞");
+        assert_eq!(
+            [0.0, 1.14e-5, 9.6e-4, 1e-3, 1.0].map(probability),
+            ["0.0000", "1.1e−5", "9.6e−4", "0.0010", "1.0000"]
+        );
     }
 }

@@ -101,9 +101,17 @@ impl Number {
         Self::new(Some(value as f64), 0, key)
     }
 
-    /// How many decimals are printed.
-    pub(crate) fn decimals(text: &str) -> usize {
-        text.split_once('.').map_or(0, |(_, decimals)| decimals.len())
+    /// A probability, however small.
+    pub(crate) fn probability(value: f64, key: Key) -> Self {
+        Self { text: format::probability(value), value: Some(value), key: Rc::new(key) }
+    }
+
+    /// Another value in the way that `text` is printed.
+    pub(crate) fn like(text: &str, value: Option<f64>) -> String {
+        match value {
+            Some(value) if text.contains('e') => format::probability(value),
+            _ => format::number(value, text.split_once('.').map_or(0, |(_, decimals)| decimals.len())),
+        }
     }
 }
 

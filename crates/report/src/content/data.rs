@@ -117,9 +117,19 @@ fn disparity(run: &Run, summary: &Summary) -> Text {
 }
 
 fn targets(header: &TrialHeader) -> String {
-    let targets = header.targets.iter().map(|target| format!("{} ({})", target.id, target.points.len()));
-    let points: usize = header.targets.iter().map(|target| target.points.len()).sum();
-    format!("{}: {points} feature points", targets.collect::<Vec<_>>().join(", "))
+    const NAMED: usize = 12;
+    let sizes = || header.targets.iter().map(|target| target.points.len());
+    let points: usize = sizes().sum();
+    let who = match (sizes().min(), sizes().max()) {
+        (Some(least), Some(most)) if header.targets.len() > NAMED => {
+            format!("{} of {least} to {most} points", header.targets.len())
+        }
+        _ => {
+            let each = header.targets.iter().map(|target| format!("{} ({})", target.id, target.points.len()));
+            each.collect::<Vec<_>>().join(", ")
+        }
+    };
+    format!("{who}: {points} feature points")
 }
 
 fn camera(camera: &CameraRecord) -> String {

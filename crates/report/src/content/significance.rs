@@ -113,7 +113,7 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
             let alone = [("alone-first", comparison.alone[0]), ("alone-second", comparison.alone[1])];
             let [a, b] = alone.map(|(what, n)| told(what, n as f64, 0));
             line.push(Cell { text: text![a, "/", b], ..Cell::default() });
-            line.push(told("mcnemar", comparison.mcnemar, 4).into());
+            line.push(Number::probability(comparison.mcnemar, key(run, comparison, "mcnemar")).into());
         }
         table.line(first && before.is_some(), line);
         before = Some(&comparison.condition);
@@ -128,7 +128,7 @@ fn holm(run: &Run, comparisons: &[Comparison], own: &Comparison) -> Number {
     let trials: Vec<&Trial> = family.iter().map(|&index| &run.trials[index]).collect();
     let over = if own.over_conditions { "conditions" } else { "attempts" };
     let what = format!("holm m2_rms over {over} in families of {}", own.logs.len());
-    Number::new(Some(own.holm), 4, super::tell::over(&trials, "/metrics/evaluation", what))
+    Number::probability(own.holm, super::tell::over(&trials, "/metrics/evaluation", what))
 }
 
 /// The intervals side by side.

@@ -5,7 +5,7 @@ mod logs;
 
 use std::{fs, path::Path};
 
-use crate::{Forms, Key, Number, ReportError, Summary, format, run::Run, write::files};
+use crate::{Forms, Key, Number, ReportError, Summary, run::Run, write::files};
 use evaluate::evaluate;
 use logs::Logs;
 
@@ -94,12 +94,12 @@ impl Verified {
     }
 }
 
-/// A value as it would be printed, with as many decimals.
+/// A value as it would be printed.
 fn again(key: &Key, value: Option<f64>, printed: &str) -> String {
     if key.what == "stamp" {
         return key.span[0].to_string();
     }
-    format::number(value, Number::decimals(printed))
+    Number::like(printed, value)
 }
 
 /// Keys and texts of all numbers of a page.
