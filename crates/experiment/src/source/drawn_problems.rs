@@ -49,23 +49,26 @@ impl Source for DrawnProblems {
     fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
         let family = self.family.parse().map_err(|what: String| vec![Fault::new(what, Path::new("the source"))])?;
         let presence = if self.absent { Presence::Absent } else { Presence::Present };
-        let posed = (self.first..self.first + self.frames).map(|number| {
-            let Drawn { problem, truth } = Drawn::new(family, seed, number, presence);
-            let camera_from_object =
-                Transform::<Camera, Object>::from_rows(&truth.t_cam_obj).expect("it was made of a rigid motion");
-            let rule = Solved { ideal_rms: truth.ideal_tre_rms, putative: problem.putative.is_some() };
-            let pairs = truth.pairs.iter().map(|&[model, cloud]| (model, cloud)).collect();
-            Posed {
-                problem: Arc::new(problem.problem()),
-                truth: Some((camera_from_object.inverse(), TrueAnswer { pairs, rule })),
-            }
-        });
+        let numbers = self.first..self.first + self.frames;
+        let posed = numbers.map(|number| posed(Drawn::new(family, seed, number, presence))).collect();
         let absent = if self.absent { " without the object" } else { "" };
         let name = format!("problems of family {}{absent}, seed {seed}", self.family);
-        Ok(Box::new(ProblemPassage::new(name, posed.collect(), Vec::new())))
+        Ok(Box::new(ProblemPassage::new(name, posed, Vec::new())))
     }
 
     fn has_pixels(&self) -> bool {
         false
+    }
+}
+
+/// A problem, and its truth for the judge.
+pub(super) fn posed(Drawn { problem, truth }: Drawn) -> Posed {
+    let camera_from_object =
+        Transform::<Camera, Object>::from_rows(&truth.t_cam_obj).expect("it was made of a rigid motion");
+    let rule = Solved { ideal_rms: truth.ideal_tre_rms, putative: problem.putative.is_some() };
+    let pairs = truth.pairs.iter().map(|&[model, cloud]| (model, cloud)).collect();
+    Posed {
+        problem: Arc::new(problem.problem()),
+        truth: Some((camera_from_object.inverse(), TrueAnswer { pairs, rule })),
     }
 }

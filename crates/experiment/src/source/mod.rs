@@ -11,6 +11,7 @@ use seafix_vision::Image;
 
 mod dataset;
 mod dive;
+mod drawn_pairs;
 mod drawn_problems;
 mod euroc;
 mod kitti;
@@ -28,6 +29,7 @@ mod virtual_points;
 
 pub use dataset::DatasetSource;
 pub use dive::Dive;
+pub use drawn_pairs::DrawnPairs;
 pub use drawn_problems::DrawnProblems;
 pub use euroc::Euroc;
 pub use kitti::Kitti;
@@ -209,6 +211,7 @@ pub static SOURCES: Registry<dyn Source> = Registry::new(
         entry!(DatasetSource),
         entry!(Dive),
         entry!(DrawnProblems),
+        entry!(DrawnPairs),
         entry!(Euroc),
         entry!(Kitti),
         entry!(Mcap),

@@ -29,6 +29,7 @@ mod truth;
 use std::str::FromStr;
 
 pub use problem::{DrawnPrior, DrawnProblem};
+pub use putative::PutativePairs;
 pub use truth::{DrawnParameters, DrawnTruth};
 
 use crate::stream::{Purpose, Stream};
@@ -99,6 +100,12 @@ impl Drawn {
             Family::E => lattice::draw(&source),
             _ => boxes::draw(&source),
         }
+    }
+
+    /// The problem of this `number` among those of family d, with pairs of another kind: of one seed and number the object,
+    /// its pose and the noise are the same whatever the share of wrong pairs.
+    pub fn of_pairs(pairs: &PutativePairs, seed: u64, number: u64) -> Self {
+        putative::drawn(&Source { family: Family::D, seed, number, presence: Presence::Present }, pairs)
     }
 }
 

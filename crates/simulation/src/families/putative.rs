@@ -28,12 +28,28 @@ const CELLS: [(usize, usize); 13] = [
 ];
 /// Problems of a cell before the next one's turn.
 const A_CELL: usize = 4;
-const SIGMA: f64 = 0.01;
+
+/// Putative correspondences between the points of an object, uniform in a cube of edge 1 m, and as many measured points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PutativePairs {
+    /// How many.
+    pub pairs: usize,
+    /// How many in a hundred are wrong: their measured points lie anywhere in a ball about the object.
+    pub outliers: usize,
+    /// The radius of the ball (m).
+    pub radius: f64,
+    /// Noise of the measured points, an axis (m).
+    pub sigma: f64,
+}
 
 pub(super) fn draw(source: &Source) -> Drawn {
     let k = usize::try_from(source.number % 1_000_000).expect("it is below a million");
-    let (n, wrong) = CELLS[k / A_CELL % CELLS.len()];
-    let radius = [5.0, 1.0][k % 2];
+    let (pairs, outliers) = CELLS[k / A_CELL % CELLS.len()];
+    drawn(source, &PutativePairs { pairs, outliers, radius: [5.0, 1.0][k % 2], sigma: 0.01 })
+}
+
+pub(super) fn drawn(source: &Source, of: &PutativePairs) -> Drawn {
+    let &PutativePairs { pairs: n, outliers: wrong, radius, sigma } = of;
     let mut stream = source.stream(Part::Model);
     let model: Vec<Vector3<f64>> = (0..n).map(|_| cube(&mut stream, 0.5)).collect();
     let mut stream = source.stream(Part::Pose);
@@ -43,12 +59,12 @@ pub(super) fn draw(source: &Source) -> Drawn {
 
     let mut stream = source.stream(Part::Noise);
     let mut cloud: Vec<Vector3<f64>> =
-        model.iter().map(|at| (pose * Point::from(*at)).coords + stream.normal3(SIGMA)).collect();
+        model.iter().map(|at| (pose * Point::from(*at)).coords + stream.normal3(sigma)).collect();
     let mut stream = source.stream(Part::Clutter);
     for &i in &outliers {
         cloud[i] = pose.translation() + direction(&mut stream) * (radius * libm::cbrt(stream.unit()));
     }
-    let mut problem = DrawnProblem::new(source, &model, SIGMA);
+    let mut problem = DrawnProblem::new(source, &model, sigma);
     problem.cloud = cloud.iter().map(micrometres).collect();
     problem.putative = Some((0..n).map(|i| [i, i]).collect());
     let parameters = DrawnParameters {

@@ -134,56 +134,74 @@ fn laws(ticks: &[f64], all: &[[f64; 2]]) -> Vec<Layer> {
         .into()
 }
 
-/// How m2 of the fixes found is distributed, a box a trial.
-pub(super) fn boxes(run: &Run, _summary: &Summary) -> Option<Figure> {
+/// A quantity whose distribution is shown, its unit, and what its axis is called.
+type Distributed = (Field, Unit, &'static str);
+
+/// How the errors of the fixes found are distributed, a box a trial: m2, and over a share of outliers what the literature on
+/// robust methods shows, attitude, position and time.
+pub(super) fn boxes(run: &Run, summary: &Summary) -> Option<Figure> {
     let groups = panels(run, 12);
     let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
     if names.len() > 7 || run.trials.len() < 2 {
         return None;
     }
-    let heads = [Head::words("condition"), Head::words("series")].into_iter();
-    let heads = heads.chain(["n", "p5 (mm)", "p25 (mm)", "median (mm)", "p75 (mm)", "p95 (mm)"].map(Head::numbers));
+    let over_outliers = keys(summary).iter().any(|key| short(key) == "outliers");
+    let shown: &[Distributed] = if over_outliers {
+        &[
+            (Field::Attitude, Unit::Degrees, "attitude of the fixes found (deg)"),
+            (Field::Position, Unit::Millimetres, "position of the fixes found (mm)"),
+            (Field::SearchTime, Unit::Plain, "search (ms)"),
+        ]
+    } else {
+        &[(Field::M2, Unit::Millimetres, "m2 of the fixes found (mm)")]
+    };
+    let heads = [Head::words("condition"), Head::words("series"), Head::words("metric")].into_iter();
+    let heads = heads.chain(["n", "p5", "p25", "median", "p75", "p95"].map(Head::numbers));
     let mut data = Table::new("distribution", text!["The boxes of the figure of distributions."], heads.collect());
-    let mut layers: Vec<Layer> = (0..names.len()).map(|series| Layer::Boxes { series, values: Vec::new() }).collect();
-    for (place, (condition, members)) in groups.iter().enumerate() {
-        for (name, trial) in members {
-            let found = trial.attempts().filter(|(_, row)| row.found()).filter_map(|(_, row)| row.get(Field::M2));
-            let mut values: Vec<f64> = found.collect();
-            if values.is_empty() {
-                continue;
+    let conditions: Vec<String> = groups.iter().map(|(condition, _)| condition.clone()).collect();
+    let mut drawn = Vec::new();
+    for &(field, unit, label) in shown {
+        let mut layers: Vec<Layer> =
+            (0..names.len()).map(|series| Layer::Boxes { series, values: Vec::new() }).collect();
+        for (place, (condition, members)) in groups.iter().enumerate() {
+            for (name, trial) in members {
+                let found = trial.attempts().filter(|(_, row)| row.found()).filter_map(|(_, row)| row.get(field));
+                let mut values: Vec<f64> = found.collect();
+                if values.is_empty() {
+                    continue;
+                }
+                let quantiles = [0.05, 0.25, 0.5, 0.75, 0.95].map(|p| seafix_evaluation::quantile(&mut values, p));
+                let index = series(&names, name);
+                let width = 0.8 / names.len() as f64;
+                let x = place as f64 + width * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
+                if let Layer::Boxes { values, .. } = &mut layers[index] {
+                    values.push(([x, 0.36 * width], quantiles.map(|q| q * unit.scale())));
+                }
+                let told = |(what, value): (&str, f64)| {
+                    tell::statistic(trial, what, field, "found", Some(value), (unit, 3)).into()
+                };
+                let mut line = vec![condition.clone().into(), name.clone().into(), label.into()];
+                line.push(n(trial, field, values.len()).into());
+                line.extend(["q5", "q25", "median", "q75", "q95"].into_iter().zip(quantiles).map(told));
+                data.line(false, line);
             }
-            let quantiles = [0.05, 0.25, 0.5, 0.75, 0.95].map(|p| seafix_evaluation::quantile(&mut values, p));
-            let index = series(&names, name);
-            let width = 0.8 / names.len() as f64;
-            let x = place as f64 + width * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
-            if let Layer::Boxes { values, .. } = &mut layers[index] {
-                values.push(([x, 0.36 * width], quantiles.map(|q| q * 1e3)));
-            }
-            let told = |(name, value): (&str, f64)| {
-                tell::statistic(trial, name, Field::M2, "found", Some(value), (Unit::Millimetres, 3)).into()
-            };
-            let mut line = vec![condition.clone().into(), name.clone().into(), n(trial, values.len()).into()];
-            line.extend(["q5", "q25", "median", "q75", "q95"].into_iter().zip(quantiles).map(told));
-            data.line(false, line);
+        }
+        // Runs without durations have none.
+        if layers.iter().any(|layer| matches!(layer, Layer::Boxes { values, .. } if !values.is_empty())) {
+            let (x, y) = (Axis::named("", conditions.clone()), Axis::logarithmic(label));
+            drawn.push(Panel { x, y, layers, ..Panel::default() });
         }
     }
-    let conditions = groups.iter().map(|(condition, _)| condition.clone()).collect();
-    let panel = Panel {
-        x: Axis::named("", conditions),
-        y: Axis::logarithmic("m2 of the fixes found (mm)"),
-        layers,
-        ..Panel::default()
-    };
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
     let page = groups.len() * names.len() > 6;
-    let chart = Chart { panels: vec![panel], columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
-    let said = "Distribution of m2 over the fixes found: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
+    let chart = Chart { panels: drawn, columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
+    let said = "Distribution over the fixes found: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
     figure("distribution", caption(said, run), &chart, data)
 }
 
 /// How many fixes of the sample were found.
-fn n(trial: &Trial, n: usize) -> Number {
-    let key = crate::Key::of(trial, "/metrics/evaluation", "sampled m2_rms of found");
+fn n(trial: &Trial, field: Field, n: usize) -> Number {
+    let key = crate::Key::of(trial, field.topic(), format!("sampled {} of found", field.name()));
     Number::count(n, key)
 }
 
