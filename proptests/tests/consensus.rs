@@ -110,9 +110,17 @@ fn beliefs_are_calibrated() {
             let said: Vec<bool> =
                 beliefs.iter().filter(|(belief, _)| *belief <= sure).map(|(_, wrong)| *wrong).collect();
             let missed = said.iter().filter(|&&missed| missed).count();
-            assert!(family != Family::A || said.len() >= 100, "{what}: {} beliefs are no test", said.len());
-            let (low, _) = clopper_pearson(missed, said.len().max(1), 0.95);
-            assert!(low <= most, "{name}, {what}: {missed} of {} were wrong", said.len());
+            let share = missed as f64 / said.len().max(1) as f64;
+            println!("{name}, {what}: of {} called wrong with {sure} at most {missed} were", said.len());
+            if family == Family::A {
+                assert!(said.len() >= 100, "{what}: {} beliefs are no test", said.len());
+                assert!(share <= most, "{name}, {what}: {missed} of {} were wrong", said.len());
+            } else {
+                // At a site's scale minutes give some tens of such beliefs, and in f their true share is near the
+                // tenth: one more wrong or less would decide. What so few can show is that it is more than that.
+                let (low, _) = clopper_pearson(missed, said.len().max(1), 0.95);
+                assert!(low <= most, "{name}, {what}: {missed} of {} were wrong", said.len());
+            }
         }
     }
 }
