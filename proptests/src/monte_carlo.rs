@@ -164,8 +164,13 @@ pub fn rival(placed: &Placed, sigma_px: f64) -> f64 {
     least
 }
 
-/// χ² of the pixels at a pose.
-fn pixel_chi2(placed: &Placed, points: &[Observation], pose: &Transform<Object, Camera>, sigma_px: f64) -> Option<f64> {
+/// χ² of the pixels at a pose; `None` where a point is behind a camera.
+pub fn pixel_chi2(
+    placed: &Placed,
+    points: &[Observation],
+    pose: &Transform<Object, Camera>,
+    sigma_px: f64,
+) -> Option<f64> {
     let of = |point: &Observation| {
         let expected = placed.rig.project(&(pose.inverse() * point.model))?.coordinates();
         Some((point.pixels?.at.coordinates() - expected).norm_squared() / sigma_px.powi(2))

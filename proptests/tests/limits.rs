@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use seafix_component::Choice;
-use seafix_proptests::monte_carlo::{Cell, cell, cell_where, is_meaningful, paired};
-use seafix_referencing::SOLVERS;
+use seafix_proptests::monte_carlo::{Cell, cell, cell_where, is_meaningful, observations, paired, pixel_chi2};
+use seafix_referencing::{Observations, SOLVERS};
 use seafix_simulation::{Layout, Shape, VirtualRig};
 
 /// The paper's cameras: the virtual one, and Karmin2.
@@ -187,21 +187,51 @@ fn three_points(name: &str, solver: &str, settings: &Layout, draws: u64) -> Cell
     c
 }
 
+/// Of few points that hardly determine their attitude no answer is less likely than the truth: χ² of the pixels is nowhere
+/// larger there. Nor is there often none: a start that does not reach its minimum is followed on.
+///
+/// Seen to fail when the other starts are believed where the first did not end, in which case two of 10 000 poses were 3.4 m off.
+#[test]
+fn no_answer_is_less_likely_than_the_truth() {
+    let mut refused = 0;
+    for solver in ["mahalanobis", "stereo-reprojection"].map(build) {
+        for number in 0..20 {
+            let settings = Layout { points: 4, number, distance: 5.0, sigma_px: 0.5, ..Layout::default() };
+            let placed = settings.place(1).expect("the layout can be placed");
+            for draw in 0..500 {
+                let Some(points) = observations(&placed, draw, 0.0) else { continue };
+                let data = Observations { points, rig: Some(&placed.rig) };
+                let Ok(pose) = solver.solve(&data) else {
+                    refused += 1;
+                    continue;
+                };
+                let chi2 =
+                    |pose| pixel_chi2(&placed, &data.points, pose, 0.5).expect("all points are before the cameras");
+                let (found, truth) = (chi2(&pose), chi2(&placed.object_from_camera));
+                assert!(found <= truth * 1.001, "{solver:?}: layout {number}, draw {draw}: {found} {truth}");
+            }
+        }
+    }
+    assert!(refused <= 10, "{refused} of 20 000 refused");
+}
+
 /// Figure 4 for every solver: its own covariance holds within ±10 % wherever its attitude errs
 /// by less than 5° (unweighted solvers err by 15° in the weakest cell). As the mean NEES of 10 000 draws of each cell
 /// with thirteen points (1000 for those whose every answer takes a hundred others or a millisecond). `LIMITS_SOLVERS` names
-/// those that are tried (`irls cauchy` is a loss of its own), `LIMITS_POINTS` other numbers of points.
+/// those that are tried (`irls cauchy` is a loss of its own), `LIMITS_POINTS` other numbers of points, `LIMITS_CELLS` what a
+/// cell's name has in it (`Compact N 13 3.25 m`).
 #[test]
 #[ignore = "15 solvers, an hour: cargo test --release --workspace --test limits -- --ignored --nocapture every_solver"]
 fn every_solver_knows_its_error() {
     let mut missed = Vec::new();
     let asked = std::env::var("LIMITS_SOLVERS").unwrap_or_default();
+    let wanted = std::env::var("LIMITS_CELLS").unwrap_or_default();
     let points = std::env::var("LIMITS_POINTS").map_or(13, |number| number.parse().expect("a number"));
     let losses = ["irls cauchy", "irls un-squared"];
     for name in
         SOLVERS.names().chain(losses).filter(|name| asked.is_empty() || asked.split(',').any(|one| one == *name))
     {
-        for (cell_name, settings) in cells(points) {
+        for (cell_name, settings) in cells(points).into_iter().filter(|(name, _)| name.contains(&wanted)) {
             let slow = ["irls", "l-bfgs", "nelder-mead", "triad"].iter().any(|slow| name.starts_with(slow));
             let c = cell(&*build(name), &settings, 20, if slow { 1000 } else { 10_000 }, true);
             let turn = c.attitude_rms.to_degrees();

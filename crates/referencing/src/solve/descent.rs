@@ -108,8 +108,9 @@ const NOTHING: f64 = 1e-20;
 /// Below this decrement the cost has no digits left that could tell better from worse; the steps themselves
 /// must shrink then.
 pub(super) const NEAR: f64 = 1e-4;
-/// Steps of one descent.
-const MOST_STEPS: u64 = 60;
+/// Steps of one descent. Half a dozen are enough of nearly all; few weak points lie in a long curved valley, where Gauss's and
+/// Newton's steps are too short or too long by nearly all of themselves.
+const MOST_STEPS: u64 = 500;
 
 /// The least cost reached from `start` by Levenberg's and Marquardt's damped steps, to where a step is shorter than
 /// √`near` standard deviations. The weights of `term` must not depend on the pose: every step must lower the cost.
@@ -145,7 +146,7 @@ pub(super) fn descend(
 }
 
 /// The pose at which the steps vanish, from one near it: Gauss's and Newton's steps, of which each must be
-/// shorter than the last. Where the weights of `term` depend on the pose it solves the likelihood's equation
+/// shorter than the last, or from there on only half as much of them is taken. Where the weights of `term` depend on the pose it solves the likelihood's equation
 /// Σ Jᵀ W r = 0 with the weights of its own answer, which no cost measures. `here` is `term` at `start`. The pose, and
 /// the normal equations at it or one vanishing step before.
 ///
@@ -157,14 +158,18 @@ pub(super) fn settle(
     here: Linearized,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
 ) -> Result<(Transform<Object, Camera>, Linearized), Degenerate> {
-    let (mut pose, mut here, mut last) = (start, here, f64::INFINITY);
+    let (mut pose, mut here, mut last, mut share) = (start, here, f64::INFINITY, 1.0);
     for taken in 0..MOST_STEPS {
         let (step, decrement) = here.determined(0.0)?;
         if !(decrement < last) {
-            // Rounding is all that is left, or the steps lead nowhere.
-            return converged(taken, last.sqrt()).map(|()| (pose, here));
+            // Rounding is all that is left, or the steps lead beyond the minimum.
+            let done = converged(taken, last.sqrt());
+            if done.is_ok() || share < LEAST_SHARE {
+                return done.map(|()| (pose, here));
+            }
+            share *= 0.5;
         }
-        pose = moved(&pose, &step);
+        pose = moved(&pose, &(step * share));
         // Steps shrink by a constant factor at least: that the next is nothing is known before it is taken.
         let rate = if last.is_finite() { decrement / last } else { SHRINK };
         if decrement * rate <= NOTHING {
@@ -176,6 +181,8 @@ pub(super) fn settle(
     converged(MOST_STEPS, last.sqrt()).map(|()| (pose, here))
 }
 
+/// With so small a share of the steps nothing is to be hoped for.
+const LEAST_SHARE: f64 = 0.01;
 /// By how much the first decrement is taken to fall.
 const SHRINK: f64 = 1e-2;
 
