@@ -1,9 +1,12 @@
 //! All objects in view solved together, with those of the frames before.
 
-use std::time::Instant;
+use std::{collections::BTreeMap, time::Instant};
 
 use seafix_geometry::StereoRig;
-use seafix_referencing::{Glimpse, JointFixes, Member, Observations, Outcome, Target, TargetKind, joint_fixes};
+use seafix_referencing::{
+    Candidates, Correspondence, Gathered, Glimpse, JointFixes, Member, Observations, Outcome, Target, TargetKind,
+    gather, joint_fixes,
+};
 
 use crate::{Attempt, Sighting, Stages, stages::milliseconds};
 
@@ -16,22 +19,31 @@ impl Stages {
         }
     }
 
-    /// What a joint fix takes from a sighting: the identified points of every object that was fixed by itself.
-    pub(crate) fn glimpse(&self, sighting: &Sighting, targets: &[Target], rig: &StereoRig) -> Glimpse {
-        let mut points = Vec::new();
-        if self.settings().target == TargetKind::Joint {
-            for attempt in &sighting.attempts {
-                let Outcome::Referenced(fix) = &attempt.answer.outcome else { continue };
-                let model = &targets[attempt.target].points;
-                let own = Observations::of(&fix.pairs, model, &sighting.cloud, Some(rig)).points;
-                points.extend(own.into_iter().map(|point| (attempt.target, point)));
-            }
+    /// What a joint fix takes from a sighting: the identified points of every object that was fixed by itself, and those
+    /// of the other objects that stand where these put them.
+    pub(crate) fn glimpse(&self, sighting: &mut Sighting, targets: &[Target], rig: &StereoRig) -> Glimpse {
+        let mut glimpse = Glimpse::default();
+        if self.settings().target != TargetKind::Joint {
+            return glimpse;
         }
-        Glimpse { points }
+        let fixed: Vec<(usize, Vec<Correspondence>)> =
+            sighting.attempts.iter().filter_map(|attempt| Some((attempt.target, pairs(attempt)?.to_vec()))).collect();
+        if fixed.is_empty() {
+            return glimpse;
+        }
+        let mut listed: Vec<Option<&Candidates>> = vec![None; targets.len()];
+        sighting.attempts.iter().for_each(|attempt| listed[attempt.target] = Some(&attempt.candidates));
+        let others = gather(rig, targets, &sighting.cloud, &listed, &fixed, &self.settings().acceptance);
+        for (object, pairs) in fixed.iter().chain(&others.added) {
+            glimpse.see(*object, &Observations::of(pairs, &targets[*object].points, &sighting.cloud, Some(rig)));
+        }
+        sighting.gathered = others;
+        glimpse
     }
 
-    /// Replaces the pose of every object fixed by itself by that of one fix over all of them and over the `before`
-    /// glimpses. Where the images contradict each other, or determine no joint fix, each keeps its own and is told why.
+    /// Replaces the pose of every object fixed by itself by that of one fix over all of them, over what was gathered of
+    /// others and over the `before` glimpses, and says of what. Where the images contradict each other, or
+    /// determine no joint fix, each keeps its own and is told why.
     pub(crate) fn join(
         &self,
         sighting: &mut Sighting,
@@ -51,14 +63,20 @@ impl Stages {
         let all: Vec<Glimpse> = before.iter().filter(related).copied().chain([own]).cloned().collect();
         let members: Vec<Member> = targets.iter().map(Target::member).collect();
         let confidence = self.settings().acceptance.confidence;
-        match joint_fixes(rig, &members, &all, confidence) {
-            Ok(fixes) => replace(sighting, &fixes, targets, rig),
-            Err(why) => {
-                let fixed = |attempt: &&mut Attempt| matches!(attempt.answer.outcome, Outcome::Referenced(_));
-                for attempt in sighting.attempts.iter_mut().filter(fixed) {
-                    attempt.apart = Some(format!("no joint fix, the pose is that of the object alone: {why}"));
-                }
+        let parts = match joint_fixes(rig, &members, &all, confidence) {
+            Ok(fixes) => {
+                replace(sighting, &fixes, targets, rig);
+                tell(&sighting.gathered, own, all.len(), &fixes, targets)
             }
+            Err(why) => {
+                Told { all: format!("no joint fix, the pose is that of the object alone: {why}"), ..Told::default() }
+            }
+        };
+        for attempt in &mut sighting.attempts {
+            attempt.joint = match attempt.answer.outcome {
+                Outcome::Referenced(_) => Some(parts.all.clone()),
+                _ => parts.own.get(&attempt.target).cloned(),
+            };
         }
         let spent = milliseconds(start);
         for attempt in &mut sighting.attempts {
@@ -67,6 +85,59 @@ impl Stages {
             }
         }
     }
+}
+
+/// The pairs of an attempt that was believed.
+fn pairs(attempt: &Attempt) -> Option<&[Correspondence]> {
+    match &attempt.answer.outcome {
+        Outcome::Referenced(fix) => Some(&fix.pairs),
+        _ => None,
+    }
+}
+
+/// What is said of a joint fix.
+#[derive(Default)]
+struct Told {
+    /// Of all that took part or might have.
+    all: String,
+    /// Of each object that was not fixed by itself.
+    own: BTreeMap<usize, String>,
+}
+
+fn tell(others: &Gathered, own: &Glimpse, instants: usize, fixes: &JointFixes, targets: &[Target]) -> Told {
+    let points = |n: usize| if n == 1 { "1 point".to_owned() } else { format!("{n} points") };
+    let (mut part, mut out, mut told) = (Vec::new(), Vec::new(), BTreeMap::new());
+    for (object, target) in targets.iter().enumerate().filter(|(object, _)| own.count(*object) > 0) {
+        let (name, seen) = (&target.name, points(own.count(object)));
+        let gathered = others.added.iter().any(|(added, _)| *added == object);
+        if fixes.left_out.contains(&object) {
+            let why = format!("{seen} contradict the rest");
+            out.push(format!("`{name}` ({why})"));
+            told.insert(object, format!("no part in the joint fix: {why}"));
+            continue;
+        }
+        let moved = if fixes.displaced.contains(&object) { ", not where it was surveyed" } else { "" };
+        let how = if gathered { ", not fixed by itself" } else { "" };
+        part.push(format!("`{name}` ({seen}{how}{moved})"));
+        if gathered {
+            told.insert(object, format!("{seen} took part in the joint fix"));
+        }
+    }
+    for (object, why) in &others.left_out {
+        out.push(format!("`{}` ({why})", targets[*object].name));
+        told.insert(*object, format!("no part in the joint fix: {why}"));
+    }
+    let mut all = format!("joint fix over {}", part.join(", "));
+    if instants > 1 {
+        all += &format!(
+            " and {} before",
+            if instants == 2 { "1 frame".to_owned() } else { format!("{} frames", instants - 1) }
+        );
+    }
+    if !out.is_empty() {
+        all += &format!("; left out: {}", out.join(", "));
+    }
+    Told { all, own: told }
 }
 
 fn replace(sighting: &mut Sighting, fixes: &JointFixes, targets: &[Target], rig: &StereoRig) {

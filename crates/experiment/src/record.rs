@@ -128,7 +128,6 @@ pub(crate) fn complete(record: &mut FrameRecord, sight: &Sight, sighting: &Sight
 fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> TargetRecord {
     let answer = &attempt.answer;
     let mut record = TargetRecord::refused(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
-    record.detail = answer.outcome.explanation().unwrap_or_default();
     record.candidates = attempt.candidates.lists.iter().map(|list| list.iter().map(|&j| j as u32).collect()).collect();
     record.times = attempt.times;
     record.optimal = Some(answer.optimal);
@@ -147,7 +146,6 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
             record.used = fix.used.iter().map(|&index| index as u32).collect();
             record.residual_rms = Some(fix.residual_rms);
             record.integrity = Some(integrity(&fix.integrity));
-            record.detail = attempt.apart.clone().unwrap_or_default();
         }
         Outcome::Ambiguous(alternatives) => {
             record.outcome = Logged::Ambiguous;
@@ -163,6 +161,8 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
         Outcome::Unidentified(_) => record.outcome = Logged::Unidentified,
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
+    let details = answer.outcome.explanation().into_iter().chain(attempt.joint.clone());
+    record.detail = details.collect::<Vec<_>>().join("; ");
     record
 }
 

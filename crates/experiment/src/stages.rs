@@ -6,8 +6,8 @@ use rand::Rng;
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_referencing::{
-    Candidates, Correspondence, ModelPoint, Outcome, Prior, PriorBound, Problem, Search, Solver, Target, Tolerance,
-    candidates, judge, judge_named, problem_file::CoherenceProblem, until_found,
+    Candidates, Correspondence, Gathered, ModelPoint, Outcome, Prior, PriorBound, Problem, Search, Solver, Target,
+    Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem, until_found,
 };
 use seafix_vision::{FrontEnd, Keypoint, Look};
 
@@ -34,6 +34,8 @@ pub struct Sighting {
     pub cloud: Vec<MeasuredPoint>,
     /// One attempt for each target in view.
     pub attempts: Vec<Attempt>,
+    /// What a joint fix takes of objects that were not fixed by themselves.
+    pub gathered: Gathered,
     /// Times of the common stages.
     pub times: FrameTimes,
 }
@@ -47,8 +49,8 @@ pub struct Attempt {
     pub candidates: Candidates,
     /// The answer.
     pub answer: seafix_referencing::Attempt,
-    /// Why the joint fix that was asked for did not replace the answer.
-    pub apart: Option<String>,
+    /// What became of the joint fix that was asked for.
+    pub joint: Option<String>,
     /// Times of this target's stages.
     pub times: TargetTimes,
     started: Instant,
@@ -64,7 +66,7 @@ impl Attempt {
         started: Instant,
     ) -> Self {
         let times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms: None };
-        Self { target, candidates, answer, apart: None, times, started }
+        Self { target, candidates, answer, joint: None, times, started }
     }
 }
 
@@ -126,7 +128,7 @@ impl Stages {
                 Some(attempt)
             })
             .collect();
-        Sighting { keypoints, cloud, attempts, times }
+        Sighting { keypoints, cloud, attempts, gathered: Gathered::default(), times }
     }
 
     /// Seeks once more, from other priors, what was not found.

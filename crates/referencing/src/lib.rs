@@ -20,7 +20,10 @@ mod solve;
 
 pub use candidates::{Candidates, Gate, candidates};
 pub use chance::{expected_chance_sets, expected_sets_as_good};
-pub use joint::{Glimpse, JointFix, JointFixes, Member, Placement, RelativePose, Unjoined, joint_fix, joint_fixes};
+pub use joint::{
+    Gathered, Glimpse, JointFix, JointFixes, Member, Placement, RelativePose, Unadded, Unjoined, gather, joint_fix,
+    joint_fixes,
+};
 pub use observations::{Observation, Observations};
 pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
 pub use reference::{

@@ -134,9 +134,9 @@ impl Group<'_> {
             true => self.trials.par_iter().zip(&self.targets).zip(voyages).map(look).collect(),
             false => trials.zip(voyages).map(look).collect(),
         };
-        let sightings =
+        let mut sightings =
             sightings.map_err(|what| Fault::new(what, Path::new(passage.name())).value(format!("frame {number}")))?;
-        let trials = self.trials.iter().zip(&self.targets).zip(&sightings);
+        let trials = self.trials.iter().zip(&self.targets).zip(&mut sightings);
         let glimpses = trials
             .map(|((trial, targets), (sighting, _))| trial.stages.glimpse(sighting, targets, passage.rig()))
             .collect();

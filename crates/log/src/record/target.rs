@@ -18,8 +18,8 @@ pub struct TargetRecord {
     /// Why not, in one word of the results' vocabulary (`too-few`, `chance`, `budget`, …); empty when
     /// referenced.
     pub reason: String,
-    /// Why not, in a sentence with numbers; of a fix, why the joint fix that was asked for did not replace it, and
-    /// empty otherwise.
+    /// Why not, in a sentence with numbers; where a joint fix was asked for, what took part in it, what did not and why,
+    /// or why there is none. Empty of any other fix.
     pub detail: String,
     /// The estimated pose, when referenced.
     pub object_from_camera: Option<Matrix4>,

@@ -15,6 +15,8 @@ pub struct JointFixes {
     pub object_from_camera: Vec<Option<RelativePose>>,
     /// The objects that do not stand where they were surveyed, by their indices.
     pub displaced: Vec<usize>,
+    /// The objects of one or two points that contradict the rest, by their indices: their points take no part.
+    pub left_out: Vec<usize>,
     /// χ² of pixels and surveys together.
     pub chi2: f64,
     /// Its degrees of freedom.
@@ -42,7 +44,8 @@ pub enum Unjoined {
 }
 
 /// One fix over all `glimpses`, the last of which is asked for; surveys that the images contradict at this `confidence`
-/// are given up, one object after the other: always that without whose survey χ² is least.
+/// are given up, one object after the other: always that without whose survey χ² is least. An object of which no glimpse
+/// has three points cannot say where it stands itself: instead of its survey its points are given up.
 ///
 /// # Errors
 /// As [`joint_fix`], and where the images contradict each other whatever the surveys are.
@@ -55,42 +58,47 @@ pub fn joint_fixes(
     glimpses: &[Glimpse],
     confidence: f64,
 ) -> Result<JointFixes, Unjoined> {
-    let mut members = members.to_vec();
-    let mut displaced = Vec::new();
-    let mut fix = joint_fix(rig, &members, glimpses)?;
-    let seen = |object: usize, glimpse: &Glimpse| glimpse.points.iter().any(|(o, _)| *o == object);
+    /// Points that say where an object stands.
+    const ENOUGH: usize = 3;
+    let (mut members, mut glimpses) = (members.to_vec(), glimpses.to_vec());
+    let (mut displaced, mut left_out) = (Vec::new(), Vec::new());
+    let mut fix = joint_fix(rig, &members, &glimpses)?;
+    let most = |object: usize, glimpses: &[Glimpse]| glimpses.iter().map(|g| g.count(object)).max().unwrap_or(0);
     let limit = |fix: &JointFix| chi_square(fix.freedom.max(1), confidence);
-    let contradiction = |fix: &JointFix| Unjoined::Contradiction { chi2: fix.chi2, limit: limit(fix) };
     // Written so that a NaN is refused too.
     while !(fix.chi2 <= limit(&fix)) {
-        let held: Vec<usize> = (0..members.len())
-            .filter(|&o| members[o].placement != Placement::Displaced && glimpses.iter().any(|g| seen(o, g)))
-            .collect();
+        let seen = (0..members.len()).filter(|&o| members[o].placement != Placement::Displaced);
+        let (held, weak): (Vec<usize>, Vec<usize>) =
+            seen.filter(|&o| most(o, &glimpses) > 0).partition(|&o| most(o, &glimpses) >= ENOUGH);
         // One object must stand where it is said to: nothing else relates the camera to the site.
-        if held.len() < 2 {
-            return Err(contradiction(&fix));
-        }
+        let given_up = if held.len() < 2 { Vec::new() } else { held };
         let without = |&object: &usize| {
-            let mut fewer = members.clone();
-            fewer[object].placement = Placement::Displaced;
-            Some((object, joint_fix(rig, &fewer, glimpses).ok()?))
+            let (mut members, mut glimpses) = (members.clone(), glimpses.clone());
+            if most(object, &glimpses) < ENOUGH {
+                glimpses.iter_mut().for_each(|glimpse| glimpse.points.retain(|(o, _)| *o != object));
+            } else {
+                members[object].placement = Placement::Displaced;
+            }
+            let fix = joint_fix(rig, &members, &glimpses).ok()?;
+            Some((object, members, glimpses, fix))
         };
-        let Some((object, better)) = held.iter().filter_map(without).min_by(|(_, a), (_, b)| a.chi2.total_cmp(&b.chi2))
-        else {
-            return Err(contradiction(&fix));
+        let best = given_up.iter().chain(&weak).filter_map(without).min_by(|a, b| a.3.chi2.total_cmp(&b.3.chi2));
+        let Some((object, fewer, left, better)) = best else {
+            return Err(Unjoined::Contradiction { chi2: fix.chi2, limit: limit(&fix) });
         };
-        members[object].placement = Placement::Displaced;
-        displaced.push(object);
-        fix = better;
+        if fewer[object].placement == Placement::Displaced { &mut displaced } else { &mut left_out }.push(object);
+        (members, glimpses, fix) = (fewer, left, better);
     }
     let instant = glimpses.len() - 1; // a fix of none is refused above
     let last = &glimpses[instant];
     displaced.sort_unstable();
+    left_out.sort_unstable();
     Ok(JointFixes {
         object_from_camera: (0..members.len())
-            .map(|object| seen(object, last).then(|| fix.object_from_camera(instant, object)))
+            .map(|object| (last.count(object) > 0).then(|| fix.object_from_camera(instant, object)))
             .collect(),
         displaced,
+        left_out,
         chi2: fix.chi2,
         freedom: fix.freedom,
         chi2_limit: limit(&fix),

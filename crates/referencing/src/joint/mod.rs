@@ -2,9 +2,12 @@
 //!
 //! A site's objects are known each by itself, and where they stand to each other by a survey. Its error is the same for all
 //! points of an object and for all instants: six numbers an object, shared, not noise of every point. Poses and those
-//! six are therefore estimated together, and the survey is an observation like the pixels.
+//! six are therefore estimated together, and the survey is an observation like the pixels. An object of which one or two
+//! points are in view has no fix of its own, but its survey makes an observation of them all the same: they are sought
+//! where the others put them.
 
 mod displaced;
+mod gather;
 mod system;
 #[cfg(test)]
 mod tests;
@@ -18,6 +21,7 @@ use crate::{
     solve::{least_squares, wide_enough},
 };
 pub use displaced::{JointFixes, RelativePose, Unjoined, joint_fixes};
+pub use gather::{Gathered, Unadded, gather};
 use system::{State, System};
 
 /// What is known of where an object stands in the site's frame.
@@ -49,6 +53,18 @@ pub struct Member {
 pub struct Glimpse {
     /// The points.
     pub points: Vec<(usize, Observation)>,
+}
+
+impl Glimpse {
+    /// Adds points of an object.
+    pub fn see(&mut self, object: usize, data: &Observations<'_>) {
+        self.points.extend(data.points.iter().map(|point| (object, *point)));
+    }
+
+    /// How many points of an object it has.
+    pub fn count(&self, object: usize) -> usize {
+        self.points.iter().filter(|(o, _)| *o == object).count()
+    }
 }
 
 /// The fix of all instants.

@@ -9,8 +9,9 @@ use seafix_geometry::{
 use super::*;
 use crate::{Solver, StereoReprojection};
 
-const MODEL: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.1, 0.6, 0.1], [0.2, 0.2, 0.4], [-0.4, 0.3, 0.2]];
-const SIGMA: f64 = 0.2;
+pub(super) const MODEL: [[f64; 3]; 5] =
+    [[0.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.1, 0.6, 0.1], [0.2, 0.2, 0.4], [-0.4, 0.3, 0.2]];
+pub(super) const SIGMA: f64 = 0.2;
 
 pub(super) fn rig() -> StereoRig {
     let camera = Pinhole::new([1600, 1200], [1348.3; 2], [799.5, 599.5], &[]).unwrap();
@@ -200,4 +201,61 @@ fn a_survey_that_the_images_contradict_is_given_up() {
     }
     let none = Err(Unjoined::Degenerate(Degenerate::TooFew { found: 0, needed: 3 }));
     assert_eq!(joint_fixes(&rig, &members, &[], 0.999), none);
+}
+
+/// Never worse than the best single fix: at the same poses the covariance relative to an object is that of its own points at
+/// most, in every direction, whatever the surveys are worth and however few points the others show.
+#[test]
+fn no_direction_is_known_worse_than_from_the_object_alone() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(9));
+    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+    for round in 0..40 {
+        let survey = 10f64.powf(rng.random_range(-5.0..-1.0));
+        let members: Vec<Member> = said
+            .iter()
+            .map(|&site_from_object| Member {
+                site_from_object,
+                placement: Placement::Surveyed(Covariance6::isotropic(survey, survey)),
+            })
+            .collect();
+        let mut seen = glimpse(&rig, &said, 1, 0.0, &mut rng);
+        let few = round % 3;
+        let mut shown = [0; 3];
+        seen.points.retain(|(object, _)| {
+            shown[*object] += 1;
+            *object == 0 || shown[*object] <= 5 - 2 * few
+        });
+        let fixes = joint_fixes(&rig, &members, std::slice::from_ref(&seen), 0.999).unwrap();
+        for object in 0..3 {
+            let own: Vec<Observation> = seen.points.iter().filter(|(o, _)| *o == object).map(|(_, p)| *p).collect();
+            let data = Observations { points: own, rig: Some(&rig) };
+            let Ok(pose) = StereoReprojection::default().solve(&data) else { continue };
+            let alone = StereoReprojection::default().covariance(&data, &pose).unwrap().matrix;
+            let joint = fixes.object_from_camera[object].unwrap().1.matrix;
+            let gain = (alone - joint).symmetric_eigenvalues().min();
+            assert!(gain > -1e-6 * alone.amax(), "round {round}, object {object}: {gain:e} of {:e}", alone.amax());
+        }
+    }
+}
+
+/// Two points of an object that stands elsewhere are given up, not the survey of another.
+#[test]
+fn of_an_object_of_two_points_the_points_are_given_up() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(10));
+    let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
+    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+    let member = |&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) };
+    let members: Vec<Member> = said.iter().map(member).collect();
+    let mut truly = said;
+    truly[1] = standing(0.86, 0.05);
+    let mut seen = glimpse(&rig, &truly, 1, 1.0, &mut rng);
+    let mut shown = 0;
+    seen.points.retain(|(object, _)| {
+        shown += usize::from(*object == 1);
+        *object != 1 || shown <= 2
+    });
+    let fixes = joint_fixes(&rig, &members, &[seen], 0.999).unwrap();
+    assert_eq!((fixes.displaced, fixes.left_out), (vec![], vec![1]));
+    assert!(fixes.object_from_camera[1].is_none());
+    assert!(fixes.chi2 <= fixes.chi2_limit);
 }

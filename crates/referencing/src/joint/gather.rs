@@ -1,0 +1,410 @@
+//! Points of objects that were not fixed by themselves, sought where the others put the camera.
+
+use nalgebra::{Matrix3, Vector3};
+use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
+
+use super::{Glimpse, JointFix, Member, Placement, joint_fix};
+use crate::{
+    Acceptance, Candidates, Correspondence, Degenerate, Gate, ModelPoint, Observations, Prior, PriorBound, Target,
+    candidates, candidates::chi_square,
+};
+
+/// What a joint fix takes of objects that were not fixed by themselves.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Gathered {
+    /// Objects that take part, by their indices, with their pairs.
+    pub added: Vec<(usize, Vec<Correspondence>)>,
+    /// Objects of which something may be in view, and why they take no part.
+    pub left_out: Vec<(usize, Unadded)>,
+}
+
+/// Why the points of an object take no part in a joint fix.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unadded {
+    /// It may stand anywhere: three points of its own must say where.
+    #[error("no survey says where it stands, and it was not fixed by itself")]
+    Unsurveyed,
+    /// Nothing tells which cloud point is which of its points.
+    #[error("{points} of its points have several candidates where the others put them, or share theirs")]
+    Several {
+        /// Points with a candidate that is not theirs alone.
+        points: usize,
+    },
+    /// Chance alone would put as many cloud points there.
+    #[error(
+        "chance gives {expected:.1e} sets of {size} points where the others put them; at most {budget:.1e} are accepted"
+    )]
+    Chance {
+        /// Pairs that were found.
+        size: usize,
+        /// Expected number of chance sets of this size or larger.
+        expected: f64,
+        /// [`Acceptance::chance_budget`].
+        budget: f64,
+    },
+    /// Together they are not where the others put them.
+    #[error("{size} of its points raise χ² by {chi2:.1}; at most {limit:.1} is likely")]
+    Contradiction {
+        /// Pairs that were found.
+        size: usize,
+        /// By how much they raise χ² of pixels and surveys together.
+        chi2: f64,
+        /// What true pairs exceed with one minus the confidence.
+        limit: f64,
+    },
+    /// With them no joint fix was found.
+    #[error("{0}")]
+    Degenerate(#[from] Degenerate),
+}
+
+/// The points of objects that are not among `fixed` and yet bear on the fix of those: one or two points of an object tell
+/// no pose of their own, but where the object should stand by its survey they are four pixels each.
+///
+/// The joint fix of `fixed` says where the camera is. From there and from its survey every other object's points are
+/// predicted, with the covariance of both, and a cloud point that no fixed object uses is a candidate within the
+/// Mahalanobis gate of [`Acceptance::confidence`] (Bar-Shalom and Fortmann, *Tracking and Data Association*, 1988),
+/// where Stage 1 has `listed` it, if Stage 1 looked. Pairs are kept that have no other candidate on either
+/// side, where chance gives less than [`Acceptance::chance_budget`] sets of as many, and, since an object's points share the
+/// error of its survey and all share the camera's, where the joint fix with them has a χ² no larger than is likely.
+/// Objects are added in their order.
+///
+/// Nothing is added where `fixed` have no joint fix, or contradict each other: which of them to believe is not known then.
+///
+/// # Panics
+/// When an index is out of range.
+pub fn gather(
+    rig: &StereoRig,
+    targets: &[Target],
+    cloud: &[MeasuredPoint],
+    listed: &[Option<&Candidates>],
+    fixed: &[(usize, Vec<Correspondence>)],
+    acceptance: &Acceptance,
+) -> Gathered {
+    let mut gathered = Gathered::default();
+    let members: Vec<Member> = targets.iter().map(Target::member).collect();
+    let mut glimpse = Glimpse::default();
+    let mut free: Vec<bool> = cloud.iter().map(|point| point.pixels.is_some()).collect();
+    for (object, pairs) in fixed {
+        glimpse.see(*object, &Observations::of(pairs, &targets[*object].points, cloud, Some(rig)));
+        pairs.iter().for_each(|pair| free[pair.cloud] = false);
+    }
+    let Some(mut fix) = agreeing(rig, &members, &glimpse, acceptance.confidence) else { return gathered };
+    let (site_from_camera, covariance) = &fix.site_from_camera[0];
+    let mut others: Vec<Gates> = Vec::new();
+    for (object, target) in targets.iter().enumerate().filter(|(object, _)| fixed.iter().all(|(o, _)| o != object)) {
+        match members[object].placement {
+            Placement::Displaced if listed[object].is_some() => gathered.left_out.push((object, Unadded::Unsurveyed)),
+            Placement::Displaced => {}
+            _ => {
+                let gates = Gates::of(object, target, site_from_camera, covariance, cloud, acceptance.confidence);
+                others.extend(gates.map(|gates| gates.only(&free, listed[object])).filter(Gates::any));
+            }
+        }
+    }
+    let mut claims = vec![0_usize; cloud.len()];
+    others.iter().flat_map(|gates| gates.lists.iter().flatten()).for_each(|&j| claims[j] += 1);
+    for gates in others {
+        let (object, points) = (gates.object, &targets[gates.object].points);
+        let pairs = gates.alone(&claims);
+        match gates.bears(&pairs, cloud, &free, acceptance).and_then(|()| {
+            let mut more = glimpse.clone();
+            more.see(object, &Observations::of(&pairs, points, cloud, Some(rig)));
+            let next = joint_fix(rig, &members, std::slice::from_ref(&more))?;
+            let (size, chi2) = (pairs.len(), next.chi2 - fix.chi2);
+            let limit = chi_square(4 * size, acceptance.confidence);
+            // Written so that a NaN is refused too.
+            if chi2 <= limit { Ok((more, next)) } else { Err(Unadded::Contradiction { size, chi2, limit }) }
+        }) {
+            Ok(better) => {
+                (glimpse, fix) = better;
+                gathered.added.push((object, pairs));
+            }
+            Err(why) => gathered.left_out.push((object, why)),
+        }
+    }
+    gathered.left_out.sort_by_key(|(object, _)| *object);
+    gathered
+}
+
+/// The joint fix of one glimpse, where its χ² is likely.
+fn agreeing(rig: &StereoRig, members: &[Member], glimpse: &Glimpse, confidence: f64) -> Option<JointFix> {
+    let fix = joint_fix(rig, members, std::slice::from_ref(glimpse)).ok()?;
+    (fix.chi2 <= chi_square(fix.freedom.max(1), confidence)).then_some(fix)
+}
+
+/// Where an object's points should be.
+struct Gates {
+    object: usize,
+    /// The predicted place of each point in the camera, and its covariance without the measurement's.
+    places: Vec<(Vector3<f64>, Matrix3<f64>)>,
+    /// The candidates of each.
+    lists: Vec<Vec<usize>>,
+}
+
+impl Gates {
+    /// `None` where no pose relative to the object follows from one relative to the site.
+    fn of(
+        object: usize,
+        target: &Target,
+        site_from_camera: &Transform<Object, Camera>,
+        covariance: &Covariance6<Object, Camera>,
+        cloud: &[MeasuredPoint],
+        confidence: f64,
+    ) -> Option<Self> {
+        // The site's frame is the world's.
+        let known = Covariance6::<World, Camera>::new(covariance.matrix);
+        let prior = target.prior(&site_from_camera.relabel(), &known)?;
+        let Prior { object_from_camera, bound: PriorBound::Gaussian(spread) } = &prior else { return None };
+        let camera_from_object = object_from_camera.inverse();
+        let place = |point: &ModelPoint| {
+            let at = camera_from_object * point.at;
+            (at.coords, spread.of_point(&at) + Matrix3::identity() * (point.sigma * point.sigma))
+        };
+        let lists = candidates(&target.points, cloud, Some(&prior), &Gate::ChiSquare(confidence), None).lists;
+        Some(Self { object, places: target.points.iter().map(place).collect(), lists })
+    }
+
+    /// Without the cloud points that are not `free`, nor among those `listed`.
+    fn only(mut self, free: &[bool], listed: Option<&Candidates>) -> Self {
+        for (k, list) in self.lists.iter_mut().enumerate() {
+            list.retain(|&j| free[j] && listed.is_none_or(|listed| listed.lists[k].contains(&j)));
+        }
+        self
+    }
+
+    fn any(&self) -> bool {
+        self.lists.iter().any(|list| !list.is_empty())
+    }
+
+    /// The pairs that have no other candidate on either side.
+    fn alone(&self, claims: &[usize]) -> Vec<Correspondence> {
+        let pair = |(model, list): (usize, &Vec<usize>)| match list[..] {
+            [cloud] if claims[cloud] == 1 => Some(Correspondence { model, cloud }),
+            _ => None,
+        };
+        self.lists.iter().enumerate().filter_map(pair).collect()
+    }
+
+    /// Whether the pairs say anything: there are some, and chance would hardly give as many.
+    fn bears(
+        &self,
+        pairs: &[Correspondence],
+        cloud: &[MeasuredPoint],
+        free: &[bool],
+        acceptance: &Acceptance,
+    ) -> Result<(), Unadded> {
+        if pairs.is_empty() {
+            return Err(Unadded::Several { points: self.lists.iter().filter(|list| !list.is_empty()).count() });
+        }
+        let (size, budget) = (pairs.len(), acceptance.chance_budget);
+        let expected = self.expected(size, cloud, free, acceptance.confidence);
+        // Written so that a NaN is refused too.
+        if expected <= budget { Ok(()) } else { Err(Unadded::Chance { size, expected, budget }) }
+    }
+
+    /// The expected number of sets of `size` points or more that chance puts into the gates: Σ_{j ≥ size} e_j(p), e_j the
+    /// elementary symmetric polynomials and p_k the volume of a point's gate times the density of the cloud about it.
+    fn expected(&self, size: usize, cloud: &[MeasuredPoint], free: &[bool], confidence: f64) -> f64 {
+        let gate = 4.0 / 3.0 * std::f64::consts::PI * chi_square(3, confidence).powf(1.5);
+        // e_0 … e_size of the points so far; the last has all larger ones as well.
+        let mut sets = vec![0.0; size + 1];
+        sets[0] = 1.0;
+        for ((place, spread), list) in self.places.iter().zip(&self.lists) {
+            let mut near: Vec<(f64, usize)> = (0..cloud.len())
+                .filter(|&j| free[j])
+                .map(|j| ((cloud[j].position.at.coords - place).norm(), j))
+                .collect();
+            near.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let noise = near.first().map_or_else(Matrix3::zeros, |&(_, j)| cloud[j].position.covariance);
+            let volume = gate * (spread + noise).determinant().max(0.0).sqrt();
+            near.retain(|(_, j)| !list.contains(j));
+            let p = volume * density(&near);
+            sets[size] += p * sets[size];
+            for j in (1..=size).rev() {
+                sets[j] += p * sets[j - 1];
+            }
+        }
+        sets[size]
+    }
+}
+
+/// The density (1/m³) of points at these distances from a place: that of the nearest four.
+fn density(near: &[(f64, usize)]) -> f64 {
+    const NEAREST: usize = 4;
+    let count = near.len().min(NEAREST);
+    match count.checked_sub(1).map(|last| near[last].0) {
+        Some(radius) => count as f64 / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)),
+        None => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::joint::{
+        joint_fixes,
+        tests::{MODEL, SIGMA, instant, normal, rig, standing},
+    };
+    use crate::{Site, SiteObject, TargetKind};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use seafix_geometry::{Pixel, Point, StereoPixels, UncertainPixels, UncertainPoint, triad};
+
+    /// Three objects of five points each, one cloud, and what is true.
+    struct Scene {
+        rig: StereoRig,
+        targets: Vec<Target>,
+        /// Where each object's frame truly stands.
+        truly: Vec<Transform<World, Object>>,
+        cloud: Vec<MeasuredPoint>,
+        /// Which point of which object each cloud point shows, of those that show one.
+        shows: Vec<(usize, usize)>,
+    }
+
+    /// The first `seen` points of each object, and as many places besides where there is nothing.
+    fn scene(seen: [usize; 3], survey_sigma: f64, clutter: usize, rng: &mut ChaCha8Rng) -> Scene {
+        let rig = rig();
+        let (mut objects, mut truly, mut places, mut shows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (k, stands) in [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)].into_iter().enumerate() {
+            let stands: Transform<World, Object> = stands.relabel();
+            let points: Vec<Point<World>> = MODEL.iter().map(|&at| stands * Point::from(at)).collect();
+            let base = [points[0], points[1], points[2]];
+            let frame = |[a, b, c]: [Point<World>; 3]| triad(&a, &b, &c).unwrap();
+            let surveyed = base.map(|at| at + Vector3::from_fn(|_, _| normal(rng) * survey_sigma));
+            let own = |(i, at): (usize, &Point<World>)| ModelPoint::exact(format!("P{i}"), frame(base).inverse() * *at);
+            objects.push(SiteObject {
+                id: format!("o{k}"),
+                base: [0, 1, 2],
+                base_in_world: Some(surveyed),
+                survey_sigma,
+                world_from_object: Some(frame(surveyed)),
+                points: points.iter().enumerate().map(own).collect(),
+                interest: Vec::new(),
+            });
+            truly.push(frame(base));
+            shows.extend((0..seen[k]).map(|i| (k, i)));
+            places.extend(points[..seen[k]].iter().copied());
+        }
+        places.extend((0..clutter).map(|_| {
+            let at = Vector3::from_fn(|_, _| rng.random_range(-1.5..1.5));
+            Point::from(at)
+        }));
+        let camera_from_world: Transform<Camera, World> = instant(1).inverse().relabel();
+        let see = |place: &Point<World>| {
+            let exact = rig.project(&(camera_from_world * *place)).unwrap();
+            let mut off = |p: Pixel| Pixel { u: p.u + SIGMA * normal(rng), v: p.v + SIGMA * normal(rng) };
+            let pixels =
+                UncertainPixels::independent(StereoPixels { left: off(exact.left), right: off(exact.right) }, SIGMA);
+            let found = rig.triangulate(&pixels).unwrap();
+            let position = UncertainPoint { at: found.point, covariance: found.covariance };
+            MeasuredPoint { position, pixels: Some(pixels) }
+        };
+        let cloud = places.iter().map(see).collect();
+        let site = Site { name: "test".to_owned(), frame: 0, objects, warnings: Vec::new() };
+        Scene { rig, targets: site.targets(TargetKind::Joint).unwrap(), truly, cloud, shows }
+    }
+
+    impl Scene {
+        /// The pairs of the first object, which is fixed by itself.
+        fn fixed(&self) -> Vec<(usize, Vec<Correspondence>)> {
+            let own = self.shows.iter().enumerate().filter(|(_, (object, _))| *object == 0);
+            vec![(0, own.map(|(cloud, &(_, model))| Correspondence { model, cloud }).collect())]
+        }
+
+        fn gathered(&self) -> Gathered {
+            gather(&self.rig, &self.targets, &self.cloud, &[None; 3], &self.fixed(), &Acceptance::default())
+        }
+
+        /// The pose relative to the first object by these pairs.
+        fn fix(&self, all: &[(usize, Vec<Correspondence>)]) -> crate::RelativePose {
+            let mut glimpse = Glimpse::default();
+            for (object, pairs) in all {
+                let points = &self.targets[*object].points;
+                glimpse.see(*object, &Observations::of(pairs, points, &self.cloud, Some(&self.rig)));
+            }
+            let members: Vec<Member> = self.targets.iter().map(Target::member).collect();
+            joint_fixes(&self.rig, &members, &[glimpse], 0.9999).unwrap().object_from_camera[0].unwrap()
+        }
+
+        /// The true pose relative to an object.
+        fn truth(&self, object: usize) -> Transform<Object, Camera> {
+            self.truly[object].inverse() * instant(1).relabel::<World, Camera>()
+        }
+    }
+
+    /// Two points of one object and one of another, neither of which could be fixed: each pair that is found is true, the
+    /// fix is as good as it says and better than that of the object that was fixed by itself, by its own word and
+    /// over the draws.
+    #[test]
+    fn one_or_two_points_of_others_make_the_fix_better() {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let draws = 300;
+        let (mut found, mut nees, mut alone, mut joint) = (0.0, 0.0, 0.0, 0.0);
+        for _ in 0..draws {
+            let scene = scene([5, 2, 1], 5e-4, 20, &mut rng);
+            let gathered = scene.gathered();
+            for (object, pairs) in &gathered.added {
+                assert!(pairs.iter().all(|pair| scene.shows.get(pair.cloud) == Some(&(*object, pair.model))));
+                found += pairs.len() as f64;
+            }
+            let by_itself = scene.fix(&scene.fixed());
+            let all: Vec<_> = scene.fixed().into_iter().chain(gathered.added).collect();
+            let (pose, covariance) = scene.fix(&all);
+            assert!(covariance.matrix.trace() <= by_itself.1.matrix.trace() * 1.05);
+            let truth = scene.truth(0);
+            let xi = pose.error_to(&truth);
+            nees += xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)) / f64::from(draws);
+            alone += (by_itself.0.translation() - truth.translation()).norm_squared();
+            joint += (pose.translation() - truth.translation()).norm_squared();
+        }
+        assert!(found > 0.8 * 3.0 * f64::from(draws), "{found} of {}", 3 * draws);
+        assert!((nees - 6.0).abs() < 4.0 * (12.0 / f64::from(draws)).sqrt(), "{nees}");
+        assert!(joint < 0.9 * alone, "{joint} {alone}");
+    }
+
+    /// Where the others show none of their points, what clutter puts there is not taken for them.
+    #[test]
+    fn clutter_is_not_taken_for_points() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let (mut added, mut refused) = (0, 0);
+        for _ in 0..300 {
+            let gathered = scene([5, 0, 0], 1e-2, 600, &mut rng).gathered();
+            added += gathered.added.len();
+            refused += gathered.left_out.len();
+        }
+        assert!(added <= 3, "{added} sets of clutter");
+        assert!(refused > 30, "only {refused} sets of clutter were there to be refused");
+    }
+
+    #[test]
+    fn what_takes_no_part_is_told_why() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let why = |scene: &Scene| scene.gathered().left_out.into_iter().map(|(_, why)| why).collect::<Vec<_>>();
+        // One cloud point is twice there: which of the two is the object's is not known.
+        let mut twice = scene([5, 1, 0], 5e-4, 0, &mut rng);
+        twice.cloud.push(twice.cloud[5]);
+        assert_eq!(why(&twice), [Unadded::Several { points: 1 }]);
+        // Each point is within its own gate, all together turn as no rigid object does.
+        let mut torn = scene([5, 4, 0], 2e-3, 0, &mut rng);
+        for (k, point) in torn.cloud[5..].iter_mut().enumerate() {
+            let pixels = point.pixels.as_mut().unwrap();
+            pixels.at.left.v += if k % 2 == 0 { 3.0 } else { -3.0 };
+            pixels.at.right.v += if k % 2 == 0 { 3.0 } else { -3.0 };
+        }
+        assert!(matches!(why(&torn)[..], [Unadded::Contradiction { size: 4, .. }]), "{:?}", why(&torn));
+        // An object that nobody surveyed.
+        let unknown = scene([5, 2, 0], 5e-4, 0, &mut rng);
+        let mut targets = unknown.targets.clone();
+        targets[1].world_from_object = None;
+        let listed = Candidates::all(5, unknown.cloud.len());
+        let lists = [Some(&listed), Some(&listed), None];
+        let said = gather(&unknown.rig, &targets, &unknown.cloud, &lists, &unknown.fixed(), &Acceptance::default());
+        assert_eq!(said, Gathered { added: Vec::new(), left_out: vec![(1, Unadded::Unsurveyed)] });
+        // Stage 1 looked, and listed nothing.
+        let none = Candidates { lists: vec![Vec::new(); 5] };
+        let lists = [Some(&listed), Some(&none), None];
+        let scene = scene([5, 2, 0], 5e-4, 0, &mut rng);
+        let said = gather(&scene.rig, &scene.targets, &scene.cloud, &lists, &scene.fixed(), &Acceptance::default());
+        assert_eq!(said, Gathered::default());
+    }
+}
