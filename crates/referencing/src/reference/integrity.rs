@@ -1,6 +1,6 @@
 //! How far off a fix may be, wrong matches included.
 
-use nalgebra::{Matrix3, SymmetricEigen};
+use nalgebra::Matrix3;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
 
 use super::Acceptance;
@@ -108,10 +108,10 @@ pub(super) fn protection(
     let mut watch = Watch { pose, deletions, level: own, spared: true };
     let twice = acceptance.two_wrong_rate > 0.0;
     let share = if twice { 0.25 } else { 0.5 } * acceptance.risk;
-    let ones = (0..n).map(|out| vec![out]);
+    let ones = (0..n).map(|out| [out]);
     let one = watch.farthest(ones, (share / acceptance.wrong_match_rate).min(1.0));
     let two = (twice && n >= 5).then_some(()).and_then(|()| {
-        let twos = (0..n).flat_map(|i| (i + 1..n).map(move |j| vec![i, j]));
+        let twos = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j]));
         watch.farthest(twos, (share / acceptance.two_wrong_rate).min(1.0))
     });
     let available = watch.spared && (!twice || n >= 6);
@@ -130,7 +130,7 @@ struct Watch<'a> {
 impl Watch<'_> {
     /// Raises the levels to what these sets of wrong matches, each as likely as `share` of the risk says, may do; the
     /// farthest move of the position (m), `None` where one of the sets cannot be spared.
-    fn farthest(&mut self, sets: impl Iterator<Item = Vec<usize>>, share: f64) -> Option<f64> {
+    fn farthest<const N: usize>(&mut self, sets: impl Iterator<Item = [usize; N]>, share: f64) -> Option<f64> {
         let k = radius(share);
         let mut farthest = Some(0.0_f64);
         for out in sets {
@@ -140,14 +140,37 @@ impl Watch<'_> {
             };
             let moved = (self.pose.translation() - without.translation()).norm();
             let turned = so3::angle(&(self.pose.rotation().inverse() * without.rotation()));
-            let (position, attitude) = semi_axes(&certainty);
             farthest = farthest.map(|farthest| farthest.max(moved));
-            self.level.position = self.level.position.max(moved + k * position);
-            self.level.attitude = self.level.attitude.max(turned + k * attitude);
-            self.spared &= attitude <= WEAK;
+            // Eigenvalues are asked for only where they may raise a level.
+            if let Some(position) = longer_than((self.level.position - moved) / k, &block(&certainty, 3)) {
+                self.level.position = self.level.position.max(moved + k * position);
+            }
+            let limit = WEAK.min((self.level.attitude - turned) / k);
+            if let Some(attitude) = longer_than(limit, &block(&certainty, 0)) {
+                self.level.attitude = self.level.attitude.max(turned + k * attitude);
+                self.spared &= attitude <= WEAK;
+            }
         }
         farthest
     }
+}
+
+/// The greatest semi-axis of a covariance, where it may exceed `limit`: it is no longer than the root of the matrix's norm.
+fn longer_than(limit: f64, covariance: &Matrix3<f64>) -> Option<f64> {
+    /// What rounding may have taken from the norm.
+    const ROUNDED: f64 = 1.0 + 1e-12;
+    // Written so that a NaN is looked at too.
+    (!(covariance.norm().sqrt() * ROUNDED <= limit)).then(|| semi_axis(covariance))
+}
+
+/// The greatest semi-axis of a covariance.
+fn semi_axis(covariance: &Matrix3<f64>) -> f64 {
+    covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
+}
+
+/// The block of the attitude (`first` = 0) or of the position (3).
+fn block(covariance: &Covariance6<Object, Camera>, first: usize) -> Matrix3<f64> {
+    covariance.matrix.fixed_view::<3, 3>(first, first).into()
 }
 
 /// An attitude less certain than this (rad) has other valleys nearby: no Gaussian radius bounds its error.
@@ -155,11 +178,7 @@ const WEAK: f64 = 0.035;
 
 /// Greatest standard deviations of position (m) and attitude (rad) over all directions.
 pub(super) fn semi_axes(covariance: &Covariance6<Object, Camera>) -> (f64, f64) {
-    let greatest = |first: usize| {
-        let block: Matrix3<f64> = covariance.matrix.fixed_view::<3, 3>(first, first).into();
-        SymmetricEigen::new(block).eigenvalues.max().max(0.0).sqrt()
-    };
-    (greatest(3), greatest(0))
+    (semi_axis(&block(covariance, 3)), semi_axis(&block(covariance, 0)))
 }
 
 /// The radius, in standard deviations, that a normal vector of three exceeds with this probability.

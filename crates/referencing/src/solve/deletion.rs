@@ -3,8 +3,9 @@
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use super::{
-    Mahalanobis, Solver,
+    Degenerate, Mahalanobis,
     descent::{Linearized, linearize},
+    mahalanobis::covariance,
 };
 use crate::Observations;
 
@@ -26,9 +27,12 @@ const SURE: f64 = 0.01;
 impl<'a> Deletions<'a> {
     /// `None` where all points together determine no pose.
     pub(crate) fn of(data: &'a Observations<'a>) -> Option<Self> {
-        let witness = Mahalanobis::default();
-        let pose = witness.solve(data).ok()?;
-        let each = witness.each(data, &pose)?;
+        let solved = Mahalanobis::default().solved(data, |pose, terms| {
+            let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
+            let each = (0..data.points.len()).map(one).collect::<Option<Vec<_>>>();
+            each.map(|each| (*pose, each)).ok_or(Degenerate::Hidden)
+        });
+        let (pose, each) = solved.ok()?;
         let mut all = *each.first()?;
         each[1..].iter().for_each(|one| all = all.plus(one));
         Some(Self { data, pose, all, each })
@@ -39,37 +43,25 @@ impl<'a> Deletions<'a> {
     pub(crate) fn without(&self, out: &[usize]) -> Option<(Transform<Object, Camera>, Covariance6<Object, Camera>)> {
         if self.each.len() >= out.len() + ENOUGH {
             let left = out.iter().fold(self.all, |left, &k| left.less(&self.each[k]));
-            let sure = left.attitude_variance().is_some_and(|variance| variance <= SURE * SURE);
-            if let (true, Some((step, decrement))) = (sure, left.step(0.0))
+            if let Some(covariance) = left.covariance()
+                && covariance.fixed_view::<3, 3>(0, 0).trace() <= SURE * SURE
+                && let Some((step, decrement)) = left.step(0.0)
                 && decrement <= NEAR
             {
-                return Some((self.pose.perturbed(&step), Covariance6::new(left.covariance()?)));
+                return Some((self.pose.perturbed(&step), Covariance6::new(covariance)));
             }
         }
         let mut fewer = self.data.clone();
         let mut place = 0..;
         fewer.points.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
-        let witness = Mahalanobis::default();
-        let pose = witness.solve(&fewer).ok()?;
-        let covariance = witness.covariance(&fewer, &pose).ok()?;
-        Some((pose, covariance))
-    }
-}
-
-impl Mahalanobis {
-    /// What each point says at a pose.
-    fn each(&self, data: &Observations<'_>, at: &Transform<Object, Camera>) -> Option<Vec<Linearized>> {
-        let one = |k: usize, term: &dyn Fn(usize, &nalgebra::Vector3<f64>) -> Option<super::Term>| {
-            linearize(&data.points[k..=k], at, &|_, place: &_| term(k, place))
-        };
-        self.with_terms(data, |term| (0..data.points.len()).map(|k| one(k, term)).collect())
+        Mahalanobis::default().solved(&fewer, |pose, terms| Ok((*pose, covariance(&fewer, pose, terms)?))).ok()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Observation;
+    use crate::{Observation, Solver};
     use nalgebra::Vector3;
     use seafix_geometry::{Point, UncertainPoint};
 

@@ -55,15 +55,7 @@ impl Component for Mahalanobis {
 
 impl Solver for Mahalanobis {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
-        let Some(rig) = self.rig(data) else {
-            let (start, measured) = (kabsch::fit(&data.points), Measured::of(&data.points));
-            let term = |k: usize, at: &_| Some(measured.term(k, at));
-            return minimize(&data.points, &start, &term);
-        };
-        let mut sightings = Sightings::new(rig);
-        sightings.see(&data.points, Target::Triangulated)?;
-        likeliest(data, rig, self.starts, &sightings)
+        self.solved(data, |pose, _| Ok(*pose))
     }
 
     fn covariance(
@@ -71,25 +63,45 @@ impl Solver for Mahalanobis {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        let information = self.with_terms(data, |term| linearize(&data.points, at, &term));
-        information.and_then(|all| all.covariance()).map(Covariance6::new).ok_or(Degenerate::Singular)
+        let Some(rig) = self.rig(data) else {
+            let measured = Measured::of(&data.points);
+            return covariance(data, at, &|k, place| Some(measured.term(k, place)));
+        };
+        let mut all = Sightings::new(rig);
+        all.see(&data.points, Target::Triangulated).map_err(|_| Degenerate::Singular)?;
+        covariance(data, at, &|k, place| all.live(k, place))
     }
 }
 
+/// What a point, by its number, says of the place where a pose puts it.
+pub(super) type Terms<'a> = &'a dyn Fn(usize, &Vector3<f64>) -> Option<Term>;
+
+/// The inverse of the points' information at a pose.
+pub(super) fn covariance(
+    data: &Observations<'_>,
+    at: &Transform<Object, Camera>,
+    terms: Terms<'_>,
+) -> Result<Covariance6<Object, Camera>, Degenerate> {
+    let information = linearize(&data.points, at, &terms);
+    information.and_then(|all| all.covariance()).map(Covariance6::new).ok_or(Degenerate::Singular)
+}
+
 impl Mahalanobis {
-    /// What `work` makes of the points' terms.
-    pub(super) fn with_terms<R>(
+    /// What `work` makes of the answer and of the terms that led to it.
+    pub(super) fn solved<R>(
         &self,
         data: &Observations<'_>,
-        work: impl FnOnce(&dyn Fn(usize, &Vector3<f64>) -> Option<Term>) -> Option<R>,
-    ) -> Option<R> {
+        work: impl FnOnce(&Transform<Object, Camera>, Terms<'_>) -> Result<R, Degenerate>,
+    ) -> Result<R, Degenerate> {
+        check(data, self.minimum(), self.least_ratio)?;
         let Some(rig) = self.rig(data) else {
-            let measured = Measured::of(&data.points);
-            return work(&|k, place| Some(measured.term(k, place)));
+            let (start, measured) = (kabsch::fit(&data.points), Measured::of(&data.points));
+            let term = |k: usize, at: &_| Some(measured.term(k, at));
+            return work(&minimize(&data.points, &start, &term)?, &term);
         };
-        let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Triangulated).ok()?;
-        work(&|k, place| all.live(k, place))
+        let mut sightings = Sightings::new(rig);
+        sightings.see(&data.points, Target::Triangulated)?;
+        work(&likeliest(data, rig, self.starts, &sightings)?, &|k, place| sightings.live(k, place))
     }
 
     fn rig<'a>(&self, data: &Observations<'a>) -> Option<&'a StereoRig> {
