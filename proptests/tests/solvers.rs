@@ -419,7 +419,8 @@ fn robust_solvers_trust_what_is_near() {
     assert!(robust.iter().all(Result::is_ok));
 }
 
-/// P45. With up to half of the points anywhere, and one largest set of points that a rigid motion brings within the
+/// P45. With up to half of the points more than .2 m off their places, in any direction (nearer ones may pass for noise of
+/// a few millimetres, and which set is the largest then hangs by it), and one largest set of points that a rigid motion brings within the
 /// threshold, `gnc-tls` keeps exactly that set. Which sets there are is found by trying all of them.
 #[test]
 fn truncated_squares_keep_the_only_consensus() {

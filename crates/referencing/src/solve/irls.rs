@@ -94,11 +94,20 @@ impl Solver for Irls {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        resampled::covariance(|drawn| self.solve(drawn), data, at)
+        resampled::covariance(|drawn| self.solve(drawn), data, at, self.pairs())
     }
 }
 
 impl Irls {
+    /// How many draws its covariance takes. The un-squared sum is nowhere nearly linear in the noise: its covariance is
+    /// then that of a sample, and its inverse the larger the smaller the sample is, by n/(n − 7) of n normal draws.
+    fn pairs(&self) -> usize {
+        match self.loss {
+            Loss::UnSquared => 4 * resampled::PAIRS,
+            Loss::Huber | Loss::Cauchy => resampled::PAIRS,
+        }
+    }
+
     fn weight(&self, point: &Observation, pose: &Transform<Object, Camera>) -> f64 {
         match self.loss {
             Loss::Huber => (self.threshold / distance(point, pose)).min(1.0),

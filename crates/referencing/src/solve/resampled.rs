@@ -17,7 +17,7 @@ use crate::{Observation, Observations};
 /// *An introduction to the bootstrap*, 1993): bias included, and whatever a loss with corners does with noise of its size,
 /// which no derivative at one draw of it tells.
 ///
-/// The draws are the rows of [`Signs`], each and its negative: of an answer that is linear in the noise they give the
+/// The draws are the rows of [`Signs`], at least `pairs` and the negative of each: of an answer that is linear in the noise they give the
 /// covariance to the last digit. A point that the noise does not explain is taken
 /// where it was measured, so that it is left out, or pulls, as it did; all others where the pose puts them.
 ///
@@ -27,11 +27,12 @@ pub(super) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
+    pairs: usize,
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
     let all: Vec<Source> =
         data.points.iter().enumerate().map(|(k, p)| Source::of(k, p, data.rig, at)).collect::<Result<_, _>>()?;
     let numbers = all.iter().map(Source::numbers).sum();
-    let (size, blocks) = rows(numbers, LEAST_PAIRS);
+    let (size, blocks) = rows(numbers, pairs);
     let mut sum = Matrix6::zeros();
     let (mut answered, mut refused) = (0_u32, None);
     let mut moved = data.clone();
@@ -61,8 +62,8 @@ pub(super) fn covariance(
     }
 }
 
-/// Draws, each with its negative, at least.
-const LEAST_PAIRS: usize = 128;
+/// Draws, each with its negative, of answers that are nearly linear in the noise.
+pub(super) const PAIRS: usize = 128;
 /// A residual (standard deviations of its point) that noise exceeds once in a million where all of it is along one axis; a
 /// pose that weighs all axes alike leaves across the others residuals that no χ² would forgive.
 const UNLIKELY: f64 = 8.5;
