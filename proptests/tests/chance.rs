@@ -16,7 +16,7 @@ use seafix_simulation::{
 /// Bounds of the bins of the prediction.
 const BINS: [f64; 6] = [1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
 /// χ² per degree of freedom that sets may have.
-const EACH: [f64; 4] = [0.1, 0.4, 1.2, 3.0];
+const EACH: [f64; 7] = [0.1, 0.2, 0.4, 0.7, 1.2, 2.0, 3.0];
 /// A bin with fewer sets says nothing.
 const ENOUGH: f64 = 100.0;
 const SIZES: std::ops::RangeInclusive<usize> = 3..=7;
@@ -213,14 +213,16 @@ fn the_null_model_is_predicted() {
 /// put together in each bin. Clutter as the families have it, on edges and floors, is printed beside.
 ///
 /// `cargo test --release --workspace --test chance -- --ignored --nocapture`; `CHANCE_FAMILIES` (abcdefg), `CHANCE_TIMES` (1)
-/// so many times the frames.
+/// so many times the frames, `CHANCE_CLUTTER` (null family).
 #[test]
 #[ignore = "a minute"]
 fn every_bin_is_predicted() {
     let variable = |name: &str, default: &str| std::env::var(name).unwrap_or_else(|_| default.to_owned());
     let families = variable("CHANCE_FAMILIES", "abcdefg");
     let times: usize = variable("CHANCE_TIMES", "1").parse().expect("a number");
-    for (clutter, name) in [(Clutter::Null, "null"), (Clutter::Family, "family")] {
+    let clutters = variable("CHANCE_CLUTTER", "null family");
+    for name in clutters.split(' ') {
+        let clutter = if name == "null" { Clutter::Null } else { Clutter::Family };
         let mut all = Bins::default();
         for letter in families.chars() {
             let family: Family = letter.to_string().parse().expect("a family");
