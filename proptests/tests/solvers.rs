@@ -322,6 +322,8 @@ fn same(solver: &Asked, a: &Transform<Object, Camera>, b: &Transform<Object, Cam
 
 /// P43. Inverse problem: solve(x, y) = solve(y, x)⁻¹ for equal weights, ≤ 1e-11 (1 + L), for every solver that claims
 /// least squares.
+///
+/// Seen to fail when points are weighed by their distance from the object's origin.
 #[test]
 fn the_inverse_problem_has_the_inverse_answer() {
     let solvers = solvers();
@@ -344,6 +346,8 @@ fn the_inverse_problem_has_the_inverse_answer() {
 /// P42. A weight of nought is a point removed, and weights twice as large for all give the same pose: ≤ 1e-13 (1 + L) for
 /// `weighted-kabsch`, 1e-10 for `mahalanobis`, which iterates. A point whose noise is 1e8 times the others' has a
 /// weight of 1e-16, and noise of half as much is a weight of four.
+///
+/// Seen to fail when every weight is larger by one.
 #[test]
 fn a_point_without_weight_is_no_point() {
     let solvers = solvers();
@@ -377,6 +381,8 @@ fn a_point_without_weight_is_no_point() {
 }
 
 /// P44. Three exact points: every solver that claims least squares agrees with the triad, ≤ 1e-11 (1 + L).
+///
+/// Seen to fail when the determinant's sign is left out.
 #[test]
 fn three_points_leave_one_answer() {
     let solvers = solvers();
@@ -399,6 +405,8 @@ fn three_points_leave_one_answer() {
 }
 
 /// P45. With all residuals below the threshold truncated squares are least squares, and so is Huber's loss: ≤ 1e-9.
+///
+/// Seen to fail when Huber's weights fall from nought on.
 #[test]
 fn robust_solvers_trust_what_is_near() {
     let robust = [
@@ -422,6 +430,8 @@ fn robust_solvers_trust_what_is_near() {
 /// P45. With up to half of the points more than .2 m off their places, in any direction (nearer ones may pass for noise of
 /// a few millimetres, and which set is the largest then hangs by it), and one largest set of points that a rigid motion brings within the
 /// threshold, `gnc-tls` keeps exactly that set. Which sets there are is found by trying all of them.
+///
+/// Seen to fail when no sets of three are tried after the graduation.
 #[test]
 fn truncated_squares_keep_the_only_consensus() {
     let solver = SOLVERS.build(&seafix_component::Choice::named("gnc-tls")).expect("it is listed");
@@ -474,6 +484,8 @@ fn only_consensus(points: &[Observation]) -> Option<Vec<usize>> {
 
 /// Agreement. Optimisers that know nothing of poses and of our derivatives find no better place than
 /// `stereo-reprojection`, and the same one: its own covariance puts theirs within a thousandth of a standard deviation.
+///
+/// Seen to fail when ours stops where the cost can no longer tell.
 #[test]
 fn independent_judges_agree() {
     let build = |name: &str| SOLVERS.build(&seafix_component::Choice::named(name)).expect("it is listed");
@@ -499,6 +511,8 @@ fn independent_judges_agree() {
 
 /// An optimiser that is stopped before its minimum refuses, with its iterations and the distance that is left; nothing that
 /// it answers is further from `stereo-reprojection`'s pose than that allows.
+///
+/// Seen to fail when every end counts as a minimum.
 #[test]
 fn what_has_not_converged_is_refused() {
     let build = |choice: seafix_component::Choice| SOLVERS.build(&choice).expect("it is listed");

@@ -335,6 +335,8 @@ mod tests {
     /// Two points of one object and one of another, neither of which could be fixed: each pair that is found is true, the
     /// fix is as good as it says and better than that of the object that was fixed by itself, by its own word and
     /// over the draws.
+    ///
+    /// Seen to fail when the predicted places' covariance has a lever of the other sign.
     #[test]
     fn one_or_two_points_of_others_make_the_fix_better() {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
@@ -363,6 +365,8 @@ mod tests {
     }
 
     /// Where the others show none of their points, what clutter puts there is not taken for them.
+    ///
+    /// Seen to fail without the test against chance: 122 sets of 300 scenes.
     #[test]
     fn clutter_is_not_taken_for_points() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -376,6 +380,7 @@ mod tests {
         assert!(refused > 30, "only {refused} sets of clutter were there to be refused");
     }
 
+    /// Seen to fail when the first of several candidates is taken.
     #[test]
     fn what_takes_no_part_is_told_why() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);

@@ -205,6 +205,8 @@ fn a_survey_that_the_images_contradict_is_given_up() {
 
 /// Never worse than the best single fix: at the same poses the covariance relative to an object is that of its own points at
 /// most, in every direction, whatever the surveys are worth and however few points the others show.
+///
+/// Seen to fail when what pose and place share does not cancel.
 #[test]
 fn no_direction_is_known_worse_than_from_the_object_alone() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(9));
@@ -239,6 +241,8 @@ fn no_direction_is_known_worse_than_from_the_object_alone() {
 }
 
 /// Two points of an object that stands elsewhere are given up, not the survey of another.
+///
+/// Seen to fail when an object of one point may be displaced.
 #[test]
 fn of_an_object_of_two_points_the_points_are_given_up() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(10));

@@ -239,6 +239,7 @@ mod tests {
         assert!((noisy.position / level.position - 2.0).abs() < 1e-6);
     }
 
+    /// Seen to fail when the separation is left out of the level.
     #[test]
     fn one_wrong_match_is_within_the_level() {
         for wrong in 0..6 {
@@ -255,6 +256,7 @@ mod tests {
         }
     }
 
+    /// Seen to fail when only single points are left out.
     #[test]
     fn two_wrong_matches_are_within_the_level_where_they_are_assumed() {
         let acceptance = Acceptance { two_wrong_rate: 0.01, ..Acceptance::default() };
