@@ -3,18 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use seafix_component::Fault;
-use seafix_experiment::{
-    Observer, Plan, dataset,
-    source::{CalibratedPort, Passage, Sight, Truth},
-};
-use seafix_geometry::{Body, Camera, StereoRig, Transform};
-use seafix_referencing::Site;
+use seafix_experiment::Plan;
 
-use crate::{
-    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
-    terminal::{Progress, print},
-};
+use super::pairs;
+use crate::exit::{Ended, Failure, INPUT, OUTPUT, USAGE};
 
 #[derive(Debug, Args)]
 pub(crate) struct Dive {
@@ -52,78 +44,7 @@ impl Dive {
                 .source
                 .open(trial.resolved.seed, &plan.folder)
                 .map_err(|faults| Failure::faults(INPUT, &faults))?;
-            let progress = Progress::new();
-            let count = passage.frames();
-            let pixels = passage.rig().left().size().map(u64::from).iter().product::<u64>();
-            progress.begins(count, pixels * 2 * count as u64 * 6 / 10, &self.out);
-            let written =
-                dataset::write(&Watched { passage: &*passage, progress: &progress }, &self.out, &self.licence);
-            progress.end();
-            written.map_err(|fault| Failure::new(OUTPUT, fault))?;
-            print(&format!("{count} stereo pairs in {}\n", self.out.display()))?;
-            Ok(DONE)
+            pairs::write(&*passage, &self.out, &self.licence)
         })
-    }
-}
-
-/// A passage that tells how far it is.
-struct Watched<'a> {
-    passage: &'a dyn Passage,
-    progress: &'a Progress,
-}
-
-impl Passage for Watched<'_> {
-    fn name(&self) -> &str {
-        self.passage.name()
-    }
-
-    fn site(&self) -> &Site {
-        self.passage.site()
-    }
-
-    fn rig(&self) -> &StereoRig {
-        self.passage.rig()
-    }
-
-    fn body_from_camera(&self) -> Transform<Body, Camera> {
-        self.passage.body_from_camera()
-    }
-
-    fn images(&self) -> bool {
-        self.passage.images()
-    }
-
-    fn frames(&self) -> usize {
-        self.passage.frames()
-    }
-
-    fn prior_sigma(&self) -> Option<(f64, f64)> {
-        self.passage.prior_sigma()
-    }
-
-    fn bits(&self) -> u8 {
-        self.passage.bits()
-    }
-
-    fn ports(&self) -> [Option<CalibratedPort>; 2] {
-        self.passage.ports()
-    }
-
-    fn sensors(&self) -> Vec<(String, String)> {
-        self.passage.sensors()
-    }
-
-    fn sight(&self, index: usize) -> Result<Sight, Fault> {
-        let sight = self.passage.sight(index);
-        self.progress.frame("");
-        sight
-    }
-
-    fn truth(&self, index: usize) -> Option<Truth> {
-        self.passage.truth(index)
-    }
-
-    fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
-        self.passage.inputs()
     }
 }

@@ -3,12 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use seafix_experiment::{Plan, dataset};
+use seafix_experiment::Plan;
 
-use crate::{
-    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
-    terminal::print,
-};
+use super::pairs;
+use crate::exit::{Ended, Failure, INPUT, USAGE};
 
 #[derive(Debug, Args)]
 pub(crate) struct Export {
@@ -31,8 +29,6 @@ impl Export {
         let trial = plan.trials.first().ok_or_else(|| Failure::new(USAGE, "the experiment has no trial"))?;
         let passage =
             trial.source.open(trial.resolved.seed, &plan.folder).map_err(|faults| Failure::faults(INPUT, &faults))?;
-        dataset::write(&*passage, &self.out, &self.licence).map_err(|fault| Failure::new(OUTPUT, fault))?;
-        print(&format!("{} stereo pairs in {}\n", passage.frames(), self.out.display()))?;
-        Ok(DONE)
+        pairs::write(&*passage, &self.out, &self.licence)
     }
 }

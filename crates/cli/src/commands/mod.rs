@@ -19,6 +19,7 @@ mod list;
 mod merge;
 mod model;
 mod odometry;
+mod pairs;
 mod publish;
 mod recover;
 mod replay;

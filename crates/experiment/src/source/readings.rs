@@ -1,4 +1,4 @@
-//! What the navigation sensors of a dive said, as tables beside its data set.
+//! What the navigation sensors of a dive said, and where its route led, as tables beside its data set.
 
 use std::fmt::Write;
 
@@ -17,7 +17,10 @@ pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
         said.rate.iter().copied().chain([q.i, q.j, q.k, q.w]).collect()
     });
     let depth = table("depth", &readings.depth, mission, |depth| vec![*depth]);
-    let all = [("acoustic", acoustic), ("doppler", doppler), ("attitude", attitude), ("depth", depth)];
+    let places = mission.waypoints().into_iter().map(|[north, east, height]| format!("{north},{east},{height}\n"));
+    let route = std::iter::once("north,east,height\n".to_owned()).chain(places).collect();
+    let all =
+        [("acoustic", acoustic), ("doppler", doppler), ("attitude", attitude), ("depth", depth), ("waypoints", route)];
     all.into_iter().chain(lbl(mission)).map(|(name, table)| (format!("{name}.csv"), table)).collect()
 }
 

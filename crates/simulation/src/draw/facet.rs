@@ -1,6 +1,7 @@
 //! A triangle before one camera: what shading needs of it.
 
 use nalgebra::{Matrix3, Vector3};
+use smallvec::SmallVec;
 
 use crate::field::Triangle;
 
@@ -89,6 +90,29 @@ impl Facet {
     pub(super) fn spot(&self, line: &Line) -> (f32, f32) {
         let t = (self.offset - dot(&self.normal, &line.from)) / dot(&self.normal, &line.along);
         (line.from[2] + t * line.along[2], t * dot(&line.along, &line.along).sqrt())
+    }
+
+    /// Its sides in a pixel where lines bend: a·u + b·v + c ≥ 0 inside at the offset (u, v) from the pixel's centre, (a, b)
+    /// of unit length; `line` gives the ray of an offset. None where the facet is seen edge-on.
+    pub(super) fn sides(&self, line: impl Fn([f32; 2]) -> Line) -> SmallVec<[[f64; 3]; 4]> {
+        // The weights of the corners at a ray's place are zero on the sides, and nearly linear within a pixel.
+        let weights = |at| {
+            let line = line(at);
+            let t = (self.offset - dot(&self.normal, &line.from)) / dot(&self.normal, &line.along);
+            let to: [f32; 3] = std::array::from_fn(|k| line.from[k] + t * line.along[k] - self.corner[k]);
+            let (b, c) = (f64::from(dot(&self.second, &to)), f64::from(dot(&self.third, &to)));
+            [1.0 - b - c, b, c]
+        };
+        let (left, right) = (weights([-0.5, 0.0]), weights([0.5, 0.0]));
+        let (above, below) = (weights([0.0, -0.5]), weights([0.0, 0.5]));
+        let side = |k: usize| {
+            let (a, b) = (right[k] - left[k], below[k] - above[k]);
+            let length = (a * a + b * b).sqrt();
+            let c = 0.25 * (left[k] + right[k] + above[k] + below[k]);
+            [a / length, b / length, c / length]
+        };
+        let sides = [side(0), side(1), side(2)];
+        if sides.iter().flatten().all(|x| x.is_finite()) { sides.into_iter().collect() } else { SmallVec::new() }
     }
 
     /// Where rays meet its plane; `BENT` rays have directions and origins of their own.

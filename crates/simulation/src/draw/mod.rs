@@ -2,12 +2,13 @@
 //!
 //! A software rasteriser with a visibility buffer: every pixel's centre, and 32 places of each pixel
 //! that an edge crosses, are assigned to a triangle; each triangle is shaded once in a pixel, at the
-//! exact place where the pixel's ray meets its plane. Lines bend behind ports and with distortion;
+//! exact place where the pixel's ray meets its plane, and counts by the area of the pixel that it covers. Lines bend behind ports and with distortion;
 //! there, triangles are cut until they are straight to a fiftieth of a pixel, and only visibility
 //! depends on the cuts. Work is shared by rows in bands of fixed size: the same bytes on any number of threads.
 
 mod band;
 mod blur;
+mod coverage;
 mod eye;
 mod facet;
 mod light;

@@ -1,6 +1,9 @@
 //! The parts of a row's pixels: which facet each of them shows, where, and how much of the pixel it is.
 
+use smallvec::SmallVec;
+
 use super::{
+    coverage::area,
     eye::{Eye, Line, RowPose},
     facet::{Facet, LANES, Spots},
     outline::Outline,
@@ -41,14 +44,19 @@ pub(super) struct Lines {
     pub(super) from: [Vec<f32>; 3],
 }
 
-/// The samples of a pixel that see one facet: how many, and the sum of their offsets.
+/// The samples of a pixel that see one facet: how many, the sum of their offsets, and the share of the pixel.
 #[derive(Debug, Clone, Copy)]
 struct Group {
+    /// An outline of the facet.
     outline: u32,
     facet: u32,
     count: f32,
     offset: [f32; 2],
+    share: f64,
 }
+
+/// The sides of a facet in a pixel, from its centre: a·u + b·v + c ≥ 0 inside, (a, b) of unit length.
+type Sides = SmallVec<[[f64; 3]; 4]>;
 
 /// All parts of a row, each number a list.
 #[derive(Debug, Default)]
@@ -173,13 +181,21 @@ impl Parts {
         let (z, range) = centre.unwrap_or((NOWHERE, NOWHERE));
         self.centres.push((column as u32, z, range));
         group(samples, outlines, offsets, &mut self.groups);
+        let sides = |group: &Group| {
+            if bent {
+                facets[group.facet as usize].sides(|at| row.line(eye, column, at))
+            } else {
+                straight(&outlines[group.outline as usize], column, row.number)
+            }
+        };
+        share(&mut self.groups, sides, offsets);
         for k in 0..self.groups.len() {
-            let Group { facet, count, offset: [du, dv], .. } = self.groups[k];
+            let Group { facet, count, offset: [du, dv], share, .. } = self.groups[k];
             let offset = [du / count, dv / count];
             let here = self.columns.len();
             self.columns.push(column as u32);
             self.u.push(column as f32 + offset[0]);
-            self.shares.push(count * (1.0 / SAMPLES as f32));
+            self.shares.push(share as f32);
             self.lines.push(&row.line(eye, column, offset), bent);
             self.run(facet, here, here + 1);
         }
@@ -210,9 +226,8 @@ fn group(samples: &[u32; SAMPLES], outlines: &[Outline], offsets: &[[f32; SAMPLE
     for (k, &outline) in samples.iter().enumerate() {
         if groups.get(here).is_none_or(|g| g.outline != outline) {
             let facet = facet_of(outlines, outline);
-            let found = groups.iter().position(|g| g.outline == outline || g.facet == facet);
-            here = found.unwrap_or_else(|| {
-                groups.push(Group { outline, facet, count: 0.0, offset: [0.0; 2] });
+            here = groups.iter().position(|g| g.facet == facet).unwrap_or_else(|| {
+                groups.push(Group { outline, facet, count: 0.0, offset: [0.0; 2], share: 0.0 });
                 groups.len() - 1
             });
         }
@@ -220,4 +235,46 @@ fn group(samples: &[u32; SAMPLES], outlines: &[Outline], offsets: &[[f32; SAMPLE
         group.count += 1.0;
         group.offset = [group.offset[0] + offsets[0][k], group.offset[1] + offsets[1][k]];
     }
+}
+
+/// The sides of an outline about a pixel.
+fn straight(outline: &Outline, column: usize, row: usize) -> Sides {
+    let (u, v) = (column as f64, row as f64);
+    outline.sides().iter().map(|side| side.line).map(|[a, b, c]| [a, b, a * u + b * v + c]).collect()
+}
+
+/// The share of the pixel that each group has. A facet that nothing hides there, which is one that all samples within it
+/// see, has the area of the pixel within its sides: samples alone would make its edges stairs. What such facets leave is
+/// divided among the others by their samples.
+fn share(groups: &mut [Group], sides: impl Fn(&Group) -> Sides, places: &[[f32; SAMPLES]; 2]) {
+    if let [only] = groups {
+        only.share = 1.0;
+        return;
+    }
+    let (mut free, mut hidden) = (0.0, 0.0);
+    for group in &mut *groups {
+        let sides = if group.facet == NONE { Sides::new() } else { sides(group) };
+        let whole = !sides.is_empty() && within(&sides, places) <= group.count;
+        group.share = if whole { area(&sides) } else { -1.0 };
+        if whole { free += group.share } else { hidden += group.count }
+    }
+    // Slivers that no sample saw are nobody's: the shares add up to one all the same.
+    let scale = if free > 1.0 || hidden == 0.0 && free > 0.0 { 1.0 / free } else { 1.0 };
+    let left = if hidden > 0.0 { (1.0 - free).max(0.0) / f64::from(hidden) } else { 0.0 };
+    for group in groups {
+        group.share = if group.share < 0.0 { left * f64::from(group.count) } else { scale * group.share };
+    }
+}
+
+/// How many samples lie within all sides, and not right beside one: bent sides are cut to a fiftieth of a pixel.
+fn within(sides: &Sides, places: &[[f32; SAMPLES]; 2]) -> f32 {
+    const BESIDE: f32 = 0.03;
+    let mut least = [f32::MAX; SAMPLES];
+    for side in sides {
+        let [a, b, at] = side.map(|x| x as f32);
+        for k in 0..SAMPLES {
+            least[k] = least[k].min(at + a * places[0][k] + b * places[1][k]);
+        }
+    }
+    least.iter().map(|x| f32::from(u8::from(*x > BESIDE))).sum()
 }

@@ -1,5 +1,7 @@
 //! One stereo pair: shadows, the two views, exposure, noise.
 
+use std::sync::Arc;
+
 use nalgebra::{Vector3, Vector6};
 use seafix_geometry::{Camera, Frame, RightCamera, Transform, World};
 use seafix_vision::{Image, Threads, Workspace};
@@ -29,7 +31,7 @@ pub(crate) struct Studio {
     pub(crate) water: Water,
     pub(crate) imager: Imager,
     pub(crate) patterns: [Pattern; 2],
-    pub(crate) looks: Looks,
+    pub(crate) looks: Arc<Looks>,
     pub(crate) shadows: bool,
     pub(crate) snow_seed: u32,
     lamp_eye: Eye,
@@ -74,7 +76,7 @@ impl Studio {
         right: Eye,
         water: Water,
         imager: Imager,
-        looks: Looks,
+        looks: Arc<Looks>,
         shadows: bool,
         device_seed: u32,
         snow_seed: u32,

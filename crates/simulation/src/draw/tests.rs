@@ -33,7 +33,7 @@ pub(super) fn studio(scale: f64, water: Water, imager: Imager, port: Port, disto
         .collect();
     let left = Eye::new(Lens::new(camera, port.clone()), lamps, &water);
     let right = Eye::new(Lens::new(camera, port), there, &water);
-    let looks = Looks::new(5);
+    let looks = Looks::shared(5);
     Studio::new(left, right, water, imager, looks, true, 1, 2)
 }
 
@@ -211,7 +211,7 @@ fn middle(field: &Field, water: Water, height: f64, lamp: Lamp) -> f64 {
     let camera = Pinhole::new([33, 33], [40.0; 2], [16.0; 2], &[]).unwrap();
     let lens = Lens::new(camera, Port::default());
     let eye = Eye::new(lens, vec![lamp], &water);
-    let looks = Looks::new(1);
+    let looks = Looks::shared(1);
     let studio = Studio::new(eye.clone(), eye, water, Imager::default(), looks, false, 1, 2);
     let down = seafix_geometry::so3::exp(&(Vector3::z() * std::f64::consts::FRAC_PI_2));
     let pose = Transform::new(down, Vector3::new(0.1, 0.2, 40.0 - height));

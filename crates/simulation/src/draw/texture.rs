@@ -1,6 +1,6 @@
 //! How surfaces look up close: tiles with mean 1, as pyramids.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 use super::math::mix;
 use crate::field::Texture;
@@ -148,6 +148,19 @@ fn floor(x: f32) -> i32 {
 impl Looks {
     pub(crate) fn new(seed: u32) -> Self {
         Self { looks: Default::default(), seed }
+    }
+
+    /// The looks of this seed, the same for all dives that are planned at once: a look takes 22 MB.
+    pub(crate) fn shared(seed: u32) -> Arc<Self> {
+        static ALL: Mutex<Vec<Weak<Looks>>> = Mutex::new(Vec::new());
+        let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|looks| looks.strong_count() > 0);
+        let known = all.iter().filter_map(Weak::upgrade).find(|looks| looks.seed == seed);
+        known.unwrap_or_else(|| {
+            let looks = Arc::new(Self::new(seed));
+            all.push(Arc::downgrade(&looks));
+            looks
+        })
     }
 
     /// By what the albedo is multiplied at places (u, v) of a surface (m), each seen by a pixel as wide as its

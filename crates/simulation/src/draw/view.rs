@@ -89,6 +89,20 @@ impl View<'_> {
         });
     }
 
+    /// The skin that the centre of every pixel shows.
+    #[cfg(test)]
+    pub(super) fn skins<F: Frame>(&self, world_from_eye: &Transform<World, F>) -> Vec<Option<u32>> {
+        use super::visibility::{NONE, Strip};
+        let [width, height] = self.eye.lens.camera().size().map(|n| n as usize);
+        let (mut scratch, mut strip) = (ViewScratch::default(), Strip::default());
+        self.collect(world_from_eye, &mut scratch);
+        let ViewScratch { facets, outlines, .. } = &scratch;
+        let order: Vec<u32> = (0..outlines.len() as u32).collect();
+        strip.draw(outlines, &order, 0..height, width);
+        let skin = |&seen: &u32| (seen != NONE).then(|| facets[outlines[seen as usize].facet as usize].skin);
+        (0..height).flat_map(|row| strip.row(row).0.iter().map(skin).collect::<Vec<_>>()).collect()
+    }
+
     /// The triangles within sight, before the camera.
     fn collect<F: Frame>(&self, world_from_eye: &Transform<World, F>, scratch: &mut ViewScratch) {
         let into = world_from_eye.inverse();

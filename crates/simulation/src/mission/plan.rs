@@ -272,7 +272,7 @@ fn build_studio(settings: &Mission, cameras: &Cameras, seed: u64, dive: u64) -> 
     let right = Eye::new(cameras.lens.clone(), there, &water);
     let bits = |purpose| Stream::new(seed, dive, 0, purpose).bits() as u32;
     let texture = Stream::new(seed, 0, 0, Purpose::Texture).bits() as u32;
-    let looks = Looks::new(texture);
+    let looks = Looks::shared(texture);
     Studio::new(
         left,
         right,

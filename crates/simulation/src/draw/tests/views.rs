@@ -1,6 +1,7 @@
 //! The two images of a pair show one world, and each pixel the body that its ray meets.
 
-use super::*;
+use super::{view::View, *};
+use crate::field::Bvh;
 
 #[test]
 fn depths_of_the_two_images_agree() {
@@ -42,5 +43,47 @@ fn depths_of_the_two_images_agree() {
         }
         assert!(all > 100_000 && same + hidden >= all - all / 1000, "{object}: {same} + {hidden} of {all}");
         assert!(same * 100 >= all * 95, "{object}: {same} of {all}");
+    }
+}
+
+#[test]
+fn pixels_show_the_body_that_their_ray_meets() {
+    // SIMULATION.md §10.2: away from edges the bodies of the rasteriser and of the ray caster are the same at every pixel.
+    // Seen to fail when paint was given the layer of its plate.
+    let field = field(&built_in("drill-centre").unwrap());
+    // Paint lies in the plane of its plate, where a ray meets both: it is sought by itself.
+    let (paint, bodies): (Vec<_>, Vec<_>) = field.mesh.triangles.iter().cloned().partition(|t| t.layer > 0);
+    let trees = [Bvh::new(&bodies), Bvh::new(&paint)];
+    let flat = Port { kind: PortKind::Flat, ..Port::default() };
+    let dome = Port { kind: PortKind::Dome, offset: [0.002, 0.001, 0.004], ..Port::default() };
+    for (port, distortion) in
+        [(Port::default(), &[][..]), (Port::default(), &[-0.12, 0.02, 1e-3, -5e-4]), (flat, &[]), (dome, &[])]
+    {
+        let kind = port.kind;
+        let studio = studio(0.25, Water::default(), Imager::default(), port, distortion);
+        let eye = &studio.left;
+        for (object, tilt) in [(2, 0.3), (0, 0.0), (4, -0.2)] {
+            let pose = above(field.objects[object].centroid(), 3.0, tilt);
+            let met = |index: usize| {
+                let pixel = seafix_geometry::Pixel { u: (index % 256) as f64, v: (index / 256) as f64 };
+                let ray = eye.lens.ray(&pixel)?;
+                let from = (pose * seafix_geometry::Point::from(ray.from)).coords;
+                let along = pose.rotation() * ray.along;
+                let body = trees[0].hit(&bodies, &from, &along, f64::INFINITY).map(|h| (h.t, bodies[h.triangle].skin));
+                let bed = field.bed.hit(&from, &along).map(|t| (t, field.bed_skin));
+                let nearest = body.into_iter().chain(bed).min_by(|a, b| a.0.total_cmp(&b.0))?;
+                let painted = trees[1].hit(&paint, &from, &along, nearest.0 * (1.0 + 1e-4));
+                Some(painted.map_or(nearest.1, |h| paint[h.triangle].skin))
+            };
+            let rays: Vec<Option<u32>> = (0..256 * 192).map(met).collect();
+            let seen = View { field: &field, eye, rolling: None, far: 25.0 }.skins(&pose);
+            let inner = (1..191).flat_map(|v| (1..255).map(move |u| v * 256 + u));
+            let even = |k: usize| [k - 257, k - 256, k - 255, k - 1, k + 1, k + 255, k + 256, k + 257].map(|n| rays[n]);
+            let inner: Vec<usize> = inner.filter(|&k| even(k).iter().all(|skin| *skin == rays[k])).collect();
+            let wrong = inner.iter().filter(|&&k| rays[k].is_some() && seen[k] != rays[k]).count();
+            assert!(inner.len() > 35_000 && wrong == 0, "{kind:?} {object}: {wrong} of {}", inner.len());
+            let bodies = rays.iter().collect::<std::collections::BTreeSet<_>>().len();
+            assert!(bodies > 15, "{bodies} bodies in view");
+        }
     }
 }
