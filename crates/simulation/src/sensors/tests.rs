@@ -24,6 +24,7 @@ fn field() -> Field {
 
 #[test]
 fn acoustic_errors_grow_with_the_range_as_said() {
+    // Seen to fail with errors 1.2 times as large as said.
     for distance in [100.0, 1000.0] {
         let usbl =
             Acoustic { from: [-distance, 0.0, 36.0], outliers: 0.0, dropouts: 0.0, rate: 50.0, ..Acoustic::default() };
@@ -59,6 +60,7 @@ fn the_scale_of_the_doppler_log_is_one_number_a_dive() {
 
 #[test]
 fn the_gyros_allan_deviation_falls_with_the_root_of_time_to_its_floor() {
+    // Seen to fail with noise that does not follow the rate.
     let sensor = AttitudeSensor { random_walk: 0.15, instability: 0.0, rate: 50.0, ..AttitudeSensor::default() };
     let allan = |sensor: &AttitudeSensor, span: usize| {
         let readings = sensor.readings(&track(600), 600.0, (3, 0));

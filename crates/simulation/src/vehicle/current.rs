@@ -92,6 +92,7 @@ mod tests {
 
     #[test]
     fn the_variance_does_not_depend_on_the_step() {
+        // Seen to fail with noise of one size for all steps.
         let current = Current { sigma: 0.1, tau: 2.0, ..Current::default() };
         for dt in [0.1, 1.0, 10.0] {
             let mut process = Fluctuation::new(&current, 3, 0);

@@ -233,6 +233,7 @@ mod tests {
 
     #[test]
     fn coriolis_does_no_work_and_allocation_inverts_the_thrusters() {
+        // Seen to fail with the sign of one block of C(ν) turned.
         for model in [Model::hover_200(), Model::bluerov2_heavy()] {
             let nu = vector(0.4, -0.3, 0.2, 0.5, -0.1, 0.7);
             let c = model.coriolis(&nu);
@@ -268,6 +269,7 @@ mod tests {
 
     #[test]
     fn terminal_speed_balances_thrust_and_drag() {
+        // Seen to fail with a quadratic drag 5 % too high.
         let model = Model::bluerov2_heavy();
         let cosine = std::f64::consts::FRAC_1_SQRT_2;
         let forward = [30.0, 30.0, -30.0, -30.0, 0.0, 0.0, 0.0, 0.0];
@@ -298,6 +300,7 @@ mod tests {
 
     #[test]
     fn it_rocks_with_the_period_of_its_righting_lever() {
+        // Seen to fail with a lever 5 % too long.
         let free = Model { linear: Vector6::zeros(), quadratic: Vector6::zeros(), ..Model::hover_200() };
         let tilted = Motion { turn: seafix_geometry::so3::exp(&(Vector3::x() * 0.01)), ..still(&free) };
         let period = std::f64::consts::TAU * ((20.0 + 10.0) / (200.0 * GRAVITY * 0.04)).sqrt();
