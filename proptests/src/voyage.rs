@@ -91,7 +91,7 @@ impl Sailing<'_> {
         self.world_from_camera = (self.world_from_camera * motion).renormalized();
         let error = Transform::<Camera, Camera>::exp(&normal6(&mut self.stream, self.settings.odometry));
         let (attitude, position) = self.settings.odometry;
-        Local { motion: motion * error.inverse(), covariance: Covariance6::isotropic(attitude, position) }
+        Local::new(motion * error.inverse(), Covariance6::isotropic(attitude, position))
     }
 
     /// A fix at an object.
@@ -101,7 +101,7 @@ impl Sailing<'_> {
         let error = Transform::<Camera, Camera>::exp(&(own + self.common[object]));
         let object_from_camera = self.truth(object) * error.inverse();
         let covariance = Covariance6::isotropic(attitude, position);
-        Navigated { object, standing: Standing { object_from_camera, covariance } }
+        Navigated { object, standing: Standing::new(object_from_camera, covariance) }
     }
 
     /// A fix that is wrong by a turn of up to half a turn and a shift of up to `reach` (m).
@@ -111,7 +111,7 @@ impl Sailing<'_> {
         let xi = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
         let right = self.fix(object).standing;
         let object_from_camera = right.object_from_camera.perturbed(&xi);
-        Navigated { object, standing: Standing { object_from_camera, ..right } }
+        Navigated { object, standing: Standing::new(object_from_camera, right.covariance) }
     }
 
     /// Moves an object by `metres` in a direction of its own, without telling the survey.

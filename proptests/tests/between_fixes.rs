@@ -51,10 +51,8 @@ fn a_policy_does_not_change_its_mind() {
 fn a_fusion_knows_no_origin() {
     let near = (pose::<Object, Camera>(5.0), proptest::array::uniform6(-3e-3..3e-3), pose::<Object, Object>(50.0));
     law(256, near, |(known, off, moved)| {
-        let at = |object_from_camera, sigma| Standing {
-            object_from_camera,
-            covariance: Covariance6::isotropic(0.5 * sigma, sigma),
-        };
+        let at =
+            |object_from_camera, sigma| Standing::new(object_from_camera, Covariance6::isotropic(0.5 * sigma, sigma));
         let fixed = known.perturbed(&off.into());
         for name in FUSIONS.names() {
             let fusion = FUSIONS.build(&Choice::named(name)).unwrap();
@@ -81,7 +79,7 @@ fn passing_there_and_back_changes_nothing() {
     law(256, (pose::<Object, Camera>(5.0), place, pose::<World, Object>(50.0)), |(start, a, b)| {
         let exact = |world_from_object| Place { world_from_object, covariance: Covariance6::new(Matrix6::zeros()) };
         let places = [exact(a), exact(b)];
-        let known = Standing { object_from_camera: start, covariance: Covariance6::isotropic(1e-3, 1e-2) };
+        let known = Standing::new(start, Covariance6::isotropic(1e-3, 1e-2));
         let there = Navigated { object: 0, standing: known }.passed_to(1, &places);
         let world = a * start;
         within("there", (b * there.standing.object_from_camera).error_to(&world).norm(), 1e-10)?;
@@ -172,7 +170,7 @@ fn a_poor_glimpse_moves_no_pose() {
     navigator.fix(&sailing.fix(0));
     let before = *navigator.pose().unwrap();
     let good = sailing.fix(1);
-    let poor = Standing { covariance: Covariance6::isotropic(0.1, 0.5), ..good.standing };
+    let poor = Standing::new(good.standing.object_from_camera, Covariance6::isotropic(0.1, 0.5));
     assert_eq!(navigator.fix(&Navigated { standing: poor, ..good }), Event::Left);
     assert_eq!(navigator.pose(), Some(&before));
     assert_eq!(navigator.fix(&good), Event::Taken);

@@ -2,11 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use seafix_component::Choice;
 use seafix_geometry::{Camera, Covariance6, Object, Pinhole, StereoRig, Transform, World};
-use seafix_navigation::{Journey, Local, Lost, ODOMETRIES, Outcome, Standing, StereoPair, by_world};
+use seafix_navigation::{
+    Device, Journey, Local, Lost, ODOMETRIES, Odometry, Outcome, Reading, Standing, StereoPair, by_world,
+};
 use seafix_proptests::{law, poses::pose, within};
 use seafix_vision::{Image, Threads};
 
@@ -16,7 +18,7 @@ fn exact<A: seafix_geometry::Frame, B: seafix_geometry::Frame>() -> Covariance6<
 
 /// The steps between poses of one dive.
 fn steps(dive: &[Transform<World, Camera>]) -> Vec<Local> {
-    let step = |two: &[Transform<World, Camera>]| Local { motion: two[0].inverse() * two[1], covariance: exact() };
+    let step = |two: &[Transform<World, Camera>]| Local::new(two[0].inverse() * two[1], exact());
     dive.windows(2).map(step).collect()
 }
 
@@ -27,7 +29,7 @@ fn a_fix_is_carried_along() {
     let dive = prop::collection::vec(pose::<World, Camera>(10.0), 2001);
     law(8, (pose::<World, Object>(50.0), dive), |(world_from_object, dive)| {
         let fix = |at: &Transform<World, Camera>| by_world(&world_from_object, at);
-        let first = Standing { object_from_camera: fix(&dive[0]), covariance: exact() };
+        let first = Standing::new(fix(&dive[0]), exact());
         let steps = steps(&dive);
         prop_assert_eq!(first.after_all(&[]).object_from_camera, first.object_from_camera);
         let last = first.after_all(&steps).object_from_camera;
@@ -41,10 +43,10 @@ fn a_fix_is_carried_along() {
 fn one_step_is_as_good_as_many() {
     let dive = prop::collection::vec(pose::<World, Camera>(10.0), 2..200);
     law(64, (pose::<Object, Camera>(10.0), dive), |(object_from_camera, dive)| {
-        let first = Standing { object_from_camera, covariance: exact() };
+        let first = Standing::new(object_from_camera, exact());
         let steps = steps(&dive);
         let motion = dive[0].inverse() * dive[dive.len() - 1];
-        let at_once = first.after(&Local { motion, covariance: exact() }).object_from_camera;
+        let at_once = first.after(&Local::new(motion, exact())).object_from_camera;
         let many = first.after_all(&steps).object_from_camera;
         within("many − one", (at_once.matrix() - many.matrix()).amax(), 1e-12 * steps.len() as f64)
     });
@@ -110,14 +112,28 @@ impl Slope {
 
     fn journey(&self, name: &str, threads: Threads, order: &[usize]) -> Journey {
         let odometry = ODOMETRIES.build(&Choice::named(name)).unwrap();
-        let mut reckoning = odometry.begin(&self.rig, threads);
+        let mut reckoning = odometry.begin(&self.rig, Transform::identity(), threads);
         for (time, &pair) in order.iter().enumerate() {
             let [left, right] = &self.pairs[pair];
             let stamp_ns = 1_000_000_000 + 100_000_000 * time as u64;
+            said(stamp_ns).iter().for_each(|reading| reckoning.sense(reading));
             reckoning.advance(&StereoPair { stamp_ns, left, right }).unwrap();
         }
         reckoning.journey()
     }
+}
+
+/// What the vehicle's sensors say as it goes along x.
+fn said(stamp_ns: u64) -> [Reading; 2] {
+    let reading =
+        |device, x| Reading { device, stamp_ns, value: Vector3::new(x, 0.0, 0.0), covariance: Matrix3::zeros() };
+    [reading(Device::Doppler, STEP / 0.1), reading(Device::Gyro, 0.0)]
+}
+
+/// The odometries that go by images.
+fn by_images() -> impl Iterator<Item = (&'static str, Box<dyn Odometry>)> {
+    let built = |name| (name, ODOMETRIES.build(&Choice::named(name)).unwrap());
+    ODOMETRIES.names().map(built).filter(|(_, odometry)| !odometry.listens())
 }
 
 fn ways(journey: &Journey) -> Vec<Vector3<f64>> {
@@ -143,16 +159,15 @@ fn every_odometry_finds_a_short_way() {
     }
 }
 
-/// B15, B16, B59: no odometry invents a motion. A stamp that is not the next is refused and changes nothing; an image
+/// B15, B16, B59: no odometry by images invents a motion. A stamp that is not the next is refused and changes nothing; an image
 /// that is the one before, or black, is left out by name; a view of somewhere else breaks the way, and the next segment
 /// begins where the last one ended.
 #[test]
-fn no_odometry_invents_a_motion() {
+fn no_odometry_by_images_invents_a_motion() {
     let slope = Slope::new(3, Vector3::new(0.1, 0.0, 0.0));
     let black = Image::new(240, 180, vec![2.0; 240 * 180]).unwrap();
-    for name in ODOMETRIES.names() {
-        let odometry = ODOMETRIES.build(&Choice::named(name)).unwrap();
-        let mut reckoning = odometry.begin(&slope.rig, Threads::One);
+    for (name, odometry) in by_images() {
+        let mut reckoning = odometry.begin(&slope.rig, Transform::identity(), Threads::One);
         let mut give = |stamp_ns: u64, images: [&Image; 2]| {
             let done = reckoning.advance(&StereoPair { stamp_ns, left: images[0], right: images[1] });
             (done, reckoning.journey())

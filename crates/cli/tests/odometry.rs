@@ -261,6 +261,36 @@ fn one_image_twice_is_left_out_or_refused() {
     assert!(said.contains("left and right images that are the same") && said.contains("l0.pgm"), "{said}");
 }
 
+/// A data set whose Doppler log and gyro are tables is reckoned without looking at its images; one without is refused.
+#[test]
+fn readings_lead_the_way() {
+    let passage = Passage::new();
+    let by_readings = ["--odometry", "dvl-gyro"];
+    let said = passage.refusal(&by_readings, 3);
+    assert!(said.contains("no readings for odometry `dvl-gyro`") && said.contains("doppler"), "{said}");
+    let text = fs::read_to_string(passage.path("dataset.toml")).unwrap();
+    let named =
+        text.replace("dataset/1\"", "dataset/1.2\"").replace("[rig]", "doppler = \"d.csv\"\ngyro = \"g.csv\"\n[rig]");
+    passage.put("dataset.toml", named);
+    let table = |columns: &str, numbers: &str| {
+        let line = |k: u64| {
+            let stamp = 1_000_000_000 + 50_000_000 * k;
+            format!("{stamp},{},{numbers}\n", stamp + 10_000_000)
+        };
+        format!("stamp_ns,arrival_ns,{columns},sigma\n") + &(0..2 * PAIRS as u64).map(line).collect::<String>()
+    };
+    // Forward is the camera's own frame here; no noise, so that a value may repeat.
+    passage.put("d.csv", table("vx,vy,vz", &format!("{},0,0,0", STEP / 0.1)));
+    passage.put("g.csv", table("wx,wy,wz", "0,0,0,0"));
+    let all = passage.json(&by_readings);
+    let ways = Passage::ways(&all);
+    assert_eq!(ways.len(), PAIRS, "{all}");
+    assert!(ways.iter().enumerate().all(|(pair, x)| (x - STEP * pair as f64).abs() < 1e-9), "{ways:?}");
+    assert!(all["landmarks"].is_null() && all["warnings"].as_array().unwrap().is_empty(), "{all}");
+    fs::remove_file(passage.path("g.csv")).unwrap();
+    assert!(passage.refusal(&by_readings, 3).contains("g.csv"));
+}
+
 #[test]
 fn a_sound_way_is_not_doubted() {
     let all = Passage::new().json(&[]);

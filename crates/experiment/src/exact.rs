@@ -2,17 +2,18 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix4, Matrix6, Quaternion, UnitQuaternion};
+use nalgebra::{Matrix3, Matrix4, Matrix6, Quaternion, UnitQuaternion};
 use seafix_evaluation::Solved;
 use seafix_geometry::{
     Covariance6, Frame, MeasuredPoint, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint,
 };
-use seafix_log::{AnswerRecord, CloudPoint, ExactPose, Inputs, ProblemRecord, SitePoint, TrueState};
+use seafix_log::{AnswerRecord, CloudPoint, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
+use seafix_navigation::{Device, Reading};
 use seafix_referencing::{ModelPoint, Prior, PriorBound, Site, problem_file::CoherenceProblem};
 use seafix_vision::Image;
 
 use crate::{
-    record::rows6,
+    record::{rows3, rows6},
     source::{Eyes, Sight, Told, TrueAnswer, Truth, WorldPrior},
 };
 
@@ -71,7 +72,31 @@ pub(crate) fn inputs(sight: &Sight, cloud: &[MeasuredPoint]) -> Inputs {
             Eyes::Pair(left, right) => whole(left) && whole(right),
             Eyes::Points(_) => false,
         },
+        readings: sight.readings.iter().map(reading).collect(),
     }
+}
+
+fn reading(reading: &Reading) -> SensorReading {
+    SensorReading {
+        device: reading.device.name().to_owned(),
+        stamp_ns: reading.stamp_ns,
+        value: reading.value.into(),
+        covariance: rows3(&reading.covariance),
+    }
+}
+
+/// What the navigation sensors told.
+///
+/// # Errors
+/// The name of a device that this version does not know.
+pub(crate) fn readings(inputs: &Inputs) -> Result<Vec<Reading>, String> {
+    let reading = |said: &SensorReading| {
+        let device =
+            Device::named(&said.device).ok_or_else(|| format!("a reading of an unknown device, `{}`", said.device))?;
+        let covariance = Matrix3::from_fn(|r, c| said.covariance[r][c]);
+        Ok(Reading { device, stamp_ns: said.stamp_ns, value: said.value.into(), covariance })
+    };
+    inputs.readings.iter().map(reading).collect()
 }
 
 fn problem_record(object: usize, problem: &CoherenceProblem) -> ProblemRecord {
@@ -109,7 +134,7 @@ pub(crate) fn cloud(points: &[CloudPoint], inputs: &Inputs) -> Option<Vec<Measur
     points
         .iter()
         .map(|point| {
-            let covariance = nalgebra::Matrix3::from_fn(|r, c| point.covariance[r][c]);
+            let covariance = Matrix3::from_fn(|r, c| point.covariance[r][c]);
             let pixels = match point.pixels {
                 None => None,
                 Some(pixels) => {

@@ -258,6 +258,13 @@ impl Plan {
             let helm = trial.navigation.as_ref().map(Navigation::build).transpose();
             let helm =
                 helm.map_err(|error| in_cell(error.message, &["navigation".to_owned(), error.setting.to_owned()]))?;
+            if helm.as_ref().is_some_and(Helm::listens) && !source.may_hear() {
+                let source = &trial.source.name;
+                let what = format!(
+                    "goes by a Doppler log and a gyro, which source `{source}` has not; use `stereo`, or the source `dive`"
+                );
+                return Err(in_cell(what, &["navigation".to_owned(), "odometry".to_owned()]));
+            }
             if helm.is_some() && trial.pipeline.target != TargetKind::Object {
                 let what = "navigation goes from object to object; use target = \"object\"".to_owned();
                 return Err(in_cell(what, &["pipeline".to_owned(), "target".to_owned()]));

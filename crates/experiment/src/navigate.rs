@@ -19,7 +19,7 @@ use crate::{
     odometry_fault::{Motions, OdometryFault},
     pipeline::{build, resolve},
     record::rows6,
-    source::{Eyes, Sight},
+    source::{Eyes, Passage, Sight},
     stages::milliseconds,
 };
 
@@ -104,6 +104,13 @@ pub struct Helm {
     faults: Vec<OdometryFault>,
 }
 
+impl Helm {
+    /// Whether it cannot do without what the vehicle's Doppler log and gyro say.
+    pub(crate) fn listens(&self) -> bool {
+        self.odometry.listens()
+    }
+}
+
 /// A trial's way through the frames of a passage, in their order.
 pub(crate) struct Voyage<'a> {
     stages: &'a Stages,
@@ -138,14 +145,15 @@ pub(crate) struct Underway {
 
 impl<'a> Voyage<'a> {
     /// Sets out; every target stands somewhere in the world.
-    pub(crate) fn begin(helm: &'a Helm, stages: &'a Stages, targets: &'a [Target], rig: &'a StereoRig) -> Self {
+    pub(crate) fn begin(helm: &'a Helm, stages: &'a Stages, targets: &'a [Target], passage: &'a dyn Passage) -> Self {
+        let rig = passage.rig();
         let names = targets.iter().map(|target| target.name.clone()).collect();
         let navigator = Navigator::new(places(targets), &*helm.policy, &*helm.fusion).with_names(names);
         Self {
             stages,
             targets,
             rig,
-            reckoning: helm.odometry.begin(rig, Threads::One),
+            reckoning: helm.odometry.begin(rig, passage.body_from_camera(), Threads::One),
             navigator,
             faults: &helm.faults,
             motions: Motions::default(),
@@ -165,6 +173,7 @@ impl<'a> Voyage<'a> {
         let Eyes::Pair(left, right) = &sight.eyes else { return Err("a frame without images".to_owned()) };
         let start = Instant::now();
         let pair = StereoPair { stamp_ns: sight.stamp_ns, left, right };
+        sight.readings.iter().for_each(|reading| self.reckoning.sense(reading));
         let followed = self.reckoning.advance(&pair).map_err(|error| error.to_string())?;
         let odometry_ms = milliseconds(start);
         let mut events = Vec::new();
@@ -227,7 +236,7 @@ impl<'a> Voyage<'a> {
     /// What is known before a fix: the navigated pose, passed to each object; else the rough one.
     fn priors(&self, rough: &[Option<Prior>]) -> Vec<Option<Prior>> {
         let known = |index| {
-            let Standing { object_from_camera, covariance } = self.navigator.pose_at(index)?.standing;
+            let Standing { object_from_camera, covariance, .. } = self.navigator.pose_at(index)?.standing;
             Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) })
         };
         rough.iter().enumerate().map(|(index, rough)| known(index).or_else(|| rough.clone())).collect()
@@ -247,7 +256,7 @@ impl<'a> Voyage<'a> {
     fn fix(&mut self, sighting: &Sighting, events: &mut Vec<String>) {
         for attempt in &sighting.attempts {
             let Outcome::Referenced(fix) = &attempt.answer.outcome else { continue };
-            let standing = Standing { object_from_camera: fix.object_from_camera, covariance: fix.covariance };
+            let standing = Standing::new(fix.object_from_camera, fix.covariance);
             let fix = Navigated { object: attempt.target, standing };
             let name = &self.targets[attempt.target].name;
             match self.navigator.fix(&fix) {

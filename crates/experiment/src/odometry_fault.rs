@@ -97,7 +97,7 @@ mod tests {
     /// The k-th motion goes k metres.
     fn motion(k: u32) -> Option<Local> {
         let motion = Transform::new(UnitQuaternion::identity(), Vector3::new(f64::from(k), 0.0, 0.0));
-        Some(Local { motion, covariance: Covariance6::isotropic(1e-3, 1e-3) })
+        Some(Local::new(motion, Covariance6::isotropic(1e-3, 1e-3)))
     }
 
     /// The lengths that come of a minute of motions a second while the odometry fails from 20 to 40 s.

@@ -266,7 +266,7 @@ fn uv(pixel: &Pixel) -> [f64; 2] {
     [pixel.u, pixel.v]
 }
 
-fn rows3(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+pub(crate) fn rows3(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
     std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
 }
 

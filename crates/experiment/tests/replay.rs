@@ -9,9 +9,13 @@ use seafix_log::{FrameRecord, FrameTimes, TargetTimes, read};
 use tempfile::TempDir;
 
 /// Sources of every kind, shortened, and what their frames are tried with.
-const EXPERIMENTS: [(&str, &str); 6] = [
+const EXPERIMENTS: [(&str, &str); 7] = [
     ("points", "[source]\nname = 'virtual-points'\nframes = 6\n"),
     ("images", "[source]\nname = 'virtual-images'\nframes = 2\n"),
+    (
+        "readings",
+        "[source]\nname = 'dive'\nframes = 5\nrate = 2.0\n[navigation]\nodometry = 'dvl-gyro'\npolicy = { name = 'interval', seconds = 1.0 }\n",
+    ),
     ("layouts", "[source]\nname = 'virtual-layouts'\nlayouts = 3\nframes = 6\nsurvey-sigma = 0.01\n"),
     (
         "joint",
@@ -70,6 +74,9 @@ fn the_logged_configuration_gives_the_logged_results() {
             assert_eq!(replay.trials[0].name, plan.trials[0].name);
             let again = frames(&replay, folder.path(), threads);
             assert_eq!(without_images(again), without_images(original.clone()), "{name}, {threads} threads");
+            let told: usize = original.iter().map(|frame| frame.inputs.as_ref().unwrap().readings.len()).sum();
+            let moved = original.iter().filter_map(|frame| frame.navigation.as_ref()?.odometry.motion).count();
+            assert!(name != "readings" || told > 20 && moved == 4, "{told} readings, {moved} motions");
         }
         if name == "images" {
             let replay = Replay { from: ReplayFrom::Images, ..Replay::default() }.plan(&log).unwrap();

@@ -122,6 +122,13 @@ fn settings_of_navigation_are_checked() {
     assert!(said(&format!("{dive}[pipeline]\ntarget = 'joint'\n[navigation]\n")).contains("target = \"object\""));
     let points = "question = 'why'\nsource = 'virtual-points'\n[navigation]\n";
     assert!(said(points).contains("navigation needs images"), "{}", said(points));
+    // An odometry that goes by readings is refused where there are none, by the plan or when the source is opened.
+    let by_readings = "[navigation]\nodometry = 'dvl-gyro'\n";
+    let none = said(&format!("question = 'why'\nsource = 'virtual-images'\n{by_readings}"));
+    assert!(none.contains("e.toml:4") && none.contains("which source `virtual-images` has not"), "{none}");
+    let off = "faults = [{ device = 'doppler', kind = 'off', from = 0.0, to = 1e4, amount = 0.0 }]";
+    let deaf = said(&format!("question = 'why'\n[source]\nname = 'dive'\nframes = 2\n{off}\n{by_readings}"));
+    assert!(deaf.contains("they are not both heard here") && deaf.lines().count() == 1, "{deaf}");
 }
 
 /// What is logged of images changes no result.

@@ -2,7 +2,7 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 
-use crate::Local;
+use crate::{Lasting, Local, lasting::Shares};
 
 /// Where the camera is relative to an object, and how well that is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +11,8 @@ pub struct Standing {
     pub object_from_camera: Transform<Object, Camera>,
     /// Its covariance.
     pub covariance: Covariance6<Object, Camera>,
+    /// What its error shares with errors of the odometry that last.
+    pub(crate) shares: Shares,
 }
 
 /// Eq. (2), the way by the world: `object_from_camera = object_from_world · world_from_camera`. What the survey errs by
@@ -23,18 +25,31 @@ pub fn by_world(
 }
 
 impl Standing {
+    /// A pose that errs independently of the odometry, such as a fix.
+    pub fn new(object_from_camera: Transform<Object, Camera>, covariance: Covariance6<Object, Camera>) -> Self {
+        Self { object_from_camera, covariance, shares: Shares::zeros() }
+    }
+
     /// Eq. (6), one step of dead reckoning: `object_from_later = object_from_earlier · earlier_from_later`. (As printed
     /// the equation multiplies by the identity; this is what its text says.)
     ///
-    /// The covariance is carried along and that of the step added, the two taken as independent:
-    /// Σ' = A Σ Aᵀ + Σ_step, A = Ad(later_from_earlier).
+    /// The covariance is carried along and that of the step added, Σ' = A Σ Aᵀ + Σ_step, A = Ad(later_from_earlier), the
+    /// two taken as independent but for errors of the odometry that [last](Lasting).
     #[must_use]
     pub fn after(&self, step: &Local) -> Self {
         let adjoint = step.motion.inverse().adjoint();
-        let carried = adjoint * self.covariance.matrix * adjoint.transpose();
+        let mut covariance = adjoint * self.covariance.matrix * adjoint.transpose() + step.covariance.matrix;
+        let mut shares = Shares::zeros();
+        if let Some(Lasting { by, keep, with }) = &step.lasting {
+            let carried = adjoint * self.shares;
+            let common = carried * by.transpose();
+            covariance += common + common.transpose();
+            shares = Shares::from_fn(|row, k| carried[(row, k)] * keep[k]) + with;
+        }
         Self {
             object_from_camera: (self.object_from_camera * step.motion).renormalized(),
-            covariance: Covariance6::new(carried + step.covariance.matrix),
+            covariance: Covariance6::new(covariance),
+            shares,
         }
     }
 
@@ -54,9 +69,9 @@ mod tests {
         // One milliradian about y, then 10 m ahead: 10 mm across.
         let mut known = Covariance6::<Object, Camera>::isotropic(1e-9, 1e-9).matrix;
         known[(1, 1)] = 1e-6;
-        let here = Standing { object_from_camera: Transform::identity(), covariance: Covariance6::new(known) };
+        let here = Standing::new(Transform::identity(), Covariance6::new(known));
         let ahead = Transform::exp(&[0.0, 0.0, 0.0, 0.0, 0.0, 10.0].into());
-        let there = here.after(&Local { motion: ahead, covariance: Covariance6::isotropic(1e-9, 1e-9) });
+        let there = here.after(&Local::new(ahead, Covariance6::isotropic(1e-9, 1e-9)));
         assert!((there.covariance.matrix[(3, 3)].sqrt() - 0.01).abs() < 1e-6);
         assert_eq!(there.object_from_camera.translation().z, 10.0);
     }

@@ -2,6 +2,8 @@
 
 use seafix_geometry::{Camera, Covariance6, Transform, World};
 
+use crate::{Device, Lasting};
+
 /// All that an odometry found.
 #[derive(Debug, Clone, Default)]
 pub struct Journey {
@@ -41,6 +43,15 @@ pub struct Local {
     pub motion: Transform<Camera, Camera>,
     /// Its covariance.
     pub covariance: Covariance6<Camera, Camera>,
+    /// What its error has in common with those of the steps around it; nothing where it is independent of them.
+    pub lasting: Option<Lasting>,
+}
+
+impl Local {
+    /// A motion that errs independently of all others.
+    pub fn new(motion: Transform<Camera, Camera>, covariance: Covariance6<Camera, Camera>) -> Self {
+        Self { motion, covariance, lasting: None }
+    }
 }
 
 /// What became of a pair.
@@ -50,7 +61,7 @@ pub enum Outcome {
     Began,
     /// Its motion is known.
     Followed {
-        /// Landmarks that were sought in it.
+        /// Landmarks that were sought in it; none by an odometry that has none.
         sought: usize,
         /// Those that were found and agree with its pose.
         found: usize,
@@ -118,6 +129,16 @@ pub enum Lost {
     /// The motion that explains the points is not determined well enough.
     #[error("the motion is known to {0:.3} m only")]
     Weak(f64),
+    /// A sensor that it goes by is not heard.
+    #[error("the {device} says nothing that can be used for {seconds:.3} s; at most {most} s are bridged")]
+    Silent {
+        /// Which.
+        device: Device,
+        /// How long (s).
+        seconds: f64,
+        /// What is bridged (s).
+        most: f64,
+    },
     /// Too long a time between two pairs.
     #[error("{seconds:.3} s without a pair that could be followed; at most {most} s are bridged{}", units(.seconds))]
     Gap {
@@ -153,11 +174,11 @@ impl Journey {
     }
 
     /// The median share of the landmarks sought in a pair that were found and agree with its pose; `None` when no pair
-    /// was followed. Where much of what is in view moves otherwise than the rest it is small.
+    /// was followed by landmarks. Where much of what is in view moves otherwise than the rest it is small.
     pub fn agreement(&self) -> Option<f64> {
         let share = |outcome: &Outcome| match outcome {
-            Outcome::Followed { sought, found } => Some(*found as f64 / (*sought).max(1) as f64),
-            Outcome::Began | Outcome::Skipped(_) => None,
+            Outcome::Followed { sought, found } if *sought > 0 => Some(*found as f64 / *sought as f64),
+            Outcome::Followed { .. } | Outcome::Began | Outcome::Skipped(_) => None,
         };
         let mut shares: Vec<f64> = self.outcomes.iter().filter_map(share).collect();
         shares.sort_unstable_by(f64::total_cmp);

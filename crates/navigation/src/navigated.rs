@@ -47,6 +47,9 @@ impl Navigated {
         let (near, far) = (here.inverse().adjoint(), pose.inverse().adjoint());
         let survey = near * from.covariance.matrix * near.transpose() + far * to.covariance.matrix * far.transpose();
         let covariance = Covariance6::new(self.standing.covariance.matrix + survey);
-        Self { object: other, standing: Standing { object_from_camera: pose.renormalized(), covariance } }
+        Self {
+            object: other,
+            standing: Standing { object_from_camera: pose.renormalized(), covariance, shares: self.standing.shares },
+        }
     }
 }

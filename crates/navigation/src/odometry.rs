@@ -1,10 +1,10 @@
 //! What every odometry does.
 
 use seafix_component::{Registry, entry};
-use seafix_geometry::StereoRig;
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_vision::{Image, Threads};
 
-use crate::{Journey, Outcome, Stereo, Waypoint};
+use crate::{DvlGyro, Journey, Outcome, Reading, Stereo, Waypoint};
 
 /// The two images of one instant.
 #[derive(Debug, Clone, Copy)]
@@ -31,14 +31,27 @@ pub struct NotAfter {
     pub before_ns: u64,
 }
 
-/// Computes the motion of a stereo rig from the images it took.
+/// Computes the motion of a stereo rig from the images it took, or from what other sensors of the vehicle say.
 pub trait Odometry: Send + Sync + std::fmt::Debug {
-    /// Begins with nothing seen yet, for this rig. The result does not depend on who works.
-    fn begin<'a>(&'a self, rig: &'a StereoRig, threads: Threads) -> Box<dyn Reckoning + 'a>;
+    /// Whether it goes by readings ([`Reckoning::sense`]) and cannot do without.
+    fn listens(&self) -> bool {
+        false
+    }
+
+    /// Begins with nothing seen yet, for this rig, which sits there in the vehicle. The result does not depend on who works.
+    fn begin<'a>(
+        &'a self,
+        rig: &'a StereoRig,
+        body_from_camera: Transform<Body, Camera>,
+        threads: Threads,
+    ) -> Box<dyn Reckoning + 'a>;
 }
 
-/// An odometry at work: pairs go in, in order of time, poses come out.
+/// An odometry at work: pairs go in, in order of time, and between them readings as they come; poses come out.
 pub trait Reckoning: Send {
+    /// Takes a reading, whenever it was made; one that goes by images alone has no use for it.
+    fn sense(&mut self, _reading: &Reading) {}
+
     /// Takes the next pair; what became of it, as far as is known by now.
     ///
     /// # Errors
@@ -53,4 +66,4 @@ pub trait Reckoning: Send {
 }
 
 /// All odometries.
-pub static ODOMETRIES: Registry<dyn Odometry> = Registry::new("odometry", &[entry!(Stereo)]);
+pub static ODOMETRIES: Registry<dyn Odometry> = Registry::new("odometry", &[entry!(DvlGyro), entry!(Stereo)]);

@@ -63,6 +63,13 @@ impl Odometer {
         let (odometry, settings) = self.build()?;
         let dataset = Dataset::open_pairs(&self.dataset).map_err(|faults| Failure::faults(INPUT, &faults))?;
         dataset.warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+        if odometry.listens() && !dataset.hears() {
+            let what = format!("no readings for odometry `{}`", self.odometry);
+            let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
+            let remedy =
+                "name the tables of the Doppler log and the gyro, `doppler = …` and `gyro = …`, or use `stereo`";
+            return Err(Failure::new(INPUT, fault.remedy(remedy)));
+        }
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
@@ -98,12 +105,15 @@ impl Odometer {
     /// Leads every pair that can be read through the odometry.
     fn travel(&self, odometry: &dyn Odometry, dataset: &Dataset) -> Result<Trip, Failure> {
         let threads = if self.threads > 1 { Threads::Pool } else { Threads::One };
-        let mut reckoning = odometry.begin(&dataset.rig, threads);
+        let mut reckoning = odometry.begin(&dataset.rig, dataset.body_from_camera, threads);
         let progress = Progress::new();
         progress.expect(dataset.frames.len());
         let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
         let mut said = HashSet::new();
+        let mut before = None;
         for frame in &dataset.frames {
+            let readings = dataset.readings(before.replace(frame.stamp_ns), frame.stamp_ns);
+            readings.iter().for_each(|reading| reckoning.sense(reading));
             match two_eyes(dataset, frame) {
                 Err(fault) => {
                     let warning = format!("warning: {fault}");
@@ -198,7 +208,7 @@ impl Trip {
         agreement.map(said).into_iter().collect()
     }
 
-    /// Landmarks found in a pair, of those sought: the least, and the means.
+    /// Landmarks found in a pair, of those sought: the least, and the means; `None` by an odometry without.
     fn landmarks(&self) -> Option<[f64; 3]> {
         let followed: Vec<(usize, usize)> = self.journey.outcomes.iter().filter_map(of_followed).collect();
         let count = followed.len() as f64;
@@ -214,8 +224,8 @@ impl Trip {
 
 fn of_followed(outcome: &Outcome) -> Option<(usize, usize)> {
     match outcome {
-        Outcome::Followed { sought, found } => Some((*sought, *found)),
-        Outcome::Began | Outcome::Skipped(_) => None,
+        Outcome::Followed { sought, found } if *sought > 0 => Some((*sought, *found)),
+        Outcome::Followed { .. } | Outcome::Began | Outcome::Skipped(_) => None,
     }
 }
 

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::source::CalibratedPort;
 
-/// The versions of the format that are read; the last is written.
-pub(super) const FORMATS: [&str; 2] = ["seafix-dataset/1", "seafix-dataset/1.1"];
+/// The versions of the format that are read. Written is the second, or the third where there are readings.
+pub(super) const FORMATS: [&str; 3] = ["seafix-dataset/1", "seafix-dataset/1.1", "seafix-dataset/1.2"];
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,6 +35,10 @@ pub(super) struct Description {
     pub(super) visibility: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) objects: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) doppler: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) gyro: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) body_from_camera: Option<[[f64; 4]; 4]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -122,7 +126,7 @@ impl PortNumbers {
 }
 
 impl Description {
-    /// Forgets all that is not about the rig and its images.
+    /// Forgets all that is not about the motion of the rig: its images and what sensors said.
     pub(super) fn keep_pairs_only(&mut self) {
         (self.site, self.truth, self.prior, self.visibility, self.objects) = (None, None, None, None, None);
         (self.prior_sigma, self.prior_covariance) = (None, None);

@@ -9,6 +9,7 @@ use super::{
     Dataset, DatasetFrame, ImageLimits,
     folder::{inside, is_absent},
 };
+use crate::source::Heard;
 
 /// A data set in the layout of others: no site, no prior.
 pub(super) struct Foreign {
@@ -36,6 +37,7 @@ impl From<Foreign> for Dataset {
             frames,
             objects: Vec::new(),
             has_visibility: false,
+            heard: Heard::default(),
             bits: 16,
             limits: ImageLimits::default(),
             table,

@@ -7,6 +7,7 @@ use std::{
 
 use seafix_component::{Fault, line_of, nearest};
 use seafix_geometry::{Body, Camera, Covariance6, Object, StereoRig, Transform, World};
+use seafix_navigation::{Device, Reading};
 use seafix_referencing::Site;
 use seafix_vision::Image;
 
@@ -19,7 +20,10 @@ use super::{
     picture::{ImageLimits, read_image, size_fault},
     tables, tum,
 };
-use crate::{read_text, source::CalibratedPort};
+use crate::{
+    read_text,
+    source::{CalibratedPort, Heard},
+};
 
 /// A data set whose description, tables and paths are in order. Its images are
 /// read frame by frame.
@@ -43,6 +47,8 @@ pub struct Dataset {
     pub objects: Vec<(String, Transform<World, Object>)>,
     /// Whether the set says which feature points are visible.
     pub has_visibility: bool,
+    /// What its Doppler log and gyro told.
+    pub(crate) heard: Heard,
     /// Depth of the pixels in images of 16 bits.
     pub bits: u8,
     /// How large an image may be; the reader's, not the data set's, to say.
@@ -100,7 +106,7 @@ impl Dataset {
         euroc::read(folder, &home, false)
     }
 
-    /// Reads what odometry may know of the data set in `folder`: the rig and the stereo pairs. Site, truth and prior are
+    /// Reads what odometry may know of the data set in `folder`: rig, stereo pairs and readings. Site, truth and prior are
     /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair).
     ///
     /// # Errors
@@ -174,6 +180,16 @@ impl Dataset {
         Self { limits, ..self }
     }
 
+    /// Whether both its Doppler log and its gyro are heard.
+    pub fn hears(&self) -> bool {
+        self.heard.is_whole()
+    }
+
+    /// What Doppler log and gyro told up to `now` (ns), up to `before` left out.
+    pub fn readings(&self, before: Option<u64>, now: u64) -> Vec<Reading> {
+        self.heard.between(before, now)
+    }
+
     /// The two images of `frame`.
     ///
     /// # Errors
@@ -242,6 +258,16 @@ impl Reader<'_> {
         let covariances = d.prior_covariance.as_deref().and_then(|name| self.table(name, tables::covariances));
         let visibility = d.visibility.as_deref().and_then(|name| self.table(name, tables::visibility));
         let objects = d.objects.as_deref().and_then(|name| self.table(name, tables::objects)).unwrap_or_default();
+        let mut readings = |name: &Option<String>, device| {
+            let table = |name: &str| self.table(name, |text, file| tables::readings(text, file, device));
+            name.as_deref().and_then(table).unwrap_or_default()
+        };
+        let (doppler, gyro) = (readings(&d.doppler, Device::Doppler), readings(&d.gyro, Device::Gyro));
+        for (key, given, other) in [("doppler", &d.doppler, &d.gyro), ("gyro", &d.gyro, &d.doppler)] {
+            if given.is_some() && other.is_none() {
+                self.fault(&[key], "one device without the other", key, "dead reckoning needs `doppler` and `gyro`");
+            }
+        }
         let sigma = self.prior_sigma();
         if d.prior.is_some() && sigma.is_none() && covariances.is_none() {
             self.fault(&["prior"], "a prior without its uncertainty", "", "add prior_sigma or prior_covariance");
@@ -299,6 +325,7 @@ impl Reader<'_> {
                 frames,
                 objects,
                 has_visibility: visibility.is_some(),
+                heard: Heard::new(doppler.into_iter().chain(gyro).collect()),
                 bits,
                 limits: ImageLimits::default(),
                 hashes: d.hashes.clone().into_iter().collect(),

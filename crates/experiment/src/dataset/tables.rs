@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use nalgebra::{Matrix4, Matrix6};
+use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 use seafix_component::Fault;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
+use seafix_navigation::{Device, Reading};
 
 /// What a table holds, or the first line that is wrong.
 type Table<T> = Result<Vec<T>, Fault>;
@@ -85,6 +86,41 @@ pub(super) fn covariances(text: &str, file: &Path) -> Table<(u64, Covariance6<Wo
         .collect()
 }
 
+/// `stamp_ns,arrival_ns,vx,vy,vz,sigma`, of a gyro `wx,wy,wz`: readings and when each is there to be used.
+pub(super) fn readings(text: &str, file: &Path, device: Device) -> Table<(u64, Reading)> {
+    let axes = match device {
+        Device::Doppler => ["vx", "vy", "vz"],
+        Device::Gyro => ["wx", "wy", "wz"],
+    };
+    rows(text, file, ["stamp_ns", "arrival_ns", axes[0], axes[1], axes[2], "sigma"])?
+        .into_iter()
+        .map(|(line, [stamp, arrival, x, y, z, sigma])| {
+            let real = |word| number::<f64>(word, line, file);
+            let value = Vector3::new(real(x)?, real(y)?, real(z)?);
+            let fault = |what: &str, value: &str, remedy: &str| {
+                Err(Fault::new(what, file).on_line(line).value(value).remedy(remedy))
+            };
+            let spread = real(sigma)?;
+            if !(spread >= 0.0 && spread.is_finite()) {
+                return fault("a standard deviation that cannot be", sigma, "give one of each axis, zero or more");
+            }
+            if !value.iter().all(|x| x.is_finite()) {
+                return fault(
+                    "a reading that is not finite",
+                    &value.map(|x| x.to_string()).as_slice().join(","),
+                    "leave the line out",
+                );
+            }
+            let (stamp_ns, arrival_ns) = (number(stamp, line, file)?, number(arrival, line, file)?);
+            if arrival_ns < stamp_ns {
+                return fault("a reading that arrives before it is made", arrival, "arrival_ns is the later one");
+            }
+            let covariance = Matrix3::identity() * (spread * spread);
+            Ok((arrival_ns, Reading { device, stamp_ns, value, covariance }))
+        })
+        .collect()
+}
+
 /// Data lines with exactly the columns of `header`, and their line numbers.
 pub(crate) fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Table<(usize, [&'a str; N])> {
     let expected = header.join(",");
@@ -157,6 +193,21 @@ mod tests {
         let columns: String = (0..16).map(|i| format!(",m{i}")).collect();
         let identity = "box,1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1";
         assert_eq!(objects(&format!("object{columns}\n{identity}\n"), file).unwrap()[0].0, "box");
+    }
+
+    #[test]
+    fn readings_are_finite_and_come_after_they_are_made() {
+        let file = Path::new("doppler.csv");
+        let table =
+            |line: &str| readings(&format!("stamp_ns,arrival_ns,vx,vy,vz,sigma\n{line}\n"), file, Device::Doppler);
+        let (arrival, reading) = table("5,7,0.4,0,-0.1,0.004").unwrap()[0];
+        assert_eq!((arrival, reading.stamp_ns, reading.value.x, reading.covariance[(2, 2)]), (7, 5, 0.4, 1.6e-5));
+        let said = |line: &str| table(line).unwrap_err().to_string();
+        assert!(
+            said("5,4,0.4,0,0,0.004").contains("doppler.csv:2") && said("5,4,0,0,0,0").contains("before it is made")
+        );
+        assert!(said("5,7,nan,0,0,0.004").contains("not finite") && said("5,7,0,0,0,-1").contains("cannot be"));
+        assert!(readings("stamp_ns,arrival_ns,wx,wy,wz,sigma\n", file, Device::Gyro).unwrap().is_empty());
     }
 
     #[test]

@@ -92,12 +92,14 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
     if let Some(table) = &objects {
         put("objects.csv", table)?;
     }
-    for (name, table) in passage.sensors() {
-        put(&name, &table)?;
+    let sensors = passage.sensors();
+    for (name, table) in &sensors {
+        put(name, table)?;
     }
+    let hears = passage.hears() && !sensors.is_empty();
     let known = |file: &str, is: bool| is.then(|| file.to_owned());
     let description = Description {
-        format: FORMATS[1].to_owned(),
+        format: FORMATS[if hears { 2 } else { 1 }].to_owned(),
         name: name.to_owned(),
         licence: licence.to_owned(),
         origin: Some(passage.name().to_owned()),
@@ -111,6 +113,8 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
         prior_covariance: known("prior_covariance.csv", varied),
         visibility: known("visibility.csv", visibility.is_some()),
         objects: known("objects.csv", objects.is_some()),
+        doppler: known("doppler.csv", hears),
+        gyro: known("gyro.csv", hears),
         body_from_camera: Some(passage.body_from_camera().rows()),
         bits: (passage.bits() > 8).then(|| passage.bits()),
         rig: Rig::of(passage.rig(), passage.ports()),

@@ -10,7 +10,7 @@ use seafix_simulation::{Purpose, Stream};
 
 use super::RunError;
 use crate::{
-    ImagesLogged, Plan, Sighting, Trial,
+    Helm, ImagesLogged, Plan, Sighting, Trial,
     judge::Judge,
     navigate::{Underway, Voyage},
     record,
@@ -66,8 +66,8 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
         for trial in &group.trials {
             match group.passage.site().targets(trial.stages.settings().target) {
                 Ok(targets) => {
-                    if trial.helm.is_some() {
-                        faults.extend(unnavigable(&*group.passage, &targets));
+                    if let Some(helm) = &trial.helm {
+                        faults.extend(unnavigable(&*group.passage, helm, &targets));
                     }
                     group.headers.push(record::header(plan, trial, &*group.passage, &targets));
                     group.targets.push(targets);
@@ -81,12 +81,17 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
 }
 
 /// Why no trial can navigate through `passage`.
-fn unnavigable(passage: &dyn Passage, targets: &[Target]) -> Option<Fault> {
+fn unnavigable(passage: &dyn Passage, helm: &Helm, targets: &[Target]) -> Option<Fault> {
     let fault = |what: &str, remedy: &str| {
         Some(Fault::new(format!("navigation {what}"), Path::new(passage.name())).remedy(remedy))
     };
     if !passage.images() {
         return fault("needs images, and this source gives points", "leave [navigation] out");
+    }
+    if helm.listens() && !passage.hears() {
+        let remedy =
+            "navigate by images, odometry = \"stereo\", or take a dive or a data set with `doppler` and `gyro`";
+        return fault("goes by a Doppler log and a gyro, and they are not both heard here", remedy);
     }
     let lost = targets.iter().find(|target| target.world_from_object.is_none())?;
     let what = format!("needs to know where every object stands; `{}` has no place in the world", lost.name);
@@ -106,12 +111,11 @@ impl Group<'_> {
 
     /// Sets out with every trial that navigates.
     pub(super) fn voyages(&self) -> Vec<Option<Voyage<'_>>> {
-        let rig = self.passage.rig();
         let trials = self.trials.iter().zip(&self.targets);
         trials
             .map(|(trial, targets)| {
                 let helm = trial.helm.as_ref()?;
-                Some(Voyage::begin(helm, &trial.stages, targets, rig))
+                Some(Voyage::begin(helm, &trial.stages, targets, &*self.passage))
             })
             .collect()
     }

@@ -60,6 +60,10 @@ impl Source for DatasetSource {
         }
         Recorded::open(dataset, &self.site, folder)
     }
+
+    fn may_hear(&self) -> bool {
+        true
+    }
 }
 
 /// A data set with a site.
@@ -116,6 +120,10 @@ impl Passage for Recorded {
         if self.dataset.bits < 16 { self.dataset.bits } else { 8 }
     }
 
+    fn hears(&self) -> bool {
+        self.dataset.hears()
+    }
+
     fn ports(&self) -> [Option<CalibratedPort>; 2] {
         self.dataset.ports.clone()
     }
@@ -137,7 +145,14 @@ impl Passage for Recorded {
         let frame = &self.dataset.frames[index];
         let (left, right) = self.dataset.pair(frame)?;
         let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes: Eyes::Pair(left, right), prior, told: Told::Nothing })
+        let before = index.checked_sub(1).map(|before| self.dataset.frames[before].stamp_ns);
+        Ok(Sight {
+            stamp_ns: frame.stamp_ns,
+            eyes: Eyes::Pair(left, right),
+            prior,
+            told: Told::Nothing,
+            readings: self.dataset.readings(before, frame.stamp_ns),
+        })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

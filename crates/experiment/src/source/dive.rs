@@ -9,7 +9,7 @@ use seafix_simulation::{CALIBRATION_RANGE, Mission, PlannedMission, optics::Port
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
-use super::{CalibratedPort, Eyes, Passage, Sight, Source, Told, Truth, WorldPrior, readings};
+use super::{CalibratedPort, Eyes, Heard, Passage, Sight, Source, Told, Truth, WorldPrior, readings};
 
 /// A vehicle's dive over a site given as data, under lamps in water: rendered stereo pairs, or clouds of
 /// the same views with `as-points`.
@@ -32,12 +32,18 @@ impl Source for Dive {
         let mission = self.0.plan(seed, 0, folder)?;
         let settings = mission.settings();
         let name = format!("dive over {}, seed {seed}, c = {} 1/m", settings.site, settings.water.c());
-        Ok(Box::new(Dived { mission, name }))
+        let heard = readings::heard(&mission);
+        Ok(Box::new(Dived { mission, heard, name }))
+    }
+
+    fn may_hear(&self) -> bool {
+        true
     }
 }
 
 struct Dived {
     mission: PlannedMission,
+    heard: Heard,
     name: String,
 }
 
@@ -85,6 +91,10 @@ impl Passage for Dived {
         [port.clone(), port]
     }
 
+    fn hears(&self) -> bool {
+        self.heard.is_whole()
+    }
+
     fn sensors(&self) -> Vec<(String, String)> {
         readings::tables(&self.mission)
     }
@@ -98,7 +108,9 @@ impl Passage for Dived {
             Eyes::Points(instant.points())
         };
         let prior = instant.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
-        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior, told: Told::Nothing })
+        let before = index.checked_sub(1).map(|before| self.mission.instant(before).stamp_ns);
+        let readings = self.heard.between(before, instant.stamp_ns);
+        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior, told: Told::Nothing, readings })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

@@ -6,6 +6,7 @@ use nalgebra::Matrix4;
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Covariance6, Pinhole, Point, RightCamera, StereoRig, Transform, World};
 use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord, TrialHeader};
+use seafix_navigation::Device;
 use seafix_referencing::{ModelPoint, Site, SiteObject};
 use seafix_vision::Image;
 
@@ -21,6 +22,7 @@ pub(super) struct Logged {
     body_from_camera: Transform<Body, Camera>,
     images: bool,
     named: bool,
+    hears: bool,
     numbers: Vec<u64>,
     warnings: Vec<Fault>,
     path: String,
@@ -49,12 +51,15 @@ impl Logged {
         let mut warnings = Vec::new();
         let (mut numbers, mut exact) = (Vec::with_capacity(frames.len()), true);
         let (mut posed, mut named) = (false, true);
+        let mut devices = std::collections::BTreeSet::new();
         for place in 0..frames.len() {
             let frame = frames.frame(place, false).map_err(|error| one(fault(path, &error)))?;
             numbers.push(frame.frame);
             exact &= frame.inputs.as_ref().is_some_and(|inputs| !images || inputs.exact_images);
             posed |= frame.inputs.as_ref().is_some_and(|inputs| inputs.problem.is_some());
             named &= frame.inputs.as_ref().is_some_and(|inputs| inputs.names.is_some());
+            let told = frame.inputs.iter().flat_map(|inputs| &inputs.readings);
+            devices.extend(told.map(|reading| reading.device.clone()));
         }
         if !exact {
             let what =
@@ -70,6 +75,7 @@ impl Logged {
             body_from_camera,
             images,
             named,
+            hears: Device::ALL.iter().all(|device| devices.contains(device.name())),
             numbers,
             warnings,
             path: path.display().to_string(),
@@ -155,6 +161,10 @@ impl Passage for Logged {
         self.named
     }
 
+    fn hears(&self) -> bool {
+        self.hears
+    }
+
     fn frames(&self) -> usize {
         self.numbers.len()
     }
@@ -187,6 +197,7 @@ impl Passage for Logged {
             None => self.old_cloud(&frame),
         };
         let told = exact::told(inputs, &self.site, &cloud);
+        let readings = exact::readings(inputs).map_err(broken)?;
         let prior = match frame.inputs {
             Some(_) => exact::prior(inputs),
             None => self.old_prior(&frame).map_err(broken)?,
@@ -199,7 +210,7 @@ impl Passage for Logged {
             Some([left, right]) => Eyes::Pair(image(left).map_err(broken)?, image(right).map_err(broken)?),
             None => Eyes::Points(cloud),
         };
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior, told })
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior, told, readings })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

@@ -142,4 +142,8 @@ impl Source for Mcap {
         }
         Ok(Box::new(Recorded::open(&path, self, folder)?))
     }
+
+    fn may_hear(&self) -> bool {
+        true
+    }
 }

@@ -5,6 +5,7 @@ use std::{path::Path, sync::Arc};
 use seafix_component::{Fault, Registry, entry};
 use seafix_evaluation::Solved;
 use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
+use seafix_navigation::Reading as SensorReading;
 use seafix_referencing::{Prior, Site, Target, problem_file::CoherenceProblem};
 use seafix_simulation::optics::Port;
 use seafix_vision::Image;
@@ -14,6 +15,7 @@ mod dive;
 mod drawn_pairs;
 mod drawn_problems;
 mod euroc;
+mod heard;
 mod kitti;
 mod logged;
 mod mcap;
@@ -36,6 +38,7 @@ pub use kitti::Kitti;
 pub use mcap::{Mcap, Reading};
 
 pub use crate::{dataset::Cameras, ros::Views};
+pub(crate) use heard::Heard;
 pub use problems::Problems;
 pub use virtual_images::VirtualImages;
 pub use virtual_layouts::VirtualLayouts;
@@ -52,6 +55,8 @@ pub struct Sight {
     pub prior: Option<WorldPrior>,
     /// What is told beside what the cameras gave.
     pub told: Told,
+    /// What the navigation sensors told since the instant before, as it arrived.
+    pub readings: Vec<SensorReading>,
 }
 
 impl Sight {
@@ -168,6 +173,10 @@ pub trait Passage: Send + Sync {
     fn ports(&self) -> [Option<CalibratedPort>; 2] {
         [None, None]
     }
+    /// Whether both the vehicle's Doppler log and its gyro are heard.
+    fn hears(&self) -> bool {
+        false
+    }
     /// What the vehicle's navigation sensors said, as tables: names of files and their CSV text.
     fn sensors(&self) -> Vec<(String, String)> {
         Vec::new()
@@ -201,6 +210,10 @@ pub trait Source: Send + Sync + std::fmt::Debug {
     /// Whether its points have pixels, which some solvers need.
     fn has_pixels(&self) -> bool {
         true
+    }
+    /// Whether it may have readings of the vehicle's Doppler log and gyro; what it opens says whether it has.
+    fn may_hear(&self) -> bool {
+        false
     }
 }
 

@@ -84,6 +84,7 @@ impl Passage for ProblemPassage {
             eyes: Eyes::Points(problem.cloud.clone()),
             prior: None,
             told: Told::Problem(index, Arc::clone(problem)),
+            readings: Vec::new(),
         })
     }
 

@@ -1,8 +1,38 @@
-//! What the navigation sensors of a dive said, and where its route led, as tables beside its data set.
+//! What the navigation sensors of a dive said, to an odometry and as tables beside its data set, and where its route led.
 
 use std::fmt::Write;
 
+use nalgebra::{Matrix3, Vector3};
+use seafix_navigation::{Device, Reading as Told};
 use seafix_simulation::{PlannedMission, sensors::Reading};
+
+use super::Heard;
+
+/// What the Doppler log and the gyro told, and how much noise their data sheets say is in it.
+pub(super) fn heard(mission: &PlannedMission) -> Heard {
+    let readings = mission.readings();
+    let noise = Noise::of(mission);
+    let told = |device, time: f64, arrival: f64, value: Vector3<f64>, sigma: f64| {
+        let covariance = Matrix3::identity() * (sigma * sigma);
+        (mission.stamp(arrival), Told { device, stamp_ns: mission.stamp(time), value, covariance })
+    };
+    let doppler = readings.doppler.iter().map(|r| told(Device::Doppler, r.time, r.arrival, r.value, noise.doppler));
+    let gyro = readings.attitude.iter().map(|r| told(Device::Gyro, r.time, r.arrival, r.value.rate, noise.gyro));
+    Heard::new(doppler.chain(gyro).collect())
+}
+
+/// Standard deviations of the noise of a reading, each axis: velocity (m/s), rate of turn (rad/s).
+struct Noise {
+    doppler: f64,
+    gyro: f64,
+}
+
+impl Noise {
+    fn of(mission: &PlannedMission) -> Self {
+        let sensors = &mission.settings().sensors;
+        Self { doppler: sensors.doppler.sigma, gyro: sensors.attitude.rate_sigma() }
+    }
+}
 
 /// The tables, by the names of their files.
 pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
@@ -11,7 +41,11 @@ pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
     let acoustic = table("north,east,down,sigma", &readings.acoustic, mission, |fix| {
         [fix.at.x, fix.at.y, fix.at.z, fix.sigma].to_vec()
     });
-    let doppler = table(&axes("v"), &readings.doppler, mission, |v| v.iter().copied().collect());
+    let noise = Noise::of(mission);
+    let with_sigma = |v: &Vector3<f64>, sigma: f64| v.iter().copied().chain([sigma]).collect();
+    let doppler = table(&format!("{},sigma", axes("v")), &readings.doppler, mission, |v| with_sigma(v, noise.doppler));
+    let gyro =
+        table(&format!("{},sigma", axes("w")), &readings.attitude, mission, |said| with_sigma(&said.rate, noise.gyro));
     let attitude = table(&format!("{},qx,qy,qz,qw", axes("w")), &readings.attitude, mission, |said| {
         let q = said.world_from_body;
         said.rate.iter().copied().chain([q.i, q.j, q.k, q.w]).collect()
@@ -19,9 +53,9 @@ pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
     let depth = table("depth", &readings.depth, mission, |depth| vec![*depth]);
     let places = mission.waypoints().into_iter().map(|[north, east, height]| format!("{north},{east},{height}\n"));
     let route = std::iter::once("north,east,height\n".to_owned()).chain(places).collect();
-    let all =
-        [("acoustic", acoustic), ("doppler", doppler), ("attitude", attitude), ("depth", depth), ("waypoints", route)];
-    all.into_iter().chain(lbl(mission)).map(|(name, table)| (format!("{name}.csv"), table)).collect()
+    let all = [("acoustic", acoustic), ("doppler", doppler), ("gyro", gyro), ("attitude", attitude), ("depth", depth)];
+    let all = all.into_iter().chain([("waypoints", route)]);
+    all.chain(lbl(mission)).map(|(name, table)| (format!("{name}.csv"), table)).collect()
 }
 
 /// Transponders as surveyed, the ranges to them, and the positions by them; nothing where there are none.

@@ -308,7 +308,7 @@ impl Passage for Recorded {
             let nearest = self.prior.partition_point(|(time, _)| time < stamp_ns).min(self.covariances.len() - 1);
             WorldPrior { world_from_camera, covariance: self.covariances[nearest] }
         });
-        Ok(Sight { stamp_ns: *stamp_ns, eyes, prior, told: Told::Nothing })
+        Ok(Sight { stamp_ns: *stamp_ns, eyes, prior, told: Told::Nothing, readings: Vec::new() })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

@@ -75,7 +75,7 @@ impl Passage for Virtual {
             world_from_camera: frame.prior.world_from_camera,
             covariance: Covariance6::isotropic(frame.prior.attitude_sigma, frame.prior.position_sigma),
         };
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior: Some(prior), told: Told::Nothing })
+        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior: Some(prior), told: Told::Nothing, readings: Vec::new() })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

@@ -237,7 +237,8 @@ impl Passage for Layouts {
             false => Told::Nothing,
         };
         let eyes = Eyes::Points(cloud);
-        Ok(Sight { stamp_ns: index as u64 * 100_000_000, eyes, prior: Some(prior), told })
+        let stamp_ns = index as u64 * 100_000_000;
+        Ok(Sight { stamp_ns, eyes, prior: Some(prior), told, readings: Vec::new() })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

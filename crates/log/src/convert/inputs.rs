@@ -1,11 +1,11 @@
 //! What a method was given.
 
 use super::{Malformed, flat, matrix, required};
-use crate::{AnswerRecord, ExactPose, FrameRecord, Inputs, ProblemRecord, SitePoint, TrueState, proto};
+use crate::{AnswerRecord, ExactPose, FrameRecord, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState, proto};
 
 /// The message that holds the inputs of `frame`.
 pub(crate) fn inputs_message(frame: &FrameRecord, inputs: &Inputs) -> proto::Inputs {
-    let Inputs { prior, pixel_covariances, names, problem, truth, exact_images } = inputs;
+    let Inputs { prior, pixel_covariances, names, problem, truth, exact_images, readings } = inputs;
     proto::Inputs {
         frame: frame.frame,
         stamp_ns: frame.stamp_ns,
@@ -19,6 +19,7 @@ pub(crate) fn inputs_message(frame: &FrameRecord, inputs: &Inputs) -> proto::Inp
         problem: problem.as_ref().map(problem_message),
         truth: truth.as_ref().map(truth_message),
         exact_images: *exact_images,
+        readings: readings.iter().map(reading_message).collect(),
     }
 }
 
@@ -39,7 +40,23 @@ pub(crate) fn inputs_record(message: proto::Inputs) -> Result<Inputs, Malformed>
         problem: message.problem.map(problem_record).transpose()?,
         truth: message.truth.map(truth_record).transpose()?,
         exact_images: message.exact_images,
+        readings: message.readings.into_iter().map(reading_record).collect::<Result<_, _>>()?,
     })
+}
+
+fn reading_message(reading: &SensorReading) -> proto::SensorReading {
+    proto::SensorReading {
+        device: reading.device.clone(),
+        stamp_ns: reading.stamp_ns,
+        value: reading.value.to_vec(),
+        covariance: flat(&reading.covariance),
+    }
+}
+
+fn reading_record(message: proto::SensorReading) -> Result<SensorReading, Malformed> {
+    let [value] = matrix("readings.value", &message.value)?;
+    let covariance = matrix("readings.covariance", &message.covariance)?;
+    Ok(SensorReading { device: message.device, stamp_ns: message.stamp_ns, value, covariance })
 }
 
 fn pose_message(pose: &ExactPose) -> proto::ExactPose {

@@ -333,6 +333,25 @@ pub struct Inputs {
     /// Whether the logged images are the method's to the last bit: true of images of 8 bits.
     #[prost(bool, tag = "9")]
     pub exact_images: bool,
+    /// What the navigation sensors told since the frame before, as it arrived.
+    #[prost(message, repeated, tag = "10")]
+    pub readings: ::prost::alloc::vec::Vec<SensorReading>,
+}
+/// A reading of a navigation sensor, body frame.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct SensorReading {
+    /// "doppler": velocity over ground (m/s); "gyro": rate of turn (rad/s).
+    #[prost(string, tag = "1")]
+    pub device: ::prost::alloc::string::String,
+    /// When it was so.
+    #[prost(uint64, tag = "2")]
+    pub stamp_ns: u64,
+    /// 3 numbers.
+    #[prost(double, repeated, tag = "3")]
+    pub value: ::prost::alloc::vec::Vec<f64>,
+    /// 3 x 3.
+    #[prost(double, repeated, tag = "4")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
 }
 /// A rigid motion without rounding: qx qy qz qw tx ty tz.
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -1,6 +1,6 @@
 //! What a method was given, to the last bit.
 
-use super::{Matrix4, Matrix6};
+use super::{Matrix3, Matrix4, Matrix6};
 
 /// What a frame's method was given and its judge knew beyond what [`FrameRecord`](super::FrameRecord) holds, to the last
 /// bit: enough to run another method on the same.
@@ -18,6 +18,21 @@ pub struct Inputs {
     pub truth: Option<TrueState>,
     /// Whether the logged images are the method's to the last bit.
     pub exact_images: bool,
+    /// What the navigation sensors told since the frame before, as it arrived.
+    pub readings: Vec<SensorReading>,
+}
+
+/// A reading of a navigation sensor, body frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorReading {
+    /// `doppler`: velocity over ground (m/s); `gyro`: rate of turn (rad/s).
+    pub device: String,
+    /// When it was so (ns).
+    pub stamp_ns: u64,
+    /// What it says.
+    pub value: [f64; 3],
+    /// The covariance of its noise.
+    pub covariance: Matrix3,
 }
 
 /// A rigid motion `a_from_b` without rounding.

@@ -9,7 +9,7 @@ mod totals;
 
 pub use frame::{CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, PriorRecord, TruthRecord, VisiblePoint};
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
-pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SitePoint, TrueState};
+pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
 pub use navigation::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 pub use target::{Alternative, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
 pub use totals::Totals;

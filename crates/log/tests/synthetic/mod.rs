@@ -213,6 +213,14 @@ fn inputs(number: u64) -> Inputs {
             answer: (!odd).then(|| AnswerRecord { pairs: vec![[0, 3]], ideal_rms: Some(0.002), is_putative: odd }),
         }),
         exact_images: odd,
+        readings: (0..number % 3)
+            .map(|k| SensorReading {
+                device: if k == 0 { "doppler" } else { "gyro" }.to_owned(),
+                stamp_ns: 1_600_000_000_000_000_000 + k,
+                value: [x, 1.0 / 3.0, -0.1],
+                covariance: [[1e-5, 0.0, 1e-7], [0.0, 1e-5, 0.0], [1e-7, 0.0, 2e-5]],
+            })
+            .collect(),
     }
 }
 

@@ -53,7 +53,7 @@ mod tests {
 
     fn at(xi: [f64; 6], sigma: f64) -> Standing {
         let object_from_camera = Transform::<Object, Camera>::exp(&xi.into());
-        Standing { object_from_camera, covariance: Covariance6::isotropic(sigma, sigma) }
+        Standing::new(object_from_camera, Covariance6::isotropic(sigma, sigma))
     }
 
     #[test]

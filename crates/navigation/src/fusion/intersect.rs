@@ -84,7 +84,7 @@ mod tests {
 
     fn at(x: f64, sigma: f64) -> Standing {
         let object_from_camera = Transform::<Object, Camera>::exp(&[0.0, 0.0, 0.0, x, 0.0, 0.0].into());
-        Standing { object_from_camera, covariance: Covariance6::isotropic(sigma, sigma) }
+        Standing::new(object_from_camera, Covariance6::isotropic(sigma, sigma))
     }
 
     #[test]

@@ -43,7 +43,9 @@ pub(super) fn joined(known: &Standing, fix: &Standing, weights: [f64; 2]) -> Opt
         pose = pose.perturbed(&-(information.cholesky()?.solve(&gradient))).renormalized();
     }
     let covariance = Covariance6::new(information.cholesky()?.inverse());
-    Some(Standing { object_from_camera: pose, covariance })
+    // Of what was known so much stays as it weighed.
+    let shares = covariance.matrix * known_information * known.shares;
+    Some(Standing { object_from_camera: pose, covariance, shares })
 }
 
 /// The covariance of η in Exp(r) Exp(η) = Exp(r + J_r(r)⁻¹ η), as one of the sum.

@@ -12,7 +12,7 @@ mod unusable;
 mod window;
 
 use seafix_component::{Choice, Component, in_range};
-use seafix_geometry::StereoRig;
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::{SOLVERS, Solver};
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, Descriptor, Direct, FILTERS, FrontEnd, LOCATORS, MATCHERS, Matcher, REFINEMENTS,
@@ -184,7 +184,12 @@ impl Stereo {
 }
 
 impl Odometry for Stereo {
-    fn begin<'a>(&'a self, rig: &'a StereoRig, threads: Threads) -> Box<dyn Reckoning + 'a> {
+    fn begin<'a>(
+        &'a self,
+        rig: &'a StereoRig,
+        _: Transform<Body, Camera>,
+        threads: Threads,
+    ) -> Box<dyn Reckoning + 'a> {
         let stages = self.stages().expect("a component's settings were checked");
         Box::new(StereoReckoning::new(self, stages, rig, threads))
     }

@@ -261,7 +261,7 @@ impl<'a> StereoReckoning<'a> {
         if speed > settings.most_speed {
             return Err(Lost::Jump { speed, most: settings.most_speed });
         }
-        Ok(Step { world_from_camera: guess, local: Local { motion, covariance }, seconds, sought, sightings })
+        Ok(Step { world_from_camera: guess, local: Local::new(motion, covariance), seconds, sought, sightings })
     }
 
     /// The motion that the points in common agree on, `earlier_from_later`.

@@ -84,6 +84,11 @@ impl AttitudeSensor {
         within("latency", self.latency, 0.0, 60.0)
     }
 
+    /// Standard deviation of the white noise of a reading's rate, each axis (rad/s): the random walk over a reading's time.
+    pub fn rate_sigma(&self) -> f64 {
+        self.random_walk.to_radians() / 60.0 * self.rate.sqrt()
+    }
+
     /// The readings up to `until` (s).
     pub(crate) fn readings(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<Reading<AttitudeReading>> {
         let mut dive = Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Gyro);
@@ -94,7 +99,7 @@ impl AttitudeSensor {
         let mut bias = dive.normal3(spread);
         let dt = 1.0 / self.rate;
         let keep = libm::exp(-dt / self.tau);
-        let white = self.random_walk.to_radians() / 60.0 * self.rate.sqrt();
+        let white = self.rate_sigma();
         let reading = |k: u64| {
             let time = k as f64 * dt;
             let mut stream = Stream::new(seeds.0, seeds.1, k, Purpose::Gyro);
