@@ -223,8 +223,8 @@ pub static SOURCES: Registry<dyn Source> = Registry::new(
     &[
         entry!(DatasetSource),
         entry!(Dive),
-        entry!(DrawnProblems),
         entry!(DrawnPairs),
+        entry!(DrawnProblems),
         entry!(Euroc),
         entry!(Kitti),
         entry!(Mcap),
