@@ -152,7 +152,7 @@ impl Judge<'_> {
     }
 
     /// Whether precision and prior let the pose pass.
-    fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
+    pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let data = self.observations(&hypothesis.pairs);
         let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
         hypothesis.covariance = Some(covariance);

@@ -15,6 +15,7 @@ mod integrity;
 mod judge;
 mod outcome;
 mod refusal;
+mod twins;
 mod weighed;
 mod widened;
 
@@ -65,6 +66,7 @@ pub fn judge(
         (Ok(()), None) => judge.poses(&found),
         (Err(refusal), _) => (Outcome::Unidentified(refusal), None),
     };
+    let outcome = judge.told_apart(outcome, found.belief.is_some());
     let outcome = match &found.undecided {
         Some(why @ Unidentified::Mirrored { .. }) => Outcome::Unidentified(why.clone().into()),
         Some(why) if !settled(&outcome, found.optimal) => Outcome::Unidentified(why.clone().into()),

@@ -1,0 +1,136 @@
+//! Other readings of the same measured points.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+use seafix_geometry::{Camera, Object, Transform};
+
+use super::{Outcome, hypothesis::Hypothesis, judge::Judge};
+use crate::{Correspondence, Kabsch, Observations, Solver};
+
+/// Pairs of model points that the first two measured points may be, beyond which other readings are not sought.
+const MOST_BASES: usize = 1_000_000;
+/// More readings of one set are not needed to call it ambiguous.
+const MOST_TWINS: usize = 64;
+
+impl Judge<'_> {
+    /// The outcome, or that it is ambiguous because the measured points of a fix are other points of the model as well.
+    ///
+    /// Where a motion maps the identified points of a model onto points of the model, the pose before it and the pose after
+    /// it explain the same measurements. Candidates, residuals, precision, prior and the visible sides of the points decide
+    /// between them as between any sets; what passes all is an alternative. A search that weighs evidence must leave all
+    /// alternatives together no more than [`Acceptance::doubt`](super::Acceptance::doubt), by the likelihood of the pairs and
+    /// the prior; of other searches none may pass.
+    pub(super) fn told_apart(&self, outcome: Outcome, weighs: bool) -> Outcome {
+        let Outcome::Referenced(reference) = &outcome else { return outcome };
+        let sets = self.twins(&reference.pairs);
+        if sets.is_empty() {
+            return outcome;
+        }
+        let Ok(own) = self.hypothesis(&reference.pairs) else { return outcome };
+        let mut others: Vec<Hypothesis> = Vec::new();
+        for mut other in sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok()) {
+            let new =
+                self.apart(&own.pose, &other.pose) && others.iter().all(|known| self.apart(&known.pose, &other.pose));
+            if new && self.faces(&other) && self.residuals(&other).is_ok() && self.precise_and_near(&mut other).is_ok()
+            {
+                others.push(other);
+            }
+        }
+        let weight: f64 = others.iter().map(|other| (other.score - own.score).exp()).sum();
+        if others.is_empty() || (weighs && weight <= self.acceptance.doubt * (1.0 + weight)) {
+            return outcome;
+        }
+        Outcome::Ambiguous(std::iter::once(own).chain(others).map(Hypothesis::alternative).collect())
+    }
+
+    /// All sets of as many pairs in which the same measured points are other points of the model: a triangle of them, as wide
+    /// as they have one, is laid on every triangle of the model that is coherent with it, and each of the others must come to
+    /// lie at a model point of its own.
+    /// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
+    fn twins(&self, pairs: &[Correspondence]) -> BTreeSet<Vec<Correspondence>> {
+        let mut found = BTreeSet::new();
+        let Some(base) = self.wide(pairs) else { return found };
+        let [first, second, third] = base.map(|cloud| self.admitted(cloud));
+        if first.len().saturating_mul(second.len()) > MOST_BASES {
+            return found;
+        }
+        let at = |model: usize, place: usize| Correspondence { model, cloud: base[place] };
+        let known: BTreeSet<&Correspondence> = pairs.iter().collect();
+        for &i in &first {
+            for &j in second.iter().filter(|&&j| self.problem.coherent(at(i, 0), at(j, 1))) {
+                let meets = |k: usize| [at(i, 0), at(j, 1)].iter().all(|&other| self.problem.coherent(other, at(k, 2)));
+                for &k in third.iter().filter(|&&k| meets(k)) {
+                    let three = [at(i, 0), at(j, 1), at(k, 2)];
+                    if three.iter().all(|pair| known.contains(pair)) {
+                        continue;
+                    }
+                    found.extend(self.completed(three, pairs));
+                    if found.len() >= MOST_TWINS {
+                        return found;
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// The model points that a measured point may be.
+    fn admitted(&self, cloud: usize) -> Vec<usize> {
+        let lists = self.problem.candidates.lists.iter().enumerate();
+        lists.filter(|(_, list)| list.binary_search(&cloud).is_ok()).map(|(model, _)| model).collect()
+    }
+
+    /// Three of the measured points, far apart: one far from their middle, the farthest from that, and the one that makes the
+    /// largest triangle with both.
+    fn wide(&self, pairs: &[Correspondence]) -> Option<[usize; 3]> {
+        let place = |pair: &Correspondence| self.problem.cloud[pair.cloud].position.at.coords;
+        let middle = pairs.iter().map(place).sum::<Vector3<f64>>() / pairs.len() as f64;
+        let largest = |size: &dyn Fn(Vector3<f64>) -> f64| {
+            pairs.iter().max_by(|a, b| size(place(a)).total_cmp(&size(place(b))).then_with(|| b.cmp(a)))
+        };
+        let first = largest(&|at| (at - middle).norm())?;
+        let second = largest(&|at| (at - place(first)).norm())?;
+        let side = place(second) - place(first);
+        let third = largest(&|at| side.cross(&(at - place(first))).norm())?;
+        let three = [first.cloud, second.cloud, third.cloud];
+        (three[0] != three[1] && three[0] != three[2] && three[1] != three[2]).then_some(three)
+    }
+
+    /// The set of all measured points of `pairs` that these three begin, if every other lies at a model point of its own.
+    fn completed(&self, three: [Correspondence; 3], pairs: &[Correspondence]) -> Option<Vec<Correspondence>> {
+        let pose =
+            Kabsch::default().solve(&Observations::of(&three, self.problem.model, self.problem.cloud, None)).ok()?;
+        let mut set = three.to_vec();
+        let mut taken: BTreeSet<usize> = three.iter().map(|pair| pair.model).collect();
+        for cloud in pairs.iter().map(|pair| pair.cloud).filter(|cloud| three.iter().all(|pair| pair.cloud != *cloud)) {
+            let model = self.nearest(&pose, cloud, &three)?;
+            if !taken.insert(model) {
+                return None;
+            }
+            set.push(Correspondence { model, cloud });
+        }
+        set.sort_unstable();
+        Some(set)
+    }
+
+    /// The model point nearest to where the pose places a measured point, of those that it may be and that are coherent with
+    /// the three.
+    fn nearest(&self, pose: &Transform<Object, Camera>, cloud: usize, three: &[Correspondence; 3]) -> Option<usize> {
+        let place = *pose * self.problem.cloud[cloud].position.at;
+        let distance = |model: usize| self.problem.model[model].at.distance(&place);
+        let coherent = |model: &usize| {
+            three.iter().all(|&pair| self.problem.coherent(pair, Correspondence { model: *model, cloud }))
+        };
+        self.admitted(cloud).into_iter().filter(coherent).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Whether the camera sees the identified points from the sides from which they can be seen.
+    fn faces(&self, hypothesis: &Hypothesis) -> bool {
+        let camera = hypothesis.pose.translation();
+        hypothesis.pairs.iter().all(|pair| {
+            let point = &self.problem.model[pair.model];
+            point.normal.is_none_or(|normal| normal.dot(&(camera - point.at.coords)) > 0.0)
+        })
+    }
+}

@@ -1,0 +1,96 @@
+//! Every search: what measured points are other points of the model as well is ambiguous, unless something decides.
+
+use nalgebra::{Matrix6, Vector3};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use seafix_component::Choice;
+use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
+use seafix_referencing::{
+    Acceptance, Candidates, Kabsch, ModelPoint, Outcome, Prior, PriorBound, Problem, SEARCHES, Tolerance, reference,
+};
+
+const SIGMA: f64 = 0.002;
+
+/// Models that a motion maps onto themselves: a grid, a long one, a box of points; their edges in metres.
+fn models() -> [Vec<Point<Object>>; 3] {
+    let grid = |[a, b, c]: [u32; 3], [x, y, z]: [f64; 3]| {
+        let steps = |n: u32, step: f64| (0..n).map(move |i| f64::from(i) * step);
+        let at = steps(a, x).flat_map(|x| steps(b, y).flat_map(move |y| steps(c, z).map(move |z| Point::new(x, y, z))));
+        at.collect()
+    };
+    [grid([4, 4, 1], [0.4, 0.4, 0.0]), grid([5, 2, 1], [0.3, 0.7, 0.0]), grid([2, 2, 2], [1.0, 0.6, 0.8])]
+}
+
+/// What each search answers of a model seen whole, 3 m before the camera and turned by so much, with this prior.
+fn answers(
+    model: &[ModelPoint],
+    turn: Vector3<f64>,
+    prior: Option<f64>,
+) -> Vec<(&'static str, Outcome, Transform<Object, Camera>)> {
+    let camera_from_object = Transform::<Camera, Object>::new(so3::exp(&turn).into(), Vector3::new(-0.5, -0.4, 3.0));
+    let mut wave = (1_u32..).map(|k| f64::from(k.wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 23) - 1.0);
+    let cloud: Vec<MeasuredPoint> = model
+        .iter()
+        .map(|point| {
+            let noise = Vector3::from_fn(|_, _| SIGMA * wave.next().unwrap_or(0.0));
+            let at = Point::from((camera_from_object * point.at).coords + noise);
+            MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None }
+        })
+        .collect();
+    let truth = camera_from_object.inverse();
+    let prior = prior.map(|sigma| {
+        let covariance = Covariance6::new(Matrix6::identity() * sigma * sigma);
+        Prior { object_from_camera: truth, bound: PriorBound::Gaussian(covariance) }
+    });
+    let candidates = Candidates::all(model.len(), cloud.len());
+    let problem = Problem {
+        model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Sigmas(3.0),
+        prior: prior.as_ref(),
+    };
+    let answer = |name| {
+        let search = SEARCHES.build(&Choice::named(name)).expect("it is listed");
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let attempt = reference(&problem, &*search, &Kabsch::default(), &Acceptance::default(), None, &mut rng);
+        (name, attempt.outcome, truth)
+    };
+    SEARCHES.names().map(answer).collect()
+}
+
+fn model(points: &[Point<Object>]) -> Vec<ModelPoint> {
+    let point = |(k, at): (usize, &Point<Object>)| ModelPoint::exact(format!("p{k}"), *at);
+    points.iter().enumerate().map(point).collect()
+}
+
+/// P34. Nothing tells the turned poses of a symmetric model apart: no search may choose one.
+///
+/// Seen to fail, by `gnc-tls` first, when the sets of a fix are not read otherwise.
+#[test]
+fn a_symmetric_model_is_not_referenced_without_a_prior() {
+    for points in models() {
+        for turn in [Vector3::new(0.1, 0.2, -0.3), Vector3::new(-0.3, 0.1, 1.4)] {
+            for (name, outcome, _) in answers(&model(&points), turn, None) {
+                assert!(!matches!(outcome, Outcome::Referenced(_)), "{name}: {} points, {outcome:?}", points.len());
+            }
+        }
+    }
+}
+
+/// A prior that excludes the other poses decides.
+#[test]
+fn a_prior_decides_between_the_poses_of_a_symmetric_model() {
+    let turn = Vector3::new(0.1, 0.2, -0.3);
+    let right = |outcome: &Outcome, truth: &Transform<Object, Camera>| match outcome {
+        Outcome::Referenced(reference) => reference.object_from_camera.error_to(truth).amax() < 0.02,
+        _ => false,
+    };
+    for points in models() {
+        let told = answers(&model(&points), turn, Some(0.02));
+        let found = told.iter().filter(|(_, outcome, truth)| right(outcome, truth)).count();
+        assert!(found > 3, "{} points: {found} searches found the right pose", points.len());
+        for (name, outcome, truth) in &told {
+            assert!(right(outcome, truth) || !matches!(outcome, Outcome::Referenced(_)), "{name}: {outcome:?}");
+        }
+    }
+}
