@@ -1,5 +1,8 @@
 //! An independent detector finds the corners of rendered images where the truth has them.
 
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+#![expect(clippy::print_stdout, reason = "what was measured")]
+
 use std::{fmt::Write, fs, path::Path, process::Command};
 
 use seafix_simulation::{
