@@ -130,8 +130,7 @@ fn late_readings_are_put_in_order() {
                 let mut chained = Transform::<Camera, Camera>::identity();
                 for pair in 0..=70 {
                     let now = START + pair * 100_000_000;
-                    let told =
-                        |arrival: u64| pair == 0 && arrival <= now || arrival + 100_000_000 > now && arrival <= now;
+                    let told = |arrival: u64| arrival <= now && (pair == 0 || arrival + 100_000_000 > now);
                     let new: Vec<Reading> = all.iter().filter(|(arrival, _)| told(*arrival)).map(|one| one.1).collect();
                     journey.hear(&new);
                     if let Outcome::Followed { .. } = journey.pair(now) {

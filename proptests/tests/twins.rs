@@ -26,7 +26,7 @@ fn answers(
     turn: Vector3<f64>,
     prior: Option<f64>,
 ) -> Vec<(&'static str, Outcome, Transform<Object, Camera>)> {
-    let camera_from_object = Transform::<Camera, Object>::new(so3::exp(&turn).into(), Vector3::new(-0.5, -0.4, 3.0));
+    let camera_from_object = Transform::<Camera, Object>::new(so3::exp(&turn), Vector3::new(-0.5, -0.4, 3.0));
     let mut wave = (1_u32..).map(|k| f64::from(k.wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 23) - 1.0);
     let cloud: Vec<MeasuredPoint> = model
         .iter()
