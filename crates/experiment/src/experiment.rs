@@ -242,7 +242,9 @@ impl Plan {
                 let parts = [fault.value, fault.remedy].into_iter().filter(|part| !part.is_empty());
                 in_cell(std::iter::once(fault.what).chain(parts).collect::<Vec<_>>().join(", "), &last)
             })?;
-            let trial = trial.resolved().map_err(|unfit| in_cell(unfit.message, &unfit.path))?;
+            let mut trial = trial.resolved().map_err(|unfit| in_cell(unfit.message, &unfit.path))?;
+            let keyframes = trial.navigation.iter_mut().filter_map(|navigation| navigation.network.as_mut());
+            keyframes.for_each(|keyframes| keyframes.pin(folder));
             let source =
                 SOURCES.build(&trial.source).map_err(|error| in_cell(error.to_string(), &["source".to_owned()]))?;
             let stages = trial

@@ -9,6 +9,7 @@ pub mod dataset;
 mod diff;
 mod exact;
 mod experiment;
+mod explore;
 mod joint;
 mod judge;
 mod logging;
@@ -32,6 +33,7 @@ mod vary;
 
 pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
+pub use explore::Keyframes;
 pub use logging::{ImagesLogged, Logging};
 pub use model::{HandModel, HandPoint, Mark, ModelByHand};
 pub use navigate::{Helm, Navigation};

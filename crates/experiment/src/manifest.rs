@@ -91,7 +91,8 @@ impl Manifest {
     pub(crate) fn new(plan: &Plan, options: &Options, groups: &[Group<'_>], pieces: usize) -> Result<Self, Fault> {
         let mut inputs = Vec::new();
         for group in groups {
-            let files: BTreeMap<String, String> = group.passage.inputs()?.into_iter().collect();
+            let mut files: BTreeMap<String, String> = group.passage.inputs()?.into_iter().collect();
+            files.extend(group.networks_read());
             let warnings = group.passage.warnings().iter().map(ToString::to_string).collect();
             inputs.push(Input { source: group.passage.name().to_owned(), warnings, files });
         }

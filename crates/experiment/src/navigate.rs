@@ -7,15 +7,16 @@ use seafix_component::Choice;
 use seafix_geometry::{Covariance6, Object, StereoRig};
 use seafix_log::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 use seafix_navigation::{
-    Event, FUSIONS, Fusion, Navigated, Navigator, ODOMETRIES, Odometry, Outcome as Followed, POLICIES, Place, Policy,
-    Reckoning, Standing, State, StereoPair,
+    Event, FUSIONS, Fusion, Navigated, Navigator, Network, ODOMETRIES, Odometry, Outcome as Followed, POLICIES, Place,
+    Policy, Reckoning, Standing, State, StereoPair,
 };
 use seafix_referencing::{Outcome, Prior, PriorBound, Target};
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    PipelineError, Sighting, Stages,
+    Keyframes, PipelineError, Sighting, Stages,
+    explore::Explorer,
     odometry_fault::{Motions, OdometryFault},
     pipeline::{build, resolve},
     record::rows6,
@@ -36,6 +37,9 @@ pub struct Navigation {
     /// How the odometry fails, and when.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<OdometryFault>,
+    /// Key frames where no object is in view; without it none are laid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network: Option<Keyframes>,
 }
 
 impl Default for Navigation {
@@ -45,6 +49,7 @@ impl Default for Navigation {
             policy: Choice::named("every-frame"),
             fusion: Choice::named("fuse"),
             faults: Vec::new(),
+            network: None,
         }
     }
 }
@@ -60,6 +65,7 @@ impl Navigation {
             policy: resolve(&POLICIES, &self.policy)?,
             fusion: resolve(&FUSIONS, &self.fusion)?,
             faults: self.faults.clone(),
+            network: self.network.as_ref().map(Keyframes::resolved).transpose()?,
         })
     }
 
@@ -70,6 +76,7 @@ impl Navigation {
             build(&POLICIES, &self.policy).map(drop),
             build(&FUSIONS, &self.fusion).map(drop),
             self.sound(),
+            self.network.as_ref().map_or(Ok(()), Keyframes::check),
         ];
         parts.into_iter().filter_map(Result::err).collect()
     }
@@ -86,11 +93,13 @@ impl Navigation {
     /// [`PipelineError`] names the setting.
     pub fn build(&self) -> Result<Helm, PipelineError> {
         self.sound()?;
+        self.network.as_ref().map_or(Ok(()), Keyframes::check)?;
         Ok(Helm {
             odometry: build(&ODOMETRIES, &self.odometry)?,
             policy: build(&POLICIES, &self.policy)?,
             fusion: build(&FUSIONS, &self.fusion)?,
             faults: self.faults.clone(),
+            network: self.network.clone(),
         })
     }
 }
@@ -102,6 +111,7 @@ pub struct Helm {
     policy: Box<dyn Policy>,
     fusion: Box<dyn Fusion>,
     faults: Vec<OdometryFault>,
+    pub(crate) network: Option<Keyframes>,
 }
 
 impl Helm {
@@ -118,6 +128,7 @@ pub(crate) struct Voyage<'a> {
     rig: &'a StereoRig,
     reckoning: Box<dyn Reckoning + 'a>,
     navigator: Navigator<'a>,
+    explorer: Option<Explorer<'a>>,
     /// How the odometry fails, and its motions on their way through that.
     faults: &'a [OdometryFault],
     motions: Motions,
@@ -144,8 +155,14 @@ pub(crate) struct Underway {
 }
 
 impl<'a> Voyage<'a> {
-    /// Sets out; every target stands somewhere in the world.
-    pub(crate) fn begin(helm: &'a Helm, stages: &'a Stages, targets: &'a [Target], passage: &'a dyn Passage) -> Self {
+    /// Sets out, in the network of an earlier run where there is one; every target stands somewhere in the world.
+    pub(crate) fn begin(
+        helm: &'a Helm,
+        stages: &'a Stages,
+        targets: &'a [Target],
+        passage: &'a dyn Passage,
+        earlier: Option<&Network>,
+    ) -> Self {
         let rig = passage.rig();
         let names = targets.iter().map(|target| target.name.clone()).collect();
         let navigator = Navigator::new(places(targets), &*helm.policy, &*helm.fusion).with_names(names);
@@ -155,6 +172,7 @@ impl<'a> Voyage<'a> {
             rig,
             reckoning: helm.odometry.begin(rig, passage.body_from_camera(), Threads::One),
             navigator,
+            explorer: helm.network.as_ref().map(|keyframes| Explorer::begin(keyframes, targets, rig, earlier)),
             faults: &helm.faults,
             motions: Motions::default(),
             began: None,
@@ -190,7 +208,10 @@ impl<'a> Voyage<'a> {
             true => self.look(sight, &priors, &rough, rng),
             false => Sighting::default(),
         };
-        self.fix(&sighting, &mut events);
+        let taken = self.fix(&sighting, &mut events);
+        if here && let Some(explorer) = &mut self.explorer {
+            explorer.visit(sight, &pair, &mut self.navigator, &taken, &mut events);
+        }
         self.tell(&mut events);
         let pose = self.navigator.pose().filter(|_| here).copied();
         let unreferenced = self.unreferenced.filter(|_| here);
@@ -225,6 +246,7 @@ impl<'a> Voyage<'a> {
         let time = (sight.stamp_ns - began) as f64 * 1e-9;
         let motion = self.motions.passed(self.faults, time, found);
         self.navigator.advance(seconds, motion.as_ref());
+        self.explorer.iter_mut().for_each(|explorer| explorer.advance(seconds, motion.as_ref()));
         self.unreferenced = self.unreferenced.zip(motion).map(|(pose, motion)| pose.after(&motion));
         let Some(motion) = motion else {
             let why = if found.is_some() { "it failed" } else { "a new segment begins" };
@@ -252,14 +274,19 @@ impl<'a> Voyage<'a> {
         sighting
     }
 
-    /// Gives the fixes to the navigator.
-    fn fix(&mut self, sighting: &Sighting, events: &mut Vec<String>) {
+    /// Gives the fixes to the navigator; those that it took.
+    fn fix(&mut self, sighting: &Sighting, events: &mut Vec<String>) -> Vec<Navigated> {
+        let mut taken = Vec::new();
         for attempt in &sighting.attempts {
             let Outcome::Referenced(fix) = &attempt.answer.outcome else { continue };
             let standing = Standing::new(fix.object_from_camera, fix.covariance);
             let fix = Navigated { object: attempt.target, standing };
             let name = &self.targets[attempt.target].name;
-            match self.navigator.fix(&fix) {
+            let event = self.navigator.fix(&fix);
+            if matches!(event, Event::Taken | Event::Left | Event::Relocated) {
+                taken.push(fix);
+            }
+            match event {
                 Event::Taken => events.push(format!("fix at {name} taken")),
                 Event::Left => events.push(format!("fix at {name} left: the last one, carried here, is better known")),
                 Event::Doubted(why) => events.push(format!("fix at {name} doubted: {why}")),
@@ -267,12 +294,19 @@ impl<'a> Voyage<'a> {
                 Event::Displaced(found) => {
                     let shift = found.old_from_new.translation().norm();
                     events.push(format!("{} stands {shift:.3} m from its place", self.targets[found.object].name));
+                    self.explorer.iter_mut().for_each(|explorer| explorer.displaced(&found));
                 }
             }
             if !std::mem::replace(&mut self.fixed, true) {
                 self.unreferenced = Some(fix);
             }
         }
+        taken
+    }
+
+    /// What its network has become, as a file, where it is to be kept.
+    pub(crate) fn network(self) -> Option<String> {
+        self.explorer?.finish()
     }
 
     fn tell(&mut self, events: &mut Vec<String>) {
@@ -292,7 +326,7 @@ impl<'a> Voyage<'a> {
 }
 
 /// Where the objects stand by the survey.
-fn places(targets: &[Target]) -> Vec<Place> {
+pub(crate) fn places(targets: &[Target]) -> Vec<Place> {
     let place = |target: &Target| Place {
         world_from_object: target.world_from_object.expect("checked when the source was opened"),
         covariance: target.survey.unwrap_or_else(|| Covariance6::<_, Object>::new(nalgebra::Matrix6::zeros())),

@@ -21,6 +21,7 @@
 mod closed_form;
 mod covariance;
 mod frame;
+mod jacobian;
 mod measured;
 mod pinhole;
 pub mod row_vector;
@@ -31,6 +32,7 @@ mod triad;
 
 pub use covariance::{Covariance6, UncertainPoint};
 pub use frame::{Body, Camera, Frame, Object, Point, RightCamera, Site, World};
+pub use jacobian::right_jacobian_inverse;
 pub use measured::{MeasuredPoint, UncertainPixels};
 pub use pinhole::{BadCamera, Distortion, Pinhole, Pixel};
 pub use stereo::{BadRig, StereoPixels, StereoRig, Triangulation, Untriangulable};

@@ -12,6 +12,7 @@ mod journey;
 mod lasting;
 mod navigated;
 mod navigator;
+mod network;
 mod odometry;
 mod policy;
 mod reading;
@@ -24,6 +25,10 @@ pub use journey::{Journey, Local, Lost, Outcome, Segment, Side, Waypoint};
 pub use lasting::Lasting;
 pub use navigated::{Navigated, Place};
 pub use navigator::{Change, Displacement, Event, Navigator, State};
+pub use network::{
+    Candidate, Closed, Closure, Fix, Footprint, Glance, Graph, Here, KeyFrame, Leg, Network, NetworkSettings,
+    NoCovariance, Recognised, Recogniser, Recognition, Refound, Rough, Solved, Station, Traverse, Unrecognised,
+};
 pub use odometry::{NotAfter, ODOMETRIES, Odometry, Reckoning, StereoPair};
 pub use policy::{EveryFrame, InView, Interval, POLICIES, Policy, ProtectionLevel, Situation, Travelled};
 pub use reading::{Device, Reading};

@@ -211,6 +211,20 @@ impl<'a> Navigator<'a> {
         }
     }
 
+    /// A pose at this instant that rests on more than the fixes in a row: a key frame was found again, and the way closed
+    /// over the graph. It is taken where it is better known than what there was, and `why` said.
+    pub fn settle(&mut self, pose: &Navigated, why: String) -> bool {
+        let better = self.known.is_none_or(|known| {
+            let known = known.passed_to(pose.object, &self.places).standing;
+            pose.standing.covariance.position_sigma() < known.covariance.position_sigma()
+        });
+        if better {
+            self.doubts.fill(None);
+            self.take(*pose, why);
+        }
+        better
+    }
+
     fn doubt(&mut self, known: &Navigated, fix: &Navigated, contradiction: Contradiction) -> Event {
         let object = fix.object;
         let votes = match self.doubts[object].take() {

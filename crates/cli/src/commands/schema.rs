@@ -1,7 +1,7 @@
 //! `seafix schema`.
 
 use clap::ValueEnum;
-use seafix_experiment::{Navigation, Pipeline};
+use seafix_experiment::{Keyframes, Navigation, Pipeline};
 use serde_json::{Map, Value, json};
 
 use crate::{
@@ -42,6 +42,11 @@ fn experiment() -> Value {
         navigation.insert(part.to_owned(), component(part));
     }
     navigation.insert("faults".to_owned(), said("how the odometry fails: kind, from, to, amount", "array"));
+    let network = properties(&toml::Table::try_from(Keyframes::default()).expect("settings are a table"));
+    navigation.insert(
+        "network".to_owned(),
+        json!({ "type": "object", "properties": network, "additionalProperties": false }),
+    );
     let range = json!({
         "type": "object",
         "properties": {

@@ -9,7 +9,10 @@ use std::{
 use rayon::prelude::*;
 use seafix_component::Fault;
 
-use super::{Observer, RunError, store::Sealed};
+use super::{
+    Observer, RunError,
+    store::{Sealed, network},
+};
 use crate::{
     dataset::sha256,
     manifest::Manifest,
@@ -32,6 +35,10 @@ pub(super) fn assemble(
             pieces.iter().filter_map(|piece| Some((piece, piece.stretch(&trial.name)?))).collect();
         let logs = of_trial.iter().map(|(piece, _)| piece.log(&trial.name)).collect();
         outputs.push(Output { path: folder.join(&trial.log), kind: Kind::Log(logs) });
+        // What one run knows after its last frame: a source that is navigated is one piece.
+        if let Some(laid) = of_trial.iter().find_map(|(piece, _)| piece.network(&trial.name)) {
+            outputs.push(Output { path: folder.join(network(&trial.name)), kind: Kind::Network(laid) });
+        }
         stretches.extend(of_trial.into_iter().map(|(_, stretch)| stretch));
     }
     manifest.rows = stretches.iter().map(|stretch| stretch.rows).sum();
@@ -57,6 +64,7 @@ struct Output<'a> {
 
 enum Kind<'a> {
     Log(Vec<PathBuf>),
+    Network(PathBuf),
     Csv(&'a [Stretch]),
     Parquet(&'a [Stretch]),
 }
@@ -72,6 +80,9 @@ impl Output<'_> {
                 if !seafix_log::join(parts, &self.path, || !observer.stops())? {
                     return Ok(None);
                 }
+            }
+            Kind::Network(laid) => {
+                self.complete(|path| fs::copy(laid, path).map(drop).map_err(|error| error.to_string()))?
             }
             Kind::Csv(stretches) => self.complete(|path| join_csv(stretches, path).map_err(|e| e.to_string()))?,
             Kind::Parquet(stretches) => {

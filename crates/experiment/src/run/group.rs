@@ -5,12 +5,13 @@ use std::path::Path;
 use rayon::prelude::*;
 use seafix_component::Fault;
 use seafix_log::{FrameRecord, TrialHeader};
+use seafix_navigation::Network;
 use seafix_referencing::{Glimpse, Target};
 use seafix_simulation::{Purpose, Stream};
 
 use super::RunError;
 use crate::{
-    Helm, ImagesLogged, Plan, Sighting, Trial,
+    Helm, ImagesLogged, Keyframes, Plan, Sighting, Trial,
     judge::Judge,
     navigate::{Underway, Voyage},
     record,
@@ -24,6 +25,8 @@ pub(crate) struct Group<'a> {
     pub(crate) trials: Vec<&'a Trial>,
     /// What each trial searches for.
     targets: Vec<Vec<Target>>,
+    /// The network of an earlier run that each trial reads.
+    networks: Vec<Option<Network>>,
     /// What the log of each trial begins with.
     pub(super) headers: Vec<TrialHeader>,
     /// About how much log (bytes) one frame takes.
@@ -54,8 +57,8 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
         match trial.source.open(trial.resolved.seed, &plan.folder) {
             Ok(passage) => match frame_bytes(&*passage, trial.resolved.log.images) {
                 Ok(frame_bytes) => {
-                    let (targets, headers) = (Vec::new(), Vec::new());
-                    groups.push(Group { passage, trials: vec![trial], targets, headers, frame_bytes });
+                    let (targets, networks, headers) = (Vec::new(), Vec::new(), Vec::new());
+                    groups.push(Group { passage, trials: vec![trial], targets, networks, headers, frame_bytes });
                 }
                 Err(fault) => faults.push(fault),
             },
@@ -69,6 +72,10 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
                     if let Some(helm) = &trial.helm {
                         faults.extend(unnavigable(&*group.passage, helm, &targets));
                     }
+                    match keyframes(trial).map_or(Ok(None), |keyframes| keyframes.open(&plan.folder)) {
+                        Ok(network) => group.networks.push(network),
+                        Err(fault) => faults.push(fault),
+                    }
                     group.headers.push(record::header(plan, trial, &*group.passage, &targets));
                     group.targets.push(targets);
                 }
@@ -78,6 +85,11 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
     }
     faults.dedup();
     if faults.is_empty() { Ok(groups) } else { Err(RunError::Input(faults)) }
+}
+
+/// The settings of a trial's key frames, where it has any.
+fn keyframes(trial: &Trial) -> Option<&Keyframes> {
+    trial.helm.as_ref()?.network.as_ref()
 }
 
 /// Why no trial can navigate through `passage`.
@@ -99,6 +111,12 @@ fn unnavigable(passage: &dyn Passage, helm: &Helm, targets: &[Target]) -> Option
 }
 
 impl Group<'_> {
+    /// The files that its trials read besides the source's, with their SHA-256.
+    pub(crate) fn networks_read(&self) -> impl Iterator<Item = (String, String)> {
+        let read = self.trials.iter().filter_map(|trial| keyframes(trial)).filter(|one| !one.read.is_empty());
+        read.map(|keyframes| (keyframes.read.clone(), keyframes.sha256.clone()))
+    }
+
     /// How many frames before its own the answer to a frame looks back on.
     pub(super) fn looks_back(&self) -> usize {
         self.trials.iter().map(|trial| trial.stages.looks_back()).max().unwrap_or(0)
@@ -111,11 +129,11 @@ impl Group<'_> {
 
     /// Sets out with every trial that navigates.
     pub(super) fn voyages(&self) -> Vec<Option<Voyage<'_>>> {
-        let trials = self.trials.iter().zip(&self.targets);
+        let trials = self.trials.iter().zip(&self.targets).zip(&self.networks);
         trials
-            .map(|(trial, targets)| {
+            .map(|((trial, targets), network)| {
                 let helm = trial.helm.as_ref()?;
-                Some(Voyage::begin(helm, &trial.stages, targets, &*self.passage))
+                Some(Voyage::begin(helm, &trial.stages, targets, &*self.passage, network.as_ref()))
             })
             .collect()
     }

@@ -66,12 +66,23 @@ impl Sealed {
         self.folder.join(format!("{trial}.mcap"))
     }
 
+    /// The network that a trial laid, where it is kept.
+    pub(super) fn network(&self, trial: &str) -> Option<PathBuf> {
+        let name = network(trial);
+        self.seal.files.contains_key(&name).then(|| self.folder.join(name))
+    }
+
     /// The rows of a trial, where this piece has some.
     pub(super) fn stretch(&self, trial: &str) -> Option<Stretch> {
         let share = self.seal.trials.iter().find(|share| share.name == trial)?;
         let (csv, parquet) = (self.folder.join(CSV), self.folder.join(PARQUET));
         Some(Stretch { csv, text: share.text, parquet, groups: share.groups, rows: share.rows })
     }
+}
+
+/// The file of a trial's network.
+pub(super) fn network(trial: &str) -> String {
+    format!("{trial}.network")
 }
 
 const CSV: &str = "rows.csv";
@@ -171,10 +182,15 @@ impl Draft {
         let (mut trials, mut length, mut groups) = (Vec::new(), 0, 0);
         let mut csv = File::create(at(CSV)).map_err(|error| RunError::unwritable(&at(CSV), error))?;
         let mut parquet = create_parquet(&at(PARQUET)).map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
-        for Output { trial, mut log, thinned, mut table } in outputs {
+        for Output { trial, mut log, thinned, mut table, network: laid } in outputs {
             log.totals(&thinned.totals)?;
             log.finish()?;
             files.push(format!("{trial}.mcap"));
+            if let Some(text) = laid {
+                let name = network(&trial);
+                fs::write(at(&name), text).map_err(|error| RunError::unwritable(&at(&name), error))?;
+                files.push(name);
+            }
             let (rows, text) = (table.rows, table.text.len() as u64);
             csv.write_all(table.text.as_bytes()).map_err(|error| RunError::unwritable(&at(CSV), error))?;
             let more = table.write(&mut parquet, true).map_err(|error| RunError::unwritable(&at(PARQUET), error))?;

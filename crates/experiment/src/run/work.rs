@@ -16,6 +16,7 @@ use super::{
     store::{Draft, Store},
 };
 use crate::{
+    navigate::Voyage,
     results::{Row, Table},
     thin::Thinned,
 };
@@ -63,6 +64,8 @@ pub(super) struct Output {
     pub(super) log: Writer,
     pub(super) thinned: Thinned,
     pub(super) table: Table,
+    /// The network that it laid, where that is kept.
+    pub(super) network: Option<String>,
 }
 
 /// Makes one piece; `false` when it was stopped before its end, its logs then closed behind the last frame.
@@ -79,7 +82,13 @@ fn make(
     let mut outputs = Vec::with_capacity(group.trials.len());
     for (trial, header) in group.trials.iter().zip(&group.headers) {
         let log = Writer::piece(&draft.log(&trial.name), header)?;
-        outputs.push(Output { trial: trial.name.clone(), log, thinned: piece.thinned(), table: Table::default() });
+        outputs.push(Output {
+            trial: trial.name.clone(),
+            log,
+            thinned: piece.thinned(),
+            table: Table::default(),
+            network: None,
+        });
     }
     let back = group.looks_back();
     let mut voyages = group.voyages();
@@ -110,6 +119,9 @@ fn make(
             Row::of(&output.trial, &record).for_each(|row| output.table.add(&row));
             observer.frame(&output.trial);
         }
+    }
+    for (output, voyage) in outputs.iter_mut().zip(voyages) {
+        output.network = voyage.and_then(Voyage::network);
     }
     draft.seal(piece.first, piece.end, outputs)?;
     Ok(true)

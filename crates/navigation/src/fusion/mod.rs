@@ -11,6 +11,7 @@ use crate::Standing;
 
 pub use fuse::Fuse;
 pub use intersect::Intersect;
+pub(crate) use join::gate;
 pub use replace::Replace;
 
 /// A fix that contradicts what was known.

@@ -5,25 +5,25 @@ use seafix_geometry::{Camera, Object, StereoPixels, StereoRig, Transform};
 use seafix_referencing::{Observation, Observations, Solver};
 
 /// When points agree, and how long it is sought.
-pub(super) struct Rules {
+pub(crate) struct Rules {
     /// The root mean square of the distances in both images up to which they do (px).
-    pub(super) px: f64,
+    pub(crate) px: f64,
     /// With what probability three right points have been drawn.
-    pub(super) confidence: f64,
+    pub(crate) confidence: f64,
     /// Draws at most.
-    pub(super) draws: usize,
+    pub(crate) draws: usize,
 }
 
 /// A motion, `earlier_from_later`, and the points that agree with it.
-pub(super) struct Consensus {
-    pub(super) motion: Transform<Object, Camera>,
-    pub(super) inliers: Vec<usize>,
+pub(crate) struct Consensus {
+    pub(crate) motion: Transform<Object, Camera>,
+    pub(crate) inliers: Vec<usize>,
     score: f64,
 }
 
 /// Maximises Σ (1 − r²/t²)₊ over motions, r the distance of a point from where it is expected in both new images: over
 /// the motions of random minimal sets and the `guesses`. Each new best is solved again from all that agree with it.
-pub(super) fn consensus(
+pub(crate) fn consensus(
     data: &Observations<'_>,
     rig: &StereoRig,
     rules: &Rules,
@@ -80,7 +80,7 @@ pub(super) fn consensus(
 }
 
 /// Some of the points.
-pub(super) fn subset<'a>(data: &Observations<'a>, indices: &[usize]) -> Observations<'a> {
+pub(crate) fn subset<'a>(data: &Observations<'a>, indices: &[usize]) -> Observations<'a> {
     Observations { points: indices.iter().map(|&index| data.points[index]).collect(), rig: data.rig }
 }
 

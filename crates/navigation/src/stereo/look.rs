@@ -1,14 +1,14 @@
 //! What one pair of images shows.
 
 use seafix_geometry::{MeasuredPoint, Pixel, StereoRig};
-use seafix_vision::{Descriptors, Image, Keypoint, Look, Match, View, Workspace};
+use seafix_vision::{Descriptors, Image, Keypoint, Look, Match, Matcher, View, Workspace};
 
 use super::Stages;
 use crate::StereoPair;
 
 /// One pair.
 #[derive(Debug)]
-pub(super) struct Seen {
+pub(crate) struct Seen {
     pub(super) stamp_ns: u64,
     /// As the filters leave them.
     pub(super) images: [Image; 2],
@@ -19,7 +19,7 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    pub(super) fn new(
+    pub(crate) fn new(
         pair: &StereoPair<'_>,
         stages: &Stages,
         rig: &StereoRig,
@@ -50,6 +50,19 @@ impl Seen {
         Self { stamp_ns: pair.stamp_ns, images, cloud, keypoints, descriptors }
     }
 
+    /// Its strongest points, so many at most, with their key points and descriptors.
+    pub(crate) fn strongest(self, most: usize) -> (Vec<MeasuredPoint>, Vec<Keypoint>, Descriptors) {
+        let mut order: Vec<usize> = (0..self.cloud.len()).collect();
+        order.sort_by(|&a, &b| self.keypoints[b].response.total_cmp(&self.keypoints[a].response).then(a.cmp(&b)));
+        order.truncate(most);
+        order.sort_unstable();
+        let mut descriptors = Descriptors::default();
+        pick(&self.descriptors, &order, &mut descriptors);
+        let cloud = order.iter().map(|&index| self.cloud[index]).collect();
+        let keypoints = order.iter().map(|&index| self.keypoints[index]).collect();
+        (cloud, keypoints, descriptors)
+    }
+
     fn view(&self) -> View<'_> {
         View { image: &self.images[0], keypoints: &self.keypoints, descriptors: &self.descriptors }
     }
@@ -62,18 +75,29 @@ impl Seen {
         rig: &StereoRig,
         work: &mut Workspace,
     ) -> Vec<(usize, usize)> {
-        let mut found: Vec<Match> = Vec::new();
-        stages.between.match_into(&earlier.view(), &self.view(), rig, work, &mut found);
-        let key = |at: &Pixel| (at.u.to_bits(), at.v.to_bits());
-        let mut places: Vec<((u64, u64), usize)> =
-            self.keypoints.iter().enumerate().map(|(index, keypoint)| (key(&keypoint.at), index)).collect();
-        places.sort_unstable();
-        let index = |at: &Pixel| {
-            let place = places.binary_search_by(|(other, _)| other.cmp(&key(at))).ok()?;
-            Some(places[place].1)
-        };
-        found.iter().filter_map(|found| Some((found.left, index(&found.right)?))).collect()
+        in_common(&earlier.view(), &self.view(), &*stages.between, rig, work)
     }
+}
+
+/// Indices of key points of `earlier` and of `later` that look alike.
+pub(crate) fn in_common(
+    earlier: &View<'_>,
+    later: &View<'_>,
+    between: &dyn Matcher,
+    rig: &StereoRig,
+    work: &mut Workspace,
+) -> Vec<(usize, usize)> {
+    let mut found: Vec<Match> = Vec::new();
+    between.match_into(earlier, later, rig, work, &mut found);
+    let key = |at: &Pixel| (at.u.to_bits(), at.v.to_bits());
+    let mut places: Vec<((u64, u64), usize)> =
+        later.keypoints.iter().enumerate().map(|(index, keypoint)| (key(&keypoint.at), index)).collect();
+    places.sort_unstable();
+    let index = |at: &Pixel| {
+        let place = places.binary_search_by(|(other, _)| other.cmp(&key(at))).ok()?;
+        Some(places[place].1)
+    };
+    found.iter().filter_map(|found| Some((found.left, index(&found.right)?))).collect()
 }
 
 /// The rows of `all` at `indices`.

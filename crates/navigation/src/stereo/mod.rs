@@ -1,10 +1,10 @@
 //! Stereo visual odometry.
 
-mod consensus;
+pub(crate) mod consensus;
 mod follow;
 mod landmark;
-mod look;
-mod pose;
+pub(crate) mod look;
+pub(crate) mod pose;
 mod reckoning;
 mod taken;
 mod times;
@@ -152,16 +152,16 @@ impl Component for Stereo {
 
 /// The stages, built.
 #[derive(Debug)]
-struct Stages {
-    front_end: FrontEnd,
-    descriptor: Box<dyn Descriptor>,
-    between: Box<dyn Matcher>,
-    minimal: Box<dyn Solver>,
-    solver: Box<dyn Solver>,
+pub(crate) struct Stages {
+    pub(crate) front_end: FrontEnd,
+    pub(crate) descriptor: Box<dyn Descriptor>,
+    pub(crate) between: Box<dyn Matcher>,
+    pub(crate) minimal: Box<dyn Solver>,
+    pub(crate) solver: Box<dyn Solver>,
 }
 
 impl Stereo {
-    fn stages(&self) -> Result<Stages, String> {
+    pub(crate) fn stages(&self) -> Result<Stages, String> {
         let said = |error: seafix_component::BuildError| error.to_string();
         let filters =
             self.filters.iter().map(|filter| FILTERS.build(filter)).collect::<Result<_, _>>().map_err(said)?;

@@ -1,0 +1,182 @@
+//! Key frames on the way: laid, found again, kept for another run.
+
+use std::path::Path;
+
+use seafix_component::{Fault, read_text};
+use seafix_geometry::StereoRig;
+use seafix_navigation::{
+    Displacement, Here, Local, Navigated, Navigator, Network, NetworkSettings, Recognition, StereoPair, Traverse,
+};
+use seafix_referencing::{SOLVERS, Target};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, Threads};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::{PipelineError, dataset::hex, navigate::places, pipeline::resolve, source::Sight};
+
+/// The key frames of a run.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Keyframes {
+    /// Whether the network is kept, as `<trial>.network` in the folder of the run.
+    pub lay: bool,
+    /// The network of an earlier run, relative to the experiment file; none where it is empty.
+    pub read: String,
+    /// SHA-256 of that file, where it must be a certain one; a log says which it was.
+    pub sha256: String,
+    /// When key frames are laid, and how they are found again.
+    pub settings: NetworkSettings,
+}
+
+impl Keyframes {
+    /// The same with every setting of its components written out.
+    pub(crate) fn resolved(&self) -> Result<Self, PipelineError> {
+        let r = &self.settings.recognition;
+        let recognition = Recognition {
+            filters: r.filters.iter().map(|filter| resolve(&FILTERS, filter)).collect::<Result<_, _>>()?,
+            detector: resolve(&DETECTORS, &r.detector)?,
+            locator: resolve(&LOCATORS, &r.locator)?,
+            descriptor: resolve(&DESCRIPTORS, &r.descriptor)?,
+            matcher: resolve(&MATCHERS, &r.matcher)?,
+            refine: resolve(&REFINEMENTS, &r.refine)?,
+            triangulation: resolve(&TRIANGULATORS, &r.triangulation)?,
+            between: resolve(&MATCHERS, &r.between)?,
+            minimal: resolve(&SOLVERS, &r.minimal)?,
+            solver: resolve(&SOLVERS, &r.solver)?,
+            ..r.clone()
+        };
+        Ok(Self { settings: NetworkSettings { recognition, ..self.settings.clone() }, ..self.clone() })
+    }
+
+    /// Whether it can be worked with.
+    pub(crate) fn check(&self) -> Result<(), PipelineError> {
+        let wrong = |message| PipelineError { setting: "network", key: None, message };
+        self.settings.check().map_err(|said| wrong(format!("settings.{said}")))?;
+        if self.read.is_empty() && !self.sha256.is_empty() {
+            return Err(wrong("sha256 says which file is read; name it by `read`".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Writes down which file is read, where that is not said; a file that cannot be read is told of when it is opened.
+    pub(crate) fn pin(&mut self, folder: &Path) {
+        if !self.read.is_empty()
+            && self.sha256.is_empty()
+            && let Ok(text) = read_text(&folder.join(&self.read))
+        {
+            self.sha256 = digest(&text);
+        }
+    }
+
+    /// The network that is read, if one is.
+    ///
+    /// # Errors
+    /// A file that is no network, or not the one that was meant.
+    pub(crate) fn open(&self, folder: &Path) -> Result<Option<Network>, Fault> {
+        if self.read.is_empty() {
+            return Ok(None);
+        }
+        let path = folder.join(&self.read);
+        let text = read_text(&path)?;
+        let found = digest(&text);
+        if found != self.sha256 {
+            return Err(Fault::new("another network than the one that was meant", &path)
+                .value(format!("sha256 {found}"))
+                .remedy(format!("give the one with {}, or leave `sha256` out", self.sha256)));
+        }
+        Network::read(&path, &text, &self.settings.recognition).map(Some)
+    }
+}
+
+/// Of the text, which is what is read: byte order mark and line ends do not count.
+fn digest(text: &str) -> String {
+    hex(&Sha256::digest(text))
+}
+
+/// A run that lays key frames and finds them again.
+#[derive(Debug)]
+pub(crate) struct Explorer<'a> {
+    keyframes: &'a Keyframes,
+    traverse: Traverse<'a>,
+    /// Of each target, its place among the network's objects, and the other way round.
+    objects: Vec<usize>,
+    targets: Vec<Option<usize>>,
+}
+
+impl<'a> Explorer<'a> {
+    pub(crate) fn begin(
+        keyframes: &'a Keyframes,
+        targets: &[Target],
+        rig: &'a StereoRig,
+        earlier: Option<&Network>,
+    ) -> Self {
+        let mut network = earlier.cloned().unwrap_or_default();
+        let mut objects = Vec::with_capacity(targets.len());
+        for (target, place) in targets.iter().zip(places(targets)) {
+            let known = network.objects.iter().position(|(name, _)| *name == target.name);
+            objects.push(known.unwrap_or_else(|| {
+                network.objects.push((target.name.clone(), place));
+                network.objects.len() - 1
+            }));
+        }
+        let of = |object: usize| objects.iter().position(|other| *other == object);
+        let back = (0..network.objects.len()).map(of).collect();
+        let traverse = Traverse::begin(&keyframes.settings, network, rig, Threads::One);
+        Self { keyframes, traverse, objects, targets: back }
+    }
+
+    pub(crate) fn advance(&mut self, seconds: f64, motion: Option<&Local>) {
+        self.traverse.advance(seconds, motion);
+    }
+
+    /// An object stands elsewhere than was believed.
+    pub(crate) fn displaced(&mut self, found: &Displacement) {
+        self.traverse.displaced(self.objects[found.object], found.place);
+    }
+
+    /// A frame: what it adds to the network, and what the network says of the pose.
+    pub(crate) fn visit(
+        &mut self,
+        sight: &Sight,
+        pair: &StereoPair<'_>,
+        navigator: &mut Navigator<'_>,
+        taken: &[Navigated],
+        events: &mut Vec<String>,
+    ) {
+        let ours = |navigated: &Navigated| Navigated { object: self.objects[navigated.object], ..*navigated };
+        let here = Here {
+            stamp_ns: sight.stamp_ns,
+            navigated: navigator.pose().map(ours),
+            rough: sight.prior.as_ref().map(|prior| (prior.world_from_camera, prior.covariance)),
+        };
+        let fixes: Vec<Navigated> = taken.iter().map(ours).collect();
+        let closure = self.traverse.visit(pair, &here, &fixes);
+        match closure.sought {
+            Some(Ok(found)) => {
+                let (station, seen) = (found.station, &found.recognised);
+                let how = format!("{} of {} points", seen.found, seen.matches);
+                let sigma = 1e3 * seen.motion.covariance.position_sigma();
+                if found.given_up {
+                    events.push(format!("key frame {station} found again, {how}, contradicts the network: given up"));
+                } else {
+                    events.push(format!("key frame {station} found again, {how}, to {sigma:.1} mm"));
+                }
+                let theirs = |pose: Navigated| Some(Navigated { object: self.targets[pose.object]?, ..pose });
+                if let Some(pose) = found.navigated.and_then(theirs) {
+                    navigator.settle(&pose, format!("key frame {station} found again"));
+                }
+            }
+            Some(Err(why)) => events.push(format!("no key frame found again: {why}")),
+            None => {}
+        }
+        if let Some(station) = closure.laid {
+            events.push(format!("key frame {station} laid"));
+        }
+    }
+
+    /// The network as a file, where it is to be kept.
+    pub(crate) fn finish(self) -> Option<String> {
+        let network = self.traverse.finish();
+        self.keyframes.lay.then(|| network.text(&self.keyframes.settings.recognition))
+    }
+}
