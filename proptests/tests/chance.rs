@@ -215,7 +215,7 @@ fn the_null_model_is_predicted() {
 /// `cargo test --release --workspace --test chance -- --ignored --nocapture`; `CHANCE_FAMILIES` (abcdefg), `CHANCE_TIMES` (1)
 /// so many times the frames, `CHANCE_CLUTTER` (null family).
 #[test]
-#[ignore = "a minute"]
+#[ignore = "a minute a family: the command stands above"]
 fn every_bin_is_predicted() {
     let variable = |name: &str, default: &str| std::env::var(name).unwrap_or_else(|_| default.to_owned());
     let families = variable("CHANCE_FAMILIES", "abcdefg");

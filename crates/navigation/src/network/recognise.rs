@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use seafix_component::{Choice, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform, UncertainPoint};
-use seafix_referencing::{Observation, Observations};
+use seafix_referencing::Observations;
 use seafix_vision::{Image, Look, Threads, View, Workspace};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ use crate::{
     fusion::{Contradiction, gate},
     stereo::{
         Stages,
-        consensus::{Consensus, Rules, consensus},
+        consensus::{Consensus, Rules, consensus, seen_again},
         look::{Seen, in_common},
         pose::{Found, joint, refine},
     },
@@ -323,16 +323,7 @@ impl<'a> Recogniser<'a> {
         if matches < needed {
             return Err(Unrecognised::FewMatches { found: matches, needed });
         }
-        let points = pairs.iter().map(|&(kept, seen)| {
-            let (model, measured) = (&keyframe.points[kept], &glance.cloud[seen]);
-            Observation {
-                measured: measured.position,
-                pixels: measured.pixels,
-                model: seafix_geometry::Point::<Object>::from(model.at.coords),
-                // Across the line of sight, as in the odometry.
-                model_sigma: model.covariance.symmetric_eigenvalues().min().max(0.0).sqrt(),
-            }
-        });
+        let points = pairs.iter().map(|&(kept, seen)| seen_again(&keyframe.points[kept], &glance.cloud[seen]));
         let data = Observations { points: points.collect(), rig: Some(self.rig) };
         let rules = Rules { px: settings.consensus_px, confidence: 0.999, draws: settings.draws };
         let guesses = [candidate.prior.motion.relabel()];

@@ -1,8 +1,19 @@
 //! The motion that most points agree on.
 
 use rand::{Rng, RngExt};
-use seafix_geometry::{Camera, Object, StereoPixels, StereoRig, Transform};
+use seafix_geometry::{Camera, MeasuredPoint, Object, Point, StereoPixels, StereoRig, Transform, UncertainPoint};
 use seafix_referencing::{Observation, Observations, Solver};
+
+/// A point of an earlier pair, which takes the model's place, seen again in a later one.
+pub(crate) fn seen_again(earlier: &UncertainPoint<Camera>, later: &MeasuredPoint) -> Observation {
+    Observation {
+        measured: later.position,
+        pixels: later.pixels,
+        model: Point::<Object>::from(earlier.at.coords),
+        // Across the line of sight: along it the error is larger, and the same for every motion.
+        model_sigma: earlier.covariance.symmetric_eigenvalues().min().max(0.0).sqrt(),
+    }
+}
 
 /// When points agree, and how long it is sought.
 pub(crate) struct Rules {

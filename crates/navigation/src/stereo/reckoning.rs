@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use nalgebra::{Matrix4, Vector4};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform, World};
-use seafix_referencing::{Observation, Observations};
+use seafix_geometry::{Camera, Covariance6, StereoRig, Transform, World};
+use seafix_referencing::Observations;
 use seafix_vision::{Image, Look, Threads, Workspace};
 
 use super::{
     Stages, Stereo,
-    consensus::{Consensus, Rules, consensus},
+    consensus::{Consensus, Rules, consensus, seen_again},
     follow::{Followed, KeyFrame, follow},
     landmark::{Landmark, Sighting},
     look::Seen,
@@ -275,17 +275,8 @@ impl<'a> StereoReckoning<'a> {
             return Err(Lost::FewMatches { found: pairs.len(), needed });
         }
         let start = Instant::now();
-        // The earlier cloud takes the model's place.
-        let points = pairs.iter().map(|&(earlier, later)| {
-            let (model, measured) = (&last.seen.cloud[earlier].position, &seen.cloud[later]);
-            Observation {
-                measured: measured.position,
-                pixels: measured.pixels,
-                model: seafix_geometry::Point::<Object>::from(model.at.coords),
-                // Across the line of sight: along it the error is larger, and the same for every motion.
-                model_sigma: model.covariance.symmetric_eigenvalues().min().max(0.0).sqrt(),
-            }
-        });
+        let points =
+            pairs.iter().map(|&(earlier, later)| seen_again(&last.seen.cloud[earlier].position, &seen.cloud[later]));
         let data = Observations { points: points.collect(), rig: Some(self.rig) };
         let rules = Rules { px: settings.consensus_px, confidence: settings.confidence, draws: settings.draws };
         let mut guesses = vec![Transform::identity()];

@@ -172,15 +172,21 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
     }
 }
 
-#[test]
-fn a_survey_that_the_images_contradict_is_given_up() {
-    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(5));
+/// Three surveyed objects, and where they truly stand: the second elsewhere.
+fn one_displaced() -> (Vec<Member>, [Transform<Object, Object>; 3]) {
     let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
     let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
     let member = |&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) };
     let members: Vec<Member> = said.iter().map(member).collect();
     let mut truly = said;
     truly[1] = standing(0.86, 0.05);
+    (members, truly)
+}
+
+#[test]
+fn a_survey_that_the_images_contradict_is_given_up() {
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(5));
+    let (members, truly) = one_displaced();
     let seen = glimpse(&rig, &truly, 1, 1.0, &mut rng);
     let fixes = joint_fixes(&rig, &members, std::slice::from_ref(&seen), 0.999).unwrap();
     assert_eq!(fixes.displaced, [1]);
@@ -246,12 +252,7 @@ fn no_direction_is_known_worse_than_from_the_object_alone() {
 #[test]
 fn of_an_object_of_two_points_the_points_are_given_up() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(10));
-    let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
-    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
-    let member = |&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) };
-    let members: Vec<Member> = said.iter().map(member).collect();
-    let mut truly = said;
-    truly[1] = standing(0.86, 0.05);
+    let (members, truly) = one_displaced();
     let mut seen = glimpse(&rig, &truly, 1, 1.0, &mut rng);
     let mut shown = 0;
     seen.points.retain(|(object, _)| {
