@@ -53,7 +53,8 @@ impl Search for GncTls {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
         feasible(problem, self.most_pairs)?;
         let vertices = vertices(problem);
-        let solver = solve::GncTls { growth: self.growth, ..solve::GncTls::default() };
+        // From the convex problem alone: sets of three of thousands of pairs, most of them wrong, lead nowhere.
+        let solver = solve::GncTls { growth: self.growth, triples: 0, ..solve::GncTls::default() };
         let mut data = Observations::of(&vertices, problem.model, problem.cloud, None);
         for (point, &pair) in data.points.iter_mut().zip(&vertices) {
             // The solver leaves out what is off by `threshold` standard deviations.

@@ -86,6 +86,22 @@ impl Solver for GncTls {
     }
 }
 
+/// The `m`-th set of three of `n` points in the order of the dictionary: 0 is {0, 1, 2}.
+fn triple(mut m: usize, n: usize) -> [usize; 3] {
+    let pairs = |i: usize| (n - i - 1) * (n - i - 2) / 2;
+    let mut i = 0;
+    while m >= pairs(i) {
+        m -= pairs(i);
+        i += 1;
+    }
+    let mut j = i + 1;
+    while m >= n - j - 1 {
+        m -= n - j - 1;
+        j += 1;
+    }
+    [i, j, j + 1 + m]
+}
+
 impl GncTls {
     /// The pose and which points it rests on.
     fn keep(&self, data: &Observations<'_>) -> Result<(Transform<Object, Camera>, Vec<bool>), Degenerate> {
@@ -103,8 +119,7 @@ impl GncTls {
         let all = n * (n - 1) * (n - 2) / 6;
         // Of more than are tried every so-manieth.
         let stride = all.div_ceil(self.triples.max(1));
-        let triples = (0..n).flat_map(|i| (i + 1..n).flat_map(move |j| (j + 1..n).map(move |k| [i, j, k])));
-        for three in triples.step_by(stride).take(self.triples) {
+        for three in (0..all).step_by(stride).take(self.triples).map(|m| triple(m, n)) {
             let mut chosen: Vec<bool> = (0..n).map(|k| three.contains(&k)).collect();
             for _ in 0..MOST_TURNS {
                 let weights: Vec<f64> = chosen.iter().map(|&kept| f64::from(u8::from(kept))).collect();
@@ -169,5 +184,19 @@ impl GncTls {
     fn determined(&self, data: &Observations<'_>, weights: &[f64]) -> bool {
         let kept = data.points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(point, _)| *point).collect();
         check(&Observations { points: kept, rig: data.rig }, self.minimum(), self.least_ratio).is_ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::triple;
+
+    #[test]
+    fn sets_of_three_come_in_the_order_of_the_dictionary() {
+        let n = 7;
+        let all = (0..n).flat_map(|i| (i + 1..n).flat_map(move |j| (j + 1..n).map(move |k| [i, j, k])));
+        for (m, three) in all.enumerate() {
+            assert_eq!(triple(m, n), three);
+        }
     }
 }
