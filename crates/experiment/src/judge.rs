@@ -9,7 +9,7 @@ use seafix_log::{Evaluation, FrameRecord, NavigationErrors, TruthRecord, Visible
 use seafix_navigation::Navigated;
 use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
 
-use crate::{Sighting, exact, navigate::Underway, source::Truth};
+use crate::{Sighting, exact, inspect, navigate::Underway, source::Truth};
 
 /// A pair is correct when its cloud point shows within this distance (px) of the true projections.
 const CORRECT_PX: f64 = 2.0;
@@ -42,6 +42,7 @@ impl<'a> Judge<'a> {
         if let (Some(underway), Some(row)) = (underway, &mut record.navigation) {
             row.errors = errors(underway, self);
         }
+        record.inspected = inspect::inspected(truth, self.site, rig, kind, sighting, underway);
         for (attempt, row) in sighting.attempts.iter().zip(record.targets.iter_mut()) {
             let Some(known) = &self.known(attempt.target) else { continue };
             let identified = row.evaluation.identified;

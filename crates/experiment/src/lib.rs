@@ -10,6 +10,7 @@ mod diff;
 mod exact;
 mod experiment;
 mod explore;
+mod inspect;
 mod joint;
 mod judge;
 mod logging;

@@ -26,6 +26,7 @@
 //! | `/referencing/candidates` | `seafix.v1.Candidates` | one an attempted target and frame |
 //! | `/referencing/result` | `seafix.v1.ReferencingResult` | likewise |
 //! | `/metrics/evaluation` | `seafix.v1.Evaluation` | likewise: comparison with truth |
+//! | `/metrics/inspection` | `seafix.v1.Inspection` | one a frame with a point of interest in view: where the vehicle had it, and where it is |
 //! | `/metrics/timing` | `seafix.v1.Timing` | one a frame |
 //! | `/metrics/totals` | `seafix.v1.Totals` | once, last: what all frames add up to, logged or not |
 //! | `/referencing/inputs` | `seafix.v1.Inputs` | one a frame: what the method was given, to the last bit |
@@ -73,9 +74,10 @@ pub use png::encode_png;
 pub use read::{Reader, TrialLog, read};
 pub use record::{
     Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, Evaluation, ExactPose, FrameRecord,
-    FrameTimes, GreyImage, Inputs, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord, NavigationErrors,
-    NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord, ProblemRecord, RigRecord, SensorReading,
-    SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
+    FrameTimes, GreyImage, Inputs, InspectedPoint, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord,
+    NavigationErrors, NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord, ProblemRecord, RigRecord,
+    SensorReading, SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord,
+    VisiblePoint,
 };
 pub use recording::{Entry, Recording, Topic};
 pub use recover::{Recovered, recover};

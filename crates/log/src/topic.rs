@@ -18,6 +18,8 @@ pub(crate) const RESULT: &str = "/referencing/result";
 pub(crate) const CANDIDATES: &str = "/referencing/candidates";
 /// Comparison with truth.
 pub(crate) const EVALUATION: &str = "/metrics/evaluation";
+/// The points of interest in view, as the vehicle had them and as they are.
+pub(crate) const INSPECTION: &str = "/metrics/inspection";
 /// What all frames add up to.
 pub(crate) const TOTALS: &str = "/metrics/totals";
 /// Wall-clock times.
@@ -63,7 +65,7 @@ macro_rules! own {
         }
     )*};
 }
-own!(TrialHeader, Frame, Inputs, ReferencingResult, Candidates, Evaluation, Timing, Totals);
+own!(TrialHeader, Frame, Inputs, ReferencingResult, Candidates, Evaluation, Inspection, Timing, Totals);
 
 macro_rules! well_known {
     ($($message:ident),*) => {$(
@@ -89,7 +91,7 @@ well_known!(
 pub(crate) type Schema = fn() -> (String, Cow<'static, [u8]>);
 
 /// The topics of which every frame has its own messages, with their schemas: what is copied when logs are joined.
-pub(crate) const OF_FRAMES: [(&str, Schema); 17] = [
+pub(crate) const OF_FRAMES: [(&str, Schema); 18] = [
     (IMAGES[0], messages::CompressedImage::schema),
     (IMAGES[1], messages::CompressedImage::schema),
     (ANNOTATIONS[0], messages::ImageAnnotations::schema),
@@ -104,6 +106,7 @@ pub(crate) const OF_FRAMES: [(&str, Schema); 17] = [
     (CANDIDATES, proto::Candidates::schema),
     (RESULT, proto::ReferencingResult::schema),
     (EVALUATION, proto::Evaluation::schema),
+    (INSPECTION, proto::Inspection::schema),
     (TIMING, proto::Timing::schema),
     (INPUTS, proto::Inputs::schema),
     (FRAME, proto::Frame::schema),

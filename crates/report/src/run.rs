@@ -9,7 +9,9 @@ use seafix_log::{FrameRecord, LogError, Outcome, Reader, TargetRecord, Totals, T
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Field, ReportError, disparity, place,
+    Field, ReportError, disparity,
+    looked::{self, Looked},
+    place,
     sailed::{Counted, Sailed},
 };
 
@@ -58,6 +60,15 @@ pub(crate) struct Frame {
     rows: (u32, u32),
     /// What the navigator knew, where the trial navigates.
     pub(crate) sailed: Option<Underway>,
+    /// The points of interest in view.
+    pub(crate) inspected: Vec<Inspected>,
+}
+
+/// A point of interest in view of a frame.
+#[derive(Debug)]
+pub(crate) struct Inspected {
+    name: u16,
+    values: [f64; Looked::ALL.len()],
 }
 
 /// What a navigator knew after a frame.
@@ -163,6 +174,14 @@ impl Trial {
                 values: values(target),
             });
         }
+        let inspected = frame
+            .inspected
+            .iter()
+            .map(|point| Inspected {
+                name: self.word(&looked::name(point)),
+                values: Looked::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN)),
+            })
+            .collect();
         let times = &frame.times;
         self.frames.push(Frame {
             number: frame.frame,
@@ -183,6 +202,7 @@ impl Trial {
                 counted: Counted::ALL.map(|counted| counted.holds(record)),
                 values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
             }),
+            inspected,
         });
     }
 
@@ -236,6 +256,11 @@ impl Trial {
         self.words.get(row.object as usize).map_or("", String::as_str)
     }
 
+    /// What a point of interest is called, with its object.
+    pub(crate) fn inspected(&self, point: &Inspected) -> &str {
+        self.words.get(point.name as usize).map_or("", String::as_str)
+    }
+
     /// Why an attempt was refused: the word for it, or its outcome.
     pub(crate) fn reason(&self, row: &Attempt) -> &str {
         match self.words.get(row.reason as usize).map_or("", String::as_str) {
@@ -263,6 +288,13 @@ impl Underway {
     /// Whether its frame is one of these.
     pub(crate) fn is(&self, counted: Counted) -> bool {
         self.counted[counted as usize]
+    }
+}
+
+impl Inspected {
+    /// The value of a quantity; `None` where nothing is known.
+    pub(crate) fn get(&self, quantity: Looked) -> Option<f64> {
+        Some(self.values[quantity as usize]).filter(|value| !value.is_nan())
     }
 }
 

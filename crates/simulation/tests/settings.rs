@@ -27,6 +27,7 @@ const BY_HAND: &str = "imager.automatic=false";
 const RANDOM: &str = r#"site="random""#;
 const BUILT: Option<&str> = Some(r#"site="drill-centre""#);
 const TOUR: Option<&str> = Some(r#"route.kind="tour""#);
+const INSPECTION: &str = r#"route.kind="inspection";rate=0.0"#;
 
 #[rustfmt::skip]
 const SETTINGS: &[Setting] = &[
@@ -103,6 +104,9 @@ const SETTINGS: &[Setting] = &[
     ("route.spacing", "5.0", "route.kind=\"lawnmower\";rate=0.0", TOUR),
     ("route.radius", "2.0", r#"route.kind="orbit""#, TOUR),
     ("route.object", r#""plet""#, r#"route.kind="orbit""#, TOUR),
+    ("route.stand-off", "1.7", INSPECTION, TOUR),
+    ("route.clearance", "1.0", INSPECTION, TOUR),
+    ("route.hold", "2.0", INSPECTION, TOUR),
     ("route.waypoints", "[[0.0, 0.0, 4.0], [9.0, 3.0, 4.0]]", "route.kind=\"waypoints\";route.waypoints=[[0.0, 0.0, 4.0], [9.0, 0.0, 4.0]]", TOUR),
     ("vehicle.kind", r#""rail""#, "", None),
     ("vehicle.proportional", "0.5", "", Some(r#"vehicle.kind="rail""#)),

@@ -1,6 +1,6 @@
 //! The columns of the table of results: one row a trial, frame and attempted target.
 
-use seafix_log::{FrameRecord, Integrity, NavigationRecord, TargetRecord};
+use seafix_log::{FrameRecord, InspectedPoint, Integrity, NavigationRecord, TargetRecord};
 
 /// One row: an attempt, its frame and its trial.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +18,12 @@ impl<'a> Row<'a> {
 
     fn integrity(&self) -> Option<&'a Integrity> {
         self.target.integrity.as_ref()
+    }
+
+    /// Of the points of interest in view the one that is nearest to the line of sight of the left camera.
+    fn inspected(&self) -> Option<&'a InspectedPoint> {
+        let off = |point: &InspectedPoint| point.at[0].hypot(point.at[1]) / point.at[2];
+        self.frame.inspected.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
     fn navigation(&self) -> Option<&'a NavigationRecord> {
@@ -103,6 +109,11 @@ pub static COLUMNS: &[Column] = columns![
     Real "navigated_m3_attitude" = |r: &Row<'_>| r.navigation()?.errors.m3_attitude,
     Real "navigated_nees" = |r: &Row<'_>| r.navigation()?.errors.nees,
     Real "unreferenced_m3_position" = |r: &Row<'_>| r.navigation()?.errors.unreferenced_m3_position,
+    Whole "inspected_points" = |r: &Row<'_>| Some(r.frame.inspected.len() as i64),
+    Text "inspected" = |r: &Row<'_>| r.inspected().map_or_else(String::new, |point| format!("{}/{}", point.object, point.point)),
+    Real "inspected_range" = |r: &Row<'_>| r.inspected().map(InspectedPoint::range),
+    Real "inspected_error" = |r: &Row<'_>| r.inspected()?.error(),
+    Real "inspected_nees" = |r: &Row<'_>| r.inspected()?.nees,
     Text "redundancy" = |r: &Row<'_>| r.integrity().map_or_else(String::new, |it| it.redundancy.clone()),
     Real "chi2" = |r: &Row<'_>| Some(r.integrity()?.chi2),
     Whole "chi2_freedom" = |r: &Row<'_>| Some(r.integrity()?.freedom as i64),

@@ -3,6 +3,7 @@
 mod frame;
 mod header;
 mod inputs;
+mod inspection;
 mod navigation;
 mod result;
 mod totals;
@@ -10,6 +11,7 @@ mod totals;
 pub(crate) use frame::{frame_message, frame_record};
 pub(crate) use header::{header_message, header_record};
 pub(crate) use inputs::{inputs_message, inputs_record};
+pub(crate) use inspection::{inspection_message, inspection_record};
 pub(crate) use result::{
     candidates_message, evaluation_message, evaluation_record, result_message, result_record, target_times,
     timing_message,

@@ -596,6 +596,37 @@ pub struct TargetTiming {
     #[prost(double, optional, tag = "5")]
     pub total_ms: ::core::option::Option<f64>,
 }
+/// The points of interest that truly are in both images: where the vehicle had them, and where they are. Topic
+/// /metrics/inspection, for frames with any.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Inspection {
+    #[prost(uint64, tag = "1")]
+    pub frame: u64,
+    #[prost(uint64, tag = "2")]
+    pub stamp_ns: u64,
+    #[prost(message, repeated, tag = "3")]
+    pub points: ::prost::alloc::vec::Vec<InspectedPoint>,
+}
+/// One point of interest, frame of the left camera.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct InspectedPoint {
+    #[prost(string, tag = "1")]
+    pub object: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub point: ::prost::alloc::string::String,
+    /// Three coordinates (m): where it truly is.
+    #[prost(double, repeated, tag = "3")]
+    pub at: ::prost::alloc::vec::Vec<f64>,
+    /// Where the pose that is known and the site have it; empty where no pose is known.
+    #[prost(double, repeated, tag = "4")]
+    pub believed: ::prost::alloc::vec::Vec<f64>,
+    /// The distance between the two (m).
+    #[prost(double, optional, tag = "5")]
+    pub error: ::core::option::Option<f64>,
+    /// Normalised estimation error squared, three degrees of freedom.
+    #[prost(double, optional, tag = "6")]
+    pub nees: ::core::option::Option<f64>,
+}
 /// What came of one attempt to fix one target in one frame. Topic /referencing/result.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct ReferencingResult {

@@ -15,6 +15,7 @@ pub(crate) struct Pending {
     results: Vec<proto::ReferencingResult>,
     candidates: Vec<proto::Candidates>,
     evaluations: Vec<proto::Evaluation>,
+    inspection: Option<proto::Inspection>,
     timing: Option<proto::Timing>,
     inputs: Option<proto::Inputs>,
 }
@@ -24,6 +25,7 @@ impl Pending {
     pub(super) fn is_empty(&self) -> bool {
         self.images.len() + self.skipped_images + self.results.len() + self.candidates.len() + self.evaluations.len()
             == 0
+            && self.inspection.is_none()
             && self.timing.is_none()
             && self.inputs.is_none()
     }
@@ -48,6 +50,7 @@ impl Pending {
             topic::RESULT => self.results.push(message.decode(path, "ReferencingResult")?),
             topic::CANDIDATES => self.candidates.push(message.decode(path, "Candidates")?),
             topic::EVALUATION => self.evaluations.push(message.decode(path, "Evaluation")?),
+            topic::INSPECTION => self.inspection = Some(message.decode(path, "Inspection")?),
             topic::INPUTS => self.inputs = Some(message.decode(path, "Inputs")?),
             topic::TIMING => self.timing = Some(message.decode(path, "Timing")?),
             topic::FRAME => {
@@ -82,6 +85,12 @@ impl Pending {
                 return Err(format!("the inputs of frame {} stand in frame {number}", inputs.frame));
             }
             frame.inputs = Some(Box::new(convert::inputs_record(inputs).map_err(|error| error.0)?));
+        }
+        if let Some(inspection) = self.inspection {
+            if inspection.frame != number {
+                return Err(format!("the inspection of frame {} stands in frame {number}", inspection.frame));
+            }
+            frame.inspected = convert::inspection_record(inspection).map_err(|error| error.0)?;
         }
         frame.images = <[GreyImage; 2]>::try_from(self.images).ok();
         let attempts = self.results.into_iter().zip(self.candidates).zip(self.evaluations).zip(target_times);

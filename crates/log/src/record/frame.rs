@@ -1,6 +1,6 @@
 //! What one stereo pair gave.
 
-use super::{Inputs, Matrix3, Matrix4, NavigationRecord, TargetRecord};
+use super::{Inputs, InspectedPoint, Matrix3, Matrix4, NavigationRecord, TargetRecord};
 
 /// One frame: what was seen, what was known, and what came of every attempted target.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -28,6 +28,8 @@ pub struct FrameRecord {
     pub inputs: Option<Box<Inputs>>,
     /// What the navigator knew, where the trial navigates between fixes.
     pub navigation: Option<Box<NavigationRecord>>,
+    /// The points of interest that truly are in both images.
+    pub inspected: Vec<InspectedPoint>,
 }
 
 /// An 8-bit grey image.

@@ -3,6 +3,7 @@
 mod frame;
 mod header;
 mod inputs;
+mod inspection;
 mod navigation;
 mod target;
 mod totals;
@@ -10,6 +11,7 @@ mod totals;
 pub use frame::{CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, PriorRecord, TruthRecord, VisiblePoint};
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
+pub use inspection::InspectedPoint;
 pub use navigation::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 pub use target::{Alternative, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
 pub use totals::Totals;

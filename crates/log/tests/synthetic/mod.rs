@@ -157,6 +157,15 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         },
         inputs: (number % 4 != 3).then(|| Box::new(inputs(number))),
         navigation: (number > 0).then(|| Box::new(navigation(number))),
+        inspected: (0..number % 3)
+            .map(|k| InspectedPoint {
+                object: "A".to_owned(),
+                point: format!("valve-{k}"),
+                at: [0.1, value(70 + k), 1.5],
+                believed: (k == 0).then(|| [0.1 + 1.0 / 3.0, value(70), 1.5]),
+                nees: (k == 0).then_some(2.5),
+            })
+            .collect(),
     }
 }
 

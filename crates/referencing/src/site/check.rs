@@ -51,6 +51,15 @@ impl Checker<'_> {
         }
     }
 
+    /// A direction: finite, and not zero.
+    fn direction(&mut self, what: &str, normal: &[f64; 3], path: &[&str]) {
+        self.finite(what, normal, path);
+        if Vector3::from(*normal).norm() < 1e-9 {
+            let fault = self.at(format!("{what} has no direction"), path).value(format!("{normal:?}"));
+            self.fault(fault.remedy("give the direction from which the point is seen, or leave it out"));
+        }
+    }
+
     fn sigma(&mut self, what: &str, value: f64, path: &[&str]) {
         if !(value >= 0.0 && value.is_finite()) {
             let fault = self.at(format!("{what} is no standard deviation"), path).value(value);
@@ -175,7 +184,11 @@ fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Opti
         interest: raw
             .interest
             .iter()
-            .map(|interest| Interest { id: interest.id.clone(), at: Point::from(interest.at) })
+            .map(|interest| Interest {
+                id: interest.id.clone(),
+                at: Point::from(interest.at),
+                normal: interest.normal.map(|normal| unit(Vector3::from(normal))),
+            })
             .collect(),
     })
 }
@@ -196,17 +209,15 @@ fn numbers(check: &mut Checker<'_>, raw: &ObjectFile, of: &str, number: &str) {
         check.finite(&format!("{name}: `at`"), &point.at, &["object", number, "point", &i, "at"]);
         check.sigma(&format!("{name}: `sigma`"), point.sigma, &["object", number, "point", &i, "sigma"]);
         if let Some(normal) = point.normal {
-            let path = ["object", number, "point", &i, "normal"];
-            check.finite(&format!("{name}: `normal`"), &normal, &path);
-            if Vector3::from(normal).norm() < 1e-9 {
-                let fault = check.at(format!("{name}: `normal` has no direction"), &path).value(format!("{normal:?}"));
-                check.fault(fault.remedy("give the direction from which the point is seen, or leave it out"));
-            }
+            check.direction(&format!("{name}: `normal`"), &normal, &["object", number, "point", &i, "normal"]);
         }
     }
     for (i, interest) in raw.interest.iter().enumerate() {
-        let path = ["object", number, "interest", &i.to_string(), "at"];
-        check.finite(&format!("{of}, interest `{}`: `at`", interest.id), &interest.at, &path);
+        let (i, name) = (i.to_string(), format!("{of}, interest `{}`", interest.id));
+        check.finite(&format!("{name}: `at`"), &interest.at, &["object", number, "interest", &i, "at"]);
+        if let Some(normal) = interest.normal {
+            check.direction(&format!("{name}: `normal`"), &normal, &["object", number, "interest", &i, "normal"]);
+        }
     }
 }
 

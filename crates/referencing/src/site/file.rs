@@ -55,6 +55,8 @@ pub(super) struct PointFile {
 pub(super) struct InterestFile {
     pub(super) id: String,
     pub(super) at: [f64; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) normal: Option<[f64; 3]>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's `skip_serializing_if` passes a reference")]
@@ -99,7 +101,11 @@ pub(super) fn write(site: &Site) -> String {
         interest: object
             .interest
             .iter()
-            .map(|interest| InterestFile { id: interest.id.clone(), at: interest.at.coords.into() })
+            .map(|interest| InterestFile {
+                id: interest.id.clone(),
+                at: interest.at.coords.into(),
+                normal: interest.normal.map(Into::into),
+            })
             .collect(),
     });
     let file = SiteFile {

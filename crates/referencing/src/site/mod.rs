@@ -47,6 +47,8 @@ pub struct Interest {
     pub id: String,
     /// Where it is, object frame.
     pub at: Point<Object>,
+    /// Unit vector of the side from which it is looked at, object frame; `None` where none is given.
+    pub normal: Option<Vector3<f64>>,
 }
 
 /// One known object.

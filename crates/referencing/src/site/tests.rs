@@ -31,6 +31,7 @@ at = [2.0, 0.0, 0.0]
 [[object.interest]]
 id = "valve"
 at = [1.0, 0.5, 0.25]
+normal = [0.0, 0.5, 0.0]
 [[object]]
 id = "frame"
 base = ["A", "B", "C"]

@@ -6,6 +6,7 @@ mod answer;
 mod data;
 mod failures;
 mod figures;
+mod inspection;
 mod limits;
 mod method;
 mod navigation;
@@ -44,6 +45,7 @@ pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Docu
             Some(protocol::section(run, &comparisons)),
             Some(results::section(run, summary, &comparisons)),
             navigation::section(run, summary),
+            inspection::section(run, summary),
             significance::section(run, &comparisons),
             ablation::section(run, summary),
             Some(failures),

@@ -1,6 +1,6 @@
 //! Numbers about trials, with their keys.
 
-use crate::{Field, Key, Number, format, run::Trial, sailed::Sailed};
+use crate::{Field, Key, Number, format, looked::Looked, run::Trial, sailed::Sailed};
 
 /// What a quantity is printed in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +76,18 @@ pub(super) fn sailed(
 ) -> Number {
     let what = format!("{name} {} of navigated{}", quantity.name(), unit.suffix());
     Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/referencing/frame", what))
+}
+
+/// A statistic of a point of interest, over the frames that have it in view.
+pub(super) fn inspected(
+    trial: &Trial,
+    name: &str,
+    (quantity, point): (Looked, &str),
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let what = format!("{name} {} at the point {point}{}", quantity.name(), unit.suffix());
+    Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/metrics/inspection", what))
 }
 
 /// What the navigator knew after one frame.

@@ -8,6 +8,7 @@ use seafix_log::{FrameTimes, Outcome, TargetRecord};
 use super::logs::{Log, Logs};
 use crate::{
     Field, Key, ReportError,
+    looked::{self, Looked},
     paired::Statistics,
     sailed::{Counted, Sailed},
 };
@@ -46,7 +47,10 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     };
     let (first, rest) = what.split_once(' ').unwrap_or((what, ""));
     let log = logs.first()?;
-    if matches!(first, "least" | "greatest" | "middle") && !rest.ends_with(" of navigated") {
+    if matches!(first, "least" | "greatest" | "middle")
+        && !rest.ends_with(" of navigated")
+        && !rest.contains(" at the point ")
+    {
         let each: Option<Vec<Option<f64>>> = logs.iter().map(|log| answer(rest, span, &[log])).collect();
         let mut each: Vec<f64> = each?.into_iter().flatten().map(|value| value * scale).collect();
         return Some(match first {
@@ -54,6 +58,9 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             "greatest" => each.iter().copied().reduce(f64::max),
             _ => (!each.is_empty()).then(|| quantile(&mut each, 0.5)),
         });
+    }
+    if let Some((quantity, point)) = rest.split_once(" at the point ") {
+        return Some(inspected(first, quantity, point, span, log)?.map(|value| value * scale));
     }
     if let Some((_, over)) = rest.split_once(" over ") {
         return compared(first, over, logs, span);
@@ -125,6 +132,16 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             statistic(name, values)?.map(|value| value * scale)
         }
     })
+}
+
+/// `NAME QUANTITY at the point OBJECT/POINT`: over the frames that have the point in view.
+fn inspected(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let own = log.sample(span).flat_map(|frame| &frame.inspected).filter(|seen| looked::name(seen) == point);
+    if (name, quantity) == ("count", "views") {
+        return Some(Some(own.count() as f64));
+    }
+    let quantity = Looked::named(quantity)?;
+    statistic(name, own.filter_map(|seen| quantity.of(seen)).collect())
 }
 
 fn value(row: Row<'_>, field: Field) -> Option<f64> {

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_log::{FrameTimes, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader};
+use seafix_log::{FrameTimes, InspectedPoint, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader};
 
 use crate::{ReportError, disparity, place};
 
@@ -31,6 +31,7 @@ pub(super) struct Seen {
     pub(super) times: FrameTimes,
     pub(super) truth: Option<[f64; 3]>,
     pub(super) navigation: Option<Box<NavigationRecord>>,
+    pub(super) inspected: Vec<InspectedPoint>,
     /// Key points, points, candidates, identified, used.
     pub(super) marks: [usize; 5],
     /// Attempts, with the number of their candidates and where they put the camera.
@@ -93,6 +94,7 @@ impl Log {
                 stamp_ns: frame.stamp_ns,
                 times: frame.times,
                 navigation: frame.navigation,
+                inspected: frame.inspected,
                 truth: frame
                     .truth
                     .as_ref()

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use seafix_log::{
-    Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, ModelPoint, Outcome,
-    Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TargetTimes, TrialHeader, TruthRecord, Writer,
+    Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, InspectedPoint,
+    ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TargetTimes, TrialHeader,
+    TruthRecord, Writer,
 };
 
 const EYE: [[f64; 4]; 4] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
@@ -187,6 +188,15 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         },
         inputs: None,
         navigation: None,
+        inspected: (0..number % 3)
+            .map(|k| InspectedPoint {
+                object: target.id.clone(),
+                point: ["panel", "valve over of <2>"][k as usize].to_owned(),
+                at: [0.1, 0.0, distance],
+                believed: (!refused).then(|| [0.1 + 0.01 * worse * noise(seed + k), 0.0, distance]),
+                nees: (!refused).then(|| 3.0 + 2.0 * noise(seed + 9 + k)),
+            })
+            .collect(),
     }
 }
 

@@ -21,6 +21,7 @@ fn all_numbers_are_computed_again() {
     assert!(verified.numbers > 500, "{}", verified.numbers);
     // All cells of the tables of numbers carry a key: a bare number is none.
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.contains("title=\"q95 inspected_error at the point ") && page.contains("valve over of &lt;2&gt;"));
     let bare =
         page.split("<td class=\"n\">").skip(1).filter(|cell| cell.starts_with(|c: char| c.is_ascii_digit())).count();
     let axes = 4; // the distance stands in the tables of results

@@ -14,4 +14,6 @@ pub use settings::{Mission, PriorKind};
 #[cfg(test)]
 mod fault_tests;
 #[cfg(test)]
+mod inspection_tests;
+#[cfg(test)]
 mod tests;

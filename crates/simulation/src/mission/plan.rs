@@ -10,12 +10,12 @@ use seafix_vision::{Threads, Workspace};
 use super::{Instant, Mission, rig::Cameras};
 use crate::{
     draw::{Eye, Looks, Studio},
-    field::{Field, SitePlan},
+    field::{Changes, Field, SitePlan},
     optics::Lamp,
     sensors::{Navigation, Readings, Rough},
     stream::{Purpose, Stream},
     survey::SurveyErrors,
-    vehicle::{Track, Way},
+    vehicle::{Looker, RouteKind, Track, Way},
 };
 
 /// The first stamp: some time in 2023, so that stamps look like those of a real log.
@@ -39,7 +39,7 @@ pub struct PlannedMission {
     /// What the sensors say, and where the route leads.
     navigation: Navigation,
     way: Way,
-    times: Vec<f64>,
+    pub(super) times: Vec<f64>,
     /// Memories of rendering, one for each that renders at once.
     memories: Mutex<Vec<Workspace>>,
 }
@@ -50,7 +50,18 @@ impl PlannedMission {
         let field = Field::new(plan, &settings.changes, errors, seed);
         let cameras = settings.rig.build()?;
         let body_from_camera = mount(settings.rig.ahead_deg, settings.rig.at);
-        let way = Way::new(&settings.route, &field)?;
+        let studio = build_studio(settings, &cameras, seed, dive);
+        let looker = Looker {
+            rig: &cameras.told,
+            body_from_camera,
+            parts: parts(&cameras, &studio).into_iter().map(|(_, at)| at).collect(),
+        };
+        // An inspection is planned by the site as it was built, which the changes of the field are not known to.
+        let built = (settings.route.kind == RouteKind::Inspection).then(|| {
+            let exact = SurveyErrors { model: 0.0, survey: 0.0 };
+            Field::new(plan, &Changes::default(), exact, seed)
+        });
+        let way = Way::new(&settings.route, built.as_ref().unwrap_or(&field), &looker)?;
         let last = settings.start
             + if settings.rate > 0.0 {
                 (settings.frames - 1) as f64 / settings.rate
@@ -76,7 +87,6 @@ impl PlannedMission {
             settings.vehicle.travel(&way, last + 0.2, &place, &field.bed, &settings.current, (seed, dive));
         let until = last + 0.1;
         let navigation = Navigation::new(&settings.sensors, &settings.faults, &track, &field, until, (seed, dive));
-        let studio = build_studio(settings, &cameras, seed, dive);
         let planned = Self {
             settings: settings.clone(),
             seed,
@@ -205,13 +215,7 @@ impl PlannedMission {
     /// Whether the vehicle, its cameras or its lamps come too near to anything.
     fn collision(&self, last: f64) -> Result<(), String> {
         let clearance = self.settings.clearance;
-        let lamps = self.studio.left.lamps.iter().enumerate();
-        let right = self.cameras.right_from_left.inverse().translation();
-        let parts: Vec<(String, Vector3<f64>)> =
-            [("the left camera".to_owned(), Vector3::zeros()), ("the right camera".to_owned(), right)]
-                .into_iter()
-                .chain(lamps.map(|(k, lamp)| (format!("lamp {k}"), Vector3::from(lamp.at))))
-                .collect();
+        let parts = parts(&self.cameras, &self.studio);
         let places = |time: f64| {
             let camera = self.camera(time);
             parts.iter().map(|(_, p)| camera.rotation() * p + camera.translation()).collect::<Vec<_>>()
@@ -251,6 +255,16 @@ impl PlannedMission {
         }
         Ok(())
     }
+}
+
+/// What must not touch anything, in the left camera's frame: both cameras, then the lamps.
+fn parts(cameras: &Cameras, studio: &Studio) -> Vec<(String, Vector3<f64>)> {
+    let lamps = studio.left.lamps.iter().enumerate();
+    let right = cameras.right_from_left.inverse().translation();
+    [("the left camera".to_owned(), Vector3::zeros()), ("the right camera".to_owned(), right)]
+        .into_iter()
+        .chain(lamps.map(|(k, lamp)| (format!("lamp {k}"), Vector3::from(lamp.at))))
+        .collect()
 }
 
 /// The cameras look down and `ahead` degrees forward: right in the image is starboard, its lower edge is aft.

@@ -2,12 +2,14 @@
 
 mod controller;
 mod current;
+mod inspection;
 mod model;
 mod route;
 mod track;
 
 pub use controller::{Vehicle, VehicleKind};
 pub use current::Current;
+pub(crate) use inspection::Looker;
 pub(crate) use route::Way;
 pub use route::{Route, RouteKind};
 #[cfg(test)]

@@ -4,10 +4,11 @@ use nalgebra::{Vector2, Vector3};
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
+use super::{Looker, inspection};
 use crate::field::Field;
 
 /// Half of the stretch over which corners of the way are rounded (m).
-const ROUNDING: f64 = 0.8;
+pub(super) const ROUNDING: f64 = 0.8;
 /// Samples of that stretch.
 const SAMPLES: i32 = 16;
 
@@ -26,6 +27,8 @@ pub enum RouteKind {
     Approach,
     /// Through `waypoints`.
     Waypoints,
+    /// To a view of each point of interest of the site, or of `object`, from `stand-off`, with a rest at each.
+    Inspection,
 }
 
 /// Where the vehicle is meant to go.
@@ -34,7 +37,7 @@ pub enum RouteKind {
 pub struct Route {
     /// The kind of way.
     pub kind: RouteKind,
-    /// Height of the cameras above the mean bed (m).
+    /// Height of the cameras above the mean bed (m); on an inspection between views that no straight way joins.
     pub altitude: f64,
     /// Speed over ground (m/s).
     pub speed: f64,
@@ -44,8 +47,14 @@ pub struct Route {
     pub spacing: f64,
     /// Radius of an orbit (m).
     pub radius: f64,
-    /// The object of an orbit or approach; empty is the site's own.
+    /// The object of an orbit or approach, empty is the site's own; of an inspection, empty is all.
     pub object: String,
+    /// From a point of interest to the left camera that looks at it (m).
+    pub stand_off: f64,
+    /// How far an inspection keeps from the objects' shells, and from all else (m).
+    pub clearance: f64,
+    /// Rest at each view (s).
+    pub hold: f64,
     /// North, east, height above the mean bed (m), one after the other.
     pub waypoints: Vec<[f64; 3]>,
 }
@@ -60,6 +69,9 @@ impl Default for Route {
             spacing: 3.0,
             radius: 1.5,
             object: String::new(),
+            stand_off: 1.5,
+            clearance: 0.5,
+            hold: 4.0,
             waypoints: Vec::new(),
         }
     }
@@ -75,6 +87,9 @@ impl Route {
         within("length", self.length, 0.0, 1e5)?;
         within("spacing", self.spacing, 0.2, 100.0)?;
         within("radius", self.radius, 0.2, 100.0)?;
+        within("stand-off", self.stand_off, 0.2, 100.0)?;
+        within("clearance", self.clearance, 0.0, 100.0)?;
+        within("hold", self.hold, 0.0, 600.0)?;
         for (k, point) in self.waypoints.iter().enumerate() {
             let fine = point.iter().all(|x| x.abs() < 1e5) && point[2] > 0.0;
             let name = format!("route.waypoints[{k}]");
@@ -88,11 +103,13 @@ impl Route {
 /// A way in the world: a line through places, with a place to look at or the way ahead as the heading.
 #[derive(Debug, Clone)]
 pub(crate) struct Way {
-    places: Vec<Vector3<f64>>,
-    /// Length of the way up to each place.
-    lengths: Vec<f64>,
-    look_at: Option<Vector2<f64>>,
-    speed: f64,
+    pub(super) places: Vec<Vector3<f64>>,
+    /// Length of the way up to each place; between two that are one, of a rest.
+    pub(super) lengths: Vec<f64>,
+    /// The heading at each place, none jumping by more than half a turn; empty where places do not say.
+    pub(super) headings: Vec<f64>,
+    pub(super) look_at: Option<Vector2<f64>>,
+    pub(super) speed: f64,
 }
 
 /// Where the vehicle should be, and how it should move.
@@ -104,20 +121,20 @@ pub(crate) struct Goal {
 }
 
 impl Way {
-    pub(crate) fn new(route: &Route, field: &Field) -> Result<Self, String> {
+    /// The way over a field, by the cameras and lamps of `looker`.
+    pub(crate) fn new(route: &Route, field: &Field, looker: &Looker<'_>) -> Result<Self, String> {
         let depth = field.bed.depth();
         let over = |p: Vector2<f64>, height: f64| Vector3::new(p.x, p.y, depth - height);
         let centres: Vec<Vector2<f64>> = field.objects.iter().map(|o| o.centroid().xy()).collect();
-        let chosen = if route.object.is_empty() {
-            field.told.frame
-        } else {
-            let found = field.told.objects.iter().position(|o| o.id == route.object);
+        let named = field.told.objects.iter().position(|o| o.id == route.object);
+        if named.is_none() && !route.object.is_empty() {
             let names: Vec<&str> = field.told.objects.iter().map(|o| o.id.as_str()).collect();
-            found.ok_or_else(|| format!("route.object = `{}`; give one of {}", route.object, names.join(", ")))?
-        };
-        let (centre, altitude) = (centres[chosen], route.altitude);
+            return Err(format!("route.object = `{}`; give one of {}", route.object, names.join(", ")));
+        }
+        let (centre, altitude) = (centres[named.unwrap_or(field.told.frame)], route.altitude);
         let mut look_at = None;
         let places = match route.kind {
+            RouteKind::Inspection => return inspection::way(route, named, field, looker),
             RouteKind::Waypoints => route.waypoints.iter().map(|w| over(Vector2::new(w[0], w[1]), w[2])).collect(),
             RouteKind::Tour => tour(&centres, route.length).into_iter().map(|p| over(p, altitude)).collect(),
             RouteKind::Lawnmower => {
@@ -151,21 +168,27 @@ impl Way {
         for pair in places.windows(2) {
             lengths.push(lengths[lengths.len() - 1] + (pair[1] - pair[0]).norm());
         }
-        Self { places, lengths, look_at, speed }
+        Self { places, lengths, headings: Vec::new(), look_at, speed }
     }
 
     /// The place after this length of the way.
     fn place(&self, s: f64) -> Vector3<f64> {
+        let (k, t) = self.between(s);
+        if t == 0.0 { self.places[k] } else { self.places[k] + (self.places[k + 1] - self.places[k]) * t }
+    }
+
+    /// The place before this length of the way, and what share of the stretch to the next is gone.
+    fn between(&self, s: f64) -> (usize, f64) {
         let last = self.places.len() - 1;
         let k = self.lengths.partition_point(|l| *l <= s);
         if k == 0 || last == 0 {
-            return self.places[0];
+            return (0, 0.0);
         }
         if k > last {
-            return self.places[last];
+            return (last, 0.0);
         }
         let (a, b) = (self.lengths[k - 1], self.lengths[k]);
-        self.places[k - 1] + (self.places[k] - self.places[k - 1]) * ((s - a) / (b - a))
+        (k - 1, (s - a) / (b - a))
     }
 
     /// The goal at a time (s): the mean of the way around its place, so that corners are round.
@@ -179,6 +202,18 @@ impl Way {
         let at = mean(s);
         const H: f64 = 0.05;
         let ahead = (mean(s + H) - mean(s - H)) / (2.0 * H);
+        if !self.headings.is_empty() {
+            let heading = |s: f64| {
+                let (k, t) = self.between(s);
+                if t == 0.0 {
+                    self.headings[k]
+                } else {
+                    self.headings[k] + (self.headings[k + 1] - self.headings[k]) * t
+                }
+            };
+            let sum: f64 = (-SAMPLES..=SAMPLES).map(|k| heading(s + f64::from(k) * step)).sum();
+            return Goal { at, velocity: ahead * self.speed, heading: sum / f64::from(2 * SAMPLES + 1) };
+        }
         // The way ahead, seen from a little farther, so that the heading stays defined at both ends.
         let far = self.place((s + 1.5).min(self.length())) - self.place((s - 1.5).max(0.0).min(self.length() - 1e-3));
         let look = self.look_at.map_or(far.xy(), |p| p - at.xy());
@@ -191,7 +226,7 @@ impl Way {
         &self.places
     }
 
-    /// Its length (m).
+    /// Its length (m), rests included.
     pub(crate) fn length(&self) -> f64 {
         self.lengths[self.lengths.len() - 1]
     }

@@ -1,0 +1,86 @@
+//! What the vehicle is there for: how far off it had the points of interest.
+
+use super::{
+    distinct, results,
+    tell::{self, Unit},
+};
+use crate::{
+    Key, Number, Summary,
+    document::{Block, Head, Section, Table, text},
+    looked::Looked,
+    run::{Inspected, Run, Trial},
+};
+
+/// The topic that the numbers come from.
+const TOPIC: &str = "/metrics/inspection";
+
+/// The section, where any point of interest came into view.
+pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+    let seen = |trial: &Trial| distinct(views(trial).map(|point| trial.inspected(point).to_owned()));
+    if run.trials.iter().all(|trial| views(trial).next().is_none()) {
+        return None;
+    }
+    let caption = text![
+        "Where the vehicle had each point of interest, in the frame of its left camera, against where it is: by the navigated pose, or without navigation by the frame’s fix; to an object that is not the pose’s own by the survey. In view: frames that have the point in both images, nothing known of what hides it. With a pose: those at which the vehicle knew one; the errors are over these. NEES: 3 for an honest covariance."
+    ];
+    let mut above = results::blank(summary, 1);
+    above.extend([
+        Head::over(2, "frames"),
+        Head::over(1, "range (m)"),
+        Head::over(3, "error (mm)"),
+        Head::over(1, "NEES"),
+    ]);
+    let mut below = results::heads(summary);
+    below.push(Head::words("point"));
+    below.extend(["in view", "with a pose", "median", "median", "p95", "most", "mean"].map(Head::numbers));
+    let mut table = Table { id: "inspection".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let mut names = seen(trial);
+        names.sort();
+        for (place, name) in names.iter().enumerate() {
+            let own = || views(trial).filter(|point| trial.inspected(point) == name);
+            let count = Key::of(trial, TOPIC, format!("count views at the point {name}"));
+            let mut line = results::cells(row);
+            line.push(name.clone().into());
+            line.push(Number::count(own().count(), count).into());
+            let all = |quantity| own().filter_map(move |point| point.get(quantity)).collect::<Vec<f64>>();
+            let said = |statistic, quantity, unit, decimals| {
+                number(trial, name, statistic, quantity, all(quantity), (unit, decimals))
+            };
+            line.push(said("sampled", Looked::Error, Unit::Plain, 0).into());
+            line.push(said("median", Looked::Range, Unit::Plain, 2).into());
+            for statistic in ["median", "q95", "greatest"] {
+                line.push(said(statistic, Looked::Error, Unit::Millimetres, 1).into());
+            }
+            line.push(said("mean", Looked::Nees, Unit::Plain, 1).into());
+            table.line(place == 0 && results::breaks(summary, index), line);
+        }
+    }
+    Some(Section::new("Inspection").with([Block::Table(table)]))
+}
+
+/// Each point of interest in view of each frame.
+fn views(trial: &Trial) -> impl Iterator<Item = &Inspected> {
+    trial.sample().flat_map(|frame| &frame.inspected)
+}
+
+/// A statistic of a quantity of one point.
+fn number(
+    trial: &Trial,
+    point: &str,
+    statistic: &str,
+    quantity: Looked,
+    mut values: Vec<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let n = values.len();
+    let value = match statistic {
+        "sampled" => Some(n as f64),
+        "greatest" => values.iter().copied().reduce(f64::max),
+        _ if n == 0 => None,
+        "mean" => Some(values.iter().sum::<f64>() / n as f64),
+        "median" => Some(seafix_evaluation::quantile(&mut values, 0.5)),
+        _ => Some(seafix_evaluation::quantile(&mut values, 0.95)),
+    };
+    tell::inspected(trial, statistic, (quantity, point), value, (unit, decimals))
+}

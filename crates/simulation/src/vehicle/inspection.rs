@@ -1,0 +1,350 @@
+//! The way of an inspection: each point of interest is looked at from a stand-off, from as near to its normal as the cameras,
+//! which look where they are mounted, and the bodies around it let them.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use seafix_geometry::{Body, Camera, Point, StereoRig, Transform, World, so3};
+use seafix_referencing::Shell;
+
+use super::route::{Goal, ROUNDING, Route, Way};
+use crate::field::Field;
+
+/// No view is farther from a point's normal than this (degrees).
+const OBLIQUE_DEG: i32 = 60;
+/// Views are sought on rings about the normal, so far apart (degrees), and at so many places of each.
+const RING_DEG: i32 = 5;
+const PLACES: i32 = 24;
+/// Headings that are tried at each place.
+const HEADINGS: i32 = 4;
+/// A point that is looked at is this share of the image's shorter side away from its border.
+const BORDER: f64 = 0.1;
+/// So much of the line of sight before the point may be hidden (m): the point's own relief.
+const RELIEF: f64 = 0.01;
+/// Between two places of a leg that are held against the bodies (m).
+const STEP: f64 = 0.1;
+/// How far above the altitude the vehicle may have to go from one view to the next (m).
+const RAISED: [f64; 5] = [0.0, 1.0, 2.0, 4.0, 8.0];
+
+/// What looks at the points: the cameras as they are mounted, and what else must not touch anything.
+#[derive(Debug, Clone)]
+pub(crate) struct Looker<'a> {
+    pub(crate) rig: &'a StereoRig,
+    pub(crate) body_from_camera: Transform<Body, Camera>,
+    /// Cameras and lamps, in the left camera's frame (m).
+    pub(crate) parts: Vec<Vector3<f64>>,
+}
+
+/// Where the left camera is, and how the vehicle, which is level, is turned (rad from north to east).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stand {
+    at: Vector3<f64>,
+    heading: f64,
+}
+
+/// A point of interest in the world.
+struct Wanted {
+    /// Its object and its name.
+    name: String,
+    at: Vector3<f64>,
+    normal: Vector3<f64>,
+}
+
+/// How many of the places about a point were refused, and why.
+#[derive(Debug, Clone, Copy, Default)]
+struct Refused {
+    touching: usize,
+    outside: usize,
+    hidden: usize,
+    under: usize,
+}
+
+/// The way along the points of interest of all objects, or of one. `field` is the site as it was built: what a vehicle knows
+/// of it when it plans.
+///
+/// The views are gone in the order that is short, by nearest neighbours and exchanges; from one to the next straight where
+/// that keeps clear, else up to the altitude of the route, over, and down again.
+pub(super) fn way(route: &Route, only: Option<usize>, field: &Field, looker: &Looker<'_>) -> Result<Way, String> {
+    let ground = Ground::new(route, field, looker);
+    let wanted = wanted(only, field);
+    if wanted.is_empty() {
+        let whose = only.map_or_else(|| "the site".to_owned(), |o| format!("`{}`", field.told.objects[o].id));
+        return Err(format!(
+            "route.kind = `inspection`; {whose} has no point to inspect: give it an [[object.interest]] in the site file"
+        ));
+    }
+    let views: Vec<Stand> = wanted.iter().map(|point| ground.view(point)).collect::<Result<_, _>>()?;
+    let order = short(&views);
+    let rest = 2.0 * ROUNDING + route.hold * route.speed;
+    let mut way = Along::new(views[order[0]], rest);
+    for pair in order.windows(2) {
+        let (a, b) = (&views[pair[0]], &views[pair[1]]);
+        let names = [pair[0], pair[1]].map(|k| &wanted[k].name);
+        for corner in ground.leg(a, b, names)? {
+            way.go(corner);
+            // At rest a corner is not cut.
+            way.rest(2.0 * ROUNDING);
+        }
+        way.rest(route.hold * route.speed);
+    }
+    Ok(way.finish(route.speed))
+}
+
+/// The points of interest, in the world as it was built; one without a normal is looked at from above.
+fn wanted(only: Option<usize>, field: &Field) -> Vec<Wanted> {
+    let objects = field.told.objects.iter().zip(&field.world_from_object).enumerate();
+    let chosen = objects.filter(|(o, _)| only.is_none_or(|one| one == *o));
+    let points = chosen.flat_map(|(_, (object, pose))| object.interest.iter().map(move |point| (object, pose, point)));
+    let of = |(object, pose, point): (&seafix_referencing::SiteObject, &Transform<World, _>, _)| {
+        let point: &seafix_referencing::Interest = point;
+        Wanted {
+            name: format!("{}/{}", object.id, point.id),
+            at: (*pose * point.at).coords,
+            normal: point.normal.map_or_else(|| -Vector3::z(), |normal| pose.rotation() * normal),
+        }
+    };
+    points.map(of).collect()
+}
+
+/// What stands there, and how near one may come.
+struct Ground<'a> {
+    route: &'a Route,
+    field: &'a Field,
+    looker: &'a Looker<'a>,
+    shells: Vec<Shell<World>>,
+    /// The depth of the altitude (m).
+    cruise: f64,
+}
+
+impl<'a> Ground<'a> {
+    fn new(route: &'a Route, field: &'a Field, looker: &'a Looker<'a>) -> Self {
+        let shells = field
+            .objects
+            .iter()
+            .filter_map(|object| Shell::around(object.points.iter().map(|point| Point::from(point.at))))
+            .collect();
+        Self { route, field, looker, shells, cruise: field.bed.depth() - route.altitude }
+    }
+
+    /// world_from_camera of a stand, its turn.
+    fn turned(&self, stand: &Stand) -> UnitQuaternion<f64> {
+        so3::exp(&(Vector3::z() * stand.heading)) * self.looker.body_from_camera.rotation()
+    }
+
+    /// Whether every camera and lamp keeps clear of the shells, the bodies and the bed.
+    fn clear(&self, stand: &Stand) -> bool {
+        let (turn, clearance) = (self.turned(stand), self.route.clearance);
+        self.looker.parts.iter().all(|part| {
+            let at = stand.at + turn * part;
+            let place = Point::from(at);
+            !self.shells.iter().any(|shell| shell.grown_contains(&place, clearance))
+                && self.field.distance(&at, clearance.max(1e-6)).is_none()
+        })
+    }
+
+    /// Whether all of a straight leg from rest to rest is clear, the vehicle turning as it will.
+    fn clear_along(&self, a: &Stand, b: &Stand) -> bool {
+        let mut leg = Along::new(*a, 2.0 * ROUNDING);
+        leg.go(*b);
+        leg.rest(2.0 * ROUNDING);
+        let leg = leg.finish(1.0);
+        let steps = (leg.length() / STEP).ceil() as i32;
+        (0..=steps).all(|k| {
+            let Goal { at, heading, .. } = leg.at(leg.length() * f64::from(k) / f64::from(steps));
+            self.clear(&Stand { at, heading })
+        })
+    }
+
+    /// The view of a point nearest to its normal.
+    fn view(&self, point: &Wanted) -> Result<Stand, String> {
+        let mut refused = Refused::default();
+        let across = across_of(&point.normal);
+        let other = point.normal.cross(&across);
+        for degrees in (0..=OBLIQUE_DEG).step_by(RING_DEG as usize) {
+            let (sine, cosine) = libm::sincos(f64::from(degrees).to_radians());
+            let mut best: Option<(f64, Stand)> = None;
+            for place in 0..if degrees == 0 { 1 } else { PLACES } {
+                let (y, x) = libm::sincos(std::f64::consts::TAU * f64::from(place) / f64::from(PLACES));
+                let from = point.normal * cosine + (across * x + other * y) * sine;
+                if let Some((off, stand)) = self.stand(point, &from, &mut refused)
+                    && best.is_none_or(|(least, _)| off < least - 1e-9)
+                {
+                    best = Some((off, stand));
+                }
+            }
+            if let Some((_, stand)) = best {
+                return Ok(stand);
+            }
+        }
+        let Refused { touching, outside, hidden, under } = refused;
+        Err(format!(
+            "route: no clear view of `{}` at north {:.2}, east {:.2}, depth {:.2} m from {} m within {OBLIQUE_DEG}° of its normal: \
+             of the places around it {touching} are within {} m of a shell, a body or the bed, from {outside} it is out of the \
+             images, from {hidden} hidden, {under} have no free way up; change route.stand-off, route.clearance or rig.ahead-deg",
+            point.name, point.at.x, point.at.y, point.at.z, self.route.stand_off, self.route.clearance
+        ))
+    }
+
+    /// The best heading of a view from the direction `from`: how far from the middle of the view the point is then (rad).
+    fn stand(&self, point: &Wanted, from: &Vector3<f64>, refused: &mut Refused) -> Option<(f64, Stand)> {
+        let at = point.at + from * self.route.stand_off;
+        let ahead = -from.xy();
+        let straight = if ahead.norm() > 1e-6 { libm::atan2(ahead.y, ahead.x) } else { 0.0 };
+        let headings = (0..HEADINGS).map(|k| straight + std::f64::consts::TAU * f64::from(k) / f64::from(HEADINGS));
+        let mut seeing: Vec<(f64, Stand)> = headings
+            .filter_map(|heading| {
+                let stand = Stand { at, heading };
+                let seen: Point<Camera> = Point::from(self.turned(&stand).inverse() * (point.at - at));
+                let [w, h] = self.looker.rig.left().size().map(f64::from);
+                self.looker.rig.sees(&seen, BORDER * w.min(h))?;
+                Some((libm::atan2(seen.coords.xy().norm(), seen.coords.z), stand))
+            })
+            .collect();
+        seeing.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if seeing.is_empty() {
+            refused.outside += 1;
+            return None;
+        }
+        seeing.retain(|(_, stand)| self.clear(stand));
+        if seeing.is_empty() {
+            refused.touching += 1;
+            return None;
+        }
+        seeing.retain(|(_, stand)| {
+            // The first two parts are the cameras.
+            self.looker.parts.iter().take(2).all(|camera| {
+                let eye = stand.at + self.turned(stand) * camera;
+                let to = point.at + (eye - point.at).normalize() * RELIEF;
+                self.field.clear(&eye, &to)
+            })
+        });
+        if seeing.is_empty() {
+            refused.hidden += 1;
+            return None;
+        }
+        seeing.retain(|(_, stand)| self.clear_along(stand, &self.above(stand, self.cruise)));
+        if seeing.is_empty() {
+            refused.under += 1;
+        }
+        seeing.first().copied()
+    }
+
+    /// Straight above a place, at a depth; the place itself where it is higher.
+    fn above(&self, stand: &Stand, depth: f64) -> Stand {
+        Stand { at: Vector3::new(stand.at.x, stand.at.y, depth.min(stand.at.z)), ..*stand }
+    }
+
+    /// The places from one view to the next, the last included.
+    fn leg(&self, a: &Stand, b: &Stand, names: [&String; 2]) -> Result<Vec<Stand>, String> {
+        if self.clear_along(a, b) {
+            return Ok(vec![*b]);
+        }
+        for raised in RAISED {
+            let depth = self.cruise - raised;
+            let (up, down) = (self.above(a, depth), self.above(b, depth));
+            if self.clear_along(a, &up) && self.clear_along(&up, &down) && self.clear_along(&down, b) {
+                return Ok(vec![up, down, *b]);
+            }
+        }
+        Err(format!(
+            "route: no clear way from `{}` to `{}`, neither straight nor at {} m above the bed or up to {} m higher; raise \
+             route.altitude or lower route.clearance",
+            names[0],
+            names[1],
+            self.route.altitude,
+            RAISED[RAISED.len() - 1]
+        ))
+    }
+}
+
+/// Some unit vector across `normal`.
+fn across_of(normal: &Vector3<f64>) -> Vector3<f64> {
+    let axis = if normal.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
+    normal.cross(&axis).normalize()
+}
+
+/// An order in which the way through the views is short: by nearest neighbours, then by turning parts round while that helps.
+fn short(views: &[Stand]) -> Vec<usize> {
+    let n = views.len();
+    let far = |i: usize, k: usize| (views[i].at - views[k].at).norm();
+    let mut order = vec![0];
+    while order.len() < n {
+        let last = order[order.len() - 1];
+        let left = (0..n).filter(|k| !order.contains(k));
+        order.extend(left.min_by(|&i, &k| far(last, i).total_cmp(&far(last, k))));
+    }
+    // A part i..=k turned round changes the two legs at its ends; an end of the way has none.
+    loop {
+        let mut better = false;
+        for i in 0..n {
+            for k in i + 1..n {
+                let before = |i: usize| i.checked_sub(1).map(|before| order[before]);
+                let after = order.get(k + 1).copied();
+                let (first, last) = (order[i], order[k]);
+                let leg = |a: Option<usize>, b: usize| a.map_or(0.0, |a| far(a, b));
+                let was = leg(before(i), first) + leg(after, last);
+                let would = leg(before(i), last) + leg(after, first);
+                if would < was - 1e-9 {
+                    order[i..=k].reverse();
+                    better = true;
+                }
+            }
+        }
+        if !better {
+            return order;
+        }
+    }
+}
+
+/// A way in the making.
+struct Along {
+    places: Vec<Vector3<f64>>,
+    headings: Vec<f64>,
+    lengths: Vec<f64>,
+}
+
+impl Along {
+    /// From a view, with a rest there.
+    fn new(start: Stand, rest: f64) -> Self {
+        let mut way = Self { places: vec![start.at], headings: vec![start.heading], lengths: vec![0.0] };
+        way.rest(rest);
+        way
+    }
+
+    fn push(&mut self, at: Vector3<f64>, heading: f64, length: f64) {
+        self.places.push(at);
+        self.headings.push(heading);
+        self.lengths.push(self.lengths[self.lengths.len() - 1] + length);
+    }
+
+    /// On to a place; headings go on the shorter way round.
+    fn go(&mut self, to: Stand) {
+        let (at, heading) = (self.places[self.places.len() - 1], self.headings[self.headings.len() - 1]);
+        let turn = libm::remainder(to.heading - heading, std::f64::consts::TAU);
+        self.push(to.at, heading + turn, (to.at - at).norm());
+    }
+
+    fn rest(&mut self, length: f64) {
+        self.push(self.places[self.places.len() - 1], self.headings[self.headings.len() - 1], length);
+    }
+
+    fn finish(self, speed: f64) -> Way {
+        Way { places: self.places, lengths: self.lengths, headings: self.headings, look_at: None, speed }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_is_short() {
+        // Places of a line, mixed up: the way through them is the line, from one end to the other.
+        let stand = |x: f64| Stand { at: Vector3::new(x, 0.0, 0.0), heading: 0.0 };
+        let places = [3.0, 0.0, 5.0, 1.0, 4.0, 2.0];
+        let order = short(&places.map(stand));
+        let mut way: Vec<f64> = order.iter().map(|&k| places[k]).collect();
+        if way[0] > way[5] {
+            way.reverse();
+        }
+        assert_eq!(way, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    }
+}
