@@ -5,15 +5,16 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Matrix4, Matrix6, Quaternion, UnitQuaternion};
 use seafix_evaluation::Solved;
 use seafix_geometry::{
-    Covariance6, Frame, MeasuredPoint, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint,
+    Covariance6, Frame, MeasuredPoint, Object, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint,
+    World,
 };
 use seafix_log::{AnswerRecord, CloudPoint, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
 use seafix_navigation::{Device, Reading};
-use seafix_referencing::{ModelPoint, Prior, PriorBound, Site, problem_file::CoherenceProblem};
+use seafix_referencing::{ModelPoint, Prior, PriorBound, Site, Target, problem_file::CoherenceProblem};
 use seafix_vision::Image;
 
 use crate::{
-    record::{rows3, rows6},
+    record::{model, rows3, rows6},
     source::{Eyes, Sight, Told, TrueAnswer, Truth, WorldPrior},
 };
 
@@ -50,7 +51,7 @@ fn matches(pairs: &[(usize, usize)]) -> Vec<[u32; 2]> {
 }
 
 /// What a log holds of a sight and the cloud that was made of it.
-pub(crate) fn inputs(sight: &Sight, cloud: &[MeasuredPoint]) -> Inputs {
+pub(crate) fn inputs(sight: &Sight, cloud: &[MeasuredPoint], targets: &[Target]) -> Inputs {
     let whole = |image: &Image| image.pixels().iter().all(|&level| level.fract() == 0.0);
     Inputs {
         prior: sight.prior.map(|prior| (pose(&prior.world_from_camera), rows6(&prior.covariance.matrix))),
@@ -64,7 +65,7 @@ pub(crate) fn inputs(sight: &Sight, cloud: &[MeasuredPoint]) -> Inputs {
             _ => None,
         },
         problem: match &sight.told {
-            Told::Problem(object, problem) => Some(problem_record(*object, problem)),
+            Told::Problem(problem) => targets.first().map(|object| problem_record(object, problem)),
             _ => None,
         },
         truth: None,
@@ -99,9 +100,9 @@ pub(crate) fn readings(inputs: &Inputs) -> Result<Vec<Reading>, String> {
     inputs.readings.iter().map(reading).collect()
 }
 
-fn problem_record(object: usize, problem: &CoherenceProblem) -> ProblemRecord {
+fn problem_record(object: &Target, problem: &CoherenceProblem) -> ProblemRecord {
     ProblemRecord {
-        object: object as u32,
+        model: model(object),
         delta: problem.delta,
         prior: problem.prior.as_ref().and_then(|prior| match prior.bound {
             PriorBound::Box(half) => Some((pose(&prior.object_from_camera), half)),
@@ -149,28 +150,26 @@ pub(crate) fn cloud(points: &[CloudPoint], inputs: &Inputs) -> Option<Vec<Measur
         .collect()
 }
 
-/// What was told; a problem's model is that of its object.
-pub(crate) fn told(inputs: &Inputs, site: &Site, cloud: &[MeasuredPoint]) -> Told {
+/// What was told.
+pub(crate) fn told(inputs: &Inputs, cloud: &[MeasuredPoint]) -> Told {
     if let Some(names) = &inputs.names {
         return Told::Names(indices(names));
     }
     let Some(problem) = &inputs.problem else { return Told::Nothing };
-    let index = problem.object as usize;
-    let Some(object) = site.objects.get(index) else { return Told::Nothing };
-    let model: Vec<ModelPoint> = object.points.clone();
+    let point = |point: &seafix_log::ModelPoint| ModelPoint {
+        sigma: point.sigma,
+        ..ModelPoint::exact(&*point.id, Point::from(point.at))
+    };
     let prior =
         |(pose, half): &(ExactPose, f64)| Prior { object_from_camera: transform(pose), bound: PriorBound::Box(*half) };
-    Told::Problem(
-        index,
-        Arc::new(CoherenceProblem {
-            id: object.id.clone(),
-            model,
-            cloud: cloud.to_vec(),
-            delta: problem.delta,
-            prior: problem.prior.as_ref().map(prior),
-            putative: problem.putative.as_deref().map(index_pairs),
-        }),
-    )
+    Told::Problem(Arc::new(CoherenceProblem {
+        id: problem.model.id.clone(),
+        model: problem.model.points.iter().map(point).collect(),
+        cloud: cloud.to_vec(),
+        delta: problem.delta,
+        prior: problem.prior.as_ref().map(prior),
+        putative: problem.putative.as_deref().map(index_pairs),
+    }))
 }
 
 /// The rough pose.
@@ -179,9 +178,9 @@ pub(crate) fn prior(inputs: &Inputs) -> Option<WorldPrior> {
     Some(WorldPrior { world_from_camera: transform(pose), covariance: covariance6(covariance) })
 }
 
-/// The truth that a log holds.
-pub(crate) fn truth_of(state: &TrueState, site: &Site) -> Truth {
-    let mut world_from_object: Vec<_> = site.objects.iter().map(|object| object.world_from_object).collect();
+/// The truth that a log holds, of objects that were `surveyed`.
+pub(crate) fn truth_of(state: &TrueState, surveyed: Vec<Option<Transform<World, Object>>>) -> Truth {
+    let mut world_from_object = surveyed;
     for (index, place) in &state.moved {
         if let Some(known) = world_from_object.get_mut(*index as usize) {
             *known = place.as_ref().map(transform);

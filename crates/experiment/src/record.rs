@@ -25,7 +25,7 @@ const NAMED: &str = "named";
 /// What is the same for every frame of `trial`.
 pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets: &[Target]) -> TrialHeader {
     let site = passage.site();
-    let world_from_site = site.frame_object().world_from_object;
+    let world_from_site = site.objects.get(site.frame).and_then(|object| object.world_from_object);
     let pipeline = trial.stages.settings();
     let prior = passage.prior_sigma();
     TrialHeader {
@@ -44,7 +44,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
             .collect(),
         components: components(&trial.resolved, passage),
         configuration: toml::to_string(&trial.resolved).expect("a resolved experiment is plain values"),
-        site: site.to_toml(),
+        site: if site.objects.is_empty() { String::new() } else { site.to_toml() },
         source: passage.name().to_owned(),
         rig: rig(passage.rig()),
         body_from_camera: passage.body_from_camera().rows(),
@@ -52,18 +52,12 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
         targets: targets
             .iter()
             .map(|target| TargetModel {
-                id: target.name.clone(),
                 site_from_object: match (world_from_site, target.world_from_object) {
                     (Some(site), Some(object)) => Some((site.inverse() * object).rows()),
                     _ => (pipeline.target == TargetKind::Site || target.name == site.frame_object().id)
                         .then(|| Transform::<Object, Object>::identity().rows()),
                 },
-                points: target
-                    .points
-                    .iter()
-                    .map(|point| ModelPoint { id: point.id.clone(), at: point.at.coords.into(), sigma: point.sigma })
-                    .collect(),
-                alert_limit: alert_limit(target.diameter()),
+                ..model(target)
             })
             .collect(),
         prior_position_sigma: prior.map(|(position, _)| position),
@@ -71,6 +65,21 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
         pixel_sigma: passage.pixel_sigma().or_else(|| pipeline.pixel_sigma()),
         seeds: vec![("experiment".to_owned(), trial.resolved.seed)],
         versions: versions(),
+    }
+}
+
+/// What is searched for, wherever it stands.
+pub(crate) fn model(target: &Target) -> TargetModel {
+    let point = |point: &seafix_referencing::ModelPoint| ModelPoint {
+        id: point.id.clone(),
+        at: point.at.coords.into(),
+        sigma: point.sigma,
+    };
+    TargetModel {
+        id: target.name.clone(),
+        site_from_object: None,
+        points: target.points.iter().map(point).collect(),
+        alert_limit: alert_limit(target.diameter()),
     }
 }
 
@@ -107,8 +116,14 @@ pub(crate) fn frame(
 }
 
 /// Adds what only a log holds: what was seen, and what the method was given.
-pub(crate) fn complete(record: &mut FrameRecord, sight: &Sight, sighting: &Sighting, images: ImagesLogged) {
-    let mut inputs = exact::inputs(sight, &sighting.cloud);
+pub(crate) fn complete(
+    record: &mut FrameRecord,
+    sight: &Sight,
+    sighting: &Sighting,
+    targets: &[Target],
+    images: ImagesLogged,
+) {
+    let mut inputs = exact::inputs(sight, &sighting.cloud, targets);
     inputs.exact_images &= images == ImagesLogged::All;
     record.inputs = Some(Box::new(inputs));
     if let Eyes::Pair(left, right) = &sight.eyes {

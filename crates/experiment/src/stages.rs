@@ -113,15 +113,12 @@ impl Stages {
             .zip(priors)
             .enumerate()
             .filter_map(|(index, (target, prior))| {
+                let prior = prior.as_ref();
                 let mut attempt = match &sight.told {
-                    Told::Problem(object, problem) if *object == index => self.answer(index, target, problem, rng),
-                    Told::Problem(..) => return None,
-                    told => {
-                        let prior = prior.as_ref();
-                        match told {
-                            Told::Names(names) => self.named(index, target, &cloud, names, prior, rig)?,
-                            _ => self.attempt(index, target, &cloud, prior, &in_view(target, prior, rig)?, rig, rng),
-                        }
+                    Told::Problem(problem) => self.answer(index, target, problem, rng),
+                    Told::Names(names) => self.named(index, target, &cloud, names, prior, rig)?,
+                    Told::Nothing => {
+                        self.attempt(index, target, &cloud, prior, &in_view(target, prior, rig)?, rig, rng)
                     }
                 };
                 attempt.times.total_ms = Some(common + milliseconds(attempt.started));

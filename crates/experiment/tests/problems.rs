@@ -4,7 +4,10 @@
 
 use std::{fs, path::Path};
 
-use seafix_experiment::{Options, Plan, Silent, run};
+use seafix_experiment::{
+    Options, Plan, Silent, run,
+    source::{DrawnProblems, Eyes, Source},
+};
 use seafix_log::{Evaluation, FrameRecord, Outcome, TargetRecord, TargetTimes, read};
 use seafix_simulation::families::{Drawn, Family, Presence};
 use tempfile::TempDir;
@@ -84,6 +87,48 @@ fn truth_is_the_judge_s_alone() {
         assert_eq!(known.evaluation == other.evaluation, ![4, 6].contains(&index), "problem {index}");
     }
     assert_eq!(other[6].evaluation.wrong, None);
+}
+
+#[test]
+fn every_frame_has_an_object_of_its_own() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("e.toml");
+    let write = |more: &str| {
+        let source = "source = { name = 'drawn-problems', frames = 5, first = 3 }";
+        fs::write(
+            &file,
+            format!("question = 'Which?'\nseed = 1\n{source}\n[pipeline]\nsolver = 'mahalanobis'\n{more}"),
+        )
+        .unwrap();
+        Plan::read(&file, &[]).unwrap()
+    };
+    let (plan, out) = (write(""), folder.path().join("out"));
+    run(&plan, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
+    let log = read(&out.join(format!("{}.mcap", plan.trials[0].name))).unwrap();
+    assert!(log.header.targets.is_empty() && log.header.site.is_empty());
+    for (frame, number) in log.frames.iter().zip(3..) {
+        let drawn = Drawn::new(Family::A, 1, number, Presence::Present).problem;
+        let model = frame.model(&log.header, &frame.targets[0].object).unwrap();
+        assert_eq!(model.id, drawn.id);
+        assert_eq!(model.points.iter().map(|point| point.at).collect::<Vec<_>>(), drawn.model);
+    }
+    // What is no object by itself is nothing that a problem could be about.
+    for kind in ["site", "joint"] {
+        let said = run(&write(&format!("target = '{kind}'")), &Options::into(folder.path().join(kind)), &Silent);
+        assert!(said.unwrap_err().to_string().contains("use target = \"object\""));
+    }
+}
+
+#[test]
+fn of_any_number_of_problems_only_those_looked_at_are_drawn() {
+    let source = DrawnProblems { frames: 1_000_000_000, ..DrawnProblems::default() };
+    let passage = source.open(1, Path::new(".")).unwrap();
+    let last = passage.frames() - 1;
+    let drawn = Drawn::new(Family::A, 1, last as u64, Presence::Present);
+    let (Eyes::Points(cloud), Some(truth)) = (passage.sight(last).unwrap().eyes, passage.truth(last)) else {
+        panic!("points and truth")
+    };
+    assert_eq!((cloud.len(), truth.answer.unwrap().pairs.len()), (drawn.problem.cloud.len(), drawn.truth.pairs.len()));
 }
 
 #[test]

@@ -60,10 +60,10 @@ pub(crate) fn frame(header: &TrialHeader, frame: &FrameRecord, last: Option<u64>
 
 /// What is wrong with the row of one target.
 fn target(header: &TrialHeader, frame: &FrameRecord, target: &TargetRecord) -> Result<(), String> {
-    let points = match header.targets.iter().find(|model| model.id == target.object) {
+    let points = match frame.model(header, &target.object) {
         Some(model) => model.points.len(),
         None if target.object.is_empty() => 0,
-        None => return Err("the header knows no such target".to_owned()),
+        None => return Err("neither the header nor the frame knows such a target".to_owned()),
     };
     if target.candidates.len() > points {
         return Err(format!("{} lists of candidates for {points} points", target.candidates.len()));

@@ -92,9 +92,9 @@ impl Frames {
 fn message(recording: &Recording, entry: &Entry, wanted: bool) -> Result<Message, LogError> {
     let topic = &recording.topics()[entry.topic];
     Ok(Message {
-        topic: topic.name.clone(),
-        schema: topic.schema.clone(),
-        encoding: topic.encoding.clone(),
+        topic: topic.name.as_str().into(),
+        schema: topic.schema.as_str().into(),
+        encoding: topic.encoding.as_str().into(),
         sequence: entry.sequence,
         log_time: entry.log_time,
         data: if wanted { recording.message(entry)? } else { Vec::new() },

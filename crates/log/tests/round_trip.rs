@@ -6,7 +6,7 @@ mod synthetic;
 
 use std::fs;
 
-use seafix_log::{LogError, Reader, Totals, Writer, read};
+use seafix_log::{FrameRecord, LogError, Reader, Totals, Writer, read};
 
 #[test]
 fn every_record_comes_back() {
@@ -35,6 +35,29 @@ fn images_can_be_left_out() {
         assert_eq!(frame.unwrap(), expected);
     }
     assert!(reader.has_images());
+}
+
+#[test]
+fn frames_decoded_side_by_side_are_those_read_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.mcap");
+    // More than are decoded at a time.
+    synthetic::write(&path, 300);
+    let bare = |mut frame: FrameRecord| {
+        (frame.images, frame.inputs) = (None, None);
+        frame
+    };
+    let expected: Vec<FrameRecord> = read(&path).unwrap().frames.into_iter().map(bare).collect();
+    let mut all = Vec::new();
+    let mut reader = Reader::open(&path).unwrap().without_images().without_inputs();
+    reader.for_each_frame(|frame| all.push(frame)).unwrap();
+    assert_eq!(all, expected);
+    assert!(reader.has_images() && reader.totals().is_some());
+    assert!(reader.next().is_none());
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    let cut_off = Reader::open(&path).unwrap().for_each_frame(drop).unwrap_err();
+    assert!(matches!(cut_off, LogError::Truncated { .. }), "{cut_off}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Numbers that know where they come from.
 
-use std::{fmt, rc::Rc};
+use std::{fmt, sync::Arc};
 
 use crate::{format, run::Trial};
 
@@ -25,7 +25,7 @@ pub(crate) struct Number {
     pub(crate) text: String,
     /// What was rounded; `None` where nothing is known.
     pub(crate) value: Option<f64>,
-    pub(crate) key: Rc<Key>,
+    pub(crate) key: Arc<Key>,
 }
 
 impl Key {
@@ -93,7 +93,7 @@ fn unescape(text: &str) -> String {
 impl Number {
     /// A value with this many decimals; a dash where there is none.
     pub(crate) fn new(value: Option<f64>, decimals: usize, key: Key) -> Self {
-        Self { text: format::number(value, decimals), value, key: Rc::new(key) }
+        Self { text: format::number(value, decimals), value, key: Arc::new(key) }
     }
 
     /// A whole number.
@@ -103,7 +103,7 @@ impl Number {
 
     /// A probability, however small.
     pub(crate) fn probability(value: f64, key: Key) -> Self {
-        Self { text: format::probability(value), value: Some(value), key: Rc::new(key) }
+        Self { text: format::probability(value), value: Some(value), key: Arc::new(key) }
     }
 
     /// Another value in the way that `text` is printed.

@@ -1,10 +1,12 @@
 //! A run, as its logs have it.
 
 use std::{
+    collections::HashMap,
     fs,
     path::{Path, PathBuf},
 };
 
+use rayon::prelude::*;
 use seafix_log::{FrameRecord, LogError, Outcome, Reader, TargetRecord, Totals, TrialHeader};
 use sha2::{Digest, Sha256};
 
@@ -86,8 +88,8 @@ pub(crate) struct Attempt {
     pub(crate) points: u32,
     /// Where the left camera is in the world by this fix and the survey (m); NaN where unknown.
     pub(crate) estimate: [f64; 3],
-    object: u16,
-    reason: u16,
+    object: u32,
+    reason: u32,
     values: [f64; Field::ALL.len()],
 }
 
@@ -106,7 +108,9 @@ impl Run {
         if paths.is_empty() {
             return Err(ReportError::NoLogs(folder.to_owned()));
         }
-        let trials: Vec<Trial> = paths.into_iter().map(Trial::read).collect::<Result<_, _>>()?;
+        // What is wrong with the first of them is told first.
+        let trials: Vec<_> = paths.into_par_iter().map(Trial::read).collect();
+        let trials: Vec<Trial> = trials.into_iter().collect::<Result<_, _>>()?;
         // Tables have one set of columns, so all logs must be of one experiment.
         let keys = |trial: &Trial| trial.header.axes.iter().map(|axis| axis.key.clone()).collect::<Vec<_>>();
         if let Some(other) = trials.iter().find(|trial| keys(trial) != keys(&trials[0])) {
@@ -123,7 +127,7 @@ impl Run {
 
 impl Trial {
     fn read(path: PathBuf) -> Result<Self, LogError> {
-        let mut reader = Reader::open(&path)?.without_images();
+        let mut reader = Reader::open(&path)?.without_images().without_inputs();
         let mut trial = Self {
             label: path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             path,
@@ -139,10 +143,11 @@ impl Trial {
             words: vec![String::new()],
         };
         let mut digest = Sha256::new();
-        while let Some(frame) = reader.next().transpose()? {
-            trial.take(&frame);
+        let mut places = HashMap::from([(String::new(), 0)]);
+        reader.for_each_frame(|frame| {
+            trial.take(&frame, &mut places);
             results(&mut digest, &frame);
-        }
+        })?;
         trial.digest = digest.finalize().to_vec();
         // A detector is named where there were images, logged or not.
         trial.images = trial.frames.is_empty() || trial.header.components.iter().any(|c| c.stage == "detector");
@@ -153,7 +158,8 @@ impl Trial {
         Ok(trial)
     }
 
-    fn take(&mut self, frame: &FrameRecord) {
+    /// Takes in a frame; `places` are those of the words that are known.
+    fn take(&mut self, frame: &FrameRecord, places: &mut HashMap<String, u32>) {
         for error in disparity::errors(&self.header, frame) {
             self.disparity.0 += error * error;
             self.disparity.1 += 1;
@@ -163,7 +169,7 @@ impl Trial {
             if self.rows.is_empty() {
                 self.named = [target.search.clone(), target.solver.clone()];
             }
-            let (object, reason) = (self.word(&target.object), self.word(&target.reason));
+            let [object, reason] = [&target.object, &target.reason].map(|word| self.word(word, places));
             self.rows.push(Attempt {
                 outcome: target.outcome,
                 wrong: target.evaluation.wrong,
@@ -207,12 +213,14 @@ impl Trial {
     }
 
     /// The place of `word` among those known.
-    fn word(&mut self, word: &str) -> u16 {
-        let place = self.words.iter().position(|known| known == word).unwrap_or_else(|| {
-            self.words.push(word.to_owned());
-            self.words.len() - 1
-        });
-        u16::try_from(place).unwrap_or(u16::MAX)
+    fn word(&mut self, word: &str, places: &mut HashMap<String, u32>) -> u32 {
+        if let Some(place) = places.get(word) {
+            return *place;
+        }
+        let place = self.words.len() as u32;
+        self.words.push(word.to_owned());
+        places.insert(word.to_owned(), place);
+        place
     }
 
     /// The name of the log.

@@ -5,9 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use rayon::prelude::*;
+
 use crate::{
     ReportError, Summary, content,
-    document::{Document, Figure},
+    document::{Document, Figure, Table},
     print,
     run::Run,
 };
@@ -76,23 +78,20 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
 /// Everything that a report consists of.
 pub(crate) fn files(run: &Run, summary: &Summary, forms: Forms) -> Result<Vec<File>, ReportError> {
     let document = content::document(run, summary, forms.small)?;
-    let mut files: Vec<File> = Vec::new();
+    let html = || forms.html.then(|| print::html(&document, !forms.small).into_bytes());
+    let latex = || forms.latex.then(|| print::latex(&document).into_bytes());
+    let pdf = || forms.pdf.then(|| print::pdf(&document));
+    let drawn = || if forms.small { Vec::new() } else { figures(&document) };
+    let ((html, latex), (pdf, drawn)) = rayon::join(|| rayon::join(html, latex), || rayon::join(pdf, drawn));
+    let papers = [("report.html", html), ("report.tex", latex), ("report.pdf", pdf)];
+    let mut files: Vec<File> =
+        papers.into_iter().filter_map(|(name, bytes)| Some((name.to_owned(), bytes?))).chain(drawn).collect();
     let mut add = |name: String, bytes: Vec<u8>| files.push((name, bytes));
-    if forms.html {
-        add("report.html".to_owned(), print::html(&document, !forms.small).into_bytes());
-    }
-    if forms.latex {
-        add("report.tex".to_owned(), print::latex(&document).into_bytes());
-    }
-    if forms.pdf {
-        add("report.pdf".to_owned(), print::pdf(&document));
-    }
     if forms.small {
         kept(&document, &mut add);
         add("summary.txt".to_owned(), summary.to_string().into_bytes());
         return Ok(files);
     }
-    figures(&document, &mut add);
     for picture in document.pictures() {
         // In the page they are already; LaTeX asks for files, and the first is the report's face.
         if forms.latex || picture.id == "fix" {
@@ -126,15 +125,23 @@ fn main_figure(document: &Document) -> Option<&Figure> {
     order.find_map(|id| document.figures().find(|figure| figure.id == id))
 }
 
-fn figures(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
-    for figure in document.figures() {
-        add(format!("figures/{}.svg", figure.id), print::standalone(&figure.drawing).into_bytes());
-        add(format!("figures/{}.pdf", figure.id), print::figure_pdf(&figure.drawing));
-    }
-    for table in document.tables() {
-        add(format!("tables/{}.csv", table.id), print::csv(table).into_bytes());
-        add(format!("tables/{}.json", table.id), print::json(table).into_bytes());
-    }
+/// Figures and tables, each in both its forms.
+fn figures(document: &Document) -> Vec<File> {
+    let figures: Vec<&Figure> = document.figures().collect();
+    let figure = |figure: &&Figure| {
+        [
+            (format!("figures/{}.svg", figure.id), print::standalone(&figure.drawing).into_bytes()),
+            (format!("figures/{}.pdf", figure.id), print::figure_pdf(&figure.drawing)),
+        ]
+    };
+    let tables: Vec<&Table> = document.tables().collect();
+    let table = |table: &&Table| {
+        [
+            (format!("tables/{}.csv", table.id), print::csv(table).into_bytes()),
+            (format!("tables/{}.json", table.id), print::json(table).into_bytes()),
+        ]
+    };
+    figures.par_iter().flat_map_iter(figure).chain(tables.par_iter().flat_map_iter(table)).collect()
 }
 
 /// Removes what an earlier report left in `folder` and this one does not write.

@@ -25,9 +25,10 @@ impl Merge {
     pub(crate) fn execute(&self) -> Ended {
         let progress = Progress::new();
         signals::listen();
-        let finished = merge(&self.shards, &self.place.options(), &progress);
+        let options = self.place.options();
+        let finished = merge(&self.shards, &options, &progress);
         signals::end_at_once();
-        tell_of(&finished?)?;
+        tell_of(&finished?, options.threads)?;
         Ok(DONE)
     }
 }

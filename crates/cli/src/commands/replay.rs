@@ -63,7 +63,7 @@ impl Replayed {
         let finished = run(&plan, &options, &progress);
         signals::end_at_once();
         progress.end();
-        tell_of(&finished?)?;
+        tell_of(&finished?, options.threads)?;
         Ok(DONE)
     }
 }

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use rayon::ThreadPoolBuilder;
 use seafix_experiment::{Estimate, Existing, Options, Plan, Shard, estimate, run};
 use seafix_report::{Forms, report};
 
 use crate::{
-    exit::{DONE, Ended, Failure, USAGE},
+    exit::{DONE, Ended, Failure, OUTPUT, USAGE},
     signals,
     terminal::{Progress, print},
 };
@@ -77,7 +78,7 @@ impl Run {
         let finished = finished?;
         match self.shard {
             Some(shard) => print(&format!("shard {shard}: {}\n", finished.folder.display()))?,
-            None => tell_of(&finished)?,
+            None => tell_of(&finished, options.threads)?,
         }
         Ok(DONE)
     }
@@ -105,9 +106,11 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// Makes the report of a run that is complete, and prints its summary.
-pub(crate) fn tell_of(finished: &seafix_experiment::Finished) -> Result<(), Failure> {
-    let written =
-        report(&finished.folder, &finished.folder.join("report"), Forms::ALL).map_err(super::report::failure)?;
+/// Makes the report of a run that is complete on so many threads, and prints its summary.
+pub(crate) fn tell_of(finished: &seafix_experiment::Finished, threads: usize) -> Result<(), Failure> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Failure::new(OUTPUT, format!("no threads ({error}): {threads}")))?;
+    let written = pool.install(|| report(&finished.folder, &finished.folder.join("report"), Forms::ALL));
+    let written = written.map_err(super::report::failure)?;
     print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))
 }

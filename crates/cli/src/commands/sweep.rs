@@ -137,7 +137,7 @@ impl Sweep {
         let progress = Progress::new();
         let finished = merge(&folders, &options, &progress);
         progress.end();
-        tell_of(&finished?)?;
+        tell_of(&finished?, cores)?;
         fs::remove_dir_all(shards)
             .map_err(|error| Failure::new(OUTPUT, format!("cannot remove {}: {error}", shards.display())))?;
         Ok(DONE)

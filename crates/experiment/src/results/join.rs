@@ -47,7 +47,10 @@ pub(crate) fn join_csv(stretches: &[Stretch], to: &Path) -> io::Result<()> {
     all.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
 }
 
-/// Writes the rows of all stretches, in order. Row groups that are full are copied as they are; smaller ones are
+/// Row groups of fewer rows are not kept as they are.
+const SMALL: usize = ROW_GROUP / 8;
+
+/// Writes the rows of all stretches, in order. Row groups that are not small are copied as they are; smaller ones are
 /// collected, so that a table of many small pieces has few row groups.
 pub(crate) fn join_parquet(stretches: &[Stretch], to: &Path) -> Result<(), ParquetError> {
     let mut all = table::create(to)?;
@@ -56,7 +59,7 @@ pub(crate) fn join_parquet(stretches: &[Stretch], to: &Path) -> Result<(), Parqu
         let file = File::open(parquet)?;
         let read = SerializedFileReader::new(file.try_clone()?)?;
         for group in *first..first + count {
-            if waiting.rows == 0 && read.metadata().row_group(group).num_rows() as usize >= ROW_GROUP {
+            if waiting.rows == 0 && read.metadata().row_group(group).num_rows() as usize >= SMALL {
                 copy(&mut all, &file, &read, group)?;
                 continue;
             }

@@ -6,8 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rayon::prelude::*;
-use seafix_component::Fault;
+use rayon::{ThreadPool, prelude::*};
 
 use super::{
     Observer, RunError,
@@ -25,7 +24,7 @@ pub(super) fn assemble(
     folder: &Path,
     manifest: &mut Manifest,
     pieces: &[Sealed],
-    threads: usize,
+    pool: &ThreadPool,
     observer: &dyn Observer,
 ) -> Result<bool, RunError> {
     let mut stretches = Vec::new();
@@ -45,9 +44,6 @@ pub(super) fn assemble(
     outputs.push(Output { path: folder.join("results.csv"), kind: Kind::Csv(&stretches) });
     outputs.push(Output { path: folder.join("results.parquet"), kind: Kind::Parquet(&stretches) });
 
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build().map_err(|error| {
-        RunError::Output(Fault::new(format!("no threads ({error})"), Path::new("the machine")).value(threads))
-    })?;
     let hashes: Result<Vec<Option<(String, String)>>, RunError> =
         pool.install(|| outputs.par_iter().map(|output| output.write(observer)).collect());
     let hashes: Option<BTreeMap<String, String>> = hashes?.into_iter().collect();

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use seafix_component::Fault;
 use seafix_log::{FrameRecord, TrialHeader};
 use seafix_navigation::Network;
-use seafix_referencing::{Glimpse, Target};
+use seafix_referencing::{Glimpse, Site, Target, TargetKind};
 use seafix_simulation::{Purpose, Stream};
 
 use super::RunError;
@@ -36,6 +36,8 @@ pub(crate) struct Group<'a> {
 /// What every trial of a group made of one frame, each object by itself.
 pub(super) struct Looked {
     sight: Sight,
+    /// What there was to see, and what of it was searched for, where that is not the passage's.
+    own: Option<(Site, Vec<Target>)>,
     /// Of each trial, what it saw, and what it knew then if it navigates.
     sightings: Vec<(Sighting, Option<Underway>)>,
     /// Of each trial, what a joint fix takes from it.
@@ -67,7 +69,13 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
     }
     for group in &mut groups {
         for trial in &group.trials {
-            match group.passage.site().targets(trial.stages.settings().target) {
+            let kind = trial.stages.settings().target;
+            if group.passage.posed() && kind != TargetKind::Object {
+                let what = "every problem is about an object of its own, and stands in no site";
+                faults.push(Fault::new(what, Path::new(group.passage.name())).remedy("use target = \"object\""));
+                continue;
+            }
+            match group.passage.site().targets(kind) {
                 Ok(targets) => {
                     if let Some(helm) = &trial.helm {
                         faults.extend(unnavigable(&*group.passage, helm, &targets));
@@ -143,8 +151,13 @@ impl Group<'_> {
     pub(super) fn look(&self, index: usize, voyages: &mut [Option<Voyage<'_>>]) -> Result<Looked, Fault> {
         let (passage, number) = (&*self.passage, self.passage.number(index));
         let sight = passage.sight(index)?;
+        let own = sight.own_site().map(|site| {
+            let targets = site.targets(TargetKind::Object).expect("an object by itself needs no world");
+            (site, targets)
+        });
         let look = |((trial, targets), voyage): ((&&Trial, &Vec<Target>), &mut Option<Voyage<'_>>)| {
             let mut stream = Stream::new(trial.resolved.seed, 0, number, Purpose::Search);
+            let targets = searched(&own, targets);
             match voyage {
                 None => Ok((trial.stages.reference(&sight, targets, passage.rig(), stream.rng()), None)),
                 Some(voyage) => voyage.advance(&sight, stream.rng()).map(|(seen, known)| (seen, Some(known))),
@@ -160,9 +173,11 @@ impl Group<'_> {
             sightings.map_err(|what| Fault::new(what, Path::new(passage.name())).value(format!("frame {number}")))?;
         let trials = self.trials.iter().zip(&self.targets).zip(&mut sightings);
         let glimpses = trials
-            .map(|((trial, targets), (sighting, _))| trial.stages.glimpse(sighting, targets, passage.rig()))
+            .map(|((trial, targets), (sighting, _))| {
+                trial.stages.glimpse(sighting, searched(&own, targets), passage.rig())
+            })
             .collect();
-        Ok(Looked { sight, sightings, glimpses })
+        Ok(Looked { sight, own, sightings, glimpses })
     }
 
     /// The records of one frame, a trial each: what is solved together is joined, then truth is asked. `glimpses` are
@@ -177,10 +192,12 @@ impl Group<'_> {
     ) -> Vec<FrameRecord> {
         let passage = &*self.passage;
         let truth = passage.truth(index);
+        let site = looked.own.as_ref().map_or(passage.site(), |(site, _)| site);
         let sightings = looked.sightings.into_iter().enumerate();
         sightings
             .zip(self.trials.iter().zip(&self.targets))
             .map(|((which, (mut sighting, underway)), (trial, targets))| {
+                let targets = searched(&looked.own, targets);
                 if let Some((own, before)) = glimpses.split_last() {
                     let back = before.len().saturating_sub(trial.stages.looks_back());
                     let before: Vec<&Glimpse> = before[back..].iter().map(|all| &all[which]).collect();
@@ -189,24 +206,23 @@ impl Group<'_> {
                 let number = passage.number(index);
                 let mut record = record::frame(number, &looked.sight, &sighting, underway.as_ref(), trial, targets);
                 let kind = trial.stages.settings().target;
-                let judge = truth.as_ref().map(|truth| Judge {
-                    truth,
-                    site: passage.site(),
-                    targets,
-                    kind,
-                    rig: passage.rig(),
-                });
+                let judge = truth.as_ref().map(|truth| Judge { truth, site, targets, kind, rig: passage.rig() });
                 if let Some(judge) = &judge {
                     judge.evaluate(&mut record, &sighting, underway.as_ref());
                 }
                 if logged(which, &record) {
-                    record::complete(&mut record, &looked.sight, &sighting, trial.resolved.log.images);
+                    record::complete(&mut record, &looked.sight, &sighting, targets, trial.resolved.log.images);
                     judge.iter().for_each(|judge| judge.tell(&mut record));
                 }
                 record
             })
             .collect()
     }
+}
+
+/// What a trial searches for in a frame: the frame's `own`, or what it always does.
+fn searched<'a>(own: &'a Option<(Site, Vec<Target>)>, always: &'a [Target]) -> &'a [Target] {
+    own.as_ref().map_or(always, |(_, targets)| targets)
 }
 
 /// About how much log (bytes) one frame of a passage takes for one trial, by its first. Images, losslessly compressed to

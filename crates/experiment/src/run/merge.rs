@@ -30,7 +30,7 @@ pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) ->
         return Ok(Finished { folder: claim.folder, rows: finished.rows });
     }
     manifest.write(&claim.folder, "running")?;
-    if !assemble::assemble(&claim.folder, &mut manifest, &pieces, options.threads, observer)? {
+    if !assemble::assemble(&claim.folder, &mut manifest, &pieces, &options.pool()?, observer)? {
         manifest.write(&claim.folder, "interrupted")?;
         return Err(RunError::Interrupted(claim.folder));
     }

@@ -123,12 +123,16 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     if !made.is_empty() {
         observer.resumes(frames(&made));
     }
-    let mut done = work::work(&groups, &missing, &store, options, observer)?;
+    let pool = options.pool()?;
+    let mut done = work::work(&groups, &missing, &store, &pool, options.timed, observer)?;
     if done && options.shard.is_some() {
         manifest.write(&claim.folder, "shard")?;
         return Ok(Finished { folder: claim.folder, rows: 0 });
     }
-    done = done && assemble::assemble(&claim.folder, &mut manifest, &store.all(), options.threads, observer)?;
+    if done {
+        let pieces = pool.install(|| store.all());
+        done = assemble::assemble(&claim.folder, &mut manifest, &pieces, &pool, observer)?;
+    }
     if !done {
         manifest.write(&claim.folder, "interrupted")?;
         return Err(RunError::Interrupted(claim.folder));

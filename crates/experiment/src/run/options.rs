@@ -1,6 +1,15 @@
 //! How a plan is run: what does not change the answer.
 
-use std::{fmt, path::PathBuf, str::FromStr};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use seafix_component::Fault;
+
+use super::RunError;
 
 /// Where a run goes, who works on it, and on how much of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,6 +30,15 @@ impl Options {
     /// A run into `out` by one thread, which must be a new or an empty folder.
     pub fn into(out: impl Into<PathBuf>) -> Self {
         Self { out: Some(out.into()), existing: Existing::Refuse, threads: 1, shard: None, timed: true }
+    }
+
+    /// The threads that work.
+    pub(super) fn pool(&self) -> Result<ThreadPool, RunError> {
+        let threads = self.threads.max(1);
+        ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
+            let fault = Fault::new(format!("no threads ({error})"), Path::new("the machine")).value(threads);
+            RunError::Output(fault.remedy("ask for fewer with --threads"))
+        })
     }
 
     /// Whether the piece of this number is to be made.

@@ -10,6 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{RunError, work::Output};
@@ -123,8 +124,8 @@ impl Store {
     /// All pieces that are there and whole, in their order.
     pub(super) fn all(&self) -> Vec<Sealed> {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
-        let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-        let mut all: Vec<Sealed> = numbers.filter_map(|number| self.sound(number)).collect();
+        let numbers: Vec<usize> = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
+        let mut all: Vec<Sealed> = numbers.into_par_iter().filter_map(|number| self.sound(number)).collect();
         all.sort_by_key(|sealed| sealed.seal.piece);
         all
     }

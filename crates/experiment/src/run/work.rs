@@ -5,12 +5,13 @@ use std::sync::{
     atomic::{AtomicBool, AtomicUsize, Ordering},
 };
 
+use rayon::ThreadPool;
 use seafix_component::Fault;
 use seafix_log::{FrameRecord, FrameTimes, TargetTimes, Writer};
 use seafix_referencing::Glimpse;
 
 use super::{
-    Observer, Options, RunError,
+    Observer, RunError,
     cut::Piece,
     group::Group,
     store::{Draft, Store},
@@ -26,21 +27,17 @@ pub(super) fn work(
     groups: &[Group<'_>],
     pieces: &[&Piece],
     store: &Store,
-    options: &Options,
+    pool: &ThreadPool,
+    timed: bool,
     observer: &dyn Observer,
 ) -> Result<bool, RunError> {
-    let threads = options.threads.max(1);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
-        let fault = Fault::new(format!("no threads ({error})"), std::path::Path::new("the machine"));
-        RunError::Output(fault.value(threads).remedy("ask for fewer with --threads"))
-    })?;
     let (next, halted, failure) = (AtomicUsize::new(0), AtomicBool::new(false), Mutex::new(None));
     let stops = || halted.load(Ordering::Relaxed) || observer.stops();
     pool.scope(|scope| {
-        for _ in 0..threads.min(pieces.len()) {
+        for _ in 0..pool.current_num_threads().min(pieces.len()) {
             scope.spawn(|_| {
                 while let Some(piece) = pieces.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !stops()) {
-                    match make(&groups[piece.group], piece, store, options.timed, observer, &stops) {
+                    match make(&groups[piece.group], piece, store, timed, observer, &stops) {
                         Ok(true) => {}
                         Ok(false) => break,
                         Err(error) => {

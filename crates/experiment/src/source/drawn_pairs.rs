@@ -45,7 +45,7 @@ impl Component for DrawnPairs {
         in_range(radius, "radius", self.radius, "a positive length of at most 1000 m")?;
         let sigma = self.sigma > 0.0 && self.sigma <= 1.0;
         in_range(sigma, "sigma", self.sigma, "a positive length of at most 1 m")?;
-        in_range((1..=100_000).contains(&self.frames), "frames", self.frames, "1 to 100000")
+        in_range((1..=1_000_000_000).contains(&self.frames), "frames", self.frames, "1 to 1000000000")
     }
 }
 
@@ -53,9 +53,9 @@ impl Source for DrawnPairs {
     fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
         let &Self { pairs, outliers, radius, sigma, frames } = self;
         let of = PutativePairs { pairs, outliers, radius, sigma };
-        let drawn = (0..frames).map(|number| posed(Drawn::of_pairs(&of, seed, number)));
+        let drawn = move |index: usize| posed(Drawn::of_pairs(&of, seed, index as u64));
         let name = format!("{pairs} pairs, {outliers} % wrong, seed {seed}");
-        Ok(Box::new(ProblemPassage::new(name, drawn.collect(), Vec::new())))
+        Ok(Box::new(ProblemPassage::new(name, frames as usize, drawn, Vec::new())))
     }
 
     fn has_pixels(&self) -> bool {

@@ -40,7 +40,7 @@ impl Component for DrawnProblems {
 
     fn check(&self) -> Result<(), String> {
         self.family.parse::<Family>()?;
-        in_range((1..=100_000).contains(&self.frames), "frames", self.frames, "1 to 100000")?;
+        in_range((1..=1_000_000_000).contains(&self.frames), "frames", self.frames, "1 to 1000000000")?;
         in_range(self.first <= 1_000_000_000, "first", self.first, "at most 1000000000")
     }
 }
@@ -49,11 +49,11 @@ impl Source for DrawnProblems {
     fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
         let family = self.family.parse().map_err(|what: String| vec![Fault::new(what, Path::new("the source"))])?;
         let presence = if self.absent { Presence::Absent } else { Presence::Present };
-        let numbers = self.first..self.first + self.frames;
-        let posed = numbers.map(|number| posed(Drawn::new(family, seed, number, presence))).collect();
+        let first = self.first;
+        let drawn = move |index: usize| posed(Drawn::new(family, seed, first + index as u64, presence));
         let absent = if self.absent { " without the object" } else { "" };
         let name = format!("problems of family {}{absent}, seed {seed}", self.family);
-        Ok(Box::new(ProblemPassage::new(name, posed, Vec::new())))
+        Ok(Box::new(ProblemPassage::new(name, self.frames as usize, drawn, Vec::new())))
     }
 
     fn has_pixels(&self) -> bool {

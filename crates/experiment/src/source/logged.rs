@@ -4,13 +4,13 @@ use std::path::Path;
 
 use nalgebra::Matrix4;
 use seafix_component::Fault;
-use seafix_geometry::{Body, Camera, Covariance6, Pinhole, Point, RightCamera, StereoRig, Transform, World};
-use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord, TrialHeader};
+use seafix_geometry::{Body, Camera, Covariance6, Pinhole, RightCamera, StereoRig, Transform, World};
+use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord};
 use seafix_navigation::Device;
-use seafix_referencing::{ModelPoint, Site, SiteObject};
+use seafix_referencing::Site;
 use seafix_vision::Image;
 
-use super::{Eyes, Passage, Reading, Sight, Truth, WorldPrior};
+use super::{Eyes, Passage, Reading, Sight, Truth, WorldPrior, problem_passage::no_site};
 use crate::{dataset::sha256, exact};
 
 /// A trial's log as a passage: what its method was given, its judge's truth, but none of its answers.
@@ -22,6 +22,7 @@ pub(super) struct Logged {
     body_from_camera: Transform<Body, Camera>,
     images: bool,
     named: bool,
+    posed: bool,
     hears: bool,
     numbers: Vec<u64>,
     warnings: Vec<Fault>,
@@ -67,7 +68,7 @@ impl Logged {
             warnings
                 .push(Fault::new(what, path).remedy("results may differ from the logged ones in their last digits"));
         }
-        let site = if posed { Ok(site_of_targets(header)) } else { Site::parse(&header.site, path) }?;
+        let site = if posed { no_site() } else { Site::parse(&header.site, path)? };
         Ok(Self {
             name: format!("log {} of {}", header.trial, header.source),
             site,
@@ -75,6 +76,7 @@ impl Logged {
             body_from_camera,
             images,
             named,
+            posed,
             hears: Device::ALL.iter().all(|device| devices.contains(device.name())),
             numbers,
             warnings,
@@ -95,24 +97,6 @@ pub(super) fn fault(path: &Path, error: &LogError) -> Fault {
     let shown = path.display().to_string();
     let what = what.strip_prefix(&shown).map_or(what, str::trim_start);
     Fault::new(what, path).remedy(remedy)
-}
-
-/// Problems are no site that a file could describe: their objects have no frame by the rule.
-fn site_of_targets(header: &TrialHeader) -> Site {
-    let objects = header.targets.iter().map(|target| SiteObject {
-        id: target.id.clone(),
-        base: [0, 1, 2],
-        base_in_world: None,
-        survey_sigma: 0.0,
-        world_from_object: None,
-        points: target
-            .points
-            .iter()
-            .map(|point| ModelPoint { sigma: point.sigma, ..ModelPoint::exact(&*point.id, Point::from(point.at)) })
-            .collect(),
-        interest: Vec::new(),
-    });
-    Site { name: "problems".to_owned(), frame: 0, objects: objects.collect(), warnings: Vec::new() }
 }
 
 fn rig(record: &RigRecord) -> Result<StereoRig, String> {
@@ -161,6 +145,10 @@ impl Passage for Logged {
         self.named
     }
 
+    fn posed(&self) -> bool {
+        self.posed
+    }
+
     fn hears(&self) -> bool {
         self.hears
     }
@@ -196,7 +184,7 @@ impl Passage for Logged {
                 .ok_or_else(|| broken("a point whose pixels have no covariance".to_owned()))?,
             None => self.old_cloud(&frame),
         };
-        let told = exact::told(inputs, &self.site, &cloud);
+        let told = exact::told(inputs, &cloud);
         let readings = exact::readings(inputs).map_err(broken)?;
         let prior = match frame.inputs {
             Some(_) => exact::prior(inputs),
@@ -214,8 +202,12 @@ impl Passage for Logged {
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
-        let frame = self.frame(index, false).ok()?;
-        Some(exact::truth_of(frame.inputs?.truth.as_ref()?, &self.site))
+        let inputs = self.frame(index, false).ok()?.inputs?;
+        let surveyed = match &inputs.problem {
+            Some(_) => vec![None],
+            None => self.site.objects.iter().map(|object| object.world_from_object).collect(),
+        };
+        Some(exact::truth_of(inputs.truth.as_ref()?, surveyed))
     }
 
     fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {

@@ -68,6 +68,14 @@ impl Sight {
         };
         targets.iter().map(prior).collect()
     }
+
+    /// The site of a problem, which is about an object of its own; `None` where the passage's is looked at.
+    pub(crate) fn own_site(&self) -> Option<Site> {
+        match &self.told {
+            Told::Problem(problem) => Some(problem_passage::site_of(problem)),
+            _ => None,
+        }
+    }
 }
 
 /// What a method is told of one instant beside what the cameras gave and the rough pose in the world.
@@ -79,9 +87,9 @@ pub enum Told {
     /// Which feature point each point of the cloud says it is, as (object, point) indices, no two the same: nothing is
     /// searched then.
     Names(Vec<(usize, usize)>),
-    /// An identification problem about the object of this index, its tolerance, candidates and rough pose included:
-    /// only that object is attempted, and the pipeline's `gate` and `tolerance` have no say.
-    Problem(usize, Arc<CoherenceProblem>),
+    /// An identification problem about an object of its own, its tolerance, candidates and rough pose included: only
+    /// that object is attempted, and the pipeline's `gate` and `tolerance` have no say.
+    Problem(Arc<CoherenceProblem>),
 }
 
 /// What the cameras gave.
@@ -107,7 +115,7 @@ pub struct WorldPrior {
 pub struct Truth {
     /// The left camera.
     pub world_from_camera: Transform<World, Camera>,
-    /// Each object of the site, in its order; `None` where no world is known.
+    /// Each object of the site, in its order; `None` where no world is known. Of a problem its only object.
     pub world_from_object: Vec<Option<Transform<World, Object>>>,
     /// The feature points both cameras see, as (object, point) indices; `None` where nobody knows.
     pub visible: Option<Vec<(usize, usize)>>,
@@ -140,7 +148,7 @@ pub struct CalibratedPort {
 pub trait Passage: Send + Sync {
     /// Its name, for people.
     fn name(&self) -> &str;
-    /// What there is to see.
+    /// What there is to see; without objects where each instant brings its own.
     fn site(&self) -> &Site;
     /// The rig the method is told.
     fn rig(&self) -> &StereoRig;
@@ -150,6 +158,10 @@ pub trait Passage: Send + Sync {
     fn images(&self) -> bool;
     /// Whether every point says which one it is, so that nothing is searched.
     fn named(&self) -> bool {
+        false
+    }
+    /// Whether every instant is a problem about an object of its own: the passage has then no site.
+    fn posed(&self) -> bool {
         false
     }
     /// How many instants there are.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use seafix_component::Fault;
-use seafix_geometry::{Body, Camera, Object, StereoRig, Transform, World};
+use seafix_geometry::{Body, Camera, Object, StereoRig, Transform};
 use seafix_referencing::{Site, SiteObject, problem_file::CoherenceProblem};
 use seafix_simulation::VirtualRig;
 
@@ -19,31 +19,49 @@ pub(super) struct Posed {
     pub(super) truth: Option<(Transform<Object, Camera>, TrueAnswer)>,
 }
 
-/// A problem a frame: its model is an object of its own, of a site that has no world.
+/// Gives the problem of an index, the same one every time.
+type Posing = Box<dyn Fn(usize) -> Posed + Send + Sync>;
+
+/// A problem a frame: its model is an object of its own, which no other frame has and which stands in no world. Those
+/// that are drawn are in memory one at a time.
 pub(super) struct ProblemPassage {
     name: String,
     site: Site,
     rig: StereoRig,
-    posed: Vec<Posed>,
+    frames: usize,
+    posing: Posing,
     inputs: Vec<(String, String)>,
 }
 
+/// The site of problems: none, for each frame has its own.
+pub(super) fn no_site() -> Site {
+    Site { name: "problems".to_owned(), frame: 0, objects: Vec::new(), warnings: Vec::new() }
+}
+
+/// The site of one problem: its object by itself.
+pub(super) fn site_of(problem: &CoherenceProblem) -> Site {
+    let object = SiteObject {
+        id: problem.id.clone(),
+        base: [0, 1, 2],
+        base_in_world: None,
+        survey_sigma: 0.0,
+        world_from_object: None,
+        points: problem.model.clone(),
+        interest: Vec::new(),
+    };
+    Site { objects: vec![object], ..no_site() }
+}
+
 impl ProblemPassage {
-    /// The problems in this order; their ids differ. `inputs` are the files they came from, with their hashes.
-    pub(super) fn new(name: String, posed: Vec<Posed>, inputs: Vec<(String, String)>) -> Self {
-        let object = |posed: &Posed| SiteObject {
-            id: posed.problem.id.clone(),
-            base: [0, 1, 2],
-            base_in_world: None,
-            survey_sigma: 0.0,
-            world_from_object: None,
-            points: posed.problem.model.clone(),
-            interest: Vec::new(),
-        };
-        let objects = posed.iter().map(object).collect();
-        let site = Site { name: "problems".to_owned(), frame: 0, objects, warnings: Vec::new() };
+    /// So many problems; their ids differ. `inputs` are the files they came from, with their hashes.
+    pub(super) fn new(
+        name: String,
+        frames: usize,
+        posing: impl Fn(usize) -> Posed + Send + Sync + 'static,
+        inputs: Vec<(String, String)>,
+    ) -> Self {
         let rig = VirtualRig::default().build().expect("the default rig is sound");
-        Self { name, site, rig, posed, inputs }
+        Self { name, site: no_site(), rig, frames, posing: Box::new(posing), inputs }
     }
 }
 
@@ -69,8 +87,12 @@ impl Passage for ProblemPassage {
         false
     }
 
+    fn posed(&self) -> bool {
+        true
+    }
+
     fn frames(&self) -> usize {
-        self.posed.len()
+        self.frames
     }
 
     fn prior_sigma(&self) -> Option<(f64, f64)> {
@@ -78,26 +100,25 @@ impl Passage for ProblemPassage {
     }
 
     fn sight(&self, index: usize) -> Result<Sight, Fault> {
-        let problem = &self.posed[index].problem;
+        let problem = (self.posing)(index).problem;
         Ok(Sight {
             stamp_ns: index as u64 * STEP_NS,
             eyes: Eyes::Points(problem.cloud.clone()),
             prior: None,
-            told: Told::Problem(index, Arc::clone(problem)),
+            told: Told::Problem(problem),
             readings: Vec::new(),
         })
     }
 
     /// The world of a frame is its object's.
     fn truth(&self, index: usize) -> Option<Truth> {
-        let (object_from_camera, answer) = self.posed[index].truth.as_ref()?;
-        let place = |object: usize| (object == index).then(Transform::<World, Object>::identity);
+        let (object_from_camera, answer) = (self.posing)(index).truth?;
         Some(Truth {
             world_from_camera: object_from_camera.relabel(),
-            world_from_object: (0..self.posed.len()).map(place).collect(),
-            visible: Some(answer.pairs.iter().map(|&(model, _)| (index, model)).collect()),
+            world_from_object: vec![Some(Transform::identity())],
+            visible: Some(answer.pairs.iter().map(|&(model, _)| (0, model)).collect()),
             bound: None,
-            answer: Some(answer.clone()),
+            answer: Some(answer),
         })
     }
 

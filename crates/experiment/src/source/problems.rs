@@ -11,6 +11,7 @@ use seafix_evaluation::Solved;
 use seafix_geometry::{Camera, Object, Transform};
 use seafix_referencing::problem_file::{self, CoherenceProblem};
 use serde::{Deserialize, Serialize, de::IgnoredAny};
+use sha2::{Digest, Sha256};
 
 use super::{
     Passage, Source, TrueAnswer,
@@ -62,7 +63,13 @@ impl Source for Problems {
         if !faults.is_empty() {
             return Err(faults);
         }
-        Ok(Box::new(ProblemPassage::new(format!("problems in {}", self.path), posed, inputs)))
+        // Problems of one path and number need not be the same.
+        let mut contents = Sha256::new();
+        inputs.iter().for_each(|(name, hash)| contents.update(format!("{hash}  {name}\n")));
+        let contents: String = contents.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+        let name = format!("{} problems in {}, SHA-256 {contents}", posed.len(), self.path);
+        let frames = posed.len();
+        Ok(Box::new(ProblemPassage::new(name, frames, move |index| posed[index].clone(), inputs)))
     }
 
     fn has_pixels(&self) -> bool {

@@ -66,7 +66,7 @@ fn camera_message(camera: CameraRecord) -> proto::Camera {
     proto::Camera { width, height, matrix: flat(&camera.matrix), distortion: camera.distortion }
 }
 
-fn target_message(target: TargetModel) -> proto::Target {
+pub(super) fn target_message(target: TargetModel) -> proto::Target {
     let point = |ModelPoint { id, at: [x, y, z], sigma }| proto::ModelPoint { id, x, y, z, sigma };
     proto::Target {
         site_from_object: target.site_from_object.as_ref().map(flat).unwrap_or_default(),
@@ -123,7 +123,7 @@ fn camera_record(message: proto::Camera) -> Result<CameraRecord, Malformed> {
     })
 }
 
-fn target_record(message: proto::Target) -> Result<TargetModel, Malformed> {
+pub(super) fn target_record(message: proto::Target) -> Result<TargetModel, Malformed> {
     let point = |proto::ModelPoint { id, x, y, z, sigma }| ModelPoint { id, at: [x, y, z], sigma };
     Ok(TargetModel {
         site_from_object: matrix_if_any("target.site_from_object", &message.site_from_object)?,

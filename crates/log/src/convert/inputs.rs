@@ -1,6 +1,10 @@
 //! What a method was given.
 
-use super::{Malformed, flat, matrix, required};
+use super::{
+    Malformed, flat,
+    header::{target_message, target_record},
+    matrix, required,
+};
 use crate::{AnswerRecord, ExactPose, FrameRecord, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState, proto};
 
 /// The message that holds the inputs of `frame`.
@@ -88,7 +92,7 @@ fn matches_record(pairs: &[proto::Match]) -> Vec<[u32; 2]> {
 
 fn problem_message(problem: &ProblemRecord) -> proto::Problem {
     proto::Problem {
-        object: problem.object,
+        model: Some(target_message(problem.model.clone())),
         delta: problem.delta,
         object_from_camera: problem.prior.as_ref().map(|(pose, _)| pose_message(pose)),
         shell_half: problem.prior.map_or(0.0, |(_, half)| half),
@@ -100,7 +104,7 @@ fn problem_message(problem: &ProblemRecord) -> proto::Problem {
 fn problem_record(message: proto::Problem) -> Result<ProblemRecord, Malformed> {
     let half = message.shell_half;
     Ok(ProblemRecord {
-        object: message.object,
+        model: target_record(required("problem.model", message.model)?)?,
         delta: message.delta,
         prior: message.object_from_camera.map(|pose| Ok((pose_record(pose)?, half))).transpose()?,
         putative: message.is_putative.then(|| matches_record(&message.putative)),

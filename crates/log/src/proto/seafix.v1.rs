@@ -376,11 +376,9 @@ pub struct SitePoint {
     #[prost(uint32, tag = "2")]
     pub point: u32,
 }
-/// An identification problem about one object; its model is that object's points.
+/// An identification problem about an object of its own, which no other frame has and the header does not know.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Problem {
-    #[prost(uint32, tag = "1")]
-    pub object: u32,
     /// Distances that differ by no more agree (m).
     #[prost(double, tag = "2")]
     pub delta: f64,
@@ -394,6 +392,8 @@ pub struct Problem {
     pub is_putative: bool,
     #[prost(message, repeated, tag = "6")]
     pub putative: ::prost::alloc::vec::Vec<Match>,
+    #[prost(message, optional, tag = "7")]
+    pub model: ::core::option::Option<Target>,
 }
 /// A model point and a cloud point.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]

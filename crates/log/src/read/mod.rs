@@ -5,10 +5,12 @@ mod source;
 
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
+
 use crate::{FrameRecord, LogError, Totals, TrialHeader, convert, topic};
 pub(crate) use pending::Pending;
-use source::Source;
 pub(crate) use source::{Message, looks_like};
+use source::{Source, Take};
 
 /// A whole trial, as its log has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,8 +40,8 @@ pub fn read(path: &Path) -> Result<TrialLog, LogError> {
 pub struct Reader {
     source: Source,
     header: TrialHeader,
-    pending: Pending,
     images: Images,
+    inputs: bool,
     seen_images: bool,
     totals: Option<Totals>,
     ended: bool,
@@ -71,16 +73,16 @@ impl Reader {
     /// trial.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let mut source = Source::open(path)?;
-        while let Some(message) = source.next_message()? {
-            if message.topic == topic::HEADER {
+        while let Some(message) = source.next_message(|_, _| Take::Whole)? {
+            if &*message.topic == topic::HEADER {
                 let header = message.decode(path, "TrialHeader").and_then(|header| {
                     convert::header_record(header).map_err(|error| foreign(path, &message, &error.0))
                 })?;
                 return Ok(Self {
                     source,
                     header,
-                    pending: Pending::default(),
                     images: Images::All,
+                    inputs: true,
                     seen_images: false,
                     totals: None,
                     ended: false,
@@ -94,6 +96,13 @@ impl Reader {
     #[must_use]
     pub fn without_images(mut self) -> Self {
         self.images = Images::None;
+        self
+    }
+
+    /// The same, without what methods were given to the last bit: frames come with `inputs: None`.
+    #[must_use]
+    pub fn without_inputs(mut self) -> Self {
+        self.inputs = false;
         self
     }
 
@@ -111,7 +120,7 @@ impl Reader {
 
     /// The next message behind the header as it stands in the file; `None` at the end, when every check sum held.
     pub(crate) fn next_message(&mut self) -> Result<Option<Message>, LogError> {
-        self.source.next_message()
+        self.source.next_message(|_, _| Take::Whole)
     }
 
     /// Whether a frame read so far has images in the log, decoded or not.
@@ -124,24 +133,86 @@ impl Reader {
         self.totals.as_ref()
     }
 
+    /// Leads all frames that are left through `take`, in order. On the threads of the pool that this is called in some
+    /// are decoded while the next are read.
+    ///
+    /// # Errors
+    /// [`LogError`] as the reading goes; not all frames before it need have been taken.
+    pub fn for_each_frame(&mut self, mut take: impl FnMut(FrameRecord) + Send) -> Result<(), LogError> {
+        let mut read = self.some_messages()?;
+        while !read.is_empty() {
+            let (path, images) = (self.source.path().to_owned(), self.images);
+            let decode = || -> Result<Vec<FrameRecord>, LogError> {
+                read.par_iter().map(|messages| decoded(&path, images, messages)).collect()
+            };
+            let (frames, next) = rayon::join(decode, || self.some_messages());
+            frames?.into_iter().for_each(&mut take);
+            read = next?;
+        }
+        self.ended = true;
+        Ok(())
+    }
+
     fn next_frame(&mut self) -> Result<Option<FrameRecord>, LogError> {
-        let path: PathBuf = self.source.path().to_owned();
-        while let Some(message) = self.source.next_message()? {
-            if message.topic == topic::TOTALS {
-                self.totals = Some(convert::totals_record(message.decode(&path, "Totals")?));
+        self.next_messages()?.map(|messages| decoded(self.source.path(), self.images, &messages)).transpose()
+    }
+
+    /// The messages of the next frames; none at the end.
+    fn some_messages(&mut self) -> Result<Vec<Vec<Message>>, LogError> {
+        /// So many frames are read at a time, or so many bytes.
+        const MOST: (usize, usize) = (256, 16 << 20);
+        let (mut frames, mut bytes) = (Vec::new(), 0);
+        while frames.len() < MOST.0 && bytes < MOST.1 {
+            let Some(messages) = self.next_messages()? else { break };
+            bytes += messages.iter().map(|message| message.data.len()).sum::<usize>();
+            frames.push(messages);
+        }
+        Ok(frames)
+    }
+
+    /// The messages of the next frame, the last of which closes it.
+    fn next_messages(&mut self) -> Result<Option<Vec<Message>>, LogError> {
+        let (images, inputs) = (self.images, self.inputs);
+        let take = |topic: &str, stamp: u64| match topic {
+            topic::RESULT | topic::CANDIDATES | topic::EVALUATION | topic::TIMING | topic::FRAME | topic::TOTALS => {
+                Take::Whole
+            }
+            topic::INPUTS if inputs => Take::Whole,
+            topic if !topic::IMAGES.contains(&topic) => Take::Nothing,
+            _ if images.wanted(stamp) => Take::Whole,
+            _ => Take::Mark,
+        };
+        let mut messages = Vec::new();
+        while let Some(message) = self.source.next_message(take)? {
+            if &*message.topic == topic::TOTALS {
+                self.totals = Some(convert::totals_record(message.decode(self.source.path(), "Totals")?));
                 continue;
             }
             self.seen_images |= topic::IMAGES.contains(&&message.topic[..]);
-            if let Some(frame) = self.pending.take(&path, &message, self.images.wanted(message.log_time))? {
-                return Ok(Some(frame));
+            let closes = &*message.topic == topic::FRAME;
+            messages.push(message);
+            if closes {
+                return Ok(Some(messages));
             }
         }
-        if self.pending.is_empty() {
+        if messages.is_empty() {
             Ok(None)
         } else {
+            let path: PathBuf = self.source.path().to_owned();
             Err(LogError::Foreign { path, what: "its last frame is not closed".to_owned() })
         }
     }
+}
+
+/// The frame of these messages.
+fn decoded(path: &Path, images: Images, messages: &[Message]) -> Result<FrameRecord, LogError> {
+    let mut pending = Pending::default();
+    for message in messages {
+        if let Some(frame) = pending.take(path, message, images.wanted(message.log_time))? {
+            return Ok(frame);
+        }
+    }
+    unreachable!("the last message of a frame closes it")
 }
 
 impl Iterator for Reader {

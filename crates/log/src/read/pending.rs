@@ -21,15 +21,6 @@ pub(crate) struct Pending {
 }
 
 impl Pending {
-    /// Whether no frame is open.
-    pub(super) fn is_empty(&self) -> bool {
-        self.images.len() + self.skipped_images + self.results.len() + self.candidates.len() + self.evaluations.len()
-            == 0
-            && self.inspection.is_none()
-            && self.timing.is_none()
-            && self.inputs.is_none()
-    }
-
     /// Takes in one message; the whole frame, if it closes one.
     pub(crate) fn take(
         &mut self,

@@ -6,6 +6,7 @@ use std::{
     fs::File,
     io::{BufReader, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use mcap::{
@@ -20,9 +21,9 @@ use crate::{LogError, proto};
 /// A message as it stands in the file.
 #[derive(Debug)]
 pub(crate) struct Message {
-    pub(crate) topic: String,
-    pub(crate) schema: String,
-    pub(crate) encoding: String,
+    pub(crate) topic: Arc<str>,
+    pub(crate) schema: Arc<str>,
+    pub(crate) encoding: Arc<str>,
     pub(crate) sequence: u32,
     pub(crate) log_time: u64,
     pub(crate) data: Vec<u8>,
@@ -36,7 +37,7 @@ impl Message {
 
     /// The content, which must have this schema.
     pub(crate) fn decode_as<M: prost::Message + Default>(&self, path: &Path, schema: &str) -> Result<M, LogError> {
-        if self.encoding != "protobuf" || self.schema != schema {
+        if &*self.encoding != "protobuf" || &*self.schema != schema {
             let what = format!(
                 "it is a `{}` in `{}`; this version reads `{schema}` in `protobuf`",
                 self.schema, self.encoding
@@ -50,9 +51,20 @@ impl Message {
 /// A channel of the file: topic, schema's name, encoding of messages.
 #[derive(Debug)]
 struct Channel {
-    topic: String,
-    schema: String,
-    encoding: String,
+    topic: Arc<str>,
+    schema: Arc<str>,
+    encoding: Arc<str>,
+}
+
+/// What a reader takes of a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Take {
+    /// All of it.
+    Whole,
+    /// That it is there.
+    Mark,
+    /// Nothing.
+    Nothing,
 }
 
 /// An MCAP file read from start to end.
@@ -60,7 +72,7 @@ pub(super) struct Source {
     path: PathBuf,
     file: BufReader<File>,
     reader: LinearReader,
-    schemas: HashMap<u16, String>,
+    schemas: HashMap<u16, Arc<str>>,
     channels: HashMap<u16, Channel>,
     fed: u64,
     messages: u64,
@@ -112,8 +124,9 @@ impl Source {
         &self.path
     }
 
-    /// The next message; `None` when the file has been read to its end and every check sum held.
-    pub(super) fn next_message(&mut self) -> Result<Option<Message>, LogError> {
+    /// The next message of which anything is taken, by its topic and stamp; `None` when the file has been read to its end
+    /// and every check sum held.
+    pub(super) fn next_message(&mut self, take: impl Fn(&str, u64) -> Take) -> Result<Option<Message>, LogError> {
         loop {
             let record = match self.reader.next_event() {
                 None => return Ok(None),
@@ -140,11 +153,12 @@ impl Source {
                 // The summary repeats schemas and channels.
                 _ if self.past_data => {}
                 Record::Schema { header, .. } => {
-                    self.schemas.insert(header.id, header.name);
+                    self.schemas.insert(header.id, header.name.into());
                 }
                 Record::Channel(channel) => {
-                    let schema = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                    let known = Channel { topic: channel.topic, schema, encoding: channel.message_encoding };
+                    let schema = self.schemas.get(&channel.schema_id).cloned().unwrap_or_else(|| "".into());
+                    let (topic, encoding) = (channel.topic.into(), channel.message_encoding.into());
+                    let known = Channel { topic, schema, encoding };
                     self.channels.insert(channel.id, known);
                 }
                 Record::Message { header, data } => {
@@ -154,13 +168,18 @@ impl Source {
                     };
                     self.messages += 1;
                     self.last_ns = header.log_time;
+                    let data = match take(&channel.topic, header.log_time) {
+                        Take::Whole => data.into_owned(),
+                        Take::Mark => Vec::new(),
+                        Take::Nothing => continue,
+                    };
                     return Ok(Some(Message {
-                        topic: channel.topic.clone(),
-                        schema: channel.schema.clone(),
-                        encoding: channel.encoding.clone(),
+                        topic: Arc::clone(&channel.topic),
+                        schema: Arc::clone(&channel.schema),
+                        encoding: Arc::clone(&channel.encoding),
                         sequence: header.sequence,
                         log_time: header.log_time,
-                        data: data.into_owned(),
+                        data,
                     }));
                 }
                 _ => {}

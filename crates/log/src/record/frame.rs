@@ -1,6 +1,6 @@
 //! What one stereo pair gave.
 
-use super::{Inputs, InspectedPoint, Matrix3, Matrix4, NavigationRecord, TargetRecord};
+use super::{Inputs, InspectedPoint, Matrix3, Matrix4, NavigationRecord, TargetModel, TargetRecord, TrialHeader};
 
 /// One frame: what was seen, what was known, and what came of every attempted target.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,6 +30,15 @@ pub struct FrameRecord {
     pub navigation: Option<Box<NavigationRecord>>,
     /// The points of interest that truly are in both images.
     pub inspected: Vec<InspectedPoint>,
+}
+
+impl FrameRecord {
+    /// What is known of the object of this name: by the header of the trial, or by the frame, whose problem may be about
+    /// an object of its own.
+    pub fn model<'a>(&'a self, header: &'a TrialHeader, object: &str) -> Option<&'a TargetModel> {
+        let own = self.inputs.iter().filter_map(|inputs| Some(&inputs.problem.as_ref()?.model));
+        header.targets.iter().chain(own).find(|model| model.id == object)
+    }
 }
 
 /// An 8-bit grey image.

@@ -1,6 +1,6 @@
 //! What a method was given, to the last bit.
 
-use super::{Matrix3, Matrix4, Matrix6};
+use super::{Matrix3, Matrix4, Matrix6, TargetModel};
 
 /// What a frame's method was given and its judge knew beyond what [`FrameRecord`](super::FrameRecord) holds, to the last
 /// bit: enough to run another method on the same.
@@ -53,11 +53,11 @@ pub struct SitePoint {
     pub point: u32,
 }
 
-/// An identification problem about one object; its model is that object's points.
+/// An identification problem about an object of its own, which no other frame has and the header does not know.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProblemRecord {
-    /// Index of the object.
-    pub object: u32,
+    /// The object.
+    pub model: TargetModel,
     /// Distances that differ by no more agree (m).
     pub delta: f64,
     /// The rough pose, object from camera, and the half-size of the shells about it (m).

@@ -28,6 +28,9 @@ pub(super) enum Use {
     Joined,
 }
 
+/// Bytes that wait for the file: every message is several writes.
+const BUFFER: usize = 1 << 18;
+
 /// An MCAP file that is renamed from `.partial` when it is complete.
 pub(super) struct Sink {
     mcap: mcap::Writer<BufWriter<File>>,
@@ -64,7 +67,7 @@ impl Sink {
             .library(concat!("seafix-log/", env!("CARGO_PKG_VERSION")))
             // The library's default depends on the machine's number of processors, and so do the bytes.
             .compression_threads(0)
-            .create(BufWriter::new(file))
+            .create(BufWriter::with_capacity(BUFFER, file))
             .map_err(|error| write_error(&partial, error))?;
         Ok(Self { mcap, path: path.to_owned(), partial, purpose, channels: BTreeMap::new() })
     }

@@ -209,7 +209,12 @@ fn inputs(number: u64) -> Inputs {
         pixel_covariances: vec![pixels; number as usize],
         names: odd.then(|| vec![SitePoint { object: 1, point: 2 }]),
         problem: (!odd).then(|| ProblemRecord {
-            object: 1,
+            model: TargetModel {
+                id: "of its own".to_owned(),
+                site_from_object: None,
+                points: vec![ModelPoint { id: "1".to_owned(), at: [x, 1.0 / 3.0, 0.25], sigma: 1e-3 }],
+                alert_limit: 0.05,
+            },
             delta: 0.04,
             prior: (number > 0).then_some((pose, 0.5)),
             putative: (number > 1).then(|| vec![[0, 3], [1, 4]]),

@@ -53,7 +53,7 @@ pub(super) fn section(run: &Run, summary: &Summary, small: bool) -> Section {
         text![of(|header| {
             let sigmas = header.targets.iter().flat_map(|target| &target.points);
             let sigmas = distinct(sigmas.map(|point| format!("{} mm", number(Some(point.sigma * 1e3), 2))));
-            format!("σ = {} per axis", sigmas.join(", "))
+            if sigmas.is_empty() { String::new() } else { format!("σ = {} per axis", sigmas.join(", ")) }
         })],
     );
     line("Seeds", text![of(|header| pairs(header.seeds.iter().map(|(name, seed)| (name, seed.to_string()))))]);
@@ -118,6 +118,9 @@ fn disparity(run: &Run, summary: &Summary) -> Text {
 
 fn targets(header: &TrialHeader) -> String {
     const NAMED: usize = 12;
+    if header.targets.is_empty() {
+        return "an object of its own in every frame, as the log has it".to_owned();
+    }
     let sizes = || header.targets.iter().map(|target| target.points.len());
     let points: usize = sizes().sum();
     let who = match (sizes().min(), sizes().max()) {

@@ -43,7 +43,8 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
         items.push(text!["Statistical: frames of one passage are not independent. The bootstrap draws blocks; the signed rank test does not, and its p is too small where the differences of neighbouring frames agree. A difference is called significant only where both say so."]);
     }
     let sites: Vec<&String> = headers().map(|header| &header.site).collect();
-    if sites.iter().all(|site| *site == sites[0]) {
+    // Problems have none: every frame brings another object.
+    if !run.header().targets.is_empty() && sites.iter().all(|site| *site == sites[0]) {
         items.push(text![format!(
             "External: one site of {} target{}; nothing is said of objects of other shape, size or symmetry.",
             run.header().targets.len(),
