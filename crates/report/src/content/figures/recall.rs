@@ -41,7 +41,9 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             for threshold in THRESHOLDS {
                 let k = errors.partition_point(|error| *error <= threshold / 1e3);
                 let (low, high) = clopper_pearson(k, n, 0.95);
-                let [share, low, high] = [k as f64 / n as f64, low, high].map(|share| 100.0 * share);
+                // One rounding: of a tie another order of the two would print another last digit.
+                let share = 100.0 * k as f64 / n as f64;
+                let [low, high] = [low, high].map(|share| 100.0 * share);
                 line.push([threshold, share]);
                 band.push([threshold, low, high]);
                 let told = |(what, value): (&str, f64)| {
