@@ -69,7 +69,7 @@ pub(crate) struct Frame {
 /// A point of interest in view of a frame.
 #[derive(Debug)]
 pub(crate) struct Inspected {
-    name: u16,
+    name: u32,
     values: [f64; Looked::ALL.len()],
 }
 
@@ -184,7 +184,7 @@ impl Trial {
             .inspected
             .iter()
             .map(|point| Inspected {
-                name: self.word(&looked::name(point)),
+                name: self.word(&looked::name(point), places),
                 values: Looked::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN)),
             })
             .collect();
