@@ -6,6 +6,7 @@ use super::*;
 
 mod light;
 mod projection;
+mod shadow;
 mod views;
 
 use crate::{
