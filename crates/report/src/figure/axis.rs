@@ -96,14 +96,18 @@ impl Scale {
 
     /// The ticks in view.
     pub(crate) fn ticks(&self) -> Vec<f64> {
+        let most = (self.place[1] - self.place[0]).abs() / 32.0;
         let ticks = if !self.axis.names.is_empty() {
             (0..self.axis.names.len()).map(|i| i as f64).collect()
         } else if !self.axis.ticks.is_empty() {
             self.axis.ticks.clone()
         } else if self.axis.logarithmic {
-            decades(self.ends)
+            let decades = decades(self.ends);
+            // So narrow a view has no decades to speak of: it is read as a linear one.
+            let few = decades.iter().filter(|tick| self.holds(**tick)).count() < 2;
+            if few { steps(self.ends.map(|end| 10_f64.powf(end)), most) } else { decades }
         } else {
-            steps(self.ends, (self.place[1] - self.place[0]).abs() / 32.0)
+            steps(self.ends, most)
         };
         ticks.into_iter().filter(|tick| self.holds(*tick)).collect()
     }
@@ -164,6 +168,13 @@ mod tests {
         assert_eq!(steps([0.1, 9.7], 5.0), [2.0, 4.0, 6.0, 8.0]);
         assert_eq!(decades([0.0, 1.0]), [1.0, 2.0, 5.0, 10.0, 20.0, 50.0]);
         assert_eq!([0.02, 100.0, -3.5, 1e6].map(tick_text), ["0.02", "100", "−3.5", "1e6"]);
+    }
+
+    #[test]
+    fn a_narrow_logarithmic_axis_has_numbers_too() {
+        let scale = Scale::new(Axis::logarithmic("x"), [0.62_f64, 0.88].map(f64::log10), [0.0, 160.0]);
+        let labels: Vec<_> = scale.ticks().into_iter().map(|tick| scale.label(tick)).collect();
+        assert_eq!(labels, ["0.7", "0.8"]);
     }
 
     #[test]
