@@ -75,8 +75,35 @@ fn a_log_that_was_cut_off_is_saved() {
     assert_eq!(seafix(folder, &["check", "cut-recovered.mcap"]).0, 0);
     let (code, _, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
     assert!(code == 4 && error.contains("name another file with --out"), "{error}");
+    let (code, _, error) = seafix(folder, &["report", "cut.mcap.partial"]);
+    assert!(code == 3 && error.contains("not the folder of a run"), "{error}");
     let (code, _, error) = seafix(folder, &["recover", "e.toml"]);
     assert!(code == 3 && error.contains("not an MCAP file"), "{error}");
+}
+
+/// What the message of an interrupted run promises. A shard leaves its pieces as they are: here the first and the third of
+/// three, 16 + 8 frames, and a torn one is laid beside them.
+#[test]
+fn a_run_that_did_not_end_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let points =
+        "question = 'Where?'\n[source]\nname = 'virtual-layouts'\nframes = 40\n[pipeline]\nsolver = 'kabsch'\n";
+    fs::write(folder.join("e.toml"), points).unwrap();
+    assert_eq!(seafix(folder, &["run", "e.toml", "--shard", "1/2", "--out", "a"]).0, 0);
+    let torn = folder.join("a/pieces/000005.partial");
+    fs::create_dir(&torn).unwrap();
+    let bytes = fs::read(folder.join("a/pieces/000002/001.mcap")).unwrap();
+    fs::write(torn.join("001.mcap.partial"), &bytes[..100]).unwrap();
+    let (code, out, error) = seafix(folder, &["recover", "a"]);
+    assert!(code == 0 && out.contains("24 whole frames of 2 pieces"), "{out}{error}");
+    assert!(error.contains("lost: no message in it is readable"), "{error}");
+    assert_eq!(seafix(folder, &["check", "a/recovered/001.mcap"]).0, 0);
+    assert_eq!(seafix(folder, &["report", "a/recovered"]).0, 0);
+    let (code, _, error) = seafix(folder, &["recover", "a"]);
+    assert!(code == 4 && error.contains("name another folder with --out"), "{error}");
+    let (code, _, error) = seafix(folder, &["recover", "a/pieces"]);
+    assert!(code == 3 && error.contains("no piece of a run"), "{error}");
 }
 
 /// All files below a folder.

@@ -44,8 +44,9 @@ pub enum LogError {
     /// The file ends before its footer.
     #[error(
         "{} has no footer: it was cut off or is still being written; {messages} messages up to stamp {last_ns} ns \
-         are readable; run the trial again, or save them with `seafix recover`",
-        .path.display()
+         are readable; run the trial again{}",
+        .path.display(),
+        if *messages > 0 { ", or save them with `seafix recover`" } else { "" }
     )]
     Truncated {
         /// The file.
@@ -58,6 +59,14 @@ pub enum LogError {
     /// The bytes are not those that were written.
     #[error("{} is damaged: {what}; copy it again from its source, or save the rest with `seafix recover`", .path.display())]
     Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What the reader found, and where.
+        what: String,
+    },
+    /// Nothing of a damaged file can be saved.
+    #[error("no message in it is readable: {}: {what}; copy it again from its source, or run the trial again", .path.display())]
+    Lost {
         /// The file.
         path: PathBuf,
         /// What the reader found, and where.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{LogError, Reader, Totals, Writer, convert, topic};
+use crate::{LogError, Reader, Totals, Writer, convert, read::Message, topic};
 
 /// Writes the log of a whole trial to `to` from logs of successive frames of it, each with its totals.
 ///
@@ -30,14 +30,24 @@ pub fn join(parts: &[impl AsRef<Path>], to: &Path, mut go_on: impl FnMut() -> bo
             None => writer.insert(Writer::create(to, reader.header())?),
         };
         let mut begun = false;
-        while let Some(message) = reader.next_message()? {
-            match &message.topic[..] {
-                topic::TOTALS => totals.merge(&convert::totals_record(message.decode(path, "Totals")?)),
-                // The last of what stands before the first frame.
-                topic::MODEL => begun = true,
-                _ if !begun => {}
-                topic => writer.copy(topic, message.log_time, &message.data)?,
+        let mut copy = |messages: &[Message]| -> Result<(), LogError> {
+            for message in messages {
+                match &message.topic[..] {
+                    topic::TOTALS => totals.merge(&convert::totals_record(message.decode(path, "Totals")?)),
+                    // The last of what stands before the first frame.
+                    topic::MODEL => begun = true,
+                    _ if !begun => {}
+                    topic => writer.copy(topic, message.log_time, &message.data)?,
+                }
             }
+            Ok(())
+        };
+        // Some are written, which is to compress them, while the next are read.
+        let mut read = some_messages(&mut reader)?;
+        while !read.is_empty() {
+            let (written, next) = rayon::join(|| copy(&read), || some_messages(&mut reader));
+            written?;
+            read = next?;
         }
     }
     let Some(mut writer) = writer else {
@@ -46,4 +56,16 @@ pub fn join(parts: &[impl AsRef<Path>], to: &Path, mut go_on: impl FnMut() -> bo
     writer.totals(&totals)?;
     writer.finish()?;
     Ok(true)
+}
+
+/// The next messages, some megabytes of them; none at the end.
+fn some_messages(reader: &mut Reader) -> Result<Vec<Message>, LogError> {
+    const BYTES: usize = 4 << 20;
+    let (mut messages, mut bytes) = (Vec::new(), 0);
+    while bytes < BYTES {
+        let Some(message) = reader.next_message()? else { break };
+        bytes += message.data.len();
+        messages.push(message);
+    }
+    Ok(messages)
 }

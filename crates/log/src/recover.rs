@@ -317,8 +317,7 @@ impl Output {
         if self.found.messages == 0 {
             drop(self.mcap);
             let _ = std::fs::remove_file(&self.partial);
-            let what = format!("no message in it is readable ({})", self.found.lost.join("; "));
-            return Err(LogError::Damaged { path: from.to_owned(), what });
+            return Err(LogError::Lost { path: from.to_owned(), what: self.found.lost.join("; ") });
         }
         self.mcap.finish().map_err(|error| unwritten(&self.partial, error))?;
         let mut buffer = self.mcap.into_inner();

@@ -22,7 +22,8 @@ pub enum ReportError {
     #[error(transparent)]
     Log(#[from] LogError),
     /// The file system refused.
-    #[error("cannot {doing} {}: {source}; is there room, and may this user {doing} there?", .path.display())]
+    #[error("cannot {doing} {}: {source}; is {}, and may this user {doing} there?", .path.display(),
+        if *doing == "read" { "the name right" } else { "there room" })]
     Io {
         /// `read` or `write`.
         doing: &'static str,

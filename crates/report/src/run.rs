@@ -97,6 +97,9 @@ impl Run {
     /// Reads every `*.mcap` in `folder`.
     pub(crate) fn read(folder: &Path) -> Result<Self, ReportError> {
         let io = |source| ReportError::Io { doing: "read", path: folder.to_owned(), source };
+        if folder.is_file() {
+            return Err(ReportError::NoLogs(folder.to_owned()));
+        }
         let mut paths = Vec::new();
         for entry in fs::read_dir(folder).map_err(io)? {
             let path = entry.map_err(io)?.path();

@@ -1,9 +1,13 @@
 //! `seafix recover`.
 
-use std::path::PathBuf;
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
-use seafix_log::{LogError, recover};
+use seafix_log::{LogError, Reader, join, recover};
 
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT},
@@ -12,15 +16,18 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Recover {
-    /// The log: cut off, damaged, or left as `.partial` by a run that was killed.
+    /// The log: cut off, damaged, or left as `.partial` by a run that was killed; or the folder of a run that did not end.
     log: PathBuf,
-    /// The file to write [default: NAME-recovered.mcap beside it].
+    /// The file to write [default: NAME-recovered.mcap beside it], or the folder [default: `recovered` in it].
     #[arg(long)]
     out: Option<PathBuf>,
 }
 
 impl Recover {
     pub(crate) fn execute(&self) -> Ended {
+        if self.log.is_dir() {
+            return of_run(&self.log, &self.out.clone().unwrap_or_else(|| self.log.join("recovered")));
+        }
         let out = self.out.clone().unwrap_or_else(|| {
             let name = self.log.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
             let name = name.trim_end_matches(".partial").trim_end_matches(".mcap");
@@ -29,11 +36,7 @@ impl Recover {
         if out.exists() {
             return Err(Failure::new(OUTPUT, format!("{} exists; name another file with --out", out.display())));
         }
-        let found = recover(&self.log, &out).map_err(|error| {
-            let written = matches!(&error, LogError::Write { .. })
-                || matches!(&error, LogError::Io { doing, .. } if *doing != "read");
-            Failure::new(if written { OUTPUT } else { INPUT }, error)
-        })?;
+        let found = recover(&self.log, &out).map_err(failure)?;
         for lost in &found.lost {
             tell(&format!("lost: {lost} in {}", self.log.display()));
         }
@@ -47,4 +50,75 @@ impl Recover {
         ))?;
         Ok(DONE)
     }
+}
+
+/// Whose fault it is: that of the files read, or of those written.
+fn failure(error: LogError) -> Failure {
+    let written = is_of_output(&error);
+    Failure::new(if written { OUTPUT } else { INPUT }, error)
+}
+
+fn is_of_output(error: &LogError) -> bool {
+    matches!(error, LogError::Write { .. }) || matches!(error, LogError::Io { doing, .. } if *doing != "read")
+}
+
+/// Joins what there is of every trial of a run that did not end: pieces that are whole, and of the others what is sound.
+fn of_run(run: &Path, out: &Path) -> Ended {
+    if out.exists() {
+        return Err(Failure::new(OUTPUT, format!("{} exists; name another folder with --out", out.display())));
+    }
+    let mut trials: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    for log in inside(&run.join("pieces")).iter().flat_map(|piece| inside(piece)) {
+        let name = log.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        if let Some(trial) = name.strip_suffix(".partial").unwrap_or(&name).strip_suffix(".mcap") {
+            trials.entry(trial.to_owned()).or_default().push(log);
+        }
+    }
+    if trials.is_empty() {
+        let what = format!("{} holds no piece of a run that did not end; name a log", run.display());
+        return Err(Failure::new(INPUT, what));
+    }
+    let io =
+        |path: &Path, error: std::io::Error| Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()));
+    fs::create_dir_all(out).map_err(|error| io(out, error))?;
+    let saved = out.join("torn");
+    for (trial, logs) in trials {
+        let mut parts = Vec::new();
+        for log in logs {
+            if log.extension().is_some_and(|end| end == "mcap") {
+                parts.push(log);
+                continue;
+            }
+            fs::create_dir_all(&saved).map_err(|error| io(&saved, error))?;
+            let part = saved.join(format!("{}.mcap", parts.len()));
+            match recover(&log, &part) {
+                Ok(found) => {
+                    found.lost.iter().for_each(|lost| tell(&format!("lost: {lost} in {}", log.display())));
+                    parts.push(part);
+                }
+                Err(error) if is_of_output(&error) => return Err(failure(error)),
+                Err(error) => tell(&format!("lost: {error}")),
+            }
+        }
+        let to = out.join(format!("{trial}.mcap"));
+        if !parts.is_empty() {
+            join(&parts, &to, || true).map_err(failure)?;
+            let mut frames = 0;
+            let counted = Reader::open(&to).and_then(|log| log.without_images().for_each_frame(|_| frames += 1));
+            counted.map_err(failure)?;
+            print(&format!("{}: {frames} whole frames of {} pieces\n", to.display(), parts.len()))?;
+        }
+        if saved.exists() {
+            fs::remove_dir_all(&saved).map_err(|error| io(&saved, error))?;
+        }
+    }
+    Ok(DONE)
+}
+
+/// What is in a folder, by name.
+fn inside(folder: &Path) -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+    found.sort();
+    found
 }
