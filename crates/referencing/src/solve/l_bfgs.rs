@@ -3,12 +3,14 @@
 use argmin::core::{Executor, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
 use seafix_component::Component;
+use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate,
     pixel_cost::{Best, Optimiser, PixelCost},
 };
+use crate::Observations;
 
 /// The pose of least Σ rᵀ S⁻¹ r over the pixels of both images, the cost of `stereo-reprojection`, by limited-memory
 /// BFGS with Moré's and Thuente's line search on six numbers and a numerical gradient: an independent judge of our own
@@ -44,11 +46,14 @@ impl Optimiser for LBfgs {
         (self.iterations, self.least_ratio)
     }
 
-    fn lower<'a>(
+    fn lower(
         &self,
-        cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
-        _best: &'a Best,
-    ) -> Result<u64, Degenerate> {
+        data: &Observations<'_>,
+        rig: &StereoRig,
+        start: &Transform<Object, Camera>,
+    ) -> Result<(Transform<Object, Camera>, u64), Degenerate> {
+        let best = Best::default();
+        let cost = || PixelCost::of(data, rig, *start, &best);
         let search = MoreThuenteLineSearch::new().with_c(1e-4, 0.9).map_err(|_| Degenerate::Singular)?;
         let method = LBFGS::new(search, 7).with_tolerance_grad(1e-8).and_then(|m| m.with_tolerance_cost(0.0));
         let method = method.map_err(|_| Degenerate::Singular)?;
@@ -58,6 +63,7 @@ impl Optimiser for LBfgs {
             .configure(|state| state.param(vec![0.0; 6]).max_iters(self.iterations))
             .timer(false)
             .run();
-        Ok(run.map_or(self.iterations, |result| result.state().get_iter()))
+        let taken = run.map_or(self.iterations, |result| result.state().get_iter());
+        Ok((cost()?.pose(&best.seen().1), taken))
     }
 }

@@ -2,21 +2,25 @@
 
 use argmin::core::{Executor, State};
 use argmin::solver::neldermead;
+use nalgebra::Vector6;
 use seafix_component::Component;
+use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate,
     pixel_cost::{Best, Optimiser, PixelCost},
 };
+use crate::Observations;
 
 /// The pose of least Σ rᵀ S⁻¹ r over the pixels of both images, the cost of `stereo-reprojection`, by a simplex of seven
-/// poses, begun anew from its own answer until that gains nothing: an independent judge that no error of a
-/// derivative can mislead. It ends where the cost has no digits left.
+/// poses, begun anew about its own answer until that moves it by nothing: an independent judge that no error of a
+/// derivative can mislead. Each simplex measures in standard deviations of the pose that it begins at, so that the cost
+/// falls alike in all directions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct NelderMead {
-    /// Iterations at most.
+    /// Iterations of one simplex at most.
     pub(crate) iterations: u64,
     /// Second extent of the points over the first below which they count as a line.
     pub(crate) least_ratio: f64,
@@ -40,37 +44,50 @@ impl Component for NelderMead {
 
 /// Simplices begun at most.
 const MOST_ROUNDS: usize = 20;
+/// Edges of the first simplex, and of the smallest that is begun (standard deviations of the pose).
+const EDGES: [f64; 2] = [5.0, 0.1];
+/// The standard deviation of the costs of the seven poses at which the first simplex ends, near the minimum, and every later
+/// one, at it: χ² is the square of the distance.
+const LEVEL: [f64; 2] = [1e-1, 1e-10];
+/// The same as a share of the cost: below it are no digits.
+const DIGITS: f64 = 1e-14;
+/// Two simplices, one on each side, that move their pose by less (standard deviations) are the last.
+const STILL: f64 = 1e-4;
 
 impl Optimiser for NelderMead {
     fn limits(&self) -> (u64, f64) {
         (self.iterations, self.least_ratio)
     }
 
-    fn lower<'a>(
+    fn lower(
         &self,
-        cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
-        best: &'a Best,
-    ) -> Result<u64, Degenerate> {
-        let (mut size, mut taken) = (5.0, 0);
+        data: &Observations<'_>,
+        rig: &StereoRig,
+        start: &Transform<Object, Camera>,
+    ) -> Result<(Transform<Object, Camera>, u64), Degenerate> {
+        let (mut pose, mut taken) = (*start, 0);
+        let [mut edge, least] = EDGES;
+        let (mut level, mut still) = (LEVEL[0], 0);
         for _ in 0..MOST_ROUNDS {
-            let (before, centre) = best.borrow().clone();
-            let corner = |i: usize| {
-                let mut x = centre.clone();
-                if i > 0 {
-                    x[i - 1] += size;
-                }
-                x
-            };
-            let method = neldermead::NelderMead::new((0..7).map(corner).collect()).with_sd_tolerance(1e-15);
+            let best = Best::default();
+            let cost = || PixelCost::of(data, rig, pose, &best);
+            let corner = |i: usize| (1..7).map(|k| if k == i { edge } else { 0.0 }).collect();
+            let method = neldermead::NelderMead::new((0..7).map(corner).collect()).with_sd_tolerance(level);
             let method = method.map_err(|_| Degenerate::Singular)?;
             let run =
                 Executor::new(cost()?, method).configure(|state| state.max_iters(self.iterations)).timer(false).run();
             taken += run.map_or(self.iterations, |result| result.state().get_iter());
-            if before - best.borrow().0 < 1e-10 {
+            let (lowest, x) = best.seen();
+            let moved = Vector6::from(x).norm();
+            pose = cost()?.pose(&x);
+            still = if moved < STILL { still + 1 } else { 0 };
+            if still == 2 {
                 break;
             }
-            size = f64::max(0.1, 0.5 * size);
+            // A simplex may collapse away from the minimum; one on the other side then does not.
+            edge = -f64::max(least, 0.1 * edge.abs()).copysign(edge);
+            level = f64::max(LEVEL[1], lowest * DIGITS);
         }
-        Ok(taken)
+        Ok((pose, taken))
     }
 }

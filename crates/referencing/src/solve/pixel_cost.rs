@@ -19,12 +19,13 @@ pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
     /// Iterations at most, and the second extent of the points over the first below which they count as a line.
     fn limits(&self) -> (u64, f64);
 
-    /// Lowers the cost that `cost` makes anew, from `best` on; the best place seen is left there. The iterations it took.
-    fn lower<'a>(
+    /// The lowest pose that it finds from `start` on, and the iterations that it took.
+    fn lower(
         &self,
-        cost: impl Fn() -> Result<PixelCost<'a>, Degenerate>,
-        best: &'a Best,
-    ) -> Result<u64, Degenerate>;
+        data: &Observations<'_>,
+        rig: &StereoRig,
+        start: &Transform<Object, Camera>,
+    ) -> Result<(Transform<Object, Camera>, u64), Degenerate>;
 
     /// What is wrong with the limits.
     fn check_limits(&self) -> Result<(), String> {
@@ -45,12 +46,10 @@ impl<T: Optimiser> Solver for T {
 
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.limits().1)?;
-        let (rig, best) = (pixels_and_rig(data)?, RefCell::new((f64::INFINITY, vec![0.0; 6])));
-        let start = kabsch::fit(&data.points);
-        let iterations = self.lower(|| PixelCost::of(data, rig, start, &best), &best)?;
-        let pose = PixelCost::of(data, rig, start, &best)?.pose(&best.borrow().1);
+        let rig = pixels_and_rig(data)?;
+        let (pose, iterations) = self.lower(data, rig, &kabsch::fit(&data.points))?;
         // Whatever the library says of how it ended: at a minimum nothing pulls.
-        let off = PixelCost::of(data, rig, pose, &best)?.distance();
+        let off = PixelCost::of(data, rig, pose, &Best::default())?.distance();
         converged(iterations, off).map(|()| pose)
     }
 
@@ -65,7 +64,21 @@ impl<T: Optimiser> Solver for T {
 }
 
 /// The best place seen: its cost and its six numbers.
-pub(super) type Best = RefCell<(f64, Vec<f64>)>;
+#[derive(Debug)]
+pub(super) struct Best(RefCell<(f64, [f64; 6])>);
+
+impl Default for Best {
+    fn default() -> Self {
+        Self(RefCell::new((f64::INFINITY, [0.0; 6])))
+    }
+}
+
+impl Best {
+    /// Its cost and its six numbers: infinite and none where nothing was seen.
+    pub(super) fn seen(&self) -> (f64, [f64; 6]) {
+        *self.0.borrow()
+    }
+}
 
 /// Σ rᵀ S⁻¹ r at `start · Exp(L x)`, r the pixel residuals and S = Σ_px + σ_model² J Jᵀ with J at the measured point.
 ///
@@ -88,7 +101,7 @@ const STEP: f64 = 1e-4;
 
 impl<'a> PixelCost<'a> {
     /// About `start`.
-    fn of(
+    pub(super) fn of(
         data: &'a Observations<'_>,
         rig: &'a StereoRig,
         start: Transform<Object, Camera>,
@@ -163,9 +176,9 @@ impl CostFunction for PixelCost<'_> {
 
     fn cost(&self, x: &Self::Param) -> Result<f64, Error> {
         let cost = self.chi2(x);
-        let mut best = self.best.borrow_mut();
+        let mut best = self.best.0.borrow_mut();
         if cost < best.0 {
-            *best = (cost, x.clone());
+            *best = (cost, std::array::from_fn(|i| x[i]));
         }
         Ok(cost)
     }
