@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use seafix_component::Choice;
 use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 use seafix_proptests::{
     admissible::objection,
@@ -12,7 +13,9 @@ use seafix_proptests::{
     problems::{LARGE, Planted, SMALL, planted},
     searches::{Tried, nowhere, searches, sets},
 };
-use seafix_referencing::{Candidates, Correspondence, ModelPoint, Tolerance, Unidentified};
+use seafix_referencing::{
+    Acceptance, Candidates, Correspondence, Degenerate, ModelPoint, Outcome, SOLVERS, Tolerance, Unidentified, judge,
+};
 
 const BUDGET: i64 = 20_000;
 
@@ -65,6 +68,30 @@ fn too_few_points_are_no_pose() {
         }
         Ok(())
     });
+}
+
+/// Points on a line determine no pose: whatever a search makes of them, the answer is `degenerate`, with the number that failed.
+#[test]
+fn points_on_a_line_are_degenerate() {
+    let solver = SOLVERS.build(&Choice::named("mahalanobis")).expect("it is listed");
+    let along = |k: usize| Vector3::new(1.0, 0.3, 0.2) * [0.0, 0.23, 0.31, 0.58, 0.77, 1.0][k];
+    let image = |k: usize| (nowhere().inverse() * Point::from(along(k))).coords;
+    let line = Planted {
+        model: (0..6).map(|k| ModelPoint::exact("P", Point::from(along(k)))).collect(),
+        cloud: (0..6)
+            .map(|k| MeasuredPoint { position: UncertainPoint::isotropic(Point::from(image(k)), 0.002), pixels: None })
+            .collect(),
+        candidates: Candidates::all(6, 6),
+        tolerance: Tolerance::Fixed(0.01),
+        truth: Vec::new(),
+        pose: nowhere(),
+    };
+    for search in each(BUDGET) {
+        let problem = line.problem();
+        let attempt = judge(&problem, search.answer(&line), &*solver, &Acceptance::default(), None);
+        let told = matches!(attempt.outcome, Outcome::Degenerate(Degenerate::Collinear { ratio, .. }) if ratio < 1e-3);
+        assert!(told, "{}: {:?}", search.name, attempt.outcome);
+    }
 }
 
 /// P35. Δ = 1e-9 of the extent: with exact coordinates every visible point is identified; with noise fewer are, and nothing

@@ -4,8 +4,8 @@ use rand::Rng;
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use crate::{
-    Correspondence, Identification, ModelPoint, Problem, Search, Shell, Solver, Unidentified,
-    chance::expected_sets_as_good, site::diameter,
+    Correspondence, Degenerate, Identification, ModelPoint, Problem, Search, Shell, Solver, Unidentified,
+    chance::expected_sets_as_good, site::diameter, solve::second_ratio,
 };
 
 mod acceptance;
@@ -52,7 +52,11 @@ pub fn judge(
 ) -> Attempt {
     let found = match found {
         Ok(found) => found,
-        Err(why) => return Attempt::without(why),
+        Err(why) => {
+            let attempt = Attempt::without(why);
+            let outcome = on_a_line(problem).map_or(attempt.outcome, Outcome::Degenerate);
+            return Attempt { outcome, ..attempt };
+        }
     };
     let alert_limit = alert_limit(problem.model, acceptance);
     let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
@@ -72,6 +76,7 @@ pub fn judge(
         Some(why) if !settled(&outcome, found.optimal) => Outcome::Unidentified(why.clone().into()),
         _ => outcome,
     };
+    let outcome = on_a_line(problem).map_or(outcome, Outcome::Degenerate);
     let believed = match &outcome {
         Outcome::Referenced(reference) => &reference.pairs,
         _ => &found.pairs,
@@ -113,6 +118,17 @@ pub fn judge_named(
         expected_chance_sets: None,
         tests: None,
     }
+}
+
+/// That the model points with a candidate, three or more, lie on a line: whatever a search found of them, or did not, they
+/// determine no pose.
+fn on_a_line(problem: &Problem<'_>) -> Option<Degenerate> {
+    const LEAST: f64 = 1e-3;
+    let lists = problem.candidates.lists.iter();
+    let places: Vec<_> =
+        problem.model.iter().zip(lists).filter(|(_, list)| !list.is_empty()).map(|(p, _)| p.at.coords).collect();
+    let ratio = (places.len() >= 3).then(|| second_ratio(places.iter().copied()))?;
+    (ratio < LEAST).then_some(Degenerate::Collinear { ratio, least: LEAST })
 }
 
 /// Poses further apart than this (m) are different answers: the alert limit, or its share of the model's diameter.

@@ -43,6 +43,7 @@ pub use kabsch::Kabsch;
 pub(crate) use kabsch::fit as least_squares;
 pub use mahalanobis::Mahalanobis;
 pub(crate) use sightings::{Sightings, Target as PixelTarget};
+pub(crate) use spread::second_ratio;
 pub use stereo_reprojection::StereoReprojection;
 pub use triad::{Choose, Triad};
 
