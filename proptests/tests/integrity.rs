@@ -15,6 +15,8 @@ use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
 
 /// Half-size (m) of the shell in which a wrong match lies.
 const SHELL: f64 = 0.25;
+/// That of one in which most wrong matches pass for noise.
+const HIDDEN: f64 = 0.02;
 /// Draws of one layout.
 const DRAWS: u64 = 500;
 
@@ -73,9 +75,9 @@ impl Count {
     }
 }
 
-/// Fixes of the `number`-th layout: three to twelve points, 1.5 to 5 m, spread or compact; in one of ten draws one
-/// point is replaced by one that is uniform in its shell.
-fn fixes(number: u64, acceptance: &Acceptance) -> Count {
+/// Fixes of the `number`-th layout: three to twelve points, 1.5 to 5 m, spread or compact; at the rate of the settings one
+/// point is replaced by one that is uniform in its shell of this half-size (m).
+fn fixes(number: u64, acceptance: &Acceptance, shell: f64) -> Count {
     let mut choose = Stream::new(71, number, 0, Purpose::Survey);
     let rigs = [VirtualRig::default(), VirtualRig { size: [1600, 1200], focal: 1348.3, baseline: 0.25 }];
     let layout = Layout {
@@ -94,7 +96,7 @@ fn fixes(number: u64, acceptance: &Acceptance) -> Count {
         let wrong = wrong(layout.points, acceptance, &mut stream);
         let Some(mut cloud) = placed.draw(draw) else { continue };
         for wrong in wrong {
-            let Some(other) = elsewhere(&placed, &placed.model[wrong], &mut stream) else { continue };
+            let Some(other) = elsewhere(&placed, &placed.model[wrong], shell, &mut stream) else { continue };
             cloud[wrong] = other;
         }
         if let Some(fix) = fix(&placed, &cloud, acceptance) {
@@ -118,8 +120,8 @@ fn wrong(points: usize, acceptance: &Acceptance, stream: &mut Stream) -> Vec<usi
 }
 
 /// A point uniform in the shell about the true place of a model point, seen with the noise of all others.
-fn elsewhere(placed: &Placed, model: &Point<Object>, stream: &mut Stream) -> Option<MeasuredPoint> {
-    let off = Vector3::from_fn(|_, _| stream.between(-SHELL, SHELL));
+fn elsewhere(placed: &Placed, model: &Point<Object>, shell: f64, stream: &mut Stream) -> Option<MeasuredPoint> {
+    let off = Vector3::from_fn(|_, _| stream.between(-shell, shell));
     let exact = placed.rig.project(&(placed.object_from_camera.inverse() * *model + off))?;
     let mut noisy = |p: Pixel| Pixel { u: p.u + 0.2 * stream.normal(), v: p.v + 0.2 * stream.normal() };
     let at = StereoPixels { left: noisy(exact.left), right: noisy(exact.right) };
@@ -148,10 +150,10 @@ fn fix(placed: &Placed, cloud: &[MeasuredPoint], acceptance: &Acceptance) -> Opt
 }
 
 /// `layouts` layouts on two threads; the same counts on any number.
-fn trial(layouts: u64, acceptance: &Acceptance) -> Count {
+fn trial(layouts: u64, acceptance: &Acceptance, shell: f64) -> Count {
     let half = |first: u64| {
         let mut all = Count::default();
-        (first..layouts).step_by(2).for_each(|number| all.merge(&fixes(number, acceptance)));
+        (first..layouts).step_by(2).for_each(|number| all.merge(&fixes(number, acceptance, shell)));
         all
     };
     let mut all = Count::default();
@@ -186,7 +188,7 @@ fn a_million_fixes_keep_their_levels_under_two_wrong_matches() {
 }
 
 fn million(acceptance: &Acceptance) {
-    let all = trial(1_000_000 / DRAWS, acceptance);
+    let all = trial(1_000_000 / DRAWS, acceptance, SHELL);
     let share = |n: u64| 100.0 * n as f64 / all.drawn as f64;
     println!(
         "{} draws: referenced {:.2} %, with a level {:.2} %, level within the alert limit {:.2} %; beyond the level: \
@@ -212,25 +214,51 @@ fn million(acceptance: &Acceptance) {
     assert!(all.position <= 130 && all.attitude <= 130, "position {}, attitude {}", all.position, all.attitude);
 }
 
-/// P71, short: 20 000 draws at risk 1e-3, and no level for three points. The levels are far above the errors: without the
-/// separation in them this law still holds, and it is the hand-worked cases beside the code that fail.
-#[test]
-fn levels_hold() {
-    let acceptance = Acceptance { risk: 1e-3, ..Acceptance::default() };
-    let all = trial(40, &acceptance);
+/// P71, short: `layouts` times 500 draws, no level for three points, and a level for `available` of ten at least.
+fn held(layouts: u64, acceptance: &Acceptance, shell: f64, available: u64) {
+    let all = trial(layouts, acceptance, shell);
+    println!("{} drawn, {} with a level, beyond it {} and {}", all.drawn, all.available, all.position, all.attitude);
     assert_eq!(all.unmonitored, 0, "three points are unavailable");
-    assert!(all.available * 2 > all.drawn, "{} of {} have a level", all.available, all.drawn);
+    assert!(all.available * 10 > all.drawn * available, "{} of {} have a level", all.available, all.drawn);
     let most = most(all.drawn, acceptance.risk);
     assert!(all.position <= most && all.attitude <= most, "{} {} of {most}", all.position, all.attitude);
+}
+
+/// P71, short: 20 000 draws at risk 1e-3. Levels are far above the errors, for whichever point may be wrong
+/// widens them; the two laws below come nearer.
+#[test]
+fn levels_hold() {
+    held(40, &Acceptance { risk: 1e-3, ..Acceptance::default() }, SHELL, 5);
+}
+
+/// P71 where nothing is wrong and the settings say so: only the noise is left to be protected against.
+///
+/// Seen to fail with levels a third smaller, 249 and 225 beyond of 33, and without the radius of the fix itself.
+#[test]
+fn levels_hold_against_noise_alone() {
+    held(40, &Acceptance { risk: 1e-3, wrong_match_rate: 1e-12, ..Acceptance::default() }, SHELL, 5);
+}
+
+/// Settings under which no test leaves a wrong match out, so that levels alone speak of it.
+fn without_tests(risk: f64, wrong_match_rate: f64, two_wrong_rate: f64) -> Acceptance {
+    let wide = Acceptance { alert_limit: 1e3, alert_share: 1e3, attitude_limit: 1e3, ..Acceptance::default() };
+    Acceptance { confidence: 1.0 - 1e-12, risk, wrong_match_rate, two_wrong_rate, ..wide }
+}
+
+/// P71 where in every draw a match is wrong by so little that nothing leaves it out.
+#[test]
+fn levels_hold_where_wrong_matches_hide() {
+    held(40, &without_tests(0.02, 1.0, 0.0), HIDDEN, 1);
 }
 
 /// P71 under two wrong matches, short: 10 000 draws at risk 1e-3, two wrong in one of ten and one in another.
 #[test]
 fn levels_hold_under_two_wrong_matches() {
-    let acceptance = Acceptance { risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() };
-    let all = trial(20, &acceptance);
-    assert_eq!(all.unmonitored, 0, "three points are unavailable");
-    assert!(all.available * 3 > all.drawn, "{} of {} have a level", all.available, all.drawn);
-    let most = most(all.drawn, acceptance.risk);
-    assert!(all.position <= most && all.attitude <= most, "{} {} of {most}", all.position, all.attitude);
+    held(20, &Acceptance { risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() }, SHELL, 3);
+}
+
+/// The same where in every draw two are wrong by little.
+#[test]
+fn levels_hold_where_two_wrong_matches_hide() {
+    held(40, &without_tests(0.02, 1e-12, 1.0), HIDDEN, 1);
 }
