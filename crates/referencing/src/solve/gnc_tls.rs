@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Degenerate, Solver,
     irls::distance,
-    kabsch::fit_weighted,
+    kabsch::{self, fit_weighted},
     sandwich,
     spread::{check, share},
     weighted_kabsch::variance,
@@ -82,7 +82,8 @@ impl Solver for GncTls {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let kept = self.used(data).into_iter().map(|k| data.points[k]).collect();
-        sandwich::covariance(&Observations { points: kept, rig: data.rig }, at, |_| 1.0)
+        let kept = Observations { points: kept, rig: data.rig };
+        sandwich::or_resampled(&kept, at, |_| 1.0, |drawn| Ok(kabsch::fit(&drawn.points)))
     }
 }
 

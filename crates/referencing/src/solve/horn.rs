@@ -69,6 +69,6 @@ impl Solver for Horn {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        sandwich::covariance(data, at, |_| 1.0)
+        sandwich::or_resampled(data, at, |_| 1.0, |drawn| self.solve(drawn))
     }
 }

@@ -1,5 +1,6 @@
 //! Iteratively reweighted least squares: losses that grow more slowly than the square.
 
+use nalgebra::Vector6;
 use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
@@ -7,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::{
     Degenerate, Solver, converged,
     kabsch::fit_weighted,
-    resampled, sandwich,
+    resampled::{self, Answer},
+    sandwich,
     spread::{check, share},
     weighted_kabsch::variance,
 };
@@ -61,18 +63,44 @@ impl Component for Irls {
 
 /// Steps of the iteration.
 const MOST_STEPS: u64 = 200;
+/// A step (standard deviations of the pose) after which an answer that only serves a covariance is at its minimum: what is
+/// left, a few times as much, adds a ten-thousandth to the variance.
+const STILL: f64 = 1e-3;
 /// Residuals count as no smaller than this (standard deviations of the point): the un-squared sum has a corner at zero.
 const CORNER: f64 = 1e-4;
 
 impl Solver for Irls {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        self.follow(data, |step| step.amax() <= 1e-14)
+    }
+
+    /// That of many draws: with residuals of the size where a loss bends, its derivative at one draw says little.
+    fn covariance(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        let known = sandwich::covariance(data, at, |k| self.weight(&data.points[k], at))?;
+        let length = known.matrix.cholesky().ok_or(Degenerate::Singular)?;
+        let still = |step: &Vector6<f64>| step.dot(&length.solve(step)) <= STILL * STILL;
+        resampled::covariance(|drawn| self.follow(drawn, still), data, at, self.bends())
+    }
+}
+
+impl Irls {
+    /// The iteration from Kabsch's pose on, until a step is `still`.
+    fn follow(
+        &self,
+        data: &Observations<'_>,
+        still: impl Fn(&Vector6<f64>) -> bool,
+    ) -> Result<Transform<Object, Camera>, Degenerate> {
         check(data, self.minimum(), self.least_ratio)?;
         let mut pose = fit_weighted(&data.points, |_| 1.0);
         let mut last = f64::INFINITY;
         for taken in 1..=MOST_STEPS {
             let next = fit_weighted(&data.points, |k| self.weight(&data.points[k], &pose));
             let step = pose.error_to(&next);
-            if step.amax() <= 1e-14 {
+            if still(&step) {
                 return Ok(next);
             }
             if taken == MOST_STEPS {
@@ -88,23 +116,11 @@ impl Solver for Irls {
         Ok(pose)
     }
 
-    /// That of many draws: with residuals of the size where a loss bends, its derivative at one draw says little.
-    fn covariance(
-        &self,
-        data: &Observations<'_>,
-        at: &Transform<Object, Camera>,
-    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        resampled::covariance(|drawn| self.solve(drawn), data, at, self.pairs())
-    }
-}
-
-impl Irls {
-    /// How many draws its covariance takes. The un-squared sum is nowhere nearly linear in the noise: its covariance is
-    /// then that of a sample, and its inverse the larger the smaller the sample is, by n/(n − 7) of n normal draws.
-    fn pairs(&self) -> usize {
+    /// Noise hardly reaches where Huber's loss turns; the others bend everywhere.
+    fn bends(&self) -> Answer {
         match self.loss {
-            Loss::UnSquared => 4 * resampled::PAIRS,
-            Loss::Huber | Loss::Cauchy => resampled::PAIRS,
+            Loss::Huber => Answer::Straight,
+            Loss::Cauchy | Loss::UnSquared => Answer::Bent,
         }
     }
 

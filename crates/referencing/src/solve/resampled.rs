@@ -1,6 +1,6 @@
 //! The covariance of an answer that derivatives do not describe, from what other noise would have shown.
 
-use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector4};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Matrix6, Matrix6x2, Vector3, Vector4, Vector6};
 use seafix_geometry::{
     Camera, Covariance6, Object, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint,
 };
@@ -17,7 +17,7 @@ use crate::{Observation, Observations};
 /// *An introduction to the bootstrap*, 1993): bias included, and whatever a loss with corners does with noise of its size,
 /// which no derivative at one draw of it tells.
 ///
-/// The draws are the rows of [`Signs`], at least `pairs` and the negative of each: of an answer that is linear in the noise they give the
+/// The draws are the rows of [`Signs`], as many as `answer` takes and the negative of each: of an answer that is linear in the noise they give the
 /// covariance to the last digit. A point that the noise does not explain is taken
 /// where it was measured, so that it is left out, or pulls, as it did; all others where the pose puts them.
 ///
@@ -27,43 +27,80 @@ pub(super) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
-    pairs: usize,
+    answer: Answer,
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
     let all: Vec<Source> =
         data.points.iter().enumerate().map(|(k, p)| Source::of(k, p, data.rig, at)).collect::<Result<_, _>>()?;
     let numbers = all.iter().map(Source::numbers).sum();
-    let (size, blocks) = rows(numbers, pairs);
-    let mut sum = Matrix6::zeros();
-    let (mut answered, mut refused) = (0_u32, None);
+    let (size, blocks) = rows(numbers, answer.pairs());
+    let mut answers: Vec<[Option<Vector6<f64>>; 2]> = Vec::with_capacity(size * blocks);
+    let mut refused = None;
     let mut moved = data.clone();
     for block in 0..blocks {
         for row in Signs::new(size, block as u64).rows() {
-            for sign in [1.0, -1.0] {
+            answers.push([1.0, -1.0].map(|sign| {
                 let mut noise = row.iter().map(|z| sign * z);
                 let shown = all.iter().zip(&mut moved.points).try_for_each(|(source, point)| {
                     *point = source.draw(data.rig, &mut noise)?;
                     Some(())
                 });
                 match shown.ok_or(Degenerate::Hidden).and_then(|()| solve(&moved)) {
-                    Ok(answer) => {
-                        let xi = at.error_to(&answer);
-                        sum += xi * xi.transpose();
-                        answered += 1;
+                    Ok(answer) => Some(at.error_to(&answer)),
+                    Err(why) => {
+                        refused.get_or_insert(why);
+                        None
                     }
-                    Err(why) => refused = refused.or(Some(why)),
                 }
-            }
+            }));
         }
     }
-    let drawn = (2 * size * blocks) as u32;
-    match refused {
-        Some(why) if answered * 10 < drawn * 9 => Err(why),
-        _ => Ok(Covariance6::new(sum / f64::from(answered))),
+    let answered = answers.iter().flatten().flatten().count();
+    if let Some(why) = refused.filter(|_| answered * 10 < 2 * size * blocks * 9) {
+        return Err(why);
+    }
+    let sum: Matrix6<f64> = answers.iter().flatten().flatten().map(|xi| xi * xi.transpose()).sum();
+    let scale = match answer {
+        Answer::Straight => 1.0,
+        Answer::Bent => left_out(&answers, &sum).ok_or(Degenerate::Singular)?,
+    };
+    Ok(Covariance6::new(sum * (scale / answered as f64)))
+}
+
+/// How the answer bends with the noise, and so how many draws it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// It is nearly linear: the draws tell its covariance all but exactly.
+    Straight,
+    /// It is nowhere linear: the covariance is that of a sample, and its inverse the larger the smaller the sample is and
+    /// the longer its tails are, which is made good by what the draws say of one of them that was left out.
+    Bent,
+}
+
+impl Answer {
+    /// Draws, each with its negative.
+    fn pairs(self) -> usize {
+        match self {
+            Self::Straight => 128,
+            Self::Bent => 512,
+        }
     }
 }
 
-/// Draws, each with its negative, of answers that are nearly linear in the noise.
-pub(super) const PAIRS: usize = 128;
+/// The mean of ξᵀ Σ⁻¹ ξ / 6 over all answers, Σ being that of all draws but that of ξ and its negative; `sum` is Σ ξξᵀ of all.
+/// With U the two answers of a pair, S their sum without them is known by G = Uᵀ S⁻¹ U of all: G (1 − G)⁻¹.
+fn left_out(answers: &[[Option<Vector6<f64>>; 2]], sum: &Matrix6<f64>) -> Option<f64> {
+    let of_all = sum.cholesky()?;
+    let count = answers.iter().flatten().flatten().count() as f64;
+    let mut squares = 0.0;
+    for pair in answers {
+        let [a, b] = pair.map(Option::unwrap_or_default);
+        let pair = Matrix6x2::from_columns(&[a, b]);
+        let g = pair.transpose() * of_all.solve(&pair);
+        squares += (g * (Matrix2::identity() - g).try_inverse()?).trace() * (count - 2.0);
+    }
+    Some(squares / (6.0 * count))
+}
+
 /// A residual (standard deviations of its point) that noise exceeds once in a million where all of it is along one axis; a
 /// pose that weighs all axes alike leaves across the others residuals that no χ² would forgive.
 const UNLIKELY: f64 = 8.5;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-use super::{Degenerate, eyes::Eyes, normal::Normal};
+use super::{Degenerate, eyes::Eyes, normal::Normal, resampled};
 use crate::{Observation, Observations};
 
 /// A⁻¹ B A⁻¹ with A = Σ w JᵀJ and B = Σ w² Jᵀ S J, J = \[ \[p\]×, −I \] and S the noise of a point: what the noise makes
@@ -29,6 +29,25 @@ pub(super) fn covariance(
     }
     let bread = a.matrix().cholesky().ok_or(Degenerate::Singular)?.inverse();
     Ok(Covariance6::new(bread * b.matrix() * bread))
+}
+
+/// The greatest standard deviation of the attitude (rad) at which errors are straight enough in the noise.
+const STRAIGHT: f64 = 0.15;
+
+/// [`covariance`] where errors are straight in the noise; where the attitude is known to [`STRAIGHT`] at best, that of
+/// many draws, which `solve` answers.
+pub(super) fn or_resampled(
+    data: &Observations<'_>,
+    at: &Transform<Object, Camera>,
+    weight: impl Fn(usize) -> f64,
+    solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
+) -> Result<Covariance6<Object, Camera>, Degenerate> {
+    let known = covariance(data, at, weight)?;
+    if known.attitude_sigma() <= STRAIGHT {
+        Ok(known)
+    } else {
+        resampled::covariance(solve, data, at, resampled::Answer::Straight)
+    }
 }
 
 /// The covariance (m²) of a point's residual, seen from `place`.

@@ -74,7 +74,7 @@ impl Solver for Triad {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let three = self.three(data)?.map(|i| data.points[i]).to_vec();
-        resampled::covariance(of_three, &Observations { points: three, rig: data.rig }, at, resampled::PAIRS)
+        resampled::covariance(of_three, &Observations { points: three, rig: data.rig }, at, resampled::Answer::Straight)
     }
 }
 

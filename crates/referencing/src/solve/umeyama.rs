@@ -63,7 +63,7 @@ impl Solver for Umeyama {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        sandwich::covariance(data, at, |_| 1.0)
+        sandwich::or_resampled(data, at, |_| 1.0, |drawn| self.solve(drawn))
     }
 }
 

@@ -49,7 +49,8 @@ impl Solver for WeightedKabsch {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        sandwich::covariance(data, at, |k| 1.0 / variance(&data.points[k]))
+        let weight = |k: usize| 1.0 / variance(&data.points[k]);
+        sandwich::or_resampled(data, at, weight, |drawn| self.solve(drawn))
     }
 }
 
