@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use seafix_component::Choice;
+use seafix_evaluation::{position_error, transfer_rms};
 use seafix_proptests::monte_carlo::{Cell, cell, cell_where, is_meaningful, observations, paired, pixel_chi2};
 use seafix_referencing::{Observations, SOLVERS};
 use seafix_simulation::{Layout, Shape, VirtualRig};
@@ -74,6 +75,8 @@ fn table() {
 /// P46, P47, short form: over 2000 draws of a spread layout the two solvers that weigh by covariance have m2 and m3
 /// within 6 % of the Cramér–Rao bound, and a NEES whose mean is six to four of its own standard deviations. The long
 /// form is the table below with 10 000 draws.
+///
+/// Seen to fail when covariances are a fifth too small, and when the right image is left out.
 #[test]
 fn weighed_solvers_reach_the_bound() {
     for (_, rig) in cameras() {
@@ -106,6 +109,85 @@ fn cells(points: usize) -> Vec<(String, Layout)> {
         }
     }
     all
+}
+
+/// m2 and m3 of a solver (mm), and half a unit of the last digit of each.
+type Printed = [(f64, f64); 2];
+
+/// Errors that others found for thirteen points over the view at a disparity noise of 0.3 px: camera, distance (m), and of
+/// `triad`, `kabsch` and the likeliest pose the root mean square errors of model points and of the camera's position (mm),
+/// as printed, with half a unit of the last digit.
+#[rustfmt::skip]
+const ELSEWHERE: [(usize, f64, [Printed; 3]); 3] = [
+    (1, 1.75, [[(2.8, 0.05), (10.5, 0.05)], [(1.5, 0.05), (5.9, 0.05)], [(0.32, 0.005), (1.2, 0.05)]]),
+    (1, 3.25, [[(9.8, 0.05), (35.0, 0.5)], [(5.1, 0.05), (20.0, 0.5)], [(0.61, 0.005), (2.2, 0.05)]]),
+    (0, 5.0, [[(72.0, 0.5), (154.0, 0.5)], [(34.0, 0.5), (85.0, 0.5)], [(1.9, 0.05), (4.3, 0.05)]]),
+];
+
+/// Figure 2: the table of [`ELSEWHERE`] within its Monte Carlo error, which is that of twenty layouts: errors differ by a
+/// tenth from layout to layout, those of their mean by two or three percent. 500 layouts, 20 draws each.
+///
+/// The model points are then other points of the view than those that the pose rests on. Over these themselves, as in
+/// all other figures, least squares err by an eighth less, which no choice of layouts explains: seen to fail there, at 7 to 13
+/// standard errors.
+#[test]
+fn the_table_of_others_is_reproduced() {
+    const USED: usize = 13;
+    let mut missed = Vec::new();
+    for (camera, distance, columns) in ELSEWHERE {
+        let (camera, rig) = cameras()[camera].clone();
+        for (solver, expected) in ["triad", "kabsch", "stereo-reprojection"].iter().zip(columns) {
+            let built = build(solver);
+            // Of every draw the squares of m2 over other points, over those used, and of m3 (mm²).
+            let layout = |number: u64| -> Vec<[f64; 3]> {
+                let settings = Layout {
+                    points: USED + 40,
+                    number,
+                    distance,
+                    sigma_px: 0.3 / 2f64.sqrt(),
+                    rig: rig.clone(),
+                    ..Layout::default()
+                };
+                let placed = settings.place(2).expect("the layout can be placed");
+                let truth = &placed.object_from_camera;
+                let draw = |draw| {
+                    let mut points = observations(&placed, draw, 0.0).expect("every draw can be triangulated");
+                    points.truncate(USED);
+                    let pose = built.solve(&Observations { points, rig: Some(&placed.rig) }).expect("thirteen points");
+                    let (used, others) = placed.model.split_at(USED);
+                    let rms = |points| transfer_rms(&pose, truth, points).expect("there are points");
+                    [rms(others), rms(used), position_error(&pose, truth)].map(|error| (error * 1e3).powi(2))
+                };
+                (0..20).map(draw).collect()
+            };
+            let squares: Vec<Vec<[f64; 3]>> = (0..500).map(layout).collect();
+            let mut line = format!("{camera:7} {distance} m {solver:19}");
+            for (which, name) in ["m2, other points", "m2, points used", "m3"].iter().enumerate() {
+                let each: Vec<(f64, f64)> =
+                    squares.iter().map(|draws| moments(draws.iter().map(|draw| draw[which]))).collect();
+                let (mean, variance) = moments(each.iter().map(|(mean, _)| *mean));
+                // What the layouts differ by, without what twenty draws do.
+                let layouts = variance - moments(each.iter().map(|(_, variance)| variance / 20.0)).0;
+                let rms = mean.sqrt();
+                let error = (layouts.max(0.0) / 20.0).sqrt() / (2.0 * rms);
+                let (printed, half) = expected[usize::from(which == 2)];
+                let off = (printed - rms) / error.hypot(half / 3f64.sqrt());
+                line += &format!(" | {name} {rms:.3} ± {error:.3}, {printed} ({off:+.1})");
+                if which != 1 && off.abs() > 3.29 {
+                    missed.push(format!("{camera} {distance} m {solver} {name}: {rms} {printed}"));
+                }
+            }
+            println!("{line}");
+        }
+    }
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// Mean and variance.
+fn moments(all: impl ExactSizeIterator<Item = f64> + Clone) -> (f64, f64) {
+    let n = all.len() as f64;
+    let mean = all.clone().sum::<f64>() / n;
+    (mean, all.map(|one| (one - mean).powi(2)).sum::<f64>() / (n - 1.0))
 }
 
 /// A solver by its name, with a loss behind it where it has one.
@@ -215,31 +297,32 @@ fn no_answer_is_less_likely_than_the_truth() {
     assert!(refused <= 10, "{refused} of 20 000 refused");
 }
 
-/// Figure 4 for every solver: its own covariance holds within ±10 % wherever its attitude errs
-/// by less than 5° (unweighted solvers err by 15° in the weakest cell). As the mean NEES of 10 000 draws of each cell
+/// Figure 4 for every solver: its own covariance holds within ±10 % wherever its attitude errs by less than 5°, and claims no
+/// more than that in weaker cells (unweighted solvers err by 15° in the weakest). As the mean NEES of 10 000 draws of each cell
 /// with thirteen points (1000 for those whose every answer takes a hundred others or a millisecond). `LIMITS_SOLVERS` names
-/// those that are tried (`irls cauchy` is a loss of its own), `LIMITS_POINTS` other numbers of points, `LIMITS_CELLS` what a
-/// cell's name has in it (`Compact N 13 3.25 m`).
+/// those that are tried (`irls cauchy` is a loss of its own), `LIMITS_POINTS` other numbers of points, `LIMITS_DRAWS` of draws,
+/// `LIMITS_CELLS` what a cell's name has in it (`Compact N 13 3.25 m`).
 #[test]
 #[ignore = "15 solvers, an hour: cargo test --release --workspace --test limits -- --ignored --nocapture every_solver"]
 fn every_solver_knows_its_error() {
     let mut missed = Vec::new();
     let asked = std::env::var("LIMITS_SOLVERS").unwrap_or_default();
     let wanted = std::env::var("LIMITS_CELLS").unwrap_or_default();
-    let points = std::env::var("LIMITS_POINTS").map_or(13, |number| number.parse().expect("a number"));
+    let number = |key: &str| std::env::var(key).ok().map(|number| number.parse::<u64>().expect("a number"));
+    let (points, draws) = (number("LIMITS_POINTS").unwrap_or(13) as usize, number("LIMITS_DRAWS"));
     let losses = ["irls cauchy", "irls un-squared"];
     for name in
         SOLVERS.names().chain(losses).filter(|name| asked.is_empty() || asked.split(',').any(|one| one == *name))
     {
         for (cell_name, settings) in cells(points).into_iter().filter(|(name, _)| name.contains(&wanted)) {
             let slow = ["irls", "l-bfgs", "nelder-mead", "triad"].iter().any(|slow| name.starts_with(slow));
-            let c = cell(&*build(name), &settings, 20, if slow { 1000 } else { 10_000 }, true);
+            let c = cell(&*build(name), &settings, 20, draws.unwrap_or(if slow { 1000 } else { 10_000 }), true);
             let turn = c.attitude_rms.to_degrees();
             println!(
                 "{name} {cell_name}: NEES {:.3} cover {:.4}, attitude {turn:.2}°, {} refused",
                 c.nees, c.coverage, c.refused
             );
-            if turn < 5.0 && !(5.4..=6.6).contains(&c.nees) {
+            if c.nees > 6.6 || turn < 5.0 && c.nees < 5.4 {
                 missed.push(format!("{name} {cell_name}: {:.3}", c.nees));
             }
         }
@@ -248,6 +331,8 @@ fn every_solver_knows_its_error() {
 }
 
 /// Figure 3, short: 600 draws a cell.
+///
+/// Seen to fail when the model's variance is left out of the weights, and when the right image is.
 #[test]
 fn model_error_makes_weights_no_worse_than_none() {
     weights_are_no_worse(600);

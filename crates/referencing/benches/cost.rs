@@ -37,16 +37,25 @@ fn main() {
         }
         return;
     }
+    // As many calls of each as take a quarter of a millisecond, fifty at most.
+    let calls: Vec<u32> = solvers
+        .iter()
+        .map(|solver| {
+            let start = Instant::now();
+            let _ = black_box(solver.solve(black_box(&data)));
+            (250e-6 / start.elapsed().as_secs_f64()).clamp(1.0, 50.0) as u32
+        })
+        .collect();
     let mut least = vec![f64::INFINITY; solvers.len()];
     let mut eigen = f64::INFINITY;
     let umeyama = umeyama();
     for round in 0..200 {
-        for (solver, least) in solvers.iter().zip(&mut least) {
+        for ((solver, least), &calls) in solvers.iter().zip(&mut least).zip(&calls) {
             let start = Instant::now();
-            for _ in 0..50 {
+            for _ in 0..calls {
                 let _ = black_box(solver.solve(black_box(&data)));
             }
-            *least = least.min(start.elapsed().as_secs_f64() * 1e9 / 50.0);
+            *least = least.min(start.elapsed().as_secs_f64() * 1e9 / f64::from(calls));
         }
         if let Some(program) = umeyama.as_ref().filter(|_| round % 40 == 0) {
             eigen = eigen.min(nanoseconds(program));
@@ -54,7 +63,8 @@ fn main() {
     }
     let of = |name: &str| choices.iter().position(|(known, _)| known == name).expect("it is listed");
     let kabsch = of("kabsch");
-    let instructions: Vec<Option<f64>> = (0..solvers.len()).map(instructions).collect();
+    let instructions: Vec<Option<f64>> =
+        (0..solvers.len()).map(|which| instructions(which, 20 * calls[which] as usize)).collect();
     println!(
         "{:32} {:>9} {:>7} {:>12} {:>7} {:>11}",
         "solver", "ns", "kabsch", "instructions", "kabsch", "allocations"
@@ -76,8 +86,8 @@ fn main() {
     }
 }
 
-/// Instructions of one call: what ten and a thousand and ten calls differ by.
-fn instructions(which: usize) -> Option<f64> {
+/// Instructions of one call: what ten calls and `more` of them besides differ by.
+fn instructions(which: usize, more: usize) -> Option<f64> {
     let count = |calls: usize| -> Option<f64> {
         let output = Command::new("valgrind")
             .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
@@ -88,7 +98,7 @@ fn instructions(which: usize) -> Option<f64> {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         said.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
     };
-    Some((count(1010)? - count(10)?) / 1000.0)
+    Some((count(10 + more)? - count(10)?) / more as f64)
 }
 
 /// The compiled peer.
