@@ -56,7 +56,7 @@ struct Looked {
     u: Vec<f32>,
     v: Vec<f32>,
     own: Vec<f32>,
-    slow: Vec<f32>,
+    cover: Vec<f32>,
     tufts: Vec<f32>,
 }
 
@@ -160,14 +160,9 @@ impl Looked {
             out.extend(self.own.iter().map(|own| (skin.albedo * own).min(1.0)));
             return;
         }
-        // Growth begins where a slow pattern is low, and ends in tufts.
         looks.at(Texture::Growth, &self.u, &self.v, footprint, &mut self.tufts);
-        self.u.iter_mut().for_each(|u| *u = 0.37 * *u + 5.0);
-        self.v.iter_mut().for_each(|v| *v *= 0.37);
-        looks.at(Texture::Steel, &self.u, &self.v, footprint, &mut self.slow);
-        let level = 0.34 * (skin.growth * 2.0 - 1.0);
-        for ((own, slow), tufts) in self.own.iter().zip(&self.slow).zip(&self.tufts) {
-            let cover = if skin.growth >= 1.0 { 1.0 } else { ((level - (slow - 1.0)) * 12.0 + 0.5).clamp(0.0, 1.0) };
+        looks.grown(skin.growth, &mut self.u, &mut self.v, footprint, &mut self.cover);
+        for ((own, cover), tufts) in self.own.iter().zip(&self.cover).zip(&self.tufts) {
             let own = (skin.albedo * own).min(1.0);
             out.push(own + cover * (GROWTH * tufts - own));
         }

@@ -33,6 +33,8 @@ pub(super) struct Look {
 #[derive(Debug, Clone)]
 pub(crate) struct Looks {
     looks: [OnceLock<Box<Look>>; 7],
+    /// Values of the pattern that growth follows, at places everywhere, in order.
+    slow: OnceLock<Vec<f32>>,
     seed: u32,
 }
 
@@ -147,7 +149,7 @@ fn floor(x: f32) -> i32 {
 
 impl Looks {
     pub(crate) fn new(seed: u32) -> Self {
-        Self { looks: Default::default(), seed }
+        Self { looks: Default::default(), slow: OnceLock::new(), seed }
     }
 
     /// The looks of this seed, the same for all dives that are planned at once: a look takes 22 MB.
@@ -172,6 +174,37 @@ impl Looks {
             let look = self.looks[texture as usize].get_or_init(|| Box::new(look(texture, self.seed)));
             look.at(u, v, footprint, out);
         }
+    }
+}
+
+/// Values by which it is found how low a pattern must be for growth.
+const SPREAD: usize = 4096;
+/// How steeply growth thins out at its border.
+const BORDER: f32 = 12.0;
+
+impl Looks {
+    /// The share of each place that growth covers, on a body of which it covers the share `growth`: it begins where a slow
+    /// pattern is low.
+    pub(super) fn grown(&self, growth: f32, u: &mut [f32], v: &mut [f32], footprint: &[f32], out: &mut Vec<f32>) {
+        if growth >= 1.0 {
+            out.clear();
+            return out.resize(u.len(), 1.0);
+        }
+        // So low is the pattern on that share of all places. (Places: Roberts' R2 sequence, 2018.)
+        let slow = self.slow.get_or_init(|| {
+            let place = |k: usize, step: f64| (30.0 * (k as f64 * step).fract()) as f32;
+            let north: Vec<f32> = (0..SPREAD).map(|k| place(k, 0.754_877_666_246_692_8)).collect();
+            let east: Vec<f32> = (0..SPREAD).map(|k| place(k, 0.569_840_290_998_053_3)).collect();
+            let mut values = Vec::new();
+            self.at(Texture::Steel, &north, &east, &[0.004; SPREAD], &mut values);
+            values.sort_unstable_by(f32::total_cmp);
+            values
+        });
+        let level = slow[((growth * SPREAD as f32) as usize).min(SPREAD - 1)];
+        u.iter_mut().for_each(|u| *u = 0.37 * *u + 5.0);
+        v.iter_mut().for_each(|v| *v *= 0.37);
+        self.at(Texture::Steel, u, v, footprint, out);
+        out.iter_mut().for_each(|slow| *slow = ((level - *slow) * BORDER + 0.5).clamp(0.0, 1.0));
     }
 }
 
@@ -362,7 +395,7 @@ mod tests {
 
     #[test]
     fn stains_of_a_coat_differ_with_the_distance() {
-        // Of Brownian noise the mean square difference doubles with the distance. Seen to fail with octaves of one size.
+        // Of Brownian noise the mean square difference doubles with the distance.
         for waves in [[5, 11, 24, 59, 131], [7, 19, 47, 113, 241]] {
             let octaves = stained(waves, 0.2);
             let value = |x: usize, y: usize| f64::from(sum(&octaves, x, y, 7));
@@ -372,6 +405,20 @@ mod tests {
             };
             let growth = structure(32) / structure(8);
             assert!((3.0..5.0).contains(&growth), "{growth}");
+        }
+    }
+
+    #[test]
+    fn growth_covers_its_share() {
+        // Held against fixed levels, growth of a quarter hardly showed.
+        let looks = Looks::new(9);
+        for growth in [0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98, 1.0] {
+            let mut u: Vec<f32> = (0..20_000).map(|k| (k % 141) as f32 * 0.31).collect();
+            let mut v: Vec<f32> = (0..20_000).map(|k| (k / 141) as f32 * 0.29).collect();
+            let mut cover = Vec::new();
+            looks.grown(growth, &mut u, &mut v, &[0.004; 20_000], &mut cover);
+            let mean = cover.iter().sum::<f32>() / cover.len() as f32;
+            assert!((mean - growth).abs() < 0.06, "{growth}: {mean}");
         }
     }
 
