@@ -433,7 +433,7 @@ fn an_unknown_filter_among_filters() {
 fn a_value_out_of_range() {
     let (_folder, file) = experiment("question = 'why'\n[source]\nname = 'virtual-points'\ndistance = -1.0\n");
     let run = Path::new(&file).with_file_name("out");
-    refused(&["run", &file, "--out", run.to_str().unwrap()], 2, &["e.toml:2", "distance = -1", "from 1 m to 30 m"]);
+    refused(&["run", &file, "--out", run.to_str().unwrap()], 2, &["e.toml:4", "distance = -1", "from 1 m to 30 m"]);
     assert!(!run.exists());
 }
 

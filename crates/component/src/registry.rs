@@ -133,6 +133,12 @@ pub fn in_range(holds: bool, name: &str, value: impl std::fmt::Display, range: &
     if holds { Ok(()) } else { Err(format!("{name} = {value}; give {range}")) }
 }
 
+/// The setting, as a dotted key, that a message of [`in_range`] is about.
+fn out_of_range(message: &str) -> Option<String> {
+    let (name, _) = message.split_once(" = ")?;
+    name.chars().all(|c| c.is_ascii_alphanumeric() || "-.[]".contains(c)).then(|| name.to_owned())
+}
+
 fn defaults<C: Component>() -> toml::Table {
     toml::Table::try_from(C::default()).expect("a component's settings are a table of plain values")
 }
@@ -206,7 +212,10 @@ impl<T: ?Sized> Registry<T> {
                 let message = format!("setting `{key}`: {}", error.message.trim_end());
                 BuildError::BadValue { kind: self.kind, name: entry.name, key: Some(key), message }
             }
-            None => BuildError::BadValue { kind: self.kind, name: entry.name, key: None, message: error.message },
+            None => {
+                let key = out_of_range(&error.message);
+                BuildError::BadValue { kind: self.kind, name: entry.name, key, message: error.message }
+            }
         })
     }
 
@@ -297,5 +306,12 @@ mod tests {
     fn a_wrong_type_names_its_key() {
         let error = SHAPES.build(&Choice::named("square").with("side-length", "long")).unwrap_err();
         assert!(error.to_string().starts_with("shape `square`: setting `side-length`: invalid type"), "{error}");
+    }
+
+    #[test]
+    fn a_number_out_of_range_names_its_key() {
+        assert_eq!(out_of_range("lamps[1].aim = [0.0]; give a place").as_deref(), Some("lamps[1].aim"));
+        assert_eq!(out_of_range("two keys = 1; give one"), None);
+        assert_eq!(out_of_range("no number"), None);
     }
 }

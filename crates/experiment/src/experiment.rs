@@ -137,7 +137,7 @@ struct Unfit {
 impl Unfit {
     fn new(path: &[&str], error: BuildError) -> Self {
         let mut path: Vec<String> = path.iter().map(|&step| step.to_owned()).collect();
-        path.extend(error.key().filter(|&key| key != "name").map(str::to_owned));
+        path.extend(error.key().filter(|&key| key != "name").into_iter().flat_map(steps));
         Self { path, message: error.to_string() }
     }
 
@@ -150,9 +150,17 @@ impl Unfit {
     }
 
     fn below(table: &str, error: PipelineError) -> Self {
-        let path = [table.to_owned(), error.setting.to_owned()].into_iter().chain(error.key).collect();
-        Self { path, message: error.message }
+        let path = [table.to_owned(), error.setting.to_owned()];
+        Self {
+            path: path.into_iter().chain(error.key.iter().flat_map(|key| steps(key))).collect(),
+            message: error.message,
+        }
     }
+}
+
+/// The steps of a dotted key with places in lists: `lamps[1].aim` is `lamps`, `1`, `aim`.
+fn steps(key: &str) -> impl Iterator<Item = String> {
+    key.split(['.', '[', ']']).filter(|step| !step.is_empty()).map(str::to_owned)
 }
 
 impl Plan {

@@ -9,6 +9,7 @@ use seafix_experiment::{
     read_text,
 };
 use seafix_referencing::{Site, TargetKind, problem_file};
+use seafix_simulation::field::SitePlan;
 
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, INPUT},
@@ -102,11 +103,22 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
                 Some(format) if format.starts_with("seafix-dataset/") => {
                     dataset::check(path.parent().unwrap_or(Path::new(".")), limits)
                 }
+                Some(format) if format.starts_with("seafix-geometry/") => faults(geometry(path)),
                 Some(format) if format.starts_with("seafix-reports/") => faults(publication::read(path).map(|_| ())),
                 _ => faults(Plan::read(path, &[]).map(|_| ())),
             },
         },
     }
+}
+
+/// Bodies are checked with the site that they belong to.
+fn geometry(path: &Path) -> Result<(), Vec<Fault>> {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let Some(stem) = name.strip_suffix(".geometry.toml") else {
+        let remedy = "the bodies of NAME.site.toml are NAME.geometry.toml";
+        return Err(vec![Fault::new("not the name of a geometry file", path).remedy(remedy)]);
+    };
+    SitePlan::read(&path.with_file_name(format!("{stem}.site.toml"))).map(|_| ())
 }
 
 /// What of a site's targets is mapped onto itself, and which points would tell: notes, no faults.

@@ -123,6 +123,15 @@ impl RigPlan {
         let camera = Pinhole::new(self.size, [focal; 2], principal, &self.distortion)
             .map_err(|error| format!("rig: {error}"))?;
         let lens = Lens::new(camera, self.port.clone());
+        if let Some(pixel) = lens.blind() {
+            // A distortion that turns back before the border, or a port that reflects all light there.
+            let what = match self.distortion.as_slice() {
+                [] => format!("rig.port = {:?}", self.port),
+                numbers => format!("rig.distortion = {numbers:?}"),
+            };
+            let (u, v) = (pixel.u, pixel.v);
+            return Err(format!("{what} (no ray at pixel ({u:.0}, {v:.0})); give what lets all of the border see"));
+        }
         let angle = lens.half_diagonal().to_degrees();
         in_range(!flat || angle < 80.0, "rig.focal", format!("{focal} ({angle:.1} degrees)"), "less than 80 degrees")?;
         let right_from_left = Transform::new(UnitQuaternion::identity(), Vector3::new(-self.baseline, 0.0, 0.0));

@@ -85,6 +85,17 @@ impl Lens {
         Pinhole::new(size, [f, f], [fit[0], fit[1]], &distortion)
     }
 
+    /// A pixel of the image's border that sees along no ray.
+    pub(crate) fn blind(&self) -> Option<Pixel> {
+        const STEPS: u32 = 16;
+        let [w, h] = self.camera.size().map(|n| f64::from(n - 1));
+        let border = (0..=STEPS).flat_map(|k| {
+            let t = f64::from(k) / f64::from(STEPS);
+            [[t * w, 0.0], [t * w, h], [0.0, t * h], [w, t * h]]
+        });
+        border.map(|[u, v]| Pixel { u, v }).find(|pixel| self.ray(pixel).is_none())
+    }
+
     /// The angle to the optical axis of the farthest corner of the image (rad): in the air, and in the
     /// water where a flat port lets it through.
     pub(crate) fn half_diagonal(&self) -> f64 {
@@ -121,6 +132,14 @@ mod tests {
                 assert!(seen.distance(&pixel) < 1e-6, "{pixel:?} {seen:?}");
             }
         }
+    }
+
+    #[test]
+    fn an_image_whose_border_sees_nothing_is_told() {
+        let blind = |distortion: &[f64], port: Port| Lens::new(camera(500.0, distortion), port).blind();
+        assert_eq!(blind(&[-0.1, 0.02, 1e-3, -5e-4], Port::default()), None);
+        assert_eq!(blind(&[], Port { kind: PortKind::Flat, ..Port::default() }), None);
+        assert_eq!(blind(&[-5.0, 0.0, 0.0, 0.0], Port::default()), Some(Pixel { u: 0.0, v: 0.0 }));
     }
 
     /// The errors (px) of the calibrated camera for points at this distance.

@@ -33,6 +33,8 @@ pub struct AttitudeSensor {
     pub rate: f64,
     /// How late a reading comes (s).
     pub latency: f64,
+    /// Share of readings that never come.
+    pub dropouts: f64,
 }
 
 impl Default for AttitudeSensor {
@@ -46,6 +48,7 @@ impl Default for AttitudeSensor {
             tau: 300.0,
             rate: 10.0,
             latency: 0.01,
+            dropouts: 0.0,
         }
     }
 }
@@ -81,7 +84,8 @@ impl AttitudeSensor {
         within("instability", self.instability, 0.0, 1e6)?;
         within("tau", self.tau, 1e-3, 1e6)?;
         within("rate", self.rate, 1e-3, 1e3)?;
-        within("latency", self.latency, 0.0, 60.0)
+        within("latency", self.latency, 0.0, 60.0)?;
+        within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
     /// Standard deviation of the white noise of a reading's rate, each axis (rad/s): the random walk over a reading's time.
@@ -107,9 +111,11 @@ impl AttitudeSensor {
             let rate = state.motion.fixed_rows::<3>(0).into_owned() + bias + stream.normal3(white);
             let noise = stream.normal3(self.sigma_deg.to_radians());
             bias = bias * keep + stream.normal3(spread * (1.0 - keep * keep).sqrt());
+            let lost = stream.unit() < self.dropouts;
             let world_from_body = so3::exp(&offset) * state.world_from_body.rotation() * so3::exp(&noise);
-            Reading { time, arrival: time + self.latency, value: AttitudeReading { rate, world_from_body } }
+            let value = AttitudeReading { rate, world_from_body };
+            (!lost).then_some(Reading { time, arrival: time + self.latency, value })
         };
-        (0..=(until * self.rate) as u64).map(reading).collect()
+        (0..=(until * self.rate) as u64).filter_map(reading).collect()
     }
 }

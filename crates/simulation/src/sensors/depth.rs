@@ -23,11 +23,13 @@ pub struct DepthGauge {
     pub rate: f64,
     /// How late a reading comes (s).
     pub latency: f64,
+    /// Share of readings that never come.
+    pub dropouts: f64,
 }
 
 impl Default for DepthGauge {
     fn default() -> Self {
-        Self { at: [0.0; 3], bias: 0.1, sigma: 0.02, rate: 5.0, latency: 0.02 }
+        Self { at: [0.0; 3], bias: 0.1, sigma: 0.02, rate: 5.0, latency: 0.02, dropouts: 0.0 }
     }
 }
 
@@ -38,7 +40,8 @@ impl DepthGauge {
         within("bias", self.bias, 0.0, 100.0)?;
         within("sigma", self.sigma, 0.0, 100.0)?;
         within("rate", self.rate, 1e-3, 1e3)?;
-        within("latency", self.latency, 0.0, 60.0)
+        within("latency", self.latency, 0.0, 60.0)?;
+        within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
     /// The readings up to `until` (s): depth (m).
@@ -46,12 +49,13 @@ impl DepthGauge {
         let bias = self.bias * Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Depth).normal();
         let reading = |k: u64| {
             let time = k as f64 / self.rate;
-            let noise = self.sigma * Stream::new(seeds.0, seeds.1, k, Purpose::Depth).normal();
+            let mut stream = Stream::new(seeds.0, seeds.1, k, Purpose::Depth);
+            let (noise, lost) = (self.sigma * stream.normal(), stream.unit() < self.dropouts);
             let world_from_body = track.at(time).world_from_body;
             let below = (world_from_body.rotation() * Vector3::from(self.at)).z;
             let value = world_from_body.translation().z + below + bias + noise;
-            Reading { time, arrival: time + self.latency, value }
+            (!lost).then_some(Reading { time, arrival: time + self.latency, value })
         };
-        (0..=(until * self.rate) as u64).map(reading).collect()
+        (0..=(until * self.rate) as u64).filter_map(reading).collect()
     }
 }

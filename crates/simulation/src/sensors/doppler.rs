@@ -32,11 +32,13 @@ pub struct Doppler {
     pub reach: [f64; 2],
     /// How late a reading comes (s).
     pub latency: f64,
+    /// Share of readings that never come.
+    pub dropouts: f64,
 }
 
 impl Default for Doppler {
     fn default() -> Self {
-        Self { at: [0.0; 3], scale: 0.002, sigma: 0.004, rate: 5.0, reach: [0.4, 100.0], latency: 0.05 }
+        Self { at: [0.0; 3], scale: 0.002, sigma: 0.004, rate: 5.0, reach: [0.4, 100.0], latency: 0.05, dropouts: 0.0 }
     }
 }
 
@@ -49,7 +51,8 @@ impl Doppler {
         within("rate", self.rate, 1e-3, 100.0)?;
         within("reach[0]", self.reach[0], 0.0, 100.0)?;
         within("reach[1]", self.reach[1], self.reach[0], 1e4)?;
-        within("latency", self.latency, 0.0, 60.0)
+        within("latency", self.latency, 0.0, 60.0)?;
+        within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
     /// The readings up to `until` (s): velocity over ground, body frame (m/s).
@@ -78,9 +81,10 @@ impl Doppler {
                 length >= self.reach[0] && length <= self.reach[1] && (on_bed || luck)
             });
             let locked = beams.iter().filter(|b| **b).count() >= 3;
+            let lost = stream.unit() < self.dropouts;
             let turning = state.motion.fixed_rows::<3>(0).into_owned();
             let value = (state.motion.fixed_rows::<3>(3) + turning.cross(&at)) * scale + noise;
-            locked.then_some(Reading { time, arrival: time + self.latency, value })
+            (locked && !lost).then_some(Reading { time, arrival: time + self.latency, value })
         };
         (0..=(until * self.rate) as u64).filter_map(reading).collect()
     }
