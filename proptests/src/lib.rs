@@ -17,6 +17,7 @@
 //! `proptest-regressions/` and tried first ever after.
 
 pub mod admissible;
+pub mod imitations;
 mod law;
 pub mod least_squares;
 pub mod monte_carlo;

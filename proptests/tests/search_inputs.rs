@@ -199,8 +199,12 @@ fn a_blow_up_ends_at_the_budget() {
                 assert!(size <= bound && bound <= 50, "{}: {size}, {bound}", search.name);
                 let objection = objection(&search.seen(&problem).problem(), search.refuses_mirrors(), &found.pairs);
                 assert_eq!(objection, None, "{}", search.name);
+                assert!(size >= 3 && !found.optimal, "{}: {size}", search.name);
             }
-            Err(refusal) => assert!(!matches!(refusal, Unidentified::TooFew { .. }), "{}: {refusal}", search.name),
+            Err(refusal) => {
+                let nothing = matches!(refusal, Unidentified::TooFew { .. } | Unidentified::Budget { .. });
+                assert!(!nothing, "{}: {refusal}", search.name);
+            }
         }
     }
 }

@@ -95,6 +95,23 @@ fn a_prior_decides_between_the_poses_of_a_symmetric_model() {
     }
 }
 
+/// The side from which points can be seen is held against every pose, found with a prior or without.
+#[test]
+fn no_pose_shows_points_from_behind() {
+    let solid =
+        [[0.0, 0.9, 0.0], [0.4, 0.5, 0.3], [-0.4, 0.4, 0.1], [0.1, -0.8, 0.4], [0.5, -0.1, -0.2], [-0.6, -0.3, 0.2]];
+    let solid = solid.map(Point::from);
+    let found = |normal| {
+        let told = answers(&model(&solid, Some(normal)), Vector3::new(0.1, 0.2, -0.3), None);
+        told.into_iter()
+            .filter(|(_, outcome, _)| matches!(outcome, Outcome::Referenced(_)))
+            .map(|(name, ..)| name)
+            .collect()
+    };
+    let (front, behind): (Vec<_>, Vec<_>) = (found(-Vector3::z()), found(Vector3::z()));
+    assert!(front.len() > 5 && behind.is_empty(), "{front:?}, {behind:?}");
+}
+
 /// A flat model that a flip maps onto itself: the side from which its points can be seen decides, and nothing else does.
 ///
 /// Seen to fail when every side counts as visible.

@@ -134,7 +134,11 @@ fn congruences(path: &Path) -> String {
                 congruence.broken_by.iter().take(MOST_NOTED).map(|&i| format!("`{}`", target.points[i].id)).collect();
             let told = match ids.as_slice() {
                 [] => "no point excludes it; add one that it does not map onto another".to_owned(),
-                ids => format!("identifying one of {} excludes it", ids.join(", ")),
+                ids => {
+                    let more = congruence.broken_by.len() - ids.len();
+                    let more = if more > 0 { format!(" or of {more} more") } else { String::new() };
+                    format!("identifying one of {}{more} excludes it", ids.join(", "))
+                }
             };
             notes += &format!("note: `{}`: {}; {told}\n", target.name, congruence.describe(&target.points));
         }

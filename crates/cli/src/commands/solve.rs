@@ -85,6 +85,13 @@ impl Solve {
     }
 }
 
+/// How far apart two poses put the object's origin.
+fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
+    let Some(pose) = pose else { return "which is not believed either".to_owned() };
+    let square: f64 = (0..3).map(|k| (pose[k][3] - other[k][3]).powi(2)).sum();
+    format!("whose origin is {:.2} m off", square.sqrt())
+}
+
 /// An answer for people: what came of it, then the pose.
 fn people(answer: &Answer) -> String {
     let mut text = format!("{}: {}", answer.file, answer.outcome);
@@ -95,6 +102,13 @@ fn people(answer: &Answer) -> String {
     if let Some(why) = &answer.explanation {
         text += &format!(": {why}");
     }
+    text += &match (&answer.runner_up, answer.margin) {
+        (Some(other), Some(margin)) => {
+            format!("; {margin:.1} better than the next pose, {}", apart(answer.t_cam_obj.as_ref(), &other.t_cam_obj))
+        }
+        _ if answer.t_cam_obj.is_some() => "; no three pairs speak for another pose".to_owned(),
+        _ => String::new(),
+    };
     text += &format!(" ({:.1} ms)\n", answer.time_ms);
     for row in answer.t_cam_obj.iter().flatten().take(3) {
         text += &format!("  {:10.6} {:10.6} {:10.6} {:10.4}\n", row[0], row[1], row[2], row[3]);

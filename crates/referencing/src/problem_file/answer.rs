@@ -98,6 +98,8 @@ pub struct Answer {
     pub covariance: Option<[[f64; 6]; 6]>,
     /// The identified pairs (model, cloud), if referenced.
     pub pairs: Option<Vec<[usize; 2]>>,
+    /// What was identified and is not believed (model, cloud), if not referenced: at the end of a budget the best so far.
+    pub unbelieved: Option<Vec<[usize; 2]>>,
     /// What supports the fix beyond its covariance, if referenced.
     pub integrity: Option<Support>,
     /// The poses among which the data do not decide.
@@ -161,6 +163,7 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
             std::array::from_fn(|row| std::array::from_fn(|column| reference.covariance.matrix[(row, column)]))
         }),
         pairs: reference.map(|reference| indices(&reference.pairs)),
+        unbelieved: (reference.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
         integrity: reference.map(|reference| Support::from(&reference.integrity)),
         alternatives: match &attempt.outcome {
             Outcome::Ambiguous(all) => all.iter().map(OtherPose::from).collect(),

@@ -49,6 +49,7 @@ fn a_good_problem_is_answered_with_the_keys_of_the_format() {
         "pairs",
         "alternatives",
         "runner_up",
+        "unbelieved",
         "margin",
         "optimal",
         "size_bound",

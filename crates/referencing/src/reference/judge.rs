@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     Correspondence, Degenerate, Identification, Observations, Prior, PriorBound, Problem, Solver,
-    candidates::chi_square, chance::expected_sets, solve::likelihood,
+    candidates::chi_square, chance::expected_sets, search::elsewhere, solve::likelihood,
 };
 
 /// What a set is judged by.
@@ -111,7 +111,7 @@ impl Judge<'_> {
         if stand.passed.iter().any(repeats) {
             return None;
         }
-        match self.precise_and_near(&mut hypothesis) {
+        match self.precise_and_near(&mut hypothesis).and_then(|()| self.from_the_front(&hypothesis)) {
             Ok(()) => {
                 stand.passed.push(hypothesis);
                 None
@@ -121,6 +121,12 @@ impl Judge<'_> {
                 Some(fall)
             }
         }
+    }
+
+    /// A pose elsewhere to hold a fix against, where the search named none: that of pairs that contradict it.
+    pub(super) fn elsewhere(&self, fix: &Reference) -> Option<Alternative> {
+        let other = self.hypothesis(&elsewhere(self.problem, &fix.object_from_camera)?).ok()?;
+        self.apart(&fix.object_from_camera, &other.pose).then(|| other.alternative())
     }
 
     fn observations(&self, pairs: &[Correspondence]) -> Observations<'_> {
@@ -176,6 +182,11 @@ impl Judge<'_> {
             PriorBound::Box(half) => self.off_box(hypothesis, &covariance, &prior.object_from_camera, *half),
         };
         if off <= 1.0 { Ok(()) } else { Err(Fallen::Refused(Refusal::Prior { off })) }
+    }
+
+    /// Whether the camera of the pose sees the identified points from the sides from which they can be seen.
+    fn from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
+        if self.faces(hypothesis) { Ok(()) } else { Err(Fallen::Refused(Refusal::Behind)) }
     }
 
     /// The predicted error of the model points that the pose transfers: root mean square over all of

@@ -71,6 +71,10 @@ pub fn judge(
         (Err(refusal), _) => (Outcome::Unidentified(refusal), None),
     };
     let outcome = judge.told_apart(outcome, found.belief.is_some());
+    let runner_up = match (&outcome, runner_up) {
+        (Outcome::Referenced(reference), None) if found.belief.is_none() => judge.elsewhere(reference),
+        (_, known) => known,
+    };
     let outcome = match &found.undecided {
         Some(why @ Unidentified::Mirrored { .. }) => Outcome::Unidentified(why.clone().into()),
         Some(why) if !settled(&outcome, found.optimal) => Outcome::Unidentified(why.clone().into()),

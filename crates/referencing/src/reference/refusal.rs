@@ -61,6 +61,9 @@ pub enum Refusal {
         /// [`Acceptance::attitude_limit`](crate::Acceptance::attitude_limit) (rad).
         limit: f64,
     },
+    /// The camera of the pose would have to see points from behind.
+    #[error("the pose has the camera behind points that it identified")]
+    Behind,
     /// The pose contradicts the prior.
     #[error("the pose is {off:.3} times as far from the prior as the prior allows")]
     Prior {
@@ -76,7 +79,7 @@ impl Refusal {
             Self::Search(why) => why.reason(),
             Self::TooFew { .. } => "too-few",
             Self::Chance { .. } | Self::Absent { .. } => "chance",
-            Self::Residuals { .. } | Self::Prior { .. } => "gate",
+            Self::Residuals { .. } | Self::Behind | Self::Prior { .. } => "gate",
             Self::Imprecise { .. } | Self::Attitude { .. } => "imprecise",
         }
     }

@@ -126,11 +126,8 @@ impl Judge<'_> {
     }
 
     /// Whether the camera sees the identified points from the sides from which they can be seen.
-    fn faces(&self, hypothesis: &Hypothesis) -> bool {
+    pub(super) fn faces(&self, hypothesis: &Hypothesis) -> bool {
         let camera = hypothesis.pose.translation();
-        hypothesis.pairs.iter().all(|pair| {
-            let point = &self.problem.model[pair.model];
-            point.normal.is_none_or(|normal| normal.dot(&(camera - point.at.coords)) > 0.0)
-        })
+        hypothesis.pairs.iter().all(|pair| self.problem.model[pair.model].shows_itself(&camera))
     }
 }

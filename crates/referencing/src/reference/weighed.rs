@@ -9,7 +9,7 @@ impl Judge<'_> {
     pub(super) fn weighed(&self, found: &Identification, belief: &Belief) -> (Outcome, Option<Alternative>) {
         let shares = belief.shares(self.problem.model, self.alert_limit);
         let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
-        let runner_up = elsewhere.first().map(|other| other.alternative());
+        let runner_up = belief.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
         let limit = self.absence_limit();
         // Written so that a NaN is refused too.
         if !(shares.absent <= limit || self.rare(found, &shares)) {

@@ -8,7 +8,7 @@ use super::{
     BUDGET, Identification, MOST_TIES, NEEDED, Search, Unidentified,
     association::vertices,
     bounded,
-    grow::{feasible, most_possible},
+    grow::{feasible, most_possible, so_far},
     maximum_clique::least_residual,
     orientation::{Sense, wholly_mirrored},
     volumes::Volumes,
@@ -73,10 +73,14 @@ impl Search for Backtracking {
         let mut ties = std::mem::take(&mut run.found);
         let size = ties.first().map_or(0, Vec::len);
         if size < NEEDED {
-            return Err(match complete {
-                true => Unidentified::NoConsensus { best: size, needed: NEEDED },
-                false => Unidentified::Budget { budget, best: size, bound: possible, tests: self.budget - run.left },
-            });
+            let tests = self.budget - run.left;
+            return match complete {
+                true => Err(Unidentified::NoConsensus { best: size, needed: NEEDED }),
+                false => {
+                    let ended = Unidentified::Budget { budget, best: size, bound: possible, tests };
+                    so_far(problem, self.orientation, ended)
+                }
+            };
         }
         let mut undecided = None;
         if self.orientation {

@@ -33,12 +33,18 @@ impl Explanation {
 pub struct Belief {
     /// The poses; what is less likely than the best by many orders of magnitude is left out.
     pub explanations: Vec<Explanation>,
-    /// What the cloud shows beside the likeliest: poses that explain nearly as many of the points which it leaves, the
-    /// likeliest first.
+    /// What the cloud shows beside the likeliest: poses that explain points which it leaves, the likeliest first.
     pub beside: Vec<Explanation>,
     /// What a pattern that goes on beyond the object explains of the cloud; `None` of an object without one.
     pub look_alike: Option<LookAlike>,
+    /// Whether poses that contradict the likeliest find oftener what they predict than evenly spread clutter lets them.
+    pub imitated: bool,
+    /// A pose elsewhere that was followed however unlikely it is, where nothing likelier was met: the answer is held against it.
+    pub unlikely: Option<Explanation>,
 }
+
+/// Clutter alone shows this much evidence (nats) in one frame of twenty: E Σ Λ = 1 where it is spread as the terms have it.
+const ACCIDENT: f64 = 3.0;
 
 /// How the belief is shared out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,28 +75,45 @@ impl Belief {
         different
     }
 
-    /// A second copy of the object, elsewhere: a pose that explains other cloud points than the likeliest does, nearly as
-    /// many, and that alone would be believed: no object at all has at most the probability `absence`.
+    /// A second copy of the object, elsewhere, whole or in part: a pose that explains other cloud points than the likeliest
+    /// does, and that alone would be believed: no object at all has at most the probability `absence`.
     ///
     /// Where two poses are each beyond chance, clutter explains neither: it is not the evidence that decides between
     /// them, but which of two things is the object. Of that the cloud says only how much of each is seen.
     pub fn copy(&self, model: &[ModelPoint], limit: f64, absence: f64) -> Option<&Explanation> {
-        let best = self.explanations.first()?;
-        self.beside.iter().find(|other| {
-            other.ln_evidence >= libm::log((1.0 - absence) / absence)
-                && !(rms_apart(model, &best.object_from_camera, &other.object_from_camera) <= limit)
-        })
+        let likely = libm::log((1.0 - absence) / absence);
+        self.apart(&self.beside, model, limit).into_iter().find(|other| other.ln_evidence >= likely)
+    }
+
+    /// The likeliest pose of all that are elsewhere, however unlikely.
+    pub fn next(&self, model: &[ModelPoint], limit: f64) -> Option<&Explanation> {
+        let known = [&self.explanations[..], &self.beside, self.unlikely.as_slice()];
+        let all = known.into_iter().filter_map(|some| self.apart(some, model, limit).first().copied());
+        all.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+    }
+
+    /// Those of these poses that are not about the likeliest, in their order.
+    fn apart<'a>(&self, of: &'a [Explanation], model: &[ModelPoint], limit: f64) -> Vec<&'a Explanation> {
+        let Some(best) = self.explanations.first() else { return Vec::new() };
+        let near =
+            |other: &&Explanation| rms_apart(model, &best.object_from_camera, &other.object_from_camera) <= limit;
+        of.iter().filter(|other| !near(other)).collect()
     }
 
     /// The posterior probabilities: P_m = Λ_m/(1 + Σ Λ), Λ the evidence, presence and absence being
     /// equally likely beforehand; poses within `limit` (m, RMS over the model points) of the likeliest count
-    /// as one with it. A pattern like the object's, alone or around the object, is as likely beforehand.
+    /// as one with it. A pattern like the object's, alone or around the object, is as likely beforehand. And what looks
+    /// like the object beside it, in the points that it leaves, is what clutter of this cloud can do; where clutter imitates the
+    /// object, in all points: without the object it would be as likely that clutter did it here.
     pub fn shares(&self, model: &[ModelPoint], limit: f64) -> Shares {
         let Some(best) = self.explanations.first() else {
             return Shares { likeliest: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0 };
         };
         let pattern = self.look_alike.unwrap_or(LookAlike { alone: f64::NEG_INFINITY, around: f64::NEG_INFINITY });
-        let most = best.ln_evidence.max(0.0).max(pattern.alone).max(pattern.around);
+        let first = |some| self.apart(some, model, limit).first().map_or(0.0, |other| other.ln_evidence);
+        let others = if self.imitated { first(&self.explanations) } else { 0.0 };
+        let clutter = Some(first(&self.beside).max(others)).filter(|&most| most > ACCIDENT).unwrap_or(0.0);
+        let most = best.ln_evidence.max(clutter).max(pattern.alone).max(pattern.around);
         let (mut likeliest, mut elsewhere) = (0.0, 0.0);
         for other in &self.explanations {
             let share = libm::exp(other.ln_evidence - most);
@@ -102,7 +125,7 @@ impl Belief {
         }
         likeliest += libm::exp(pattern.around - most);
         let alike = libm::exp(pattern.alone - most);
-        let absent = libm::exp(-most) + alike;
+        let absent = libm::exp(clutter - most) + alike;
         let all = likeliest + elsewhere + absent;
         Shares { likeliest: likeliest / all, elsewhere: elsewhere / all, absent: absent / all, alike: alike / all }
     }

@@ -1,13 +1,20 @@
 //! From pairs in order of preference to an admissible set: the last step of every strategy that ranks.
 
+use seafix_geometry::{Camera, Object, Transform};
+
 use super::{
     Identification, NEEDED, Unidentified,
     association::vertices,
     clique::{MOST_ORIENTED, decisive_members},
     orientation::{Sense, unmirrored, wholly_mirrored},
+    pose::share,
     volumes::Volumes,
 };
 use crate::{Correspondence, Problem};
+
+/// Pairs that are looked at where any set will do, and how many sets are begun with them.
+const MOST_GROWN: usize = 2048;
+const BEGINNINGS: usize = 8;
 
 /// Fours that are tested of a set too large for all of them.
 const MOST_FOURS: u64 = 1_000_000;
@@ -99,6 +106,54 @@ pub(super) fn conclude(
     }
     pairs.sort_unstable();
     Ok(Identification { undecided, ..Identification::unproved(pairs, most_possible(problem), tests) })
+}
+
+/// What a search has that came to the end of its budget before it had found three pairs: the largest admissible set that grows
+/// from a few beginnings, unproved, with the reason why it is not to be believed.
+///
+/// # Errors
+/// The reason itself, where nothing grows.
+pub(super) fn so_far(
+    problem: &Problem<'_>,
+    orientation: bool,
+    why: Unidentified,
+) -> Result<Identification, Unidentified> {
+    let Unidentified::Budget { budget, bound, mut tests, .. } = why else { return Err(why) };
+    let sense = if orientation { Sense::Proper } else { Sense::Any };
+    let pairs = largest_grown(&evenly(vertices(problem), MOST_GROWN), problem, sense, &mut tests);
+    if pairs.len() < NEEDED {
+        return Err(why);
+    }
+    let undecided = Some(Unidentified::Budget { budget, best: pairs.len(), bound, tests });
+    Ok(Identification { undecided, ..Identification::unproved(pairs, bound, tests) })
+}
+
+/// An admissible set of pairs that contradict a pose, for comparison with it; `None` where no three of them agree.
+pub(crate) fn elsewhere(problem: &Problem<'_>, pose: &Transform<Object, Camera>) -> Option<Vec<Correspondence>> {
+    let contradicts = |pair: &Correspondence| !(share(problem, pose, *pair) <= 1.0);
+    let against: Vec<Correspondence> = vertices(problem).into_iter().filter(contradicts).collect();
+    let pairs = largest_grown(&evenly(against, MOST_GROWN), problem, Sense::Proper, &mut 0);
+    (pairs.len() >= NEEDED).then_some(pairs)
+}
+
+/// So many of them, taken evenly.
+fn evenly(all: Vec<Correspondence>, most: usize) -> Vec<Correspondence> {
+    let step = all.len().div_ceil(most).max(1);
+    all.into_iter().step_by(step).collect()
+}
+
+/// The largest set that grows from one of a few of these pairs.
+fn largest_grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, tests: &mut u64) -> Vec<Correspondence> {
+    let mut best = Vec::new();
+    for first in evenly((0..of.len()).map(|k| of[k]).collect(), BEGINNINGS) {
+        let ranked: Vec<Correspondence> = std::iter::once(first).chain(of.iter().copied()).collect();
+        let pairs = grow(problem, &ranked, sense, tests);
+        if pairs.len() > best.len() {
+            best = pairs;
+        }
+    }
+    best.sort_unstable();
+    best
 }
 
 /// No set has more pairs than there are model points with candidates, nor than there are candidates.

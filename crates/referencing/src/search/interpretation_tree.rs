@@ -8,7 +8,7 @@ use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
     bounded,
-    grow::{admits, conclude, feasible, most_possible},
+    grow::{admits, conclude, feasible, most_possible, so_far},
     orientation::Sense,
     pose::{fitted, share},
     volumes::Volumes,
@@ -75,7 +75,8 @@ impl Search for InterpretationTree {
         tree.descend(0, &mut Vec::new());
         if tree.best.is_empty() && tree.tests >= self.budget {
             let (budget, tests) = (self.budget, tree.tests);
-            return Err(Unidentified::Budget { budget, best: 0, bound: most_possible(problem), tests });
+            let ended = Unidentified::Budget { budget, best: 0, bound: most_possible(problem), tests };
+            return so_far(problem, self.orientation, ended);
         }
         let ranked: Vec<Correspondence> = tree.best.iter().map(|&v| vertices[v]).collect();
         conclude(problem, &ranked, self.orientation, tree.tests)

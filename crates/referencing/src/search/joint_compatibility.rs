@@ -9,7 +9,7 @@ use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
     bounded,
-    grow::{admits, conclude, feasible, most_possible},
+    grow::{admits, conclude, feasible, most_possible, so_far},
     orientation::Sense,
     volumes::Volumes,
 };
@@ -78,7 +78,8 @@ impl Search for JointCompatibility {
         run.descend(0, &mut Vec::new(), &Joint::default());
         if run.best.0.len() < NEEDED && run.tests >= self.budget {
             let (budget, best, tests) = (self.budget, run.best.0.len(), run.tests);
-            return Err(Unidentified::Budget { budget, best, bound: most_possible(problem), tests });
+            let ended = Unidentified::Budget { budget, best, bound: most_possible(problem), tests };
+            return so_far(problem, self.orientation, ended);
         }
         let ranked: Vec<Correspondence> = run.best.0.iter().map(|&v| vertices[v]).collect();
         conclude(problem, &ranked, self.orientation, run.tests)

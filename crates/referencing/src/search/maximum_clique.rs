@@ -10,7 +10,7 @@ use super::{
     association::Association,
     bounded,
     clique::{self, MOST_ORIENTED},
-    grow::feasible,
+    grow::{feasible, so_far},
     orientation::{Sense, unmirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Observations, Problem, solve::least_squares};
@@ -63,10 +63,13 @@ impl Search for MaximumClique {
         let size = largest.found.first().map_or(0, Vec::len);
         if size < NEEDED {
             let tests = graph.tests + (share - cliques.left());
-            return Err(match largest.complete {
-                true => Unidentified::NoConsensus { best: size, needed: NEEDED },
-                false => Unidentified::Budget { budget, best: size, bound: largest.bound, tests },
-            });
+            return match largest.complete {
+                true => Err(Unidentified::NoConsensus { best: size, needed: NEEDED }),
+                false => {
+                    let ended = Unidentified::Budget { budget, best: size, bound: largest.bound, tests };
+                    so_far(problem, self.orientation, ended)
+                }
+            };
         }
         if self.orientation && largest.complete && size == NEEDED {
             self.refuse_mirrored(problem, &graph, &mut cliques)?;

@@ -36,6 +36,7 @@ mod weighted_clique;
 
 pub use belief::{Belief, Explanation, Shares};
 pub use consensus::LookAlike;
+pub(crate) use grow::elsewhere;
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]
 pub(crate) use orientation::mirrored;
@@ -44,8 +45,9 @@ pub use structural_coherence::{Samples, StructuralCoherence};
 
 /// Decides which cloud points are which model points.
 ///
-/// Every search has a budget of pair tests beyond those that build its graph (default 10⁷); past
-/// it the answer is [`Unidentified::Budget`] or an identification that is not `optimal`.
+/// Every search has a budget of pair tests beyond those that build its graph (default 10⁷); past it the answer is the best
+/// identification so far, not `optimal`, with [`Unidentified::Budget`] as what leaves it undecided; that alone where no three
+/// pairs were found to agree.
 pub trait Search: Send + Sync + std::fmt::Debug {
     /// The best set of correspondences by this search's own measure.
     ///

@@ -8,7 +8,7 @@ use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
     bounded,
-    grow::{conclude, feasible, most_possible},
+    grow::{conclude, feasible, most_possible, so_far},
     pose::{fitted, refined, share},
 };
 use crate::{Correspondence, Problem};
@@ -87,10 +87,13 @@ impl Search for Ransac {
         }
         let Some(pose) = best.1 else {
             let bound = most_possible(problem);
-            return Err(match tests < self.budget {
-                true => Unidentified::NotFound { bound, needed: NEEDED },
-                false => Unidentified::Budget { budget: self.budget, best: 0, bound, tests },
-            });
+            return match tests < self.budget {
+                true => Err(Unidentified::NotFound { bound, needed: NEEDED }),
+                false => {
+                    let ended = Unidentified::Budget { budget: self.budget, best: 0, bound, tests };
+                    so_far(problem, self.orientation, ended)
+                }
+            };
         };
         let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
         conclude(problem, &ranked, self.orientation, tests)

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Belief, Explanation, Identification, NEEDED, Search, Unidentified, bounded,
-    consensus::{Crowd, Graph, Mode, Pattern, Rough, Seeds, Swept, Terms, mirror_image},
-    grow::{feasible, grow, most_possible},
+    consensus::{Crowd, Graph, Mode, Pattern, Rough, Seeds, Structure, Swept, Terms, mirror_image},
+    grow::{feasible, grow, most_possible, so_far},
     orientation::Sense,
 };
 use crate::Problem;
@@ -28,7 +28,8 @@ use crate::Problem;
 ///
 /// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
 /// a box, in clumps), ρ_i is the density of the nearest points instead, and B(k) Π is summed over the subsets of the pairs:
-/// what fits in a crowd is as likely clutter. And beside the object and clutter alone stand two more explanations: a pattern
+/// what fits in a crowd is as likely clutter. Where poses of other threes find more points than the densities have it (a grid,
+/// an edge, all measured twice), ρ_i is as much greater. And beside the object and clutter alone stand two more explanations: a pattern
 /// that the object repeats in part goes on, with the object in it or without.
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
@@ -68,11 +69,18 @@ impl Component for RigidConsensus {
 
 /// Poses less likely than no object at all by this much (nats) are not looked for.
 const FLOOR: f64 = 3.0;
-/// A pose that is more likely than no object by this much (nats) may be believed: only then a second copy is looked
-/// for, as likely at least.
+/// A pose that is more likely than no object by this much (nats) may be believed: only then what else the cloud shows is
+/// looked for.
 const STRONG: f64 = 5.0;
-/// What explains so many points fewer than the likeliest pose is no copy of the object but looks like a part of it.
+/// What is found beside the likeliest pose matters where it is not less likely by this much (nats), and where it is as likely
+/// as this by itself: a second copy of the object, seen in part.
+const BESIDE: f64 = 14.0;
+const COPY: f64 = 9.0;
+/// What explains so many points fewer than the likeliest pose is no copy of the object but of a part of it. Where the object has a
+/// pattern that goes on, parts are to be seen beside it anyway, and are not looked for.
 const LEAD: usize = 4;
+/// Pair tests of the graph that take as long as a word read.
+const PAIRS_A_WORD: u64 = 16;
 
 impl Search for RigidConsensus {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
@@ -83,14 +91,24 @@ impl Search for RigidConsensus {
         let graph = Graph::of(problem, &rough);
         let terms = Terms::of(problem, &rough, &graph);
         let parts = (&terms, &rough, &graph);
-        let mut swept = Seeds::new(problem.model, parts, &BTreeSet::new(), (NEEDED, -FLOOR), self.budget).sweep();
+        let none = BTreeSet::new();
+        let mut swept = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget).sweep();
         let mut tests = graph.tests + swept.tests;
+        let pattern = Pattern::of(problem.model);
         let mut crowd = Crowd::default();
-        let mut weighed = |swept: &mut Swept| {
-            // What is not likely even in evenly spread clutter is refused whatever the clutter is like.
-            if swept.modes.first().is_none_or(|best| best.ln_evidence < STRONG) {
-                return;
+        let strong = |swept: &Swept| swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG);
+        // What a pattern of the object's own does is weighed by itself.
+        if strong(&swept) && pattern.is_none() {
+            crowd.structure = Structure::of(problem, &terms, &graph, &swept.modes[0]);
+            if crowd.structure.imitates() {
+                let left = self.budget.saturating_sub(swept.tests);
+                let wider = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), left).wider().sweep();
+                tests += wider.tests;
+                swept = Swept { complete: swept.complete && wider.complete, tests: swept.tests + wider.tests, ..wider };
             }
+        }
+        let imitated = crowd.structure.imitates();
+        let mut weighed = |swept: &mut Swept| {
             for mode in &mut swept.modes {
                 crowd.weigh(problem, &terms, &graph, mode);
             }
@@ -98,32 +116,47 @@ impl Search for RigidConsensus {
                 |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
             swept.modes.sort_by(by);
         };
-        weighed(&mut swept);
+        // What is not likely even in evenly spread clutter is refused whatever the clutter is like.
+        if strong(&swept) {
+            weighed(&mut swept);
+        }
         let ended = |best: usize, tests| Unidentified::Budget { budget: self.budget, best, bound, tests };
         let Some(best) = swept.modes.first() else {
-            return Err(if swept.complete { nothing } else { ended(0, tests) });
+            return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, tests)) };
         };
         if let Some(image) = mirror_image(problem.model, parts, best) {
             return Err(Unidentified::Mirrored { best: image.members.len() });
         }
-        // A second copy of the object in what is left of the cloud.
+        // A second copy of the object in what is left of the cloud, and a pose to hold the likeliest against.
         let mut look_alike = None;
         let mut beside = Swept { modes: Vec::new(), complete: true, tests: 0 };
+        let mut unlikely = None;
         if best.ln_evidence >= STRONG {
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
             let left = self.budget.saturating_sub(swept.tests);
             beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
+            if beside.modes.is_empty() && pattern.is_none() {
+                // Parts of it, as far as what was spent on the whole goes.
+                let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
+                let effort = left.min(swept.tests + graph.tests / PAIRS_A_WORD);
+                let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), effort).sweep();
+                beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
+            }
             weighed(&mut beside);
             tests += beside.tests;
-            look_alike = Pattern::of(problem.model).map(|pattern| pattern.look_alike(problem, &terms, &graph, best));
+            look_alike = pattern.map(|pattern| pattern.look_alike(problem, &terms, &graph, best));
+            let elsewhere = |mode: &Mode| mode.members.iter().filter(|&&v| best.holds(v)).count() < NEEDED;
+            if swept.modes.iter().chain(&beside.modes).all(|mode| !elsewhere(mode)) {
+                unlikely = Seeds::new(problem.model, parts, &none, (NEEDED, f64::NEG_INFINITY), 0).elsewhere(best);
+            }
         }
         let complete = swept.complete && beside.complete;
         // What is returned is coherent throughout: of twenty true points some two are usually further from each
         // other than the tolerance, and the worst fitting give way. The belief keeps them.
         let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut tests);
         if pairs.len() < NEEDED {
-            return Err(nothing);
+            return if complete { Err(nothing) } else { so_far(problem, true, ended(pairs.len(), tests)) };
         }
         pairs.sort_unstable();
         let explanation = |mode: &Mode| Explanation {
@@ -141,7 +174,13 @@ impl Search for RigidConsensus {
             size_bound: bound,
             tests,
             undecided: (!complete).then(|| ended(pairs.len(), tests)),
-            belief: Some(Belief { explanations: explain(&swept), beside: explain(&beside), look_alike }),
+            belief: Some(Belief {
+                explanations: explain(&swept),
+                beside: explain(&beside),
+                look_alike,
+                imitated,
+                unlikely: unlikely.as_ref().map(explanation),
+            }),
             pairs,
         })
     }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
+    grow::so_far,
     orientation::{fours, mirrored, wholly_mirrored},
 };
 use crate::{Correspondence, Problem};
@@ -134,7 +135,8 @@ impl<'a> Enumeration<'a> {
                 Ok(None) => {}
                 Err(Spent) => {
                     let (budget, best) = (self.budget, self.best);
-                    return Err(Unidentified::Budget { budget, best, bound: q, tests: self.tests });
+                    let ended = Unidentified::Budget { budget, best, bound: q, tests: self.tests };
+                    return so_far(self.problem, self.orientation, ended);
                 }
             }
         }

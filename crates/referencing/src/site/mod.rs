@@ -38,6 +38,17 @@ impl ModelPoint {
     pub fn exact(id: impl Into<String>, at: Point<Object>) -> Self {
         Self { id: id.into(), at, sigma: 0.0, normal: None }
     }
+
+    /// Whether a camera there (object frame) sees it from the side from which it can be seen, or nearly: a surface and an
+    /// attitude are known to some degrees.
+    pub fn shows_itself(&self, camera: &Vector3<f64>) -> bool {
+        /// Cosine of the angle between normal and line of sight below which a point shows its back.
+        const BACK: f64 = -0.1;
+        self.normal.is_none_or(|normal| {
+            let sight = camera - self.at.coords;
+            normal.dot(&sight) > BACK * normal.norm() * sight.norm()
+        })
+    }
 }
 
 /// A place worth inspecting: no feature point, but something that the vehicle goes to.

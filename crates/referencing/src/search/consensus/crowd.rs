@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use super::{
     graph::Graph,
     likelihood::{Mode, Terms},
+    structure::Structure,
     visible::ln_visible,
 };
-use crate::Problem;
+use crate::{Correspondence, Problem};
 
 /// The density about a point is that of so many neighbours, of so many that are looked up.
 const NEIGHBOURS: usize = 3;
@@ -23,6 +24,8 @@ const CROWDED: f64 = 4.0;
 pub(in crate::search) struct Crowd {
     /// Of the cloud points looked up: their nearest neighbours by the square of the distance (m²), ascending.
     nearest: BTreeMap<usize, Vec<(f64, usize)>>,
+    /// What its points do for other poses.
+    pub(in crate::search) structure: Structure,
 }
 
 impl Crowd {
@@ -37,12 +40,28 @@ impl Crowd {
             .members
             .iter()
             .zip(&even)
-            .map(|(&v, gain)| gain - self.cost(problem, terms, graph, v, &members))
+            .enumerate()
+            .map(|(k, (&v, gain))| {
+                let before = mode.members[..k].iter().map(|&other| graph.vertices[other]);
+                gain - self.cost(problem, terms, graph, v, &members).max(self.imitated(problem, graph, v, before))
+            })
             .collect();
         let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_share[even.len()];
         let (even, crowded) = (ln_visible(&even, &terms.ln_share), ln_visible(&crowded, &terms.ln_share));
         mode.ln_evidence = of_pose + crowded;
         mode.ln_crowd = even - crowded;
+    }
+
+    /// By how much more often than the densities have it such a point is met where a pose of clutter predicts one (nats).
+    fn imitated(
+        &self,
+        problem: &Problem<'_>,
+        graph: &Graph,
+        v: usize,
+        before: impl Iterator<Item = Correspondence>,
+    ) -> f64 {
+        let times = self.structure.times(problem, graph.vertices[v], before);
+        if times > libm::log(CROWDED) { times } else { 0.0 }
     }
 
     /// By how much the density about the cloud point of a vertex exceeds what was expected (nats).

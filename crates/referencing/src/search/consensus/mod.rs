@@ -12,6 +12,7 @@ mod pattern;
 mod rough;
 mod seeds;
 mod six;
+mod structure;
 mod visible;
 
 pub(super) use crowd::Crowd;
@@ -23,3 +24,4 @@ pub use pattern::LookAlike;
 pub(super) use pattern::Pattern;
 pub(super) use rough::Rough;
 pub(super) use seeds::{Seeds, Swept};
+pub(super) use structure::Structure;

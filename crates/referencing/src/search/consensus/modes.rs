@@ -86,7 +86,13 @@ impl Climb<'_> {
         self.compared.set(self.compared.get() + self.graph.vertices.len() as u64);
         let starts = &self.graph.starts;
         let mut best: Vec<(f64, usize)> = Vec::new();
+        // The image of a model has no sides.
+        let camera = (motion.rotation.determinant() > 0.0).then(|| motion.origin());
         for i in 0..starts.len() - 1 {
+            let point = &self.model[self.graph.vertices[starts[i]].model];
+            if camera.is_some_and(|camera| !point.shows_itself(&camera)) {
+                continue;
+            }
             let mut top: Option<(f64, usize)> = None;
             for v in starts[i]..starts[i + 1] {
                 if let Some(gain) = self.terms.of_pair(v, motion)

@@ -24,6 +24,11 @@ impl Motion {
         self.rotation * p + self.translation
     }
 
+    /// Where the camera is (object frame).
+    pub(in crate::search) fn origin(&self) -> Vector3<f64> {
+        -(self.rotation.transpose() * self.translation)
+    }
+
     /// Turned by φ about a place and then moved by τ.
     pub(in crate::search) fn moved(&self, phi: &Vector3<f64>, tau: &Vector3<f64>, about: &Vector3<f64>) -> Self {
         let turn = so3::exp(phi).to_rotation_matrix().into_inner();

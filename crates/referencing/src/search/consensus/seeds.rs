@@ -12,15 +12,23 @@ use super::{
     likelihood::{Mode, Terms},
     modes::Climb,
     rough::Rough,
+    structure::contradicting,
 };
 use crate::ModelPoint;
 
 /// Poses less likely than the best by this much (nats) are not looked for.
 const MARGIN: f64 = 10.0;
+/// Nor by this much, where clutter imitates the object.
+const WIDER: f64 = 18.0;
 /// A pair may be so many of its own standard deviations from a pose that three noisy points give.
 const LOOSE: f64 = 3.5;
 /// Modes that a new three is compared with before it is followed.
 const COMPARED: usize = 16;
+/// Beginnings of a pose that is sought whatever it is worth, and vertices compared for each.
+const BEGINNINGS: usize = 8;
+const COMPARED_BEGINNINGS: usize = 512;
+/// The least set that a pose can come from.
+const LEAST: usize = 3;
 /// Modes kept.
 const KEPT: usize = 256;
 /// Pairs kept to be followed: 12 bytes each.
@@ -62,8 +70,9 @@ pub(in crate::search) struct Seeds<'a> {
     spent: u64,
     /// The likeliest first.
     modes: Vec<Mode>,
-    /// Poses whose evidence is less (nats) are not looked for.
+    /// Poses whose evidence is less (nats) are not looked for, nor those less likely than the best by the margin.
     floor: f64,
+    margin: f64,
     /// Greatest bound of a pair followed early.
     scouted: f64,
     /// The vertices to look at, one bit each.
@@ -98,6 +107,7 @@ impl<'a> Seeds<'a> {
             spent: 0,
             modes: Vec::new(),
             floor,
+            margin: MARGIN,
             scouted: f64::NEG_INFINITY,
             free,
             row: vec![0; words],
@@ -107,10 +117,15 @@ impl<'a> Seeds<'a> {
         }
     }
 
+    /// Looks for poses less likely than the best by more than it would.
+    pub(in crate::search) fn wider(self) -> Self {
+        Self { margin: WIDER, ..self }
+    }
+
     /// The evidence that is of interest.
     fn threshold(&self) -> f64 {
         let best = self.modes.first().map_or(f64::NEG_INFINITY, |mode| mode.ln_evidence);
-        (best - MARGIN).max(self.floor)
+        (best - self.margin).max(self.floor)
     }
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
@@ -126,6 +141,43 @@ impl<'a> Seeds<'a> {
             self.follow_pair(a as usize, b as usize);
         }
         Swept { modes: self.modes, complete, tests: self.spent }
+    }
+
+    /// A pose of three pairs that contradict this one, and what joins them: begun at the pairs that most others agree with,
+    /// whatever it is worth. `None` where no three of them agree.
+    pub(in crate::search) fn elsewhere(mut self, than: &Mode) -> Option<Mode> {
+        let graph = self.climb.graph;
+        self.free = contradicting(self.climb.terms, graph, than);
+        let free = std::mem::take(&mut self.free);
+        let (mut row, mut common) = (vec![0; free.len()], vec![0; free.len()]);
+        for a in self.best_connected(&free, &free, BEGINNINGS) {
+            intersect(graph.row(a), &free, 0, &mut row);
+            let Some(&b) = self.best_connected(&row, &row, 1).first() else { continue };
+            intersect(&row, graph.row(b), 0, &mut common);
+            let Some(&c) = self.best_connected(&common, &common, 1).first() else { continue };
+            let after = graph.rank[c] as usize + 1;
+            self.third.fill(0);
+            intersect(&common, graph.row(c), graph.starts[after], &mut self.third);
+            self.follow([a, b, c], after);
+            let shared = |mode: &Mode| mode.members.iter().filter(|&&v| than.holds(v)).count();
+            self.modes.retain(|mode| shared(mode) < LEAST);
+            if !self.modes.is_empty() {
+                break;
+            }
+        }
+        self.modes.into_iter().next()
+    }
+
+    /// Of some vertices, taken evenly where they are many, those with the most later neighbours among others.
+    fn best_connected(&self, of: &[u64], among: &[u64], most: usize) -> Vec<usize> {
+        let graph = self.climb.graph;
+        let all: Vec<usize> = ones(of, 0).collect();
+        let neighbours =
+            |v: usize| -> u32 { graph.row(v).iter().zip(among).map(|(row, other)| (row & other).count_ones()).sum() };
+        let some = all.iter().step_by(all.len().div_ceil(COMPARED_BEGINNINGS).max(1));
+        let mut counted: Vec<(u32, usize)> = some.map(|&v| (neighbours(v), v)).collect();
+        counted.sort_unstable_by_key(|&(count, v)| (std::cmp::Reverse(count), v));
+        counted.into_iter().take(most).map(|(_, v)| v).collect()
     }
 
     /// The compatible pairs (a, b) that may begin a set of interest, the greatest bound first, and whether these
@@ -284,7 +336,7 @@ impl<'a> Seeds<'a> {
 }
 
 /// The least altitude of a triangle (m).
-fn altitude([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
+pub(super) fn altitude([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
     let area = (b - a).cross(&(c - a)).norm();
     let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
     (area / longest).max(1e-9)
