@@ -50,4 +50,4 @@ pub use choice::Choice;
 pub use fault::{Fault, line_at, line_of};
 pub use registry::{BuildError, Component, Entry, Listing, Registry, SettingsError, in_range, settings};
 pub use suggest::{nearest, unknown};
-pub use text::read_text;
+pub use text::{read_long_text, read_text};

@@ -9,18 +9,25 @@ use crate::Fault;
 /// # Errors
 /// A file that is missing, too large, or not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, Fault> {
-    const LIMIT: u64 = 64 << 20;
+    read_long_text(path, 64 << 20)
+}
+
+/// The same of at most `limit` bytes: for files that programs write and that grow with a run.
+///
+/// # Errors
+/// As [`read_text`].
+pub fn read_long_text(path: &Path, limit: u64) -> Result<String, Fault> {
     let unreadable = |error: std::io::Error| {
         Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
     };
     let mut bytes = Vec::new();
     // A device has no size before it is read, and no end.
     let file = std::fs::File::open(path).map_err(unreadable)?;
-    file.take(LIMIT + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-    if bytes.len() as u64 > LIMIT {
+    file.take(limit + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > limit {
         return Err(Fault::new("text file too large", path)
-            .value(format!("more than {LIMIT} bytes"))
-            .remedy(format!("at most {LIMIT} bytes are read")));
+            .value(format!("more than {limit} bytes"))
+            .remedy(format!("at most {limit} bytes are read")));
     }
     let text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();

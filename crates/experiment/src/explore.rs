@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix_component::{Fault, read_text};
+use seafix_component::{Fault, read_long_text};
 use seafix_geometry::StereoRig;
 use seafix_navigation::{
     Displacement, Here, Local, Navigated, Navigator, Network, NetworkSettings, Recognition, StereoPair, Traverse,
@@ -13,6 +13,9 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::{PipelineError, dataset::hex, navigate::places, pipeline::resolve, source::Sight};
+
+/// A network is read up to this length (bytes): some five thousand key frames.
+const MOST: u64 = 1 << 30;
 
 /// The key frames of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -62,7 +65,7 @@ impl Keyframes {
     pub(crate) fn pin(&mut self, folder: &Path) {
         if !self.read.is_empty()
             && self.sha256.is_empty()
-            && let Ok(text) = read_text(&folder.join(&self.read))
+            && let Ok(text) = read_long_text(&folder.join(&self.read), MOST)
         {
             self.sha256 = digest(&text);
         }
@@ -77,7 +80,7 @@ impl Keyframes {
             return Ok(None);
         }
         let path = folder.join(&self.read);
-        let text = read_text(&path)?;
+        let text = read_long_text(&path, MOST)?;
         let found = digest(&text);
         if found != self.sha256 {
             return Err(Fault::new("another network than the one that was meant", &path)

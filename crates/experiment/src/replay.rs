@@ -1,6 +1,6 @@
 //! Running a method on the logged inputs of another run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use seafix_component::{Choice, Fault};
 use seafix_log::Reader;
@@ -75,7 +75,8 @@ impl Replay {
         let vary = [own(&self.searches, "pipeline.search"), own(&self.solvers, "pipeline.solver")];
         let replayed = Experiment { source, vary: vary.into_iter().flatten().collect(), ..changed };
         let name = format!("replay-{}", header.trial);
-        let mut plan = Plan::resolve(replayed, &name, Path::new(""), log, "", &[])?;
+        let folder = folder_of_network(&replayed, &file);
+        let mut plan = Plan::resolve(replayed, &name, &folder, log, "", &[])?;
         plan.command = self.command(log);
         if let [trial] = &mut plan.trials[..] {
             trial.name.clone_from(&header.trial);
@@ -90,6 +91,16 @@ impl Replay {
         self.settings.iter().for_each(|setting| command += &format!(" --set '{setting}'"));
         command
     }
+}
+
+/// Where the network that is read lies, if one is: here, or in the folder of the log or one above it, for the experiment file
+/// that named it is not known any more. Which network it must be its SHA-256 says.
+fn folder_of_network(experiment: &Experiment, log: &Path) -> PathBuf {
+    let network = experiment.navigation.as_ref().and_then(|navigation| navigation.network.as_ref());
+    let read = network.map_or("", |network| network.read.as_str());
+    let lies_in = |folder: &&Path| folder.join(read).is_file();
+    let folders = std::iter::once(Path::new("")).chain(log.ancestors().skip(1));
+    folders.filter(|_| !read.is_empty()).find(lies_in).unwrap_or(Path::new("")).to_owned()
 }
 
 /// Whether all stages before the candidates are the same.
