@@ -48,9 +48,9 @@ const MOST_ROUNDS: usize = 20;
 const EDGES: [f64; 2] = [5.0, 0.1];
 /// The standard deviation of the costs of the seven poses at which the first simplex ends, near the minimum, and every later
 /// one, at it: χ² is the square of the distance.
-const LEVEL: [f64; 2] = [1e-1, 1e-10];
+const LEVEL: [f64; 2] = [1e-1, 1e-15];
 /// The same as a share of the cost: below it are no digits.
-const DIGITS: f64 = 1e-14;
+const DIGITS: f64 = 1e-15;
 /// Two simplices, one on each side, that move their pose by less (standard deviations) are the last.
 const STILL: f64 = 1e-4;
 
