@@ -8,6 +8,7 @@
 mod chain;
 mod dvl_gyro;
 mod fusion;
+mod icp;
 mod journey;
 mod lasting;
 mod navigated;
@@ -21,6 +22,7 @@ mod stereo;
 pub use chain::{Standing, by_world};
 pub use dvl_gyro::DvlGyro;
 pub use fusion::{Contradiction, FUSIONS, Fuse, Fusion, Intersect, Replace};
+pub use icp::{Distance, Icp};
 pub use journey::{Journey, Local, Lost, Outcome, Segment, Side, Waypoint};
 pub use lasting::Lasting;
 pub use navigated::{Navigated, Place};

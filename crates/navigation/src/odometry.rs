@@ -4,7 +4,7 @@ use seafix_component::{Registry, entry};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_vision::{Image, Threads};
 
-use crate::{DvlGyro, Journey, Outcome, Reading, Stereo, Waypoint};
+use crate::{DvlGyro, Icp, Journey, Outcome, Reading, Stereo, Waypoint};
 
 /// The two images of one instant.
 #[derive(Debug, Clone, Copy)]
@@ -66,4 +66,5 @@ pub trait Reckoning: Send {
 }
 
 /// All odometries.
-pub static ODOMETRIES: Registry<dyn Odometry> = Registry::new("odometry", &[entry!(DvlGyro), entry!(Stereo)]);
+pub static ODOMETRIES: Registry<dyn Odometry> =
+    Registry::new("odometry", &[entry!(DvlGyro), entry!(Icp), entry!(Stereo)]);

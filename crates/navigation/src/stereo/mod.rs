@@ -7,8 +7,8 @@ pub(crate) mod look;
 pub(crate) mod pose;
 mod reckoning;
 mod taken;
-mod times;
-mod unusable;
+pub(crate) mod times;
+pub(crate) mod unusable;
 mod window;
 
 use seafix_component::{Choice, Component, in_range};

@@ -12,7 +12,7 @@ const WHITE: f32 = 254.5;
 const MOST_WHITE: f64 = 0.5;
 
 /// Why a motion cannot be seen in these images, if so; `before`: the pair before.
-pub(super) fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
+pub(crate) fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
     for (side, image) in [Side::Left, Side::Right].into_iter().zip(images) {
         let pixels = image.pixels();
         let count = pixels.len() as f64;
