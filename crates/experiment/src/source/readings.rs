@@ -104,3 +104,109 @@ fn table<V>(
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeMap, path::Path};
+
+    use seafix_simulation::{Mission, RigPlan, sensors::Lbl};
+
+    use super::*;
+
+    /// A dive of some seconds with all sensors.
+    fn mission() -> PlannedMission {
+        let transponders = vec![[-50.0, -40.0, 38.0], [60.0, -40.0, 39.0], [55.0, 55.0, 37.0], [-40.0, 60.0, 38.5]];
+        let mut mission = Mission {
+            frames: 2,
+            rate: 0.1,
+            rig: RigPlan { size: [64, 48], focal: 31.0, ..RigPlan::default() },
+            ..Mission::default()
+        };
+        mission.sensors.lbl = Lbl { transponders, ..Lbl::default() };
+        mission.plan(3, 0, Path::new("")).unwrap()
+    }
+
+    /// A table as others read it: the names of its columns, its rows.
+    fn read(text: &str) -> (String, Vec<Vec<String>>) {
+        let mut lines = text.lines();
+        let columns = lines.next().unwrap().to_owned();
+        let rows: Vec<Vec<String>> = lines.map(|line| line.split(',').map(str::to_owned).collect()).collect();
+        assert!(rows.iter().all(|row| row.len() == columns.split(',').count()), "{columns}: rows of other lengths");
+        (columns, rows)
+    }
+
+    #[test]
+    fn tables_say_what_the_sensors_said_to_the_bit() {
+        let mission = mission();
+        let said = mission.readings();
+        let tables: BTreeMap<String, (String, Vec<Vec<String>>)> =
+            tables(&mission).into_iter().map(|(name, text)| (name, read(&text))).collect();
+        let names: Vec<&str> = tables.keys().map(String::as_str).collect();
+        assert_eq!(
+            names,
+            ["acoustic", "attitude", "depth", "doppler", "gyro", "lbl", "ranges", "transponders", "waypoints"]
+                .map(|name| format!("{name}.csv"))
+        );
+        let number = |text: &String| text.parse::<f64>().unwrap();
+        let same = |name: &str, columns: &str, times: Vec<[f64; 2]>, values: Vec<Vec<f64>>| {
+            let (found, rows) = &tables[name];
+            assert_eq!(found, &format!("stamp_ns,arrival_ns,{columns}"));
+            assert!(rows.len() == values.len() && !rows.is_empty(), "{name}: {} of {}", rows.len(), values.len());
+            for ((row, times), values) in rows.iter().zip(times).zip(values) {
+                assert_eq!(row[..2], times.map(|time| mission.stamp(time).to_string()), "{name}");
+                assert!(times[0] <= times[1], "{name}: heard before it was said");
+                assert_eq!(row[2..].iter().map(number).collect::<Vec<_>>(), values, "{name}");
+            }
+        };
+        macro_rules! check {
+            ($name:literal, $columns:literal, $list:expr, $values:expr) => {
+                same(
+                    $name,
+                    $columns,
+                    $list.iter().map(|r| [r.time, r.arrival]).collect(),
+                    $list.iter().map(|r| $values(&r.value)).collect(),
+                )
+            };
+        }
+        check!(
+            "acoustic.csv",
+            "north,east,down,sigma",
+            said.acoustic,
+            |fix: &seafix_simulation::sensors::AcousticFix| vec![fix.at.x, fix.at.y, fix.at.z, fix.sigma]
+        );
+        check!("depth.csv", "depth", said.depth, |depth: &f64| vec![*depth]);
+        check!("doppler.csv", "vx,vy,vz,sigma", said.doppler, |v: &Vector3<f64>| vec![v.x, v.y, v.z, 0.004]);
+        let sigma = mission.settings().sensors.attitude.rate_sigma();
+        type Attitude = seafix_simulation::sensors::AttitudeReading;
+        check!("gyro.csv", "wx,wy,wz,sigma", said.attitude, |said: &Attitude| vec![
+            said.rate.x,
+            said.rate.y,
+            said.rate.z,
+            sigma
+        ]);
+        check!("attitude.csv", "wx,wy,wz,qx,qy,qz,qw", said.attitude, |said: &Attitude| {
+            let q = said.world_from_body;
+            vec![said.rate.x, said.rate.y, said.rate.z, q.i, q.j, q.k, q.w]
+        });
+        // Ranges, as many as were heard, and where they put the vehicle.
+        let heard = said.lbl.iter().map(|answer| answer.value.0.0.iter().flatten().count()).sum::<usize>();
+        assert_eq!(
+            (&tables["ranges.csv"].0[..], tables["ranges.csv"].1.len()),
+            ("stamp_ns,arrival_ns,transponder,range", heard)
+        );
+        let first = said.lbl.iter().flat_map(|a| a.value.0.0).flatten().next().unwrap();
+        assert_eq!(number(&tables["ranges.csv"].1[0][3]), first);
+        let fixes = said.lbl.iter().filter_map(|answer| answer.value.1.as_ref()).collect::<Vec<_>>();
+        assert_eq!(tables["lbl.csv"].1.len(), fixes.len());
+        assert_eq!(number(&tables["lbl.csv"].1[0][2]), fixes[0].at.x);
+        let places: Vec<Vec<f64>> =
+            tables["transponders.csv"].1.iter().map(|row| row[1..].iter().map(number).collect()).collect();
+        assert_eq!(places, mission.settings().sensors.lbl.transponders.iter().map(|p| p.to_vec()).collect::<Vec<_>>());
+        // The route, as the setting `route.waypoints` takes it.
+        let (columns, rows) = &tables["waypoints.csv"];
+        assert_eq!(columns, "north,east,height");
+        let way: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|k| number(&row[k]))).collect();
+        assert_eq!(way, mission.waypoints());
+        assert!(way.len() > 2 && way.iter().all(|place| (place[2] - 3.5).abs() < 1e-9), "{way:?}");
+    }
+}

@@ -124,13 +124,15 @@ impl RigPlan {
             .map_err(|error| format!("rig: {error}"))?;
         let lens = Lens::new(camera, self.port.clone());
         if let Some(pixel) = lens.blind() {
-            // A distortion that turns back before the border, or a port that reflects all light there.
+            // A distortion that turns back before the image's side, or a port that reflects all light there.
             let what = match self.distortion.as_slice() {
                 [] => format!("rig.port = {:?}", self.port),
                 numbers => format!("rig.distortion = {numbers:?}"),
             };
             let (u, v) = (pixel.u, pixel.v);
-            return Err(format!("{what} (no ray at pixel ({u:.0}, {v:.0})); give what lets all of the border see"));
+            return Err(format!(
+                "{what} (no ray at pixel ({u:.0}, {v:.0})); give what lets the middle of each side see"
+            ));
         }
         let angle = lens.half_diagonal().to_degrees();
         in_range(!flat || angle < 80.0, "rig.focal", format!("{focal} ({angle:.1} degrees)"), "less than 80 degrees")?;

@@ -3,6 +3,9 @@
 use super::*;
 use crate::field::{BoxBody, ObjectGeometry, Texture};
 
+/// Whether a lamp is seen from a place, the place, and the normal of its surface.
+type Met = (bool, Vector3<f64>, Vector3<f64>);
+
 /// The share of one lamp's light that reaches what each pixel of the left image shows; NaN where none would arrive.
 fn shares(field: &Field, lamp: &Lamp, scale: f64, shot: &Shot) -> Vec<f32> {
     let water = Water { attenuation: 0.0, snow: 0.0, ..Water::default() };
@@ -35,8 +38,7 @@ fn a_lamp_reaches_what_nothing_hides_from_it() {
         let shares = shares(&field, &lamp, SCALE, &shot);
         let eye = studio(SCALE, Water::default(), Imager::default(), Port::default(), &[]).left;
         let from = (shot.world_from_left * seafix_geometry::Point::from(Vector3::from(lamp.at))).coords;
-        // Whether the lamp is seen from the place that a pixel shows, and the plane of its surface.
-        let met: Vec<Option<(bool, Vector3<f64>, Vector3<f64>)>> = (0..width * height)
+        let met: Vec<Option<Met>> = (0..width * height)
             .map(|k| {
                 let pixel = seafix_geometry::Pixel { u: f64::from(k % width), v: f64::from(k / width) };
                 let ray = eye.lens.ray(&pixel)?;
@@ -82,6 +84,7 @@ fn a_lamp_reaches_what_nothing_hides_from_it() {
 
 #[test]
 fn a_shadow_ends_where_the_line_over_the_edge_meets_the_bed() {
+    // Seen to fail, with a mean of 2.2 mm, where places were lifted by 6 mm along their normal.
     // A plate over a flat bed, turned against the map's rows, lit from the side. A pixel of the map is 7 mm wide on the bed.
     let mut errors = Vec::new();
     for degrees in [0.0, 4.0, 11.0, 23.0, 37.0, 58.0] {
