@@ -100,6 +100,12 @@ fn the_order_of_the_points_changes_nothing() {
     not_idle("answers", answered.get(), cases, 1);
 }
 
+/// Whether a search came to the end of its budget.
+fn ended(answer: &Answer) -> bool {
+    let why = answer.as_ref().map_or_else(Some, |found| found.undecided.as_ref());
+    matches!(why, Some(Unidentified::Budget { .. }))
+}
+
 /// P25. A rigid motion of the cloud inside the same candidate lists changes nothing, as distances alone decide, unless
 /// rounding does: the size is the same, and the set where it is the only one of its size.
 ///
@@ -133,7 +139,7 @@ fn a_motion_of_the_cloud_changes_nothing() {
                     let only = brute[usize::from(search.refuses_mirrors())].sets.len() == 1;
                     prop_assert!(!only || a.pairs == b.pairs, "{}", search.name);
                 }
-                (Err(Unidentified::Budget { .. }), _) | (_, Err(Unidentified::Budget { .. })) => {}
+                _ if ended(&here) || ended(&there) => {}
                 _ => prop_assert_eq!(gist(&here), gist(&there), "{}", &search.name),
             }
         }

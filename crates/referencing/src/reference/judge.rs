@@ -111,7 +111,7 @@ impl Judge<'_> {
         if stand.passed.iter().any(repeats) {
             return None;
         }
-        match self.precise_and_near(&mut hypothesis).and_then(|()| self.from_the_front(&hypothesis)) {
+        match self.precise_and_near(&mut hypothesis).and_then(|()| self.seen_from_the_front(&hypothesis)) {
             Ok(()) => {
                 stand.passed.push(hypothesis);
                 None
@@ -125,8 +125,9 @@ impl Judge<'_> {
 
     /// A pose elsewhere to hold a fix against, where the search named none: that of pairs that contradict it.
     pub(super) fn elsewhere(&self, fix: &Reference) -> Option<Alternative> {
-        let other = self.hypothesis(&elsewhere(self.problem, &fix.object_from_camera)?).ok()?;
-        self.apart(&fix.object_from_camera, &other.pose).then(|| other.alternative())
+        let sets = elsewhere(self.problem, &fix.object_from_camera);
+        let mut others = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok());
+        others.find(|other| self.apart(&fix.object_from_camera, &other.pose)).map(Hypothesis::alternative)
     }
 
     fn observations(&self, pairs: &[Correspondence]) -> Observations<'_> {
@@ -185,7 +186,7 @@ impl Judge<'_> {
     }
 
     /// Whether the camera of the pose sees the identified points from the sides from which they can be seen.
-    fn from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
+    fn seen_from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
         if self.faces(hypothesis) { Ok(()) } else { Err(Fallen::Refused(Refusal::Behind)) }
     }
 

@@ -11,6 +11,15 @@ impl Judge<'_> {
         let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
         let runner_up = belief.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
         let limit = self.absence_limit();
+        // Two things that are each the object by themselves: neither is the other's clutter.
+        let even = shares.absent - shares.clutter;
+        if let (true, Some(best), Some(copy)) = (
+            even <= limit || self.rare(found, &shares),
+            belief.explanations.first(),
+            belief.copy(self.problem.model, self.alert_limit, limit.max(even)),
+        ) {
+            return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
+        }
         // Written so that a NaN is refused too.
         if !(shares.absent <= limit || self.rare(found, &shares)) {
             return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
@@ -18,11 +27,6 @@ impl Judge<'_> {
         if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
             let all = belief.explanations.first().into_iter().chain(elsewhere);
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
-        }
-        if let (Some(best), Some(copy)) =
-            (belief.explanations.first(), belief.copy(self.problem.model, self.alert_limit, limit.max(shares.absent)))
-        {
-            return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
         }
         let (mut outcome, _) = self.poses(found);
         if let (Outcome::Referenced(reference), Some(best)) = (&mut outcome, belief.explanations.first()) {

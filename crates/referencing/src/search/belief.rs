@@ -37,8 +37,6 @@ pub struct Belief {
     pub beside: Vec<Explanation>,
     /// What a pattern that goes on beyond the object explains of the cloud; `None` of an object without one.
     pub look_alike: Option<LookAlike>,
-    /// Whether poses that contradict the likeliest find oftener what they predict than evenly spread clutter lets them.
-    pub imitated: bool,
     /// A pose elsewhere that was followed however unlikely it is, where nothing likelier was met: the answer is held against it.
     pub unlikely: Option<Explanation>,
 }
@@ -57,6 +55,8 @@ pub struct Shares {
     pub absent: f64,
     /// The part of that in which a pattern is there that looks like it.
     pub alike: f64,
+    /// The part of it that is due to clutter doing more than evenly spread clutter would.
+    pub clutter: f64,
 }
 
 impl Belief {
@@ -103,16 +103,15 @@ impl Belief {
     /// The posterior probabilities: P_m = Λ_m/(1 + Σ Λ), Λ the evidence, presence and absence being
     /// equally likely beforehand; poses within `limit` (m, RMS over the model points) of the likeliest count
     /// as one with it. A pattern like the object's, alone or around the object, is as likely beforehand. And what looks
-    /// like the object beside it, in the points that it leaves, is what clutter of this cloud can do; where clutter imitates the
-    /// object, in all points: without the object it would be as likely that clutter did it here.
+    /// like the object beside it, in the points that it leaves, is what clutter of this cloud can do: without the object it
+    /// would be as likely that clutter did it here.
     pub fn shares(&self, model: &[ModelPoint], limit: f64) -> Shares {
         let Some(best) = self.explanations.first() else {
-            return Shares { likeliest: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0 };
+            return Shares { likeliest: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0, clutter: 0.0 };
         };
         let pattern = self.look_alike.unwrap_or(LookAlike { alone: f64::NEG_INFINITY, around: f64::NEG_INFINITY });
-        let first = |some| self.apart(some, model, limit).first().map_or(0.0, |other| other.ln_evidence);
-        let others = if self.imitated { first(&self.explanations) } else { 0.0 };
-        let clutter = Some(first(&self.beside).max(others)).filter(|&most| most > ACCIDENT).unwrap_or(0.0);
+        let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
+        let clutter = if beside > ACCIDENT { beside } else { 0.0 };
         let most = best.ln_evidence.max(clutter).max(pattern.alone).max(pattern.around);
         let (mut likeliest, mut elsewhere) = (0.0, 0.0);
         for other in &self.explanations {
@@ -127,6 +126,13 @@ impl Belief {
         let alike = libm::exp(pattern.alone - most);
         let absent = libm::exp(clutter - most) + alike;
         let all = likeliest + elsewhere + absent;
-        Shares { likeliest: likeliest / all, elsewhere: elsewhere / all, absent: absent / all, alike: alike / all }
+        let more = libm::exp(clutter - most) - libm::exp(-most);
+        Shares {
+            likeliest: likeliest / all,
+            elsewhere: elsewhere / all,
+            absent: absent / all,
+            alike: alike / all,
+            clutter: more / all,
+        }
     }
 }

@@ -14,7 +14,7 @@ use crate::{Correspondence, Problem};
 
 /// Pairs that are looked at where any set will do, and how many sets are begun with them.
 const MOST_GROWN: usize = 2048;
-const BEGINNINGS: usize = 8;
+const BEGINNINGS: usize = 16;
 
 /// Fours that are tested of a set too large for all of them.
 const MOST_FOURS: u64 = 1_000_000;
@@ -120,20 +120,25 @@ pub(super) fn so_far(
 ) -> Result<Identification, Unidentified> {
     let Unidentified::Budget { budget, bound, mut tests, .. } = why else { return Err(why) };
     let sense = if orientation { Sense::Proper } else { Sense::Any };
-    let pairs = largest_grown(&evenly(vertices(problem), MOST_GROWN), problem, sense, &mut tests);
-    if pairs.len() < NEEDED {
-        return Err(why);
+    let some = evenly(vertices(problem), MOST_GROWN);
+    let sets = grown(&some, problem, sense, &mut tests);
+    let Some(pairs) = sets.into_iter().next() else { return Err(why) };
+    if orientation {
+        // What is left of a mirror image is no set of the object's.
+        let images = grown(&some, problem, Sense::Mirrored, &mut tests);
+        if images.first().is_some_and(|image| image.len() > pairs.len()) {
+            return Err(why);
+        }
     }
     let undecided = Some(Unidentified::Budget { budget, best: pairs.len(), bound, tests });
     Ok(Identification { undecided, ..Identification::unproved(pairs, bound, tests) })
 }
 
-/// An admissible set of pairs that contradict a pose, for comparison with it; `None` where no three of them agree.
-pub(crate) fn elsewhere(problem: &Problem<'_>, pose: &Transform<Object, Camera>) -> Option<Vec<Correspondence>> {
+/// Admissible sets of pairs that contradict a pose, for comparison with it, the largest first.
+pub(crate) fn elsewhere(problem: &Problem<'_>, pose: &Transform<Object, Camera>) -> Vec<Vec<Correspondence>> {
     let contradicts = |pair: &Correspondence| !(share(problem, pose, *pair) <= 1.0);
     let against: Vec<Correspondence> = vertices(problem).into_iter().filter(contradicts).collect();
-    let pairs = largest_grown(&evenly(against, MOST_GROWN), problem, Sense::Proper, &mut 0);
-    (pairs.len() >= NEEDED).then_some(pairs)
+    grown(&evenly(against, MOST_GROWN), problem, Sense::Proper, &mut 0)
 }
 
 /// So many of them, taken evenly.
@@ -142,18 +147,19 @@ fn evenly(all: Vec<Correspondence>, most: usize) -> Vec<Correspondence> {
     all.into_iter().step_by(step).collect()
 }
 
-/// The largest set that grows from one of a few of these pairs.
-fn largest_grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, tests: &mut u64) -> Vec<Correspondence> {
-    let mut best = Vec::new();
-    for first in evenly((0..of.len()).map(|k| of[k]).collect(), BEGINNINGS) {
+/// The sets of three pairs and more that grow from a few of these, the largest first.
+fn grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, tests: &mut u64) -> Vec<Vec<Correspondence>> {
+    let begun = |first: Correspondence| {
         let ranked: Vec<Correspondence> = std::iter::once(first).chain(of.iter().copied()).collect();
-        let pairs = grow(problem, &ranked, sense, tests);
-        if pairs.len() > best.len() {
-            best = pairs;
-        }
-    }
-    best.sort_unstable();
-    best
+        let mut pairs = grow(problem, &ranked, sense, tests);
+        pairs.sort_unstable();
+        pairs
+    };
+    let mut sets: Vec<_> = evenly(of.to_vec(), BEGINNINGS).into_iter().map(begun).collect();
+    sets.retain(|pairs| pairs.len() >= NEEDED);
+    // Of equals the first in the order of coordinates: no number of a point decides.
+    sets.sort_by_key(|pairs| std::cmp::Reverse(pairs.len()));
+    sets
 }
 
 /// No set has more pairs than there are model points with candidates, nor than there are candidates.

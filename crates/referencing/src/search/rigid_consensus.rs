@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Belief, Explanation, Identification, NEEDED, Search, Unidentified, bounded,
-    consensus::{Crowd, Graph, Mode, Pattern, Rough, Seeds, Structure, Swept, Terms, mirror_image},
+    consensus::{Crowd, Graph, Mode, Pattern, Rough, Seeds, Swept, Terms, mirror_image},
     grow::{feasible, grow, most_possible, so_far},
     orientation::Sense,
 };
@@ -28,8 +28,7 @@ use crate::Problem;
 ///
 /// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
 /// a box, in clumps), ρ_i is the density of the nearest points instead, and B(k) Π is summed over the subsets of the pairs:
-/// what fits in a crowd is as likely clutter. Where poses of other threes find more points than the densities have it (a grid,
-/// an edge, all measured twice), ρ_i is as much greater. And beside the object and clutter alone stand two more explanations: a pattern
+/// what fits in a crowd is as likely clutter. And beside the object and clutter alone stand two more explanations: a pattern
 /// that the object repeats in part goes on, with the object in it or without.
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
@@ -94,20 +93,8 @@ impl Search for RigidConsensus {
         let none = BTreeSet::new();
         let mut swept = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget).sweep();
         let mut tests = graph.tests + swept.tests;
-        let pattern = Pattern::of(problem.model);
         let mut crowd = Crowd::default();
         let strong = |swept: &Swept| swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG);
-        // What a pattern of the object's own does is weighed by itself.
-        if strong(&swept) && pattern.is_none() {
-            crowd.structure = Structure::of(problem, &terms, &graph, &swept.modes[0]);
-            if crowd.structure.imitates() {
-                let left = self.budget.saturating_sub(swept.tests);
-                let wider = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), left).wider().sweep();
-                tests += wider.tests;
-                swept = Swept { complete: swept.complete && wider.complete, tests: swept.tests + wider.tests, ..wider };
-            }
-        }
-        let imitated = crowd.structure.imitates();
         let mut weighed = |swept: &mut Swept| {
             for mode in &mut swept.modes {
                 crowd.weigh(problem, &terms, &graph, mode);
@@ -132,14 +119,15 @@ impl Search for RigidConsensus {
         let mut beside = Swept { modes: Vec::new(), complete: true, tests: 0 };
         let mut unlikely = None;
         if best.ln_evidence >= STRONG {
+            let pattern = Pattern::of(problem.model);
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
             let left = self.budget.saturating_sub(swept.tests);
             beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
             if beside.modes.is_empty() && pattern.is_none() {
-                // Parts of it, as far as what was spent on the whole goes.
+                // Parts of it, as far as a quarter of what was spent on the whole goes.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
-                let effort = left.min(swept.tests + graph.tests / PAIRS_A_WORD);
+                let effort = left.min((swept.tests + graph.tests / PAIRS_A_WORD) / 4);
                 let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), effort).sweep();
                 beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
             }
@@ -178,7 +166,6 @@ impl Search for RigidConsensus {
                 explanations: explain(&swept),
                 beside: explain(&beside),
                 look_alike,
-                imitated,
                 unlikely: unlikely.as_ref().map(explanation),
             }),
             pairs,

@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use super::{
     graph::Graph,
     likelihood::{Mode, Terms},
-    structure::Structure,
     visible::ln_visible,
 };
-use crate::{Correspondence, Problem};
+use crate::Problem;
 
 /// The density about a point is that of so many neighbours, of so many that are looked up.
 const NEIGHBOURS: usize = 3;
@@ -24,8 +23,8 @@ const CROWDED: f64 = 4.0;
 pub(in crate::search) struct Crowd {
     /// Of the cloud points looked up: their nearest neighbours by the square of the distance (m²), ascending.
     nearest: BTreeMap<usize, Vec<(f64, usize)>>,
-    /// What its points do for other poses.
-    pub(in crate::search) structure: Structure,
+    /// Without a prior, which cloud points are candidates: the others are no clutter of this search. Empty where all count.
+    candidates: Vec<bool>,
 }
 
 impl Crowd {
@@ -40,11 +39,7 @@ impl Crowd {
             .members
             .iter()
             .zip(&even)
-            .enumerate()
-            .map(|(k, (&v, gain))| {
-                let before = mode.members[..k].iter().map(|&other| graph.vertices[other]);
-                gain - self.cost(problem, terms, graph, v, &members).max(self.imitated(problem, graph, v, before))
-            })
+            .map(|(&v, gain)| gain - self.cost(problem, terms, graph, v, &members))
             .collect();
         let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_share[even.len()];
         let (even, crowded) = (ln_visible(&even, &terms.ln_share), ln_visible(&crowded, &terms.ln_share));
@@ -52,22 +47,15 @@ impl Crowd {
         mode.ln_crowd = even - crowded;
     }
 
-    /// By how much more often than the densities have it such a point is met where a pose of clutter predicts one (nats).
-    fn imitated(
-        &self,
-        problem: &Problem<'_>,
-        graph: &Graph,
-        v: usize,
-        before: impl Iterator<Item = Correspondence>,
-    ) -> f64 {
-        let times = self.structure.times(problem, graph.vertices[v], before);
-        if times > libm::log(CROWDED) { times } else { 0.0 }
-    }
-
     /// By how much the density about the cloud point of a vertex exceeds what was expected (nats).
     fn cost(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, v: usize, members: &[usize]) -> f64 {
         let pair = graph.vertices[v];
-        let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| nearest(problem, pair.cloud));
+        if problem.prior.is_none() && self.candidates.is_empty() {
+            self.candidates = vec![false; problem.cloud.len()];
+            problem.candidates.lists.iter().flatten().for_each(|&j| self.candidates[j] = true);
+        }
+        let counts = |j: usize| self.candidates.get(j).is_none_or(|counts| *counts);
+        let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| nearest(problem, pair.cloud, counts));
         let Some(&(square, _)) = nearest.iter().filter(|(_, j)| !members.contains(j)).nth(NEIGHBOURS - 1) else {
             return 0.0;
         };
@@ -79,7 +67,8 @@ impl Crowd {
             Some(_) => terms.ln_density[pair.model],
             None => {
                 let own = problem.candidates.lists[pair.model].len().max(1);
-                terms.ln_density[pair.model] + libm::log(problem.cloud.len() as f64 / own as f64)
+                terms.ln_density[pair.model]
+                    + libm::log(self.candidates.iter().filter(|&&counts| counts).count() as f64 / own as f64)
             }
         };
         let times = libm::log(NEIGHBOURS as f64 / volume) - even;
@@ -87,13 +76,13 @@ impl Crowd {
     }
 }
 
-fn nearest(problem: &Problem<'_>, of: usize) -> Vec<(f64, usize)> {
+fn nearest(problem: &Problem<'_>, of: usize, counts: impl Fn(usize) -> bool) -> Vec<(f64, usize)> {
     let at = &problem.cloud[of].position.at.coords;
     let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(LOOKED_UP + 1);
     for (j, point) in problem.cloud.iter().enumerate() {
         let square = (point.position.at.coords - at).norm_squared();
         let far = nearest.len() == LOOKED_UP && !(square < nearest[LOOKED_UP - 1].0);
-        if j == of || far || !square.is_finite() {
+        if j == of || far || !square.is_finite() || !counts(j) {
             continue;
         }
         let place = nearest.partition_point(|(known, _)| *known <= square);

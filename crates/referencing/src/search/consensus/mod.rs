@@ -12,7 +12,6 @@ mod pattern;
 mod rough;
 mod seeds;
 mod six;
-mod structure;
 mod visible;
 
 pub(super) use crowd::Crowd;
@@ -24,4 +23,3 @@ pub use pattern::LookAlike;
 pub(super) use pattern::Pattern;
 pub(super) use rough::Rough;
 pub(super) use seeds::{Seeds, Swept};
-pub(super) use structure::Structure;

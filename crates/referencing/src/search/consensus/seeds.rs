@@ -12,14 +12,11 @@ use super::{
     likelihood::{Mode, Terms},
     modes::Climb,
     rough::Rough,
-    structure::contradicting,
 };
 use crate::ModelPoint;
 
 /// Poses less likely than the best by this much (nats) are not looked for.
 const MARGIN: f64 = 10.0;
-/// Nor by this much, where clutter imitates the object.
-const WIDER: f64 = 18.0;
 /// A pair may be so many of its own standard deviations from a pose that three noisy points give.
 const LOOSE: f64 = 3.5;
 /// Modes that a new three is compared with before it is followed.
@@ -70,9 +67,8 @@ pub(in crate::search) struct Seeds<'a> {
     spent: u64,
     /// The likeliest first.
     modes: Vec<Mode>,
-    /// Poses whose evidence is less (nats) are not looked for, nor those less likely than the best by the margin.
+    /// Poses whose evidence is less (nats) are not looked for.
     floor: f64,
-    margin: f64,
     /// Greatest bound of a pair followed early.
     scouted: f64,
     /// The vertices to look at, one bit each.
@@ -107,7 +103,6 @@ impl<'a> Seeds<'a> {
             spent: 0,
             modes: Vec::new(),
             floor,
-            margin: MARGIN,
             scouted: f64::NEG_INFINITY,
             free,
             row: vec![0; words],
@@ -117,15 +112,10 @@ impl<'a> Seeds<'a> {
         }
     }
 
-    /// Looks for poses less likely than the best by more than it would.
-    pub(in crate::search) fn wider(self) -> Self {
-        Self { margin: WIDER, ..self }
-    }
-
     /// The evidence that is of interest.
     fn threshold(&self) -> f64 {
         let best = self.modes.first().map_or(f64::NEG_INFINITY, |mode| mode.ln_evidence);
-        (best - self.margin).max(self.floor)
+        (best - MARGIN).max(self.floor)
     }
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
@@ -335,8 +325,21 @@ impl<'a> Seeds<'a> {
     }
 }
 
+/// The pairs that a pose explains neither itself nor by their cloud point, one bit each.
+fn contradicting(terms: &Terms, graph: &Graph, pose: &Mode) -> Vec<u64> {
+    let mut taken: Vec<usize> = pose.members.iter().map(|&v| graph.vertices[v].cloud).collect();
+    taken.sort_unstable();
+    let mut bits = vec![0; graph.vertices.len().div_ceil(64)];
+    for (v, pair) in graph.vertices.iter().enumerate() {
+        if taken.binary_search(&pair.cloud).is_err() && terms.of_pair(v, &pose.motion).is_none() {
+            bits[v / 64] |= 1 << (v % 64);
+        }
+    }
+    bits
+}
+
 /// The least altitude of a triangle (m).
-pub(super) fn altitude([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
+fn altitude([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
     let area = (b - a).cross(&(c - a)).norm();
     let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
     (area / longest).max(1e-9)
