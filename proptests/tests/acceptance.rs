@@ -45,9 +45,12 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
     let likeliest = belief.explanations.first().is_some_and(|best| rule.holds(&best.object_from_camera, &truth, &at));
     let (mut absent, mut alike, mut right) = (1.0, 1.0, false);
     let solver = Mahalanobis::default();
-    let refused = judge(&problem, found.clone(), &solver, &Acceptance::default(), None).outcome.reason();
+    let by_default = judge(&problem, found.clone(), &solver, &Acceptance::default(), None).outcome;
+    let refused = by_default.reason();
     let attempt = judge(&problem, found, &solver, &acceptance, None);
-    if let Outcome::Referenced(reference) = attempt.outcome {
+    // With nothing refused as absent any second pose would be a copy: what the default answers is judged as it answers.
+    let answers = [by_default, attempt.outcome].into_iter().find(|outcome| matches!(outcome, Outcome::Referenced(_)));
+    if let Some(Outcome::Referenced(reference)) = answers {
         let shares = belief.shares(&file.model, 0.08);
         (absent, alike) = (shares.absent, shares.alike);
         right = rule.holds(&reference.object_from_camera, &truth, &at);
