@@ -106,7 +106,7 @@ fn people(answer: &Answer) -> String {
         (Some(other), Some(margin)) => {
             format!("; {margin:.1} better than the next pose, {}", apart(answer.t_cam_obj.as_ref(), &other.t_cam_obj))
         }
-        _ if answer.t_cam_obj.is_some() => "; no three pairs speak for another pose".to_owned(),
+        _ if answer.t_cam_obj.is_some() => "; no other pose was met".to_owned(),
         _ => String::new(),
     };
     text += &format!(" ({:.1} ms)\n", answer.time_ms);

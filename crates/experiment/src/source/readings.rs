@@ -54,7 +54,9 @@ pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
     let places = mission.waypoints().into_iter().map(|[north, east, height]| format!("{north},{east},{height}\n"));
     let route = std::iter::once("north,east,height\n".to_owned()).chain(places).collect();
     let all = [("acoustic", acoustic), ("doppler", doppler), ("gyro", gyro), ("attitude", attitude), ("depth", depth)];
-    let all = all.into_iter().chain([("waypoints", route)]);
+    let truth = mission.true_points().map(|(object, point, [x, y, z])| format!("{object},{point},{x},{y},{z}\n"));
+    let truth = std::iter::once("object,point,x,y,z\n".to_owned()).chain(truth).collect();
+    let all = all.into_iter().chain([("waypoints", route), ("truth-points", truth)]);
     all.chain(lbl(mission)).map(|(name, table)| (format!("{name}.csv"), table)).collect()
 }
 
@@ -144,8 +146,19 @@ mod tests {
         let names: Vec<&str> = tables.keys().map(String::as_str).collect();
         assert_eq!(
             names,
-            ["acoustic", "attitude", "depth", "doppler", "gyro", "lbl", "ranges", "transponders", "waypoints"]
-                .map(|name| format!("{name}.csv"))
+            [
+                "acoustic",
+                "attitude",
+                "depth",
+                "doppler",
+                "gyro",
+                "lbl",
+                "ranges",
+                "transponders",
+                "truth-points",
+                "waypoints"
+            ]
+            .map(|name| format!("{name}.csv"))
         );
         let number = |text: &String| text.parse::<f64>().unwrap();
         let same = |name: &str, columns: &str, times: Vec<[f64; 2]>, values: Vec<Vec<f64>>| {
@@ -202,6 +215,20 @@ mod tests {
         let places: Vec<Vec<f64>> =
             tables["transponders.csv"].1.iter().map(|row| row[1..].iter().map(number).collect()).collect();
         assert_eq!(places, mission.settings().sensors.lbl.transponders.iter().map(|p| p.to_vec()).collect::<Vec<_>>());
+        // The points as they are, where the survey has them but for its errors.
+        let (columns, rows) = &tables["truth-points.csv"];
+        assert_eq!(columns, "object,point,x,y,z");
+        let surveyed =
+            mission.site().objects.iter().zip(mission.world_from_object()).flat_map(|(object, at)| {
+                object.points.iter().map(move |point| (&object.id, &point.id, *at * point.at))
+            });
+        let surveyed: Vec<_> = surveyed.collect();
+        assert_eq!(rows.len(), surveyed.len());
+        for (row, (object, point, at)) in rows.iter().zip(&surveyed) {
+            assert_eq!([&row[0], &row[1]], [*object, *point]);
+            let truth = Vector3::from_fn(|k, _| number(&row[2 + k]));
+            assert!((truth - at.coords).norm() < 0.01 && truth != at.coords, "{object} {point}");
+        }
         // The route, as the setting `route.waypoints` takes it.
         let (columns, rows) = &tables["waypoints.csv"];
         assert_eq!(columns, "north,east,height");

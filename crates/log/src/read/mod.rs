@@ -174,9 +174,13 @@ impl Reader {
     fn next_messages(&mut self) -> Result<Option<Vec<Message>>, LogError> {
         let (images, inputs) = (self.images, self.inputs);
         let take = |topic: &str, stamp: u64| match topic {
-            topic::RESULT | topic::CANDIDATES | topic::EVALUATION | topic::TIMING | topic::FRAME | topic::TOTALS => {
-                Take::Whole
-            }
+            topic::RESULT
+            | topic::CANDIDATES
+            | topic::EVALUATION
+            | topic::INSPECTION
+            | topic::TIMING
+            | topic::FRAME
+            | topic::TOTALS => Take::Whole,
             topic::INPUTS if inputs => Take::Whole,
             topic if !topic::IMAGES.contains(&topic) => Take::Nothing,
             _ if images.wanted(stamp) => Take::Whole,

@@ -140,18 +140,18 @@ fn a_nearly_collinear_base_is_a_warning() {
 #[test]
 fn points_in_one_place_are_refused_by_both_names() {
     let found = faults("at = [0.5, 0.5, -1.0]", "at = [1.0, 0.0, 1e-7]");
-    assert_eq!(found, ["object `frame`: two points in one place in site.toml:39: `C` and `D`; remove one"]);
+    assert_eq!(found, ["object `frame`: two points in one place in site.toml:40: `C` and `D`; remove one"]);
 }
 
 #[test]
 fn an_id_used_twice_names_both_lines() {
     let found = faults("id = \"D\"", "id = \"B\"");
     let expected =
-        "object `frame`: point id is used twice in site.toml:40: `B`; it is already used on line 34; give each its own";
+        "object `frame`: point id is used twice in site.toml:41: `B`; it is already used on line 35; give each its own";
     assert_eq!(found, [expected]);
     let found = faults("id = \"frame\"", "id = \"plate\"");
     assert!(
-        found[0].starts_with("object id is used twice in site.toml:26: `plate`; it is already used on line 7"),
+        found[0].starts_with("object id is used twice in site.toml:27: `plate`; it is already used on line 7"),
         "{found:?}"
     );
 }

@@ -153,6 +153,17 @@ impl PlannedMission {
         self.way.places().iter().map(|p| [p.x, p.y, depth - p.z]).collect()
     }
 
+    /// Where the feature points truly are, in the order of the site: object, point, place in the world (m).
+    ///
+    /// The site has them as they were surveyed, in the frames of their objects.
+    pub fn true_points(&self) -> impl Iterator<Item = (&str, &str, [f64; 3])> {
+        let objects = self.field.told.objects.iter().zip(&self.field.objects);
+        objects.flat_map(|(told, object)| {
+            let points = told.points.iter().zip(&object.points);
+            points.map(|(point, truth)| (&told.id[..], &point.id[..], truth.at.into()))
+        })
+    }
+
     /// How many frames it has.
     pub fn len(&self) -> usize {
         self.times.len()

@@ -57,7 +57,7 @@ pub struct DeviceFault {
     pub kind: FaultKind,
     /// When it begins (s).
     pub from: f64,
-    /// When it ends (s); not after `from` is never.
+    /// When it ends (s), not before `from`; at `from` it never acts.
     pub to: f64,
     /// Seconds of delay, or the probability of a loss.
     #[serde(default = "half")]
@@ -72,7 +72,7 @@ impl DeviceFault {
     pub(crate) fn check(&self, index: usize) -> Result<(), String> {
         let name = |key: &str| format!("faults[{index}].{key}");
         in_range(self.from >= 0.0 && self.from.is_finite(), &name("from"), self.from, "seconds, zero or more")?;
-        in_range(self.to.is_finite(), &name("to"), self.to, "seconds")?;
+        in_range(self.to >= self.from && self.to.is_finite(), &name("to"), self.to, "seconds, not before `from`")?;
         let most = if self.kind == FaultKind::Intermittent { 1.0 } else { 1e3 };
         let range = format!("a number from 0 to {most}");
         in_range(self.amount >= 0.0 && self.amount <= most, &name("amount"), self.amount, &range)
