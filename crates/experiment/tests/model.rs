@@ -113,6 +113,11 @@ fn marks_that_mean_no_point_are_refused_with_their_line() {
     let crossed = text.replace(lines[3], &third.join(","));
     let said = refusal(&crossed, None);
     assert!(said.contains("clicks.csv:4") && said.contains("px off the epipolar line"), "{said}");
+    // Two marks on one corner.
+    let (mut fifth, third) = (split(lines[5]), split(lines[3]));
+    fifth[1..].clone_from_slice(&third[1..]);
+    let said = refusal(&text.replace(lines[5], &fifth.join(",")), None);
+    assert!(said.contains("clicks.csv:6") && said.contains("a mark of the same corner as `"), "{said}");
     let said = refusal(&text, Some(["M1", "M2", "M33"]));
     assert!(said.contains("`M33`; did you mean `M3`?"), "{said}");
     let said = refusal(&text, Some(["M1", "M2", "M2"]));

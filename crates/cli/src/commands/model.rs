@@ -6,7 +6,7 @@ use clap::Args;
 use seafix_component::Fault;
 use seafix_experiment::{
     HandModel, HandPoint, ModelByHand, Pipeline,
-    dataset::{DescribedRig, read_image, read_rig},
+    dataset::{DescribedRig, are_twins, read_image, read_rig, twins_fault},
     read_text,
 };
 use serde_json::{Value, json};
@@ -75,6 +75,9 @@ impl Model {
         let limits = self.limits.of_images();
         let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
+        if are_twins(&left, &right) {
+            return Err(Failure::new(INPUT, twins_fault(&self.left, &self.right)));
+        }
         let text = read_text(&self.points).map_err(input)?;
         let (reach, mark_sigma, object) = (self.reach, self.mark_sigma, self.id.clone());
         let by_hand = ModelByHand { front_end: &front_end, reach, mark_sigma, object, base };

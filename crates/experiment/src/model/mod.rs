@@ -69,6 +69,9 @@ impl HandPoint {
     }
 }
 
+/// Points nearer to each other than this (m) are one: two marks that mean one corner.
+const ONE_POINT: f64 = 1e-3;
+
 /// The least sine of the angle at P1 that a base by hand should have.
 const LEAST_SINE: f64 = 0.1;
 /// Model coordinates are written to this (m).
@@ -85,6 +88,15 @@ impl ModelByHand<'_> {
         let keypoints = images.map(|image| self.front_end.detector.detect(image));
         let seen: Vec<Seen> =
             marks.into_iter().map(|mark| self.see(mark, images, &keypoints, rig, file)).collect::<Result<_, _>>()?;
+        for (k, one) in seen.iter().enumerate() {
+            let same = |other: &&Seen| one.measured.position.at.distance(&other.measured.position.at) < ONE_POINT;
+            if let Some(other) = seen[..k].iter().find(same) {
+                return Err(Fault::new(format!("a mark of the same corner as `{}`", other.mark.id), file)
+                    .on_line(one.mark.line)
+                    .value(format!("`{}`", one.mark.id))
+                    .remedy("mark every corner once"));
+            }
+        }
         let base = self.base(&seen, file)?;
         let corner = base.map(|index| seen[index].measured.position.at);
         let camera_from_object: Transform<Camera, Object> = triad(&corner[0], &corner[1], &corner[2])

@@ -58,6 +58,17 @@ pub(crate) struct CameraInfo {
     pub(crate) region: [u32; 4],
 }
 
+impl CameraInfo {
+    /// Whether both tell the same of the camera, whatever their stamps.
+    pub(crate) fn is_of_one_camera_with(&self, other: &Self) -> bool {
+        let bits = |info: &Self| -> Vec<u64> {
+            info.d.iter().chain(&info.k).chain(&info.r).chain(&info.p).map(|number| number.to_bits()).collect()
+        };
+        let rest = |info: &Self| (info.size, info.model.clone(), info.binning, info.region);
+        rest(self) == rest(other) && bits(self) == bits(other)
+    }
+}
+
 /// `nav_msgs/Odometry`, without the velocity.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Odometry {

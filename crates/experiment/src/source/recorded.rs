@@ -151,7 +151,16 @@ impl Messages<'_> {
     fn info(&self, topic: &str) -> Result<CameraInfo, Fault> {
         let first = self.of(topic).next();
         let entry = first.ok_or_else(|| Fault::new("a topic without messages", self.path).value(topic))?;
-        self.read(entry, CameraInfo::decode)
+        let info = self.read(entry, CameraInfo::decode)?;
+        for later in self.of(topic).skip(1) {
+            let other = self.read(later, CameraInfo::decode)?;
+            if !info.is_of_one_camera_with(&other) {
+                let value = format!("{topic}: the message of {} ns", other.header.stamp_ns);
+                let fault = Fault::new("a calibration that changes within the recording", self.path).value(value);
+                return Err(fault.remedy("cut the recording there and run its parts by themselves"));
+            }
+        }
+        Ok(info)
     }
 
     /// Stamp, message and coordinate frame of each image, in order of time.

@@ -20,6 +20,8 @@ use crate::{
 
 /// The first stamp: some time in 2023, so that stamps look like those of a real log.
 const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
+/// A vehicle farther off its route than this (m) does not dive it.
+const STRAY: f64 = 10.0;
 /// Seconds between two looks for collisions.
 const LOOK: f64 = 0.1;
 
@@ -223,10 +225,26 @@ impl PlannedMission {
         result
     }
 
+    /// Whether the vehicle is near the place where its route has it: thrusters too weak for the current or for the speed let it go.
+    fn on_its_way(&self, time: f64) -> Result<(), String> {
+        let (camera, goal) = (self.camera(time).translation(), self.way.at(time).at);
+        let off = (camera - goal).norm();
+        // Written so that a NaN is refused too.
+        if off <= STRAY {
+            return Ok(());
+        }
+        Err(format!(
+            "vehicle: {off:.1} m off its route after {time:.1} s, at north {:.2}, east {:.2}, depth {:.2} m: its thrusters do not hold \
+             it; lower current.speed or route.speed",
+            camera.x, camera.y, camera.z
+        ))
+    }
+
     /// Whether the vehicle, its cameras or its lamps come too near to anything.
     fn collision(&self, last: f64) -> Result<(), String> {
         let clearance = self.settings.clearance;
-        let parts = parts(&self.cameras, &self.studio);
+        let mut parts = parts(&self.cameras, &self.studio);
+        parts.push(("the vehicle".to_owned(), self.body_from_camera.inverse().translation()));
         let places = |time: f64| {
             let camera = self.camera(time);
             parts.iter().map(|(_, p)| camera.rotation() * p + camera.translation()).collect::<Vec<_>>()
@@ -235,6 +253,7 @@ impl PlannedMission {
         for k in 0..=(last / LOOK).ceil() as usize {
             let time = k as f64 * LOOK;
             let now = places(time);
+            self.on_its_way(time)?;
             for (i, place) in now.iter().enumerate() {
                 // In the middle of a large body no surface is near.
                 let near =
