@@ -1,7 +1,6 @@
 //! An odometry that fails, between what it found and what is navigated by.
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
 use seafix_geometry::{Transform, so3};
 use seafix_navigation::Local;
 use seafix_simulation::{Purpose, Stream, sensors::FaultKind};
@@ -19,7 +18,7 @@ pub struct OdometryFault {
     pub kind: FaultKind,
     /// When it begins, after the first frame (s).
     pub from: f64,
-    /// When it ends (s); not after `from` is never.
+    /// When it ends (s), not before `from`; at `from` it never acts.
     pub to: f64,
     /// Seconds of delay, or the probability of a loss.
     #[serde(default = "half")]
@@ -36,12 +35,7 @@ impl OdometryFault {
     /// # Errors
     /// The first number outside its range: `name = value; give range`.
     pub(crate) fn check(&self, index: usize) -> Result<(), String> {
-        let name = |key: &str| format!("faults[{index}].{key}");
-        in_range(self.from >= 0.0 && self.from.is_finite(), &name("from"), self.from, "seconds, zero or more")?;
-        in_range(self.to.is_finite(), &name("to"), self.to, "seconds")?;
-        let most = if self.kind == FaultKind::Intermittent { 1.0 } else { 1e3 };
-        let range = format!("a number from 0 to {most}");
-        in_range(self.amount >= 0.0 && self.amount <= most, &name("amount"), self.amount, &range)
+        self.kind.check((self.from, self.to), self.amount, index)
     }
 
     fn acts(&self, time: f64) -> bool {

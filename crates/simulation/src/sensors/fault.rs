@@ -68,14 +68,24 @@ fn half() -> f64 {
     0.5
 }
 
+impl FaultKind {
+    /// Whether a fault of this kind can be from one time to another (s) with an amount; `index` is its place among `faults`.
+    ///
+    /// # Errors
+    /// The first number outside its range: `name = value; give range`.
+    pub fn check(self, (from, to): (f64, f64), amount: f64, index: usize) -> Result<(), String> {
+        let name = |key: &str| format!("faults[{index}].{key}");
+        in_range(from >= 0.0 && from.is_finite(), &name("from"), from, "seconds, zero or more")?;
+        in_range(to >= from && to.is_finite(), &name("to"), to, "seconds, not before `from`")?;
+        let most = if self == FaultKind::Intermittent { 1.0 } else { 1e3 };
+        let range = format!("a number from 0 to {most}");
+        in_range(amount >= 0.0 && amount <= most, &name("amount"), amount, &range)
+    }
+}
+
 impl DeviceFault {
     pub(crate) fn check(&self, index: usize) -> Result<(), String> {
-        let name = |key: &str| format!("faults[{index}].{key}");
-        in_range(self.from >= 0.0 && self.from.is_finite(), &name("from"), self.from, "seconds, zero or more")?;
-        in_range(self.to >= self.from && self.to.is_finite(), &name("to"), self.to, "seconds, not before `from`")?;
-        let most = if self.kind == FaultKind::Intermittent { 1.0 } else { 1e3 };
-        let range = format!("a number from 0 to {most}");
-        in_range(self.amount >= 0.0 && self.amount <= most, &name("amount"), self.amount, &range)
+        self.kind.check((self.from, self.to), self.amount, index)
     }
 
     /// Whether it acts at a time (s).
