@@ -47,7 +47,9 @@ impl<'a> Judge<'a> {
             let Some(known) = &self.known(attempt.target) else { continue };
             let identified = row.evaluation.identified;
             let visible = count_visible(known, rig);
-            row.evaluation = Evaluation { identified, visible, wrong: Some(false), ..Evaluation::default() };
+            let alert_limit = Some(alert_limit(known.target.diameter()));
+            row.evaluation =
+                Evaluation { identified, visible, wrong: Some(false), alert_limit, ..Evaluation::default() };
             if let Some((_, bound)) =
                 truth.bound.filter(|(object, _)| kind != TargetKind::Site && *object == attempt.target)
             {

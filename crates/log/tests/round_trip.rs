@@ -90,6 +90,10 @@ fn totals_come_back_after_the_last_frame() {
         writer.frame(&frame).unwrap();
     }
     assert_eq!((totals.frames, totals.attempted, totals.found, totals.refused()), (4, 6, 3, 3));
+    assert_eq!(totals.regions, Some([3, 0, 0, 0, 0, 0]), "an error of 10 mm, a level of 30, a limit of 50");
+    let mut twice = totals.clone();
+    twice.merge(&totals);
+    assert_eq!(twice.regions, Some([6, 0, 0, 0, 0, 0]));
     assert_eq!((totals.judged, totals.bounded, totals.nees_count, totals.nees_within), (3, 0, 3, 3));
     writer.totals(&totals).unwrap();
     writer.finish().unwrap();

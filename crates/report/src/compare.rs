@@ -63,7 +63,7 @@ pub fn compare(folders: &[PathBuf], force: bool, out: Option<&Path>) -> Result<C
         write(folder, "compare.html", print::html(&document, true).as_bytes())
     });
     Ok(Compared {
-        table: format!("{summary}\n\n{}", lines(&comparisons)),
+        table: format!("{summary}\n\n{}{}", same(&run, &names), lines(&comparisons)),
         page: page.transpose()?,
         differ: comparisons.iter().any(|comparison| comparison.better().is_some()),
     })
@@ -129,6 +129,19 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
     });
     both("site", |trial| trial.header.site.lines().map(str::to_owned).collect());
     found
+}
+
+/// That runs gave the same results bit for bit, where they did: such a comparison says nothing of methods.
+fn same(run: &Run, names: &[String]) -> String {
+    let of = |name: &String| -> Vec<&[u8]> {
+        let own = run.trials.iter().filter(|trial| trial.header.axes[0].value == *name);
+        own.map(|trial| &trial.digest[..]).collect()
+    };
+    let alike = names.iter().skip(1).filter(|name| of(name) == of(&names[0]));
+    let printed = |name: &String| name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
+    alike
+        .map(|name| format!("{} and {} have the same results, bit for bit.\n", printed(&names[0]), printed(name)))
+        .collect()
 }
 
 /// The comparisons, a line each.

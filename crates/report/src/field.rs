@@ -33,7 +33,8 @@ fields! {
     Nees "nees" |r| r.evaluation.nees;
     M2Bound "m2_bound" |r| r.evaluation.m2_bound;
     PositionBound "m3_bound" |r| r.evaluation.m3_bound;
-    PositionRadius "position_radius" |r| crate::place::radius(r);
+    Level "protection_position" |r| r.integrity.as_ref()?.protection_position;
+    Limit "alert_limit" |r| r.evaluation.alert_limit;
     Residual "residual_rms" |r| r.residual_rms;
     Visible "visible" |r| r.evaluation.visible.map(f64::from);
     Identified "identified" |r| r.evaluation.identified.map(f64::from);
@@ -55,7 +56,7 @@ impl Field {
     /// The topic that carries it.
     pub(crate) fn topic(self) -> &'static str {
         match self {
-            Self::Residual | Self::Tests | Self::PositionRadius => "/referencing/result",
+            Self::Residual | Self::Tests | Self::Level => "/referencing/result",
             Self::Candidates => "/referencing/candidates",
             Self::CandidatesTime | Self::SearchTime | Self::SolveTime | Self::TotalTime => "/metrics/timing",
             _ => "/metrics/evaluation",

@@ -1,13 +1,16 @@
 //! Numbers and names as people read them.
 
-/// The last part of a dotted key: `source.distance` is the distance.
+/// The last part of a dotted key: `source.distance` is the distance, `pipeline.tolerance.fixed` the tolerance.
 pub(crate) fn short(key: &str) -> &str {
+    let kind = [".fixed", ".sigmas"].into_iter().find_map(|kind| key.strip_suffix(kind));
+    let key = kind.filter(|key| key.ends_with("tolerance")).unwrap_or(key);
     key.rsplit('.').next().unwrap_or(key)
 }
 
 /// The unit of an axis that has a known one.
 pub(crate) fn unit(key: &str) -> Option<&'static str> {
     match short(key) {
+        "tolerance" => key.ends_with(".fixed").then_some("m"),
         "distance" | "baseline" | "altitude" | "shift" => Some("m"),
         "attenuation" => Some("1/m"),
         "speed" => Some("m/s"),

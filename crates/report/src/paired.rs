@@ -32,6 +32,8 @@ pub(crate) struct Comparison {
     pub(crate) logs: Vec<usize>,
     /// Whether the units are conditions: then differences are logarithms of ratios.
     pub(crate) over_conditions: bool,
+    /// Whether the two saw other frames, of the same numbers, made with the same random numbers: what differs is a condition.
+    pub(crate) between_conditions: bool,
     pub(crate) n: usize,
     /// Median of first − second (m), or of ln(first / second), and its 95 % interval.
     pub(crate) difference: f64,
@@ -99,8 +101,11 @@ pub(crate) fn names(run: &Run, members: &[usize]) -> (String, Vec<String>) {
 /// Every comparison the run allows, as one family.
 pub(crate) fn comparisons(run: &Run, summary: &Summary) -> Vec<Comparison> {
     let groups: Vec<Vec<usize>> = groups(run).into_iter().filter(|group| group.len() > 1).collect();
-    let mut family =
-        if groups.len() >= CONDITIONS { over_conditions(run, summary, &groups) } else { within(run, &groups) };
+    let mut family = match groups.len() {
+        0 => between(run),
+        n if n < CONDITIONS => within(run, &groups),
+        _ => over_conditions(run, summary, &groups),
+    };
     let adjusted = holm(&family.iter().map(|c| c.p).collect::<Vec<_>>());
     family.iter_mut().zip(adjusted).for_each(|(comparison, p)| comparison.holm = p);
     family
@@ -138,6 +143,33 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
             }
             let names = [names[a].clone(), names[b].clone()];
             found.push(of(condition.clone(), names, vec![first, second], false, &errors));
+        }
+    }
+    found
+}
+
+/// Conditions of one seed, where no two trials saw the same frames: frame k of each is drawn from the same random numbers, so
+/// that attempts pair off by frame and target. Trials of other seeds, or with other targets, are left alone.
+fn between(run: &Run) -> Vec<Comparison> {
+    let alike = |trial: &Trial| {
+        let targets: Vec<String> = trial.header.targets.iter().map(|target| target.id.clone()).collect();
+        (trial.header.seeds.clone(), targets, trial.count(), trial.every())
+    };
+    let first = alike(&run.trials[0]);
+    // Recorded frames have no random numbers in common.
+    let drawn = !run.header().configuration.contains("name = \"dataset\"");
+    if run.joined || !drawn || first.0.is_empty() || run.trials.iter().any(|trial| alike(trial) != first) {
+        return Vec::new();
+    }
+    let members: Vec<usize> = (0..run.trials.len()).collect();
+    let (_, names) = names(run, &members);
+    let mut found = Vec::new();
+    for (a, b) in pairs(members.len()) {
+        let errors = errors(&run.trials[a], &run.trials[b]);
+        if !errors.is_empty() {
+            let names = [names[a].clone(), names[b].clone()];
+            let comparison = of(String::new(), names, vec![a, b], false, &errors);
+            found.push(Comparison { between_conditions: true, ..comparison });
         }
     }
     found
@@ -187,6 +219,7 @@ fn of(condition: String, names: [String; 2], logs: Vec<usize>, over: bool, error
         second: logs[1],
         logs,
         over_conditions: over,
+        between_conditions: false,
         n: errors.len(),
         difference: statistics.difference,
         interval: statistics.interval,

@@ -76,6 +76,9 @@ pub(crate) struct Inspected {
 /// What a navigator knew after a frame.
 #[derive(Debug)]
 pub(crate) struct Underway {
+    /// Where the navigated pose and the survey put the left camera in the world, and where the first fix carried by odometry
+    /// alone does (m); NaN where unknown.
+    pub(crate) places: [[f64; 3]; 2],
     counted: [bool; Counted::ALL.len()],
     values: [f64; Sailed::ALL.len()],
 }
@@ -147,7 +150,8 @@ impl Trial {
         };
         let mut digest = Sha256::new();
         let mut places = HashMap::from([(String::new(), 0)]);
-        reader.for_each_frame(|frame| {
+        reader.for_each_frame(|mut frame| {
+            frame.targets.iter_mut().for_each(|target| place::limit(&trial.header, target));
             trial.take(&frame, &mut places);
             results(&mut digest, &frame);
         })?;
@@ -208,6 +212,7 @@ impl Trial {
             .map(|time| time.unwrap_or(f64::NAN)),
             rows: (first, self.rows.len() as u32),
             sailed: frame.navigation.as_deref().map(|record| Underway {
+                places: [&record.pose, &record.unreferenced].map(|pose| place::carried(&self.header, pose.as_ref())),
                 counted: Counted::ALL.map(|counted| counted.holds(record)),
                 values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
             }),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use seafix_evaluation::quantile;
-use seafix_log::{Axis, Totals};
+use seafix_log::{Axis, Outcome, Region, Totals};
 
 use crate::{
     Field, paired,
@@ -70,6 +70,9 @@ pub struct Row {
     pub nees_count: usize,
     /// Identified points of the fixes found.
     pub identified: Option<Spread>,
+    /// How many fixes are in each region of the Stanford diagram, in the order of [`Region::ALL`]; `None` where the log does
+    /// not say of all frames, or truth is unknown.
+    pub regions: Option<[usize; Region::ALL.len()]>,
     /// Root mean squares over all fixes that truth could judge, wrong ones included, beside their bounds.
     pub limits: Option<Limits>,
     /// Measured standard deviation of the disparity of correctly identified points (px).
@@ -229,6 +232,7 @@ impl Row {
             nees_mean: None,
             nees_count: 0,
             identified: None,
+            regions: regions(trial),
             limits: trial.totals.as_ref().and_then(Limits::of),
             disparity_sigma: Some(trial.disparity)
                 .filter(|(_, n)| *n > 0)
@@ -296,6 +300,20 @@ impl Row {
     pub(crate) fn conditions(&self) -> impl Iterator<Item = &Axis> {
         self.axes.iter().filter(|axis| !matches!(crate::format::short(&axis.key), "search" | "solver"))
     }
+}
+
+/// As the totals count them, or the frames where all are logged.
+fn regions(trial: &Trial) -> Option<[usize; Region::ALL.len()]> {
+    if let Some(counts) = trial.totals.as_ref().and_then(|totals| totals.regions) {
+        return Some(counts.map(|count| count as usize));
+    }
+    let mut counts = [0; Region::ALL.len()];
+    for (_, row) in trial.attempts().filter(|(_, row)| row.outcome == Outcome::Referenced) {
+        if let (Some(error), Some(limit)) = (row.get(Field::Position), row.get(Field::Limit)) {
+            counts[Region::of(error, row.get(Field::Level), limit) as usize] += 1;
+        }
+    }
+    (trial.every() == 1 && counts.iter().any(|count| *count > 0)).then_some(counts)
 }
 
 fn times(trial: &Trial) -> StageTimes {

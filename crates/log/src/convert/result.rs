@@ -157,6 +157,7 @@ pub(crate) fn evaluation_message(frame: &FrameRecord, index: usize) -> proto::Ev
         nees: it.nees,
         m2_bound: it.m2_bound,
         m3_bound: it.m3_bound,
+        alert_limit: it.alert_limit,
     }
 }
 
@@ -176,6 +177,7 @@ pub(crate) fn evaluation_record(message: &proto::Evaluation) -> Evaluation {
         nees: message.nees,
         m2_bound: message.m2_bound,
         m3_bound: message.m3_bound,
+        alert_limit: message.alert_limit,
     }
 }
 

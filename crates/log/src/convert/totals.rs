@@ -1,6 +1,6 @@
 //! What the frames of a trial add up to.
 
-use crate::{Totals, proto};
+use crate::{Region, Totals, proto};
 
 /// The message that holds `totals`.
 pub(crate) fn totals_message(totals: &Totals) -> proto::Totals {
@@ -25,6 +25,7 @@ pub(crate) fn totals_message(totals: &Totals) -> proto::Totals {
         nees_sum: totals.nees_sum,
         nees_count: totals.nees_count,
         nees_within: totals.nees_within,
+        regions: totals.regions.map(regions_message),
     }
 }
 
@@ -50,5 +51,13 @@ pub(crate) fn totals_record(message: proto::Totals) -> Totals {
         nees_sum: message.nees_sum,
         nees_count: message.nees_count,
         nees_within: message.nees_within,
+        regions: message.regions.map(|of| {
+            [of.available, of.misleading, of.hazardous, of.unavailable, of.unavailable_misleading, of.unprotected]
+        }),
     }
+}
+
+fn regions_message(of: [u64; Region::ALL.len()]) -> proto::Regions {
+    let [available, misleading, hazardous, unavailable, unavailable_misleading, unprotected] = of;
+    proto::Regions { available, misleading, hazardous, unavailable, unavailable_misleading, unprotected }
 }

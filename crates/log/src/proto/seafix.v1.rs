@@ -498,6 +498,9 @@ pub struct Evaluation {
     pub m2_bound: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "17")]
     pub m3_bound: ::core::option::Option<f64>,
+    /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable.
+    #[prost(double, optional, tag = "18")]
+    pub alert_limit: ::core::option::Option<f64>,
 }
 /// What all frames of a trial add up to, logged or not. Topic /metrics/totals, once, after the last frame.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -546,6 +549,32 @@ pub struct Totals {
     pub nees_count: u64,
     #[prost(uint64, tag = "19")]
     pub nees_within: u64,
+    /// Fixes whose error, protection level and alert limit are known, by the region of the Stanford diagram they are in.
+    #[prost(message, optional, tag = "20")]
+    pub regions: ::core::option::Option<Regions>,
+}
+/// How many fixes there are in each region of the Stanford diagram: error e and protection level p of the position, alert
+/// limit a.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Regions {
+    /// e <= p <= a.
+    #[prost(uint64, tag = "1")]
+    pub available: u64,
+    /// p < e <= a.
+    #[prost(uint64, tag = "2")]
+    pub misleading: u64,
+    /// p <= a < e.
+    #[prost(uint64, tag = "3")]
+    pub hazardous: u64,
+    /// a < p, e <= p.
+    #[prost(uint64, tag = "4")]
+    pub unavailable: u64,
+    /// a < p < e.
+    #[prost(uint64, tag = "5")]
+    pub unavailable_misleading: u64,
+    /// Fixes that have no protection level.
+    #[prost(uint64, tag = "6")]
+    pub unprotected: u64,
 }
 /// A reason and how often it was given.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]

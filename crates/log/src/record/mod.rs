@@ -5,6 +5,7 @@ mod header;
 mod inputs;
 mod inspection;
 mod navigation;
+mod region;
 mod target;
 mod totals;
 
@@ -13,6 +14,7 @@ pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetMod
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
 pub use inspection::InspectedPoint;
 pub use navigation::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
+pub use region::Region;
 pub use target::{Alternative, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
 pub use totals::Totals;
 

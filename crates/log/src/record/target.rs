@@ -205,6 +205,9 @@ pub struct Evaluation {
     pub m2_bound: Option<f64>,
     /// The Cramér–Rao bound on the position (m), where it is known.
     pub m3_bound: Option<f64>,
+    /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable. `None` in logs
+    /// that are older than it, whose header has those of the targets.
+    pub alert_limit: Option<f64>,
 }
 
 /// Times of the stages that serve one target (ms); `None` where a stage did not run.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{FrameRecord, Outcome};
+use super::{FrameRecord, Outcome, Region};
 
 /// Sums over every frame of a trial, of which the log may hold a part.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,6 +45,9 @@ pub struct Totals {
     pub nees_count: u64,
     /// So many of which are below the 95 % quantile of χ² with six degrees of freedom.
     pub nees_within: u64,
+    /// Fixes whose error, protection level and alert limit are known, by their region in the order of [`Region::ALL`]; `None`
+    /// in logs that are older than these.
+    pub regions: Option<[u64; Region::ALL.len()]>,
 }
 
 /// χ²₆ at 95 %.
@@ -59,10 +62,16 @@ impl Totals {
         self.wrong_frames += u64::from(fixes().any(|fix| fix.evaluation.wrong == Some(true)));
         for target in frame.targets.iter().filter(|target| target.attempted()) {
             self.attempted += 1;
+            if target.evaluation.alert_limit.is_some() {
+                self.regions.get_or_insert_default();
+            }
             if target.outcome != Outcome::Referenced {
                 let reason = if target.reason.is_empty() { target.outcome.name() } else { &target.reason };
                 *self.reasons.entry(reason.to_owned()).or_default() += 1;
                 continue;
+            }
+            if let Some(region) = target.region() {
+                self.regions.get_or_insert_default()[region as usize] += 1;
             }
             let fix = &target.evaluation;
             match fix.wrong {
@@ -113,6 +122,10 @@ impl Totals {
         self.nees_sum += other.nees_sum;
         self.nees_count += other.nees_count;
         self.nees_within += other.nees_within;
+        for (sum, count) in self.regions.iter_mut().zip(&other.regions).flat_map(|(sum, own)| sum.iter_mut().zip(own)) {
+            *sum += count;
+        }
+        self.regions = self.regions.or(other.regions);
     }
 
     /// Attempts that gave no fix.

@@ -123,6 +123,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         nees: Some(5.5),
         m2_bound: Some(0.005),
         m3_bound: None,
+        alert_limit: Some(0.05),
     };
     fixed.times =
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };

@@ -7,6 +7,7 @@ mod data;
 mod failures;
 mod figures;
 mod inspection;
+mod integrity;
 mod limits;
 mod method;
 mod navigation;
@@ -44,6 +45,7 @@ pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Docu
             Some(data::section(run, summary, small)),
             Some(protocol::section(run, &comparisons)),
             Some(results::section(run, summary, &comparisons)),
+            integrity::section(run, summary),
             navigation::section(run, summary),
             inspection::section(run, summary),
             significance::section(run, &comparisons),
@@ -84,7 +86,9 @@ fn sentence_case(text: &str) -> String {
 
 /// Whether `index` is better than every trial it was compared with, surely.
 fn best(comparisons: &[Comparison], index: usize) -> bool {
-    let mut own =
-        comparisons.iter().filter(|c| !c.over_conditions && (c.first == index || c.second == index)).peekable();
+    let mut own = comparisons
+        .iter()
+        .filter(|c| !c.over_conditions && !c.between_conditions && (c.first == index || c.second == index))
+        .peekable();
     own.peek().is_some() && own.all(|c| c.better() == Some(index))
 }

@@ -65,6 +65,8 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     if !comparisons.is_empty() {
         let unit = if comparisons[0].over_conditions {
             "Methods are compared over conditions, one value each: the median of m2 over all attempts, failures as infinitely far off; the difference is the ratio of two such medians"
+        } else if comparisons[0].between_conditions {
+            "Frame k of every trial is drawn from the same random numbers, so that only the condition differs: trials are compared frame by frame and target by target, as far as both attempted it, failures as infinitely far off, by the median of the paired differences of m2"
         } else {
             "Trials that saw the same frames are compared attempt by attempt, failures as infinitely far off, by the median of the paired differences of m2"
         };

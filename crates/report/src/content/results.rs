@@ -114,8 +114,9 @@ fn errors(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Table {
         italic("All"),
         ": median of m2 over all attempts, refused and wrong ones counted as infinitely far off. ",
     ];
-    caption.push(Span::from(match (comparisons.is_empty(), any_best) {
-        (true, _) => "Nothing is compared: no two trials saw the same frames.",
+    caption.push(Span::from(match (comparisons.first(), any_best) {
+        (None, _) => "Nothing is compared: no two trials saw the same frames.",
+        (Some(first), _) if first.between_conditions => "Conditions are compared below, frame by frame.",
         (_, true) => "Bold: better than every trial it was compared with, significantly.",
         _ => "No value is in bold: none is significantly better than all others on the same frames.",
     }));

@@ -36,18 +36,20 @@ pub(super) fn sentences(run: &Run, comparisons: &[Comparison], most: usize) -> V
     let mut sure: Vec<&Comparison> = comparisons.iter().filter(|c| c.better().is_some()).filter(finite).collect();
     sure.sort_by(|a, b| a.holm.total_cmp(&b.holm));
     if sure.is_empty() && !comparisons.is_empty() {
-        return vec![text!["On the same attempts no difference of m2 is both finite and significant."]];
+        let what = if comparisons[0].between_conditions { "Frame by frame" } else { "On the same attempts" };
+        return vec![text![format!("{what} no difference of m2 is both finite and significant.")]];
     }
-    sure.into_iter().take(most).map(|comparison| sentence(run, comparisons, comparison)).collect()
+    sure.into_iter().take(most).map(|comparison| sentence(run, comparison)).collect()
 }
 
-fn sentence(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> Text {
+fn sentence(run: &Run, comparison: &Comparison) -> Text {
     let over = comparison.over_conditions;
     let real = |value: f64| if over { value.exp() } else { value * 1e3 };
     let told =
         |what: &str, value: f64| Number::new(Some(real(value)), if over { 3 } else { 2 }, key(run, comparison, what));
     let [first, second] = &comparison.names;
     let begin = match comparison.condition.as_str() {
+        "" if comparison.between_conditions => "Frame by frame".to_owned(),
         "" => "On the same attempts".to_owned(),
         condition => format!("At {condition}, on the same attempts"),
     };
@@ -59,9 +61,7 @@ fn sentence(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> T
         told("difference-low", comparison.interval.0),
         ", ",
         told("difference-high", comparison.interval.1),
-        "], p = ",
-        holm(run, comparisons, comparison),
-        "."
+        if over { "], 95 % bootstrap over conditions." } else { "], 95 % bootstrap over blocks of frames." }
     ]
 }
 

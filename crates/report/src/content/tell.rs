@@ -44,6 +44,18 @@ pub(super) fn percent(trial: &Trial, group: &str, k: usize, n: usize) -> Number 
     Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
 }
 
+/// Their share of all attempts or an end of its exact 95 % interval, in percent: `percent`, `low`, `high`.
+pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize), decimals: usize) -> Number {
+    let (low, high) = seafix_evaluation::clopper_pearson(k, n, 0.95);
+    let value = match what {
+        "low" => 100.0 * low,
+        "high" => 100.0 * high,
+        _ => 100.0 * k as f64 / n as f64,
+    };
+    let key = Key::of(trial, counted(trial), format!("{what} {group} of attempted"));
+    Number::new((n > 0).then_some(value), decimals, key)
+}
+
 /// The exact 95 % interval of that share.
 pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
     let (low, high) = seafix_evaluation::clopper_pearson(k, n, 0.95);

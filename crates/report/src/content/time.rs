@@ -33,6 +33,7 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Section {
         section.say(text![
             "No durations were logged, so that the run has the same bytes wherever and whenever it is made."
         ]);
+        section.blocks.extend(figures::search_cost(run).map(Block::Figure));
         return section;
     }
     let mut heads = results::heads(summary);

@@ -132,7 +132,12 @@ impl Panel {
         let room = height / self.y.names.len().max(1) as f64 > 2.2 * FONT;
         let above = !self.y.names.is_empty() && label > 0.4 * width && room;
         let left = x + if above { 0.0 } else { label } + 7.0 + if self.y.label.is_empty() { 2.0 } else { FONT * 1.6 };
-        let right = x + width - 7.0;
+        let mut right = x + width - 7.0;
+        // The number at the end of the horizontal axis stands out by half of itself.
+        let across = Scale::new(self.x.clone(), x_ends, [left, right]);
+        let ends = across.ticks().into_iter().map(|tick| across.at(tick) + width_of(&across.label(tick), FONT) / 2.0);
+        let beyond = if self.x.names.is_empty() { ends.fold(right, f64::max) - (x + width - 1.0) } else { 0.0 };
+        right -= beyond.max(0.0);
         // Long names on the horizontal axis are stacked in levels.
         let levels = self.levels(x_ends, right - left);
         let bottom = y + height - 6.0 - FONT * (levels + 0.4) - if self.x.label.is_empty() { 0.0 } else { FONT * 1.4 };

@@ -1,6 +1,6 @@
 //! What stands between the axes.
 
-use super::{Anchor, Drawing, Ink, Scale, Stroke};
+use super::{Anchor, Drawing, Ink, Scale, Stroke, drawing::Shape};
 
 /// One kind of mark, for many values.
 #[derive(Debug, Clone)]
@@ -25,9 +25,18 @@ pub(crate) enum Layer {
     Columns { series: usize, values: Vec<[f64; 3]> },
     /// A field of coloured cells at whole numbers: x, y, share of the darkest, words.
     Heat { values: Vec<([f64; 3], String)> },
-    /// A word at a place.
-    Note { at: [f64; 2], text: String },
+    /// A thin circle round a place.
+    Ring { at: [f64; 2], radius: f64 },
+    /// A field of the sheet, lightly coloured.
+    Area { series: usize, points: Vec<[f64; 2]> },
+    /// A thin line between fields.
+    Rule { points: Vec<[f64; 2]>, dash: usize },
+    /// Lines of words beginning, or ending, at a place, below it or above.
+    Words { at: [f64; 2], end: bool, up: bool, lines: Vec<String> },
 }
+
+/// From one line of words to the next (pt).
+const LEADING: f64 = 8.5;
 
 /// The line of a series.
 pub(super) fn stroke(series: usize) -> Stroke {
@@ -37,12 +46,12 @@ pub(super) fn stroke(series: usize) -> Stroke {
 impl Layer {
     /// Whether there is anything to draw, apart from guides.
     pub(crate) fn draws(&self) -> bool {
-        !matches!(self, Self::Range { .. } | Self::Guide { .. } | Self::Note { .. }) && self.reach().next().is_some()
+        self.reach().next().is_some() && !matches!(self, Self::Range { .. })
     }
 
     /// Whether it lies below the grid.
     pub(super) fn below(&self) -> bool {
-        matches!(self, Self::Range { .. } | Self::Band { .. } | Self::Columns { .. } | Self::Heat { .. })
+        matches!(self, Self::Range { .. } | Self::Band { .. } | Self::Columns { .. } | Self::Area { .. })
     }
 
     /// The points that the axes must hold.
@@ -61,7 +70,9 @@ impl Layer {
                 Box::new(values.iter().flat_map(|[left, right, height]| [[*left, 0.0], [*right, *height]]))
             }
             Self::Heat { values } => Box::new(values.iter().map(|([x, y, _], _)| [*x, *y])),
-            Self::Guide { .. } | Self::Note { .. } => Box::new(std::iter::empty()),
+            Self::Guide { .. } | Self::Ring { .. } | Self::Area { .. } | Self::Rule { .. } | Self::Words { .. } => {
+                Box::new(std::iter::empty())
+            }
         }
     }
 
@@ -115,7 +126,7 @@ impl Layer {
                     drawing.rectangle([left, top], [right - left, bottom - top], Some(Ink::Heat(*share)), None);
                     let ink = if *share > 0.55 { Ink::OnDark } else { Ink::OnPale };
                     let [u, v] = place([*a, *b]);
-                    drawing.shapes.push(super::drawing::Shape::Words {
+                    drawing.shapes.push(Shape::Words {
                         at: [u, v + 2.6],
                         text: words.clone(),
                         size: super::drawing::FONT,
@@ -125,9 +136,25 @@ impl Layer {
                     });
                 }
             }
-            Self::Note { at, text } => {
+            Self::Ring { at, radius } => {
+                let edge = Stroke { ink: Ink::Text, width: 0.8, dash: 0 };
+                let centre = place(*at);
+                drawing.shapes.push(Shape::Circle { centre, radius: *radius, fill: None, stroke: Some(edge) });
+            }
+            Self::Area { series, points } => {
+                drawing.area(points.iter().copied().map(place).collect(), Ink::Light(*series));
+            }
+            Self::Rule { points, dash } => {
+                let stroke = Stroke { ink: Ink::Minor, width: 0.7, dash: *dash };
+                drawing.line(points.iter().copied().map(place), stroke);
+            }
+            Self::Words { at, end, up, lines } => {
                 let [a, b] = place(*at);
-                drawing.words([a + 3.0, b - 3.0], Anchor::Start, Ink::Minor, text.clone());
+                let (a, anchor) = if *end { (a - 3.0, Anchor::End) } else { (a + 3.0, Anchor::Start) };
+                let above = if *up { lines.len() as f64 * LEADING + 2.0 } else { 0.0 };
+                for (line, text) in (1..).zip(lines) {
+                    drawing.words([a, b - above + f64::from(line) * LEADING], anchor, Ink::Text, text.clone());
+                }
             }
         }
     }

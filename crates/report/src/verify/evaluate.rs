@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use seafix_evaluation::{clopper_pearson, holm, mcnemar, quantile};
-use seafix_log::{FrameTimes, Outcome, TargetRecord};
+use seafix_log::{FrameTimes, Outcome, Region, TargetRecord};
 
 use super::logs::{Log, Logs};
 use crate::{
@@ -65,11 +65,12 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     if let Some((_, over)) = rest.split_once(" over ") {
         return compared(first, over, logs, span);
     }
-    if let Some(bin) = rest.strip_prefix("search_ms at ") {
-        let bin: f64 = bin.strip_suffix(" half octaves of candidates")?.parse().ok()?;
+    if let Some(of) = rest.strip_suffix(" half octaves of candidates") {
+        let (field, bin) = of.split_once(" at ")?;
+        let (field, bin): (Field, f64) = (Field::named(field)?, bin.parse().ok()?);
         let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.1 > 0);
         let own = own.filter(|row| (2.0 * (row.1 as f64).log2()).round() / 2.0 == bin);
-        return statistic(first, own.filter_map(|row| row.0.times.search_ms).filter(|t| *t > 0.0).collect());
+        return statistic(first, own.filter_map(|row| field.of(&row.0)).filter(|cost| *cost > 0.0).collect());
     }
     Some(match (first, rest) {
         ("axis", key) => log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok(),
@@ -88,15 +89,13 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         }
         ("count", group) => Some(pooled(logs, group, span)? as f64),
         ("percent" | "low" | "high", group) => share(first, group, scale, span, logs)?,
-        ("beyond", _) => {
-            let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.0.outcome == Outcome::Referenced);
-            let beyond = own.filter(|row| row.0.evaluation.m3_position > Field::PositionRadius.of(&row.0));
-            Some(beyond.filter(|row| Field::PositionRadius.of(&row.0).is_some()).count() as f64)
-        }
         ("sum", fields) => {
+            // Only fixes have pairs that are known to be correct.
             let (above, below) = fields.split_once(" by ")?;
+            let (below, fixes) = below.strip_suffix(" of referenced").map_or((below, false), |below| (below, true));
             let (above, below) = (Field::named(above)?, Field::named(below)?);
-            let sum = |field: Field| rows(log, span).filter_map(|row| field.of(&row.0)).sum::<f64>();
+            let own = || rows(log, span).filter(|row| !fixes || row.0.outcome == Outcome::Referenced);
+            let sum = |field: Field| own().filter_map(|row| field.of(&row.0)).sum::<f64>();
             Some(sum(above) / sum(below))
         }
         ("rms", of) if of.ends_with(" of navigated") => {
@@ -157,7 +156,7 @@ fn error(row: &TargetRecord, field: Field) -> f64 {
 }
 
 fn at(log: &Log, span: [u64; 2]) -> Option<&super::logs::Seen> {
-    log.frames.iter().find(|frame| frame.stamp_ns == span[0])
+    log.at(span[0]).next()
 }
 
 fn stage(times: &FrameTimes, name: &str) -> Option<f64> {
@@ -195,6 +194,12 @@ fn pooled(logs: &[&Log], group: &str, span: [u64; 2]) -> Option<usize> {
 }
 
 fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
+    if let Some(region) = Region::ALL.into_iter().find(|region| region.name() == group) {
+        return Some(match log.totals.as_ref().and_then(|totals| totals.regions) {
+            Some(counts) => counts[region as usize] as usize,
+            None => rows(log, span).filter(|row| inside(region, &row.0)).count(),
+        });
+    }
     if let Some(totals) = &log.totals {
         let n = match group {
             "frames" => totals.frames,
@@ -232,6 +237,23 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
             rows(log, span).filter(|row| row.0.outcome != Outcome::Referenced && of(row)).count()
         }
     })
+}
+
+/// Whether a fix is in a region, by the region's definition.
+fn inside(region: Region, row: &TargetRecord) -> bool {
+    let values = [Field::Position, Field::Level, Field::Limit].map(|field| field.of(row));
+    let [Some(e), p, Some(a)] = values.map(|value| value.filter(|_| row.outcome == Outcome::Referenced)) else {
+        return false;
+    };
+    match (region, p) {
+        (Region::Unprotected, p) => p.is_none(),
+        (Region::Available, Some(p)) => e <= p && p <= a,
+        (Region::Misleading, Some(p)) => p < e && e <= a,
+        (Region::Hazardous, Some(p)) => p <= a && a < e,
+        (Region::Unavailable, Some(p)) => a < p && e <= p,
+        (Region::UnavailableMisleading, Some(p)) => a < p && p < e,
+        (_, None) => false,
+    }
 }
 
 /// A share of attempts in percent, or an end of its interval.
@@ -291,7 +313,7 @@ fn single(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let (field, rest) = of.split_once(" of ")?;
     let (object, number) = rest.rsplit_once(" at ")?;
     let number: u64 = number.parse().ok()?;
-    let frame = log.frames.iter().find(|frame| frame.number == number && frame.stamp_ns == span[0])?;
+    let frame = log.at(span[0]).find(|frame| frame.number == number)?;
     if let Some(quantity) = Sailed::named(field) {
         return Some(quantity.of(frame.navigation.as_deref()?));
     }
@@ -308,6 +330,8 @@ fn located(axis: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64
     let frame = at(log, span)?;
     Some(match what {
         "truth" => Some(frame.truth?[axis]),
+        "navigated" => Some(frame.carried[0][axis]),
+        "odometry" => Some(frame.carried[1][axis]),
         _ => Some(frame.rows.iter().find(|row| row.0.object == object)?.2[axis]),
     })
 }

@@ -31,6 +31,8 @@ pub(super) struct Seen {
     pub(super) times: FrameTimes,
     pub(super) truth: Option<[f64; 3]>,
     pub(super) navigation: Option<Box<NavigationRecord>>,
+    /// Where the navigated pose and the first fix carried by odometry put the camera in the world.
+    pub(super) carried: [[f64; 3]; 2],
     pub(super) inspected: Vec<InspectedPoint>,
     /// Key points, points, candidates, identified, used.
     pub(super) marks: [usize; 5],
@@ -86,10 +88,15 @@ impl Log {
             let rows = frame.targets.into_iter().filter(TargetRecord::attempted).map(|mut row| {
                 let lists = std::mem::take(&mut row.candidates);
                 (row.pairs, row.used, row.alternatives) = Default::default();
+                place::limit(&header, &mut row);
                 let at = place::estimate(&header, &row);
                 (row, lists.iter().map(Vec::len).sum(), at)
             });
+            let carried = frame.navigation.as_deref().map_or([[f64::NAN; 3]; 2], |known| {
+                [&known.pose, &known.unreferenced].map(|pose| place::carried(&header, pose.as_ref()))
+            });
             frames.push(Seen {
+                carried,
                 number: frame.frame,
                 stamp_ns: frame.stamp_ns,
                 times: frame.times,
@@ -106,6 +113,12 @@ impl Log {
         }
         let totals = reader.totals().cloned();
         Ok(Self { header, frames, totals, disparity })
+    }
+
+    /// The frames of this stamp; stamps do not decrease.
+    pub(super) fn at(&self, stamp_ns: u64) -> impl Iterator<Item = &Seen> {
+        let first = self.frames.partition_point(|frame| frame.stamp_ns < stamp_ns);
+        self.frames[first..].iter().take_while(move |frame| frame.stamp_ns == stamp_ns)
     }
 
     /// The frames that were logged whatever came of them, within the stamps.

@@ -32,7 +32,9 @@ fn runs_of_the_same_data_are_compared() {
     assert!(compared.differ && compared.table.contains("significant"), "{}", compared.table);
     assert!(compared.page.unwrap().exists());
     let again = run(folder.path(), "c", "triad", 1);
+    assert!(!compared.table.contains("bit for bit"), "{}", compared.table);
     let compared = compare(&[first, again], false, None).unwrap();
+    assert!(compared.table.contains("a and c have the same results, bit for bit"), "{}", compared.table);
     assert!(!compared.differ && compared.table.contains("p 1.0000, not significant"), "{}", compared.table);
 }
 

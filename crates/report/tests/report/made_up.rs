@@ -4,8 +4,8 @@ use std::path::Path;
 
 use seafix_log::{
     Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, InspectedPoint,
-    ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TargetTimes, TrialHeader,
-    TruthRecord, Writer,
+    Integrity, ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TargetTimes,
+    TrialHeader, TruthRecord, Writer,
 };
 
 const EYE: [[f64; 4]; 4] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
@@ -149,6 +149,11 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         row.covariance = Some(std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e-5 } else { 0.0 })));
         row.pairs = (0..7).map(|i| Pair { model: i, cloud: i }).collect();
         row.used = if solver == "triad" { vec![0, 2, 6] } else { (0..7).collect() };
+        row.integrity = Some(Integrity {
+            redundancy: "excludable".to_owned(),
+            protection_position: (number % 5 != 4).then(|| 0.03 + 0.02 * noise(seed + 5)),
+            ..Integrity::default()
+        });
         row.evaluation = Evaluation {
             wrong: Some(wrong),
             wrong_pairs: Some(wrong),

@@ -5,6 +5,7 @@
 mod browser;
 mod compared;
 mod harmless;
+mod integrity;
 mod made_up;
 mod paper;
 mod verified;

@@ -49,7 +49,10 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
     let mut ticks: Vec<f64> = summary.rows.iter().filter_map(|row| on(row, &key)).collect();
     ticks.sort_by(f64::total_cmp);
     ticks.dedup();
-    let reach = ticks.last()? - ticks.first()?;
+    let (&first, &last) = (ticks.first()?, ticks.last()?);
+    // Values over more than a decade would stand on each other at one end.
+    let wide = first > 0.0 && last / first > 12.0;
+    let reach = if wide { (last / first).ln() } else { last - first };
     let mut heads = vec![Head::words("series"), Head::numbers(headed(&key)), Head::words("metric")];
     heads.extend(["p5 (mm)", "median (mm)", "p95 (mm)"].map(Head::numbers));
     let mut data =
@@ -80,7 +83,7 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
             }
             // Series of the same place stand beside each other.
             let shift = 0.012 * reach * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
-            let at = |x: f64| x + shift;
+            let at = |x: f64| if wide { x * shift.exp() } else { x + shift };
             let line: Vec<[f64; 2]> = points.iter().map(|(x, s, _)| [at(*x), s.median * 1e3]).collect();
             all.extend(line.iter().copied());
             layers.push(Layer::Whiskers {
@@ -98,7 +101,8 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
             let [from, to] = PAPER_M1.map(|m| m * 1e3);
             layers.insert(0, Layer::Range { from, to, note: "the paper, 2–5 m".to_owned() });
         }
-        let (x, y) = (Axis::linear(headed(&key)).at(ticks.clone()), Axis::logarithmic(label));
+        let x = Axis { logarithmic: wide, ..Axis::linear(headed(&key)) }.at(ticks.clone());
+        let y = Axis::logarithmic(label);
         drawn.push(Panel { title: String::new(), x, y, layers, equal: false });
     }
     let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
@@ -203,52 +207,4 @@ pub(super) fn boxes(run: &Run, summary: &Summary) -> Option<Figure> {
 fn n(trial: &Trial, field: Field, n: usize) -> Number {
     let key = crate::Key::of(trial, field.topic(), format!("sampled {} of found", field.name()));
     Number::count(n, key)
-}
-
-/// Precision over recall of the identified points, along the tolerance.
-pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
-    let key = keys(summary).into_iter().find(|key| key.contains("tolerance"))?;
-    let names = distinct(summary.rows.iter().map(|row| name(row, &key)));
-    let heads =
-        vec![Head::words("series"), Head::numbers(headed(&key)), Head::numbers("recall"), Head::numbers("precision")];
-    let mut data = Table::new("precision-recall", text!["Every point of the figure of precision over recall."], heads);
-    let mut layers = Vec::new();
-    for (index, series_name) in names.iter().enumerate() {
-        let mut points = Vec::new();
-        for (row, trial) in summary.rows.iter().zip(&run.trials).filter(|(row, _)| name(row, &key) == *series_name) {
-            let sum = |field: Field| trial.attempts().filter_map(|(_, row)| row.get(field)).sum::<f64>();
-            let (correct, identified, visible) = (sum(Field::Correct), sum(Field::Identified), sum(Field::Visible));
-            let place = on(row, &key)?;
-            let ratio = |to: f64| (to > 0.0).then(|| correct / to);
-            let (Some(recall), Some(precision)) = (ratio(visible), ratio(identified)) else { continue };
-            points.push((place, [recall, precision]));
-            let told = |over: Field, value| {
-                let what = format!("sum correct_pairs by {}", over.name());
-                Number::new(Some(value), 4, crate::Key::of(trial, "/metrics/evaluation", what)).into()
-            };
-            let at = tell::axis(trial, &key, Some(place)).into();
-            data.line(
-                false,
-                vec![series_name.clone().into(), at, told(Field::Visible, recall), told(Field::Identified, precision)],
-            );
-        }
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let line: Vec<[f64; 2]> = points.iter().map(|(_, point)| *point).collect();
-        layers.push(Layer::Line { series: index, points: line.clone() });
-        layers.push(Layer::Marks { series: index, points: line, radius: 2.0 });
-        layers.extend(points.into_iter().map(|(place, at)| Layer::Note { at, text: crate::format::trimmed(place) }));
-    }
-    let panel = Panel {
-        x: Axis::linear("recall of visible points"),
-        y: Axis::linear("precision of identified points"),
-        layers,
-        ..Panel::default()
-    };
-    let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
-    let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.8, legend };
-    let said = format!(
-        "Precision over recall of the identified points, along {}, whose value stands at each mark.",
-        headed(&key)
-    );
-    figure("precision-recall", caption(&said, run), &chart, data)
 }

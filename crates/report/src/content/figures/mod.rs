@@ -2,11 +2,13 @@
 
 mod axis;
 mod consistency;
+mod cost;
 mod frames;
 mod grid;
 mod rates;
 mod recall;
 mod sawtooth;
+mod tolerance;
 mod way;
 
 use crate::{
@@ -19,7 +21,7 @@ use crate::{
 use super::{data::baseline, distinct};
 
 pub(super) use axis::numeric;
-pub(super) use consistency::search_cost;
+pub(super) use cost::search_cost;
 pub(super) use sawtooth::figure as sawtooth;
 
 /// Those that show results.
@@ -31,11 +33,10 @@ pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
         rates::figure(run, summary),
         axis::boxes(run, summary),
         recall::figure(run),
-        axis::precision_recall(run, summary),
+        tolerance::precision_recall(run, summary),
         grid::figure(run, summary),
         way::figure(run),
         consistency::histogram(run),
-        consistency::stanford(run),
     ]
     .into_iter()
     .flatten()
@@ -58,7 +59,12 @@ fn conditions(run: &Run) -> String {
 }
 
 /// What a figure needs besides its drawing.
-fn figure(id: &str, caption: Text, chart: &crate::figure::Chart, data: crate::document::Table) -> Option<Figure> {
+pub(super) fn figure(
+    id: &str,
+    caption: Text,
+    chart: &crate::figure::Chart,
+    data: crate::document::Table,
+) -> Option<Figure> {
     Some(Figure { id: id.to_owned(), caption, drawing: chart.draw()?, data })
 }
 
@@ -77,11 +83,11 @@ fn panels(run: &Run, most: usize) -> Vec<(String, Vec<(String, &Trial)>)> {
 }
 
 /// A caption that ends with what all trials share.
-fn caption(said: &str, run: &Run) -> Text {
+pub(super) fn caption(said: &str, run: &Run) -> Text {
     text![format!("{said} {}", conditions(run))]
 }
 
 /// The series of a name among all names.
-fn series(names: &[String], name: &str) -> usize {
+pub(super) fn series(names: &[String], name: &str) -> usize {
     names.iter().position(|known| known == name).unwrap_or(0)
 }

@@ -41,7 +41,7 @@ pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
     }
     let names = run.trials.iter().rev().map(|trial| Summary::name(run, trial)).collect();
     let panel = Panel {
-        x: Axis::linear("share of the attempts (%)").within([0.0, 100.0]),
+        x: Axis::linear("share of the attempts (%)").within([-1.0, 101.0]),
         y: Axis::named("", names),
         layers,
         ..Panel::default()

@@ -11,7 +11,7 @@ use crate::{
     run::Run,
 };
 
-/// From above and from the side: truth, fixes, feature points and the boxes around the objects; of the first trial.
+/// From above and from the side: truth, fixes, what was carried between them, feature points and the boxes around the objects; of the first trial.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
     let trial = &run.trials[0];
     let truth: Vec<[f64; 3]> = trial.sample().take(3000).filter_map(|frame| frame.truth).collect();
@@ -25,11 +25,23 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     if truth.is_empty() || fixes.is_empty() || objects.is_empty() {
         return None;
     }
+    // What a navigator carried, where there is one: by its fixes, and the first fix by odometry alone.
+    let sailed = || trial.sample().take(3000).filter_map(|frame| Some((frame, frame.sailed.as_ref()?)));
+    let sails = sailed().next().is_some();
+    let carried = |which: usize| {
+        let places = sailed().map(move |(frame, sailed)| (frame, sailed.places[which]));
+        places.filter(|(_, at)| at[0].is_finite())
+    };
     let heads = [Head::words("what"), Head::words("name"), Head::numbers("frame")];
     let heads = heads.into_iter().chain(["north (m)", "east (m)", "down (m)"].map(Head::numbers));
     let mut data = Table::new("way", text!["Every place of the figure of the way."], heads.collect());
     for (frame, at) in trial.sample().take(3000).filter_map(|frame| Some((frame, frame.truth?))) {
         data.line(false, line(trial, "truth", "", (frame.number, frame.stamp_ns), at));
+    }
+    for (which, what) in ["navigated", "odometry"].into_iter().enumerate() {
+        for (frame, at) in carried(which) {
+            data.line(false, line(trial, what, "", (frame.number, frame.stamp_ns), at));
+        }
     }
     for (number, stamp, object, at) in &fixes {
         data.line(false, line(trial, "fix", object, (*number, *stamp), *at));
@@ -48,24 +60,37 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             layers.push(Layer::Line { series: 2, points: vec![[l, lo], [r, lo], [r, hi], [l, hi], [l, lo]] });
         }
         layers.push(Layer::Marks { series: 6, points: objects.iter().flatten().map(flat).collect(), radius: 0.9 });
-        layers.push(Layer::Marks { series: 0, points: truth.iter().map(flat).collect(), radius: 2.4 });
+        let truth: Vec<[f64; 2]> = truth.iter().map(flat).collect();
+        if sails {
+            let way = |which: usize| carried(which).map(|(_, at)| flat(&at)).collect();
+            layers.push(Layer::Line { series: 0, points: truth });
+            layers.push(Layer::Line { series: 3, points: way(1) });
+            layers.push(Layer::Line { series: 4, points: way(0) });
+        } else {
+            layers.push(Layer::Marks { series: 0, points: truth, radius: 2.4 });
+        }
         layers.push(Layer::Marks { series: 1, points: fixes.iter().map(|fix| flat(&fix.3)).collect(), radius: 1.4 });
         Panel { x: Axis::linear(labels[0]), y: Axis::linear(labels[1]), layers, equal: true, ..Panel::default() }
     };
+    let mut legend = vec![
+        if sails { Entry::line("camera, true", 0) } else { Entry::mark("camera, true", 0) },
+        Entry::mark("camera, by the fix and the survey", 1),
+        Entry::mark("feature points", 6),
+        Entry::line("shells of the objects", 2),
+    ];
+    if sails {
+        legend.extend([Entry::line("first fix carried by odometry alone", 3), Entry::line("navigated", 4)]);
+    }
     let chart = Chart {
         panels: vec![panel((0, 1), ["north (m)", "east (m)"], false), panel((0, 2), ["north (m)", "height (m)"], true)],
         columns: 2,
         page: true,
         shape: 0.8,
-        legend: vec![
-            Entry::mark("camera, true", 0),
-            Entry::mark("camera, by the fix and the survey", 1),
-            Entry::mark("feature points", 6),
-            Entry::line("shells of the objects", 2),
-        ],
+        legend,
     };
     let said = format!(
-        "The way from above and from the side, equal scales: the true places of the left camera, those by the fixes found and the survey, the feature points and the min–max shells of their objects. Log {}.",
+        "The way from above and from the side, equal scales: the true places of the left camera, those by the fixes found and the survey,{} the feature points and the min–max shells of their objects. Log {}.",
+        if sails { " the way that was navigated and the first fix carried on by odometry alone," } else { "" },
         trial.file()
     );
     super::figure("way", caption(&said, run), &chart, data)

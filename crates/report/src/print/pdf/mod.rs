@@ -22,7 +22,8 @@ pub(crate) fn pdf(document: &Document) -> Vec<u8> {
     let mut paper = Paper { sheets: Sheets::new(), sections: 0, tables: 0, figures: 0 };
     paper.title(document);
     for section in &document.sections {
-        paper.heading(&section.title);
+        let below = section.blocks.first().map_or(0.0, |block| paper.beginning(block));
+        paper.heading(&section.title, below);
         section.blocks.iter().for_each(|block| paper.block(block));
     }
     paper.sheets.number();
@@ -39,6 +40,12 @@ pub(crate) fn figure_pdf(drawing: &Drawing) -> Vec<u8> {
 /// Text over the whole width.
 fn plain(size: f64, align: Align) -> Style {
     Style { size, align, width: WIDTH, left: LEFT, font: Font::Regular }
+}
+
+/// Width and height of a picture on the page.
+fn pictured(picture: &Picture) -> [f64; 2] {
+    let width = if picture.size[0] < 1000 { 0.62 * WIDTH } else { WIDTH };
+    [width, width * f64::from(picture.size[1]) / f64::from(picture.size[0].max(1))]
 }
 
 struct Paper {
@@ -64,11 +71,11 @@ impl Paper {
         }
     }
 
-    fn heading(&mut self, title: &str) {
+    /// A section's heading, on one page with the beginning of what stands below it.
+    fn heading(&mut self, title: &str, below: f64) {
         self.sections += 1;
         self.sheets.space(14.0);
-        // A heading is never the last thing on a page.
-        self.sheets.need(60.0);
+        self.sheets.need(30.0 + below.max(30.0));
         let text = [bold(format!("{}   {title}", self.sections))];
         set(&mut self.sheets, &text, plain(12.5, Align::Left));
         self.sheets.space(4.0);
@@ -130,6 +137,16 @@ impl Paper {
         10.0 + 1.25 * SMALL * paragraph::lines(text, plain(SMALL, Align::Both)) as f64
     }
 
+    /// What a block needs on the page it begins on.
+    fn beginning(&self, block: &Block) -> f64 {
+        match block {
+            Block::Table(table) => 8.0 + table::beginning(table),
+            Block::Figure(figure) => 6.0 + figure.drawing.size[1] + self.caption_height(&figure.caption),
+            Block::Picture(picture) => 6.0 + pictured(picture)[1] + self.caption_height(&picture.caption),
+            _ => 0.0,
+        }
+    }
+
     fn figure(&mut self, figure: &Figure) {
         let [width, height] = figure.drawing.size;
         self.sheets.space(6.0);
@@ -139,8 +156,7 @@ impl Paper {
     }
 
     fn picture(&mut self, picture: &Picture) {
-        let width = if picture.size[0] < 1000 { 0.62 * WIDTH } else { WIDTH };
-        let height = width * f64::from(picture.size[1]) / f64::from(picture.size[0].max(1));
+        let [width, height] = pictured(picture);
         self.sheets.space(6.0);
         self.sheets.need(height + self.caption_height(&picture.caption));
         self.sheets.picture(&picture.jpeg, picture.size, [LEFT + (WIDTH - width) / 2.0, width, height]);

@@ -22,17 +22,31 @@ struct Grid {
     right: f64,
 }
 
+/// How captions are set.
+const CAPTION: Style = Style { size: SMALL, align: Align::Both, width: WIDTH, left: LEFT, font: Font::Regular };
+
+/// What a table needs on the page it begins on: caption, heads, the first line.
+pub(super) fn beginning(table: &Table) -> f64 {
+    needs(&Grid::of(table), table, &caption(table, 0))
+}
+
+fn needs(grid: &Grid, table: &Table, caption: &[Span]) -> f64 {
+    let caption_height = paragraph::lines(caption, CAPTION) as f64 * SMALL * LEADING;
+    let first = table.lines.first().map_or(0.0, |line| grid.height(table, line));
+    caption_height + 4.0 + grid.head_height(table) + first + 20.0
+}
+
+fn caption(table: &Table, number: usize) -> Vec<Span> {
+    [bold(format!("Table {number}. "))].into_iter().chain(table.caption.iter().cloned()).collect()
+}
+
 /// Sets a table with its caption above it.
 pub(super) fn set(sheets: &mut Sheets, table: &Table, number: usize) {
     let grid = Grid::of(table);
-    let style = Style { size: SMALL, align: Align::Both, width: WIDTH, left: LEFT, font: Font::Regular };
-    let mut caption = vec![bold(format!("Table {number}. "))];
-    caption.extend(table.caption.iter().cloned());
-    let caption_height = paragraph::lines(&caption, style) as f64 * SMALL * LEADING;
-    let first = table.lines.first().map_or(0.0, |line| grid.height(table, line));
+    let caption = caption(table, number);
     sheets.space(8.0);
-    sheets.need(caption_height + 4.0 + grid.head_height(table) + first + 20.0);
-    paragraph::set(sheets, &caption, style);
+    sheets.need(needs(&grid, table, &caption));
+    paragraph::set(sheets, &caption, CAPTION);
     sheets.space(3.0);
     grid.heads(sheets, table);
     for (index, line) in table.lines.iter().enumerate() {

@@ -1,0 +1,85 @@
+//! What a search costs.
+
+use std::collections::BTreeMap;
+
+use super::{caption, distinct, figure, series};
+use crate::{
+    Field, Key, Number,
+    content::tell,
+    document::{Cell, Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    run::{Run, Trial},
+};
+
+/// So many searches are told apart by colour, mark and line.
+const MOST: usize = 10;
+/// A median of fewer attempts is not drawn.
+const LEAST: usize = 3;
+
+/// Pair tests and time of the search over how many candidates there were, both axes logarithmic; time where durations were
+/// logged.
+pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
+    let names = distinct(run.trials.iter().map(|trial| trial.method()[0].clone()));
+    if names.len() > MOST {
+        return None;
+    }
+    let heads = [Head::words("search"), Head::words("cost"), Head::numbers("candidates"), Head::numbers("n")];
+    let heads = heads.into_iter().chain(["p5", "median", "p95"].map(Head::numbers));
+    let mut data =
+        Table::new("search-cost", text!["Every point of the figure of the cost of the search."], heads.collect());
+    let mut panels = Vec::new();
+    for (field, label, decimals) in [(Field::Tests, "pair tests", 1), (Field::SearchTime, "search (ms)", 4)] {
+        let mut layers = Vec::new();
+        for name in &names {
+            let trials: Vec<&Trial> = run.trials.iter().filter(|trial| trial.method()[0] == *name).collect();
+            let (mut line, mut bars) = (Vec::new(), Vec::new());
+            for (bin, mut costs) in bins(&trials, field) {
+                let [low, middle, high] = [0.05, 0.5, 0.95].map(|p| seafix_evaluation::quantile(&mut costs, p));
+                let half_octaves = f64::from(bin) / 2.0;
+                let size = 2_f64.powf(half_octaves);
+                line.push([size, middle]);
+                bars.push([size, low, high]);
+                let key = |what: &str| -> Key {
+                    let what = format!("{what} {} at {half_octaves} half octaves of candidates", field.name());
+                    tell::over(&trials, field.topic(), what)
+                };
+                let mut cells: Vec<Cell> = vec![name.clone().into(), label.into(), format!("{size:.1}").into()];
+                cells.push(Number::count(costs.len(), key("sampled")).into());
+                let told = |(what, value)| Number::new(Some(value), decimals, key(what)).into();
+                cells.extend([("q5", low), ("median", middle), ("q95", high)].map(told));
+                data.line(false, cells);
+            }
+            let series = series(&names, name);
+            layers.push(Layer::Whiskers { series, values: bars });
+            layers.push(Layer::Line { series, points: line.clone() });
+            layers.push(Layer::Marks { series, points: line, radius: 2.0 });
+        }
+        if layers.iter().any(Layer::draws) {
+            let (x, y) = (Axis::logarithmic("candidates in all lists"), Axis::logarithmic(label));
+            panels.push(Panel { x, y, layers, ..Panel::default() });
+        }
+    }
+    let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
+    let both = panels.len() > 1;
+    let chart = Chart { panels, columns: 2, page: both, shape: 0.8, legend };
+    let said = format!(
+        "What a search costs over the size of its problem, the number of candidates: tests of pairs{}; medians of half octaves with {LEAST} attempts or more, bars from the 5 % to the 95 % quantile. Searches that count no tests have no line.",
+        if both { " and time" } else { "" }
+    );
+    figure("search-cost", caption(&said, run), &chart, data)
+}
+
+/// The costs of all attempts, by the number of candidates in half octaves.
+fn bins(trials: &[&Trial], field: Field) -> BTreeMap<i32, Vec<f64>> {
+    let mut bins: BTreeMap<i32, Vec<f64>> = BTreeMap::new();
+    for (_, row) in trials.iter().flat_map(|trial| trial.attempts()) {
+        if let (Some(size), Some(cost)) = (row.get(Field::Candidates), row.get(field))
+            && size >= 1.0
+            && cost > 0.0
+        {
+            bins.entry((2.0 * size.log2()).round() as i32).or_default().push(cost);
+        }
+    }
+    bins.retain(|_, costs| costs.len() >= LEAST);
+    bins
+}

@@ -1,0 +1,110 @@
+//! Which points are identified along the tolerance of distances.
+
+use seafix_log::Outcome;
+
+use super::{axis, caption, distinct, figure, series};
+use crate::{
+    Field, Key, Number, Row, Summary,
+    content::tell,
+    document::{Figure, Head, Table, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    format::{headed, short, trimmed},
+    run::{Attempt, Run},
+};
+
+/// More methods, or more conditions, are no picture.
+const MOST: usize = 7;
+
+/// Precision over recall of the identified points along the tolerance Δ, a line a method, a panel a condition. The tolerance
+/// with the greatest harmonic mean of both has a ring.
+pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
+    let key = axis::keys(summary).into_iter().find(|key| key.contains("tolerance"))?;
+    let condition = |row: &Row| {
+        let others = row.conditions().filter(|axis| axis.key != key);
+        others.map(|axis| format!("{} {}", short(&axis.key), axis.value)).collect::<Vec<_>>().join(", ")
+    };
+    let conditions = distinct(summary.rows.iter().map(condition));
+    let names = distinct(summary.rows.iter().map(Row::method));
+    if names.len() > MOST || conditions.len() > MOST {
+        return None;
+    }
+    let heads = [Head::words("condition"), Head::words("method"), Head::numbers(headed(&key))].into_iter();
+    let heads = heads.chain(["recall", "precision"].map(Head::numbers)).collect();
+    let mut data = Table::new("precision-recall", text!["Every point of the figure of precision over recall."], heads);
+    let mut panels = Vec::new();
+    for title in &conditions {
+        let (mut layers, mut rings, mut notes) = (Vec::new(), Vec::new(), Vec::new());
+        for name in &names {
+            let mut points: Vec<(f64, [f64; 2])> = Vec::new();
+            let rows = summary.rows.iter().zip(&run.trials);
+            for (row, trial) in rows.filter(|(row, _)| condition(row) == *title && row.method() == *name) {
+                // What a refused attempt had in hand is no answer; what it could have seen counts.
+                let sum = |field: Field, of: fn(&Attempt) -> bool| -> f64 {
+                    trial.attempts().filter(|(_, row)| of(row)).filter_map(|(_, row)| row.get(field)).sum()
+                };
+                let fixed = |row: &Attempt| row.outcome == Outcome::Referenced;
+                let (correct, identified) = (sum(Field::Correct, fixed), sum(Field::Identified, fixed));
+                let visible = sum(Field::Visible, |_| true);
+                let tolerance = axis::on(row, &key)?;
+                // Without an answer there is no precision.
+                if !(visible > 0.0 && identified > 0.0) {
+                    continue;
+                }
+                let [recall, precision] = [correct / visible, correct / identified];
+                points.push((tolerance, [recall, precision]));
+                let told = |over: &str, value| {
+                    let what = format!("sum correct_pairs by {over}");
+                    Number::new(Some(value), 4, Key::of(trial, "/metrics/evaluation", what)).into()
+                };
+                let at = tell::axis(trial, &key, Some(tolerance)).into();
+                let ends = [told("visible", recall), told("identified of referenced", precision)];
+                data.line(false, [title.clone().into(), name.clone().into(), at].into_iter().chain(ends).collect());
+            }
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let f1 =
+                |[recall, precision]: [f64; 2]| 2.0 * recall * precision / (recall + precision).max(f64::MIN_POSITIVE);
+            let best = points.iter().copied().max_by(|a, b| f1(a.1).total_cmp(&f1(b.1)));
+            let index = series(&names, name);
+            let best = best.filter(|(_, at)| f1(*at) > 0.0);
+            rings.extend(best.map(|(_, at)| Layer::Ring { at, radius: 4.2 }));
+            let ends = [best.as_ref(), points.first(), points.last()];
+            ends.into_iter().flatten().for_each(|&(tolerance, at)| note(&mut notes, trimmed(tolerance), at));
+            let line: Vec<[f64; 2]> = points.into_iter().map(|(_, point)| point).collect();
+            layers.push(Layer::Line { series: index, points: line.clone() });
+            layers.push(Layer::Marks { series: index, points: line, radius: 2.0 });
+        }
+        layers.extend(rings);
+        layers.extend(notes.into_iter().map(|(at, words)| Layer::Words {
+            at,
+            end: at[0] > 0.5,
+            up: at[1] < 0.5 || at[0] > 0.5,
+            lines: vec![words.join(", ")],
+        }));
+        panels.push(Panel {
+            title: title.clone(),
+            x: Axis::linear("recall of visible points").within([-0.03, 1.03]),
+            y: Axis::linear("precision").within([-0.03, 1.13]),
+            layers,
+            ..Panel::default()
+        });
+    }
+    let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
+    let page = panels.len() > 1;
+    let columns = if panels.len() == 4 { 2 } else { panels.len().min(3) };
+    let chart = Chart { panels, columns, page, shape: if columns == 2 { 0.62 } else { 0.8 }, legend };
+    let said = format!(
+        "Precision of the points that fixes identified over recall of those in view of all attempts, refused ones included, along {}: its least and its greatest value stand at the ends of each line, and a ring is round the value with the greatest harmonic mean of both, on these very frames.",
+        headed(&key)
+    );
+    figure("precision-recall", caption(&said, run), &chart, data)
+}
+
+/// Notes a word at a place, beside those of places so near that they would overlap.
+fn note(notes: &mut Vec<([f64; 2], Vec<String>)>, word: String, at: [f64; 2]) {
+    let near = |known: &[f64; 2]| (known[0] - at[0]).abs() < 0.16 && (known[1] - at[1]).abs() < 0.12;
+    match notes.iter_mut().find(|(known, _)| near(known)) {
+        Some((_, words)) if words.contains(&word) => {}
+        Some((_, words)) => words.push(word),
+        None => notes.push((at, vec![word])),
+    }
+}

@@ -1,0 +1,293 @@
+//! Whether fixes keep what their protection levels promise, and how often a level lets them be used.
+
+use seafix_log::{Outcome, Region};
+
+use super::{
+    distinct, figures, results,
+    tell::{self, Unit},
+};
+use crate::{
+    Field, Number, Summary,
+    document::{Block, Cell, Figure, Head, Section, Table, Text, text},
+    figure::{Axis, Chart, Entry, Layer, Panel},
+    format::trimmed,
+    run::{Attempt, Frame, Run, Trial},
+};
+
+/// So many marks are drawn of fixes that keep their levels, and so many of those that do not: more hide each other.
+const MARKS: usize = 1200;
+/// More methods than this are drawn as one.
+const SERIES: usize = 7;
+
+/// Rates and the diagram; `None` where truth or levels are unknown.
+pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+    let judged = |row: &crate::Row| row.regions.is_some_and(|regions| regions.iter().any(|count| *count > 0));
+    if !summary.rows.iter().any(judged) {
+        return None;
+    }
+    let mut section = Section::new("Integrity");
+    section.say(said(run));
+    section.add(Block::Table(table(run, summary)));
+    section.blocks.extend(stanford(run, summary).map(Block::Figure));
+    Some(section)
+}
+
+/// What a level promises.
+fn said(run: &Run) -> Text {
+    let risks = distinct(run.trials.iter().filter_map(risk).map(|risk| format!("{risk:e}").replace('-', "−")));
+    let risk = match &risks[..] {
+        [risk] => format!("a risk of {risk} a fix"),
+        _ => "the risk that its configuration states".to_owned(),
+    };
+    text![format!(
+        "With every fix comes a protection level p, a radius that the error e of the camera’s position exceeds with no more than {risk}, wrong matches included; where a point cannot be spared there is none. A fix may be used where its level is within the alert limit a of its target. It is available where e ≤ p ≤ a, misleading where p < e ≤ a, hazardously misleading where p ≤ a < e, and not available where a < p, whether its error is within its level or beyond."
+    )]
+}
+
+/// The risk of a trial's levels, as its configuration has it.
+fn risk(trial: &Trial) -> Option<f64> {
+    let table = trial.header.configuration.parse::<toml::Table>().ok()?;
+    table.get("pipeline")?.get("acceptance")?.get("risk")?.as_float()
+}
+
+/// The regions in the order of the table, their keys, and what their columns are called.
+const COLUMNS: [(Region, &str); 6] = [
+    (Region::Available, "Available"),
+    (Region::Misleading, "Misleading"),
+    (Region::Hazardous, "Hazardously misleading"),
+    (Region::Unavailable, "unavailable"),
+    (Region::UnavailableMisleading, "and misleading"),
+    (Region::Unprotected, "no level"),
+];
+
+fn table(run: &Run, summary: &Summary) -> Table {
+    let caption = text![
+        "Integrity: of n attempts, how many gave a fix that is available, that misleads and that misleads hazardously, in % with exact 95 % intervals; and, as counts, fixes whose level exceeds the alert limit, those of them that mislead, and fixes without a level. Attempts that were refused are the rest."
+    ];
+    let mut above = results::blank(summary, 1);
+    above.extend(COLUMNS[..3].iter().map(|(_, name)| Head::over(3, *name)));
+    above.push(Head::over(3, "Not available"));
+    let mut below = results::heads(summary);
+    below.push(Head::numbers("n"));
+    below.extend((0..3).flat_map(|_| ["count", "%", "interval"].map(Head::numbers)));
+    below.extend(COLUMNS[3..].iter().map(|(_, name)| Head::numbers(*name)));
+    let mut table = Table { id: "integrity".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let Some(regions) = row.regions else { continue };
+        let mut line = results::cells(row);
+        line.push(tell::count(trial, "attempted", row.attempted).into());
+        for (place, (region, _)) in COLUMNS.into_iter().enumerate() {
+            let (group, k) = (region.name(), regions[region as usize]);
+            line.push(tell::count(trial, group, k).into());
+            if place < 3 {
+                let decimals = if region == Region::Available { 1 } else { 3 };
+                let of = (k, row.attempted);
+                let [share, low, high] =
+                    ["percent", "low", "high"].map(|what| tell::rate(trial, what, group, of, decimals));
+                line.push(share.into());
+                line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
+            }
+        }
+        table.line(results::breaks(summary, index), line);
+    }
+    table
+}
+
+/// A fix with its error, its level and its limit (m).
+struct Mark<'a> {
+    series: usize,
+    trial: &'a Trial,
+    frame: &'a Frame,
+    row: &'a Attempt,
+    values: [f64; 3],
+}
+
+impl Mark<'_> {
+    fn region(&self) -> Region {
+        let [error, level, limit] = self.values;
+        Region::of(error, Some(level), limit)
+    }
+}
+
+/// The protection level of the position over its error: the diagram of Stanford's integrity monitors, with its regions.
+fn stanford(run: &Run, summary: &Summary) -> Option<Figure> {
+    let mut names = distinct(run.trials.iter().map(|trial| trial.method().join(" + ")));
+    let apart = names.len() <= SERIES;
+    let series = |trial: &Trial| if apart { figures::series(&names, &trial.method().join(" + ")) } else { 0 };
+    let mut marks = Vec::new();
+    for trial in &run.trials {
+        let series = series(trial);
+        for (frame, row) in trial.attempts().filter(|(_, row)| row.outcome == Outcome::Referenced) {
+            let values = [Field::Position, Field::Level, Field::Limit].map(|field| row.get(field).unwrap_or(f64::NAN));
+            if values.iter().all(|value| *value > 0.0) {
+                marks.push(Mark { series, trial, frame, row, values });
+            }
+        }
+    }
+    let n = marks.len();
+    if n == 0 {
+        return None;
+    }
+    if !apart {
+        names = vec!["fixes".to_owned()];
+    }
+    let limits = distinct(marks.iter().map(|mark| mark.values[2].to_string()));
+    // Where targets have limits of their own, errors and levels are shares of them.
+    let one = limits.len() == 1;
+    let drawn_in = |mark: &Mark<'_>| {
+        let [error, level, limit] = mark.values;
+        if one { [error * 1e3, level * 1e3] } else { [error / limit, level / limit] }
+    };
+    let limit = if one { marks[0].values[2] * 1e3 } else { 1.0 };
+    let of = |axis: usize| marks.iter().map(move |mark| drawn_in(mark)[axis]);
+    let least = [0, 1].map(|axis| 0.8 * of(axis).fold(limit / 20.0, f64::min));
+    let most = 1.25 * of(0).chain(of(1)).fold(limit * 6.0, f64::max);
+    let shares = Regions::of(summary);
+    let mut layers = shares.layers(least, most, limit);
+
+    let misleads = |mark: &Mark<'_>| mark.values[0] > mark.values[1];
+    let beyond = marks.iter().filter(|mark| misleads(mark)).count();
+    let every = (n - beyond).div_ceil(MARKS).max(1);
+    let every_beyond = beyond.div_ceil(MARKS).max(1);
+    let heads = [Head::words("series"), Head::numbers("frame"), Head::words("target"), Head::words("region")];
+    let heads = heads.into_iter().chain(["error (mm)", "level (mm)", "alert limit (mm)"].map(Head::numbers));
+    let mut data = Table::new("stanford", text!["Every mark of the diagram of integrity."], heads.collect());
+    let mut points = vec![Vec::new(); names.len()];
+    let mut seen = [0_usize; 2];
+    for mark in &marks {
+        let place = usize::from(misleads(mark));
+        seen[place] += 1;
+        if !(seen[place] - 1).is_multiple_of([every, every_beyond][place]) {
+            continue;
+        }
+        points[mark.series].push(drawn_in(mark));
+        let &Mark { trial, frame, row, .. } = mark;
+        let place = (trial.object(row), frame.number, frame.stamp_ns);
+        let told = |field| tell::value(trial, place, field, row.get(field), (Unit::Millimetres, 3)).into();
+        let mut line: Vec<Cell> = vec![
+            names[mark.series].clone().into(),
+            tell::frame(trial, frame.number, frame.stamp_ns).into(),
+            trial.object(row).to_owned().into(),
+            mark.region().name().into(),
+        ];
+        line.extend([Field::Position, Field::Level, Field::Limit].map(told));
+        data.line(false, line);
+    }
+    layers.extend(points.into_iter().enumerate().map(|(series, points)| Layer::Marks { series, points, radius: 1.3 }));
+    let labels = match one {
+        true => ["error of the position (mm)", "protection level (mm)"],
+        false => ["error of the position / alert limit", "protection level / alert limit"],
+    };
+    let panel = Panel {
+        x: Axis::logarithmic(labels[0]).within([least[0], most]),
+        y: Axis::logarithmic(labels[1]).within([least[1], most]),
+        layers,
+        ..Panel::default()
+    };
+    let entry = |(index, name): (usize, &String)| Entry::mark(name.clone(), index);
+    let legend = if names.len() > 1 { names.iter().enumerate().map(entry).collect() } else { Vec::new() };
+    let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.95, legend };
+    let mut said = text![format!(
+        "Stanford diagram: protection level over error of the camera’s position, with the alert limit {}. ",
+        if one { format!("of {} mm", trimmed(limit)) } else { "of each target as the unit".to_owned() }
+    )];
+    said.extend(shares.said(run));
+    let thinned = match (every, every_beyond) {
+        (1, 1) => "Every fix is a mark. ".to_owned(),
+        (_, 1) => format!("A mark is one fix in {every} of those that keep their level, and every one that does not. "),
+        _ => format!(
+            "A mark is one fix in {every} of those that keep their level, one in {every_beyond} of those that do not. "
+        ),
+    };
+    said.extend(text![thinned]);
+    said.extend(figures::caption("", run));
+    figures::figure("stanford", said, &chart, data)
+}
+
+/// How many fixes of all trials are in each region.
+struct Regions {
+    /// `None` where a log does not say.
+    counts: Option<[usize; Region::ALL.len()]>,
+}
+
+impl Regions {
+    fn of(summary: &Summary) -> Self {
+        let known: Option<Vec<_>> =
+            summary.rows.iter().filter(|row| row.attempted > 0).map(|row| row.regions).collect();
+        let sum =
+            |known: Vec<[usize; 6]>| std::array::from_fn(|region| known.iter().map(|counts| counts[region]).sum());
+        Self { counts: known.map(sum) }
+    }
+
+    /// The share of a region among all fixes with a level, in words.
+    fn share(&self, region: Region) -> String {
+        let Some(counts) = &self.counts else { return String::new() };
+        let all: usize = counts.iter().sum::<usize>() - counts[Region::Unprotected as usize];
+        let share = 100.0 * counts[region as usize] as f64 / all.max(1) as f64;
+        match counts[region as usize] {
+            0 => "0 %".to_owned(),
+            _ if share < 0.05 => "< 0.1 %".to_owned(),
+            _ => format!("{share:.1} %"),
+        }
+    }
+
+    /// The regions, their names and shares, and the lines between them.
+    fn layers(&self, [left, low]: [f64; 2], high: f64, limit: f64) -> Vec<Layer> {
+        let a = limit;
+        // Where the diagonal comes in.
+        let d = left.max(low);
+        let areas: [(usize, Vec<[f64; 2]>); 5] = [
+            (2, vec![[left, d], [d, d], [a, a], [left, a]]),
+            (5, vec![[d, d], [a, a], [a, low], [d, low]]),
+            (1, vec![[a, low], [high, low], [high, a], [a, a]]),
+            (6, vec![[left, a], [a, a], [high, high], [left, high]]),
+            (3, vec![[a, a], [high, a], [high, high]]),
+        ];
+        let mut layers: Vec<Layer> = areas.into_iter().map(|(series, points)| Layer::Area { series, points }).collect();
+        let line = |points: [[f64; 2]; 2], dash| Layer::Rule { points: points.into(), dash };
+        layers.extend([
+            line([[d, d], [high, high]], 0),
+            line([[left, a], [high, a]], 1),
+            line([[a, low], [a, high]], 1),
+        ]);
+        let word = |at: [f64; 2], end: bool, up: bool, name: &str, region: Region| Layer::Words {
+            at,
+            end,
+            up,
+            lines: [name.to_owned(), self.share(region)].into_iter().filter(|line| !line.is_empty()).collect(),
+        };
+        layers.extend([
+            word([left, high], false, false, "not available", Region::Unavailable),
+            word([left, a], false, false, "available", Region::Available),
+            word([a, low], true, true, "misleading", Region::Misleading),
+            word([high, low], true, true, "hazardous", Region::Hazardous),
+            word([high, a], true, true, "misleading", Region::UnavailableMisleading),
+        ]);
+        layers
+    }
+
+    /// The counts in words, with their keys.
+    fn said(&self, run: &Run) -> Text {
+        let Some(counts) = &self.counts else { return Text::new() };
+        let trials: Vec<&Trial> = run.trials.iter().collect();
+        let told = |region: Region| {
+            let key = tell::over(&trials, "/metrics/evaluation", format!("count {}", region.name()));
+            Number::count(counts[region as usize], key)
+        };
+        text![
+            "Of all fixes with a level ",
+            told(Region::Available),
+            " are available, ",
+            told(Region::Misleading),
+            " misleading, ",
+            told(Region::Hazardous),
+            " hazardously misleading; the level of ",
+            told(Region::Unavailable),
+            " exceeds the limit, and that of ",
+            told(Region::UnavailableMisleading),
+            " is beyond the limit and below the error. ",
+            told(Region::Unprotected),
+            " fixes have no level. The shares in the drawing are of the fixes with one. "
+        ]
+    }
+}
