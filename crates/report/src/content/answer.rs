@@ -1,12 +1,12 @@
 //! The answer to the question of an experiment: what was found along its axes, one sentence a quantity or a series.
 
 use super::{
-    figures, navigation, significance,
+    figures, inspection, navigation, objects, significance,
     tell::{self, Unit},
 };
 use crate::{
     Field, Number, Row, Spread, Summary,
-    document::{Text, text},
+    document::{Span, Text, text},
     format,
     paired::Comparison,
     run::{Run, Trial},
@@ -20,7 +20,10 @@ const DIFFERENCES: usize = 3;
 /// The sentences.
 pub(super) fn sentences(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Vec<Text> {
     let labels = Labels::of(summary);
-    let mut said = navigation::sentences(run, &|index| labels.of_trial(&summary.rows[index]));
+    let name = |index: usize| labels.of_trial(&summary.rows[index]);
+    let mut said = navigation::sentences(run, &name);
+    said.extend(inspection::sentences(run, &name));
+    said.extend(objects::sentences(run, &name));
     if !said.is_empty() {
         said.extend(wrong(run, summary, &labels));
         return said;
@@ -31,6 +34,7 @@ pub(super) fn sentences(run: &Run, summary: &Summary, comparisons: &[Comparison]
         false if labels.told_singly(summary) => one_by_one(run, summary, &labels),
         false => by_series(run, summary, &labels),
     };
+    said.extend(objects::company(run, &name));
     said.extend(wrong(run, summary, &labels));
     said.extend(significance::sentences(run, comparisons, DIFFERENCES));
     said
@@ -132,7 +136,8 @@ fn one_by_one(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
         (share.value.is_some()).then(|| text![labels.of_trial(row), ": ", share, " % of ", n])
     });
     let mut said = vec![list("Found of the attempts", found)];
-    for (name, field, of) in METRICS {
+    let m1: Metric = ("residual of the identified points (m1)", Field::M1, |row| row.m1);
+    for (name, field, of) in METRICS.into_iter().chain([m1]) {
         let digits = tell::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
         let medians = order.iter().map(|&index| {
             let (row, spread) = (&summary.rows[index], of(&summary.rows[index])?);
@@ -183,6 +188,7 @@ fn by_series(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
                 pooled("wrong", total(|row| row.wrong)),
                 " wrong"
             ];
+            said.extend(nowhere(summary, labels, &members).map(Span::from));
             for metric in METRICS {
                 said.extend(course(run, summary, labels, &members, metric));
             }
@@ -190,6 +196,15 @@ fn by_series(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
             said
         })
         .collect()
+}
+
+/// `, none at 4.5 and 5.5`: where along the condition a series that finds something finds nothing.
+fn nowhere(summary: &Summary, labels: &Labels, members: &[usize]) -> Option<String> {
+    let key = labels.along.as_ref()?;
+    let found = |index: &usize| summary.rows[*index].found > 0;
+    let places: Vec<String> =
+        members.iter().filter(|index| !found(index)).map(|&index| labels.place(&summary.rows[index], key)).collect();
+    (members.iter().any(found) && !places.is_empty()).then(|| format!(", none at {}", places.join(" and ")))
 }
 
 /// `; the median error … goes from a mm at 2 to b mm at 5`, or between the least and the greatest.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     Key, Number, Summary,
-    document::{Block, Head, Section, Table, text},
+    document::{Block, Head, Section, Table, Text, text},
     looked::Looked,
     run::{Inspected, Run, Trial},
 };
@@ -57,6 +57,39 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
         }
     }
     Some(Section::new("Inspection").with([Block::Table(table)]))
+}
+
+/// A sentence a trial that goes to the points of interest: the point it knew best and the one it knew least; `name` says
+/// what the trial at a place is called.
+pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
+    let inspects = |trial: &Trial| trial.header.configuration.contains("kind = \"inspection\"");
+    let trials = run.trials.iter().enumerate().filter(|(_, trial)| inspects(trial));
+    let sentence = |(index, trial): (usize, &Trial)| {
+        let errors = |point: &str| -> Vec<f64> {
+            let own = views(trial).filter(|seen| trial.inspected(seen) == point);
+            own.filter_map(|seen| seen.get(Looked::Error)).collect()
+        };
+        let points = distinct(views(trial).map(|point| trial.inspected(point).to_owned()));
+        let median = |point: &String| {
+            let mut errors = errors(point);
+            (!errors.is_empty()).then(|| seafix_evaluation::quantile(&mut errors, 0.5))
+        };
+        let mut known: Vec<(f64, &String)> = points.iter().filter_map(|point| Some((median(point)?, point))).collect();
+        known.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
+        let told = |point: &str| {
+            let of = |statistic| number(trial, point, statistic, Looked::Error, errors(point), (Unit::Millimetres, 1));
+            let views = number(trial, point, "sampled", Looked::Error, errors(point), (Unit::Plain, 0));
+            text![of("median"), " mm (median; ", of("q95"), " mm in 95 % of ", views, " views)"]
+        };
+        let [(_, best), .., (_, worst)] = known[..] else { return None };
+        let mut said = text![format!("{}: of the points of interest {best} was known to ", name(index))];
+        said.extend(told(best));
+        said.push(format!(", {worst} to ").into());
+        said.extend(told(worst));
+        said.push(".".into());
+        Some(said)
+    };
+    trials.filter_map(sentence).collect()
 }
 
 /// Each point of interest in view of each frame.

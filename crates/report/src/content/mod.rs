@@ -11,6 +11,7 @@ mod integrity;
 mod limits;
 mod method;
 mod navigation;
+mod objects;
 mod protocol;
 mod reproduce;
 mod results;
@@ -46,6 +47,7 @@ pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Docu
             Some(protocol::section(run, &comparisons)),
             Some(results::section(run, summary, &comparisons)),
             integrity::section(run, summary),
+            objects::section(run, summary),
             navigation::section(run, summary),
             inspection::section(run, summary),
             significance::section(run, &comparisons),

@@ -50,7 +50,7 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
     Some(Section::new("Navigation").with([Block::Table(table)]).with(figure))
 }
 
-/// A sentence a trial that navigates; `name` says what the trial at a place is called.
+/// A sentence a trial that navigates; `name` says what the trial at a place is called. That it is one dive is said once.
 pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let sails = |trial: &Trial| trial.sample().any(|frame| frame.sailed.is_some());
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial));
@@ -71,12 +71,20 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
             count(trial, Counted::Referenced),
             " of ",
             count(trial, Counted::Tried),
-            " frames where one was due; the first fix, carried on by odometry alone, ends ",
+            " frames where one was due; the first fix, carried on by odometry alone, errs by ",
+            metres("rms", Sailed::AlonePosition),
+            " mm (RMS) and ends ",
             metres("last", Sailed::AlonePosition),
-            " mm off."
+            " mm off; the mean NEES is ",
+            statistic(trial, "mean", Sailed::Nees, Unit::Plain),
+            " (6 for an honest covariance)."
         ]
     };
-    trials.map(sentence).collect()
+    let mut said: Vec<Text> = trials.map(sentence).collect();
+    if said.len() > 1 {
+        said.push(text!["Each of these is one dive: how much another would differ is not in these numbers."]);
+    }
+    said
 }
 
 fn count(trial: &Trial, counted: Counted) -> Number {

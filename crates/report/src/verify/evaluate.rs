@@ -62,6 +62,9 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     if let Some((quantity, point)) = rest.split_once(" at the point ") {
         return Some(inspected(first, quantity, point, span, log)?.map(|value| value * scale));
     }
+    if let Some((of, object)) = rest.split_once(" on the object ") {
+        return Some(on_object(first, of, object, span, log)?.map(|value| value * scale));
+    }
     if let Some((_, over)) = rest.split_once(" over ") {
         return compared(first, over, logs, span);
     }
@@ -86,6 +89,12 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         ("count", group) if Counted::ALL.iter().any(|counted| counted.name() == group) => {
             let counted = Counted::ALL.into_iter().find(|counted| counted.name() == group)?;
             Some(log.sample(span).filter_map(|f| f.navigation.as_deref()).filter(|n| counted.holds(n)).count() as f64)
+        }
+        ("count", group) if group.ends_with(" targets") => {
+            let (which, size) = group.strip_suffix(" targets")?.split_once(" with ")?;
+            let size: usize = size.parse().ok()?;
+            let own = logs.iter().flat_map(|log| log.sample(span)).filter(|frame| frame.rows.len() == size);
+            Some(own.filter(|frame| which == "frames" || frame.rows.iter().any(|row| found(&row.0))).count() as f64)
         }
         ("count", group) => Some(pooled(logs, group, span)? as f64),
         ("percent" | "low" | "high", group) => share(first, group, scale, span, logs)?,
@@ -141,6 +150,22 @@ fn inspected(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log)
     }
     let quantity = Looked::named(quantity)?;
     statistic(name, own.filter_map(|seen| quantity.of(seen)).collect())
+}
+
+/// `count GROUP on the object NAME`, `NAME FIELD of found on the object NAME`.
+fn on_object(name: &str, of: &str, object: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let own = || rows(log, span).filter(|row| row.0.object == object);
+    let is: fn(&TargetRecord) -> bool = match of {
+        "attempted" => |_| true,
+        "refused" => |row| row.outcome != Outcome::Referenced,
+        "wrong" => |row| row.outcome == Outcome::Referenced && !found(row),
+        _ => found,
+    };
+    if name == "count" {
+        return Some(Some(own().filter(|row| is(&row.0)).count() as f64));
+    }
+    let field = Field::named(of.strip_suffix(" of found")?)?;
+    statistic(name, own().filter(|row| found(&row.0)).filter_map(|row| value(row, field)).collect())
 }
 
 fn value(row: Row<'_>, field: Field) -> Option<f64> {

@@ -1,0 +1,127 @@
+//! What came of each object, where several were looked for.
+
+use super::{distinct, results, tell::Unit};
+use crate::{
+    Field, Key, Number, Summary,
+    document::{Block, Head, Section, Table, Text, text},
+    run::{Attempt, Run, Trial},
+};
+
+/// The topic that counts stand on.
+const TOPIC: &str = "/metrics/evaluation";
+
+/// An outcome that is counted.
+type Group = (&'static str, fn(&Attempt) -> bool);
+
+const GROUPS: [Group; 4] = [
+    ("attempted", |_| true),
+    ("found", Attempt::found),
+    ("refused", |row| !row.found() && !row.wrong()),
+    ("wrong", Attempt::wrong),
+];
+
+/// The errors that are told, and what they are called in a head.
+const ERRORS: [(&str, Field); 2] = [("m2 (mm)", Field::M2), ("m3 (mm)", Field::Position)];
+
+/// The section, where any trial looked for several objects and logged all its frames.
+pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+    if !run.trials.iter().any(|trial| objects(trial).len() > 1) {
+        return None;
+    }
+    let caption =
+        text!["The attempts on each object: how many there were and what came of them; medians of the fixes found."];
+    let mut above = results::blank(summary, 5);
+    above.extend(ERRORS.map(|(head, _)| Head::over(2, head)));
+    let mut below = results::heads(summary);
+    below.push(Head::words("object"));
+    below.extend(GROUPS.map(|(name, _)| Head::numbers(name)));
+    below.extend(ERRORS.iter().flat_map(|_| ["median", "p95"]).map(Head::numbers));
+    let mut table = Table { id: "objects".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        for (place, object) in objects(trial).iter().enumerate() {
+            let mut line = results::cells(row);
+            line.push(object.clone().into());
+            line.extend(GROUPS.map(|group| count(trial, object, group).into()));
+            for (_, field) in ERRORS {
+                line.extend(["median", "q95"].map(|name| error(trial, object, name, field).into()));
+            }
+            table.line(place == 0 && results::breaks(summary, index), line);
+        }
+    }
+    Some(Section::new("Objects").with([Block::Table(table)]))
+}
+
+/// A sentence a trial with each object's own rate and error, where the objects themselves are what is varied: whether one
+/// that stands elsewhere misleads the others; `name` says what the trial at a place is called.
+pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
+    let changes = |trial: &Trial| trial.header.axes.iter().any(|axis| axis.key.starts_with("source.changes"));
+    let trials = run.trials.iter().enumerate().filter(|(_, trial)| changes(trial) && objects(trial).len() > 1);
+    let sentence = |(index, trial): (usize, &Trial)| {
+        let mut said = text![format!("{}, object by object — ", name(index))];
+        for (place, object) in objects(trial).iter().enumerate() {
+            let [attempted, found, _, _] = GROUPS.map(|group| count(trial, object, group));
+            let median = error(trial, object, "median", Field::Position);
+            said.extend(text![format!("{}{object}: ", if place > 0 { "; " } else { "" }), found, " of ", attempted]);
+            if median.value.is_some() {
+                said.extend(text![" found, median m3 ", median, " mm"]);
+            }
+        }
+        said.push(".".into());
+        said
+    };
+    trials.map(sentence).collect()
+}
+
+/// How many frames have a fix, by how many targets are in view of the prior, where any frame has several; `name` says
+/// what the trial at a place is called.
+pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
+    let sizes = |trial: &Trial| -> Vec<usize> {
+        let mut sizes: Vec<usize> = trial.sample().map(|frame| trial.attempts_of(frame).count()).collect();
+        sizes.sort_unstable();
+        sizes.dedup();
+        sizes.into_iter().filter(|size| *size > 0).collect()
+    };
+    if !run.trials.iter().any(|trial| sizes(trial).into_iter().any(|size| size > 1)) {
+        return None;
+    }
+    let mut said = text!["Frames with a fix, by how many targets are in view — "];
+    for (index, trial) in run.trials.iter().enumerate() {
+        said.push(format!("{}{}: ", if index > 0 { "; " } else { "" }, name(index)).into());
+        for (place, size) in sizes(trial).into_iter().enumerate() {
+            let own = || trial.sample().filter(|frame| trial.attempts_of(frame).count() == size);
+            let fixed = own().filter(|frame| trial.attempts_of(frame).any(Attempt::found)).count();
+            let key = |which: &str| Key::of(trial, TOPIC, format!("count {which} with {size} targets"));
+            let (fixed, all) = (Number::count(fixed, key("fixed-frames")), Number::count(own().count(), key("frames")));
+            said.extend(text![if place > 0 { ", " } else { "" }, fixed, " of ", all, format!(" with {size}")]);
+        }
+    }
+    said.push(".".into());
+    Some(said)
+}
+
+/// The objects that were looked for, in the order of their names; none where not all frames are logged.
+fn objects(trial: &Trial) -> Vec<String> {
+    if trial.every() > 1 {
+        return Vec::new();
+    }
+    let mut names = distinct(trial.attempts().map(|(_, row)| trial.object(row).to_owned()));
+    names.sort();
+    names
+}
+
+fn own<'a>(trial: &'a Trial, object: &'a str) -> impl Iterator<Item = &'a Attempt> {
+    trial.attempts().map(|(_, row)| row).filter(move |row| trial.object(row) == object)
+}
+
+fn count(trial: &Trial, object: &str, (name, is): Group) -> Number {
+    let key = Key::of(trial, TOPIC, format!("count {name} on the object {object}"));
+    Number::count(own(trial, object).filter(|row| is(row)).count(), key)
+}
+
+fn error(trial: &Trial, object: &str, name: &str, field: Field) -> Number {
+    let mut values: Vec<f64> = own(trial, object).filter(|row| row.found()).filter_map(|row| row.get(field)).collect();
+    let share = if name == "median" { 0.5 } else { 0.95 };
+    let value = (!values.is_empty()).then(|| seafix_evaluation::quantile(&mut values, share));
+    let what = format!("{name} {} of found on the object {object} in mm", field.name());
+    Number::new(value.map(|value| value * Unit::Millimetres.scale()), 1, Key::of(trial, field.topic(), what))
+}
