@@ -1,14 +1,15 @@
 //! A vehicle that goes from object to object: true poses, odometry and fixes with errors as stated.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
-use seafix_geometry::{Camera, Covariance6, Object, Transform, World, so3};
-use seafix_navigation::{Local, Navigated, Place, Standing};
+use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, UncertainPoint, World, so3};
+use seafix_navigation::{Considered, Local, Navigated, Place, Standing};
+use seafix_referencing::{Mahalanobis, Observation, Observations, Solver};
 use seafix_simulation::{Purpose, Stream};
 
 /// What a voyage is made of.
 #[derive(Debug, Clone)]
 pub struct Voyage {
-    /// Objects, each 10 m from the one before.
+    /// Objects along the way, each 10 m from the one before, up to 3 m aside.
     pub objects: usize,
     /// Standard deviations of a step of odometry: attitude (rad) and position (m), an axis.
     pub odometry: (f64, f64),
@@ -22,6 +23,10 @@ pub struct Voyage {
     pub step: f64,
     /// Standard deviation of the change of heading in a step (rad); 0 goes straight on.
     pub meander: f64,
+    /// Standard deviation of the points of each object's model (m), where they are looked at.
+    pub model: f64,
+    /// The same of a point measured by the cameras, an axis.
+    pub measured: f64,
 }
 
 impl Default for Voyage {
@@ -34,6 +39,8 @@ impl Default for Voyage {
             shared: 0.0,
             step: 0.3,
             meander: 0.02,
+            model: 5e-3,
+            measured: 5e-3,
         }
     }
 }
@@ -52,7 +59,16 @@ pub struct Sailing<'a> {
     heading: f64,
     /// Of each object, what all its fixes err by.
     common: Vec<Vector6<f64>>,
+    /// Of each object the points: where they are, and where its model has them.
+    points: Vec<Vec<[Point<Object>; 2]>>,
+    /// Whether it goes backwards.
+    back: bool,
 }
+
+/// Points of an object, within a metre of its origin.
+const POINTS: usize = 10;
+/// The tangent of the angle from the optical axis within which a point is in view.
+const VIEW: f64 = 1.5;
 
 impl Voyage {
     /// The voyage number `number`.
@@ -60,10 +76,17 @@ impl Voyage {
         let mut stream = Stream::new(1, number, 0, Purpose::Points);
         let mut apart = Stream::new(1, number, 1, Purpose::Points);
         let common = (0..self.objects).map(|_| normal6(&mut apart, self.fix) * self.shared.sqrt()).collect();
+        let mut built = Stream::new(1, number, 2, Purpose::Points);
+        let mut point = || {
+            let at = Vector3::from_fn(|_, _| built.between(-1.0, 1.0));
+            [at, at + built.normal3(self.model)].map(Point::from)
+        };
+        let points = (0..self.objects).map(|_| (0..POINTS).map(|_| point()).collect()).collect();
+        let down = so3::exp(&Vector3::new(0.0, 0.0, 0.3));
         let (mut world_from_object, mut surveyed) = (Vec::new(), Vec::new());
         for i in 0..self.objects {
             let turn = so3::exp(&(Vector3::new(0.0, 0.0, stream.between(-3.0, 3.0))));
-            let at = Vector3::new(10.0 * i as f64, stream.between(-3.0, 3.0), 40.0);
+            let at = down * Vector3::new(10.0 * i as f64, stream.between(-3.0, 3.0), 40.0);
             let truth = Transform::<World, Object>::new(turn, at);
             let covariance = Covariance6::isotropic(self.survey.0, self.survey.1);
             // T_true = T_survey Exp(ω).
@@ -71,9 +94,18 @@ impl Voyage {
             surveyed.push(Place { world_from_object: truth * error.inverse(), covariance });
             world_from_object.push(truth);
         }
-        let down = so3::exp(&Vector3::new(0.0, 0.0, 0.3));
         let world_from_camera = Transform::new(down, Vector3::new(0.0, 0.0, 37.0));
-        Sailing { settings: self, stream, world_from_object, surveyed, world_from_camera, heading: 0.0, common }
+        Sailing {
+            settings: self,
+            stream,
+            world_from_object,
+            surveyed,
+            world_from_camera,
+            heading: 0.0,
+            common,
+            points,
+            back: false,
+        }
     }
 }
 
@@ -86,7 +118,8 @@ impl Sailing<'_> {
     /// One step along a meandering way, and what odometry says of it.
     pub fn step(&mut self) -> Local {
         self.heading = 0.9 * self.heading + self.settings.meander * self.stream.normal();
-        let xi = Vector6::new(0.0, 0.0, self.heading, self.settings.step, 0.0, 0.0);
+        let ahead = if self.back { -self.settings.step } else { self.settings.step };
+        let xi = Vector6::new(0.0, 0.0, self.heading, ahead, 0.0, 0.0);
         let motion = Transform::<Camera, Camera>::exp(&xi);
         self.world_from_camera = (self.world_from_camera * motion).renormalized();
         let error = Transform::<Camera, Camera>::exp(&normal6(&mut self.stream, self.settings.odometry));
@@ -102,6 +135,35 @@ impl Sailing<'_> {
         let object_from_camera = self.truth(object) * error.inverse();
         let covariance = Covariance6::isotropic(attitude, position);
         Navigated { object, standing: Standing::new(object_from_camera, covariance) }
+    }
+
+    /// From now on it goes the other way.
+    pub fn turn_about(&mut self) {
+        self.back = !self.back;
+    }
+
+    /// A fix by the points of an object that are in view, as a solver makes it of its model and of what the cameras
+    /// measure; `None` where too few are in view.
+    pub fn look(&mut self, object: usize) -> Option<Navigated> {
+        let camera_from_object = self.truth(object).inverse();
+        let (mut points, mut places) = (Vec::new(), Vec::new());
+        for (index, [true_place, model]) in self.points[object].iter().enumerate() {
+            let at = camera_from_object * *true_place;
+            let noise = self.stream.normal3(self.settings.measured);
+            if at.coords.z > 0.0 && at.coords.xy().amax() < VIEW * at.coords.z {
+                let measured = UncertainPoint::isotropic(at + noise, self.settings.measured);
+                points.push(Observation { measured, pixels: None, model: *model, model_sigma: self.settings.model });
+                places.push(index);
+            }
+        }
+        if points.len() < 4 {
+            return None;
+        }
+        let (data, solver) = (Observations { points, rig: None }, Mahalanobis::default());
+        let pose = solver.solve(&data).ok()?;
+        let errors = places.into_iter().zip(solver.model_errors(&data, &pose).ok()?);
+        let standing = Standing::new(pose, solver.covariance(&data, &pose).ok()?);
+        Some(Navigated { object, standing: standing.considering(Considered::of_model(object, errors)) })
     }
 
     /// A fix that is wrong by a turn of up to half a turn and a shift of up to `reach` (m).

@@ -146,7 +146,10 @@ impl<'a> Explorer<'a> {
         taken: &[Navigated],
         events: &mut Vec<String>,
     ) {
-        let ours = |navigated: &Navigated| Navigated { object: self.objects[navigated.object], ..*navigated };
+        let ours = |navigated: &Navigated| Navigated {
+            object: self.objects[navigated.object],
+            standing: navigated.standing.clone(),
+        };
         let here = Here {
             stamp_ns: sight.stamp_ns,
             navigated: navigator.pose().map(ours),

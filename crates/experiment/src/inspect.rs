@@ -33,7 +33,7 @@ pub(crate) fn inspected(
             if rig.sees(&at, 0.0).is_none() {
                 continue;
             }
-            let standing = *known.get_or_insert_with(|| standing(o, site, kind, sighting, underway));
+            let standing = known.get_or_insert_with(|| standing(o, site, kind, sighting, underway)).as_ref();
             let believed = standing.map(|standing| standing.object_from_camera.inverse() * interest.at);
             let nees = believed.zip(standing).and_then(|(believed, standing)| {
                 let error = believed - at;
@@ -68,7 +68,7 @@ fn standing(
     // The object whose frame a target's pose is in.
     let own = |target: usize| if kind == TargetKind::Site { site.frame } else { target };
     let known = match underway {
-        Some(underway) => underway.pose.map(|pose| Navigated { object: own(pose.object), ..pose })?,
+        Some(underway) => underway.pose.clone().map(|pose| Navigated { object: own(pose.object), ..pose })?,
         None => {
             let fixes = sighting.attempts.iter().filter_map(|attempt| match &attempt.answer.outcome {
                 Outcome::Referenced(fix) => Some(Navigated {
@@ -78,7 +78,7 @@ fn standing(
                 _ => None,
             });
             let fixes: Vec<Navigated> = fixes.collect();
-            *fixes.iter().find(|fix| fix.object == object).or(fixes.first())?
+            fixes.iter().find(|fix| fix.object == object).or(fixes.first())?.clone()
         }
     };
     if known.object == object {

@@ -7,8 +7,8 @@ use seafix_component::Choice;
 use seafix_geometry::{Covariance6, Object, StereoRig};
 use seafix_log::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 use seafix_navigation::{
-    Event, FUSIONS, Fusion, Navigated, Navigator, Network, ODOMETRIES, Odometry, Outcome as Followed, POLICIES, Place,
-    Policy, Reckoning, Standing, State, StereoPair,
+    Considered, Event, FUSIONS, Fusion, Navigated, Navigator, Network, ODOMETRIES, Odometry, Outcome as Followed,
+    POLICIES, Place, Policy, Reckoning, Standing, State, StereoPair,
 };
 use seafix_referencing::{Outcome, Prior, PriorBound, Target};
 use seafix_vision::Threads;
@@ -213,13 +213,13 @@ impl<'a> Voyage<'a> {
             explorer.visit(sight, &pair, &mut self.navigator, &taken, &mut events);
         }
         self.tell(&mut events);
-        let pose = self.navigator.pose().filter(|_| here).copied();
-        let unreferenced = self.unreferenced.filter(|_| here);
+        let pose = self.navigator.pose().filter(|_| here).cloned();
+        let unreferenced = self.unreferenced.clone().filter(|_| here);
         let record = NavigationRecord {
             state: (if here { self.navigator.state() } else { State::Rough }).to_string(),
             due,
-            pose: pose.map(|pose| self.record(&pose)),
-            unreferenced: unreferenced.map(|pose| self.record(&pose)),
+            pose: pose.as_ref().map(|pose| self.record(pose)),
+            unreferenced: unreferenced.as_ref().map(|pose| self.record(pose)),
             odometry,
             events,
             errors: NavigationErrors::default(),
@@ -247,7 +247,7 @@ impl<'a> Voyage<'a> {
         let motion = self.motions.passed(self.faults, time, found);
         self.navigator.advance(seconds, motion.as_ref());
         self.explorer.iter_mut().for_each(|explorer| explorer.advance(seconds, motion.as_ref()));
-        self.unreferenced = self.unreferenced.zip(motion).map(|(pose, motion)| pose.after(&motion));
+        self.unreferenced = self.unreferenced.take().zip(motion).map(|(pose, motion)| pose.after(&motion));
         let Some(motion) = motion else {
             let why = if found.is_some() { "it failed" } else { "a new segment begins" };
             return OdometryStep { lost: format!("{why}: the way here is unknown"), motion: None };
@@ -279,12 +279,21 @@ impl<'a> Voyage<'a> {
         let mut taken = Vec::new();
         for attempt in &sighting.attempts {
             let Outcome::Referenced(fix) = &attempt.answer.outcome else { continue };
-            let standing = Standing::new(fix.object_from_camera, fix.covariance);
+            let target = &self.targets[attempt.target];
+            let name = &target.name;
+            let shares = match self.stages.model_errors(fix, target, &sighting.cloud, self.rig) {
+                Ok(shares) => shares,
+                Err(why) => {
+                    events.push(format!("fix at {name} not used, what it owes to the model is unknown: {why}"));
+                    continue;
+                }
+            };
+            let standing = Standing::new(fix.object_from_camera, fix.covariance)
+                .considering(Considered::of_model(attempt.target, shares));
             let fix = Navigated { object: attempt.target, standing };
-            let name = &self.targets[attempt.target].name;
             let event = self.navigator.fix(&fix);
             if matches!(event, Event::Taken | Event::Left | Event::Relocated) {
-                taken.push(fix);
+                taken.push(fix.clone());
             }
             match event {
                 Event::Taken => events.push(format!("fix at {name} taken")),

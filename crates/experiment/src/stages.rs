@@ -5,9 +5,11 @@ use std::time::Instant;
 use rand::Rng;
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
+use seafix_navigation::Share;
 use seafix_referencing::{
-    Candidates, Correspondence, Gathered, ModelPoint, Outcome, Prior, PriorBound, Problem, Search, Solver, Target,
-    Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem, until_found,
+    Candidates, Correspondence, Degenerate, Gathered, ModelPoint, Observations, Outcome, Prior, PriorBound, Problem,
+    Reference, Search, Solver, Target, Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem,
+    until_found,
 };
 use seafix_vision::{FrontEnd, Keypoint, Look};
 
@@ -156,6 +158,19 @@ impl Stages {
                 *attempt = other;
             }
         }
+    }
+
+    /// What a fix owes to the errors of its model: for each point that it rests on, by its place in the model.
+    pub(crate) fn model_errors(
+        &self,
+        fix: &Reference,
+        target: &Target,
+        cloud: &[MeasuredPoint],
+        rig: &StereoRig,
+    ) -> Result<Vec<(usize, Share)>, Degenerate> {
+        let data = Observations::of(&fix.pairs, &target.points, cloud, Some(rig));
+        let shares = self.solver.model_errors(&data, &fix.object_from_camera)?;
+        Ok(fix.pairs.iter().map(|pair| pair.model).zip(shares).collect())
     }
 
     /// Whether enough of `target` should be in view for a fix, by what is known of the pose; without that it may be.

@@ -2,10 +2,10 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 
-use crate::{Lasting, Local, lasting::Shares};
+use crate::{Considered, Lasting, Local, lasting::Shares};
 
 /// Where the camera is relative to an object, and how well that is known.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
     /// The pose.
     pub object_from_camera: Transform<Object, Camera>,
@@ -13,6 +13,8 @@ pub struct Standing {
     pub covariance: Covariance6<Object, Camera>,
     /// What its error shares with errors of the odometry that last.
     pub(crate) shares: Shares,
+    /// What its error shares with those of models and surveys.
+    pub(crate) considered: Considered,
 }
 
 /// Eq. (2), the way by the world: `object_from_camera = object_from_world · world_from_camera`. What the survey errs by
@@ -25,9 +27,16 @@ pub fn by_world(
 }
 
 impl Standing {
-    /// A pose that errs independently of the odometry, such as a fix.
+    /// A pose that errs independently of all others.
     pub fn new(object_from_camera: Transform<Object, Camera>, covariance: Covariance6<Object, Camera>) -> Self {
-        Self { object_from_camera, covariance, shares: Shares::zeros() }
+        let considered = Considered::default();
+        Self { object_from_camera, covariance, shares: Shares::zeros(), considered }
+    }
+
+    /// The same, part of its covariance being due to errors that other fixes have too.
+    #[must_use]
+    pub fn considering(self, considered: Considered) -> Self {
+        Self { considered, ..self }
     }
 
     /// Eq. (6), one step of dead reckoning: `object_from_later = object_from_earlier · earlier_from_later`. (As printed
@@ -50,13 +59,14 @@ impl Standing {
             object_from_camera: (self.object_from_camera * step.motion).renormalized(),
             covariance: Covariance6::new(covariance),
             shares,
+            considered: self.considered.carried(&adjoint),
         }
     }
 
     /// The same over many steps, in their order; without a step it is the same to the last bit.
     #[must_use]
     pub fn after_all<'a>(&self, steps: impl IntoIterator<Item = &'a Local>) -> Self {
-        steps.into_iter().fold(*self, |here, step| here.after(step))
+        steps.into_iter().fold(self.clone(), |here, step| here.after(step))
     }
 }
 

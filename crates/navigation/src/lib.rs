@@ -6,6 +6,7 @@
 //! from fix to fix and from object to object. This crate knows no truth.
 
 mod chain;
+mod considered;
 mod dvl_gyro;
 mod fusion;
 mod icp;
@@ -20,6 +21,7 @@ mod reading;
 mod stereo;
 
 pub use chain::{Standing, by_world};
+pub use considered::{Considered, Share};
 pub use dvl_gyro::DvlGyro;
 pub use fusion::{Contradiction, FUSIONS, Fuse, Fusion, Intersect, Replace};
 pub use icp::{Distance, Icp};

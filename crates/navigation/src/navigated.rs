@@ -2,13 +2,13 @@
 
 use seafix_geometry::{Covariance6, Object, Transform, World};
 
-use crate::{Local, Standing, by_world};
+use crate::{Considered, Local, Standing, by_world};
 
 /// The camera's pose relative to one object of the site.
 ///
 /// A vehicle works at an object, so its pose relative to *that* object counts: the survey, which is
 /// far worse than a fix, enters only when the pose passes from one object to another.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Navigated {
     /// The object, as its place in the site.
     pub object: usize,
@@ -29,27 +29,36 @@ impl Navigated {
     /// The pose after the motion `step`, Eq. (6).
     #[must_use]
     pub fn after(&self, step: &Local) -> Self {
-        Self { standing: self.standing.after(step), ..*self }
+        Self { standing: self.standing.after(step), object: self.object }
     }
 
     /// The same camera relative to `other`, by the world: Eq. (2).
     ///
     /// object_m_from_camera = W_m⁻¹ W_r T. With W_true = W Exp(ω) it errs by
-    /// ξ + Ad(T⁻¹) ω_r − Ad(T_m⁻¹) ω_m; the survey of the object it stays with does not matter.
+    /// ξ + Ad(T⁻¹) ω_r − Ad(T_m⁻¹) ω_m; the survey of the object it stays with does not matter. Both ω are
+    /// [considered](Considered): what one passage took up the way back gives away again.
     #[must_use]
     pub fn passed_to(&self, other: usize, places: &[Place]) -> Self {
         if other == self.object {
-            return *self;
+            return self.clone();
         }
         let (from, to) = (&places[self.object], &places[other]);
         let here = self.standing.object_from_camera;
         let pose = by_world(&to.world_from_object, &(from.world_from_object * here));
         let (near, far) = (here.inverse().adjoint(), pose.inverse().adjoint());
-        let survey = near * from.covariance.matrix * near.transpose() + far * to.covariance.matrix * far.transpose();
-        let covariance = Covariance6::new(self.standing.covariance.matrix + survey);
-        Self {
-            object: other,
-            standing: Standing { object_from_camera: pose.renormalized(), covariance, shares: self.standing.shares },
-        }
+        let surveys = Considered::of_survey(self.object, &near, &from.covariance.matrix).plus(&Considered::of_survey(
+            other,
+            &-far,
+            &to.covariance.matrix,
+        ));
+        let common = self.standing.considered.common(&surveys);
+        let covariance = self.standing.covariance.matrix + surveys.common(&surveys) + common + common.transpose();
+        let standing = Standing {
+            object_from_camera: pose.renormalized(),
+            covariance: Covariance6::new(covariance),
+            considered: self.standing.considered.clone().plus(&surveys),
+            ..self.standing.clone()
+        };
+        Self { object: other, standing }
     }
 }

@@ -77,7 +77,7 @@ pub struct Change {
 const VOTES: usize = 3;
 
 /// Fixes of one object that were doubted, the latest carried along by odometry.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Doubt {
     latest: Navigated,
     votes: usize,
@@ -175,7 +175,7 @@ impl<'a> Navigator<'a> {
 
     /// Whether a fix should be tried now; `in_view` says whether an object should be seen.
     pub fn due(&mut self, in_view: bool) -> bool {
-        let sigma = self.known.map_or(f64::INFINITY, |known| {
+        let sigma = self.known.as_ref().map_or(f64::INFINITY, |known| {
             let position = known.standing.covariance.matrix.fixed_view::<3, 3>(3, 3).into_owned();
             position.symmetric_eigenvalues().max().max(0.0).sqrt()
         });
@@ -190,8 +190,8 @@ impl<'a> Navigator<'a> {
     /// A fix of one of the objects at this instant.
     pub fn fix(&mut self, fix: &Navigated) -> Event {
         let object = fix.object;
-        let Some(known) = self.known else {
-            self.take(*fix, format!("first fix, at {}", self.names[object]));
+        let Some(known) = self.known.clone() else {
+            self.take(fix.clone(), format!("first fix, at {}", self.names[object]));
             return Event::Taken;
         };
         match self.fusion.take(&known.passed_to(object, &self.places).standing, &fix.standing) {
@@ -214,13 +214,13 @@ impl<'a> Navigator<'a> {
     /// A pose at this instant that rests on more than the fixes in a row: a key frame was found again, and the way closed
     /// over the graph. It is taken where it is better known than what there was, and `why` said.
     pub fn settle(&mut self, pose: &Navigated, why: String) -> bool {
-        let better = self.known.is_none_or(|known| {
+        let better = self.known.as_ref().is_none_or(|known| {
             let known = known.passed_to(pose.object, &self.places).standing;
             pose.standing.covariance.position_sigma() < known.covariance.position_sigma()
         });
         if better {
             self.doubts.fill(None);
-            self.take(*pose, why);
+            self.take(pose.clone(), why);
         }
         better
     }
@@ -232,12 +232,12 @@ impl<'a> Navigator<'a> {
             _ => 1,
         };
         if votes < VOTES {
-            self.doubts[object] = Some(Doubt { latest: *fix, votes });
+            self.doubts[object] = Some(Doubt { latest: fix.clone(), votes });
             return Event::Doubted(contradiction);
         }
         if object == known.object {
             let why = format!("{VOTES} fixes at {} agree with each other, not with what was known", self.names[object]);
-            self.take(*fix, why);
+            self.take(fix.clone(), why);
             return Event::Relocated;
         }
         // Which of the two stands elsewhere? The one that no other object confirms.
@@ -253,7 +253,7 @@ impl<'a> Navigator<'a> {
         self.agreed.iter_mut().for_each(|others| others.retain(|&other| other != moved));
         let (shift, turn) = (old_from_new.translation().norm(), so3::angle(&old_from_new.rotation()).to_degrees());
         let name = &self.names[moved];
-        self.take(*fix, format!("{name} stands {shift:.3} m and {turn:.2}° from where it was surveyed"));
+        self.take(fix.clone(), format!("{name} stands {shift:.3} m and {turn:.2}° from where it was surveyed"));
         Event::Displaced(Box::new(Displacement { object: moved, old_from_new, place }))
     }
 

@@ -1,19 +1,21 @@
-//! Fix and odometry, each by its information.
+//! Fix and what was known, each by what is its own.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
     Contradiction, Fusion,
-    join::{gate, joined},
+    join::{considered, gate},
 };
 use crate::Standing;
 
-/// Gates a fix by its innovation, then joins both by their information.
+/// Gates a fix by its innovation, then takes the pose of least covariance between both.
 ///
-/// With r = log(T_known⁻¹ T_fix) the fix says ξ = r + J_r(r)⁻¹ η about the error ξ of what was known. A fix
-/// with rᵀ (Σ_known + Σ_fix)⁻¹ r beyond χ²₆(`confidence`) is rejected; else the error is estimated by
-/// (Σ_known⁻¹ + Σ_fix⁻¹)⁻¹ Σ_fix⁻¹ r, repeated about the new pose.
+/// With F = J_r(r)⁻¹ the innovation is r = log(T_known⁻¹ T_fix) = ξ_known − F ξ_fix. All fixes of an object err by what its
+/// model has wrong, so that the two errors have X = E\[ξ_known (F ξ_fix)ᵀ\] in common: models and surveys are
+/// considered as Schmidt does it ([`Considered`](crate::Considered)). A fix with rᵀ S⁻¹ r beyond χ²₆(`confidence`),
+/// S = Σ_known + F Σ_fix Fᵀ − X − Xᵀ, is rejected; else the gain is (Σ_known − X) S⁻¹. Taken as independent, sixty fixes
+/// would make a pose eight times surer than one, and the model is as wrong as before.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fuse {
@@ -29,10 +31,10 @@ impl Default for Fuse {
 
 impl Component for Fuse {
     const NAME: &'static str = "fuse";
-    const SUMMARY: &'static str = "a fix that agrees is joined with what was known, by their information";
-    const SOURCE: &'static str = "Bar-Shalom, Li, Kirubarajan, Estimation with applications to tracking and \
-                                  navigation, 2001; on SE(3): Barfoot, Furgale, Associating uncertainty with \
-                                  three-dimensional poses, 2014";
+    const SUMMARY: &'static str =
+        "a fix that agrees is joined with what was known; what all fixes of a model have wrong is considered";
+    const SOURCE: &'static str = "Schmidt, Application of state-space methods to navigation problems, 1966; on SE(3): \
+                                  Barfoot, Furgale, Associating uncertainty with three-dimensional poses, 2014";
 
     fn check(&self) -> Result<(), String> {
         in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "between zero and one")
@@ -42,7 +44,7 @@ impl Component for Fuse {
 impl Fusion for Fuse {
     fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
         gate(known, fix, self.confidence)?;
-        Ok(joined(known, fix, [1.0; 2]).unwrap_or(*fix))
+        Ok(considered(known, fix).unwrap_or_else(|| fix.clone()))
     }
 }
 

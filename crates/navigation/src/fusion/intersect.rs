@@ -12,8 +12,8 @@ use crate::Standing;
 
 /// Gates a fix by its innovation, then takes the covariance intersection of both.
 ///
-/// Fixes of one object share the errors of its model, of the calibration and of the light: they are not independent, and a
-/// pose that joins them by their full information soon believes itself far too much. The intersection
+/// Fixes of one object share the errors of its model, of the calibration and of the light. Those of the model `fuse` knows;
+/// for the rest nobody has a number. The intersection
 /// Σ⁻¹ = ω Σ_known⁻¹ + (1 − ω) Σ_fix⁻¹, ω for the least det Σ, is at least as large as the true covariance whatever the
 /// two have in common.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -47,7 +47,7 @@ impl Fusion for Intersect {
         let fix_here = carried_back(&fix.covariance.matrix, &innovation);
         let both = known.covariance.matrix.try_inverse().zip(fix_here.try_inverse());
         let omega = both.map_or(0.0, |(known, fix)| least_determinant(&known, &fix));
-        Ok(joined(known, fix, [omega, 1.0 - omega]).unwrap_or(*fix))
+        Ok(joined(known, fix, [omega, 1.0 - omega]).unwrap_or_else(|| fix.clone()))
     }
 }
 

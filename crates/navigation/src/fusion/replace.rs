@@ -20,7 +20,7 @@ impl Component for Replace {
 
 impl Fusion for Replace {
     fn take(&self, _: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
-        Ok(*fix)
+        Ok(fix.clone())
     }
 
     fn passes(&self, _: &Standing, _: &Standing) -> bool {

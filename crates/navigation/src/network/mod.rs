@@ -45,7 +45,7 @@ pub struct Leg {
 }
 
 /// A fix of an object, taken at a station.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// The station.
     pub station: usize,

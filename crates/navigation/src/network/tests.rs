@@ -196,7 +196,7 @@ fn dive(seed: u64, rig: &StereoRig, settings: &NetworkSettings, earlier: Option<
         .collect();
     let truth = world_from_object.inverse() * way[0];
     let fix = Standing::new(truth.perturbed(&-normal6(&mut rng, FIX.0, FIX.1)), Covariance6::isotropic(FIX.0, FIX.1));
-    let mut known = Navigated { object: 0, standing: fix };
+    let mut known = Navigated { object: 0, standing: fix.clone() };
     let mut alone = fix;
     let (mut laid, mut refound) = (0, 0);
     for (k, world_from_camera) in way.iter().enumerate() {
@@ -211,8 +211,8 @@ fn dive(seed: u64, rig: &StereoRig, settings: &NetworkSettings, earlier: Option<
             alone = alone.after(&step);
         }
         let stamp_ns = 1 + k as u64 * 2_000_000_000;
-        let here = Here { stamp_ns, navigated: Some(known), rough: None };
-        let fixes: &[Navigated] = if k == 0 { &[known] } else { &[] };
+        let here = Here { stamp_ns, navigated: Some(known.clone()), rough: None };
+        let fixes: &[Navigated] = if k == 0 { std::slice::from_ref(&known) } else { &[] };
         let closure = traverse.visit_by(&here, fixes, |_| ground.seen(&mut rng, rig, world_from_camera));
         laid += usize::from(closure.laid.is_some());
         if let Some(Ok(found)) = closure.sought {

@@ -68,7 +68,7 @@ impl NetworkSettings {
 }
 
 /// What is known of the camera at an instant.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Here {
     /// When (ns).
     pub stamp_ns: u64,
@@ -242,7 +242,7 @@ impl<'a> Traverse<'a> {
         let by_way = self
             .last
             .map(|last| self.network.stations[last].world_from_camera * self.since.object_from_camera.relabel());
-        let by_object = || here.navigated.map(|navigated| in_world(&navigated, &self.places()).0);
+        let by_object = || here.navigated.as_ref().map(|navigated| in_world(navigated, &self.places()).0);
         by_way.or_else(by_object).or_else(|| here.rough.map(|(world, _)| world))
     }
 
@@ -251,7 +251,7 @@ impl<'a> Traverse<'a> {
         let position = |matrix: &nalgebra::Matrix6<f64>| matrix.fixed_view::<3, 3>(3, 3).trace().sqrt();
         let by_way =
             self.last.map(|last| self.network.stations[last].sigma.hypot(self.since.covariance.position_sigma()));
-        let by_object = here.navigated.map(|navigated| position(&in_world(&navigated, &self.places()).1));
+        let by_object = here.navigated.as_ref().map(|navigated| position(&in_world(navigated, &self.places()).1));
         let rough = || here.rough.map_or(f64::INFINITY, |(_, covariance)| covariance.position_sigma());
         match (by_way, by_object) {
             (Some(a), Some(b)) => a.min(b),
@@ -274,15 +274,12 @@ impl<'a> Traverse<'a> {
             self.visits[navigated.object] = Some(Visit { seconds: self.seconds, ..visit });
             return;
         }
-        let fix = Fix { station: self.station(here), navigated: *navigated };
-        let index = match visit {
-            Some(visit) => visit.fix,
-            None => {
-                self.network.fixes.push(fix);
-                self.network.fixes.len() - 1
-            }
-        };
-        self.network.fixes[index] = fix;
+        let fix = Fix { station: self.station(here), navigated: navigated.clone() };
+        let index = visit.map_or(self.network.fixes.len(), |visit| visit.fix);
+        match self.network.fixes.get_mut(index) {
+            Some(worse) => *worse = fix,
+            None => self.network.fixes.push(fix),
+        }
         self.visits[navigated.object] = Some(Visit { fix: index, sigma, seconds: self.seconds });
     }
 
@@ -398,7 +395,7 @@ impl<'a> Traverse<'a> {
 
     /// The camera relative to the object that it is navigated by, or to the one it is known best to.
     fn best(&self, closed: &Closed, station: usize, here: &Here) -> Option<Navigated> {
-        if let Some(known) = here.navigated {
+        if let Some(known) = &here.navigated {
             return closed.navigated(known.object, station);
         }
         let all = (0..self.network.objects.len()).filter_map(|object| closed.navigated(object, station));

@@ -1,6 +1,6 @@
 //! Least squares over SE(3) where every point speaks by an information matrix.
 
-use nalgebra::{Matrix3, Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{Degenerate, converged, normal::Normal};
@@ -58,6 +58,28 @@ pub(super) fn linearize(
     }
     let gradient = Vector6::new(torque.x, torque.y, torque.z, force.x, force.y, force.z);
     Some(Linearized { normal, gradient, cost })
+}
+
+/// What each model point's error makes of the minimum: with n of the pixels and e of the model the terms ask
+/// Σ Jᵀ W (J ξ + Rᵀ e + n) = 0, R that of the pose, so that ξ = −(Σ JᵀWJ)⁻¹ Σ Jᵀ W Rᵀ e + …, a standard deviation of e each.
+pub(super) fn model_errors(
+    points: &[Observation],
+    pose: &Transform<Object, Camera>,
+    term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
+) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
+    let covariance =
+        linearize(points, pose, term).ok_or(Degenerate::Hidden)?.covariance().ok_or(Degenerate::Singular)?;
+    let (r, t) = (pose.rotation_matrix(), pose.translation());
+    let of = |(k, point): (usize, &Observation)| {
+        let at: Vector3<f64> = r.tr_mul(&(point.model.coords - t));
+        let pull = term(k, &at).ok_or(Degenerate::Hidden)?.information * r.transpose() * point.model_sigma;
+        let mut errors = SMatrix::<f64, 6, 3>::zeros();
+        // −Jᵀ = [ [p]×; I ].
+        errors.fixed_view_mut::<3, 3>(0, 0).copy_from(&(at.cross_matrix() * pull));
+        errors.fixed_view_mut::<3, 3>(3, 0).copy_from(&pull);
+        Ok(covariance * errors)
+    };
+    points.iter().enumerate().map(of).collect()
 }
 
 impl Linearized {

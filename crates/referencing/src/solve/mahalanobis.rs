@@ -1,6 +1,6 @@
 //! Mahalanobis: 3D–3D least squares, every point weighed by its whole covariance.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 
 use super::{
     Degenerate, Solver,
-    descent::{Term, linearize, minimize},
+    descent::{Term, linearize, minimize, model_errors},
     kabsch,
     sightings::{FEW, Sightings, Target},
     spread::{check, share},
@@ -70,6 +70,20 @@ impl Solver for Mahalanobis {
         let mut all = Sightings::new(rig);
         all.see(&data.points, Target::Triangulated).map_err(|_| Degenerate::Singular)?;
         covariance(data, at, &|k, place| all.live(k, place))
+    }
+
+    fn model_errors(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
+        let Some(rig) = self.rig(data) else {
+            let measured = Measured::of(&data.points);
+            return model_errors(&data.points, at, &|k, place: &_| Some(measured.term(k, place)));
+        };
+        let mut all = Sightings::new(rig);
+        all.see(&data.points, Target::Triangulated).map_err(|_| Degenerate::Singular)?;
+        model_errors(&data.points, at, &|k, place: &_| all.live(k, place))
     }
 }
 

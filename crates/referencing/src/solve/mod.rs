@@ -1,5 +1,6 @@
 //! Solvers: the rigid motion that carries the measured points onto the model.
 
+use nalgebra::SMatrix;
 use seafix_component::{Registry, entry};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
@@ -190,6 +191,20 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         numerical::covariance(|moved| self.solve(moved), data, at)
+    }
+
+    /// What the model's errors have in [`covariance`](Self::covariance): for each point H = σ_model ∂ξ/∂P, the error of the
+    /// pose a standard deviation of that point's three coordinates, by central differences through the solver itself.
+    /// Σ H Hᵀ is common to every pose from this model; the rest is drawn anew with each image.
+    ///
+    /// # Errors
+    /// As `solve`.
+    fn model_errors(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
+        numerical::model_errors(|moved| self.solve(moved), data, at)
     }
 }
 

@@ -85,6 +85,30 @@ pub(super) fn covariance(
     Ok(Covariance6::new(sum))
 }
 
+/// σ ∂ξ/∂P of each model point P.
+pub(super) fn model_errors(
+    solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
+    data: &Observations<'_>,
+    at: &Transform<Object, Camera>,
+) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
+    let mut moved = data.clone();
+    let mut of = |i: usize| {
+        let original = data.points[i];
+        if original.model_sigma == 0.0 {
+            return Ok(SMatrix::zeros());
+        }
+        let reach = original.measured.at.coords.amax().max(original.model.coords.amax());
+        let j = jacobian(at, step(STEP, original.model_sigma, reach), |step: Vector3<f64>| {
+            moved.points[i].model = original.model + step;
+            let answer = solve(&moved);
+            moved.points[i] = original;
+            answer
+        })?;
+        Ok(j * original.model_sigma)
+    };
+    (0..data.points.len()).map(&mut of).collect()
+}
+
 /// ∂ξ/∂step at step 0.
 fn jacobian<const N: usize>(
     at: &Transform<Object, Camera>,

@@ -1,12 +1,13 @@
 //! Stereo reprojection: maximum likelihood on the four pixel coordinates of every point.
 
+use nalgebra::SMatrix;
 use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver,
-    descent::linearize,
+    descent::{linearize, model_errors},
     sightings::{Sightings, Target},
     spread::{check, share},
     starts::likeliest,
@@ -73,6 +74,16 @@ impl Solver for StereoReprojection {
             .covariance()
             .map(Covariance6::new)
             .ok_or(Degenerate::Singular)
+    }
+
+    fn model_errors(
+        &self,
+        data: &Observations<'_>,
+        at: &Transform<Object, Camera>,
+    ) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
+        let mut all = Sightings::new(pixels_and_rig(data)?);
+        all.see(&data.points, Target::Pixels)?;
+        model_errors(&data.points, at, &|k, place: &_| all.live(k, place))
     }
 }
 
