@@ -232,6 +232,7 @@ fn of(condition: String, names: [String; 2], logs: Vec<usize>, over: bool, error
 }
 
 /// What pairs of errors say.
+#[derive(Debug)]
 pub(crate) struct Statistics {
     pub(crate) difference: f64,
     pub(crate) interval: (f64, f64),

@@ -1,6 +1,6 @@
 //! What a key says, by the definitions.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, rc::Rc};
 
 use seafix_evaluation::{clopper_pearson, holm, mcnemar, quantile};
 use seafix_log::{FrameTimes, Outcome, Region, TargetRecord};
@@ -364,17 +364,16 @@ fn located(axis: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64
 /// Something about paired logs: first and second in turn.
 fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Option<f64>> {
     let conditions = over.starts_with("conditions");
-    let pairs = |logs: &[&Log]| if conditions { medians(logs, span) } else { errors(logs[0], logs[1], span) };
     if what == "holm" {
         let size: usize = over.rsplit(' ').next()?.parse().ok()?;
-        let raw = logs.chunks(size.max(2)).map(|logs| Statistics::of(&pairs(logs), conditions).p);
+        let raw = logs.chunks(size.max(2)).map(|logs| once(logs, span, conditions).1.p);
         return Some(holm(&raw.collect::<Vec<_>>()).first().copied());
     }
-    let pairs = pairs(logs);
-    let statistics = Statistics::of(&pairs, conditions);
+    let known = once(logs, span, conditions);
+    let (pairs, statistics) = &*known;
     let real = |value: f64| if conditions { value.exp() } else { value * 1e3 };
     Some(Some(match what {
-        "pairs" => pairs.len() as f64,
+        "pairs" => *pairs as f64,
         "difference" => real(statistics.difference),
         "difference-low" => real(statistics.interval.0),
         "difference-high" => real(statistics.interval.1),
@@ -384,6 +383,19 @@ fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Opt
         "mcnemar" => mcnemar(statistics.alone[0], statistics.alone[1]),
         _ => return None,
     }))
+}
+
+/// How many pairs there are and what they say; resampled once for all numbers of a comparison.
+fn once(logs: &[&Log], span: [u64; 2], conditions: bool) -> Rc<(usize, Statistics)> {
+    let trials: Vec<&str> = logs.iter().map(|log| log.header.trial.as_str()).collect();
+    let name = format!("{conditions} {span:?} {trials:?}");
+    if let Some(known) = logs[0].compared.borrow().get(&name) {
+        return Rc::clone(known);
+    }
+    let pairs = if conditions { medians(logs, span) } else { errors(logs[0], logs[1], span) };
+    let known = Rc::new((pairs.len(), Statistics::of(&pairs, conditions)));
+    logs[0].compared.borrow_mut().insert(name, Rc::clone(&known));
+    known
 }
 
 fn errors(first: &Log, second: &Log, span: [u64; 2]) -> Vec<(f64, f64)> {

@@ -1,13 +1,15 @@
 //! The logs that keys name, read once each.
 
 use std::{
+    cell::RefCell,
     collections::HashMap,
     path::{Path, PathBuf},
+    rc::Rc,
 };
 
 use seafix_log::{FrameTimes, InspectedPoint, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader};
 
-use crate::{ReportError, disparity, place};
+use crate::{ReportError, disparity, paired::Statistics, place};
 
 /// The logs of a run.
 pub(super) struct Logs {
@@ -22,6 +24,8 @@ pub(super) struct Log {
     pub(super) totals: Option<Totals>,
     /// Squared errors of disparities, and how many.
     pub(super) disparity: (f64, usize),
+    /// Comparisons that begin with this log, by what they are over: a table prints many numbers of each.
+    pub(super) compared: RefCell<HashMap<String, Rc<(usize, Statistics)>>>,
 }
 
 /// One frame.
@@ -112,7 +116,7 @@ impl Log {
             });
         }
         let totals = reader.totals().cloned();
-        Ok(Self { header, frames, totals, disparity })
+        Ok(Self { header, frames, totals, disparity, compared: RefCell::default() })
     }
 
     /// The frames of this stamp; stamps do not decrease.

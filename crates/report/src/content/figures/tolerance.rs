@@ -77,17 +77,21 @@ pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
         layers.extend(notes.into_iter().map(|(at, words)| Layer::Words {
             at,
             end: at[0] > 0.5,
-            up: at[1] < 0.5 || at[0] > 0.5,
+            up: at[0] > 0.5,
             lines: vec![words.join(", ")],
         }));
         panels.push(Panel {
             title: title.clone(),
             x: Axis::linear("recall of visible points").within([-0.03, 1.03]),
-            y: Axis::linear("precision").within([-0.03, 1.13]),
+            y: Axis::linear("precision"),
             layers,
             ..Panel::default()
         });
     }
+    // The same scale in all, with room for words above.
+    let reached = panels.iter().flat_map(|panel| &panel.layers).flat_map(Layer::reach).map(|point| point[1]);
+    let room = 0.15 * (1.0 - reached.fold(0.9, f64::min));
+    panels.iter_mut().for_each(|panel| panel.y.range = Some([1.0 - room / 0.15 - room, 1.0 + room]));
     let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
     let page = panels.len() > 1;
     let columns = if panels.len() == 4 { 2 } else { panels.len().min(3) };
