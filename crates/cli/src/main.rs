@@ -23,6 +23,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
+    signals::outgrow_files();
     match Arguments::parse().command.execute() {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {

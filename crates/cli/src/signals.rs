@@ -35,6 +35,15 @@ pub(crate) fn listen() {
     });
 }
 
+/// From now on a file that may grow no further (`ulimit -f`) is an error of writing, not the end of the program.
+pub(crate) fn outgrow_files() {
+    #[cfg(unix)]
+    {
+        // A handler that does nothing: the system call then says EFBIG.
+        let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
+    }
+}
+
 /// From now on the next signal ends the program at once.
 pub(crate) fn end_at_once() {
     if let Some(asked) = ASKED.get() {

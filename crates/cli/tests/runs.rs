@@ -33,6 +33,38 @@ fn two_runs_are_compared() {
     assert!(code == 3 && error.contains("name the folder of a finished run"), "{error}");
 }
 
+/// Trials belong together by what they are, not by where they stand. Seen to fail with rows paired by the trial's place.
+#[test]
+fn runs_with_their_trials_in_another_order_are_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run = |name: &str, axes: &str| {
+        let start = EXPERIMENT.split("[[vary]]").next().unwrap();
+        fs::write(folder.join("e.toml"), format!("{start}{axes}")).unwrap();
+        assert_eq!(seafix(folder, &["run", "e.toml", "--out", name]).0, 0);
+    };
+    let solvers = |names: &str| format!("[[vary]]\nkey = 'pipeline.solver'\nvalues = [{names}]\n");
+    run("a", &solvers("'kabsch', 'triad'"));
+    run("b", &solvers("'triad', 'kabsch'"));
+    run("c", &solvers("'horn', 'triad', 'umeyama', 'kabsch'"));
+    run("d", &format!("{}[[vary]]\nkey = 'source.distance'\nvalues = [2.0, 3.0]\n", solvers("'triad', 'kabsch'")));
+    let (code, out, _) = seafix(folder, &["diff", "a", "b"]);
+    assert!(code == 0 && out.contains("equal rows"), "{out}");
+    for (other, alone) in
+        [("c", ["trial 001-solver-horn", "trial 003-solver-umeyama"]), ("d", ["distance-2.0", "distance-"])]
+    {
+        let (code, out, _) = seafix(folder, &["diff", "a", other]);
+        assert_eq!(code, 1, "{out}");
+        assert!(alone.iter().all(|name| out.contains(name)) && out.contains("trials: 2 | 4"), "{out}");
+        // What is in both is the same.
+        assert!(out.lines().filter(|line| line.contains(" differ")).all(|line| line.starts_with("  row:")), "{out}");
+    }
+    let (code, _, error) = seafix(folder, &["run", "e.toml", "--out", "s", "--shard", "1/2"]);
+    assert_eq!(code, 0, "{error}");
+    let (code, _, error) = seafix(folder, &["diff", "a", "s"]);
+    assert!(code == 3 && error.contains("a shard of a run") && error.contains("seafix merge"), "{error}");
+}
+
 #[test]
 fn reports_are_verified_and_runs_compared() {
     let folder = tempfile::tempdir().unwrap();

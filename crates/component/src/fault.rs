@@ -5,11 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::nearest;
+use crate::{nearest, plain};
 
 /// One fault of an input: what, in which file, on which line, the value, and the remedy.
 ///
-/// Printed as `what in file:line: value; remedy`, one line whatever the input contains.
+/// Printed as `what in file:line:column: value; remedy`, one line whatever the input contains.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
     /// What is wrong.
@@ -18,6 +18,8 @@ pub struct Fault {
     pub file: PathBuf,
     /// The line, from 1, where it is known.
     pub line: Option<usize>,
+    /// The column (letters, from 1), where it is known.
+    pub column: Option<u32>,
     /// The value at fault; empty where there is none.
     pub value: String,
     /// What to do about it; empty where nothing helps.
@@ -27,13 +29,22 @@ pub struct Fault {
 impl Fault {
     /// The fault `what` of `file`.
     pub fn new(what: impl Into<String>, file: &Path) -> Self {
-        Self { what: what.into(), file: file.to_owned(), line: None, value: String::new(), remedy: String::new() }
+        let (value, remedy) = (String::new(), String::new());
+        Self { what: what.into(), file: file.to_owned(), line: None, column: None, value, remedy }
     }
 
     /// The same fault on a line (from 1), if one is known.
     #[must_use]
     pub fn on_line(mut self, line: impl Into<Option<usize>>) -> Self {
         self.line = line.into();
+        self
+    }
+
+    /// The same fault in a line and column (from 1), if they are known.
+    #[must_use]
+    pub fn at(mut self, place: Option<(usize, usize)>) -> Self {
+        self.line = place.map(|(line, _)| line);
+        self.column = place.and_then(|(_, column)| u32::try_from(column).ok());
         self
     }
 
@@ -54,19 +65,19 @@ impl Fault {
     /// The fault that the TOML reader found in `text`, the content of `file`; an unknown key is
     /// answered with the nearest right one.
     pub fn in_toml(file: &Path, text: &str, error: &toml::de::Error) -> Self {
-        let line = error.span().map(|span| line_at(text, span.start));
+        let place = error.span().filter(|_| !text.is_empty()).map(|span| place_at(text, span.start));
         let message = error.message().trim_end();
         let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         match quoted.split_first() {
             Some((key, known)) if message.starts_with("unknown field") => Self::new("unknown key", file)
-                .on_line(line)
+                .at(place)
                 .value(format!("`{key}`"))
                 .remedy(match nearest(key, known.iter().copied()) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!("there are {}", known.join(", ")),
                 }),
-            _ => Self::new(message.lines().next().unwrap_or_default(), file)
-                .on_line(line)
+            _ => Self::new(plain(message), file)
+                .at(place)
                 .value(error.span().and_then(|span| text.get(span)).unwrap_or_default()),
         }
     }
@@ -77,6 +88,9 @@ impl fmt::Display for Fault {
         let mut text = format!("{} in {}", self.what, self.file.display());
         if let Some(line) = self.line {
             text += &format!(":{line}");
+        }
+        if let Some(column) = self.column {
+            text += &format!(":{column}");
         }
         if !self.value.is_empty() {
             let short: String = self.value.chars().take(120).collect();
@@ -97,29 +111,42 @@ pub fn line_at(text: &str, offset: usize) -> usize {
     1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }
 
+/// The line and column (letters, from 1) of the byte at `offset`.
+pub fn place_at(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text.as_bytes()[..offset.min(text.len())];
+    let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
+    // Bytes that continue a letter are none of their own.
+    (line_at(text, offset), 1 + before[start..].iter().filter(|&&b| b & 0xC0 != 0x80).count())
+}
+
 /// The line (from 1) of the key at `path` in a TOML text, or of the nearest table above it that
 /// exists; numbers in the path are places in arrays: `["object", "2", "id"]`.
 pub fn line_of(text: &str, path: &[&str]) -> Option<usize> {
-    let document = toml::de::DeTable::parse(text).ok()?;
-    let mut line = None;
+    place_of(text, path).map(|(_, (line, _))| line)
+}
+
+/// The same with the column, behind how many steps of `path` lead to it: fewer than all where only a table above is there.
+pub fn place_of(text: &str, path: &[&str]) -> Option<(usize, (usize, usize))> {
+    let (document, _) = toml::de::DeTable::parse_recoverable(text);
+    let mut place = None;
     let mut table = Some(document.get_ref());
     let mut array: Option<&toml::de::DeArray<'_>> = None;
-    for step in path {
+    for (depth, step) in path.iter().enumerate() {
         let value = if let Some(items) = array {
-            items.get(step.parse::<usize>().ok()?)
+            step.parse::<usize>().ok().and_then(|k| items.get(k))
         } else {
             table.and_then(|table| table.iter().find(|(key, _)| key.get_ref() == step)).map(|(key, value)| {
-                line = Some(line_at(text, key.span().start));
+                place = Some((depth + 1, place_at(text, key.span().start)));
                 value
             })
         };
         let Some(value) = value else { break };
         if array.is_some() {
-            line = Some(line_at(text, value.span().start));
+            place = Some((depth + 1, place_at(text, value.span().start)));
         }
         (table, array) = (value.get_ref().as_table(), value.get_ref().as_array());
     }
-    line
+    place
 }
 
 #[cfg(test)]
@@ -138,7 +165,7 @@ mod tests {
         let text = "question = 'why'\nsede = 3\n";
         let error = toml::from_str::<Experiment>(text).unwrap_err();
         let fault = Fault::in_toml(Path::new("e.toml"), text, &error);
-        assert_eq!(fault.to_string(), "unknown key in e.toml:2: `sede`; did you mean `seed`?");
+        assert_eq!(fault.to_string(), "unknown key in e.toml:2:1: `sede`; did you mean `seed`?");
     }
 
     #[test]
@@ -148,6 +175,8 @@ mod tests {
         assert_eq!(line_of(text, &["d", "1", "e"]), Some(7));
         assert_eq!(line_of(text, &["d", "1", "missing"]), Some(6));
         assert_eq!(line_of(text, &["nothing"]), None);
+        assert_eq!(place_of("é = 1\nb = { ü = 2, c = 3 }", &["b", "c", "x"]), Some((2, (2, 14))));
+        assert_eq!(place_at("ab\ncé d", 7), (2, 4));
     }
 
     #[test]

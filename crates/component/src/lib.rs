@@ -45,9 +45,11 @@ mod fault;
 mod registry;
 mod suggest;
 mod text;
+mod words;
 
 pub use choice::Choice;
-pub use fault::{Fault, line_at, line_of};
-pub use registry::{BuildError, Component, Entry, Listing, Registry, SettingsError, in_range, settings};
+pub use fault::{Fault, line_at, line_of, place_at, place_of};
+pub use registry::{BuildError, Component, Entry, Listing, Registry, SettingsError, in_range, settings, take_out};
 pub use suggest::{nearest, unknown};
 pub use text::{read_long_text, read_text};
+pub use words::plain;

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::{Choice, suggest::unknown};
+use crate::{Choice, plain, suggest::unknown};
 
 /// What every component says of itself, whatever it does.
 ///
@@ -75,7 +75,7 @@ impl BuildError {
     }
 }
 
-/// Why settings could not become a component: the key if one is known, and the reason.
+/// Why settings could not become a component: the key if one is known, dotted, and the reason.
 #[derive(Debug)]
 pub struct SettingsError {
     key: Option<String>,
@@ -89,12 +89,12 @@ pub struct Entry<T: ?Sized> {
     summary: &'static str,
     source: &'static str,
     defaults: fn() -> toml::Table,
-    build: fn(toml::Table) -> Result<Box<T>, SettingsError>,
+    build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>,
 }
 
 impl<T: ?Sized> Entry<T> {
     /// The entry of component `C`.
-    pub const fn of<C: Component>(build: fn(toml::Table) -> Result<Box<T>, SettingsError>) -> Self {
+    pub const fn of<C: Component>(build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>) -> Self {
         Self { name: C::NAME, summary: C::SUMMARY, source: C::SOURCE, defaults: defaults::<C>, build }
     }
 }
@@ -107,22 +107,121 @@ macro_rules! entry {
     };
 }
 
-/// A component from its settings; [`entry!`](crate::entry) calls it.
+/// A component from its settings, or all that is wrong with them; [`entry!`](crate::entry) calls it.
 #[doc(hidden)]
-pub fn settings<C: Component>(settings: toml::Table) -> Result<C, SettingsError> {
-    // One key at a time first, so that the message can name the one at fault.
-    for (key, value) in &settings {
-        let mut one = toml::Table::new();
-        one.insert(key.clone(), value.clone());
-        if let Err(error) = one.try_into::<C>() {
-            return Err(SettingsError { key: Some(key.clone()), message: error.message().to_owned() });
+pub fn settings<C: Component>(mut settings: toml::Table) -> Result<C, Vec<SettingsError>> {
+    let mut errors = Vec::new();
+    // One key at a time first, so that the message can name the one at fault. What is wrong is taken out, for the rest to be
+    // looked at.
+    for key in settings.keys().cloned().collect::<Vec<_>>() {
+        while let Some(value) = settings.get(&key) {
+            let refused = |value: &toml::Value| {
+                let alone = toml::Table::from_iter([(key.clone(), value.clone())]);
+                alone.try_into::<C>().err().map(|error| error.message().to_owned())
+            };
+            let Some(message) = refused(value) else { break };
+            let mut path = vec![key.clone()];
+            culprit(value, &message, &refused, &mut path);
+            take_out(&mut settings, &path);
+            errors.push(SettingsError { key: Some(path.join(".")), message });
         }
     }
-    let component: C = settings
-        .try_into()
-        .map_err(|error: toml::de::Error| SettingsError { key: None, message: error.message().to_owned() })?;
-    component.check().map_err(|message| SettingsError { key: None, message })?;
-    Ok(component)
+    loop {
+        let message = match settings.clone().try_into::<C>() {
+            Err(error) => plain(error.message()),
+            Ok(component) => match component.check() {
+                Ok(()) if errors.is_empty() => return Ok(component),
+                Ok(()) => return Err(errors),
+                Err(message) => message,
+            },
+        };
+        let key = out_of_range(&message);
+        let written = key.as_deref().and_then(|key| key.split(['.', '[']).next());
+        // Where nothing is written the fault is a consequence of another.
+        let next = written.and_then(|key| settings.remove(key)).is_some();
+        if next || errors.is_empty() {
+            errors.push(SettingsError { key, message });
+        }
+        if !next {
+            return Err(errors);
+        }
+    }
+}
+
+/// Where in `value` the fault is that is told as `message`: the steps to it are added to `path`. `refused` says what is
+/// wrong with another value in its place.
+fn culprit(
+    value: &toml::Value,
+    message: &str,
+    refused: &dyn Fn(&toml::Value) -> Option<String>,
+    path: &mut Vec<String>,
+) {
+    let is_it = |rest: &toml::Value| {
+        // Without it the fault is gone, or another one comes up.
+        refused(rest).is_none_or(|other| other != message && !other.starts_with("missing field"))
+    };
+    let steps: Vec<String> = match value {
+        toml::Value::Table(table) => table.keys().cloned().collect(),
+        toml::Value::Array(list) if list.iter().all(toml::Value::is_table) => {
+            (0..list.len()).map(|k| k.to_string()).collect()
+        }
+        _ => return,
+    };
+    for step in steps {
+        let mut rest = value.clone();
+        remove(&mut rest, &step);
+        if is_it(&rest) {
+            path.push(step.clone());
+            let replaced = |inner: &toml::Value| {
+                let mut whole = value.clone();
+                if let Some(place) = inside(&mut whole, &step) {
+                    *place = inner.clone();
+                }
+                refused(&whole)
+            };
+            let mut whole = value.clone();
+            if let Some(inner) = inside(&mut whole, &step) {
+                culprit(inner, message, &replaced, path);
+            }
+            return;
+        }
+    }
+}
+
+fn inside<'a>(value: &'a mut toml::Value, step: &str) -> Option<&'a mut toml::Value> {
+    match value {
+        toml::Value::Table(table) => table.get_mut(step),
+        toml::Value::Array(list) => list.get_mut(step.parse::<usize>().ok()?),
+        _ => None,
+    }
+}
+
+fn remove(value: &mut toml::Value, step: &str) {
+    match value {
+        toml::Value::Table(table) => drop(table.remove(step)),
+        toml::Value::Array(list) => {
+            if let Some(place) = step.parse().ok().filter(|&k: &usize| k < list.len()) {
+                list.remove(place);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Takes what is at `path` out of settings.
+pub fn take_out(settings: &mut toml::Table, path: &[impl AsRef<str>]) {
+    let Some((last, above)) = path.split_last() else { return };
+    let Some((first, above)) = above.split_first() else {
+        settings.remove(last.as_ref());
+        return;
+    };
+    let mut here = settings.get_mut(first.as_ref());
+    for step in above {
+        here = here.and_then(|value| inside(value, step.as_ref()));
+    }
+    if let Some(value) = here {
+        remove(value, last.as_ref());
+    }
 }
 
 /// The message of a setting that is out of its range, for [`Component::check`]: `Err` unless `holds`.
@@ -198,25 +297,45 @@ impl<T: ?Sized> Registry<T> {
     /// The component that `choice` names, with its settings.
     ///
     /// # Errors
-    /// An unknown name or key (with the nearest right one), or a value of the wrong type or range.
+    /// An unknown name or key (with the nearest right one), or a value of the wrong type or range: the first of
+    /// [`faults`](Self::faults).
     pub fn build(&self, choice: &Choice) -> Result<Box<T>, BuildError> {
         let entry = self.find(&choice.name)?;
-        (entry.build)(choice.settings.clone()).map_err(|error| match error.key {
-            Some(key) if !(entry.defaults)().contains_key(&key) => BuildError::UnknownKey {
-                kind: self.kind,
-                name: entry.name,
-                hint: unknown(&key, &(entry.defaults)().keys().map(String::as_str).collect::<Vec<_>>()),
-                key,
-            },
-            Some(key) => {
-                let message = format!("setting `{key}`: {}", error.message.trim_end());
-                BuildError::BadValue { kind: self.kind, name: entry.name, key: Some(key), message }
-            }
-            None => {
-                let key = out_of_range(&error.message);
-                BuildError::BadValue { kind: self.kind, name: entry.name, key, message: error.message }
-            }
+        (entry.build)(choice.settings.clone()).map_err(|errors| {
+            let first = errors.into_iter().next().expect("what is refused has a fault");
+            self.fault(entry, first)
         })
+    }
+
+    /// Everything that keeps `choice` from being built.
+    pub fn faults(&self, choice: &Choice) -> Vec<BuildError> {
+        match self.find(&choice.name) {
+            Err(error) => vec![error],
+            Ok(entry) => {
+                let errors = (entry.build)(choice.settings.clone()).err().unwrap_or_default();
+                errors.into_iter().map(|error| self.fault(entry, error)).collect()
+            }
+        }
+    }
+
+    fn fault(&self, entry: &'static Entry<T>, SettingsError { key, message }: SettingsError) -> BuildError {
+        let (kind, name) = (self.kind, entry.name);
+        let Some(key) = key else { return BuildError::BadValue { kind, name, key: None, message } };
+        let words: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        let nested = words.split_first().filter(|_| key.contains('.') && message.starts_with("unknown field"));
+        if !key.contains(['.', '[']) && !(entry.defaults)().contains_key(&key) {
+            let hint = unknown(&key, &(entry.defaults)().keys().map(String::as_str).collect::<Vec<_>>());
+            return BuildError::UnknownKey { kind, name, key, hint };
+        }
+        if let Some((word, known)) = nested {
+            return BuildError::UnknownKey { kind, name, hint: unknown(word, known), key };
+        }
+        // What a check says names its setting by itself.
+        let message = match out_of_range(&message) {
+            Some(_) => message,
+            None => format!("setting `{key}`: {}", plain(&message)),
+        };
+        BuildError::BadValue { kind, name, key: Some(key), message }
     }
 
     /// The choice with every setting written out: what a resolved experiment stores.
@@ -252,11 +371,19 @@ mod tests {
     #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
     struct Square {
         side_length: f64,
+        frame: Frame,
+    }
+
+    #[derive(Debug, Default, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+    struct Frame {
+        width: f64,
+        holes: Vec<Frame>,
     }
 
     impl Default for Square {
         fn default() -> Self {
-            Self { side_length: 1.0 }
+            Self { side_length: 1.0, frame: Frame::default() }
         }
     }
 
@@ -291,7 +418,7 @@ mod tests {
         let error = SHAPES.build(&Choice::named("square").with("side-lenght", 2.0)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "shape `square` has no setting `side-lenght`, did you mean `side-length`? There are side-length"
+            "shape `square` has no setting `side-lenght`, did you mean `side-length`? There are side-length, frame"
         );
         assert_eq!(error.key(), Some("side-lenght"));
     }
@@ -305,7 +432,33 @@ mod tests {
     #[test]
     fn a_wrong_type_names_its_key() {
         let error = SHAPES.build(&Choice::named("square").with("side-length", "long")).unwrap_err();
-        assert!(error.to_string().starts_with("shape `square`: setting `side-length`: invalid type"), "{error}");
+        assert_eq!(error.to_string(), "shape `square`: setting `side-length`: not a number: string \"long\"");
+    }
+
+    /// Seen to fail when the first fault ends the search.
+    #[test]
+    fn all_faults_are_told_each_with_its_place() {
+        let settings: toml::Table = toml::from_str(
+            "side-length = -2.0\nside = 1\nframe = { widht = 1.0, width = 'wide', holes = [{ width = 1.0 }, { width = 'x' }] }",
+        )
+        .unwrap();
+        let faults = SHAPES.faults(&Choice { name: "square".to_owned(), settings });
+        let said: Vec<String> = faults.iter().map(ToString::to_string).collect();
+        assert_eq!(said.len(), 5, "{said:?}");
+        let keys: Vec<&str> = faults.iter().filter_map(BuildError::key).collect();
+        for key in ["frame.widht", "frame.width", "frame.holes.1.width", "side", "side-length"] {
+            assert!(keys.contains(&key), "no {key} in {said:?}");
+        }
+        let all = said.join("\n");
+        for part in [
+            "no setting `frame.widht`, did you mean `width`?",
+            "`frame.width`: not a number: string \"wide\"",
+            "side-length = -2; give",
+        ] {
+            assert!(all.contains(part), "no {part} in {all}");
+        }
+        assert!(SHAPES.faults(&Choice::named("square")).is_empty());
+        assert!(matches!(SHAPES.faults(&Choice::named("sqare"))[..], [BuildError::UnknownName { .. }]));
     }
 
     #[test]

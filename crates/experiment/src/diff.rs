@@ -1,17 +1,20 @@
 //! What differs between two runs: first in what they were told, then in what came of it.
 
 use std::{
-    collections::BTreeMap,
+    cmp::Ordering,
+    collections::{BTreeMap, BTreeSet},
     fs::File,
-    io::{BufRead, BufReader},
-    path::Path,
+    io::{BufRead, BufReader, Seek, SeekFrom},
+    path::{Path, PathBuf},
 };
 
 use seafix_component::{Fault, read_text};
 use serde::Deserialize;
 
+use crate::manifest;
+
 /// One value that differs; `None` where it is only in the other run.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Change {
     /// Which: a dotted key of the configuration, a file, or a row and its column.
     pub what: String,
@@ -46,19 +49,21 @@ impl Difference {
     }
 }
 
-/// Compares the runs in two folders. Rows belong together by their trial's place in the experiment,
-/// frame and object, in order; durations, versions and machines are not compared.
+/// Compares the runs in two folders. A trial belongs to that of the other run which has its values of all settings that vary
+/// in either run, wherever it stands; rows of two such trials belong together by frame and object, in order. Durations,
+/// versions and machines are not compared.
 ///
 /// # Errors
 /// A folder that is no finished run, or files that cannot be read.
 pub fn diff(first: &Path, second: &Path) -> Result<Difference, Fault> {
     let (a, b) = (Told::read(first)?, Told::read(second)?);
+    let pairs = pairs(&a.trials, &b.trials);
     let mut difference = Difference {
-        configuration: changes(&a.settings, &b.settings),
+        configuration: configuration(&a, &b, &pairs),
         inputs: changes(&a.inputs, &b.inputs),
         ..Difference::default()
     };
-    let (mut one, mut two) = (Table::open(first, &a.trials)?, Table::open(second, &b.trials)?);
+    let (mut one, mut two) = (Table::open(first)?, Table::open(second)?);
     let common: Vec<(usize, usize)> = one
         .columns
         .iter()
@@ -72,39 +77,109 @@ pub fn diff(first: &Path, second: &Path) -> Result<Difference, Fault> {
             difference.columns.insert(name.clone(), 0);
         }
     }
-    let (mut left, mut right) = (one.next()?, two.next()?);
-    loop {
-        let order = match (&left, &right) {
-            (None, None) => break,
-            (Some(_), None) => std::cmp::Ordering::Less,
-            (None, Some(_)) => std::cmp::Ordering::Greater,
-            (Some(a), Some(b)) => a.key.cmp(&b.key),
-        };
-        let names = |row: &Option<Row>| row.as_ref().map(Row::name).unwrap_or_default();
-        match order {
-            std::cmp::Ordering::Less => {
-                difference.note("row", names(&left), Some("there".to_owned()), None);
-                left = one.next()?;
-            }
-            std::cmp::Ordering::Greater => {
-                difference.note("row", names(&right), None, Some("there".to_owned()));
-                right = two.next()?;
-            }
-            std::cmp::Ordering::Equal => {
-                if let (Some(a), Some(b)) = (&left, &right) {
-                    difference.rows += 1;
-                    for &(i, j) in &common {
-                        let (x, y) = (&a.cells[i], &b.cells[j]);
-                        if x != y {
-                            difference.note(&one.columns[i], a.name(), Some(x.clone()), Some(y.clone()));
+    for (here, there) in &pairs {
+        one.begin(here.map(|place| a.trials[place].name.as_str()))?;
+        two.begin(there.map(|place| b.trials[place].name.as_str()))?;
+        difference.rows_of_a_trial(&mut one, &mut two, &common)?;
+    }
+    Ok(difference)
+}
+
+impl Difference {
+    /// Row by row.
+    fn rows_of_a_trial(&mut self, one: &mut Table, two: &mut Table, common: &[(usize, usize)]) -> Result<(), Fault> {
+        let (mut left, mut right) = (one.next()?, two.next()?);
+        loop {
+            let order = match (&left, &right) {
+                (None, None) => return Ok(()),
+                (Some(_), None) => Ordering::Less,
+                (None, Some(_)) => Ordering::Greater,
+                (Some(a), Some(b)) => a.key.cmp(&b.key),
+            };
+            let names = |row: &Option<Row>| row.as_ref().map(Row::name).unwrap_or_default();
+            match order {
+                Ordering::Less => {
+                    self.note("row", names(&left), Some("there".to_owned()), None);
+                    left = one.next()?;
+                }
+                Ordering::Greater => {
+                    self.note("row", names(&right), None, Some("there".to_owned()));
+                    right = two.next()?;
+                }
+                Ordering::Equal => {
+                    if let (Some(a), Some(b)) = (&left, &right) {
+                        self.rows += 1;
+                        for &(i, j) in common {
+                            let (x, y) = (&a.cells[i], &b.cells[j]);
+                            if x != y {
+                                self.note(&one.columns[i], a.name(), Some(x.clone()), Some(y.clone()));
+                            }
                         }
                     }
+                    (left, right) = (one.next()?, two.next()?);
                 }
-                (left, right) = (one.next()?, two.next()?);
             }
         }
     }
-    Ok(difference)
+}
+
+/// Which trial of the second run is which of the first; those without another in the end.
+fn pairs(a: &[OfTrial], b: &[OfTrial]) -> Vec<(Option<usize>, Option<usize>)> {
+    let varies = |trials: &[OfTrial]| -> BTreeSet<String> {
+        let keys = trials.iter().flat_map(|trial| trial.settings.keys());
+        let differs =
+            |key: &&String| trials.iter().any(|trial| trial.settings.get(*key) != trials[0].settings.get(*key));
+        keys.filter(differs).cloned().collect()
+    };
+    let keys: BTreeSet<String> = varies(a).into_iter().chain(varies(b)).collect();
+    let identity = |trial: &OfTrial| keys.iter().map(|key| trial.settings.get(key).cloned()).collect::<Vec<_>>();
+    let mut left: Vec<Option<usize>> = (0..b.len()).map(Some).collect();
+    let mut pairs: Vec<(Option<usize>, Option<usize>)> = Vec::new();
+    for (place, trial) in a.iter().enumerate() {
+        // Of several alike the first that is left.
+        let same = left.iter_mut().find(|other| other.is_some_and(|k| identity(&b[k]) == identity(trial)));
+        pairs.push((Some(place), same.and_then(Option::take)));
+    }
+    pairs.extend(left.into_iter().flatten().map(|k| (None, Some(k))));
+    pairs
+}
+
+/// What differs in what the trials were told: what does so in all pairs alike is said once.
+fn configuration(a: &Told, b: &Told, pairs: &[(Option<usize>, Option<usize>)]) -> Vec<Change> {
+    let (mut found, mut alone) = (BTreeMap::<Change, Vec<&str>>::new(), Vec::new());
+    let mut both = 0;
+    for pair in pairs {
+        match *pair {
+            (Some(i), Some(j)) => {
+                both += 1;
+                for change in changes(&a.trials[i].settings, &b.trials[j].settings) {
+                    found.entry(change).or_default().push(&a.trials[i].name);
+                }
+            }
+            (here, there) => {
+                let name = here.map(|i| &a.trials[i].name).or(there.map(|j| &b.trials[j].name));
+                let is_there = |place: Option<usize>| place.map(|_| "there".to_owned());
+                let what = format!("trial {}", name.map_or("", String::as_str));
+                alone.push(Change { what, first: is_there(here), second: is_there(there) });
+            }
+        }
+    }
+    let mut all = Vec::new();
+    for (change, names) in found {
+        match names.len() == both {
+            true => all.push(change),
+            false => all.extend(
+                names.iter().map(|name| Change { what: format!("trial {name}: {}", change.what), ..change.clone() }),
+            ),
+        }
+    }
+    if a.trials.len() != b.trials.len() {
+        let count = |told: &Told| Some(told.trials.len().to_string());
+        all.push(Change { what: "trials".to_owned(), first: count(a), second: count(b) });
+    }
+    all.sort_by(|one, other| one.what.cmp(&other.what));
+    all.extend(alone);
+    all
 }
 
 impl Difference {
@@ -124,16 +199,23 @@ fn changes(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Ch
 
 /// What a run was told, from its manifest.
 struct Told {
-    settings: BTreeMap<String, String>,
     inputs: BTreeMap<String, String>,
-    /// The places of the trials, by name.
-    trials: BTreeMap<String, usize>,
+    trials: Vec<OfTrial>,
+}
+
+/// What one of its trials was told.
+struct OfTrial {
+    name: String,
+    /// Every setting by its dotted key.
+    settings: BTreeMap<String, String>,
 }
 
 /// What of `manifest.json` is compared.
 #[derive(Deserialize)]
 struct Manifest {
     format: String,
+    #[serde(default)]
+    state: String,
     trials: Vec<Entry>,
     inputs: Vec<Input>,
 }
@@ -153,38 +235,34 @@ struct Input {
 impl Told {
     fn read(folder: &Path) -> Result<Self, Fault> {
         let file = folder.join("manifest.json");
-        let text = read_text(&file).map_err(|fault| fault.remedy("name the folder of a finished run"))?;
+        let remedy = "name the folder of a finished run";
+        let text = read_text(&file).map_err(|fault| manifest::without(folder).unwrap_or(fault.remedy(remedy)))?;
         let manifest: Manifest = serde_json::from_str(&text)
             .map_err(|error| Fault::new("a manifest that cannot be read", &file).on_line(error.line()).value(error))?;
         if !manifest.format.starts_with("seafix-manifest/") {
             return Err(Fault::new("not a run's manifest", &file).value(manifest.format));
         }
+        let unfinished = match manifest.state.as_str() {
+            "shard" => Some("a shard of a run; join all with `seafix merge`"),
+            "running" | "interrupted" => Some("a run that did not end; go on with it with --resume"),
+            _ => None,
+        };
+        if let Some((what, remedy)) = unfinished.and_then(|said| said.split_once("; ")) {
+            return Err(Fault::new(what, &file).remedy(remedy));
+        }
         let mut trials = Vec::new();
-        for trial in &manifest.trials {
+        for trial in manifest.trials {
             let table: toml::Table = toml::from_str(&trial.configuration)
                 .map_err(|error| Fault::in_toml(&file, &trial.configuration, &error))?;
-            let mut leaves = BTreeMap::new();
-            flatten("", &table.into(), &mut leaves);
-            trials.push(leaves);
-        }
-        let mut settings = BTreeMap::from([("trials".to_owned(), trials.len().to_string())]);
-        for (place, leaves) in trials.iter().enumerate() {
-            for (key, value) in leaves {
-                // What all trials share is said once.
-                let shared = trials.iter().all(|other| other.get(key) == Some(value));
-                let key = if shared { key.clone() } else { format!("trial {}: {key}", place + 1) };
-                settings.insert(key, value.clone());
-            }
+            let mut settings = BTreeMap::new();
+            flatten("", &table.into(), &mut settings);
+            trials.push(OfTrial { name: trial.name, settings });
         }
         let inputs = manifest.inputs.into_iter().flat_map(|input| {
             let source = input.source;
             input.files.into_iter().map(move |(file, sum)| (format!("{source}: {file}"), sum))
         });
-        Ok(Self {
-            settings,
-            inputs: inputs.collect(),
-            trials: manifest.trials.into_iter().enumerate().map(|(place, trial)| (trial.name, place)).collect(),
-        })
+        Ok(Self { inputs: inputs.collect(), trials })
     }
 }
 
@@ -201,71 +279,100 @@ fn flatten(path: &str, value: &toml::Value, into: &mut BTreeMap<String, String>)
 
 /// One row of a table of results.
 struct Row {
-    /// The trial's place, the frame, and the attempt's place in the frame.
-    key: (usize, u64, u64),
+    /// The frame, and the attempt's place in it.
+    key: (u64, u64),
+    trial: String,
     object: String,
     cells: Vec<String>,
 }
 
 impl Row {
     fn name(&self) -> String {
-        let (trial, frame, _) = self.key;
-        format!("trial {} frame {frame} {}", trial + 1, self.object).trim_end().to_owned()
+        format!("trial {} frame {} {}", self.trial, self.key.0, self.object).trim_end().to_owned()
     }
 }
 
-/// A table of results, read row by row.
-struct Table<'a> {
-    file: std::path::PathBuf,
-    lines: std::io::Lines<BufReader<File>>,
+/// A table of results, read row by row, a trial at a time.
+struct Table {
+    file: PathBuf,
+    input: BufReader<File>,
     line: usize,
     columns: Vec<String>,
-    trials: &'a BTreeMap<String, usize>,
-    last: Option<(usize, u64, u64)>,
+    /// Where the rows of each trial begin: byte, and lines before. They stand together.
+    starts: BTreeMap<String, (u64, usize)>,
+    trial: Option<String>,
+    last: Option<(u64, u64)>,
 }
 
-impl<'a> Table<'a> {
-    fn open(folder: &Path, trials: &'a BTreeMap<String, usize>) -> Result<Self, Fault> {
+impl Table {
+    fn open(folder: &Path) -> Result<Self, Fault> {
         let file = folder.join("results.csv");
         let input = File::open(&file)
             .map_err(|error| Fault::new(format!("cannot read ({error})"), &file).remedy("name the folder of a run"))?;
-        let mut table =
-            Self { file, lines: BufReader::new(input).lines(), line: 0, columns: Vec::new(), trials, last: None };
+        let (input, starts) = (BufReader::new(input), BTreeMap::new());
+        let mut table = Self { file, input, line: 0, columns: Vec::new(), starts, trial: None, last: None };
         table.columns = table.cells()?.unwrap_or_default();
         for name in ["trial", "frame", "object"] {
             if !table.columns.iter().any(|column| column == name) {
                 return Err(Fault::new("a table without a column", &table.file).value(name));
             }
         }
-        Ok(table)
+        loop {
+            let start = (table.input.stream_position().map_err(|error| table.unreadable(&error))?, table.line);
+            let Some(cells) = table.cells()? else { return Ok(table) };
+            let trial = table.cell(&cells, "trial").to_owned();
+            table.starts.entry(trial).or_insert(start);
+        }
+    }
+
+    /// Goes to the rows of a trial; of none there are none.
+    fn begin(&mut self, trial: Option<&str>) -> Result<(), Fault> {
+        self.last = None;
+        let start = trial.and_then(|trial| Some((trial.to_owned(), *self.starts.get(trial)?)));
+        self.trial = start.as_ref().map(|(trial, _)| trial.clone());
+        if let Some((_, (byte, line))) = start {
+            self.line = line;
+            self.input.seek(SeekFrom::Start(byte)).map_err(|error| self.unreadable(&error))?;
+        }
+        Ok(())
+    }
+
+    fn unreadable(&self, error: &std::io::Error) -> Fault {
+        Fault::new(format!("cannot read ({error})"), &self.file).on_line(self.line)
+    }
+
+    fn cell<'c>(&self, cells: &'c [String], name: &str) -> &'c str {
+        let place = self.columns.iter().position(|column| column == name);
+        place.and_then(|place| cells.get(place)).map_or("", String::as_str)
     }
 
     fn cells(&mut self) -> Result<Option<Vec<String>>, Fault> {
         self.line += 1;
-        let line = self.lines.next().transpose();
-        let line = line.map_err(|error| Fault::new(format!("cannot read ({error})"), &self.file).on_line(self.line))?;
-        Ok(line.map(|line| cells(&line)))
+        let mut line = String::new();
+        let read = self.input.read_line(&mut line).map_err(|error| self.unreadable(&error))?;
+        Ok((read > 0).then(|| cells(line.trim_end_matches(['\n', '\r']))))
     }
 
+    /// The next row of the trial.
     fn next(&mut self) -> Result<Option<Row>, Fault> {
+        let Some(trial) = self.trial.clone() else { return Ok(None) };
         let Some(cells) = self.cells()? else { return Ok(None) };
         if cells.len() != self.columns.len() {
             let fault = Fault::new(format!("{} cells under {} heads", cells.len(), self.columns.len()), &self.file);
             return Err(fault.on_line(self.line));
         }
-        let cell = |name: &str| self.columns.iter().position(|column| column == name).map_or("", |i| &cells[i]);
-        let (trial, frame) = (self.trials.get(cell("trial")), cell("frame").parse::<u64>());
-        let (Some(&trial), Ok(frame)) = (trial, frame) else {
-            let value = format!("{} frame {}", cell("trial"), cell("frame"));
-            return Err(Fault::new("a row of no trial", &self.file).on_line(self.line).value(value));
-        };
-        let object = cell("object").to_owned();
-        let attempt = match self.last {
-            Some((before, at, attempt)) if (before, at) == (trial, frame) => attempt + 1,
-            _ => 0,
-        };
-        self.last = Some((trial, frame, attempt));
-        Ok(Some(Row { key: (trial, frame, attempt), object, cells }))
+        if self.cell(&cells, "trial") != trial {
+            self.trial = None;
+            return Ok(None);
+        }
+        let frame = self.cell(&cells, "frame").parse::<u64>().map_err(|_| {
+            let value = format!("{trial} frame {}", self.cell(&cells, "frame"));
+            Fault::new("a row of no frame", &self.file).on_line(self.line).value(value)
+        })?;
+        let object = self.cell(&cells, "object").to_owned();
+        let attempt = self.last.filter(|(at, _)| *at == frame).map_or(0, |(_, attempt)| attempt + 1);
+        self.last = Some((frame, attempt));
+        Ok(Some(Row { key: (frame, attempt), trial, object, cells }))
     }
 }
 
@@ -297,6 +404,34 @@ mod tests {
     fn fields_may_be_quoted() {
         assert_eq!(cells("a,\"b,\"\"c\"\"\",,d"), ["a", "b,\"c\"", "", "d"]);
         assert_eq!(cells(""), [""]);
+    }
+
+    fn trial(name: &str, settings: &[(&str, &str)]) -> OfTrial {
+        let settings = settings.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        OfTrial { name: name.to_owned(), settings }
+    }
+
+    #[test]
+    fn trials_belong_together_by_what_varies() {
+        let a = [trial("1", &[("solver", "x"), ("range", "2")]), trial("2", &[("solver", "y"), ("range", "2")])];
+        let b = [
+            trial("1", &[("solver", "y"), ("range", "2"), ("seed", "3")]),
+            trial("2", &[("solver", "x"), ("range", "2"), ("seed", "3")]),
+            trial("3", &[("solver", "x"), ("range", "5"), ("seed", "3")]),
+        ];
+        // The seed varies in neither: it is a difference, and parts nothing.
+        assert_eq!(pairs(&a, &b), [(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))]);
+        assert_eq!(pairs(&b, &a), [(Some(0), Some(1)), (Some(1), Some(0)), (Some(2), None)]);
+        let told = |trials| Told { inputs: BTreeMap::new(), trials };
+        let said: Vec<String> =
+            configuration(&told(a.into()), &told(b.into()), &[(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))])
+                .into_iter()
+                .map(|change| format!("{} {:?} {:?}", change.what, change.first, change.second))
+                .collect();
+        assert_eq!(said, ["seed None Some(\"3\")", "trials Some(\"2\") Some(\"3\")", "trial 3 None Some(\"there\")"]);
+        // Of trials that are alike the first belongs to the first.
+        let same = [trial("1", &[]), trial("2", &[])];
+        assert_eq!(pairs(&same, &same), [(Some(0), Some(0)), (Some(1), Some(1))]);
     }
 
     #[test]

@@ -1,8 +1,12 @@
 //! The experiment file, and its resolution into trials.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::Read as _,
+    path::{Path, PathBuf},
+};
 
-use seafix_component::{BuildError, Choice, Fault, line_of};
+use seafix_component::{BuildError, Choice, Fault, take_out};
+use seafix_log::looks_like;
 use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -11,9 +15,10 @@ use crate::{
     Axis, Helm, Logging, Navigation, Pipeline, Place, Stages,
     dataset::hex,
     pipeline::PipelineError,
-    read, read_text,
+    read::{self, Read, Texts},
+    read_text,
     source::{SOURCES, Source},
-    vary,
+    vary::{self, Cell},
 };
 
 /// An experiment as its file says it: one question, a source, a pipeline, what varies.
@@ -62,10 +67,10 @@ impl Experiment {
 
     /// Every setting that nothing can be built from.
     fn unfit(&self) -> Vec<Unfit> {
-        let source = SOURCES.resolve(&self.source).err().map(|error| Unfit::new(&["source"], error));
+        let source = SOURCES.faults(&self.source).into_iter().map(|error| Unfit::new(&["source"], error));
         let pipeline = self.pipeline.unfit().into_iter().map(Unfit::pipeline);
         let navigation = self.navigation.iter().flat_map(Navigation::unfit).map(Unfit::navigation);
-        source.into_iter().chain(pipeline).chain(navigation).collect()
+        source.chain(pipeline).chain(navigation).collect()
     }
 
     /// The experiment that a data set alone is: exactly one pipeline, the default.
@@ -182,30 +187,45 @@ impl Plan {
             let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
             let name = real.file_name().map_or(name, |name| name.to_string_lossy().into_owned());
             let experiment = changed(Experiment::of_dataset(path, &name), settings)?;
-            return Self::resolve(experiment, &name, Path::new(""), path, "", settings);
+            return Self::resolve(experiment, &name, Path::new(""), path, &Texts::of(path, ""), settings);
+        }
+        if let Some(fault) = another_kind(path) {
+            return Err(vec![fault]);
         }
         let text = read_text(path).map_err(|fault| vec![fault])?;
-        let experiment = read::experiment(path, &text)?;
+        let Read { experiment, mut faults, texts } = read::experiment(path, &text);
         let folder = path.parent().unwrap_or(Path::new(""));
-        Self::resolve(changed(experiment, settings)?, &name, folder, path, &text, settings)
+        let experiment = experiment.map(|experiment| changed(experiment, settings)).transpose();
+        let planned = experiment.and_then(|experiment| {
+            experiment.map(|known| Self::resolve(known, &name, folder, path, &texts, settings)).transpose()
+        });
+        match planned {
+            Ok(Some(plan)) if faults.is_empty() => return Ok(plan),
+            Ok(_) => {}
+            Err(more) => faults.extend(more),
+        }
+        // In the order of the file; what two ways of looking found is one fault.
+        faults.sort_by_key(|fault| (fault.file != path, fault.line, fault.column));
+        faults.dedup();
+        Err(faults)
     }
 
-    /// The plan of an experiment that `file`, whose text is `text`, holds; relative paths start from `folder`.
+    /// The plan of an experiment that `file` holds, as `texts` write it; relative paths start from `folder`.
     pub(crate) fn resolve(
         experiment: Experiment,
         name: &str,
         folder: &Path,
         file: &Path,
-        text: &str,
+        texts: &Texts,
         settings: &[String],
     ) -> Result<Self, Vec<Fault>> {
-        let fault = |path: &[&str], what: &str| Fault::new(what, file).on_line(line_of(text, path));
-        let unfit = |unfit: Unfit| {
+        let fault = |path: &[&str], what: &str| texts.fault(path, what);
+        let mut faults = vary::check(&experiment.vary, fault);
+        let unfit = experiment.unfit();
+        faults.extend(unfit.iter().map(|unfit| {
             let path: Vec<&str> = unfit.path.iter().map(String::as_str).collect();
             fault(&path, &unfit.message)
-        };
-        let mut faults = vary::check(&experiment.vary, fault);
-        faults.extend(experiment.unfit().into_iter().map(unfit));
+        }));
         if experiment.question.trim().is_empty() {
             faults.push(fault(&["question"], "no question").remedy("say in one sentence what the experiment asks"));
         }
@@ -220,71 +240,128 @@ impl Plan {
             faults.push(fault(&["repetitions"], "the seed varies already").remedy(remedy));
         }
         if !faults.is_empty() {
+            faults.extend(experiment.faults_of_axes(&unfit, folder, texts));
             return Err(faults);
         }
-        let base = experiment.resolved().map_err(|error| vec![unfit(error)])?;
-        let base = Experiment { vary: Vec::new(), repetitions: 1, ..base };
-        let base = toml::Table::try_from(&base).expect("an experiment is a table of plain values");
-
-        let mut trials = Vec::new();
-        for (index, cell) in vary::grid(&experiment.axes()).into_iter().enumerate() {
-            // A fault in one point of the grid belongs to the line of the axis whose key it is in.
-            let in_cell = |message: String, path: &[String]| {
-                let at = path.join(".");
-                let axis = experiment.vary.iter().position(|axis| axis.touches(&at));
-                let place = axis.map(|axis| axis.to_string());
-                let path: Vec<&str> = match &place {
-                    Some(place) => vec!["vary", place],
-                    None => path.iter().map(String::as_str).collect(),
-                };
-                vec![fault(&path, &message)]
-            };
-            let mut table = base.clone();
-            for (key, value) in cell.iter().flat_map(|place| &place.set) {
-                vary::set(&mut table, key, value.clone())
-                    .map_err(|message| in_cell(message, std::slice::from_ref(key)))?;
-            }
-            let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
-                let fault = Fault::in_toml(file, "", &error);
-                let last: Vec<String> = cell.last().map(|place| place.key.clone()).into_iter().collect();
-                let parts = [fault.value, fault.remedy].into_iter().filter(|part| !part.is_empty());
-                in_cell(std::iter::once(fault.what).chain(parts).collect::<Vec<_>>().join(", "), &last)
-            })?;
-            let mut trial = trial.resolved().map_err(|unfit| in_cell(unfit.message, &unfit.path))?;
-            let keyframes = trial.navigation.iter_mut().filter_map(|navigation| navigation.network.as_mut());
-            keyframes.for_each(|keyframes| keyframes.pin(folder));
-            let source =
-                SOURCES.build(&trial.source).map_err(|error| in_cell(error.to_string(), &["source".to_owned()]))?;
-            let stages = trial
-                .pipeline
-                .build()
-                .map_err(|error| in_cell(error.message, &["pipeline".to_owned(), error.setting.to_owned()]))?;
-            if stages.needs_pixels() && !source.has_pixels() {
-                let (solver, source) = (&trial.pipeline.solver.name, &trial.source.name);
-                let what =
-                    format!("solver `{solver}` needs pixels, which source `{source}` has not; use `mahalanobis`");
-                return Err(in_cell(what, &["pipeline".to_owned(), "solver".to_owned()]));
-            }
-            let helm = trial.navigation.as_ref().map(Navigation::build).transpose();
-            let helm =
-                helm.map_err(|error| in_cell(error.message, &["navigation".to_owned(), error.setting.to_owned()]))?;
-            if helm.as_ref().is_some_and(Helm::listens) && !source.may_hear() {
-                let source = &trial.source.name;
-                let what = format!(
-                    "goes by a Doppler log and a gyro, which source `{source}` has not; use `stereo`, or the source `dive`"
-                );
-                return Err(in_cell(what, &["navigation".to_owned(), "odometry".to_owned()]));
-            }
-            if helm.is_some() && trial.pipeline.target != TargetKind::Object {
-                let what = "navigation goes from object to object; use target = \"object\"".to_owned();
-                return Err(in_cell(what, &["pipeline".to_owned(), "target".to_owned()]));
-            }
-            trials.push(Trial { name: vary::name(index + 1, &cell), cell, resolved: trial, source, stages, helm });
-        }
+        let grid = vary::grid(&experiment.axes());
+        let trials = trials(&experiment, grid, folder, texts)?;
         let settings: String = settings.iter().map(|setting| format!(" --set '{setting}'")).collect();
         let command = format!("cargo run --release -- run {}{settings}", file.display());
         Ok(Self { name: name.to_owned(), folder: folder.to_owned(), command, experiment, trials })
     }
+}
+
+impl Experiment {
+    /// What is wrong with values of axes, looked at one by one, where something else is wrong too: that is left out.
+    fn faults_of_axes(&self, unfit: &[Unfit], folder: &Path, texts: &Texts) -> Vec<Fault> {
+        let mut table = toml::Table::try_from(self).expect("an experiment is a table of plain values");
+        let source_is_known = SOURCES.names().any(|name| name == self.source.name);
+        for Unfit { path, .. } in unfit {
+            match &path[..] {
+                [source] if source == "source" => drop(table.insert("source".to_owned(), "virtual-points".into())),
+                path => take_out(&mut table, path),
+            }
+        }
+        let Ok(rest) = table.try_into::<Self>() else { return Vec::new() };
+        let rest = Self { seed: 0, repetitions: 1, ..rest };
+        if !rest.unfit().is_empty() {
+            return Vec::new();
+        }
+        let sound = |axis: &&Axis| {
+            let quiet = |_: &[&str], what: &str| Fault::new(what, Path::new(""));
+            vary::check(std::slice::from_ref(*axis), quiet).is_empty() && (source_is_known || !axis.touches("source"))
+        };
+        let cells = self.vary.iter().filter(sound).flat_map(|axis| vary::grid(std::slice::from_ref(axis))).collect();
+        trials(&rest, cells, folder, texts).err().unwrap_or_default()
+    }
+}
+
+/// The trials of these points of the grid, or what is wrong with all of them.
+fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts) -> Result<Vec<Trial>, Vec<Fault>> {
+    let base = experiment.resolved().map_err(|Unfit { path, message }| {
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        vec![texts.fault(&path, &message)]
+    })?;
+    let base = Experiment { vary: Vec::new(), repetitions: 1, ..base };
+    let base = toml::Table::try_from(&base).expect("an experiment is a table of plain values");
+    let (mut trials, mut faults) = (Vec::new(), Vec::new());
+    for (index, cell) in grid.into_iter().enumerate() {
+        match trial(&base, index, cell, folder) {
+            Ok(trial) => trials.push(trial),
+            Err(Unfit { path, message }) => {
+                // A fault in one point of the grid belongs to the axis whose key it is in, and is that of many points.
+                let at = path.join(".");
+                let axis = experiment.vary.iter().position(|axis| axis.touches(&at)).map(|axis| axis.to_string());
+                let path: Vec<&str> = match &axis {
+                    Some(axis) => vec!["vary", axis],
+                    None => path.iter().map(String::as_str).collect(),
+                };
+                let fault = texts.fault(&path, &message);
+                if !faults.contains(&fault) {
+                    faults.push(fault);
+                }
+            }
+        }
+    }
+    if faults.is_empty() { Ok(trials) } else { Err(faults) }
+}
+
+/// The trial at one point of the grid.
+fn trial(base: &toml::Table, index: usize, cell: Cell, folder: &Path) -> Result<Trial, Unfit> {
+    let unfit = |message: String, path: &[&str]| Unfit { path: path.iter().map(|&s| s.to_owned()).collect(), message };
+    let mut table = base.clone();
+    for (key, value) in cell.iter().flat_map(|place| &place.set) {
+        vary::set(&mut table, key, value.clone()).map_err(|message| unfit(message, &[key]))?;
+    }
+    let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
+        let fault = Fault::in_toml(Path::new(""), "", &error);
+        let last: Vec<&str> = cell.last().map(|place| place.key.as_str()).into_iter().collect();
+        let parts = [fault.value, fault.remedy].into_iter().filter(|part| !part.is_empty());
+        unfit(std::iter::once(fault.what).chain(parts).collect::<Vec<_>>().join(", "), &last)
+    })?;
+    let mut trial = trial.resolved()?;
+    let keyframes = trial.navigation.iter_mut().filter_map(|navigation| navigation.network.as_mut());
+    keyframes.for_each(|keyframes| keyframes.pin(folder));
+    let source = SOURCES.build(&trial.source).map_err(|error| unfit(error.to_string(), &["source"]))?;
+    let stages = trial.pipeline.build().map_err(|error| unfit(error.message, &["pipeline", error.setting]))?;
+    if stages.needs_pixels() && !source.has_pixels() {
+        let (solver, source) = (&trial.pipeline.solver.name, &trial.source.name);
+        let what = format!("solver `{solver}` needs pixels, which source `{source}` has not; use `mahalanobis`");
+        return Err(unfit(what, &["pipeline", "solver"]));
+    }
+    let helm = trial.navigation.as_ref().map(Navigation::build).transpose();
+    let helm = helm.map_err(|error| unfit(error.message, &["navigation", error.setting]))?;
+    if helm.as_ref().is_some_and(Helm::listens) && !source.may_hear() {
+        let source = &trial.source.name;
+        let what = format!(
+            "goes by a Doppler log and a gyro, which source `{source}` has not; use `stereo`, or the source `dive`"
+        );
+        return Err(unfit(what, &["navigation", "odometry"]));
+    }
+    if helm.is_some() && trial.pipeline.target != TargetKind::Object {
+        let what = "navigation goes from object to object; use target = \"object\"".to_owned();
+        return Err(unfit(what, &["pipeline", "target"]));
+    }
+    Ok(Trial { name: vary::name(index + 1, &cell), cell, resolved: trial, source, stages, helm })
+}
+
+/// What a file is that is no experiment, by how it begins.
+fn another_kind(path: &Path) -> Option<Fault> {
+    // Reading a pipe would take its beginning away.
+    if !std::fs::metadata(path).is_ok_and(|file| file.is_file()) {
+        return None;
+    }
+    let mut start = Vec::new();
+    std::fs::File::open(path).ok()?.take(16).read_to_end(&mut start).ok()?;
+    let fault = Fault::new("not an experiment", path);
+    let source = "source = { name = \"mcap\", path = …, site = … }";
+    if start.starts_with(b"\x89MCAP0\r\n") {
+        let remedy =
+            format!("`seafix replay` runs a log again; a recording of ROS 2 needs an experiment file with {source}");
+        return Some(fault.value("an MCAP file").remedy(remedy));
+    }
+    let bag = start.starts_with(b"SQLite format 3") || start.starts_with(b"#ROSBAG");
+    bag.then(|| fault.value(looks_like(&start)).remedy(format!("then write an experiment file with {source}")))
 }
 
 /// The experiment with some of its settings changed from the command line.
@@ -303,7 +380,7 @@ mod tests {
     fn plan(text: &str) -> Result<Plan, String> {
         let experiment: Experiment =
             toml::from_str(text).map_err(|error| Fault::in_toml(Path::new("e.toml"), text, &error).to_string())?;
-        Plan::resolve(experiment, "e", Path::new(""), Path::new("e.toml"), text, &[])
+        Plan::resolve(experiment, "e", Path::new(""), Path::new("e.toml"), &Texts::of(Path::new("e.toml"), text), &[])
             .map_err(|faults| faults.iter().map(|fault| fault.to_string() + "\n").collect())
     }
 
@@ -369,13 +446,13 @@ mod tests {
         assert_eq!(
             message("question = 'why'\nsource = 'virtual-points'\n\n[pipeline]\nsolver = 'kabsh'\n").trim(),
             format!(
-                "no solver is called `kabsh`, did you mean `kabsch`? There are {} in e.toml:5",
+                "no solver is called `kabsh`, did you mean `kabsch`? There are {} in e.toml:5:1",
                 seafix_referencing::SOLVERS.names().collect::<Vec<_>>().join(", ")
             )
         );
         assert!(
             message("question = 'why'\nsorce = 'virtual-points'\n")
-                .starts_with("unknown key in e.toml:2: `sorce`; did you mean `source`?")
+                .starts_with("unknown key in e.toml:2:1: `sorce`; did you mean `source`?")
         );
         assert!(
             message(

@@ -23,7 +23,6 @@ pub(crate) struct Manifest {
     pub(crate) seafix: String,
     pub(crate) git: Git,
     pub(crate) machine: Machine,
-    pub(crate) threads: usize,
     pub(crate) seeds: BTreeMap<String, u64>,
     pub(crate) experiment: String,
     pub(crate) trials: Vec<TrialEntry>,
@@ -113,7 +112,6 @@ impl Manifest {
             seafix: env!("CARGO_PKG_VERSION").to_owned(),
             git: Git::here(),
             machine: Machine::here(),
-            threads: options.threads,
             seeds: BTreeMap::from([("experiment".to_owned(), plan.experiment.seed)]),
             experiment: plan.experiment.to_toml(),
             trials: plan.trials.iter().map(entry).collect(),
@@ -132,7 +130,8 @@ impl Manifest {
     /// A folder that has none, or one that this version cannot read.
     pub(crate) fn read(folder: &Path) -> Result<Self, Fault> {
         let file = folder.join(NAME);
-        let text = read_text(&file).map_err(|fault| fault.remedy("name the folder of a run"))?;
+        let text =
+            read_text(&file).map_err(|fault| without(folder).unwrap_or(fault.remedy("name the folder of a run")))?;
         let manifest: Self = serde_json::from_str(&text)
             .map_err(|error| Fault::new("a manifest that cannot be read", &file).on_line(error.line()).value(error))?;
         if !manifest.format.starts_with("seafix-manifest/1") {
@@ -172,6 +171,26 @@ impl Manifest {
         ];
         differing.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
     }
+}
+
+/// What is wrong with a folder that has logs and no manifest.
+pub(crate) fn without(folder: &Path) -> Option<Fault> {
+    let logs = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+    let mut logs: Vec<_> = logs.filter(|path| path.extension().is_some_and(|end| end == "mcap")).collect();
+    logs.sort();
+    let lacking = |path: &Path| {
+        let mut reader = seafix_log::Reader::open(path).ok()?.without_images().without_inputs();
+        reader.for_each_frame(drop).ok()?;
+        reader.recovered().map(str::to_owned)
+    };
+    let fault = Fault::new("logs without a manifest", folder).remedy("name the folder of a finished run");
+    let first = logs.first()?;
+    Some(match lacking(first) {
+        Some(lost) => Fault::new("logs that were saved of a run that is not whole", first)
+            .value(lost)
+            .remedy("`seafix report` and `seafix compare` read them; to have the run, --resume it"),
+        None => fault,
+    })
 }
 
 /// The name of its file.

@@ -18,7 +18,7 @@ use crate::{
     Keyframes, PipelineError, Sighting, Stages,
     explore::Explorer,
     odometry_fault::{Motions, OdometryFault},
-    pipeline::{build, resolve},
+    pipeline::{build, faults, resolve},
     record::rows6,
     source::{Eyes, Passage, Sight},
     stages::milliseconds,
@@ -71,14 +71,12 @@ impl Navigation {
 
     /// Every setting that it cannot be built with.
     pub(crate) fn unfit(&self) -> Vec<PipelineError> {
-        let parts = [
-            build(&ODOMETRIES, &self.odometry).map(drop),
-            build(&POLICIES, &self.policy).map(drop),
-            build(&FUSIONS, &self.fusion).map(drop),
-            self.sound(),
-            self.network.as_ref().map_or(Ok(()), Keyframes::check),
-        ];
-        parts.into_iter().filter_map(Result::err).collect()
+        let mut all = faults(&ODOMETRIES, &self.odometry);
+        all.extend(faults(&POLICIES, &self.policy));
+        all.extend(faults(&FUSIONS, &self.fusion));
+        let own = [self.sound(), self.network.as_ref().map_or(Ok(()), Keyframes::check)];
+        all.extend(own.into_iter().filter_map(Result::err));
+        all
     }
 
     /// Whether the faults are faults.

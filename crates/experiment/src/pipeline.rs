@@ -113,22 +113,27 @@ impl Pipeline {
 
     /// Every setting that it cannot be built with.
     pub(crate) fn unfit(&self) -> Vec<PipelineError> {
-        let parts = [
-            each_filter(&self.filters, build).map(drop),
-            build(&DETECTORS, &self.detector).map(drop),
-            build(&LOCATORS, &self.locator).map(drop),
-            build(&DESCRIPTORS, &self.descriptor).map(drop),
-            build(&MATCHERS, &self.matcher).map(drop),
-            build(&REFINEMENTS, &self.refine).map(drop),
-            build(&TRIANGULATORS, &self.triangulation).map(drop),
-            build(&SEARCHES, &self.search).map(drop),
-            build(&SOLVERS, &self.solver).map(drop),
+        let filters = self.filters.iter().enumerate().flat_map(|(place, choice)| {
+            let of = move |error: PipelineError| in_list(place, error);
+            faults(&FILTERS, choice).into_iter().map(of)
+        });
+        let mut all: Vec<PipelineError> = filters.collect();
+        all.extend(faults(&DETECTORS, &self.detector));
+        all.extend(faults(&LOCATORS, &self.locator));
+        all.extend(faults(&DESCRIPTORS, &self.descriptor));
+        all.extend(faults(&MATCHERS, &self.matcher));
+        all.extend(faults(&REFINEMENTS, &self.refine));
+        all.extend(faults(&TRIANGULATORS, &self.triangulation));
+        all.extend(faults(&SEARCHES, &self.search));
+        all.extend(faults(&SOLVERS, &self.solver));
+        let own = [
             fits("gate", self.gate.check()),
             fits("tolerance", self.tolerance.check()),
             fits("acceptance", self.acceptance.check()),
             fits("window", in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000")),
         ];
-        parts.into_iter().filter_map(Result::err).collect()
+        all.extend(own.into_iter().filter_map(Result::err));
+        all
     }
 
     /// Standard deviation of the coordinates of a key point that no corner was fitted to (px); none of a pipeline that
@@ -184,19 +189,24 @@ pub(crate) fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Resul
     registry.build(choice).map_err(|error| in_pipeline(registry, &error))
 }
 
+/// Everything that keeps a stage from being built.
+pub(crate) fn faults<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Vec<PipelineError> {
+    registry.faults(choice).iter().map(|error| in_pipeline(registry, error)).collect()
+}
+
+/// The fault of the filter in this place of the list.
+fn in_list(place: usize, error: PipelineError) -> PipelineError {
+    let below = error.key.map_or_else(String::new, |key| format!(".{key}"));
+    PipelineError { setting: "filters", key: Some(format!("{place}{below}")), ..error }
+}
+
 /// What `make` makes of each filter; an error names its place in the list.
 fn each_filter<T>(
     choices: &[Choice],
     make: fn(&Registry<dyn Filter>, &Choice) -> Result<T, PipelineError>,
 ) -> Result<Vec<T>, PipelineError> {
-    let in_list = |(place, choice): (usize, &Choice)| {
-        make(&FILTERS, choice).map_err(|error| PipelineError {
-            setting: "filters",
-            key: Some(place.to_string()),
-            ..error
-        })
-    };
-    choices.iter().enumerate().map(in_list).collect()
+    let one = |(place, choice)| make(&FILTERS, choice).map_err(|error| in_list(place, error));
+    choices.iter().enumerate().map(one).collect()
 }
 
 fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {

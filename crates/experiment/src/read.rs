@@ -1,42 +1,115 @@
-//! Reading an experiment file: all its faults at once, and the file it is based on.
+//! Reading an experiment file, all its faults at once, and the file it is based on.
 
-use std::path::Path;
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
-use seafix_component::{Fault, line_of, read_text};
+use seafix_component::{Fault, place_of, read_text};
+use serde::Deserialize;
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue, Deserializer},
+};
 
 use crate::Experiment;
 
-/// The experiment that `file`, whose text is `text`, holds. `base = "other.toml"` names a file whose settings hold where
-/// this one has none of its own.
-pub(crate) fn experiment(file: &Path, text: &str) -> Result<Experiment, Vec<Fault>> {
-    let own: toml::Table = toml::from_str(text).map_err(|error| vec![Fault::in_toml(file, text, &error)])?;
-    let Some(base) = own.get("base") else { return parsed(file, text) };
-    let fault = |what: &str| Fault::new(what, file).on_line(line_of(text, &["base"])).value(base);
-    let name =
-        base.as_str().ok_or_else(|| vec![fault("a base that is no file").remedy("write base = \"FILE.toml\"")])?;
-    let path = file.parent().unwrap_or(Path::new("")).join(name);
-    let below = read_text(&path).map_err(|error| vec![fault(&format!("no base ({error})"))])?;
-    let mut whole: toml::Table = toml::from_str(&below).map_err(|error| vec![Fault::in_toml(&path, &below, &error)])?;
-    if whole.contains_key("base") {
-        let fault = Fault::new("a base that has a base of its own", &path).on_line(line_of(&below, &["base"]));
-        return Err(vec![fault.remedy("an experiment has at most one")]);
-    }
-    let mut rest = own.clone();
-    rest.remove("base");
-    lay_over(&mut whole, rest);
-    whole.try_into().map_err(|error| {
-        // Each file tells its own faults, with their lines.
-        let blank = blanked(text, line_of(text, &["base"]).unwrap_or(0));
-        let faults: Vec<Fault> = faults(file, &blank).into_iter().chain(faults(&path, &below)).collect();
-        if faults.is_empty() { vec![Fault::in_toml(file, "", &error)] } else { faults }
-    })
+/// The texts that an experiment is read from: its own, then that of its base.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Texts {
+    files: Vec<(PathBuf, String)>,
 }
 
-fn parsed(file: &Path, text: &str) -> Result<Experiment, Vec<Fault>> {
-    toml::from_str(text).map_err(|error| {
-        let faults = faults(file, text);
-        if faults.is_empty() { vec![Fault::in_toml(file, text, &error)] } else { faults }
-    })
+impl Texts {
+    /// One file.
+    pub(crate) fn of(file: &Path, text: &str) -> Self {
+        Self { files: vec![(file.to_owned(), text.to_owned())] }
+    }
+
+    /// The fault `what` of the setting at `path`, in the file that says it.
+    pub(crate) fn fault(&self, path: &[&str], what: &str) -> Fault {
+        let places = self.files.iter().map(|(file, text)| (file, place_of(text, path)));
+        // Where both say as much, the later word is that of the experiment's own file, which is first.
+        let best = places.reduce(|best, next| match (&best.1, &next.1) {
+            (Some((depth, _)), Some((deeper, _))) if deeper > depth => next,
+            (None, Some(_)) => next,
+            _ => best,
+        });
+        match best {
+            Some((file, place)) => Fault::new(what, file).at(place.map(|(_, place)| place)),
+            None => Fault::new(what, Path::new("the experiment")),
+        }
+    }
+}
+
+/// An experiment as far as it can be read.
+pub(crate) struct Read {
+    /// It without what is at fault; `None` where nothing is left.
+    pub(crate) experiment: Option<Experiment>,
+    /// What is at fault.
+    pub(crate) faults: Vec<Fault>,
+    /// Where it stands.
+    pub(crate) texts: Texts,
+}
+
+/// The experiment that `file`, whose text is `text`, holds. `base = "other.toml"` names a file whose settings hold where
+/// this one has none of its own.
+pub(crate) fn experiment(file: &Path, text: &str) -> Read {
+    let (mut texts, mut faults) = (Texts::of(file, text), Vec::new());
+    let mut whole = toml::Table::new();
+    if let Some(base) = DeTable::parse_recoverable(text).0.get_ref().get("base") {
+        match base_of(file, base.get_ref().as_str()) {
+            Ok((path, below)) => {
+                let (table, more) = sifted(&path, &below, &whole);
+                if table.contains_key("base") {
+                    let fault = Fault::new("a base that has a base of its own", &path);
+                    let place = place_of(&below, &["base"]).map(|(_, place)| place);
+                    faults.push(fault.at(place).remedy("an experiment has at most one"));
+                }
+                whole = table;
+                whole.remove("base");
+                faults.extend(more);
+                texts.files.push((path, below));
+            }
+            Err((what, remedy)) => {
+                let value = text.get(base.span()).unwrap_or_default();
+                faults.push(texts.fault(&["base"], &what).value(value).remedy(remedy));
+            }
+        }
+    }
+    let (mut own, told) = sifted(file, text, &whole);
+    own.remove("base");
+    faults.splice(0..0, told);
+    lay_over(&mut whole, own);
+    for (key, stand_in, remedy) in [
+        ("question", "why?", "say in one sentence what the experiment asks"),
+        (
+            "source",
+            "virtual-points",
+            "say where the frames come from: source = \"NAME\"; `seafix list sources` names them",
+        ),
+    ] {
+        if !whole.contains_key(key) {
+            // What was at fault has been told already.
+            let named = |(_, text): &(PathBuf, String)| place_of(text, &[key]).is_some();
+            if !texts.files.iter().any(named) && !faults.iter().any(|fault| fault.what.starts_with("no base")) {
+                faults.push(Fault::new(format!("no `{key}`"), file).remedy(remedy));
+            }
+            whole.insert(key.to_owned(), stand_in.into());
+        }
+    }
+    let experiment = whole.try_into().map_err(|error| faults.push(Fault::in_toml(file, "", &error))).ok();
+    Read { experiment, faults, texts }
+}
+
+/// The file that `base` names, and its text.
+fn base_of(file: &Path, base: Option<&str>) -> Result<(PathBuf, String), (String, &'static str)> {
+    let name = base.ok_or_else(|| ("a base that is no file".to_owned(), "write base = \"FILE.toml\""))?;
+    let path = file.parent().unwrap_or(Path::new("")).join(name);
+    match read_text(&path) {
+        Ok(text) => Ok((path, text)),
+        Err(error) => Err((format!("no base ({error})"), "a base is a file, relative to the experiment's")),
+    }
 }
 
 /// The settings of `over` in place of those of `whole`; tables one by one, all else as a whole.
@@ -58,32 +131,123 @@ fn same_component(below: &toml::Table, above: &toml::Table) -> bool {
     above.get("name").is_none_or(|name| below.get("name").is_none_or(|known| known == name))
 }
 
-/// Every fault that the reader finds, line by line: a line with a fault is read as if it were empty. What is missing is
-/// not among them.
-fn faults(file: &Path, text: &str) -> Vec<Fault> {
-    let (mut rest, mut faults) = (text.to_owned(), Vec::new());
-    while let Err(error) = toml::from_str::<Experiment>(&rest) {
-        let Some(span) = error.span().filter(|_| !error.message().starts_with("missing field")) else { break };
+/// The settings of a file that can be read, and what is at fault: that is taken out, and the rest read again. Tables that lie over
+/// ones in `below` may leave their component's name to them.
+fn sifted(file: &Path, text: &str, below: &toml::Table) -> (toml::Table, Vec<Fault>) {
+    let (mut document, errors) = DeTable::parse_recoverable(text);
+    let mut faults: Vec<Fault> = errors.iter().map(|error| Fault::in_toml(file, text, error)).collect();
+    let broken: Vec<Option<usize>> = faults.iter().map(|fault| fault.line).collect();
+    loop {
+        let mut settings = document.clone();
+        settings.get_mut().remove("base");
+        name(settings.get_mut(), below);
+        for (key, value) in stand_ins().into_inner() {
+            if settings.get_ref().get(&**key.get_ref()).is_none() {
+                settings.get_mut().insert(key, value);
+            }
+        }
+        let Err(error) = Experiment::deserialize(Deserializer::from(settings)) else { break };
         let fault = Fault::in_toml(file, text, &error);
-        let Some(line) = fault.line.filter(|_| !text[span].trim().is_empty()) else { break };
-        let next = blanked(&rest, line);
-        if next == rest || toml::from_str::<toml::Table>(&next).is_err() {
+        let path = error.span().and_then(|span| smallest(document.get_ref(), &span));
+        // What follows from a fault of the writing itself is none of its own.
+        if !broken.contains(&fault.line) || broken.is_empty() {
             faults.push(fault);
+        }
+        let Some(path) = path else { break };
+        if !without(&mut document, &path) {
             break;
         }
-        faults.push(fault);
-        rest = next;
     }
-    faults
+    let table = toml::Table::deserialize(Deserializer::from(document)).unwrap_or_default();
+    (table, faults)
 }
 
-/// The text with blanks for everything on one line (from 1).
-fn blanked(text: &str, line: usize) -> String {
-    let blank = |(index, content): (usize, &str)| match index + 1 == line {
-        true => content.bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect(),
-        false => content.to_owned(),
-    };
-    text.split_inclusive('\n').enumerate().map(blank).collect()
+/// Names the components whose names only the tables below have.
+fn name(settings: &mut DeTable<'_>, below: &toml::Table) {
+    for (key, value) in settings.iter_mut() {
+        let (DeValue::Table(own), Some(toml::Value::Table(below))) = (value.get_mut(), below.get(&**key.get_ref()))
+        else {
+            continue;
+        };
+        if let (Some(known), None) = (below.get("name").and_then(toml::Value::as_str), own.get("name")) {
+            let known = DeValue::String(known.to_owned().into());
+            own.insert(Spanned::new(0..0, "name".into()), Spanned::new(0..0, known));
+        }
+        name(own, below);
+    }
+}
+
+/// What every experiment has, for a file that leaves it to its base.
+fn stand_ins() -> Spanned<DeTable<'static>> {
+    DeTable::parse("question = 'why?'\nsource = 'virtual-points'\n").expect("two settings")
+}
+
+/// The path to the smallest setting that `span` lies in.
+fn smallest(table: &DeTable<'_>, span: &Range<usize>) -> Option<Vec<String>> {
+    fn look(
+        path: &mut Vec<String>,
+        (at, value): (Range<usize>, &Spanned<DeValue<'_>>),
+        span: &Range<usize>,
+        best: &mut Option<(usize, Vec<String>)>,
+    ) {
+        for place in [at, value.span()] {
+            let holds = place.start <= span.start && span.end <= place.end;
+            if holds && best.as_ref().is_none_or(|(length, _)| place.len() <= *length) {
+                *best = Some((place.len(), path.clone()));
+            }
+        }
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                for (key, value) in table {
+                    path.push(key.get_ref().to_string());
+                    look(path, (key.span(), value), span, best);
+                    path.pop();
+                }
+            }
+            DeValue::Array(list) => {
+                for (k, value) in list.iter().enumerate() {
+                    path.push(k.to_string());
+                    look(path, (value.span(), value), span, best);
+                    path.pop();
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut best = None;
+    for (key, value) in table {
+        look(&mut vec![key.get_ref().to_string()], (key.span(), value), span, &mut best);
+    }
+    best.map(|(_, path)| path)
+}
+
+/// Takes the setting at `path` out of the document; `false` where it is not there.
+fn without(document: &mut Spanned<DeTable<'_>>, path: &[String]) -> bool {
+    fn out(value: &mut DeValue<'_>, path: &[String]) -> bool {
+        match (value, path) {
+            (DeValue::Table(table), path) => out_of(table, path),
+            (DeValue::Array(list), [step]) => {
+                let Ok(k) = step.parse::<usize>() else { return false };
+                let rest = list.clone().into_iter().enumerate().filter(|(i, _)| *i != k);
+                *list = rest.map(|(_, value)| value).collect();
+                true
+            }
+            (DeValue::Array(list), [step, rest @ ..]) => {
+                let place = step.parse::<usize>().ok().and_then(|k| list.get_mut(k));
+                place.is_some_and(|value| out(value.get_mut(), rest))
+            }
+            _ => false,
+        }
+    }
+    fn out_of(table: &mut DeTable<'_>, path: &[String]) -> bool {
+        let Some((step, rest)) = path.split_first() else { return false };
+        if rest.is_empty() {
+            return table.remove(step.as_str()).is_some();
+        }
+        let mut entries = table.iter_mut();
+        entries.find(|(key, _)| key.get_ref() == step.as_str()).is_some_and(|(_, value)| out(value.get_mut(), rest))
+    }
+    out_of(document.get_mut(), path)
 }
 
 #[cfg(test)]
@@ -92,17 +256,41 @@ mod tests {
     use std::fs;
 
     fn said(file: &Path, text: &str) -> Vec<String> {
-        experiment(file, text).unwrap_err().iter().map(ToString::to_string).collect()
+        experiment(file, text).faults.iter().map(ToString::to_string).collect()
     }
 
     #[test]
     fn all_faults_are_told_at_once() {
-        let text = "question = 'why'\nsorce = 'dive'\nsource = 'dive'\n[pipeline]\nsolvr = 'kabsch'\nwindow = 'two'\n";
+        let text =
+            "question = 'why'\nsorce = 'dive'\nsource = 'dive'\n[pipeline]\nsolvr = 'kabsch'\n  window = 'two'\n";
         let said = said(Path::new("e.toml"), text);
         assert_eq!(said.len(), 3, "{said:?}");
-        assert!(said[0].contains("e.toml:2: `sorce`; did you mean `source`?"));
-        assert!(said[1].contains("e.toml:5: `solvr`; did you mean `solver`?"));
-        assert!(said[2].contains("e.toml:6"));
+        assert!(said[0].contains("e.toml:2:1: `sorce`; did you mean `source`?"));
+        assert!(said[1].contains("e.toml:5:1: `solvr`; did you mean `solver`?"));
+        assert!(said[2].contains("e.toml:6:12"));
+        assert!(said[2].starts_with("not a whole number of at least 0: string \"two\""), "{said:?}");
+    }
+
+    #[test]
+    fn several_faults_may_stand_on_one_line_and_in_one_list() {
+        let text = "source = { nam = 'dive' }\nseed = -1\nseed = 2\nrepetitions = 'x\n[[vary]]\nvalues = [1]\n\
+                    [[vary]]\nkey = 'seed'\nvalus = 3\nvalues = [1]\n[log]\nimages = 'al'\nx = 1\n";
+        let said = said(Path::new("e.toml"), text);
+        let parts = [
+            "no `question`",
+            "e.toml:1:10",
+            "e.toml:2:8",
+            "e.toml:3:1",
+            "e.toml:4:",
+            "e.toml:5:1: ",
+            "`key` is missing",
+            "e.toml:9:1: `valus`; did you mean `values`?",
+            "did you mean `all`?",
+            "e.toml:13:1",
+        ];
+        for part in parts {
+            assert!(said.iter().any(|line| line.contains(part)), "no {part} in {said:#?}");
+        }
     }
 
     #[test]
@@ -112,11 +300,12 @@ mod tests {
         let base = "question = 'how far?'\nseed = 3\nsource = { name = 'dive', frames = 9 }\n";
         fs::write(at("base.toml"), base).unwrap();
         let own = "base = 'base.toml'\nquestion = 'how near?'\n[source]\nrate = 2.0\n";
-        let read = experiment(&at("e.toml"), own).unwrap();
+        let read = experiment(&at("e.toml"), own).experiment.unwrap();
         assert_eq!((read.question.as_str(), read.seed), ("how near?", 3));
         assert_eq!((&read.source.settings["frames"], &read.source.settings["rate"]), (&9.into(), &2.0.into()));
         // Another component keeps nothing of the base's.
-        let other = experiment(&at("e.toml"), "base = 'base.toml'\nsource = { name = 'virtual-points' }\n").unwrap();
+        let other = experiment(&at("e.toml"), "base = 'base.toml'\nsource = { name = 'virtual-points' }\n");
+        let other = other.experiment.unwrap();
         assert!(other.source.settings.is_empty());
 
         assert!(said(&at("e.toml"), "base = 'bse.toml'\n")[0].contains("e.toml:1"));

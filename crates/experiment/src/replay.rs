@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use seafix_component::{Choice, Fault};
 use seafix_log::Reader;
 
-use crate::{Axis, Experiment, Pipeline, Plan, vary};
+use crate::{Axis, Experiment, Pipeline, Plan, read::Texts, vary};
 
 /// Which of a log's frames a replay starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -40,6 +40,22 @@ impl Replay {
     /// A log that cannot be read, or a setting that cannot be.
     pub fn plan(&self, log: &Path) -> Result<Plan, Vec<Fault>> {
         let fault = |what: &str| vec![Fault::new(what, log)];
+        if log.is_dir() {
+            let mut logs: Vec<String> = std::fs::read_dir(log)
+                .into_iter()
+                .flatten()
+                .flatten()
+                .map(|entry| entry.path())
+                .filter(|path| path.extension().is_some_and(|end| end == "mcap"))
+                .map(|path| path.display().to_string())
+                .collect();
+            logs.sort();
+            let remedy = match &logs[..] {
+                [] => "name the log of a trial, an .mcap file".to_owned(),
+                [first, rest @ ..] => format!("name one of the {} logs in it, for instance {first}", rest.len() + 1),
+            };
+            return Err(vec![Fault::new("a folder, not the log of a trial", log).remedy(remedy)]);
+        }
         let reader = Reader::open(log).map_err(|error| fault(&error.to_string()))?;
         let header = reader.header().clone();
         let logged: Experiment = toml::from_str(&header.configuration)
@@ -76,7 +92,7 @@ impl Replay {
         let replayed = Experiment { source, vary: vary.into_iter().flatten().collect(), ..changed };
         let name = format!("replay-{}", header.trial);
         let folder = folder_of_network(&replayed, &file);
-        let mut plan = Plan::resolve(replayed, &name, &folder, log, "", &[])?;
+        let mut plan = Plan::resolve(replayed, &name, &folder, log, &Texts::of(log, ""), &[])?;
         plan.command = self.command(log);
         if let [trial] = &mut plan.trials[..] {
             trial.name.clone_from(&header.trial);

@@ -21,10 +21,7 @@ impl Thinned {
         if frame.frame.is_multiple_of(self.totals.every) {
             return true;
         }
-        let failed = |target: &seafix_log::TargetRecord| {
-            target.outcome != Outcome::Referenced || target.evaluation.wrong == Some(true)
-        };
-        if !frame.targets.iter().any(failed) {
+        if !failed(frame) {
             return false;
         }
         let room = self.failures > 0;
@@ -35,6 +32,14 @@ impl Thinned {
         }
         room
     }
+}
+
+/// Whether something was refused in a frame, or is wrong.
+pub(crate) fn failed(frame: &FrameRecord) -> bool {
+    let failed = |target: &seafix_log::TargetRecord| {
+        target.outcome != Outcome::Referenced || target.evaluation.wrong == Some(true)
+    };
+    frame.targets.iter().any(failed)
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ fn every_experiment_states_its_cost() {
             let units = [" s of one core (", " min of one core (", " h of one core ("];
             let timed = units.iter().any(|unit| spent.contains(unit));
             let stored = spent.ends_with("MB of log") || spent.ends_with("GB of log");
-            (timed && stored && ["measured", "estimated"].contains(&how)).then_some(())
+            (timed && stored && ["measured", "estimated", "time measured, log estimated"].contains(&how)).then_some(())
         };
         if costs.len() != 1 || states(&costs[0]).is_none() {
             wrong.push(format!("{}: {counts}… against {costs:?}", file.display()));

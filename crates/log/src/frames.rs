@@ -54,6 +54,11 @@ impl Frames {
         &self.header
     }
 
+    /// What the log lacks, where it was saved of one that was not whole.
+    pub fn recovered(&self) -> Option<&str> {
+        self.recording.recovered()
+    }
+
     /// How many frames the log holds.
     pub fn len(&self) -> usize {
         self.frames.len()

@@ -12,7 +12,22 @@ use crate::{LogError, Reader, Totals, Writer, convert, read::Message, topic};
 ///
 /// # Errors
 /// [`LogError`]: a part that cannot be read, is damaged or is of another trial, or a log that cannot be written.
-pub fn join(parts: &[impl AsRef<Path>], to: &Path, mut go_on: impl FnMut() -> bool) -> Result<bool, LogError> {
+pub fn join(parts: &[impl AsRef<Path>], to: &Path, go_on: impl FnMut() -> bool) -> Result<bool, LogError> {
+    join_lacking(parts, to, None, go_on)
+}
+
+/// The same of parts of which some are `lacking`, in words: the log says so, as one does that [`recover`](crate::recover)
+/// saved.
+///
+/// # Errors
+/// As [`join`].
+pub fn join_lacking(
+    parts: &[impl AsRef<Path>],
+    to: &Path,
+    lacking: Option<&str>,
+    mut go_on: impl FnMut() -> bool,
+) -> Result<bool, LogError> {
+    let mut lost: Vec<String> = lacking.map(str::to_owned).into_iter().collect();
     let mut writer: Option<Writer> = None;
     let mut totals = Totals::default();
     for part in parts {
@@ -49,11 +64,15 @@ pub fn join(parts: &[impl AsRef<Path>], to: &Path, mut go_on: impl FnMut() -> bo
             written?;
             read = next?;
         }
+        lost.extend(reader.recovered().map(str::to_owned));
     }
     let Some(mut writer) = writer else {
         return Err(LogError::Record { path: to.to_owned(), what: "there are no parts".to_owned() });
     };
     writer.totals(&totals)?;
+    if !lost.is_empty() {
+        writer.lacks(&lost.join("; "))?;
+    }
     writer.finish()?;
     Ok(true)
 }

@@ -39,7 +39,8 @@
 //! | `/model`, `/scene/model` | `foxglove.PointCloud`, `foxglove.SceneUpdate` | once: the feature points |
 //! | `/pose/estimate`, `/pose/truth`, `/pose/prior` | `foxglove.PoseInFrame` | the vehicle |
 //!
-//! Attachments `configuration.toml` and `site.toml`; metadata record `run`.
+//! Attachments `configuration.toml` and `site.toml`; metadata record `run`, and `recovered` in what [`recover`] saved of a
+//! log that was not whole.
 //!
 //! # Conventions
 //!
@@ -69,9 +70,9 @@ mod write;
 
 pub use error::LogError;
 pub use frames::Frames;
-pub use join::join;
+pub use join::{join, join_lacking};
 pub use png::encode_png;
-pub use read::{Reader, TrialLog, read};
+pub use read::{Reader, TrialLog, looks_like, read};
 pub use record::{
     Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, Evaluation, ExactPose, FrameRecord,
     FrameTimes, GreyImage, Inputs, InspectedPoint, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord,

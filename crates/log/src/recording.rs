@@ -11,7 +11,7 @@ use std::{
 
 use mcap::records::{self, Record};
 
-use crate::{LogError, read::looks_like, recover::chunk};
+use crate::{LogError, read::looks_like, recover::chunk, topic};
 
 /// A channel of a recording: its topic, and what its messages are said to be.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,6 +55,7 @@ pub struct Recording {
     topics: Vec<Topic>,
     entries: Vec<Entry>,
     is_protected: bool,
+    recovered: Option<String>,
     last_chunk: Mutex<Option<(u64, Chunk)>>,
 }
 
@@ -91,10 +92,12 @@ impl Recording {
             messages: 0,
             last_ns: 0,
             is_protected: true,
+            recovered: None,
         };
         walk.through(&mut input)?;
-        let Walk { topics, entries, is_protected, .. } = walk;
-        Ok(Self { path: path.to_owned(), size, topics, entries, is_protected, last_chunk: Mutex::new(None) })
+        let Walk { topics, entries, is_protected, recovered, .. } = walk;
+        let path = path.to_owned();
+        Ok(Self { path, size, topics, entries, is_protected, recovered, last_chunk: Mutex::new(None) })
     }
 
     /// The file.
@@ -115,6 +118,11 @@ impl Recording {
     /// Whether check sums covered all that was read.
     pub fn is_protected(&self) -> bool {
         self.is_protected
+    }
+
+    /// What the file lacks, where [`recover`](crate::recover) saved it of one that was not whole.
+    pub fn recovered(&self) -> Option<&str> {
+        self.recovered.as_deref()
     }
 
     /// The bytes of a message.
@@ -212,6 +220,7 @@ struct Walk<'a, W> {
     last_ns: u64,
     /// Whether a check sum of its own covers every chunk, and whether all messages are in chunks.
     is_protected: bool,
+    recovered: Option<String>,
 }
 
 impl<W: Fn(&Topic) -> bool> Walk<'_, W> {
@@ -330,6 +339,7 @@ impl<W: Fn(&Topic) -> bool> Walk<'_, W> {
                     return Err(LogError::TooLarge { path: self.path.to_owned(), what });
                 }
             }
+            Record::Metadata(metadata) => self.recovered = self.recovered.take().or_else(|| topic::lost(&metadata)),
             _ => {}
         }
         Ok(())

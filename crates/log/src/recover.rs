@@ -35,7 +35,8 @@ pub struct Recovered {
 /// Every chunk and attachment whose check sum holds is kept, in order; metadata records, which have none
 /// of their own, as they stand. Of a
 /// trial's log only whole frames are kept, so that [`read`](crate::read) takes it; a chunk lost in the
-/// middle may cost the frame after it as well. Never is a message changed.
+/// middle may cost the frame after it as well. Never is a message changed. Where anything is lost a metadata record
+/// `recovered` says what: [`Reader::recovered`](crate::Reader::recovered).
 ///
 /// # Errors
 /// [`LogError`] when `from` is no MCAP file, nothing in it can be read, or `to` cannot be written.
@@ -65,7 +66,10 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
         }
         let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
         if length > size - at - 9 {
-            output.found.lost.push(lost(format!("a record of {length} bytes that the file does not hold")));
+            let rest = size - at - 9;
+            output.found.lost.push(lost(format!(
+                "all behind a damaged head of a record, which claims more than the {rest} bytes left,"
+            )));
             break;
         }
         let mut body = vec![0; usize::try_from(length).unwrap_or(usize::MAX)];
@@ -319,6 +323,15 @@ impl Output {
             let _ = std::fs::remove_file(&self.partial);
             return Err(LogError::Lost { path: from.to_owned(), what: self.found.lost.join("; ") });
         }
+        let mut lost = self.found.lost.clone();
+        if self.found.dropped > 0 {
+            lost.push(format!("{} messages of torn frames", self.found.dropped));
+        }
+        if !lost.is_empty() {
+            // Nobody shall take it for whole.
+            let mark = topic::recovered(&lost.join("; "));
+            self.mcap.write_metadata(&mark).map_err(|error| unwritten(&self.partial, error))?;
+        }
         self.mcap.finish().map_err(|error| unwritten(&self.partial, error))?;
         let mut buffer = self.mcap.into_inner();
         let done = buffer.flush().and_then(|()| buffer.get_ref().sync_all());
@@ -326,12 +339,18 @@ impl Output {
             doing: "write",
             path: self.partial.clone(),
             source,
-            remedy: "make room on the disk",
+            remedy: REMEDY,
         })?;
         Ok(self.found)
     }
 }
 
 fn unwritten(partial: &Path, error: McapError) -> LogError {
-    LogError::Write { path: partial.to_owned(), message: error.to_string() }
+    match error {
+        // The library's own words leave out why.
+        McapError::Io(source) => LogError::Io { doing: "write", path: partial.to_owned(), source, remedy: REMEDY },
+        error => LogError::Write { path: partial.to_owned(), message: error.to_string() },
+    }
 }
+
+const REMEDY: &str = "make room on the disk, or choose another place with --out";

@@ -111,3 +111,17 @@ pub(crate) const OF_FRAMES: [(&str, Schema); 18] = [
     (INPUTS, proto::Inputs::schema),
     (FRAME, proto::Frame::schema),
 ];
+
+/// The metadata record of a log that was saved of one that was not whole.
+pub(crate) const RECOVERED: &str = "recovered";
+
+/// That record: what is lost.
+pub(crate) fn recovered(lost: &str) -> mcap::records::Metadata {
+    let metadata = std::collections::BTreeMap::from([("lost".to_owned(), lost.to_owned())]);
+    mcap::records::Metadata { name: RECOVERED.to_owned(), metadata }
+}
+
+/// What is lost, by that record; nothing by any other.
+pub(crate) fn lost(metadata: &mcap::records::Metadata) -> Option<String> {
+    (metadata.name == RECOVERED).then(|| metadata.metadata.get("lost").cloned().unwrap_or_default())
+}

@@ -35,6 +35,8 @@ pub(crate) struct Trial {
     pub(crate) frames: Vec<Frame>,
     /// What all frames add up to, logged or not; `None` where the log does not say.
     pub(crate) totals: Option<Totals>,
+    /// What the log lacks, where it was saved of one that was not whole.
+    pub(crate) lacks: Option<String>,
     /// Whether images were looked at, or no frame at all; without images the points came as they are.
     pub(crate) images: bool,
     /// Whether the log has its images.
@@ -140,6 +142,7 @@ impl Trial {
             header: reader.header().clone(),
             frames: Vec::new(),
             totals: None,
+            lacks: None,
             images: false,
             pictures: false,
             disparity: (0.0, 0),
@@ -160,6 +163,7 @@ impl Trial {
         trial.images = trial.frames.is_empty() || trial.header.components.iter().any(|c| c.stage == "detector");
         trial.pictures = reader.has_images();
         trial.totals = reader.totals().cloned();
+        trial.lacks = reader.recovered().map(str::to_owned);
         trial.frames.shrink_to_fit();
         trial.rows.shrink_to_fit();
         Ok(trial)
@@ -234,6 +238,12 @@ impl Trial {
     /// The name of the log.
     pub(crate) fn file(&self) -> String {
         self.label.clone()
+    }
+
+    /// That the log is not whole, where it is not.
+    pub(crate) fn lacking(&self) -> Option<String> {
+        let lost = self.lacks.as_ref()?;
+        Some(format!("{} was saved of a log that was not whole; lost: {lost}", self.file()))
     }
 
     /// The first and the last stamp of the log (ns).

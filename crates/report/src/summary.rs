@@ -21,6 +21,8 @@ pub struct Summary {
     pub question: String,
     /// One row a trial, in the order of their names.
     pub rows: Vec<Row>,
+    /// Logs that were saved of ones that were not whole, and what they lack.
+    pub lacking: Vec<String>,
 }
 
 /// The results of one trial. Found, refused and wrong add up to attempted.
@@ -195,6 +197,7 @@ impl Summary {
             run: header.run.clone(),
             question: header.question.clone(),
             rows: run.trials.iter().map(Row::of).collect(),
+            lacking: run.trials.iter().filter_map(Trial::lacking).collect(),
         }
     }
 

@@ -67,6 +67,9 @@ impl fmt::Display for Summary {
             )?;
         }
 
+        for lacking in &self.lacking {
+            writeln!(f, "warning: {lacking}")?;
+        }
         if !timed {
             return Ok(());
         }

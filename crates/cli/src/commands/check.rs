@@ -7,7 +7,9 @@ use seafix_experiment::{
     Plan,
     dataset::{self, ImageLimits},
     read_text,
+    source::check_recording,
 };
+use seafix_log::{LogError, Reader, Recording};
 use seafix_referencing::{Site, TargetKind, problem_file};
 use seafix_simulation::field::SitePlan;
 
@@ -28,9 +30,10 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
     let mut files = Vec::new();
     paths.iter().for_each(|path| gather(path, &mut files));
     for path in &files {
-        let (faults, warnings) = examine(path, limits);
+        let Examined { faults, warnings, note } = examine(path, limits);
         let mut text: String = faults.iter().map(|fault| format!("fault: {fault}\n")).collect();
         text += &warnings.iter().map(|warning| format!("warning: {warning}\n")).collect::<String>();
+        text += &note;
         text += &congruences(path);
         if faults.is_empty() {
             text += &format!("{}: in order\n", path.display());
@@ -71,19 +74,48 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// The faults and warnings of one file or folder, by what it is.
-fn examine(path: &Path, limits: ImageLimits) -> (Vec<String>, Vec<Fault>) {
-    let lines = |faults: Vec<Fault>| faults.iter().map(ToString::to_string).collect();
-    if path.extension().is_some_and(|extension| extension == "mcap") {
-        return (log(path).err().map(|error| error.to_string()).into_iter().collect(), Vec::new());
-    }
-    let (faults, warnings) = read(path, limits);
-    (lines(faults), warnings)
+/// What was found in a file or folder.
+#[derive(Default)]
+struct Examined {
+    faults: Vec<String>,
+    warnings: Vec<Fault>,
+    /// What it holds, where that is not plain to see.
+    note: String,
 }
 
-/// Reads a log from end to end, a frame at a time.
-fn log(path: &Path) -> Result<(), seafix_log::LogError> {
-    seafix_log::Reader::open(path)?.try_for_each(|frame| frame.map(|_| ()))
+/// The faults and warnings of one file or folder, by what it is.
+fn examine(path: &Path, limits: ImageLimits) -> Examined {
+    let lines = |faults: Vec<Fault>| faults.iter().map(ToString::to_string).collect();
+    if path.extension().is_some_and(|extension| extension == "mcap") {
+        return match log(path) {
+            Ok(warning) => Examined { warnings: warning.into_iter().collect(), ..Examined::default() },
+            // Sound, and no trial's: then a recording.
+            Err(LogError::Foreign { .. }) if !is_of_a_trial(path) => {
+                let (faults, warnings, told) = check_recording(path, limits);
+                let note = if told.is_empty() { told } else { format!("note: {told}\n") };
+                Examined { faults: lines(faults), warnings, note }
+            }
+            Err(error) => Examined { faults: vec![error.to_string()], ..Examined::default() },
+        };
+    }
+    let (faults, warnings) = read(path, limits);
+    Examined { faults: lines(faults), warnings, note: String::new() }
+}
+
+/// Reads a log from end to end, a frame at a time; a warning where it was saved of one that was not whole.
+fn log(path: &Path) -> Result<Option<Fault>, LogError> {
+    let mut reader = Reader::open(path)?;
+    reader.by_ref().try_for_each(|frame| frame.map(|_| ()))?;
+    Ok(reader.recovered().map(|lost| {
+        let fault = Fault::new("a log that was saved of one that was not whole", path).value(lost);
+        fault.remedy("what it lacks is in no result")
+    }))
+}
+
+/// Whether an MCAP file has the header of a trial.
+fn is_of_a_trial(path: &Path) -> bool {
+    let own = |topic: &seafix_log::Topic| topic.schema == "seafix.v1.TrialHeader";
+    Recording::open(path, |_| false).map_or(true, |recording| recording.topics().iter().any(own))
 }
 
 fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {

@@ -7,7 +7,7 @@ use std::{
 };
 
 use clap::Args;
-use seafix_log::{LogError, Reader, join, recover};
+use seafix_log::{LogError, Reader, join_lacking, recover};
 
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT},
@@ -102,7 +102,7 @@ fn of_run(run: &Path, out: &Path) -> Ended {
         }
         let to = out.join(format!("{trial}.mcap"));
         if !parts.is_empty() {
-            join(&parts, &to, || true).map_err(failure)?;
+            join_lacking(&parts, &to, Some("the run did not end"), || true).map_err(failure)?;
             let mut frames = 0;
             let counted = Reader::open(&to).and_then(|log| log.without_images().for_each_frame(|_| frames += 1));
             counted.map_err(failure)?;

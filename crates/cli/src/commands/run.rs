@@ -25,7 +25,7 @@ pub(crate) struct Run {
     /// Make only the k-th of n parts of the run; `seafix merge` joins them.
     #[arg(long, value_name = "K/N", requires = "out")]
     shard: Option<Shard>,
-    /// Say what it would take, by trying a few frames of every source, and write nothing.
+    /// Say what it would take, by trying frames of every source for some seconds, and keep nothing.
     #[arg(long, conflicts_with_all = ["out", "shard"])]
     dry_run: bool,
     /// Log no durations: two runs of one experiment then have the same bytes.
@@ -90,12 +90,17 @@ fn told(plan: &Plan, estimate: &Estimate, threads: usize) -> String {
     let mut text: String = lines.map(|(trial, frames)| format!("{:60} {frames:>9} frames\n", trial.name)).collect();
     let frames: usize = estimate.frames.iter().sum();
     text += &format!(
-        "{} trials, {frames} frames, about {} MB of log (twice that while it is joined), about {} on {threads} threads\n",
+        "{} trials, {frames} frames, about {} MB (twice that while it is joined), about {} on {threads} threads\n",
         plan.trials.len(),
         estimate.bytes.div_ceil(1_000_000),
-        duration(estimate.work.as_secs_f64() / threads as f64),
+        duration(estimate.on(threads).as_secs_f64()),
     );
-    text + &format!("{} frames of every source were tried; nothing was written\n", estimate.tried)
+    let build = if cfg!(debug_assertions) { ", a build with assertions" } else { "" };
+    text + &format!(
+        "by {} frames, tried on one thread in {:.1} s, this machine as busy as it is{build}; cores are not always whole ones\n",
+        estimate.tried,
+        estimate.spent.as_secs_f64()
+    )
 }
 
 fn duration(seconds: f64) -> String {

@@ -82,7 +82,7 @@ impl Twins {
 }
 
 /// Frames whose images are looked at for their order.
-const LOOKED_AT: usize = 3;
+pub(crate) const LOOKED_AT: usize = 3;
 
 /// Left and right images that have changed places, as three frames from the whole length of the set show.
 pub(crate) fn swapped(dataset: &Dataset) -> Option<Fault> {

@@ -103,7 +103,12 @@ pub(crate) fn stamp(message: &[u8]) -> Read<Stamped> {
 fn pose(cdr: &mut Cdr<'_>) -> Read<Pose> {
     let [tx, ty, tz, x, y, z, w] = cdr.f64s::<7>()?;
     let quaternion = Quaternion::new(w, x, y, z);
-    if ![tx, ty, tz].iter().all(|t| t.is_finite()) || !((quaternion.norm() - 1.0).abs() <= 1e-3) {
+    if let Some(number) = [tx, ty, tz, x, y, z, w].into_iter().find(|number| !number.is_finite()) {
+        return Err(format!(
+            "a pose with {number} in it: position [{tx}, {ty}, {tz}], quaternion [{x}, {y}, {z}, {w}]"
+        ));
+    }
+    if (quaternion.norm() - 1.0).abs() > 1e-3 {
         return Err(format!("a pose whose quaternion has the length {:.6}", quaternion.norm()));
     }
     Ok(Pose { translation: [tx, ty, tz].into(), rotation: UnitQuaternion::new_normalize(quaternion) })

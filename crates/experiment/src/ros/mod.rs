@@ -16,6 +16,6 @@ mod uncertainty;
 pub(crate) use definition::{differs, plain};
 pub(crate) use messages::{CameraInfo, CompressedImage, Image, Odometry, stamp, transforms};
 pub use rig::Views;
-pub(crate) use rig::{camera, right_from_left};
+pub(crate) use rig::{camera, contradiction, right_from_left};
 pub(crate) use tf::Tree;
 pub(crate) use uncertainty::covariance;

@@ -32,6 +32,13 @@ impl Piece {
         Thinned::new(self.every, self.failures)
     }
 
+    /// How many frames are logged of each trial where this share of them fails.
+    pub(super) fn expected(&self, failing: f64) -> f64 {
+        let regular = (self.end as u64).div_ceil(self.every) - (self.first as u64).div_ceil(self.every);
+        let others = self.frames() as f64 - regular as f64;
+        regular as f64 + (others * failing).min(self.failures as f64)
+    }
+
     /// How many frames at most are logged of each trial.
     fn logged(&self) -> u64 {
         let regular = (self.end as u64).div_ceil(self.every) - (self.first as u64).div_ceil(self.every);
@@ -116,6 +123,10 @@ mod tests {
         assert_eq!(thinning(100, 100, 1000), (20, 5));
         let piece = |first, end, failures| Piece { number: 0, group: 0, first, end, every: 20, failures };
         // Frames 0, 20, 40, 60, 80, and five failures.
+        assert_eq!(
+            (piece(0, 100, 5).expected(0.0), piece(0, 100, 5).expected(0.02), piece(0, 100, 5).expected(1.0)),
+            (5.0, 6.9, 10.0)
+        );
         assert_eq!((piece(0, 100, 5).logged(), piece(1, 20, 3).logged(), piece(41, 45, 9).logged()), (10, 3, 4));
     }
 }

@@ -1,51 +1,189 @@
-//! What a run would take, by a few of its frames.
+//! What a run would take, by some of its frames.
 
-use std::time::{Duration, Instant};
+use std::{
+    fs,
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use seafix_component::Fault;
+use seafix_log::Writer;
 
 use super::{RunError, cut, group};
-use crate::Plan;
+use crate::{
+    Plan,
+    navigate::Voyage,
+    results::{Row, Table},
+};
 
 /// What a run would take.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// Frames of each trial, in the order of the plan's trials.
     pub frames: Vec<usize>,
-    /// About so many bytes of log; while they are joined, twice as many lie on the disk.
+    /// About so many bytes of log and results; while they are joined, twice as many lie on the disk.
     pub bytes: u64,
-    /// About so long for one thread.
+    /// About so long for one thread, writing included.
     pub work: Duration,
-    /// So many frames of each source were tried.
+    /// About so long whatever the number of threads: the longest piece, which one thread makes.
+    pub longest: Duration,
+    /// So many frames were tried over all sources,
     pub tried: usize,
+    /// in so much time.
+    pub spent: Duration,
 }
 
-/// Frames of each source that are tried.
-const TRIED: usize = 3;
+impl Estimate {
+    /// About how long on so many threads.
+    pub fn on(&self, threads: usize) -> Duration {
+        self.work.div_f64(threads.max(1) as f64).max(self.longest)
+    }
+}
 
-/// What `plan` would take: leads a few frames of every source through its trials and writes nothing.
+/// Frames of each source that are tried at least, where it has as many: the first is cold.
+const LEAST: usize = 4;
+/// Together they may take so long, and each at most its share.
+const LONGEST: Duration = Duration::from_secs(20);
+
+/// What `plan` would take: leads some frames of every source through its trials and writes their logs into the system's
+/// temporary folder; nothing of it stays.
 ///
 /// # Errors
-/// Everything that is wrong with the inputs.
+/// Everything that is wrong with the inputs, and a temporary folder that cannot be written.
 pub fn estimate(plan: &Plan) -> Result<Estimate, RunError> {
     let groups = group::open(plan)?;
     let pieces = cut::cut(plan, &groups);
-    let input = |fault| RunError::Input(vec![fault]);
-    let mut work = Duration::ZERO;
-    for group in &groups {
+    let input = |fault: Fault| RunError::Input(vec![fault]);
+    let place = Scratch::new()?;
+    let mut estimate = Estimate {
+        frames: Vec::new(),
+        bytes: 0,
+        work: Duration::ZERO,
+        longest: Duration::ZERO,
+        tried: 0,
+        spent: Duration::ZERO,
+    };
+    for (number, group) in groups.iter().enumerate() {
         let (count, mut voyages) = (group.passage.frames(), group.voyages());
-        let first = Instant::now();
-        let tried = TRIED.min(count);
-        for k in 0..tried {
-            // The first frames where one follows from the other, else some over the whole way.
-            let index = if group.navigates() { k } else { k * (count - 1) / (tried - 1).max(1) };
-            let looked = group.look(index.min(count - 1), &mut voyages).map_err(input)?;
-            group.record(index.min(count - 1), looked, &[], |_, _| true);
+        let mut writers = Vec::new();
+        for (trial, header) in group.headers.iter().enumerate() {
+            writers.push(Writer::create(&place.0.join(format!("{trial}.mcap")), header)?);
         }
-        work += first.elapsed().mul_f64(count as f64 / tried.max(1) as f64);
+        let mut table = Table::default();
+        let budget = LONGEST.div_f64(groups.len() as f64);
+        let (begun, mut warm) = (Instant::now(), Vec::new());
+        let (mut tried, mut failures) = (0, 0);
+        while tried < count && (tried < LEAST || begun.elapsed() < budget) {
+            let first = Instant::now();
+            let index = place_of(tried, count, group.navigates());
+            let looked = group.look(index, &mut voyages).map_err(input)?;
+            let records = group.record(index, looked, &[], |_, _| true);
+            for (which, (record, writer)) in records.iter().zip(&mut writers).enumerate() {
+                // Frames come in an order of their own; stamps in logs do not decrease.
+                let record = seafix_log::FrameRecord { stamp_ns: tried as u64, ..record.clone() };
+                failures += usize::from(crate::thin::failed(&record));
+                writer.frame(&record)?;
+                Row::of(&group.trials[which].name, &record).for_each(|row| table.add(&row));
+            }
+            tried += 1;
+            warm.push(first.elapsed());
+        }
+        drop::<Vec<Option<Voyage>>>(voyages);
+        let closing = Instant::now();
+        for writer in writers {
+            writer.finish()?;
+        }
+        let written = place.bytes();
+        let empty = place.empty(group)?;
+        // What the first costs more, memory that is got for instance, it costs once.
+        let all: Duration = warm.iter().sum();
+        let cold = if tried > 1 { warm[0] } else { Duration::ZERO };
+        let a_frame = (all - cold).div_f64((tried - usize::from(tried > 1)).max(1) as f64)
+            + closing.elapsed().div_f64(tried.max(1) as f64);
+        let trials = group.trials.len() as f64;
+        let share = failures as f64 / (tried as f64 * trials).max(1.0);
+        let logged: f64 = pieces.iter().filter(|piece| piece.group == number).map(|piece| piece.expected(share)).sum();
+        let frame_bytes = written.saturating_sub(empty) as f64 / tried.max(1) as f64;
+        // The same rows stand in a Parquet file, a third as long.
+        let rows = table.text.len() as f64 * 4.0 / 3.0 / tried.max(1) as f64;
+        estimate.bytes += (empty as f64 + frame_bytes * logged + rows * count as f64) as u64;
+        estimate.work += cold + a_frame.mul_f64(count as f64);
+        let longest = pieces.iter().filter(|piece| piece.group == number).map(cut::Piece::frames).max().unwrap_or(0);
+        estimate.longest = estimate.longest.max(a_frame.mul_f64(longest as f64));
+        estimate.tried += tried;
+        estimate.spent += begun.elapsed();
     }
-    let frames = plan.trials.iter().map(|trial| {
-        let own = groups.iter().find(|group| group.trials.iter().any(|other| std::ptr::eq(*other, trial)));
-        own.map_or(0, |group| group.passage.frames())
-    });
-    let bytes = cut::bytes(&groups, &pieces.iter().collect::<Vec<_>>());
-    Ok(Estimate { frames: frames.collect(), bytes, work, tried: TRIED })
+    estimate.frames = plan
+        .trials
+        .iter()
+        .map(|trial| {
+            let own = groups.iter().find(|group| group.trials.iter().any(|other| std::ptr::eq(*other, trial)));
+            own.map_or(0, |group| group.passage.frames())
+        })
+        .collect();
+    Ok(estimate)
+}
+
+/// The frame that is tried as the k-th: of a way that is navigated the next, else one anywhere on it.
+fn place_of(k: usize, count: usize, navigates: bool) -> usize {
+    if navigates {
+        return k;
+    }
+    // Every number once, spread by a step without a common divisor.
+    let step = (1..).map(|n| (count * 618 / 1000).max(1) + n - 1).find(|step| divisor(*step, count) == 1).unwrap_or(1);
+    (k * step) % count
+}
+
+fn divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { divisor(b, a % b) }
+}
+
+/// A folder that goes when this does.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Self, RunError> {
+        let folder = std::env::temp_dir().join(format!("seafix-{}", std::process::id()));
+        fs::create_dir_all(&folder).map_err(|error| RunError::unwritable(&folder, error))?;
+        Ok(Self(folder))
+    }
+
+    /// Bytes of the logs in it.
+    fn bytes(&self) -> u64 {
+        let files = fs::read_dir(&self.0).into_iter().flatten().flatten();
+        files.filter_map(|file| Some(file.metadata().ok()?.len())).sum()
+    }
+
+    /// Bytes of the logs of a group without a frame.
+    fn empty(&self, group: &group::Group<'_>) -> Result<u64, RunError> {
+        for (trial, header) in group.headers.iter().enumerate() {
+            Writer::create(&self.0.join(format!("{trial}.mcap")), header)?.finish()?;
+        }
+        let bytes = self.bytes();
+        for trial in 0..group.headers.len() {
+            let _ = fs::remove_file(self.0.join(format!("{trial}.mcap")));
+        }
+        Ok(bytes)
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_frame_is_tried_once() {
+        for count in [1, 2, 3, 7, 20, 100, 1000] {
+            let mut seen: Vec<usize> = (0..count).map(|k| place_of(k, count, false)).collect();
+            seen.sort_unstable();
+            assert_eq!(seen, (0..count).collect::<Vec<_>>());
+        }
+        assert_eq!([0, 1, 2].map(|k| place_of(k, 3, true)), [0, 1, 2]);
+    }
 }

@@ -17,7 +17,21 @@ pub(super) struct Claim {
     pub(super) folder: PathBuf,
     /// The run that is finished already, where it is resumed.
     pub(super) finished: Option<Manifest>,
-    _lock: File,
+    _lock: Lock,
+}
+
+/// A file that is locked as long as this lives.
+#[derive(Debug)]
+struct Lock {
+    path: PathBuf,
+    _file: File,
+}
+
+impl Drop for Lock {
+    /// The file goes while it is still locked: whoever has opened it before sees that it has gone.
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.path);
+    }
 }
 
 /// Holds an advisory lock while a run writes into its folder, and says who does.
@@ -92,7 +106,7 @@ fn unmade(path: &Path, error: &std::io::Error) -> Fault {
 }
 
 /// Takes the lock of a folder, or says who has it.
-fn lock(folder: &Path) -> Result<File, Fault> {
+fn lock(folder: &Path) -> Result<Lock, Fault> {
     let path = folder.join(LOCK);
     let failed = |error: &std::io::Error| unmade(&path, error);
     let mut file = OpenOptions::new()
@@ -112,10 +126,28 @@ fn lock(folder: &Path) -> Result<File, Fault> {
         }
         Err(TryLockError::Error(error)) => return Err(failed(&error)),
     }
+    // A run that ended just now took the file away between opening and locking: what is locked is then no lock.
+    if !is_at(&file, &path) {
+        return lock(folder);
+    }
     let text = format!("process {} on {}\n", std::process::id(), host());
     let write = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(text.as_bytes()));
     write.map_err(|error| failed(&error))?;
-    Ok(file)
+    Ok(Lock { path, _file: file })
+}
+
+/// Whether a file that is open is the one that has this name now.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let same = |a: &fs::Metadata, b: &fs::Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
+    file.metadata().is_ok_and(|open| fs::metadata(path).is_ok_and(|named| same(&open, &named)))
+}
+
+/// Elsewhere a file that is open keeps its name.
+#[cfg(not(unix))]
+fn is_at(_file: &File, path: &Path) -> bool {
+    path.exists()
 }
 
 /// The machine's name, where it says one.

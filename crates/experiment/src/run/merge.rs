@@ -20,7 +20,6 @@ use crate::manifest::{self, Manifest};
 pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
     let (mut manifest, pieces) = gather(folders).map_err(|fault| RunError::Input(vec![fault]))?;
     manifest.shard = None;
-    manifest.threads = options.threads;
     let name = folders
         .first()
         .and_then(|folder| folder.file_name())
@@ -42,6 +41,7 @@ pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) ->
 fn gather(folders: &[PathBuf]) -> Result<(Manifest, Vec<Sealed>), Fault> {
     let mut first: Option<(&Path, Manifest)> = None;
     let mut pieces: Vec<Option<Sealed>> = Vec::new();
+    let mut damaged: Vec<(usize, PathBuf)> = Vec::new();
     for folder in folders {
         let manifest = Manifest::read(folder)?;
         let file = folder.join(manifest::NAME);
@@ -66,16 +66,28 @@ fn gather(folders: &[PathBuf]) -> Result<(Manifest, Vec<Sealed>), Fault> {
                 place.get_or_insert(sealed);
             }
         }
+        damaged.extend(Store::of(folder).damaged());
     }
-    let Some((folder, manifest)) = first else {
+    let Some((_, manifest)) = first else {
         return Err(Fault::new("no shards", Path::new("the command line")).remedy("name their folders"));
     };
     let missing: Vec<usize> = (0..pieces.len()).filter(|&number| pieces[number].is_none()).collect();
+    if let Some(piece) = damaged.iter().find(|(number, _)| missing.contains(number)) {
+        let fault = Fault::new("a piece that is damaged", &piece.1).value(format!(
+            "{} of {} are missing",
+            missing.len(),
+            pieces.len()
+        ));
+        return Err(fault.remedy("make its shard again with --resume"));
+    }
     if let Some(number) = missing.first() {
-        let what = format!("{} of {} pieces are missing or damaged", missing.len(), pieces.len());
-        return Err(Fault::new(what, folder)
-            .value(format!("the first is {number}"))
-            .remedy("name the folders of all shards, and make damaged ones again with --resume"));
+        let what = format!("{} of {} pieces are in none of the folders", missing.len(), pieces.len());
+        // A piece knows nothing of shards, but they are dealt out in turn.
+        let of = manifest.shard.as_deref().and_then(|shard| shard.split_once('/')?.1.parse::<usize>().ok());
+        let shard = of.map_or_else(String::new, |of| format!(", of shard {}/{of}", number % of + 1));
+        return Err(Fault::new(what, Path::new("the command line"))
+            .value(format!("the first is {number}{shard}"))
+            .remedy("name the folders of all shards"));
     }
     Ok((manifest, pieces.into_iter().flatten().collect()))
 }

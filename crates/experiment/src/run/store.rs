@@ -130,6 +130,18 @@ impl Store {
         all
     }
 
+    /// The pieces that are there and not what they were: their numbers and folders, in order.
+    pub(super) fn damaged(&self) -> Vec<(usize, PathBuf)> {
+        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        let mut numbers: Vec<usize> = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
+        numbers.sort_unstable();
+        numbers
+            .into_iter()
+            .filter(|&number| self.sound(number).is_none())
+            .map(|number| (number, self.at(number)))
+            .collect()
+    }
+
     /// Removes all pieces.
     pub(super) fn remove(&self) -> Result<(), RunError> {
         match fs::remove_dir_all(&self.folder) {

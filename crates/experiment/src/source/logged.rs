@@ -68,6 +68,10 @@ impl Logged {
             warnings
                 .push(Fault::new(what, path).remedy("results may differ from the logged ones in their last digits"));
         }
+        if let Some(lost) = frames.recovered() {
+            let fault = Fault::new("a log that was saved of one that was not whole", path).value(lost);
+            warnings.push(fault.remedy("frames are missing that its trial had"));
+        }
         let site = if posed { no_site() } else { Site::parse(&header.site, path)? };
         Ok(Self {
             name: format!("log {} of {}", header.trial, header.source),

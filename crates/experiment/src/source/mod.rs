@@ -10,6 +10,7 @@ use seafix_referencing::{Prior, Site, Target, problem_file::CoherenceProblem};
 use seafix_simulation::optics::Port;
 use seafix_vision::Image;
 
+mod bag;
 mod dataset;
 mod dive;
 mod drawn_pairs;
@@ -40,6 +41,7 @@ pub use mcap::{Mcap, Reading};
 pub use crate::{dataset::Cameras, ros::Views};
 pub(crate) use heard::Heard;
 pub use problems::Problems;
+pub use recorded::check_recording;
 pub use virtual_images::VirtualImages;
 pub use virtual_layouts::VirtualLayouts;
 pub use virtual_points::VirtualPoints;

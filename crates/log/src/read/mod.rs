@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use crate::{FrameRecord, LogError, Totals, TrialHeader, convert, topic};
 pub(crate) use pending::Pending;
-pub(crate) use source::{Message, looks_like};
+pub(crate) use source::Message;
+pub use source::looks_like;
 use source::{Source, Take};
 
 /// A whole trial, as its log has it.
@@ -131,6 +132,11 @@ impl Reader {
     /// What all frames of the trial add up to, logged or not: known after the last frame, where the log says it.
     pub fn totals(&self) -> Option<&Totals> {
         self.totals.as_ref()
+    }
+
+    /// What the log lacks, where it was saved of one that was not whole: known after the last frame.
+    pub fn recovered(&self) -> Option<&str> {
+        self.source.recovered()
     }
 
     /// Leads all frames that are left through `take`, in order. On the threads of the pool that this is called in some

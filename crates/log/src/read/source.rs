@@ -16,7 +16,7 @@ use mcap::{
 };
 
 use super::foreign;
-use crate::{LogError, proto};
+use crate::{LogError, proto, topic};
 
 /// A message as it stands in the file.
 #[derive(Debug)]
@@ -78,6 +78,8 @@ pub(super) struct Source {
     messages: u64,
     last_ns: u64,
     past_data: bool,
+    /// What the file lacks, if it was saved of one that was not whole.
+    recovered: Option<String>,
 }
 
 impl fmt::Debug for Source {
@@ -117,11 +119,16 @@ impl Source {
             messages: 0,
             last_ns: 0,
             past_data: false,
+            recovered: None,
         })
     }
 
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    pub(super) fn recovered(&self) -> Option<&str> {
+        self.recovered.as_deref()
     }
 
     /// The next message of which anything is taken, by its topic and stamp; `None` when the file has been read to its end
@@ -152,6 +159,9 @@ impl Source {
                 Record::DataEnd(_) => self.past_data = true,
                 // The summary repeats schemas and channels.
                 _ if self.past_data => {}
+                Record::Metadata(metadata) => {
+                    self.recovered = self.recovered.take().or_else(|| topic::lost(&metadata));
+                }
                 Record::Schema { header, .. } => {
                     self.schemas.insert(header.id, header.name.into());
                 }
@@ -188,8 +198,8 @@ impl Source {
     }
 }
 
-/// What a file that does not begin like an MCAP file looks like.
-pub(crate) fn looks_like(start: &[u8]) -> String {
+/// What a file that does not begin like an MCAP file looks like, and what to do about it.
+pub fn looks_like(start: &[u8]) -> String {
     let known: [(&[u8], &str); 5] = [
         (b"#ROSBAG", "it looks like a ROS 1 bag; convert it with `mcap convert IN.bag OUT.mcap`"),
         (

@@ -135,6 +135,12 @@ impl Writer {
         self.sink.put(topic::TOTALS, stamp, &convert::totals_message(totals))
     }
 
+    /// Marks the log as one that is not whole; after the totals.
+    pub(crate) fn lacks(&mut self, lost: &str) -> Result<(), LogError> {
+        let mark = topic::recovered(lost);
+        self.sink.metadata(&mark.name, mark.metadata)
+    }
+
     /// Completes the log: index, check sums, onto the disk, renamed to its own name.
     ///
     /// # Errors

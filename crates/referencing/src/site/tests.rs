@@ -162,7 +162,7 @@ fn an_unknown_name_is_answered_with_the_nearest() {
         faults("site_frame = \"plate\"", "site_frame = \"plat\"")[0].ends_with(":5: `plat`; did you mean `plate`?")
     );
     let found = faults("site_frame", "site_farme");
-    assert_eq!(found, ["unknown key in site.toml:5: `site_farme`; did you mean `site_frame`?"]);
+    assert_eq!(found, ["unknown key in site.toml:5:1: `site_farme`; did you mean `site_frame`?"]);
     assert!(faults("seafix-site/1", "seafix-site/2")[0].contains("unknown format in site.toml:2: `seafix-site/2`"));
 }
 

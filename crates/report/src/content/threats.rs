@@ -55,6 +55,9 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
             if run.header().targets.len() == 1 { "" } else { "s" }
         )]);
     }
+    for lacking in &summary.lacking {
+        items.push(text![format!("Internal: {lacking}. What is lost is in no number here.")]);
+    }
     let seeds: std::collections::BTreeSet<_> = headers().map(|header| format!("{:?}", header.seeds)).collect();
     if seeds.len() == 1 && !recorded {
         items.push(text!["External: one seed. Another one draws other views and noise; the intervals say how far the results may move."]);

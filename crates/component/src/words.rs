@@ -1,0 +1,130 @@
+//! What the reader of TOML says of a value, in the words of whoever writes the file.
+
+use crate::nearest;
+
+/// The message of a deserialiser without names of Rust's types: `expected u64` becomes `expected a whole number, at least 0`.
+///
+/// ```
+/// assert_eq!(
+///     seafix_component::plain("invalid type: string \"many\", expected u64"),
+///     "not a whole number of at least 0: string \"many\""
+/// );
+/// assert_eq!(
+///     seafix_component::plain("unknown variant `reed`, expected one of `red`, `green`"),
+///     "unknown word `reed`, did you mean `red`? There are `red`, `green`"
+/// );
+/// ```
+pub fn plain(message: &str) -> String {
+    let message = message.trim_end().lines().next().unwrap_or_default();
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    if let Some((word, known)) = quoted.split_first().filter(|_| message.starts_with("unknown variant")) {
+        let all = known.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ");
+        return match nearest(word, known.iter().copied()) {
+            Some(near) => format!("unknown word `{word}`, did you mean `{near}`? There are {all}"),
+            None => format!("unknown word `{word}`; there are {all}"),
+        };
+    }
+    if let (Some(field), true) = (quoted.first(), message.starts_with("missing field")) {
+        return format!("`{field}` is missing");
+    }
+    if message.starts_with("data did not match any variant") {
+        return "a value of none of the forms that can stand here".to_owned();
+    }
+    let kinds = ["invalid type: ", "invalid value: ", "invalid length "];
+    let found = kinds.iter().find_map(|kind| message.strip_prefix(kind)?.rsplit_once(", expected "));
+    match found {
+        Some((found, expected)) => {
+            let found = found.replace("floating point", "number").replace("integer", "number");
+            let found = found.replace("sequence", "a list").replace("map", "a table");
+            let found = match found.strip_suffix(" variant") {
+                Some("unit") => "a word alone".to_owned(),
+                Some(_) => "a word with a value".to_owned(),
+                None => found,
+            };
+            let values = if message.starts_with("invalid length") { " values" } else { "" };
+            format!("not {}: {found}{values}", kind(expected))
+        }
+        None => message.to_owned(),
+    }
+}
+
+/// What a value must be, by the name that the deserialiser has for it.
+fn kind(expected: &str) -> String {
+    let length = |start: &str, end: &str| expected.strip_prefix(start)?.strip_suffix(end).map(str::to_owned);
+    let many = length("an array of length ", "").or_else(|| length("a tuple of size ", ""));
+    if let Some(many) = many.or_else(|| length("array of ", " elements")) {
+        return format!("a list of {many} values");
+    }
+    let known = match expected {
+        "u8" => "a whole number from 0 to 255",
+        "u16" => "a whole number from 0 to 65535",
+        "u32" => "a whole number from 0 to 4294967295",
+        "u64" | "u128" | "usize" => "a whole number of at least 0",
+        "i8" | "i16" | "i32" | "i64" | "i128" | "isize" => "a whole number",
+        "f32" | "f64" => "a number",
+        "a boolean" => "true or false",
+        "a string" | "string" | "string only" | "str" => "a text in quotes",
+        "a sequence" => "a list",
+        "a map" | "any TOML table" => "a table",
+        other if other.starts_with("struct ") => "a table",
+        other if other.starts_with("tuple struct ") => "a list",
+        other if other.starts_with("a nonzero ") => "a whole number of at least 1",
+        // `enum Gate`, `unit variant Gate::Open`, …
+        other if other.contains("enum ") || other.contains("variant ") => "one of the words that can stand here",
+        other => other,
+    };
+    known.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    #[expect(dead_code, reason = "only what is wrong with them matters")]
+    enum Lens {
+        Pinhole,
+        FishEye { order: u8 },
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[expect(dead_code, reason = "only what is wrong with them matters")]
+    struct Settings {
+        budget: u64,
+        size: [u32; 2],
+        lens: Lens,
+        on: bool,
+        name: String,
+    }
+
+    /// What is said of `wrong` in the place of a value of sound settings.
+    fn said(key: &str, wrong: &str) -> String {
+        let mut all: toml::Table =
+            toml::from_str("budget = 1\nsize = [1, 2]\nlens = 'pinhole'\non = true\nname = 'n'").unwrap();
+        let wrong: toml::Table = toml::from_str(&format!("x = {wrong}")).unwrap();
+        all.insert(key.to_owned(), wrong["x"].clone());
+        plain(all.try_into::<Settings>().unwrap_err().message())
+    }
+
+    #[test]
+    fn no_type_of_rust_is_named() {
+        assert_eq!(said("budget", "-1"), "not a whole number of at least 0: number `-1`");
+        assert_eq!(said("budget", "1.5"), "not a whole number of at least 0: number `1.5`");
+        assert_eq!(said("budget", "[1]"), "not a whole number of at least 0: a list");
+        assert_eq!(said("size", "[1]"), "not a list of 2 values: 1 values");
+        assert_eq!(said("size", "[1, -2]"), "not a whole number from 0 to 4294967295: number `-2`");
+        assert_eq!(said("on", "1"), "not true or false: number `1`");
+        assert_eq!(said("name", "1"), "not a text in quotes: number `1`");
+        assert_eq!(
+            said("lens", "'pinhol'"),
+            "unknown word `pinhol`, did you mean `pinhole`? There are `pinhole`, `fish-eye`"
+        );
+        for wrong in ["7", "{ fish-eye = 3 }", "{ fish-eye = { order = 999 } }", "{ fish-eye = {} }"] {
+            let said = said("lens", wrong);
+            let types = ["u8", "struct", "enum", "variant", "Lens", "Settings", "invalid"];
+            assert!(types.iter().all(|name| !said.contains(name)), "{wrong}: {said}");
+        }
+    }
+}
