@@ -26,7 +26,7 @@ impl Cdr {
     }
 
     fn put(mut self, size: usize, bytes: &[u8]) -> Self {
-        while (self.0.len() - 4) % size != 0 {
+        while !(self.0.len() - 4).is_multiple_of(size) {
             self.0.push(0);
         }
         self.0.extend(bytes);
