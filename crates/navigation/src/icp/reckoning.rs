@@ -166,8 +166,7 @@ impl<'a> IcpReckoning<'a> {
         Outcome::Began
     }
 
-    /// The way to a cloud; `None` where nothing
-    /// was begun.
+    /// The way to a cloud; `None` where nothing was begun.
     fn follow(&self, ground: &Ground, stamp_ns: u64) -> Option<Result<Step, Lost>> {
         let ((key, _), last) = (self.key.as_ref()?, self.last.as_ref()?);
         Some(laid(self.settings, key, last, ground, stamp_ns))
