@@ -20,6 +20,11 @@ pub struct Cell {
     pub answered: u32,
     /// Draws that were not.
     pub refused: u32,
+    /// Draws in which another pose was as likely, where that was asked: these are not answered either.
+    pub ambiguous: u32,
+    /// Answers in another valley than the truth's, of NEES above 100, where rivals were asked for: wrong, and in the
+    /// coverage, but not in means that a single one would make.
+    pub elsewhere: u32,
     /// Root mean square of m2 over that of its bound.
     pub m2: f64,
     /// Root mean square of the position's error (m3) over that of its bound.
@@ -60,33 +65,79 @@ pub fn cell_where(
     covariance: bool,
     keep: impl Fn(&Placed, &Covariance6<Object, Camera>) -> bool,
 ) -> Cell {
+    let mut placed = placed(settings, 1, layouts);
+    placed.retain(|placed| keep(placed, &bound(placed, settings)));
+    let asked = Asked { draws: draws / layouts, covariance, rivals: None };
+    cell_of(solver, settings, &placed, &asked)
+}
+
+/// The layouts of these settings and this seed.
+///
+/// # Panics
+/// When the settings describe no layout.
+pub fn placed(settings: &Layout, seed: u64, layouts: u64) -> Vec<Placed> {
+    let place = |number| Layout { number, ..settings.clone() }.place(seed).expect("the layout can be placed");
+    (0..layouts).map(place).collect()
+}
+
+/// The Cramér–Rao bound of a layout.
+///
+/// # Panics
+/// When its points determine no pose.
+pub fn bound(placed: &Placed, settings: &Layout) -> Covariance6<Object, Camera> {
+    let pixels = Matrix4::identity() * settings.sigma_px.powi(2);
+    let seen = placed.model.iter().map(|&at| Seen { at, model_sigma: settings.model_sigma, pixels });
+    cramer_rao(&placed.rig, &placed.object_from_camera, &seen.collect::<Vec<_>>())
+        .expect("three points and more determine a pose")
+}
+
+/// What is asked of every layout.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked {
+    /// Draws of each.
+    pub draws: u64,
+    /// Whether covariances are held against the errors.
+    pub covariance: bool,
+    /// With how much more of χ² another pose makes a draw ambiguous; `None` to answer whatever else is as likely.
+    pub rivals: Option<f64>,
+}
+
+/// What a solver makes of the draws of these layouts.
+pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked: &Asked) -> Cell {
     /// χ²₆ at 95 %.
     const NINETY_FIVE: f64 = 12.591_587_243_743_977;
     let mut cell = Cell::default();
     let (mut m2, mut m3, mut m2_bound, mut m3_bound, mut counted, mut angle) = (0.0, 0.0, 0.0, 0.0, 0u32, 0.0);
-    for number in 0..layouts {
-        let placed = Layout { number, ..settings.clone() }.place(1).expect("the layout can be placed");
-        let pixels = Matrix4::identity() * settings.sigma_px.powi(2);
-        let seen = placed.model.iter().map(|&at| Seen { at, model_sigma: settings.model_sigma, pixels });
-        let bound = cramer_rao(&placed.rig, &placed.object_from_camera, &seen.collect::<Vec<_>>())
-            .expect("three points and more determine a pose");
-        if !keep(&placed, &bound) {
-            continue;
-        }
+    for placed in placed {
+        let bound = bound(placed, settings);
         cell.layouts += 1;
         cell.attitude_sigma = cell.attitude_sigma.max(bound.attitude_sigma());
         let (m2_limit, m3_limit) =
             (transfer_bound(&bound, &placed.object_from_camera, &placed.model), bound.position_sigma());
         let mut mean = Vector3::zeros();
         let mut here = 0u32;
-        for draw in 0..draws / layouts {
-            let Some(points) = observations(&placed, draw, settings.model_sigma) else { continue };
+        for draw in 0..asked.draws {
+            let Some(points) = observations(placed, draw, settings.model_sigma) else { continue };
             let data = Observations { points, rig: Some(&placed.rig) };
             let Ok(pose) = solver.solve(&data) else {
                 cell.refused += 1;
                 continue;
             };
+            if asked.rivals.is_some_and(|most| !solver.rivals(&data, &pose, most).is_empty()) {
+                cell.ambiguous += 1;
+                continue;
+            }
             let truth = &placed.object_from_camera;
+            let covariance = if asked.covariance { solver.covariance(&data, &pose).ok() } else { None };
+            let error = covariance.and_then(|covariance| {
+                let used = solver.used(&data);
+                let sum: Vector3<f64> = used.iter().map(|&i| data.points[i].measured.at.coords).sum();
+                nees(&pose, truth, &covariance, &Point::from(sum / used.len() as f64))
+            });
+            if asked.rivals.is_some() && error.is_some_and(|error| error > 100.0) {
+                cell.elsewhere += 1;
+                continue;
+            }
             m2 += transfer_rms(&pose, truth, &placed.model).expect("there are points").powi(2);
             m3 += position_error(&pose, truth).powi(2);
             angle += attitude_error(&pose, truth).powi(2);
@@ -94,22 +145,19 @@ pub fn cell_where(
             m3_bound += m3_limit * m3_limit;
             mean += pose.translation() - truth.translation();
             (cell.answered, here) = (cell.answered + 1, here + 1);
-            if covariance && let Ok(covariance) = solver.covariance(&data, &pose) {
-                let used = solver.used(&data);
-                let sum: Vector3<f64> = used.iter().map(|&i| data.points[i].measured.at.coords).sum();
-                if let Some(error) = nees(&pose, truth, &covariance, &Point::from(sum / used.len() as f64)) {
-                    counted += 1;
-                    cell.nees += error;
-                    cell.coverage += f64::from(u8::from(error <= NINETY_FIVE));
-                }
+            if let Some(error) = error {
+                counted += 1;
+                cell.nees += error;
+                cell.coverage += f64::from(u8::from(error <= NINETY_FIVE));
             }
         }
-        cell.bias += mean.norm() / f64::from(here.max(1)) / m3_limit / layouts as f64;
+        cell.bias += mean.norm() / f64::from(here.max(1)) / m3_limit;
     }
+    cell.bias /= placed.len() as f64;
     let n = f64::from(cell.answered);
     (cell.m2, cell.m3) = ((m2 / m2_bound).sqrt(), (m3 / m3_bound).sqrt());
     (cell.m2_rms, cell.m3_rms, cell.attitude_rms) = ((m2 / n).sqrt(), (m3 / n).sqrt(), (angle / n).sqrt());
-    (cell.nees, cell.coverage) = (cell.nees / f64::from(counted), cell.coverage / f64::from(counted));
+    (cell.nees, cell.coverage) = (cell.nees / f64::from(counted), cell.coverage / f64::from(counted + cell.elsewhere));
     cell
 }
 

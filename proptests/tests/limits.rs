@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use seafix_component::Choice;
 use seafix_evaluation::{position_error, transfer_rms};
-use seafix_proptests::monte_carlo::{Cell, cell, cell_where, is_meaningful, observations, paired, pixel_chi2};
+use seafix_proptests::monte_carlo::{
+    Asked, Cell, bound, cell, cell_of, cell_where, is_meaningful, observations, paired, pixel_chi2, placed,
+};
 use seafix_referencing::{Observations, SOLVERS};
 use seafix_simulation::{Layout, Shape, VirtualRig};
 
@@ -257,6 +259,71 @@ fn three_points_reach_the_bound_where_it_is_meaningful() {
             three_points(&format!("{shape:?}"), solver, &settings, 2000);
         }
     }
+}
+
+/// Four compact points whose layout may be any: some are seen as tilted either way, and some of their likelihoods are bent.
+/// What another valley explains as well is told apart at a confidence of 0.999 and counted; over the answers covariances hold
+/// all the same, and where the bound means something ([`is_meaningful`]) it is reached. 10 000 draws a seed and distance.
+///
+/// Seen to fail with first-order covariances (coverage .941 of seeds 8 and 11 at 5 m), and where rivals are not asked for (.915,
+/// NEES 110).
+#[test]
+#[ignore = "44 cells, minutes: cargo test --release --workspace --test limits -- --ignored --nocapture four_compact"]
+fn four_compact_points_of_any_seed() {
+    let missed: Vec<String> =
+        (1..=11).flat_map(|seed| [3.25, 5.0].map(|at| four_compact(seed, at, 500))).flatten().collect();
+    assert!(missed.is_empty(), "{} missed:\n{}", missed.len(), missed.join("\n"));
+}
+
+/// The same of the two seeds with the worst layouts, short.
+#[test]
+fn four_compact_points_of_bad_layouts_are_told_apart_or_known() {
+    let missed: Vec<String> = [8, 11].into_iter().flat_map(|seed| four_compact(seed, 5.0, 50)).collect();
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// What four compact points of this seed miss, `draws` of each of twenty layouts.
+fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
+    /// χ²₁ at 99.9 %.
+    const MOST: f64 = 10.827_566_170_662_733;
+    let rig = cameras()[0].1.clone();
+    let settings = Layout { shape: Shape::Compact, points: 4, distance, sigma_px: 0.5, rig, ..Layout::default() };
+    let all = placed(&settings, seed, 20);
+    let mut meant = all.clone();
+    meant.retain(|placed| is_meaningful(placed, settings.sigma_px, &bound(placed, &settings)));
+    let mut missed = Vec::new();
+    for solver in ["mahalanobis", "stereo-reprojection"] {
+        let asked = Asked { draws, covariance: true, rivals: Some(MOST) };
+        let c = cell_of(&*build(solver), &settings, &all, &asked);
+        let m = cell_of(&*build(solver), &settings, &meant, &asked);
+        let drawn = draws * 20;
+        let line = format!(
+            "seed {seed} {distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere \
+             of {drawn}; of {} layouts m2 {:.3} m3 {:.3}",
+            c.m2,
+            c.m3,
+            c.nees,
+            c.coverage,
+            c.ambiguous,
+            c.refused,
+            c.elsewhere,
+            meant.len(),
+            m.m2,
+            m.m3
+        );
+        println!("{line}");
+        // Three standard errors of the mean of so many χ²₆, and of a share of 0.95, more than the long form allows.
+        let wide =
+            if draws < 500 { 3.0 * ((12.0_f64 / drawn as f64).sqrt() - (12.0_f64 / 10_000.0).sqrt()) } else { 0.0 };
+        let consistent = (5.8 - wide..=6.3 + wide).contains(&c.nees);
+        let covers = (0.9428 - 0.06 * wide..=0.9571 + 0.06 * wide).contains(&c.coverage);
+        // Half of one in a thousand, and three standard errors.
+        let rare = f64::from(c.elsewhere) <= 0.0005 * drawn as f64 + 3.0 * (0.0005 * drawn as f64).sqrt();
+        if m.m2 > 1.05 + wide || m.m3 > 1.05 + wide || !consistent || !covers || !rare {
+            missed.push(line);
+        }
+    }
+    missed
 }
 
 fn three_points(name: &str, solver: &str, settings: &Layout, draws: u64) -> Cell {

@@ -212,7 +212,7 @@ fn dive(seed: u64, rig: &StereoRig, settings: &NetworkSettings, earlier: Option<
         }
         let stamp_ns = 1 + k as u64 * 2_000_000_000;
         let here = Here { stamp_ns, navigated: Some(known.clone()), rough: None };
-        let fixes: &[Navigated] = if k == 0 { &[known.clone()] } else { &[] };
+        let fixes: &[Navigated] = if k == 0 { std::slice::from_ref(&known) } else { &[] };
         let closure = traverse.visit_by(&here, fixes, |_| ground.seen(&mut rng, rig, world_from_camera));
         laid += usize::from(closure.laid.is_some());
         if let Some(Ok(found)) = closure.sought {

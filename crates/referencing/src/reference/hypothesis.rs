@@ -6,6 +6,7 @@ use super::{Alternative, Refusal};
 use crate::{Correspondence, Degenerate, solve::likelihood::Likelihood};
 
 /// A set with its pose.
+#[derive(Clone)]
 pub(super) struct Hypothesis {
     pub(super) pairs: Vec<Correspondence>,
     /// What the solver says.
@@ -16,6 +17,9 @@ pub(super) struct Hypothesis {
     pub(super) score: f64,
     /// The covariance of `pose`, once it was asked for.
     pub(super) covariance: Option<Covariance6<Object, Camera>>,
+    /// Other poses of the same pairs that are as likely, the likeliest first ([`Solver::rivals`](crate::Solver::rivals)): with
+    /// one the pose is ambiguous.
+    pub(super) rivals: Vec<Alternative>,
 }
 
 impl Hypothesis {

@@ -10,7 +10,13 @@ use super::{
 };
 use crate::{
     Correspondence, Degenerate, Identification, Observations, Prior, PriorBound, Problem, Solver,
-    candidates::chi_square, chance::expected_sets, search::elsewhere, solve::likelihood,
+    candidates::chi_square,
+    chance::expected_sets,
+    search::elsewhere,
+    solve::{
+        Rival,
+        likelihood::{self, Likelihood},
+    },
 };
 
 /// What a set is judged by.
@@ -93,6 +99,10 @@ impl Judge<'_> {
             return (Outcome::Ambiguous(different.into_iter().map(Hypothesis::alternative).collect()), None);
         }
         match (different.pop(), first_fall) {
+            (Some(mut best), _) if !best.rivals.is_empty() => {
+                let rivals = std::mem::take(&mut best.rivals);
+                (Outcome::Ambiguous(std::iter::once(best.alternative()).chain(rivals).collect()), None)
+            }
             (Some(best), _) => {
                 let runner_up = stand.refused.into_iter().find(|other| self.apart(&best.pose, &other.pose));
                 (self.fix(best), runner_up.map(Hypothesis::alternative))
@@ -134,20 +144,41 @@ impl Judge<'_> {
         Observations::of(pairs, self.problem.model, self.problem.cloud, self.rig)
     }
 
+    /// The pose of the pairs: of all that the solver finds as likely, and that residuals, prior and visible sides leave
+    /// possible, the likeliest, with the others beside it.
     pub(super) fn hypothesis(&self, pairs: &[Correspondence]) -> Result<Hypothesis, Degenerate> {
         let data = self.observations(pairs);
         let pose = self.solver.solve(&data)?;
         let likelihood = likelihood::maximum(&data, &pose);
-        let prior = match self.problem.prior {
+        let fewer = self.largest.saturating_sub(pairs.len()) as f64 * chi_square(3, self.acceptance.confidence);
+        let of = |pose, likelihood: Likelihood| {
+            let score = -0.5 * (likelihood.cost + fewer + self.off_prior(&likelihood.pose));
+            Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score, covariance: None, rivals: Vec::new() }
+        };
+        let own = of(pose, likelihood);
+        let others = self.solver.rivals(&data, &pose, chi_square(1, self.acceptance.confidence));
+        if others.is_empty() {
+            return Ok(own);
+        }
+        let other =
+            |rival: Rival| of(rival.pose, Likelihood { pose: rival.pose, cost: own.likelihood.cost + rival.worse });
+        let mut possible: Vec<Hypothesis> = others.into_iter().map(other).chain([own.clone()]).collect();
+        possible.retain_mut(|one| self.residuals(one).is_ok() && self.near(one).is_ok() && self.faces(one));
+        possible.sort_by(by_score);
+        let mut possible = possible.into_iter();
+        let Some(likeliest) = possible.next() else { return Ok(own) };
+        Ok(Hypothesis { rivals: possible.map(Hypothesis::alternative).collect(), ..likeliest })
+    }
+
+    /// χ² of the prior at a pose; nought without one and of a shell.
+    fn off_prior(&self, pose: &Transform<Object, Camera>) -> f64 {
+        match self.problem.prior {
             Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) }) => {
-                let xi = object_from_camera.error_to(&likelihood.pose);
+                let xi = object_from_camera.error_to(pose);
                 covariance.matrix.cholesky().map_or(0.0, |c| xi.dot(&c.solve(&xi)))
             }
             _ => 0.0,
-        };
-        let fewer = self.largest.saturating_sub(pairs.len()) as f64 * chi_square(3, self.acceptance.confidence);
-        let score = -0.5 * (likelihood.cost + fewer + prior);
-        Ok(Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score, covariance: None })
+        }
     }
 
     /// Whether a rigid motion explains the set within its noise.
@@ -160,9 +191,7 @@ impl Judge<'_> {
 
     /// Whether precision and prior let the pose pass.
     pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
-        let data = self.observations(&hypothesis.pairs);
-        let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
-        hypothesis.covariance = Some(covariance);
+        let covariance = self.covariance(hypothesis)?;
         let (rms, limit) = (self.predicted_rms(hypothesis, &covariance), self.alert_limit);
         // Written so that a NaN is refused too.
         if !(2.0 * rms <= limit) {
@@ -172,6 +201,23 @@ impl Judge<'_> {
         if !(2.0 * sigma <= limit) {
             return Err(Fallen::Refused(Refusal::Attitude { sigma, limit }));
         }
+        self.near(hypothesis)
+    }
+
+    /// The covariance of the pose, asked for once.
+    fn covariance(&self, hypothesis: &mut Hypothesis) -> Result<Covariance6<Object, Camera>, Fallen> {
+        if let Some(known) = hypothesis.covariance {
+            return Ok(known);
+        }
+        let data = self.observations(&hypothesis.pairs);
+        let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
+        hypothesis.covariance = Some(covariance);
+        Ok(covariance)
+    }
+
+    /// Whether the prior lets the pose pass.
+    fn near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
+        let covariance = self.covariance(hypothesis)?;
         let Some(prior) = self.problem.prior else { return Ok(()) };
         let off = match &prior.bound {
             PriorBound::Gaussian(of_prior) => {

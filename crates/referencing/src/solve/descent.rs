@@ -104,6 +104,11 @@ impl Linearized {
         Some(self.normal.matrix().cholesky()?.inverse())
     }
 
+    /// The square of the length of a step in standard deviations: ξᵀ Σ⁻¹ ξ.
+    pub(super) fn away(&self, step: &Vector6<f64>) -> f64 {
+        step.dot(&(self.normal.matrix() * step))
+    }
+
     /// tr Σ_φφ (rad²), by the Schur complement of the translation.
     pub(super) fn attitude_variance(&self) -> Option<f64> {
         let normal = self.normal.matrix();

@@ -7,12 +7,13 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
 use super::{
-    Degenerate, Solver,
+    Degenerate, Rival, Solver,
     descent::{Term, linearize, minimize, model_errors},
     kabsch,
+    profile::widened,
     sightings::{FEW, Sightings, Target},
     spread::{check, share},
-    starts::likeliest,
+    starts::{likeliest, rivals},
 };
 use crate::{Observation, Observations};
 
@@ -58,6 +59,15 @@ impl Solver for Mahalanobis {
         self.solved(data, |pose, _| Ok(*pose))
     }
 
+    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
+        let Some(rig) = self.rig(data) else { return Vec::new() };
+        let mut sightings = Sightings::new(rig);
+        match sightings.see(&data.points, Target::Triangulated) {
+            Ok(()) => rivals(data, rig, self.starts, &sightings, at, most),
+            Err(_) => Vec::new(),
+        }
+    }
+
     fn covariance(
         &self,
         data: &Observations<'_>,
@@ -69,7 +79,9 @@ impl Solver for Mahalanobis {
         };
         let mut all = Sightings::new(rig);
         all.see(&data.points, Target::Triangulated).map_err(|_| Degenerate::Singular)?;
-        covariance(data, at, &|k, place| all.live(k, place))
+        let live = |k: usize, place: &_| all.live(k, place);
+        let first = covariance(data, at, &live)?;
+        Ok(Covariance6::new(widened(&data.points, at, first.matrix, &live)))
     }
 
     fn model_errors(

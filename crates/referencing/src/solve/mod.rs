@@ -23,6 +23,7 @@ mod numerical;
 mod p3p;
 mod p3p_stereo;
 mod pixel_cost;
+mod profile;
 mod resampled;
 mod roots;
 mod sandwich;
@@ -144,6 +145,15 @@ pub(crate) fn wide_enough(data: &Observations<'_>) -> Result<(), Degenerate> {
     spread::check(data, 3, 1e-3)
 }
 
+/// Another pose that explains the same points nearly as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rival {
+    /// The pose.
+    pub pose: Transform<Object, Camera>,
+    /// By how much its χ² is larger; less than nought where it is smaller.
+    pub worse: f64,
+}
+
 /// Computes the rigid motion that carries observed points onto model points.
 pub trait Solver: Send + Sync + std::fmt::Debug {
     /// The least number of points it works with.
@@ -177,6 +187,18 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// says otherwise. Empty where `solve` would refuse.
     fn used(&self, data: &Observations<'_>) -> Vec<usize> {
         (0..data.points.len()).collect()
+    }
+
+    /// Other poses that are as likely as [`solve`](Self::solve)'s answer `at`, but for no more than `most` of χ², and that its
+    /// covariance does not contain: minima in other valleys of the likelihood, as few points that are small for their distance
+    /// have them. None of a solver whose cost has one minimum.
+    ///
+    /// With `most` the quantile of χ²₁ at a confidence, that of two valleys the wrong one is answered alone has no more than
+    /// half the probability that the confidence leaves, whatever the distance d of the valleys: the difference of their χ² is
+    /// normal with mean d² and variance 4d², and Q((d² + most) / 2d) is greatest where d² is `most`.
+    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
+        let _ = (data, at, most);
+        Vec::new()
     }
 
     /// First-order covariance of [`solve`](Self::solve) at its answer: Σ = Σ_i J_i Σ_i J_iᵀ over all

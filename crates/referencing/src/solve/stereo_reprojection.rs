@@ -6,25 +6,28 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver,
+    Degenerate, Rival, Solver,
     descent::{linearize, model_errors},
+    profile::widened,
     sightings::{Sightings, Target},
     spread::{check, share},
-    starts::likeliest,
+    starts::{likeliest, rivals},
 };
 use crate::Observations;
 
 /// The most likely pose given where both images show the points: least Σ rᵀ S⁻¹ r over SE(3), r the four pixel
 /// residuals of a point and S = Σ_px + σ_model² J Jᵀ, J = ∂pixels/∂p at the fitted point (the error of the model's
-/// point marginalised). It reaches the Cramér–Rao bound; its covariance (Σ Jᵀ S⁻¹ J)⁻¹ is that bound at the answer.
+/// point marginalised). It reaches the Cramér–Rao bound; its covariance (Σ Jᵀ S⁻¹ J)⁻¹ is that bound at the answer, and
+/// where the attitude is weak what the bent likelihood makes of it.
 ///
 /// Three or four points, or a small object far away, leave several minima. Where the answer from the unweighted
-/// fit of the triangulated points is in doubt, the poses that three points allow the left camera alone (P3P) are
-/// tried as well, and the least cost stands.
+/// fit of the triangulated points is in doubt, the poses that three points allow the left camera alone (P3P) and the mirror
+/// image of the answer are tried as well, and the least cost stands. What is hardly less likely is told by
+/// [`rivals`](Solver::rivals).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StereoReprojection {
-    /// How many starts at most: one is the unweighted fit alone.
+    /// How many starts at most, besides the first answer's mirror image: one is the unweighted fit alone.
     pub starts: usize,
     /// Second extent of the points over the first below which they count as a line.
     pub least_ratio: f64,
@@ -61,6 +64,15 @@ impl Solver for StereoReprojection {
         likeliest(data, rig, self.starts, &sightings)
     }
 
+    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
+        let Ok(rig) = pixels_and_rig(data) else { return Vec::new() };
+        let mut sightings = Sightings::new(rig);
+        match sightings.see(&data.points, Target::Pixels) {
+            Ok(()) => rivals(data, rig, self.starts, &sightings, at, most),
+            Err(_) => Vec::new(),
+        }
+    }
+
     fn covariance(
         &self,
         data: &Observations<'_>,
@@ -69,11 +81,10 @@ impl Solver for StereoReprojection {
         let rig = pixels_and_rig(data)?;
         let mut all = Sightings::new(rig);
         all.see(&data.points, Target::Pixels)?;
-        linearize(&data.points, at, &|k, place: &_| all.live(k, place))
-            .ok_or(Degenerate::Hidden)?
-            .covariance()
-            .map(Covariance6::new)
-            .ok_or(Degenerate::Singular)
+        let live = |k: usize, place: &_| all.live(k, place);
+        let first = linearize(&data.points, at, &live).ok_or(Degenerate::Hidden)?.covariance();
+        let first = first.ok_or(Degenerate::Singular)?;
+        Ok(Covariance6::new(widened(&data.points, at, first, &live)))
     }
 
     fn model_errors(
