@@ -31,8 +31,8 @@ pub use reference::{
     judge_named, reference, rms_apart, until_found, wider,
 };
 pub use search::{
-    Belief, Explanation, Identification, LookAlike, MaximumClique, RigidConsensus, SEARCHES, Samples, Search, Shares,
-    StructuralCoherence, Unidentified,
+    Belief, Explanation, Identification, Imitation, LookAlike, MaximumClique, RigidConsensus, SEARCHES, Samples,
+    Search, Shares, StructuralCoherence, Unidentified,
 };
 pub use site::{Congruence, Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};
 pub use solve::{Choose, Degenerate, Kabsch, Mahalanobis, Rival, SOLVERS, Solver, StereoReprojection, Triad};

@@ -2,7 +2,7 @@
 
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::LookAlike;
+use super::{Imitation, LookAlike};
 use crate::{Alternative, Correspondence, ModelPoint, rms_apart};
 
 /// Explanations less likely than the best by this much (nats) are not listed: a share of 0.05 %.
@@ -37,12 +37,18 @@ pub struct Belief {
     pub beside: Vec<Explanation>,
     /// What a pattern that goes on beyond the object explains of the cloud; `None` of an object without one.
     pub look_alike: Option<LookAlike>,
-    /// A pose elsewhere that was followed however unlikely it is, where nothing likelier was met: the answer is held against it.
+    /// What shows most that clutter imitates the object; `None` where nothing does.
+    pub imitation: Option<Imitation>,
+    /// The likeliest of what else was met elsewhere, or, where that is nothing, of what was followed however unlikely it is: the
+    /// answer is held against it.
     pub unlikely: Option<Explanation>,
 }
 
 /// Clutter alone shows this much evidence (nats) in one frame of twenty: E Σ Λ = 1 where it is spread as the terms have it.
 const ACCIDENT: f64 = 3.0;
+
+/// How often clutter imitates an object, before a frame shows it: so seldom that where nothing shows it no answer depends on it.
+const LN_IMITATES: f64 = -11.5;
 
 /// How the belief is shared out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,7 +110,8 @@ impl Belief {
     /// equally likely beforehand; poses within `limit` (m, RMS over the model points) of the likeliest count
     /// as one with it. A pattern like the object's, alone or around the object, is as likely beforehand. And what looks
     /// like the object beside it, in the points that it leaves, is what clutter of this cloud can do: without the object it
-    /// would be as likely that clutter did it here.
+    /// would be as likely that clutter did it here. Where another pose shows that the clutter imitates the object
+    /// ([`Imitation`]), the likeliest pose is such an imitation, or the object among them.
     pub fn shares(&self, model: &[ModelPoint], limit: f64) -> Shares {
         let Some(best) = self.explanations.first() else {
             return Shares { likeliest: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0, clutter: 0.0 };
@@ -112,7 +119,11 @@ impl Belief {
         let pattern = self.look_alike.unwrap_or(LookAlike { alone: f64::NEG_INFINITY, around: f64::NEG_INFINITY });
         let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
         let clutter = if beside > ACCIDENT { beside } else { 0.0 };
-        let most = best.ln_evidence.max(clutter).max(pattern.alone).max(pattern.around);
+        // The object among imitations, and imitations alone.
+        let among = self.imitation.map_or(f64::NEG_INFINITY, |of| best.ln_evidence + of.ln_evidence + LN_IMITATES);
+        let imitated = self.imitation.map_or(f64::NEG_INFINITY, |of| among + of.ln_alone);
+        let most =
+            [clutter, pattern.alone, pattern.around, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
         let (mut likeliest, mut elsewhere) = (0.0, 0.0);
         for other in &self.explanations {
             let share = libm::exp(other.ln_evidence - most);
@@ -122,11 +133,12 @@ impl Belief {
                 elsewhere += share;
             }
         }
-        likeliest += libm::exp(pattern.around - most);
+        likeliest += libm::exp(pattern.around - most) + libm::exp(among - most);
         let alike = libm::exp(pattern.alone - most);
-        let absent = libm::exp(clutter - most) + alike;
+        let of_clutter = libm::exp(clutter - most) + libm::exp(imitated - most);
+        let absent = of_clutter + alike;
         let all = likeliest + elsewhere + absent;
-        let more = libm::exp(clutter - most) - libm::exp(-most);
+        let more = of_clutter - libm::exp(-most);
         Shares {
             likeliest: likeliest / all,
             elsewhere: elsewhere / all,
@@ -134,5 +146,28 @@ impl Belief {
             alike: alike / all,
             clutter: more / all,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_geometry::Transform;
+
+    #[test]
+    fn where_clutter_imitates_the_object_it_decides_how_the_places_are_filled() {
+        let pose = Transform::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::zeros());
+        let best = Explanation { pairs: Vec::new(), object_from_camera: pose, ln_evidence: 40.0, ln_crowd: 0.0 };
+        let absent = |imitation: Option<Imitation>| {
+            let belief = Belief { explanations: vec![best.clone()], imitation, ..Belief::default() };
+            let shares = belief.shares(&[], 0.1);
+            assert!((shares.absent - shares.clutter) * 0.99 <= (-40.0_f64).exp(), "all else is no object at all");
+            shares.absent
+        };
+        let imitation = |ln_evidence, ln_alone| Some(Imitation { ln_evidence, ln_alone });
+        assert!(absent(None) < 1e-15 && absent(imitation(-20.0, 0.0)) < 1e-13);
+        // As many of the places elsewhere are filled as of the object's: even odds; far fewer: one to e¹².
+        assert!((absent(imitation(60.0, 0.0)) - 0.5).abs() < 1e-9);
+        assert!((absent(imitation(60.0, -12.0)) * 12.0_f64.exp() - 1.0).abs() < 1e-4);
     }
 }

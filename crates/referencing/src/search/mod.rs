@@ -35,7 +35,7 @@ mod volumes;
 mod weighted_clique;
 
 pub use belief::{Belief, Explanation, Shares};
-pub use consensus::LookAlike;
+pub use consensus::{Imitation, LookAlike};
 pub(crate) use grow::elsewhere;
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]

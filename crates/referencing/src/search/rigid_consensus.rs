@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Belief, Explanation, Identification, NEEDED, Search, Unidentified, bounded,
-    consensus::{Crowd, Graph, Mode, Pattern, Rough, Seeds, Swept, Terms, mirror_image},
+    consensus::{Crowd, Graph, Imitation, Mode, Occupied, Pattern, Rough, Seeds, Swept, Terms, mirror_image},
     grow::{feasible, grow, most_possible, so_far},
     orientation::Sense,
 };
@@ -28,8 +28,9 @@ use crate::Problem;
 ///
 /// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
 /// a box, in clumps), ρ_i is the density of the nearest points instead, and B(k) Π is summed over the subsets of the pairs:
-/// what fits in a crowd is as likely clutter. And beside the object and clutter alone stand two more explanations: a pattern
-/// that the object repeats in part goes on, with the object in it or without.
+/// what fits in a crowd is as likely clutter. And beside the object and clutter alone stand more explanations: a pattern
+/// that the object repeats in part goes on, with the object in it or without; and where poses elsewhere explain what clutter
+/// spread evenly would not show, clutter imitates the object, which is among the imitations or not ([`Imitation`]).
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
@@ -117,9 +118,11 @@ impl Search for RigidConsensus {
         // A second copy of the object in what is left of the cloud, and a pose to hold the likeliest against.
         let mut look_alike = None;
         let mut beside = Swept { modes: Vec::new(), complete: true, tests: 0 };
+        let mut imitation = None;
         let mut unlikely = None;
         if best.ln_evidence >= STRONG {
             let pattern = Pattern::of(problem.model);
+            let elsewhere = |mode: &Mode| mode.members.iter().filter(|&&v| best.holds(v)).count() < NEEDED;
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
             let left = self.budget.saturating_sub(swept.tests);
@@ -131,11 +134,21 @@ impl Search for RigidConsensus {
                 let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), effort).sweep();
                 beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
             }
+            // What poses elsewhere say of the clutter, those that are as likely as no object, as far as as much again goes.
+            let effort = left.min((swept.tests + graph.tests / PAIRS_A_WORD) / 4);
+            let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
+            tests += others.tests;
+            weighed(&mut others);
+            others.modes.retain(elsewhere);
+            let occupied = Occupied::of(problem, best, pattern.as_ref().and_then(Pattern::telling));
+            let imitations = others.modes.iter().map(|other| occupied.imitation(problem, parts, other));
+            let weight = |of: &Imitation| of.ln_evidence + of.ln_alone;
+            imitation = imitations.max_by(|a, b| weight(a).total_cmp(&weight(b)));
             weighed(&mut beside);
             tests += beside.tests;
             look_alike = pattern.map(|pattern| pattern.look_alike(problem, &terms, &graph, best));
-            let elsewhere = |mode: &Mode| mode.members.iter().filter(|&&v| best.holds(v)).count() < NEEDED;
-            if swept.modes.iter().chain(&beside.modes).all(|mode| !elsewhere(mode)) {
+            unlikely = others.modes.into_iter().next();
+            if unlikely.is_none() && swept.modes.iter().chain(&beside.modes).all(|mode| !elsewhere(mode)) {
                 unlikely = Seeds::new(problem.model, parts, &none, (NEEDED, f64::NEG_INFINITY), 0).elsewhere(best);
             }
         }
@@ -166,6 +179,7 @@ impl Search for RigidConsensus {
                 explanations: explain(&swept),
                 beside: explain(&beside),
                 look_alike,
+                imitation,
                 unlikely: unlikely.as_ref().map(explanation),
             }),
             pairs,

@@ -15,6 +15,9 @@ const LOOKED_UP: usize = 8;
 /// So many times the density that was expected may be an accident: one point in 25 has it in evenly spread clutter.
 const CROWDED: f64 = 4.0;
 
+/// Points nearer to each other than so many standard deviations may be one place that is measured twice.
+const TWINS: f64 = 5.0;
+
 /// How crowded the cloud is about its points.
 ///
 /// The terms of a pose take clutter to be spread evenly in each shell. On the edges of a box, or where it clumps, it is not:
@@ -25,6 +28,8 @@ pub(in crate::search) struct Crowd {
     nearest: BTreeMap<usize, Vec<(f64, usize)>>,
     /// Without a prior, which cloud points are candidates: the others are no clutter of this search. Empty where all count.
     candidates: Vec<bool>,
+    /// The share of the cloud points that have another within a distance (m²), where two members of a pose were so near.
+    twins: Option<(f64, f64)>,
 }
 
 impl Crowd {
@@ -39,12 +44,41 @@ impl Crowd {
             .members
             .iter()
             .zip(&even)
-            .map(|(&v, gain)| gain - self.cost(problem, terms, graph, v, &members))
+            .enumerate()
+            .map(|(at, (&v, gain))| {
+                let crowd = self.cost(problem, terms, graph, v, &members);
+                gain - crowd.max(self.twin(problem, terms, graph, v, &members[..at]))
+            })
             .collect();
         let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_share[even.len()];
         let (even, crowded) = (ln_visible(&even, &terms.ln_share), ln_visible(&crowded, &terms.ln_share));
         mode.ln_evidence = of_pose + crowded;
         mode.ln_crowd = even - crowded;
+    }
+
+    /// The same of a point that is measured beside one of the members before it: the second of two places a few standard
+    /// deviations apart is there as often as cloud points have another so near.
+    fn twin(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, v: usize, before: &[usize]) -> f64 {
+        let pair = graph.vertices[v];
+        let seen = &problem.cloud[pair.cloud].position;
+        let square = TWINS * TWINS * seen.covariance.trace() / 3.0;
+        let near = |a: usize, b: usize| {
+            (problem.cloud[a].position.at.coords - problem.cloud[b].position.at.coords).norm_squared() <= square
+        };
+        if !before.iter().any(|&j| near(pair.cloud, j)) {
+            return 0.0;
+        }
+        let share = match self.twins {
+            Some((of, share)) if of == square => share,
+            _ => {
+                let all = problem.cloud.len();
+                let twins = (0..all).filter(|&a| (0..all).any(|b| b != a && near(a, b))).count();
+                twins as f64 / all as f64
+            }
+        };
+        self.twins = Some((square, share));
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * square.powf(1.5);
+        (libm::log(share / volume) - terms.ln_density[pair.model]).max(0.0)
     }
 
     /// By how much the density about the cloud point of a vertex exceeds what was expected (nats).

@@ -194,6 +194,16 @@ impl Mode {
         members.into_iter().map(|(_, v)| graph.vertices[v]).collect()
     }
 
+    /// ln of the evidence of some of the members alone, which of the points are visible left aside; nothing where they fix no pose.
+    pub(in crate::search) fn ln_evidence_of(&self, terms: &Terms, rough: &Rough, members: &[usize]) -> f64 {
+        if members.len() < 3 && rough.known.is_none() {
+            return 0.0;
+        }
+        let Some((motion, factor)) = fit(terms, rough, members, &self.motion, 4) else { return 0.0 };
+        let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
+        gains + rough.ln_density(&motion) + ln_volume(&factor)
+    }
+
     /// Whether a vertex belongs to it.
     pub(in crate::search) fn holds(&self, v: usize) -> bool {
         self.members.binary_search(&v).is_ok()

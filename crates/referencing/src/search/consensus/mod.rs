@@ -4,6 +4,7 @@ mod bits;
 mod bound;
 mod crowd;
 mod graph;
+mod imitation;
 mod likelihood;
 mod mirror;
 mod modes;
@@ -16,6 +17,8 @@ mod visible;
 
 pub(super) use crowd::Crowd;
 pub(super) use graph::Graph;
+pub use imitation::Imitation;
+pub(super) use imitation::Occupied;
 pub(super) use likelihood::{Mode, Terms};
 pub(super) use mirror::mirror_image;
 pub(super) use motion::Motion;

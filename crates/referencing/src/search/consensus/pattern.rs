@@ -1,6 +1,6 @@
 //! Patterns that repeat by a step: what goes on beyond the object looks like a part of it.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::{
     graph::Graph,
@@ -67,17 +67,10 @@ impl Pattern {
             }
         }
         let alike = |step: &Vector3<f64>| steps.iter().filter(|other| (*other - step).norm() <= off).count();
-        let mut common: Vec<&Vector3<f64>> = steps.iter().filter(|step| alike(step) >= least).collect();
-        let by = |a: &Vector3<f64>, b: &Vector3<f64>| a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
-        common.sort_by(|a, b| {
-            a.norm_squared().total_cmp(&b.norm_squared()).then(by(a, b).unwrap_or(std::cmp::Ordering::Equal))
-        });
-        let mut basis: Vec<Vector3<f64>> = Vec::new();
-        for step in common {
-            let rest = basis.iter().fold(*step, |rest, known| rest - known * (rest.dot(known) / known.norm_squared()));
-            if basis.len() < 3 && rest.norm() > SAME * step.norm() {
-                basis.push(*step);
-            }
+        let common = steps.iter().filter(|step| alike(step) >= least).copied().collect();
+        let basis = independent(common);
+        if basis.is_empty() {
+            return None;
         }
         let mut pattern = Self { repeats: vec![false; n], beyond: Vec::new() };
         let next = |i: usize| basis.iter().flat_map(|step| [*step, -step]).map(move |step| (i, step));
@@ -86,6 +79,15 @@ impl Pattern {
                 pattern.repeats[i] = true;
             }
         }
+        // Others may lie on the same lattice, or on a finer one, with none beside them.
+        let (own, finer) = (Lattice::of(&basis, 1.0), Lattice::of(&repeated(&at, off), 0.5));
+        let of_it: Vec<usize> = (0..n).filter(|&i| pattern.repeats[i]).collect();
+        let on = |p: &Vector3<f64>| {
+            let mut steps = of_it.iter().map(|&i| p - at[i]);
+            steps.any(|step| own.off(&step) <= off || finer.off(&step) <= off)
+        };
+        let alone: Vec<usize> = (0..n).filter(|&i| !pattern.repeats[i] && on(&at[i])).collect();
+        alone.into_iter().for_each(|i| pattern.repeats[i] = true);
         for (i, step) in (0..n).flat_map(next) {
             let place = at[i] + step;
             let known = || pattern.beyond.iter().any(|other| (other - place).norm() <= 2.0 * off);
@@ -93,7 +95,13 @@ impl Pattern {
                 pattern.beyond.push(place);
             }
         }
-        (!basis.is_empty()).then_some(pattern)
+        Some(pattern)
+    }
+
+    /// The points that tell the object from the pattern by themselves, if they are enough.
+    pub(in crate::search) fn telling(&self) -> Option<Vec<bool>> {
+        let telling: Vec<bool> = self.repeats.iter().map(|repeats| !repeats).collect();
+        (telling.iter().filter(|&&telling| telling).count() >= TELLING).then_some(telling)
     }
 
     /// What the pattern alone, or around the object, explains of the cloud as well as a pose does.
@@ -137,6 +145,62 @@ impl Pattern {
     }
 }
 
+/// Up to three steps, the shortest in as many directions, by each of which [`LEAST_ROWS`] points or more follow others.
+fn repeated(at: &[Vector3<f64>], off: f64) -> Vec<Vector3<f64>> {
+    let mut steps: Vec<Vector3<f64>> = Vec::new();
+    for (a, from) in at.iter().enumerate() {
+        let to = at[..a].iter().map(|to| to - from).filter(|step| step.norm() >= LEAST_STEP * off);
+        steps.extend(to.map(|step| if forward(&step) { step } else { -step }));
+    }
+    steps.sort_by(|a, b| a.x.total_cmp(&b.x));
+    let alike = |step: &Vector3<f64>| {
+        let from = steps.partition_point(|other| other.x < step.x - off);
+        let beside = steps[from..].iter().take_while(|other| other.x <= step.x + off);
+        beside.filter(|other| (*other - step).norm_squared() <= off * off).count()
+    };
+    let common = steps.iter().filter(|step| alike(step) >= LEAST_ROWS).copied().collect();
+    independent(common)
+}
+
+/// The shortest of some steps, up to three, each in another direction than the shorter ones.
+fn independent(mut steps: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    let by = |a: &Vector3<f64>, b: &Vector3<f64>| a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
+    steps.sort_by(|a, b| {
+        a.norm_squared().total_cmp(&b.norm_squared()).then(by(a, b).unwrap_or(std::cmp::Ordering::Equal))
+    });
+    let mut basis: Vec<Vector3<f64>> = Vec::new();
+    for step in steps {
+        let rest = basis.iter().fold(step, |rest, known| rest - known * (rest.dot(known) / known.norm_squared()));
+        if basis.len() < 3 && rest.norm() > SAME * step.norm() {
+            basis.push(step);
+        }
+    }
+    basis
+}
+
+/// All sums of whole multiples of one to three steps, or of a share of them.
+struct Lattice {
+    basis: Vec<Vector3<f64>>,
+    /// The least-squares multiples of a step.
+    multiples: DMatrix<f64>,
+}
+
+impl Lattice {
+    fn of(steps: &[Vector3<f64>], share: f64) -> Self {
+        let basis: Vec<Vector3<f64>> = steps.iter().map(|step| step * share).collect();
+        let columns = DMatrix::from_fn(3, basis.len(), |row, column| basis[column][row]);
+        let inverse = (!basis.is_empty()).then(|| columns.pseudo_inverse(0.0).ok()).flatten();
+        Self { multiples: inverse.unwrap_or_else(|| DMatrix::zeros(basis.len(), 3)), basis }
+    }
+
+    /// How far a step is from the nearest one of these.
+    fn off(&self, step: &Vector3<f64>) -> f64 {
+        let multiples = &self.multiples * step;
+        let whole = self.basis.iter().zip(multiples.iter()).map(|(basis, m)| basis * m.round());
+        (step - whole.sum::<Vector3<f64>>()).norm()
+    }
+}
+
 /// One of a step and its reverse.
 fn forward(step: &Vector3<f64>) -> bool {
     step.iter().copied().find(|x| x.abs() > 1e-9).is_none_or(|x| x > 0.0)
@@ -165,6 +229,24 @@ mod tests {
         assert_eq!(pattern(lattice(6, 5).into_iter().chain(off)), Some((30, 22)));
         // A ladder of six rungs goes on at its two ends.
         assert_eq!(pattern(lattice(6, 2)), Some((12, 4)));
+    }
+
+    #[test]
+    fn what_stands_alone_on_the_lattice_does_not_tell_the_object() {
+        // A row of three, a column of three, and points with none beside them.
+        let nodes = [(0, 0), (1, 0), (2, 0), (5, 2), (5, 3), (5, 4), (0, 2), (2, 3), (3, 4), (4, 1)];
+        let places = nodes.map(|(x, y)| [0.3 * f64::from(x), 0.3 * f64::from(y), 0.0]);
+        let all = |off: f64| {
+            let told = [[0.14, 0.44, off], [0.75, 0.16, off], [1.33, 0.15, off]];
+            places.into_iter().chain(told.into_iter().filter(move |_| off > 0.0))
+        };
+        let telling = |off: f64| {
+            let model: Vec<ModelPoint> = all(off).map(|at| ModelPoint::exact("", Point::from(at))).collect();
+            let telling = Pattern::of(&model).expect("rows and columns").telling();
+            telling.map(|telling| telling.iter().filter(|&&telling| telling).count())
+        };
+        assert_eq!(telling(0.0), None);
+        assert_eq!(telling(0.2), Some(3));
     }
 
     #[test]

@@ -133,11 +133,17 @@ impl<'a> Seeds<'a> {
         Swept { modes: self.modes, complete, tests: self.spent }
     }
 
+    /// Only pairs that contradict a pose begin another.
+    pub(in crate::search) fn contradicting(mut self, pose: &Mode) -> Self {
+        self.free = contradicting(self.climb.terms, self.climb.graph, pose, false);
+        self
+    }
+
     /// A pose of three pairs that contradict this one, and what joins them: begun at the pairs that most others agree with,
     /// whatever it is worth. `None` where no three of them agree.
     pub(in crate::search) fn elsewhere(mut self, than: &Mode) -> Option<Mode> {
         let graph = self.climb.graph;
-        self.free = contradicting(self.climb.terms, graph, than);
+        self.free = contradicting(self.climb.terms, graph, than, true);
         let free = std::mem::take(&mut self.free);
         let (mut row, mut common) = (vec![0; free.len()], vec![0; free.len()]);
         for a in self.best_connected(&free, &free, BEGINNINGS) {
@@ -325,13 +331,13 @@ impl<'a> Seeds<'a> {
     }
 }
 
-/// The pairs that a pose explains neither itself nor by their cloud point, one bit each.
-fn contradicting(terms: &Terms, graph: &Graph, pose: &Mode) -> Vec<u64> {
+/// The pairs that a pose does not explain, one bit each; `free` ones only, if their cloud point is in none of its pairs either.
+fn contradicting(terms: &Terms, graph: &Graph, pose: &Mode, free: bool) -> Vec<u64> {
     let mut taken: Vec<usize> = pose.members.iter().map(|&v| graph.vertices[v].cloud).collect();
     taken.sort_unstable();
     let mut bits = vec![0; graph.vertices.len().div_ceil(64)];
     for (v, pair) in graph.vertices.iter().enumerate() {
-        if taken.binary_search(&pair.cloud).is_err() && terms.of_pair(v, &pose.motion).is_none() {
+        if (!free || taken.binary_search(&pair.cloud).is_err()) && terms.of_pair(v, &pose.motion).is_none() {
             bits[v / 64] |= 1 << (v % 64);
         }
     }
