@@ -283,6 +283,7 @@ fn four_compact_points_of_bad_layouts_are_told_apart_or_known() {
 }
 
 /// What four compact points of this seed miss, `draws` of each of twenty layouts.
+#[allow(clippy::print_stdout, reason = "the long form prints its cells")]
 fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
     /// χ²₁ at 99.9 %.
     const MOST: f64 = 10.827_566_170_662_733;
