@@ -233,12 +233,13 @@ mod tests {
 
     #[test]
     fn what_stands_alone_on_the_lattice_does_not_tell_the_object() {
-        // A row of three, a column of three, and points with none beside them.
-        let nodes = [(0, 0), (1, 0), (2, 0), (5, 2), (5, 3), (5, 4), (0, 2), (2, 3), (3, 4), (4, 1)];
-        let places = nodes.map(|(x, y)| [0.3 * f64::from(x), 0.3 * f64::from(y), 0.0]);
+        // A row, a column, and points with none beside them.
+        let row = (0..6).map(|x| (x, 0));
+        let nodes: Vec<(i32, i32)> = row.chain([(5, 2), (5, 3), (5, 4), (5, 5), (0, 2), (2, 3), (3, 5)]).collect();
+        let places: Vec<[f64; 3]> = nodes.iter().map(|&(x, y)| [0.3 * f64::from(x), 0.3 * f64::from(y), 0.0]).collect();
         let all = |off: f64| {
             let told = [[0.14, 0.44, off], [0.75, 0.16, off], [1.33, 0.15, off]];
-            places.into_iter().chain(told.into_iter().filter(move |_| off > 0.0))
+            places.iter().copied().chain(told.into_iter().filter(move |_| off > 0.0))
         };
         let telling = |off: f64| {
             let model: Vec<ModelPoint> = all(off).map(|at| ModelPoint::exact("", Point::from(at))).collect();
