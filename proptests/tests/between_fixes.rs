@@ -152,7 +152,7 @@ fn looked(dives: u64, policy: &dyn Policy, fusion: &dyn Fusion, considered: bool
         }
     }
     let n = dives as f64;
-    let all = ChiSquared::new(6.0 * n).unwrap();
+    let all = ChiSquared::new(6.0 * n).expect("a positive number of degrees of freedom");
     let bounds = [0.025, 0.975].map(|p| all.inverse_cdf(p));
     let within = sums.iter().filter(|sum| **sum >= bounds[0] && **sum <= bounds[1]).count();
     (sums.iter().sum::<f64>() / STEPS as f64 / n, within as f64 / STEPS as f64)
