@@ -28,7 +28,7 @@ pub(in crate::search) struct Crowd {
     nearest: BTreeMap<usize, Vec<(f64, usize)>>,
     /// Without a prior, which cloud points are candidates: the others are no clutter of this search. Empty where all count.
     candidates: Vec<bool>,
-    /// The share of the cloud points that have another within a distance (m²), where two members of a pose were so near.
+    /// The share of the candidates that have another within a distance (m), where two members of a pose were so near.
     twins: Option<(f64, f64)>,
 }
 
@@ -57,27 +57,20 @@ impl Crowd {
     }
 
     /// The same of a point that is measured beside one of the members before it: the second of two places a few standard
-    /// deviations apart is there as often as cloud points have another so near.
+    /// deviations apart is there as often as candidates have another so near.
     fn twin(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, v: usize, before: &[usize]) -> f64 {
         let pair = graph.vertices[v];
         let seen = &problem.cloud[pair.cloud].position;
-        let square = TWINS * TWINS * seen.covariance.trace() / 3.0;
-        let near = |a: usize, b: usize| {
-            (problem.cloud[a].position.at.coords - problem.cloud[b].position.at.coords).norm_squared() <= square
-        };
-        if !before.iter().any(|&j| near(pair.cloud, j)) {
+        let reach = TWINS * (seen.covariance.trace() / 3.0).sqrt();
+        if !before.iter().any(|&j| problem.cloud[j].position.at.distance(&seen.at) <= reach) {
             return 0.0;
         }
         let share = match self.twins {
-            Some((of, share)) if of == square => share,
-            _ => {
-                let all = problem.cloud.len();
-                let twins = (0..all).filter(|&a| (0..all).any(|b| b != a && near(a, b))).count();
-                twins as f64 / all as f64
-            }
+            Some((of, share)) if of == reach => share,
+            _ => twins(problem, reach),
         };
-        self.twins = Some((square, share));
-        let volume = 4.0 / 3.0 * std::f64::consts::PI * square.powf(1.5);
+        self.twins = Some((reach, share));
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * reach.powi(3);
         (libm::log(share / volume) - terms.ln_density[pair.model]).max(0.0)
     }
 
@@ -108,6 +101,26 @@ impl Crowd {
         let times = libm::log(NEIGHBOURS as f64 / volume) - even;
         if times > libm::log(CROWDED) { times } else { 0.0 }
     }
+}
+
+/// The share of the candidates that have another within `reach` (m). Points that are nobody's candidates are none of this
+/// search's.
+fn twins(problem: &Problem<'_>, reach: f64) -> f64 {
+    let mut all: Vec<usize> = problem.candidates.lists.iter().flatten().copied().collect();
+    all.sort_unstable();
+    all.dedup();
+    let at = |j: usize| &problem.cloud[j].position.at;
+    all.sort_by(|&a, &b| at(a).coords.x.total_cmp(&at(b).coords.x));
+    let mut twin = vec![false; all.len()];
+    for (i, &a) in all.iter().enumerate() {
+        let next = all[i + 1..].iter().take_while(|&&b| at(b).coords.x - at(a).coords.x <= reach);
+        for (k, &b) in next.enumerate() {
+            if at(a).distance(at(b)) <= reach {
+                (twin[i], twin[i + 1 + k]) = (true, true);
+            }
+        }
+    }
+    twin.iter().filter(|twin| **twin).count() as f64 / all.len() as f64
 }
 
 fn nearest(problem: &Problem<'_>, of: usize, counts: impl Fn(usize) -> bool) -> Vec<(f64, usize)> {
