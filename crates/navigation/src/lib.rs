@@ -19,6 +19,8 @@ mod odometry;
 mod policy;
 mod reading;
 mod stereo;
+mod times;
+mod unusable;
 
 pub use chain::{Standing, by_world};
 pub use considered::{Considered, Share};

@@ -31,6 +31,24 @@ pub struct NotAfter {
     pub before_ns: u64,
 }
 
+/// The stamps of a journey's pairs, each after the one before.
+#[derive(Debug, Default)]
+pub(crate) struct Stamps(Option<u64>);
+
+impl Stamps {
+    /// Takes the stamp of the next pair, `pair` its number from 0.
+    ///
+    /// # Errors
+    /// [`NotAfter`] when it is not the next; nothing changes then.
+    pub(crate) fn take(&mut self, pair: usize, stamp_ns: u64) -> Result<(), NotAfter> {
+        if let Some(before_ns) = self.0.filter(|before| *before >= stamp_ns) {
+            return Err(NotAfter { pair, stamp_ns, before_ns });
+        }
+        self.0 = Some(stamp_ns);
+        Ok(())
+    }
+}
+
 /// Computes the motion of a stereo rig from the images it took, or from what other sensors of the vehicle say.
 pub trait Odometry: Send + Sync + std::fmt::Debug {
     /// Whether it goes by readings ([`Reckoning::sense`]) and cannot do without.

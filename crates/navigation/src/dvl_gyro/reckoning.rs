@@ -13,6 +13,7 @@ use super::{
 use crate::{
     Device, Journey, Lasting, Local, Lost, NotAfter, Outcome, Reading, Reckoning, Segment, StereoPair, Waypoint,
     lasting::{LASTING, Shares},
+    odometry::Stamps,
 };
 
 /// The memory of one journey.
@@ -20,8 +21,7 @@ pub(super) struct DeadReckoning<'a> {
     settings: &'a DvlGyro,
     body_from_camera: Transform<Body, Camera>,
     heard: Heard,
-    /// When the last pair was taken (ns).
-    before_ns: Option<u64>,
+    stamps: Stamps,
     /// A place so long ago that no reading can come any more that would change it.
     base: Place,
     /// The last place that was told, and up to when each device was known then.
@@ -46,10 +46,7 @@ impl Reckoning for DeadReckoning<'_> {
 
     fn advance(&mut self, pair: &StereoPair<'_>) -> Result<Outcome, NotAfter> {
         let stamp_ns = pair.stamp_ns;
-        if let Some(before_ns) = self.before_ns.filter(|before| *before >= stamp_ns) {
-            return Err(NotAfter { pair: self.outcomes.len(), stamp_ns, before_ns });
-        }
-        self.before_ns = Some(stamp_ns);
+        self.stamps.take(self.outcomes.len(), stamp_ns)?;
         let start = Instant::now();
         let outcome = match self.last {
             None => self.begin(stamp_ns, None),
@@ -80,7 +77,7 @@ impl<'a> DeadReckoning<'a> {
             settings,
             body_from_camera,
             heard: Heard::default(),
-            before_ns: None,
+            stamps: Stamps::default(),
             base: Place::new(0, Transform::identity()),
             last: None,
             segments: Vec::new(),

@@ -6,10 +6,7 @@ mod reckoning;
 
 use seafix_component::{Choice, Component, in_range};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
-use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, Threads,
-    read_refinement, read_triangulator,
-};
+use seafix_vision::{FrontEnd, StageChoices, Threads, read_refinement, read_triangulator};
 use serde::{Deserialize, Serialize};
 
 use crate::{Odometry, Reckoning};
@@ -138,16 +135,16 @@ impl Component for Icp {
 
 impl Icp {
     fn front_end(&self) -> Result<FrontEnd, String> {
-        let said = |error: seafix_component::BuildError| error.to_string();
-        Ok(FrontEnd {
-            filters: self.filters.iter().map(|filter| FILTERS.build(filter)).collect::<Result<_, _>>().map_err(said)?,
-            detector: DETECTORS.build(&self.detector).map_err(said)?,
-            locator: LOCATORS.build(&self.locator).map_err(said)?,
-            descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
-            matcher: MATCHERS.build(&self.matcher).map_err(said)?,
-            refinement: REFINEMENTS.build(&self.refine).map_err(said)?,
-            triangulator: TRIANGULATORS.build(&self.triangulation).map_err(said)?,
-        })
+        let choices = StageChoices {
+            filters: &self.filters,
+            detector: &self.detector,
+            locator: &self.locator,
+            descriptor: &self.descriptor,
+            matcher: &self.matcher,
+            refine: &self.refine,
+            triangulation: &self.triangulation,
+        };
+        FrontEnd::build(&choices).map_err(|unfit| unfit.to_string())
     }
 }
 

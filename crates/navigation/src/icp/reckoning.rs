@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use nalgebra::SVector;
 use seafix_geometry::{Camera, Covariance6, StereoRig, Transform, World};
-use seafix_vision::{FrontEnd, Image, Look, Threads};
+use seafix_vision::{FrontEnd, Look, Threads};
 
 use super::{
     Icp,
@@ -13,7 +13,9 @@ use super::{
 use crate::{
     Journey, Lasting, Local, Lost, NotAfter, Outcome, Reckoning, Segment, StereoPair, Waypoint,
     lasting::{LASTING, Shares},
-    stereo::{times::Times, unusable::unusable},
+    odometry::Stamps,
+    times::Times,
+    unusable::RawImages,
 };
 
 /// The memory of one journey.
@@ -22,9 +24,8 @@ pub(super) struct IcpReckoning<'a> {
     front_end: FrontEnd,
     rig: &'a StereoRig,
     look: Look,
-    before_ns: Option<u64>,
-    /// The last images that showed anything: what a frozen camera repeats.
-    raw: Option<[Image; 2]>,
+    stamps: Stamps,
+    raw: RawImages,
     /// The key frame: its cloud, and where it is.
     key: Option<(Ground, Transform<World, Camera>)>,
     last: Option<Last>,
@@ -57,19 +58,11 @@ struct Step {
 impl Reckoning for IcpReckoning<'_> {
     fn advance(&mut self, pair: &StereoPair<'_>) -> Result<Outcome, NotAfter> {
         let stamp_ns = pair.stamp_ns;
-        if let Some(before_ns) = self.before_ns.filter(|before| *before >= stamp_ns) {
-            return Err(NotAfter { pair: self.outcomes.len(), stamp_ns, before_ns });
-        }
-        self.before_ns = Some(stamp_ns);
+        self.stamps.take(self.outcomes.len(), stamp_ns)?;
         let start = Instant::now();
-        let images = [pair.left, pair.right];
-        if let Some(lost) = unusable(images, self.raw.as_ref().map(|[left, right]| [left, right])) {
+        if let Some(lost) = self.raw.take([pair.left, pair.right]) {
             self.outcomes.push(Outcome::Skipped(lost.clone()));
             return Ok(Outcome::Skipped(lost));
-        }
-        match &mut self.raw {
-            Some(raw) => raw.iter_mut().zip(images).for_each(|(raw, image)| raw.copy_from(image)),
-            raw => *raw = Some(images.map(Image::clone)),
         }
         self.times.since("check", start);
         self.front_end.look(pair.left, pair.right, self.rig, &mut self.look);
@@ -100,8 +93,8 @@ impl<'a> IcpReckoning<'a> {
             front_end,
             rig,
             look: Look::new(threads),
-            before_ns: None,
-            raw: None,
+            stamps: Stamps::default(),
+            raw: RawImages::default(),
             key: None,
             last: None,
             pending: None,

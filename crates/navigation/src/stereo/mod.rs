@@ -7,16 +7,14 @@ pub(crate) mod look;
 pub(crate) mod pose;
 mod reckoning;
 mod taken;
-pub(crate) mod times;
-pub(crate) mod unusable;
 mod window;
 
 use seafix_component::{Choice, Component, in_range};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::{SOLVERS, Solver};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptor, Direct, FILTERS, FrontEnd, LOCATORS, MATCHERS, Matcher, REFINEMENTS,
-    TRIANGULATORS, Threads, Warp, read_refinement, read_triangulator,
+    DESCRIPTORS, Descriptor, Direct, FrontEnd, MATCHERS, Matcher, StageChoices, Threads, Warp, read_refinement,
+    read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
@@ -163,18 +161,17 @@ pub(crate) struct Stages {
 impl Stereo {
     pub(crate) fn stages(&self) -> Result<Stages, String> {
         let said = |error: seafix_component::BuildError| error.to_string();
-        let filters =
-            self.filters.iter().map(|filter| FILTERS.build(filter)).collect::<Result<_, _>>().map_err(said)?;
+        let choices = StageChoices {
+            filters: &self.filters,
+            detector: &self.detector,
+            locator: &self.locator,
+            descriptor: &self.descriptor,
+            matcher: &self.matcher,
+            refine: &self.refine,
+            triangulation: &self.triangulation,
+        };
         Ok(Stages {
-            front_end: FrontEnd {
-                filters,
-                detector: DETECTORS.build(&self.detector).map_err(said)?,
-                locator: LOCATORS.build(&self.locator).map_err(said)?,
-                descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
-                matcher: MATCHERS.build(&self.matcher).map_err(said)?,
-                refinement: REFINEMENTS.build(&self.refine).map_err(said)?,
-                triangulator: TRIANGULATORS.build(&self.triangulation).map_err(said)?,
-            },
+            front_end: FrontEnd::build(&choices).map_err(|unfit| unfit.to_string())?,
             descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
             between: MATCHERS.build(&self.between).map_err(said)?,
             minimal: SOLVERS.build(&self.minimal).map_err(said)?,

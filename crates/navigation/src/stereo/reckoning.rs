@@ -6,7 +6,7 @@ use nalgebra::{Matrix4, Vector4};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use seafix_geometry::{Camera, Covariance6, StereoRig, Transform, World};
 use seafix_referencing::Observations;
-use seafix_vision::{Image, Look, Threads, Workspace};
+use seafix_vision::{Look, Threads, Workspace};
 
 use super::{
     Stages, Stereo,
@@ -16,11 +16,12 @@ use super::{
     look::Seen,
     pose::refine,
     taken::Taken,
-    times::Times,
-    unusable::unusable,
     window::adjust,
 };
-use crate::{Journey, Local, Lost, NotAfter, Outcome, Reckoning, Segment, StereoPair, Waypoint};
+use crate::{
+    Journey, Local, Lost, NotAfter, Outcome, Reckoning, Segment, StereoPair, Waypoint, odometry::Stamps, times::Times,
+    unusable::RawImages,
+};
 
 /// The memory of one journey.
 pub(super) struct StereoReckoning<'a> {
@@ -29,9 +30,8 @@ pub(super) struct StereoReckoning<'a> {
     rig: &'a StereoRig,
     look: Look,
     work: Workspace,
-    before_ns: Option<u64>,
-    /// The last images that showed anything, as they came: what a frozen camera repeats.
-    raw: Option<[Image; 2]>,
+    stamps: Stamps,
+    raw: RawImages,
     /// The last pair that was followed.
     last: Option<Last>,
     /// A pair that could not be followed, its place among the outcomes, and why.
@@ -83,20 +83,11 @@ struct Step {
 
 impl Reckoning for StereoReckoning<'_> {
     fn advance(&mut self, pair: &StereoPair<'_>) -> Result<Outcome, NotAfter> {
-        if let Some(before_ns) = self.before_ns.filter(|before| *before >= pair.stamp_ns) {
-            return Err(NotAfter { pair: self.outcomes.len(), stamp_ns: pair.stamp_ns, before_ns });
-        }
-        self.before_ns = Some(pair.stamp_ns);
+        self.stamps.take(self.outcomes.len(), pair.stamp_ns)?;
         let start = Instant::now();
-        let images = [pair.left, pair.right];
-        let before = self.raw.as_ref().map(|[left, right]| [left, right]);
-        if let Some(lost) = unusable(images, before) {
+        if let Some(lost) = self.raw.take([pair.left, pair.right]) {
             self.outcomes.push(Outcome::Skipped(lost.clone()));
             return Ok(Outcome::Skipped(lost));
-        }
-        match &mut self.raw {
-            Some(raw) => raw.iter_mut().zip(images).for_each(|(raw, image)| raw.copy_from(image)),
-            raw => *raw = Some(images.map(Image::clone)),
         }
         self.times.since("check", start);
         let start = Instant::now();
@@ -131,8 +122,8 @@ impl<'a> StereoReckoning<'a> {
             rig,
             look: Look::new(threads),
             work: Workspace::new(threads),
-            before_ns: None,
-            raw: None,
+            stamps: Stamps::default(),
+            raw: RawImages::default(),
             last: None,
             pending: None,
             broken: None,

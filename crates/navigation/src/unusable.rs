@@ -11,8 +11,26 @@ const WHITE: f32 = 254.5;
 /// The largest share of such pixels.
 const MOST_WHITE: f64 = 0.5;
 
+/// The last images that showed anything, as they came: what a frozen camera repeats.
+#[derive(Debug, Default)]
+pub(crate) struct RawImages(Option<[Image; 2]>);
+
+impl RawImages {
+    /// Why a motion cannot be seen in these images; else they are kept, for the next.
+    pub(crate) fn take(&mut self, images: [&Image; 2]) -> Option<Lost> {
+        let lost = unusable(images, self.0.as_ref().map(|[left, right]| [left, right]));
+        if lost.is_none() {
+            match &mut self.0 {
+                Some(raw) => raw.iter_mut().zip(images).for_each(|(raw, image)| raw.copy_from(image)),
+                raw => *raw = Some(images.map(Image::clone)),
+            }
+        }
+        lost
+    }
+}
+
 /// Why a motion cannot be seen in these images, if so; `before`: the pair before.
-pub(crate) fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
+fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
     for (side, image) in [Side::Left, Side::Right].into_iter().zip(images) {
         let pixels = image.pixels();
         let count = pixels.len() as f64;
@@ -65,5 +83,18 @@ mod tests {
         assert!(matches!(unusable([&good, &black], None), Some(Lost::Blank(Side::Right, _))));
         assert!(matches!(unusable([&white, &good], None), Some(Lost::Saturated(Side::Left, _))));
         assert_eq!(unusable([&good, &other], Some([&black, &other])), Some(Lost::Frozen(Side::Right)));
+    }
+
+    #[test]
+    fn frozen_is_what_repeats_the_last_images_that_showed_anything() {
+        let good = image(|i| (i * 37 % 200) as f32);
+        let other = image(|i| (i * 53 % 200) as f32);
+        let black = image(|i| (i % 2) as f32);
+        let mut raw = RawImages::default();
+        assert_eq!(raw.take([&good, &other]), None);
+        assert!(matches!(raw.take([&black, &other]), Some(Lost::Blank(Side::Left, _))));
+        assert_eq!(raw.take([&good, &good]), Some(Lost::Frozen(Side::Left)));
+        assert_eq!(raw.take([&other, &good]), None);
+        assert_eq!(raw.take([&good, &good]), Some(Lost::Frozen(Side::Right)));
     }
 }

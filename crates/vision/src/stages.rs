@@ -1,0 +1,98 @@
+//! Which component each stage of a front end is.
+
+use seafix_component::{BuildError, Choice, Registry};
+
+use crate::{DESCRIPTORS, DETECTORS, FILTERS, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
+
+/// The choice of each stage, as settings have them under the same names.
+#[derive(Debug, Clone, Copy)]
+pub struct StageChoices<'a> {
+    /// Prepare each image, one after the other.
+    pub filters: &'a [Choice],
+    /// Finds key points in each image.
+    pub detector: &'a Choice,
+    /// Says where exactly they are.
+    pub locator: &'a Choice,
+    /// Describes their surroundings, for the matcher.
+    pub descriptor: &'a Choice,
+    /// Pairs left with right.
+    pub matcher: &'a Choice,
+    /// Aligns each pair between the cameras.
+    pub refine: &'a Choice,
+    /// Turns pairs into points.
+    pub triangulation: &'a Choice,
+}
+
+/// A stage that cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{error}")]
+pub struct UnfitStage {
+    /// Its field of [`StageChoices`].
+    pub stage: &'static str,
+    /// Of a filter, its place in the list.
+    pub place: Option<usize>,
+    /// Why.
+    pub error: BuildError,
+}
+
+impl FrontEnd {
+    /// The stages of these choices, ready to work.
+    ///
+    /// # Errors
+    /// [`UnfitStage`]: the first that cannot be built.
+    pub fn build(choices: &StageChoices<'_>) -> Result<Self, UnfitStage> {
+        let filter = |(place, choice)| {
+            FILTERS.build(choice).map_err(|error| UnfitStage { stage: "filters", place: Some(place), error })
+        };
+        Ok(Self {
+            filters: choices.filters.iter().enumerate().map(filter).collect::<Result<_, _>>()?,
+            detector: stage("detector", &DETECTORS, choices.detector)?,
+            locator: stage("locator", &LOCATORS, choices.locator)?,
+            descriptor: stage("descriptor", &DESCRIPTORS, choices.descriptor)?,
+            matcher: stage("matcher", &MATCHERS, choices.matcher)?,
+            refinement: stage("refine", &REFINEMENTS, choices.refine)?,
+            triangulator: stage("triangulation", &TRIANGULATORS, choices.triangulation)?,
+        })
+    }
+}
+
+fn stage<T: ?Sized>(stage: &'static str, of: &Registry<T>, choice: &Choice) -> Result<Box<T>, UnfitStage> {
+    of.build(choice).map_err(|error| UnfitStage { stage, place: None, error })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unfit_stage_is_named_by_its_setting() {
+        let filters = [Choice::named("clahe"), Choice::named("clahé")];
+        let good = StageChoices {
+            filters: &filters[..1],
+            detector: &Choice::named("harris"),
+            locator: &Choice::named("peak"),
+            descriptor: &Choice::named("surf"),
+            matcher: &Choice::named("epipolar-band"),
+            refine: &Choice::named("direct"),
+            triangulation: &Choice::named("optimal"),
+        };
+        assert!(FrontEnd::build(&good).is_ok());
+        let wrong = &Choice::named("nothing-of-this-name");
+        let unfit = |choices| FrontEnd::build(&choices).map(|_| ()).unwrap_err();
+        let told = unfit(StageChoices { filters: &filters, ..good });
+        assert_eq!((told.stage, told.place), ("filters", Some(1)));
+        let each = [
+            ("detector", StageChoices { detector: wrong, ..good }),
+            ("locator", StageChoices { locator: wrong, ..good }),
+            ("descriptor", StageChoices { descriptor: wrong, ..good }),
+            ("matcher", StageChoices { matcher: wrong, ..good }),
+            ("refine", StageChoices { refine: wrong, ..good }),
+            ("triangulation", StageChoices { triangulation: wrong, ..good }),
+        ];
+        for (name, choices) in each {
+            let told = unfit(choices);
+            assert_eq!((told.stage, told.place), (name, None));
+            assert_eq!(told.to_string(), told.error.to_string());
+        }
+    }
+}
