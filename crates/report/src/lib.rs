@@ -24,6 +24,7 @@ mod place;
 mod print;
 mod run;
 mod sailed;
+mod share;
 mod summary;
 mod terminal;
 mod verify;

@@ -248,12 +248,7 @@ impl Statistics {
         let differences: Vec<f64> = errors.iter().map(|(a, b)| if a == b { 0.0 } else { a - b }).collect();
         let bootstrap = Bootstrap::of(errors.len(), SEED);
         let bootstrap = if conditions { Bootstrap { block: 1, ..bootstrap } } else { bootstrap };
-        let mut drawn = Vec::with_capacity(errors.len());
-        let interval = bootstrap.interval(errors.len(), 0.95, |at| {
-            drawn.clear();
-            drawn.extend(at.iter().map(|&i| differences[i]));
-            median(&mut drawn)
-        });
+        let interval = bootstrap.median(&differences, 0.95);
         let test = signed_rank(errors);
         let alone = |one: fn(&(f64, f64)) -> [f64; 2]| {
             errors.iter().map(one).filter(|[own, other]| own.is_finite() && !other.is_finite()).count()

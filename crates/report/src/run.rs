@@ -7,7 +7,7 @@ use std::{
 };
 
 use rayon::prelude::*;
-use seafix_log::{FrameRecord, LogError, Outcome, Reader, TargetRecord, Totals, TrialHeader};
+use seafix_log::{FrameRecord, LogError, Outcome, Reader, Region, TargetRecord, Totals, TrialHeader};
 use sha2::{Digest, Sha256};
 
 use crate::{
@@ -63,7 +63,7 @@ pub(crate) struct Frame {
     pub(crate) times: [f64; 7],
     rows: (u32, u32),
     /// What the navigator knew, where the trial navigates.
-    pub(crate) sailed: Option<Underway>,
+    pub(crate) sailed: Option<Box<Underway>>,
     /// The points of interest in view.
     pub(crate) inspected: Vec<Inspected>,
 }
@@ -215,10 +215,13 @@ impl Trial {
             ]
             .map(|time| time.unwrap_or(f64::NAN)),
             rows: (first, self.rows.len() as u32),
-            sailed: frame.navigation.as_deref().map(|record| Underway {
-                places: [&record.pose, &record.unreferenced].map(|pose| place::carried(&self.header, pose.as_ref())),
-                counted: Counted::ALL.map(|counted| counted.holds(record)),
-                values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
+            sailed: frame.navigation.as_deref().map(|record| {
+                Box::new(Underway {
+                    places: [&record.pose, &record.unreferenced]
+                        .map(|pose| place::carried(&self.header, pose.as_ref())),
+                    counted: Counted::ALL.map(|counted| counted.holds(record)),
+                    values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
+                })
             }),
             inspected,
         });
@@ -338,6 +341,12 @@ impl Attempt {
     /// A fix beyond the alert limit.
     pub(crate) fn wrong(&self) -> bool {
         self.outcome == Outcome::Referenced && self.wrong == Some(true)
+    }
+
+    /// The region of the Stanford diagram that a fix is in, where its error and its limit are known.
+    pub(crate) fn region(&self) -> Option<Region> {
+        let (error, limit) = (self.get(Field::Position)?, self.get(Field::Limit)?);
+        (self.outcome == Outcome::Referenced).then(|| Region::of(error, self.get(Field::Level), limit))
     }
 
     /// What a comparison takes for its error: infinity where there is none, or a wrong one.

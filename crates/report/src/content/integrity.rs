@@ -62,7 +62,7 @@ const COLUMNS: [(Region, &str); 6] = [
 
 fn table(run: &Run, summary: &Summary) -> Table {
     let caption = text![
-        "Integrity: of n attempts, how many gave a fix that is available, that misleads and that misleads hazardously, in % with exact 95 % intervals; and, as counts, fixes whose level exceeds the alert limit, those of them that mislead, and fixes without a level. Attempts that were refused are the rest."
+        "Integrity: of n attempts, how many gave a fix that is available, that misleads and that misleads hazardously, in % with 95 % intervals; and, as counts, fixes whose level exceeds the alert limit, those of them that mislead, and fixes without a level. Attempts that were refused are the rest."
     ];
     let mut above = results::blank(summary, 1);
     above.extend(COLUMNS[..3].iter().map(|(_, name)| Head::over(3, *name)));

@@ -4,7 +4,22 @@ use crate::{
     document::{Block, Section, italic, text},
     paired::{ALPHA, Comparison, SEED},
     run::Run,
+    share,
 };
+
+/// How sure a trial's rates are, and by what.
+fn intervals(run: &Run) -> String {
+    if !run.trials.iter().any(|trial| share::is_trajectory(&trial.header)) {
+        return "Every frame is a draw by itself: the rates of a trial, and recall, carry exact (Clopper–Pearson) 95 % intervals.".to_owned();
+    }
+    let mut said = format!(
+        "Frames follow each other on one way, and neighbours are not independent: the 95 % intervals of a trial’s rates, and the bands of recall, are percentile bootstraps of 10 000 resamples, seed {SEED}, over blocks of consecutive attempts, the cube root of n long. Where all attempts are alike (0 % or 100 %) resamples say nothing: there stands the exact (Clopper–Pearson) interval with every block as one trial."
+    );
+    if run.trials.iter().any(|trial| trial.every() > 1) {
+        said.push_str(" Rates of a trial that logged only some of its frames carry the exact interval of all, as if they were independent.");
+    }
+    said
+}
 
 pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     let [h, c, p, e] = ["H", "C", "P", "E"].map(italic);
@@ -12,7 +27,8 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         (
             text![italic("found, refused, wrong")],
             text![
-                "A fix is wrong when m2 exceeds the alert limit (the smaller of 0.10 m and 5 % of the target’s diameter); an attempt without a fix is refused; all others are found. The three add up to the attempts. The rates of a trial carry exact (Clopper–Pearson) 95 % intervals."
+                "A fix is wrong when m2 exceeds the alert limit (the smaller of 0.10 m and 5 % of the target’s diameter); an attempt without a fix is refused; all others are found. The three add up to the attempts. ",
+                intervals(run)
             ],
         ),
         (

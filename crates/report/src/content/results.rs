@@ -63,7 +63,7 @@ pub(super) fn blank(summary: &Summary, more: usize) -> Vec<Head> {
 
 fn outcomes(run: &Run, summary: &Summary) -> Table {
     let caption = text![
-        "Outcomes. n: targets attempted, one a frame and target in view of the prior; rates in % of n with exact 95 % intervals. Frames: with at least one fix, and with a wrong one, of all frames. Points: median number identified."
+        "Outcomes. n: targets attempted, one a frame and target in view of the prior; rates in % of n with 95 % intervals. Frames: with at least one fix, and with a wrong one, of all frames. Points: median number identified."
     ];
     let mut above = blank(summary, 1);
     above.extend([Head::over(2, "Found"), Head::over(2, "Refused"), Head::over(2, "Wrong"), Head::over(3, "Frames")]);

@@ -1,6 +1,12 @@
 //! Numbers about trials, with their keys.
 
-use crate::{Field, Key, Number, format, looked::Looked, run::Trial, sailed::Sailed};
+use crate::{
+    Field, Key, Number, format,
+    looked::Looked,
+    run::{Attempt, Trial},
+    sailed::Sailed,
+    share,
+};
 
 /// What a quantity is printed in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,9 +50,29 @@ pub(super) fn percent(trial: &Trial, group: &str, k: usize, n: usize) -> Number 
     Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
 }
 
-/// Their share of all attempts or an end of its exact 95 % interval, in percent: `percent`, `low`, `high`.
+/// Whether an attempt is of `group`, an outcome or a region.
+fn is_of(row: &Attempt, group: &str) -> bool {
+    match group {
+        "found" => row.found(),
+        "wrong" => row.wrong(),
+        "refused" => !row.found() && !row.wrong(),
+        _ => row.region().is_some_and(|region| region.name() == group),
+    }
+}
+
+/// The 95 % interval of the share of `group`, as [`share::interval`]; of a thinned log the exact one, for its other frames
+/// are only counted.
+fn ends(trial: &Trial, group: &str, k: usize, n: usize) -> (f64, f64) {
+    if trial.every() > 1 || !share::is_trajectory(&trial.header) {
+        return seafix_evaluation::clopper_pearson(k, n, 0.95);
+    }
+    let events: Vec<bool> = trial.attempts().map(|(_, row)| is_of(row, group)).collect();
+    share::interval(true, &events)
+}
+
+/// Their share of all attempts or an end of its 95 % interval, in percent: `percent`, `low`, `high`.
 pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize), decimals: usize) -> Number {
-    let (low, high) = seafix_evaluation::clopper_pearson(k, n, 0.95);
+    let (low, high) = ends(trial, group, k, n);
     let value = match what {
         "low" => 100.0 * low,
         "high" => 100.0 * high,
@@ -56,9 +82,9 @@ pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize
     Number::new((n > 0).then_some(value), decimals, key)
 }
 
-/// The exact 95 % interval of that share.
+/// The 95 % interval of that share.
 pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
-    let (low, high) = seafix_evaluation::clopper_pearson(k, n, 0.95);
+    let (low, high) = ends(trial, group, k, n);
     [("low", low), ("high", high)].map(|(end, value)| {
         let key = Key::of(trial, counted(trial), format!("{end} {group} of attempted"));
         Number::new((n > 0).then_some(100.0 * value), 1, key)

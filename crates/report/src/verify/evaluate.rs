@@ -11,6 +11,7 @@ use crate::{
     looked::{self, Looked},
     paired::Statistics,
     sailed::{Counted, Sailed},
+    share,
 };
 
 /// The value of a key, or why there is none.
@@ -97,7 +98,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             Some(own.filter(|frame| which == "frames" || frame.rows.iter().any(|row| found(&row.0))).count() as f64)
         }
         ("count", group) => Some(pooled(logs, group, span)? as f64),
-        ("percent" | "low" | "high", group) => share(first, group, scale, span, logs)?,
+        ("percent" | "low" | "high", group) => share_of(first, group, scale, span, logs)?,
         ("sum", fields) => {
             // Only fixes have pairs that are known to be correct.
             let (above, below) = fields.split_once(" by ")?;
@@ -282,16 +283,34 @@ fn inside(region: Region, row: &TargetRecord) -> bool {
 }
 
 /// A share of attempts in percent, or an end of its interval.
-fn share(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     let group = group.strip_suffix(" of attempted")?;
-    let (k, n) = match group.split_once("<=") {
-        Some((field, bound)) => {
-            let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
-            let all = || logs.iter().flat_map(|log| rows(log, span));
-            (all().filter(|row| error(&row.0, field) <= bound).count(), all().count())
-        }
-        None => (pooled(logs, group, span)?, pooled(logs, "attempted", span)?),
+    let all = || logs.iter().flat_map(|log| rows(log, span));
+    let trajectory = logs.iter().any(|log| share::is_trajectory(&log.header));
+    let thinned = logs.iter().any(|log| log.totals.as_ref().is_some_and(|totals| totals.every > 1));
+    let known = |events: Vec<bool>| {
+        let percent = 100.0 * events.iter().filter(|event| **event).count() as f64 / events.len() as f64;
+        (!events.is_empty()).then(|| match which {
+            "percent" => percent,
+            "low" => 100.0 * share::interval(trajectory, &events).0,
+            _ => 100.0 * share::interval(trajectory, &events).1,
+        })
     };
+    if let Some((field, bound)) = group.split_once("<=") {
+        let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
+        return Some(known(all().map(|row| error(&row.0, field) <= bound).collect()));
+    }
+    if which != "percent" && trajectory && !thinned {
+        let region = Region::ALL.into_iter().find(|region| region.name() == group);
+        let is = |row: &TargetRecord| match (group, region) {
+            ("found", _) => found(row),
+            ("refused", _) => row.outcome != Outcome::Referenced,
+            ("wrong", _) => row.outcome == Outcome::Referenced && !found(row),
+            (_, region) => region.is_some_and(|region| inside(region, row)),
+        };
+        return Some(known(all().map(|row| is(&row.0)).collect()));
+    }
+    let (k, n) = (pooled(logs, group, span)?, pooled(logs, "attempted", span)?);
     let (low, high) = clopper_pearson(k, n, 0.95);
     let value = match which {
         "percent" => 100.0 * k as f64 / n as f64,

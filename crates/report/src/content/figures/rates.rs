@@ -7,12 +7,13 @@ use crate::{
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     run::Run,
+    share,
 };
 
 /// More lines are no picture.
 const MOST: usize = 36;
 
-/// The shares of the attempts with their exact 95 % intervals.
+/// The shares of the attempts with their 95 % intervals.
 pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
     let n = summary.rows.len();
     if !(2..=MOST).contains(&n) {
@@ -49,6 +50,9 @@ pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
     let shape = ((n as f64 * 15.0 + 34.0) / 482.0).clamp(0.16, 1.2);
     let legend = vec![Entry::mark("found", 0), Entry::mark("wrong", 1)];
     let chart = Chart { panels: vec![panel], columns: 1, page: true, shape, legend };
-    let said = "Share of the attempts that were found, and of those that gave a wrong fix, with exact 95 % intervals; what is missing to 100 % was refused.";
-    super::figure("rates", caption(said, run), &chart, data)
+    let intervals = share::called(run.trials.iter().map(|trial| &trial.header));
+    let said = format!(
+        "Share of the attempts that were found, and of those that gave a wrong fix, with {intervals}; what is missing to 100 % was refused."
+    );
+    super::figure("rates", caption(&said, run), &chart, data)
 }

@@ -1,7 +1,5 @@
 //! The share of attempts with an error below a bound.
 
-use seafix_evaluation::clopper_pearson;
-
 use super::{caption, distinct, panels, series};
 use crate::{
     Field, Key, Number,
@@ -9,6 +7,7 @@ use crate::{
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     run::Run,
+    share,
 };
 
 /// Thresholds (mm): four a factor of two.
@@ -17,7 +16,7 @@ const THRESHOLDS: [f64; 25] = [
     8.8388, 10.5112, 12.5, 14.865, 17.6777, 21.0224, 25.0, 29.7302, 35.3553, 42.0448, 50.0,
 ];
 
-/// Recall over the error m2, with exact 95 % bands; refused and wrong attempts are never below any bound.
+/// Recall over the error m2, with 95 % bands; refused and wrong attempts are never below any bound.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
     let groups = panels(run, 6);
     let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
@@ -31,16 +30,17 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     for (condition, members) in &groups {
         let (mut bands, mut lines) = (Vec::new(), Vec::new());
         for (name, trial) in members {
-            let mut errors: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::M2)).collect();
-            errors.sort_by(f64::total_cmp);
+            let errors: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::M2)).collect();
             let n = errors.len();
-            if n == 0 || errors[0].is_infinite() {
+            if errors.iter().all(|error| error.is_infinite()) {
                 continue;
             }
+            let trajectory = share::is_trajectory(&trial.header);
             let (mut line, mut band) = (Vec::new(), Vec::new());
             for threshold in THRESHOLDS {
-                let k = errors.partition_point(|error| *error <= threshold / 1e3);
-                let (low, high) = clopper_pearson(k, n, 0.95);
+                let events: Vec<bool> = errors.iter().map(|error| *error <= threshold / 1e3).collect();
+                let k = events.iter().filter(|event| **event).count();
+                let (low, high) = share::interval(trajectory, &events);
                 // One rounding: of a tie another order of the two would print another last digit.
                 let share = 100.0 * k as f64 / n as f64;
                 let [low, high] = [low, high].map(|share| 100.0 * share);
@@ -71,6 +71,9 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     let page = drawn.len() > 1;
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
     let chart = Chart { panels: drawn, columns, page, shape: if columns == 2 { 0.6 } else { 0.75 }, legend };
-    let said = "Recall: the share of all attempts whose m2 is below a bound, with exact 95 % bands; refused and wrong attempts are below none.";
-    super::figure("recall", caption(said, run), &chart, data)
+    let bands = share::called(run.trials.iter().map(|trial| &trial.header)).replace("intervals", "bands");
+    let said = format!(
+        "Recall: the share of all attempts whose m2 is below a bound, with {bands}; refused and wrong attempts are below none."
+    );
+    super::figure("recall", caption(&said, run), &chart, data)
 }
