@@ -6,6 +6,7 @@ mod answer;
 mod data;
 mod failures;
 mod figures;
+mod hypotheses;
 mod inspection;
 mod integrity;
 mod limits;
@@ -42,6 +43,7 @@ pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Docu
         question: header.question.clone(),
         summary: abstract_::section(run, summary, &comparisons),
         sections: [
+            Some(hypotheses::section(run, &comparisons)),
             Some(method),
             Some(data::section(run, summary, small)),
             Some(protocol::section(run, &comparisons)),

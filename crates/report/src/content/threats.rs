@@ -23,7 +23,7 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
     }
     let low = summary.rows.iter().filter(|row| row.nees_count >= 20).filter_map(|row| row.nees_mean);
     if low.fold(f64::INFINITY, f64::min) < 4.0 {
-        items.push(text!["Construct: where the mean NEES is well below 6, covariances and protection levels are wider than the errors ask for. They allow for a calibration that errs and for the corner noise that the method is told (Section 2), whether the data have as much of either or not."]);
+        items.push(text!["Construct: where the mean NEES is well below 6, covariances and protection levels are wider than the errors ask for. They allow for a calibration that errs and for the corner noise that the method is told (Section “Data”), whether the data have as much of either or not."]);
     }
     if headers().any(|header| header.prior_position_sigma.is_some()) {
         items.push(text!["Internal: rough poses are drawn with the spread that the method is told. A vehicle whose navigation is worse than it says would be refused more often, or search where nothing is."]);
