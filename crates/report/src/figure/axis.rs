@@ -63,7 +63,8 @@ impl Axis {
         let margin = if high > low {
             0.06 * (high - low)
         } else if self.logarithmic {
-            0.15
+            // Of 1, 2, 5 of the decades two are in view then, wherever the value lies.
+            0.36
         } else {
             0.5
         };

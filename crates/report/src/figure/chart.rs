@@ -11,6 +11,11 @@ use crate::print::width_of;
 const COLUMN: f64 = 85.0 * 72.0 / 25.4;
 const PAGE: f64 = 170.0 * 72.0 / 25.4;
 
+/// What stands left of a field, about (pt).
+const ROOM: f64 = 46.0;
+/// From one line of a wrapped name to the next, by the font's size.
+const LEADING: f64 = 1.1;
+
 /// Panels in rows, and a legend below them.
 #[derive(Debug, Default)]
 pub(crate) struct Chart {
@@ -71,6 +76,10 @@ impl Chart {
             let lines = self.panels.iter().map(|panel| panel.y.names.len()).max().unwrap_or(0);
             height = height.max(cell * 0.6).max(lines as f64 * FONT * 2.7 + FONT * 4.0);
         }
+        // Names below an axis that take more than two lines make the drawing taller, not its field smaller.
+        let lines = self.panels.iter().filter(|panel| !panel.x.names.is_empty());
+        let lines = lines.map(|panel| panel.below(panel.x.ends([].into_iter()), cell - ROOM).lines());
+        height += FONT * (lines.fold(2.0, f64::max) - 2.0);
         let mut drawing = Drawing::default();
         for (index, panel) in self.panels.iter().enumerate() {
             let (column, row) = (index % columns, index / columns);
@@ -138,9 +147,9 @@ impl Panel {
         let ends = across.ticks().into_iter().map(|tick| across.at(tick) + width_of(&across.label(tick), FONT) / 2.0);
         let beyond = if self.x.names.is_empty() { ends.fold(right, f64::max) - (x + width - 1.0) } else { 0.0 };
         right -= beyond.max(0.0);
-        // Long names on the horizontal axis are stacked in levels.
-        let levels = self.levels(x_ends, right - left);
-        let bottom = y + height - 6.0 - FONT * (levels + 0.4) - if self.x.label.is_empty() { 0.0 } else { FONT * 1.4 };
+        let below = self.below(x_ends, right - left);
+        let bottom =
+            y + height - 6.0 - FONT * (below.lines() + 0.4) - if self.x.label.is_empty() { 0.0 } else { FONT * 1.4 };
         if self.equal {
             equalise(&mut x_ends, &mut y_ends, (right - left) / (bottom - top));
         }
@@ -162,9 +171,23 @@ impl Panel {
         }
         for (index, tick) in scale_x.ticks().into_iter().enumerate() {
             let at = scale_x.at(tick);
-            let level = index as f64 % levels;
             drawing.line([[at, bottom], [at, top]], Stroke::thin(Ink::Grid));
-            drawing.words([at, bottom + FONT * (1.3 + level)], Anchor::Middle, Ink::Text, scale_x.label(tick));
+            match &below {
+                Below::Levels(levels) => {
+                    let level = (index % levels) as f64;
+                    drawing.words([at, bottom + FONT * (1.3 + level)], Anchor::Middle, Ink::Text, scale_x.label(tick));
+                }
+                Below::Wrapped(names) => {
+                    for (line, words) in names.get(index).into_iter().flatten().enumerate() {
+                        let place = [at, bottom + FONT * (1.3 + LEADING * line as f64)];
+                        drawing.words(place, Anchor::Middle, Ink::Text, words.clone());
+                    }
+                }
+                Below::Upright(length) => {
+                    let place = [at + 0.35 * FONT, bottom + FONT * 0.6 + length / 2.0];
+                    drawing.turned(place, Ink::Text, scale_x.label(tick));
+                }
+            }
         }
         for layer in self.layers.iter().filter(|layer| !layer.below()) {
             layer.draw(drawing, &scale_x, &scale_y);
@@ -176,16 +199,63 @@ impl Panel {
         drawing.words([left, y + FONT * 1.1], Anchor::Start, Ink::Text, self.title.clone());
     }
 
-    /// In how many levels the labels of the horizontal axis must stand so that none touches another.
-    fn levels(&self, ends: [f64; 2], width: f64) -> f64 {
+    /// How the labels of the horizontal axis stand so that none touches another: names wrapped to the room that each has, or
+    /// upright where a word is too long for that; numbers in levels.
+    fn below(&self, ends: [f64; 2], width: f64) -> Below {
         const MOST: usize = 6;
         let scale = Scale::new(self.x.clone(), ends, [0.0, width]);
         let ticks = scale.ticks();
+        if !self.x.names.is_empty() {
+            let room = width / (ends[1] - ends[0]) - 4.0;
+            let names: Vec<Vec<String>> = self.x.names.iter().map(|name| wrapped(name, room)).collect();
+            let fits = names.iter().flatten().all(|line| width_of(line, FONT) <= room);
+            let longest = self.x.names.iter().map(|name| width_of(name, FONT)).fold(0.0, f64::max);
+            return if fits { Below::Wrapped(names) } else { Below::Upright(longest) };
+        }
         let half = |tick: f64| width_of(&scale.label(tick), FONT) / 2.0;
         let apart = |a: f64, b: f64| scale.at(b) - scale.at(a) >= half(a) + half(b) + 3.0;
         let free = |levels: usize| ticks.iter().zip(ticks.iter().skip(levels)).all(|(&a, &b)| apart(a, b));
-        (1..MOST).find(|&levels| free(levels)).unwrap_or(MOST) as f64
+        Below::Levels((1..MOST).find(|&levels| free(levels)).unwrap_or(MOST))
     }
+}
+
+/// How labels stand below an axis.
+enum Below {
+    /// In turn on so many levels.
+    Levels(usize),
+    /// Each in lines of its own.
+    Wrapped(Vec<Vec<String>>),
+    /// Turned by a quarter, the longest so long (pt).
+    Upright(f64),
+}
+
+impl Below {
+    /// How many lines of the font's size they take.
+    fn lines(&self) -> f64 {
+        match self {
+            Self::Levels(levels) => *levels as f64,
+            Self::Wrapped(names) => {
+                let most = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
+                1.0 + LEADING * (most - 1) as f64
+            }
+            Self::Upright(length) => length / FONT + 0.2,
+        }
+    }
+}
+
+/// The words in lines no wider than `room` (pt), where no word is wider by itself.
+fn wrapped(name: &str, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in name.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if width_of(&format!("{line} {word}"), FONT) <= room => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// Widens the shorter of both ranges until a metre is as long in both directions.
