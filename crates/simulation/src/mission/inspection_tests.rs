@@ -34,6 +34,8 @@ fn planned(mission: &Mission) -> PlannedMission {
 
 /// Every point of interest of every built-in site is looked at, at rest, from the stand-off, in both images and with nothing
 /// between; on the whole way every camera keeps clear of the shells.
+///
+/// Seen to fail when views out of the images count, and when a corner of a leg is not rested at.
 #[test]
 fn every_point_is_looked_at_and_no_shell_is_touched() {
     for (site, _) in BUILT_IN {
