@@ -323,7 +323,6 @@ fn checked(sample: &Sample) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8(output.stdout).unwrap())
 }
 
-/// Seen to fail when pairs are decoded and not compared: check said the set was in order.
 #[test]
 fn one_image_for_both_cameras() {
     let sample = Sample::new();
@@ -340,7 +339,6 @@ fn one_image_for_both_cameras() {
     assert_eq!(checked(&sample).0, Some(0));
 }
 
-/// Seen to fail when the decoder's samples are taken as they come.
 #[test]
 fn samples_above_maxval() {
     let text = pgm(64, 48).replacen("255", "100", 1);
@@ -353,7 +351,6 @@ fn samples_above_maxval() {
     with_image(&bytes).refused(3, &["a sample above MAXVAL", "a.pgm: 201 at (4, 47), MAXVAL is 200"]);
 }
 
-/// Seen to fail when a path is read to its end, whatever is there.
 #[test]
 #[cfg(unix)]
 fn what_has_no_end_is_not_read() {
@@ -427,8 +424,7 @@ fn a_setting_of_another_type_or_twice() {
     }
 }
 
-/// Every stage of reading finds something here; the nearest right word, line and column of each. Seen to fail when the first stage
-/// with a fault ends the reading: it then tells of `sorce` alone.
+/// Every stage of reading finds something here; the nearest right word, line and column of each.
 #[test]
 fn all_faults_of_an_experiment_at_once() {
     let text = "sorce = 'dive'\nquestion = ''\n\

@@ -211,7 +211,6 @@ fn a_sound_recording_is_told_and_run() {
     assert_eq!(code, 0, "{said}");
 }
 
-/// Seen to fail when P is taken without a look at the transforms.
 #[test]
 fn baselines_that_contradict_each_other() {
     let with = |tf: [f64; 3]| Bag { tf: Some(tf), ..Bag::sound() };
@@ -234,7 +233,6 @@ fn baselines_that_contradict_each_other() {
     silent.refused(&["no baseline", "P[3]"]);
 }
 
-/// Seen to fail when a model is only looked at where D has something in it.
 #[test]
 fn a_fisheye_lens_is_no_pinhole() {
     for model in ["equidistant", "fisheye"] {
@@ -250,7 +248,6 @@ fn a_fisheye_lens_is_no_pinhole() {
     assert_eq!(Bag { rectified: false, ..Bag::sound() }.checked().0, 0);
 }
 
-/// Seen to fail when nobody looks at the images before the run.
 #[test]
 fn cameras_that_have_changed_places() {
     let mut bag = Bag::sound();
@@ -266,7 +263,6 @@ fn cameras_that_have_changed_places() {
     bag.refused(&["left and right images that are the same", "1 of 5 pairs", "one image twice has no depth"]);
 }
 
-/// Seen to fail when images are decoded as the run comes to them: the run then ended in the middle.
 #[test]
 fn an_image_that_cannot_be_read_costs_its_pair() {
     let mut bag = Bag::sound();
@@ -285,7 +281,6 @@ fn an_image_that_cannot_be_read_costs_its_pair() {
     bag.refused(&["/cam/right/image_rect", "so are 3 of 5 pairs; at least half must be readable"]);
 }
 
-/// Seen to fail when only the first calibration is read.
 #[test]
 fn a_calibration_that_changes() {
     let mut bag = Bag::sound();

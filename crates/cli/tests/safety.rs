@@ -211,8 +211,7 @@ fn a_run_that_is_there_stays_unless_told_otherwise() {
     assert!(folder.join("out/results.csv").exists());
 }
 
-/// A file that may grow no further is an error like a full disk. Seen to fail without a handler: the system ended the program
-/// (SIGXFSZ) without a word.
+/// A file that may grow no further is an error like a full disk.
 #[test]
 fn a_file_that_may_grow_no_further_is_said() {
     let folder = experiment(200);
@@ -232,7 +231,7 @@ fn a_file_that_may_grow_no_further_is_said() {
     same(&folder.join("whole"), &folder.join("out"));
 }
 
-/// What was saved of a log is told wherever it is read again. Seen to fail when nothing marks it.
+/// What was saved of a log is told wherever it is read again.
 #[test]
 fn a_recovered_log_counts_as_what_it_is() {
     let folder = experiment(40);
@@ -278,8 +277,7 @@ fn a_recovered_log_counts_as_what_it_is() {
     assert!(!text.contains("18446744073709551615"), "{text}");
 }
 
-/// What a finished run leaves, and that threads leave no trace in it. Seen to fail with the number of threads in the manifest, and with
-/// the lock's file left behind.
+/// What a finished run leaves, and that threads leave no trace in it.
 #[test]
 fn a_finished_run_is_the_same_by_any_number_of_threads() {
     let folder = experiment(40);
