@@ -176,7 +176,6 @@ mod tests {
     }
 
     /// The sums of blocks are those of the places drawn.
-    ///
     #[test]
     fn a_share_is_a_mean_of_resamples() {
         let events: Vec<bool> = (0_u32..50).map(|i| i.wrapping_mul(2_654_435_761) % 7 < 3 || i > 43).collect();
@@ -188,7 +187,6 @@ mod tests {
     }
 
     /// Of many values the median's interval is found by halving, and is that of the resamples' medians.
-    ///
     #[test]
     fn the_median_of_many_is_that_of_the_resamples() {
         let n = MANY + 1;
