@@ -71,7 +71,11 @@ impl Progress {
 
 impl Observer for Progress {
     fn begins(&self, frames: usize, bytes: u64, folder: &Path) {
-        tell(&format!("{frames} frames, about {} MB of log, into {}", bytes.div_ceil(1_000_000), folder.display()));
+        tell(&format!(
+            "{frames} frames, at most about {} MB of log, into {}",
+            bytes.div_ceil(1_000_000),
+            folder.display()
+        ));
         self.expect(frames);
     }
 

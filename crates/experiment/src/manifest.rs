@@ -134,7 +134,7 @@ impl Manifest {
             read_text(&file).map_err(|fault| without(folder).unwrap_or(fault.remedy("name the folder of a run")))?;
         let manifest: Self = serde_json::from_str(&text)
             .map_err(|error| Fault::new("a manifest that cannot be read", &file).on_line(error.line()).value(error))?;
-        if !manifest.format.starts_with("seafix-manifest/1") {
+        if !manifest.format.starts_with("seafix-manifest/1.") {
             return Err(Fault::new("not a manifest of this version", &file).value(manifest.format).remedy(FORMAT));
         }
         Ok(manifest)

@@ -10,6 +10,16 @@ pub enum ReportError {
     /// The folder holds no log.
     #[error("{} holds no *.mcap: it is not the folder of a run", .0.display())]
     NoLogs(PathBuf),
+    /// A run of a later program.
+    #[error("{}: a manifest of format {found}, this program knows {known}; report the run with the program that made it", .path.display())]
+    Newer {
+        /// The manifest.
+        path: PathBuf,
+        /// What it says it is.
+        found: String,
+        /// What is known.
+        known: &'static str,
+    },
     /// Logs of different experiments.
     #[error("{} varies other keys than {}: they belong to different runs; keep them in folders of their own", .other.display(), .first.display())]
     Mixed {

@@ -116,6 +116,7 @@ impl Run {
         if paths.is_empty() {
             return Err(ReportError::NoLogs(folder.to_owned()));
         }
+        known_manifest(folder)?;
         // What is wrong with the first of them is told first.
         let trials: Vec<_> = paths.into_par_iter().map(Trial::read).collect();
         let trials: Vec<Trial> = trials.into_iter().collect::<Result<_, _>>()?;
@@ -352,6 +353,20 @@ impl Attempt {
     /// What a comparison takes for its error: infinity where there is none, or a wrong one.
     pub(crate) fn error_or_failure(&self, field: Field) -> f64 {
         if self.found() { self.get(field).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
+    }
+}
+
+/// That the run's manifest, if it has one, is of a format that is known: a later minor version only adds.
+fn known_manifest(folder: &Path) -> Result<(), ReportError> {
+    const KNOWN: &str = "seafix-manifest/1";
+    let path = folder.join("manifest.json");
+    let manifest: Option<serde_json::Value> =
+        fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
+    match manifest.as_ref().and_then(|manifest| manifest["format"].as_str()) {
+        Some(found) if found != KNOWN && !found.starts_with("seafix-manifest/1.") => {
+            Err(ReportError::Newer { path, found: found.to_owned(), known: KNOWN })
+        }
+        _ => Ok(()),
     }
 }
 

@@ -18,7 +18,7 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
         return None;
     }
     let caption = text![
-        "The navigated pose, relative to the object of the last fix, at every frame that has one. Tried, fixed: frames at which a fix was due, and those with one; lost: frames to which the odometry knew no motion. The last three columns: the first fix, carried along by odometry alone."
+        "The navigated pose, relative to the object of the last fix, at every frame that has one. Tried, fixed: frames at which a fix was due, and those with one; lost: frames to which the odometry knew no motion. The last three columns: the first fix, carried along by odometry alone, until that is lost or the dive ends."
     ];
     let mut above = results::blank(summary, 5);
     above.extend([Head::over(4, "m3 (mm)"), Head::over(1, "m2 (mm)"), Head::over(1, "NEES")]);
@@ -71,11 +71,13 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
             count(trial, Counted::Referenced),
             " of ",
             count(trial, Counted::Tried),
-            " frames where one was due; the first fix, carried on by odometry alone, errs by ",
+            " frames where one was due; the first fix, carried on by odometry alone over ",
+            reached(trial),
+            " frames, until it is lost or the dive ends, errs by ",
             metres("rms", Sailed::AlonePosition),
-            " mm (RMS) and ends ",
+            " mm (RMS) and by ",
             metres("last", Sailed::AlonePosition),
-            " mm off; the mean NEES is ",
+            " mm at the last of them; the mean NEES is ",
             statistic(trial, "mean", Sailed::Nees, Unit::Plain),
             " (6 for an honest covariance)."
         ]
@@ -85,6 +87,13 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
         said.push(text!["Each of these is one dive: how much another would differ is not in these numbers."]);
     }
     said
+}
+
+/// How many frames the first fix is carried on to by odometry alone.
+fn reached(trial: &Trial) -> Number {
+    let known = trial.sample().filter_map(|frame| frame.sailed.as_ref()?.get(Sailed::AlonePosition));
+    let reached = known.count() as f64;
+    tell::sailed(trial, "sampled", Sailed::AlonePosition, Some(reached), (Unit::Plain, 0))
 }
 
 fn count(trial: &Trial, counted: Counted) -> Number {

@@ -16,14 +16,15 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
     let sure = comparisons.iter().filter(|comparison| comparison.better().is_some()).count();
     let mut section = Section::new("Significance");
     section.say(text![format!(
-        "Of {} comparison{} {} significant. Negative differences: the first errs less.",
+        "Of {} comparison{} {} significant. {}: the first errs less. An effect of 1: it does so in every pair, of −1: in none.",
         comparisons.len(),
         if comparisons.len() == 1 { "" } else { "s" },
         match sure {
             0 => "none is".to_owned(),
             1 => "one is".to_owned(),
             _ => format!("{sure} are"),
-        }
+        },
+        if comparisons[0].over_conditions { "Ratios below one" } else { "Negative differences" }
     )]);
     section.add(Block::Table(table(run, comparisons)));
     section.blocks.extend(forest(run, comparisons).map(Block::Figure));
@@ -49,6 +50,7 @@ fn sentence(run: &Run, comparison: &Comparison) -> Text {
         |what: &str, value: f64| Number::new(Some(real(value)), if over { 3 } else { 2 }, key(run, comparison, what));
     let [first, second] = &comparison.names;
     let begin = match comparison.condition.as_str() {
+        "" if over => "Over the conditions".to_owned(),
         "" if comparison.between_conditions => "Frame by frame".to_owned(),
         "" => "On the same attempts".to_owned(),
         condition => format!("At {condition}, on the same attempts"),

@@ -82,12 +82,13 @@ pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize
     Number::new((n > 0).then_some(value), decimals, key)
 }
 
-/// The 95 % interval of that share.
+/// The 95 % interval of that share. Of a thousand attempts or more it has two decimals: with one it would be its own share.
 pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
     let (low, high) = ends(trial, group, k, n);
+    let decimals = if n < 1000 { 1 } else { 2 };
     [("low", low), ("high", high)].map(|(end, value)| {
         let key = Key::of(trial, counted(trial), format!("{end} {group} of attempted"));
-        Number::new((n > 0).then_some(100.0 * value), 1, key)
+        Number::new((n > 0).then_some(100.0 * value), decimals, key)
     })
 }
 

@@ -82,3 +82,21 @@ fn a_newer_log_is_refused_with_both_versions() {
     assert!(refused.contains("seafix.v2.TrialHeader") && refused.contains("seafix.v1.TrialHeader"), "{refused}");
     assert!(!folder.path().join("report").exists(), "nothing is written");
 }
+
+/// Seen to fail where the manifest is not looked at.
+#[test]
+fn a_newer_manifest_is_refused_with_both_versions() {
+    let folder = tempfile::tempdir().unwrap();
+    write_run(folder.path(), &[5.0]);
+    let out = folder.path().join("report");
+    for (format, known) in [("1.9", true), ("1.12", true), ("12", false), ("2", false), ("9.1", false)] {
+        let manifest = format!("{{\"format\": \"seafix-manifest/{format}\"}}");
+        fs::write(folder.path().join("manifest.json"), manifest).unwrap();
+        let made = report(folder.path(), &out, Forms::ALL);
+        assert_eq!(made.is_ok(), known, "{format}");
+        let Err(refused) = made else { continue };
+        let refused = refused.to_string();
+        assert!(refused.contains(&format!("seafix-manifest/{format}")), "{refused}");
+        assert!(refused.contains("knows seafix-manifest/1"), "{refused}");
+    }
+}
