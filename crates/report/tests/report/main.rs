@@ -7,5 +7,6 @@ mod compared;
 mod harmless;
 mod integrity;
 mod made_up;
+mod objects;
 mod paper;
 mod verified;
