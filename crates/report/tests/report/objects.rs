@@ -13,7 +13,7 @@ const OBJECTS: [&str; 2] = ["manifold", "pod"];
 fn made(header: &seafix_log::TrialHeader, number: u64) -> FrameRecord {
     let mut frame = frame(header, number, 3.0);
     frame.images = None;
-    if number % 3 == 0 {
+    if number.is_multiple_of(3) {
         let mut pod = frame.targets[0].clone();
         pod.object = OBJECTS[1].to_owned();
         let evaluation = &mut pod.evaluation;
