@@ -134,9 +134,9 @@ pub fn joint_fix(rig: &StereoRig, members: &[Member], glimpses: &[Glimpse]) -> R
         return Err(Degenerate::TooFew { found: 0, needed: 3 });
     }
     let start = State { poses, places: members.iter().map(|member| member.site_from_object).collect() };
-    let system = System::new(rig, members, glimpses).ok_or(Degenerate::Singular)?;
+    let system = System::new(rig, members, glimpses)?;
     let (state, chi2) = system.minimize(start)?;
-    let covariance = system.covariance(&state).ok_or(Degenerate::Singular)?;
+    let covariance = system.covariance(&state)?;
     let block = |at: Option<usize>| {
         at.map_or_else(Matrix6::zeros, |b| Matrix6::from_fn(|i, j| covariance[(6 * b + i, 6 * b + j)]))
     };

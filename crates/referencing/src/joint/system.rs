@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Object, StereoRig, Transform, so3::skew};
 use super::{Glimpse, Member, Placement};
 use crate::{
     Degenerate, Observation,
-    solve::{PixelTarget, Sightings, Term, converged},
+    solve::{PixelTarget, Sightings, Term, converged, inverse, rounding},
 };
 
 /// All unknowns: the pose of each instant and the place of each object.
@@ -43,12 +43,12 @@ const NEAR: f64 = 1e-4;
 const NOTHING: f64 = 1e-18;
 
 impl<'a> System<'a> {
-    pub(super) fn new(rig: &'a StereoRig, members: &'a [Member], glimpses: &'a [Glimpse]) -> Option<Self> {
+    pub(super) fn new(rig: &'a StereoRig, members: &'a [Member], glimpses: &'a [Glimpse]) -> Result<Self, Degenerate> {
         let mut sightings = Vec::with_capacity(glimpses.len());
         for glimpse in glimpses {
             let points: Vec<Observation> = glimpse.points.iter().map(|(_, point)| *point).collect();
             let mut seen = Sightings::new(rig);
-            seen.see(&points, PixelTarget::Pixels).ok()?;
+            seen.see(&points, PixelTarget::Pixels)?;
             sightings.push(seen);
         }
         let seen = |object: usize| glimpses.iter().any(|glimpse| glimpse.points.iter().any(|(o, _)| *o == object));
@@ -61,11 +61,11 @@ impl<'a> System<'a> {
             unknowns.push(open.then_some(blocks));
             blocks += usize::from(open);
             surveys.push(match member.placement {
-                Placement::Surveyed(covariance) if open => Some(covariance.matrix.cholesky()?.inverse()),
+                Placement::Surveyed(covariance) if open => Some(inverse(&covariance.matrix)?),
                 _ => None,
             });
         }
-        Some(Self { members, glimpses, sightings, unknowns, surveys, blocks })
+        Ok(Self { members, glimpses, sightings, unknowns, surveys, blocks })
     }
 
     /// The block of an object's six unknowns.
@@ -80,7 +80,7 @@ impl<'a> System<'a> {
     }
 
     /// `live`: weights at the fitted points; else at the measured ones, so that costs can be compared.
-    fn linearize(&self, state: &State, live: bool) -> Option<Linearized> {
+    fn linearize(&self, state: &State, live: bool) -> Result<Linearized, Degenerate> {
         let size = 6 * self.blocks;
         let mut all = Linearized { normal: Mat::zeros(size, size), gradient: Mat::zeros(size, 1), cost: 0.0 };
         for (f, (glimpse, sightings)) in self.glimpses.iter().zip(&self.sightings).enumerate() {
@@ -88,7 +88,8 @@ impl<'a> System<'a> {
             for (k, (object, point)) in glimpse.points.iter().enumerate() {
                 let place = &state.places[*object];
                 let at: Vector3<f64> = r.tr_mul(&((*place * point.model).coords - t));
-                let term = if live { sightings.live(k, &at) } else { sightings.frozen(k, &at) }?;
+                let term = if live { sightings.live(k, &at) } else { sightings.frozen(k, &at) };
+                let term = term.ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
                 all.cost += term.cost;
                 // Under T Exp(ξ) the place moves by [p]× φ − ρ, under S Exp(η) by R (ρ − [P]× φ).
                 let mut by_pose = Matrix3x6::zeros();
@@ -122,7 +123,7 @@ impl<'a> System<'a> {
                 }
             }
         }
-        all.cost.is_finite().then_some(all)
+        if all.cost.is_finite() { Ok(all) } else { Err(Degenerate::NotFinite) }
     }
 
     fn moved(&self, state: &State, step: &Mat<f64>) -> State {
@@ -137,15 +138,14 @@ impl<'a> System<'a> {
 
     /// The least cost near a state, and that cost.
     pub(super) fn minimize(&self, mut state: State) -> Result<(State, f64), Degenerate> {
-        let at = |state: &State, live: bool| self.linearize(state, live).ok_or(Degenerate::Hidden);
-        let (mut here, mut damping) = (at(&state, false)?, 0.0);
+        let (mut here, mut damping) = (self.linearize(&state, false)?, 0.0);
         for _ in 0..MOST_STEPS {
-            let (step, decrement) = here.step(damping).ok_or(Degenerate::Singular)?;
+            let (step, decrement) = here.step(damping)?;
             if damping == 0.0 && decrement <= NEAR {
                 break;
             }
             let next = self.moved(&state, &step);
-            match self.linearize(&next, false).filter(|next| next.cost < here.cost) {
+            match self.linearize(&next, false).ok().filter(|next| next.cost < here.cost) {
                 Some(better) => {
                     (state, here) = (next, better);
                     damping = if damping > 1e-5 { damping * 0.1 } else { 0.0 };
@@ -154,14 +154,14 @@ impl<'a> System<'a> {
                 None => damping = f64::max(1e-4, damping * 10.0),
             }
         }
-        let (mut here, mut last) = (at(&state, true)?, f64::INFINITY);
+        let (mut here, mut last) = (self.linearize(&state, true)?, f64::INFINITY);
         for taken in 0..MOST_STEPS {
-            let (step, decrement) = here.step(0.0).ok_or(Degenerate::Singular)?;
+            let (step, decrement) = here.step(0.0)?;
             if !(decrement < last) {
                 return converged(taken, last.sqrt()).map(|()| (state, here.cost));
             }
             state = self.moved(&state, &step);
-            here = at(&state, true)?;
+            here = self.linearize(&state, true)?;
             if decrement <= NOTHING {
                 return Ok((state, here.cost));
             }
@@ -171,10 +171,10 @@ impl<'a> System<'a> {
     }
 
     /// The inverse of the normal equations at a state.
-    pub(super) fn covariance(&self, state: &State) -> Option<Mat<f64>> {
+    pub(super) fn covariance(&self, state: &State) -> Result<Mat<f64>, Degenerate> {
         let all = self.linearize(state, true)?;
-        let factor = all.normal.llt(Side::Lower).ok()?;
-        Some(factor.solve(Mat::<f64>::identity(6 * self.blocks, 6 * self.blocks)))
+        let factor = all.normal.llt(Side::Lower).map_err(|_| all.singular())?;
+        Ok(factor.solve(Mat::<f64>::identity(6 * self.blocks, 6 * self.blocks)))
     }
 }
 
@@ -208,14 +208,23 @@ impl Linearized {
     }
 
     /// The step and its decrement.
-    fn step(&self, damping: f64) -> Option<(Mat<f64>, f64)> {
+    fn step(&self, damping: f64) -> Result<(Mat<f64>, f64), Degenerate> {
         let mut normal = self.normal.clone();
         for i in 0..normal.nrows() {
             normal[(i, i)] *= 1.0 + damping;
         }
-        let step = normal.llt(Side::Lower).ok()?.solve(&self.gradient);
+        let step = normal.llt(Side::Lower).map_err(|_| self.singular())?.solve(&self.gradient);
         let decrement: f64 = (0..step.nrows()).map(|i| step[(i, 0)] * self.gradient[(i, 0)]).sum();
-        decrement.is_finite().then_some((step, decrement))
+        if decrement.is_finite() { Ok((step, decrement)) } else { Err(self.singular()) }
+    }
+
+    /// That the normal equations have no factor, with their least eigenvalue once they are scaled to ones on the diagonal.
+    fn singular(&self) -> Degenerate {
+        let rows = self.normal.nrows();
+        let root = |i: usize| if self.normal[(i, i)] > 0.0 { 1.0 / self.normal[(i, i)].sqrt() } else { 0.0 };
+        let scaled = Mat::from_fn(rows, rows, |i, j| self.normal[(i.max(j), i.min(j))] * root(i) * root(j));
+        let least = scaled.self_adjoint_eigenvalues(Side::Lower).ok().and_then(|values| values.first().copied());
+        Degenerate::Singular { share: least.unwrap_or(f64::NAN), least: rounding(rows) }
     }
 }
 

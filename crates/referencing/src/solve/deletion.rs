@@ -3,7 +3,7 @@
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use super::{
-    Degenerate, Mahalanobis,
+    Mahalanobis,
     descent::{Linearized, linearize},
     mahalanobis::covariance,
 };
@@ -29,8 +29,8 @@ impl<'a> Deletions<'a> {
     pub(crate) fn of(data: &'a Observations<'a>) -> Option<Self> {
         let solved = Mahalanobis::default().solved(data, |pose, terms| {
             let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
-            let each = (0..data.points.len()).map(one).collect::<Option<Vec<_>>>();
-            each.map(|each| (*pose, each)).ok_or(Degenerate::Hidden)
+            let each = (0..data.points.len()).map(one).collect::<Result<Vec<_>, _>>();
+            each.map(|each| (*pose, each))
         });
         let (pose, each) = solved.ok()?;
         let mut all = *each.first()?;
@@ -43,7 +43,7 @@ impl<'a> Deletions<'a> {
     pub(crate) fn without(&self, out: &[usize]) -> Option<(Transform<Object, Camera>, Covariance6<Object, Camera>)> {
         if self.each.len() >= out.len() + ENOUGH {
             let left = out.iter().fold(self.all, |left, &k| left.less(&self.each[k]));
-            if let Some(covariance) = left.covariance()
+            if let Ok(covariance) = left.covariance()
                 && covariance.fixed_view::<3, 3>(0, 0).trace() <= SURE * SURE
                 && let Some((step, decrement)) = left.step(0.0)
                 && decrement <= NEAR

@@ -3,7 +3,10 @@
 use nalgebra::{Matrix3, Matrix6, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{Degenerate, converged, normal::Normal};
+use super::{
+    Degenerate, converged,
+    normal::{Normal, inverse, singular},
+};
 use crate::Observation;
 
 /// What one point says of the place where a pose puts it, camera axes.
@@ -35,29 +38,32 @@ pub(super) struct Linearized {
     pub(super) cost: f64,
 }
 
-/// The normal equations at `pose`; `None` where a term has no value (a point behind a camera).
+/// The normal equations at `pose`.
 ///
 /// `term` is given the number of a point and the place p = T⁻¹ P where the pose puts it. Under T · Exp(ξ) that place
 /// moves by J ξ, J = \[ \[p\]×, −I \].
+///
+/// # Errors
+/// [`Degenerate::Hidden`]: the first point whose term has no value.
 #[inline]
 pub(super) fn linearize(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
-) -> Option<Linearized> {
+) -> Result<Linearized, Degenerate> {
     let (r, t) = (pose.rotation_matrix(), pose.translation());
     let mut normal = Normal::default();
     let (mut torque, mut force, mut cost) = (Vector3::zeros(), Vector3::zeros(), 0.0);
     for (k, point) in points.iter().enumerate() {
         let at: Vector3<f64> = r.tr_mul(&(point.model.coords - t));
-        let said = term(k, &at)?;
+        let said = term(k, &at).ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
         normal.add(&at, &said.information);
         torque -= at.cross(&said.pull);
         force -= said.pull;
         cost += said.cost;
     }
     let gradient = Vector6::new(torque.x, torque.y, torque.z, force.x, force.y, force.z);
-    Some(Linearized { normal, gradient, cost })
+    Ok(Linearized { normal, gradient, cost })
 }
 
 /// What each model point's error makes of the minimum: with n of the pixels and e of the model the terms ask
@@ -67,12 +73,12 @@ pub(super) fn model_errors(
     pose: &Transform<Object, Camera>,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
 ) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
-    let covariance =
-        linearize(points, pose, term).ok_or(Degenerate::Hidden)?.covariance().ok_or(Degenerate::Singular)?;
+    let covariance = linearize(points, pose, term)?.covariance()?;
     let (r, t) = (pose.rotation_matrix(), pose.translation());
     let of = |(k, point): (usize, &Observation)| {
         let at: Vector3<f64> = r.tr_mul(&(point.model.coords - t));
-        let pull = term(k, &at).ok_or(Degenerate::Hidden)?.information * r.transpose() * point.model_sigma;
+        let said = term(k, &at).ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
+        let pull = said.information * r.transpose() * point.model_sigma;
         let mut errors = SMatrix::<f64, 6, 3>::zeros();
         // −Jᵀ = [ [p]×; I ].
         errors.fixed_view_mut::<3, 3>(0, 0).copy_from(&(at.cross_matrix() * pull));
@@ -99,9 +105,12 @@ impl Linearized {
         self
     }
 
-    /// The covariance of ξ; `None` where some motion changes nothing that was measured.
-    pub(super) fn covariance(&self) -> Option<Matrix6<f64>> {
-        Some(self.normal.matrix().cholesky()?.inverse())
+    /// The covariance of ξ.
+    ///
+    /// # Errors
+    /// Some motion changes nothing that was measured.
+    pub(super) fn covariance(&self) -> Result<Matrix6<f64>, Degenerate> {
+        inverse(&self.normal.matrix())
     }
 
     /// The square of the length of a step in standard deviations: ξᵀ Σ⁻¹ ξ.
@@ -126,7 +135,7 @@ impl Linearized {
     }
 
     fn determined(&self, damping: f64) -> Result<(Vector6<f64>, f64), Degenerate> {
-        self.step(damping).ok_or(Degenerate::Singular)
+        self.step(damping).ok_or_else(|| singular(&self.normal.matrix()))
     }
 }
 
@@ -152,7 +161,7 @@ pub(super) fn descend(
     near: f64,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
 ) -> Result<(Transform<Object, Camera>, Linearized), Degenerate> {
-    let here = linearize(points, start, term).ok_or(Degenerate::Hidden)?;
+    let here = linearize(points, start, term)?;
     let (mut pose, mut here, mut damping) = (*start, here, 0.0);
     for _ in 0..MOST_STEPS {
         let (step, decrement) = here.determined(damping)?;
@@ -160,7 +169,7 @@ pub(super) fn descend(
             break;
         }
         let next = moved(&pose, &step);
-        match linearize(points, &next, term).filter(|next| next.cost < here.cost) {
+        match linearize(points, &next, term).ok().filter(|next| next.cost < here.cost) {
             Some(better) => {
                 (pose, here) = (next, better);
                 damping = if damping > 1e-5 { damping * 0.1 } else { 0.0 };
@@ -203,7 +212,7 @@ pub(super) fn settle(
             return Ok((pose, here));
         }
         last = decrement;
-        here = linearize(points, &pose, term).ok_or(Degenerate::Hidden)?;
+        here = linearize(points, &pose, term)?;
     }
     converged(MOST_STEPS, last.sqrt()).map(|()| (pose, here))
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Degenerate, Solver, converged,
     kabsch::fit_weighted,
+    normal::singular,
     resampled::{self, Answer},
     sandwich,
     spread::{check, share},
@@ -81,7 +82,7 @@ impl Solver for Irls {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let known = sandwich::covariance(data, at, |k| self.weight(&data.points[k], at))?;
-        let length = known.matrix.cholesky().ok_or(Degenerate::Singular)?;
+        let length = known.matrix.cholesky().ok_or_else(|| singular(&known.matrix))?;
         let still = |step: &Vector6<f64>| step.dot(&length.solve(step)) <= STILL * STILL;
         resampled::covariance(|drawn| self.follow(drawn, still), data, at, self.bends())
     }

@@ -54,9 +54,9 @@ impl Optimiser for LBfgs {
     ) -> Result<(Transform<Object, Camera>, u64), Degenerate> {
         let best = Best::default();
         let cost = || PixelCost::of(data, rig, *start, &best);
-        let search = MoreThuenteLineSearch::new().with_c(1e-4, 0.9).map_err(|_| Degenerate::Singular)?;
+        let search = MoreThuenteLineSearch::new().with_c(1e-4, 0.9).expect("0 < 1e-4 < 0.9 < 1");
         let method = LBFGS::new(search, 7).with_tolerance_grad(1e-8).and_then(|m| m.with_tolerance_cost(0.0));
-        let method = method.map_err(|_| Degenerate::Singular)?;
+        let method = method.expect("no tolerance is negative");
         // An error means that the line search found no lower place: mostly where the digits end. The best seen is the answer,
         // if nothing pulls there.
         let run = Executor::new(cost()?, method)

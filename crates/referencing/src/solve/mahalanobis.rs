@@ -78,7 +78,7 @@ impl Solver for Mahalanobis {
             return covariance(data, at, &|k, place| Some(measured.term(k, place)));
         };
         let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Triangulated).map_err(|_| Degenerate::Singular)?;
+        all.see(&data.points, Target::Triangulated)?;
         let live = |k: usize, place: &_| all.live(k, place);
         let first = covariance(data, at, &live)?;
         Ok(Covariance6::new(widened(&data.points, at, first.matrix, &live)))
@@ -94,7 +94,7 @@ impl Solver for Mahalanobis {
             return model_errors(&data.points, at, &|k, place: &_| Some(measured.term(k, place)));
         };
         let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Triangulated).map_err(|_| Degenerate::Singular)?;
+        all.see(&data.points, Target::Triangulated)?;
         model_errors(&data.points, at, &|k, place: &_| all.live(k, place))
     }
 }
@@ -108,8 +108,7 @@ pub(super) fn covariance(
     at: &Transform<Object, Camera>,
     terms: Terms<'_>,
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-    let information = linearize(&data.points, at, &terms);
-    information.and_then(|all| all.covariance()).map(Covariance6::new).ok_or(Degenerate::Singular)
+    linearize(&data.points, at, &terms)?.covariance().map(Covariance6::new)
 }
 
 impl Mahalanobis {

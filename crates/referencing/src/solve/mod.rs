@@ -44,6 +44,7 @@ pub(crate) use gnc_tls::GncTls;
 pub use kabsch::Kabsch;
 pub(crate) use kabsch::fit as least_squares;
 pub use mahalanobis::Mahalanobis;
+pub(crate) use normal::{inverse, rounding};
 pub(crate) use sightings::{Sightings, Target as PixelTarget};
 pub(crate) use spread::second_ratio;
 pub use stereo_reprojection::StereoReprojection;
@@ -92,9 +93,6 @@ pub enum Degenerate {
     /// The solver looks at pixels, and there are none, or no rig.
     #[error("the points have no pixels or there is no rig; `mahalanobis` takes points alone")]
     NoPixels,
-    /// Three points and their pixels allow no pose.
-    #[error("no pose lets the left camera see three points where it saw them")]
-    NoRoot,
     /// The measured points have not the size of the model's.
     #[error("the model is {scale:.4} times as large as what was measured; {most} off one is accepted")]
     Scale {
@@ -104,8 +102,16 @@ pub enum Degenerate {
         most: f64,
     },
     /// The normal equations have no solution: some motion changes nothing that was measured.
-    #[error("the points leave a motion undetermined: their information matrix is singular")]
-    Singular,
+    #[error(
+        "the points leave a motion undetermined: their information, scaled to ones on its diagonal, has the least \
+         eigenvalue {share:.1e}; more than rounding, {least:.1e}, is needed"
+    )]
+    Singular {
+        /// The least eigenvalue of the scaled information.
+        share: f64,
+        /// The least that is told from none.
+        least: f64,
+    },
     /// A number is not finite.
     #[error("a coordinate is not finite")]
     NotFinite,
@@ -115,9 +121,22 @@ pub enum Degenerate {
         /// Its place among the points.
         index: usize,
     },
-    /// Every pose that was tried puts a point where a camera that saw it cannot.
-    #[error("no pose that was tried puts every point before both cameras")]
-    Hidden,
+    /// A pose on the way to the answer puts a point where a camera that saw it cannot.
+    #[error("a pose that was tried puts point {index} at a depth of {depth:.3} m, where a camera that saw it cannot")]
+    Hidden {
+        /// Its place among the points.
+        index: usize,
+        /// Its depth before the left camera (m).
+        depth: f64,
+    },
+    /// Other noise of the same size leaves too few answers to tell how they scatter.
+    #[error("of {drawn} draws of other noise only {answered} have an answer; nine of ten are needed for a covariance")]
+    Scattered {
+        /// Draws with an answer.
+        answered: usize,
+        /// All draws.
+        drawn: usize,
+    },
     /// An iteration ended before it was at its minimum.
     #[error("after {steps} steps the minimum is still {off:.2e} standard deviations away; at most {most} is accepted")]
     Unconverged {

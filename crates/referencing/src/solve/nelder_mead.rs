@@ -73,7 +73,7 @@ impl Optimiser for NelderMead {
             let cost = || PixelCost::of(data, rig, pose, &best);
             let corner = |i: usize| (1..7).map(|k| if k == i { edge } else { 0.0 }).collect();
             let method = neldermead::NelderMead::new((0..7).map(corner).collect()).with_sd_tolerance(level);
-            let method = method.map_err(|_| Degenerate::Singular)?;
+            let method = method.expect("no tolerance is negative");
             let run =
                 Executor::new(cost()?, method).configure(|state| state.max_iters(self.iterations)).timer(false).run();
             taken += run.map_or(self.iterations, |result| result.state().get_iter());

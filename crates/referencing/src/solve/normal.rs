@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
+use super::Degenerate;
+
 /// Σ Jᵀ W J over points p with J = \[ \[p\]×, −I \]: in blocks, −\[p\]× W \[p\]×, \[p\]× W and W.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Normal {
@@ -92,6 +94,30 @@ impl Normal {
     }
 }
 
+/// The inverse of an information matrix.
+///
+/// # Errors
+/// [`Degenerate::Singular`] where it is not positive definite.
+pub(crate) fn inverse(information: &Matrix6<f64>) -> Result<Matrix6<f64>, Degenerate> {
+    information.cholesky().map(|root| root.inverse()).ok_or_else(|| singular(information))
+}
+
+/// That a matrix without a Cholesky factor has none, with its least eigenvalue once rows and columns are scaled to ones on
+/// the diagonal.
+pub(super) fn singular(information: &Matrix6<f64>) -> Degenerate {
+    let root = information.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scaled = information.component_mul(&(root * root.transpose()));
+    // Eigenvalues of what is not finite are sought without end.
+    let share = if scaled.iter().all(|x| x.is_finite()) { scaled.symmetric_eigenvalues().min() } else { f64::NAN };
+    Degenerate::Singular { share, least: rounding(6) }
+}
+
+/// The least eigenvalue at which the factor of a matrix with so many rows and ones on its diagonal is sure to be found.
+/// (Demmel, *On floating point errors in Cholesky*, 1989.)
+pub(crate) fn rounding(rows: usize) -> f64 {
+    (rows * (rows + 1)) as f64 * f64::EPSILON
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,5 +143,21 @@ mod tests {
         let damped = expected + Matrix6::from_diagonal(&(expected.diagonal() * 0.3));
         assert!((damped * all.solve(0.3, &g).unwrap() - g).amax() < 1e-10);
         assert_eq!(Normal::default().solve(0.0, &g), None);
+        assert!((inverse(&expected).unwrap() * expected - Matrix6::identity()).amax() < 1e-10);
+    }
+
+    /// Points on a line say nothing of the turn about it.
+    #[test]
+    fn what_has_no_inverse_is_refused_with_its_least_eigenvalue() {
+        let mut line = Normal::default();
+        for k in 0..4 {
+            line.add(&Vector3::new(f64::from(k), 0.0, 0.0), &(Matrix3::identity() * 1e6));
+        }
+        for bad in [line.matrix(), Matrix6::zeros()] {
+            let Err(Degenerate::Singular { share, least }) = inverse(&bad) else { panic!("it has none") };
+            assert!(share.abs() <= least && least < 1e-14, "{share} {least}");
+        }
+        let Err(Degenerate::Singular { share, .. }) = inverse(&(line.matrix() * f64::INFINITY)) else { panic!("none") };
+        assert!(share.is_nan());
     }
 }

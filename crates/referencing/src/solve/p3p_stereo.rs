@@ -5,12 +5,14 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver,
+    Degenerate, Rival, Solver,
     descent::{NEAR, descend, linearize, settle},
     kabsch,
+    profile::widened,
     roots::{Roots, squares, widest},
     sightings::{Sightings, Target},
     spread::{check, share},
+    starts,
     stereo_reprojection::pixels_and_rig,
 };
 use crate::Observations;
@@ -27,6 +29,9 @@ pub(crate) struct P3pStereo {
     /// Second extent of the points over the first below which they count as a line.
     pub(crate) least_ratio: f64,
 }
+
+/// The roots of both cameras and the triangulated places.
+const MOST_STARTS: usize = 9;
 
 impl Default for P3pStereo {
     fn default() -> Self {
@@ -63,14 +68,17 @@ impl Solver for P3pStereo {
             roots.of_camera(data, rig, chosen, right);
         }
         let starts = roots.as_slice().iter().copied().chain([kabsch::fit(&three.points)]);
-        let mut best: Option<(f64, Transform<Object, Camera>)> = None;
-        for pose in starts.filter_map(|start| refined(&three, &start, &sightings)) {
-            let Some(cost) = squares(data, rig, &pose) else { continue };
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, pose));
-            }
-        }
-        best.map(|(_, pose)| pose).ok_or(Degenerate::NoRoot)
+        let found = starts.map(|start| {
+            let pose = refined(&three, &start, &sightings)?;
+            Ok((squares(data, rig, &pose)?, pose))
+        });
+        // Where none leads anywhere, the first says why.
+        let least = found.reduce(|best, other| match (&best, &other) {
+            (Ok((least, _)), Ok((cost, _))) if cost < least => other,
+            (Err(_), Ok(_)) => other,
+            _ => best,
+        });
+        least.expect("the fit of the three is a start").map(|(_, pose)| pose)
     }
 
     /// The three.
@@ -92,11 +100,24 @@ impl Solver for P3pStereo {
         let three = widest(data).map(|i| data.points[i]);
         let mut sightings = Sightings::new(rig);
         sightings.see(&three, Target::Pixels)?;
-        linearize(&three, at, &|k, place: &_| sightings.live(k, place))
-            .ok_or(Degenerate::Hidden)?
-            .covariance()
-            .map(Covariance6::new)
-            .ok_or(Degenerate::Singular)
+        let live = |k: usize, place: &_| sightings.live(k, place);
+        let first = linearize(&three, at, &live)?.covariance()?;
+        Ok(Covariance6::new(widened(&three, at, first, &live)))
+    }
+
+    /// Those of the three that the pixels of all points leave as likely.
+    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
+        let Ok(rig) = pixels_and_rig(data) else { return Vec::new() };
+        let three = Observations { points: widest(data).map(|i| data.points[i]).to_vec(), rig: data.rig };
+        let (mut few, mut all) = (Sightings::new(rig), Sightings::new(rig));
+        if few.see(&three.points, Target::Pixels).and_then(|()| all.see(&data.points, Target::Pixels)).is_err() {
+            return Vec::new();
+        }
+        let others = starts::rivals(&three, rig, MOST_STARTS, &few, at, most);
+        let chi2 = |pose: &_| linearize(&data.points, pose, &|k, place: &_| all.live(k, place)).map(|all| all.cost);
+        let Ok(own) = chi2(at) else { return Vec::new() };
+        let told = |rival: Rival| Some(Rival { worse: chi2(&rival.pose).ok()? - own, ..rival });
+        others.into_iter().filter_map(told).filter(|rival| rival.worse <= most).collect()
     }
 }
 
@@ -105,9 +126,9 @@ fn refined(
     three: &Observations<'_>,
     start: &Transform<Object, Camera>,
     sightings: &Sightings<'_>,
-) -> Option<Transform<Object, Camera>> {
+) -> Result<Transform<Object, Camera>, Degenerate> {
     let live = |k: usize, at: &_| sightings.live(k, at);
-    let (near, here) = descend(&three.points, start, NEAR, &|k, at: &_| sightings.frozen(k, at)).ok()?;
+    let (near, here) = descend(&three.points, start, NEAR, &|k, at: &_| sightings.frozen(k, at))?;
     let here = if sightings.weights_move { linearize(&three.points, &near, &live)? } else { here };
-    Some(settle(&three.points, near, here, &live).ok()?.0)
+    Ok(settle(&three.points, near, here, &live)?.0)
 }

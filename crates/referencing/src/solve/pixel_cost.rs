@@ -9,6 +9,7 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
 use super::{
     Degenerate, Solver, StereoReprojection, converged, kabsch,
+    normal::{inverse, singular},
     spread::{check, share},
     stereo_reprojection::pixels_and_rig,
 };
@@ -107,23 +108,27 @@ impl<'a> PixelCost<'a> {
         start: Transform<Object, Camera>,
         best: &'a Best,
     ) -> Result<Self, Degenerate> {
-        let weight = |point: &Observation| {
-            let model = point.model_sigma * point.model_sigma;
-            let j = rig.project_with_jacobian(&point.measured.at)?.1;
-            (point.pixels?.covariance + j * j.transpose() * model + Matrix4::identity() * 1e-12).try_inverse()
+        let weight = |(index, point): (usize, &Observation)| {
+            let (at, model) = (point.measured.at, point.model_sigma * point.model_sigma);
+            let (_, j) = rig.project_with_jacobian(&at).ok_or(Degenerate::Hidden { index, depth: at.coords.z })?;
+            let pixels = point.pixels.ok_or(Degenerate::NoPixels)?.covariance;
+            let noise = pixels + j * j.transpose() * model + Matrix4::identity() * 1e-12;
+            noise.try_inverse().ok_or(Degenerate::Noise { index })
         };
-        let weights = data.points.iter().map(weight).collect::<Option<_>>().ok_or(Degenerate::Singular)?;
+        let weights = data.points.iter().enumerate().map(weight).collect::<Result<_, _>>()?;
         let mut cost = Self { rig, points: &data.points, weights, start, scale: Matrix6::identity(), best };
-        cost.scale = cost.spread().ok_or(Degenerate::Singular)?;
+        cost.scale = cost.spread()?;
         Ok(cost)
     }
 
     /// L of (Σ (∂r)ᵀ S⁻¹ ∂r)⁻¹ = L Lᵀ, by central differences of the projections.
-    fn spread(&self) -> Option<Matrix6<f64>> {
+    fn spread(&self) -> Result<Matrix6<f64>, Degenerate> {
         let mut information = Matrix6::zeros();
-        for (point, weight) in self.points.iter().zip(&self.weights) {
+        for (index, (point, weight)) in self.points.iter().zip(&self.weights).enumerate() {
             let at = |xi: Vector6<f64>| {
-                Some(self.rig.project(&(self.start.perturbed(&xi).inverse() * point.model))?.coordinates())
+                let place = self.start.perturbed(&xi).inverse() * point.model;
+                let seen = self.rig.project(&place).ok_or(Degenerate::Hidden { index, depth: place.coords.z })?;
+                Ok::<_, Degenerate>(seen.coordinates())
             };
             let mut j = nalgebra::Matrix4x6::zeros();
             for i in 0..6 {
@@ -132,7 +137,8 @@ impl<'a> PixelCost<'a> {
             }
             information += j.transpose() * weight * j;
         }
-        Some(information.cholesky()?.inverse().cholesky()?.l())
+        let covariance = inverse(&information)?;
+        Ok(covariance.cholesky().ok_or_else(|| singular(&information))?.l())
     }
 
     /// How far the minimum is from the start (standard deviations of the pose): half of the gradient, χ² being the square of

@@ -45,7 +45,7 @@ pub(super) fn widened(
     if attitude.trace() <= STRAIGHT * STRAIGHT {
         return first;
     }
-    let Some(here) = linearize(points, at, term) else { return first };
+    let Ok(here) = linearize(points, at, term) else { return first };
     let eigen = attitude.symmetric_eigen();
     let mut most = (0.0, first);
     for (axis, variance) in eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()) {
@@ -111,12 +111,12 @@ fn follow(
     about: &Vector6<f64>,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
 ) -> Option<f64> {
-    let mut here = linearize(points, pose, term)?;
+    let mut here = linearize(points, pose, term).ok()?;
     for _ in 0..FOLLOWS {
-        let covariance = here.covariance()?;
+        let covariance = here.covariance().ok()?;
         let (free, held) = (covariance * here.gradient, covariance * about);
         let next = pose.perturbed(&(free - held * (about.dot(&free) / about.dot(&held))));
-        let there = linearize(points, &next, term)?;
+        let there = linearize(points, &next, term).ok()?;
         if !(there.cost < here.cost) {
             break;
         }

@@ -8,6 +8,7 @@ use seafix_geometry::{
 use super::{
     Degenerate,
     irls::distance,
+    normal::singular,
     sightings::PIXEL_FLOOR,
     signs::{Signs, rows},
 };
@@ -22,7 +23,7 @@ use crate::{Observation, Observations};
 /// where it was measured, so that it is left out, or pulls, as it did; all others where the pose puts them.
 ///
 /// # Errors
-/// Where one of ten draws has no answer, why the first of them has none.
+/// [`Degenerate::Scattered`] where one of ten draws has no answer.
 pub(super) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
@@ -34,7 +35,6 @@ pub(super) fn covariance(
     let numbers = all.iter().map(Source::numbers).sum();
     let (size, blocks) = rows(numbers, answer.pairs());
     let mut answers: Vec<[Option<Vector6<f64>>; 2]> = Vec::with_capacity(size * blocks);
-    let mut refused = None;
     let mut moved = data.clone();
     for block in 0..blocks {
         for row in Signs::new(size, block as u64).rows() {
@@ -44,24 +44,19 @@ pub(super) fn covariance(
                     *point = source.draw(data.rig, &mut noise)?;
                     Some(())
                 });
-                match shown.ok_or(Degenerate::Hidden).and_then(|()| solve(&moved)) {
-                    Ok(answer) => Some(at.error_to(&answer)),
-                    Err(why) => {
-                        refused.get_or_insert(why);
-                        None
-                    }
-                }
+                shown.and_then(|()| solve(&moved).ok()).map(|answer| at.error_to(&answer))
             }));
         }
     }
     let answered = answers.iter().flatten().flatten().count();
-    if let Some(why) = refused.filter(|_| answered * 10 < 2 * size * blocks * 9) {
-        return Err(why);
+    let drawn = 2 * size * blocks;
+    if answered * 10 < drawn * 9 {
+        return Err(Degenerate::Scattered { answered, drawn });
     }
     let sum: Matrix6<f64> = answers.iter().flatten().flatten().map(|xi| xi * xi.transpose()).sum();
     let scale = match answer {
         Answer::Straight => 1.0,
-        Answer::Bent => left_out(&answers, &sum).ok_or(Degenerate::Singular)?,
+        Answer::Bent => left_out(&answers, &sum).ok_or_else(|| singular(&sum))?,
     };
     Ok(Covariance6::new(sum * (scale / answered as f64)))
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
 
-use super::{kabsch, p3p};
+use super::{Degenerate, kabsch, p3p};
 use crate::{Observation, Observations};
 
 /// Up to eight poses, the one that explains the pixels of all points best first.
@@ -62,21 +62,30 @@ impl Roots {
                 point.measured.at = if right { left_from_right * Point::from(at) } else { Point::from(at) };
             }
             let pose = kabsch::fit(&three);
-            if let Some(cost) = squares(data, rig, &pose) {
+            if let Ok(cost) = squares(data, rig, &pose) {
                 self.insert(pose, cost);
             }
         }
     }
 }
 
-/// Σ of the squared pixel residuals, unweighted (px²); `None` where a point is behind a camera.
-pub(super) fn squares(data: &Observations<'_>, rig: &StereoRig, pose: &Transform<Object, Camera>) -> Option<f64> {
+/// Σ of the squared pixel residuals, unweighted (px²).
+///
+/// # Errors
+/// The first point that a camera could not see.
+pub(super) fn squares(
+    data: &Observations<'_>,
+    rig: &StereoRig,
+    pose: &Transform<Object, Camera>,
+) -> Result<f64, Degenerate> {
     let camera_from_object = pose.inverse();
-    let of = |point: &Observation| {
-        let expected = rig.project(&(camera_from_object * point.model))?;
-        Some((point.pixels?.at.coordinates() - expected.coordinates()).norm_squared())
+    let of = |(index, point): (usize, &Observation)| {
+        let place = camera_from_object * point.model;
+        let expected = rig.project(&place).ok_or(Degenerate::Hidden { index, depth: place.coords.z })?;
+        let seen = point.pixels.ok_or(Degenerate::NoPixels)?;
+        Ok((seen.at.coordinates() - expected.coordinates()).norm_squared())
     };
-    data.points.iter().map(of).sum()
+    data.points.iter().enumerate().map(of).sum()
 }
 
 /// Three points of the model far from each other: the farthest from the centroid, the farthest from that, and the

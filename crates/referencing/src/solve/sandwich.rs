@@ -3,7 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-use super::{Degenerate, eyes::Eyes, normal::Normal, resampled};
+use super::{
+    Degenerate,
+    eyes::Eyes,
+    normal::{Normal, inverse},
+    resampled,
+};
 use crate::{Observation, Observations};
 
 /// A⁻¹ B A⁻¹ with A = Σ w JᵀJ and B = Σ w² Jᵀ S J, J = \[ \[p\]×, −I \] and S the noise of a point: what the noise makes
@@ -27,7 +32,7 @@ pub(super) fn covariance(
         a.add(&place, &(Matrix3::identity() * w));
         b.add(&place, &(noise(eyes.as_ref(), point, &place) * (w * w)));
     }
-    let bread = a.matrix().cholesky().ok_or(Degenerate::Singular)?.inverse();
+    let bread = inverse(&a.matrix())?;
     Ok(Covariance6::new(bread * b.matrix() * bread))
 }
 

@@ -64,7 +64,8 @@ impl<'a> Sightings<'a> {
         let model_variance = point.model_sigma * point.model_sigma;
         let (mut at, mut frozen) = (pixels.at.coordinates(), weight);
         if target == Target::Triangulated || model_variance > 0.0 {
-            let (seen, j) = self.eyes.look(&point.measured.at.coords).ok_or(Degenerate::Hidden)?;
+            let place = &point.measured.at.coords;
+            let (seen, j) = self.eyes.look(place).ok_or(Degenerate::Hidden { index, depth: place.z })?;
             if target == Target::Triangulated {
                 at = seen;
             }

@@ -80,7 +80,7 @@ pub(super) fn rivals(
     const CONTAINED: f64 = 12.591_587_243_743_977;
     let points = &data.points;
     let live = |k: usize, place: &_| sightings.live(k, place);
-    let Some(here) = linearize(points, at, &live) else { return Vec::new() };
+    let Ok(here) = linearize(points, at, &live) else { return Vec::new() };
     if starts == 1 || is_clear(&here, points.len()) {
         return Vec::new();
     }
@@ -108,7 +108,7 @@ fn minimum(
 ) -> Result<(Transform<Object, Camera>, Linearized), Degenerate> {
     let live = |k: usize, at: &_| sightings.live(k, at);
     let (near, here) = descend(points, start, NEAR, &|k, at: &_| sightings.frozen(k, at))?;
-    let here = if sightings.weights_move { linearize(points, &near, &live).ok_or(Degenerate::Hidden)? } else { here };
+    let here = if sightings.weights_move { linearize(points, &near, &live)? } else { here };
     let cost = here.cost;
     settle(points, near, here, &live).inspect_err(|why| unfinished(cost, why))
 }

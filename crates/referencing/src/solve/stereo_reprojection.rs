@@ -82,8 +82,7 @@ impl Solver for StereoReprojection {
         let mut all = Sightings::new(rig);
         all.see(&data.points, Target::Pixels)?;
         let live = |k: usize, place: &_| all.live(k, place);
-        let first = linearize(&data.points, at, &live).ok_or(Degenerate::Hidden)?.covariance();
-        let first = first.ok_or(Degenerate::Singular)?;
+        let first = linearize(&data.points, at, &live)?.covariance()?;
         Ok(Covariance6::new(widened(&data.points, at, first, &live)))
     }
 

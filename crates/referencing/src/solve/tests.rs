@@ -154,9 +154,10 @@ fn through_a_rig_from(
     rig: &StereoRig,
     pose: Transform<Object, Camera>,
 ) -> (Observations<'_>, Transform<Object, Camera>) {
-    let mut covariance = nalgebra::Matrix4::identity() * 0.3_f64.powi(2);
+    // Little enough that even of three points the likelihood is straight within it.
+    let mut covariance = nalgebra::Matrix4::identity() * 0.05_f64.powi(2);
     for i in 0..2 {
-        (covariance[(i, i + 2)], covariance[(i + 2, i)]) = (0.05, 0.05);
+        (covariance[(i, i + 2)], covariance[(i + 2, i)]) = (0.0014, 0.0014);
     }
     let points = SPREAD.iter().map(|at| {
         let model = Point::from(*at);
