@@ -4,9 +4,8 @@
 
 use std::fmt::Write as _;
 
-use nalgebra::Vector3;
 use seafix_evaluation::{attitude_error, position_error};
-use seafix_geometry::{MeasuredPoint, Object, Pixel, Point, StereoPixels, UncertainPixels, UncertainPoint};
+use seafix_geometry::MeasuredPoint;
 use seafix_referencing::{
     Acceptance, Candidates, Correspondence, ModelPoint, Outcome, Problem, Protection, StereoReprojection, Tolerance,
     judge_named,
@@ -31,7 +30,12 @@ struct Fix {
 /// What came of all fixes.
 #[derive(Default)]
 struct Count {
+    /// Fixes that were simulated.
     drawn: u64,
+    /// Draws that noise left without a point that can be triangulated, and those of layouts that fit no view: no fixes.
+    undrawn: u64,
+    /// Fixes with a wrong match.
+    wrong: u64,
     referenced: u64,
     available: u64,
     within_alert: u64,
@@ -62,6 +66,8 @@ impl Count {
     fn merge(&mut self, other: &Self) {
         let of = |count: &mut u64, more: u64| *count += more;
         of(&mut self.drawn, other.drawn);
+        of(&mut self.undrawn, other.undrawn);
+        of(&mut self.wrong, other.wrong);
         of(&mut self.referenced, other.referenced);
         of(&mut self.available, other.available);
         of(&mut self.within_alert, other.within_alert);
@@ -89,15 +95,19 @@ fn fixes(number: u64, acceptance: &Acceptance, shell: f64) -> Count {
         model_sigma: 0.0,
         rig: rigs[choose.below(2)].clone(),
     };
-    let mut count = Count { drawn: DRAWS, ..Count::default() };
-    let Ok(placed) = layout.place(71) else { return count };
+    let mut count = Count::default();
+    let Ok(placed) = layout.place(71) else { return Count { undrawn: DRAWS, ..count } };
     for draw in 0..DRAWS {
         let mut stream = Stream::new(71, number, draw, Purpose::Survey);
         let wrong = wrong(layout.points, acceptance, &mut stream);
-        let Some(mut cloud) = placed.draw(draw) else { continue };
+        let Some(mut cloud) = placed.draw(draw) else {
+            count.undrawn += 1;
+            continue;
+        };
+        count.drawn += 1;
+        count.wrong += u64::from(!wrong.is_empty());
         for wrong in wrong {
-            let Some(other) = elsewhere(&placed, &placed.model[wrong], shell, &mut stream) else { continue };
-            cloud[wrong] = other;
+            cloud[wrong] = placed.elsewhere(&placed.model[wrong], shell, &mut stream);
         }
         if let Some(fix) = fix(&placed, &cloud, acceptance) {
             count.add(&fix, acceptance.alert_limit);
@@ -117,18 +127,6 @@ fn wrong(points: usize, acceptance: &Acceptance, stream: &mut Stream) -> Vec<usi
         }
         _ => Vec::new(),
     }
-}
-
-/// A point uniform in the shell about the true place of a model point, seen with the noise of all others.
-fn elsewhere(placed: &Placed, model: &Point<Object>, shell: f64, stream: &mut Stream) -> Option<MeasuredPoint> {
-    let off = Vector3::from_fn(|_, _| stream.between(-shell, shell));
-    let exact = placed.rig.project(&(placed.object_from_camera.inverse() * *model + off))?;
-    let mut noisy = |p: Pixel| Pixel { u: p.u + 0.2 * stream.normal(), v: p.v + 0.2 * stream.normal() };
-    let at = StereoPixels { left: noisy(exact.left), right: noisy(exact.right) };
-    let pixels = UncertainPixels::independent(at, 0.2);
-    let found = placed.rig.triangulate(&pixels).ok()?;
-    let position = UncertainPoint { at: found.point, covariance: found.covariance };
-    Some(MeasuredPoint { position, pixels: Some(pixels) })
 }
 
 /// The fix that the tests of the method let pass, every point identified as drawn.
@@ -191,9 +189,11 @@ fn million(acceptance: &Acceptance) {
     let all = trial(1_000_000 / DRAWS, acceptance, SHELL);
     let share = |n: u64| 100.0 * n as f64 / all.drawn as f64;
     println!(
-        "{} draws: referenced {:.2} %, with a level {:.2} %, level within the alert limit {:.2} %; beyond the level: \
+        "{} fixes, {} with a wrong match; {} draws of no fix: referenced {:.2} %, with a level {:.2} %, level within the alert limit {:.2} %; beyond the level: \
          position {}, attitude {}",
         all.drawn,
+        all.wrong,
+        all.undrawn,
         share(all.referenced),
         share(all.available),
         share(all.within_alert),

@@ -139,6 +139,21 @@ impl Placed {
         self.model.iter().map(measure).collect()
     }
 
+    /// A wrong match of a point of the model: another one, uniform in what both cameras see of the shell of this half-size (m)
+    /// about it (camera axes), with the noise of all others. It is drawn until it can be triangulated.
+    ///
+    /// # Panics
+    /// Never: the true place is in view, and with it some of any shell.
+    pub fn elsewhere(&self, model: &Point<Object>, shell: f64, stream: &mut Stream) -> MeasuredPoint {
+        let (place, sigma) = (self.object_from_camera.inverse() * *model, self.settings.sigma_px);
+        let mut draw = || {
+            let other = place + Vector3::from_fn(|_, _| stream.between(-shell, shell));
+            self.rig.sees(&other, 0.0)?;
+            self.measure(&(self.object_from_camera * other), sigma.max(1e-3), || sigma * stream.normal())
+        };
+        (0..MOST_TRIES).find_map(|_| draw()).expect("some of the shell is in view")
+    }
+
     /// The points without any noise, with the covariance of pixels that err by `sigma_px`.
     ///
     /// # Panics
@@ -206,6 +221,19 @@ mod tests {
         let noisy = Layout::default().place(3).unwrap();
         assert_ne!(noisy.draw(1).unwrap()[0], noisy.draw(2).unwrap()[0]);
         assert_eq!(noisy.draw(1).unwrap(), noisy.draw(1).unwrap());
+    }
+
+    #[test]
+    fn a_wrong_match_lies_in_the_shell_and_in_view() {
+        let placed = Layout { sigma_px: 0.0, ..Layout::default() }.place(3).unwrap();
+        let mut stream = Stream::new(3, 0, 0, Purpose::Mismatches);
+        let mut farthest: f64 = 0.0;
+        for model in placed.model.iter().cycle().take(200) {
+            let other = placed.elsewhere(model, 0.25, &mut stream).position.at;
+            assert!(placed.rig.sees(&other, 0.0).is_some());
+            farthest = farthest.max((other - placed.object_from_camera.inverse() * *model).amax());
+        }
+        assert!(farthest > 0.2 && farthest < 0.25 + 1e-9, "{farthest}");
     }
 
     #[test]

@@ -52,6 +52,8 @@ pub enum Purpose {
     Snow,
     /// A question to the transponders on the bed.
     Transponders,
+    /// Which points are wrong matches, and where these lie.
+    Mismatches,
 }
 
 /// A stream of random numbers, a function of (seed, dive, frame, purpose) alone.

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{Matrix4, UnitQuaternion, Vector3};
 use seafix_component::{Component, Fault, in_range};
 use seafix_evaluation::{Seen, cramer_rao};
-use seafix_geometry::{Body, Camera, Covariance6, Object, Point, StereoRig, Transform, World, triad};
+use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, Point, StereoRig, Transform, World, triad};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
 use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,10 @@ pub struct VirtualLayouts {
     pub sigma_px: f64,
     /// Standard deviation of each coordinate of a model point (m), drawn afresh each draw.
     pub model_sigma: f64,
+    /// Share of the draws in which one point, any of them, is a wrong match: another one, uniform in its shell.
+    pub wrong_match_rate: f64,
+    /// Half-size (m) of the shell in which a wrong match lies.
+    pub shell: f64,
     /// The cameras.
     pub rig: VirtualRig,
     /// How many objects the points of a layout belong to, in turn.
@@ -52,6 +56,8 @@ impl Default for VirtualLayouts {
             distance,
             sigma_px,
             model_sigma,
+            wrong_match_rate: 0.0,
+            shell: 0.25,
             rig,
             objects: 1,
             survey_sigma: 0.0,
@@ -81,6 +87,9 @@ impl Component for VirtualLayouts {
         in_range(noise(self.sigma_px, 100.0), "sigma-px", self.sigma_px, "0 to 100")?;
         in_range(noise(self.model_sigma, 1.0), "model-sigma", self.model_sigma, "0 to 1")?;
         in_range(noise(self.survey_sigma, 1.0), "survey-sigma", self.survey_sigma, "0 to 1")?;
+        in_range(noise(self.wrong_match_rate, 1.0), "wrong-match-rate", self.wrong_match_rate, "a share from 0 to 1")?;
+        let shell = self.shell > 0.0 && self.shell <= 10.0;
+        in_range(shell, "shell", self.shell, "a positive number of metres, at most 10")?;
         let enough = self.objects >= 1 && 3 * self.objects <= self.points;
         in_range(enough, "objects", self.objects, "1 or more, with three points each")?;
         self.rig.build().map(|_| ()).map_err(|error| error.to_string())
@@ -178,6 +187,15 @@ impl Layouts {
         (layout * objects + point % objects, point / objects)
     }
 
+    /// The wrong match of a draw that has one: which point, and what was taken for it.
+    fn mismatch(&self, layout: usize, draw: u64) -> Option<(usize, MeasuredPoint)> {
+        let mut stream = Stream::new(self.seed, layout as u64, draw, Purpose::Mismatches);
+        (stream.unit() < self.settings.wrong_match_rate).then(|| {
+            let (placed, wrong) = (&self.placed[layout], stream.below(self.settings.points));
+            (wrong, placed.elsewhere(&placed.model[wrong], self.settings.shell, &mut stream))
+        })
+    }
+
     fn world_from_camera(&self, layout: usize) -> Transform<World, Camera> {
         world_from_layout(layout) * self.placed[layout].object_from_camera
     }
@@ -231,7 +249,12 @@ impl Passage for Layouts {
             covariance: Covariance6::isotropic(attitude, position),
         };
         // A draw that noise leaves untriangulable is a frame without points, and counts as one.
-        let cloud = self.placed[layout].draw(draw).unwrap_or_default();
+        let mut cloud = self.placed[layout].draw(draw).unwrap_or_default();
+        if let Some((wrong, other)) = self.mismatch(layout, draw)
+            && !cloud.is_empty()
+        {
+            cloud[wrong] = other;
+        }
         let told = match self.settings.named {
             true => Told::Names((0..cloud.len()).map(|point| self.name_of(layout, point)).collect()),
             false => Told::Nothing,
@@ -275,6 +298,27 @@ mod tests {
                 assert!((camera_from_object * known.at).distance(&seen.position.at) < 1e-9);
             }
         }
+    }
+
+    #[test]
+    fn wrong_matches_come_at_their_rate_and_lie_in_their_shell() {
+        let right = VirtualLayouts { layouts: 5, frames: 2000, ..VirtualLayouts::default() };
+        let some = VirtualLayouts { wrong_match_rate: 0.1, ..right.clone() };
+        let [right, some] = [right, some].map(|settings| settings.open(1, Path::new(".")).unwrap());
+        let cloud = |passage: &dyn Passage, index| match passage.sight(index).unwrap().eyes {
+            Eyes::Points(cloud) => cloud,
+            _ => panic!("points"),
+        };
+        let mut draws = 0;
+        for index in 0..2000 {
+            let (a, b) = (cloud(&*right, index), cloud(&*some, index));
+            let moved: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a.position.at - b.position.at).amax()).collect();
+            let wrong: Vec<&f64> = moved.iter().filter(|off| **off > 0.0).collect();
+            assert!(wrong.len() <= 1 && wrong.iter().all(|off| **off < 0.4), "{wrong:?}");
+            draws += wrong.len();
+        }
+        // 200 are expected, ± 13.4.
+        assert!((150..250).contains(&draws), "{draws}");
     }
 
     /// Layouts stand in a row, and a camera may look along it: what is a kilometre away and has no point in the cloud is
