@@ -8,7 +8,7 @@ use seafix_evaluation::{
     Seen, attitude_error, cramer_rao, nees, nonlinearity, position_error, transfer_bound, transfer_rms,
 };
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform};
-use seafix_referencing::{Observation, Observations, SOLVERS, Solver};
+use seafix_referencing::{Observation, Observations, SOLVERS, Solver, StereoReprojection};
 use seafix_simulation::{Layout, Placed};
 
 /// What the draws of one cell say of one solver.
@@ -29,6 +29,10 @@ pub struct Cell {
     pub m2: f64,
     /// Root mean square of the position's error (m3) over that of its bound.
     pub m3: f64,
+    /// Root mean square of m3 over what [`foreseen`] says of it.
+    pub m3_foreseen: f64,
+    /// Greatest [`bent`] of the layouts: how far the likelihood is from the parabola that the bound takes it for.
+    pub bent: f64,
     /// Root mean square of m2 (m).
     pub m2_rms: f64,
     /// Root mean square of the position's error (m).
@@ -108,10 +112,13 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
     const NINETY_FIVE: f64 = 12.591_587_243_743_977;
     let mut cell = Cell::default();
     let (mut m2, mut m3, mut m2_bound, mut m3_bound, mut counted, mut angle) = (0.0, 0.0, 0.0, 0.0, 0u32, 0.0);
+    let mut m3_foreseen = 0.0;
     for placed in placed {
         let bound = bound(placed, settings);
         cell.layouts += 1;
         cell.attitude_sigma = cell.attitude_sigma.max(bound.attitude_sigma());
+        cell.bent = cell.bent.max(bent(placed, settings.sigma_px, &bound));
+        let curved = foreseen(placed, settings).map_or(f64::NAN, |covariance| covariance.position_sigma());
         let (m2_limit, m3_limit) =
             (transfer_bound(&bound, &placed.object_from_camera, &placed.model), bound.position_sigma());
         let mut mean = Vector3::zeros();
@@ -143,6 +150,7 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
             angle += attitude_error(&pose, truth).powi(2);
             m2_bound += m2_limit * m2_limit;
             m3_bound += m3_limit * m3_limit;
+            m3_foreseen += curved * curved;
             mean += pose.translation() - truth.translation();
             (cell.answered, here) = (cell.answered + 1, here + 1);
             if let Some(error) = error {
@@ -156,6 +164,7 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
     cell.bias /= placed.len() as f64;
     let n = f64::from(cell.answered);
     (cell.m2, cell.m3) = ((m2 / m2_bound).sqrt(), (m3 / m3_bound).sqrt());
+    cell.m3_foreseen = (m3 / m3_foreseen).sqrt();
     (cell.m2_rms, cell.m3_rms, cell.attitude_rms) = ((m2 / n).sqrt(), (m3 / n).sqrt(), (angle / n).sqrt());
     (cell.nees, cell.coverage) = (cell.nees / f64::from(counted), cell.coverage / f64::from(counted + cell.elsewhere));
     cell
@@ -177,14 +186,27 @@ fn observations_of(placed: &Placed, cloud: &[MeasuredPoint], model_sigma: f64) -
 }
 
 /// Whether the Cramér–Rao bound is meaningful for a layout. It is a bound for the valley of the truth alone, and
-/// linear: [`nonlinearity`] is at most a tenth, and no pose in another valley comes so near to the exact pixels
+/// linear: the layout is [`bent`] by a tenth at most, and no pose in another valley comes so near to the exact pixels
 /// (χ² below 64) that noise would prefer it more often than Q(√64 / 2) = 3e-5. Where one does, the likeliest pose
 /// itself is now and then a wrong one, fifty bounds away.
 pub fn is_meaningful(placed: &Placed, sigma_px: f64, bound: &Covariance6<Object, Camera>) -> bool {
+    bent(placed, sigma_px, bound) <= 0.1 && rival(placed, sigma_px) >= 64.0
+}
+
+/// [`nonlinearity`] of a layout's exact pixels within its bound: the relative curvature of Bates and Watts, nought where the
+/// posterior is the bound's Gaussian; infinite where a pose within the bound sees a point no more.
+pub fn bent(placed: &Placed, sigma_px: f64, bound: &Covariance6<Object, Camera>) -> f64 {
     let pixels = Matrix4::identity() * sigma_px.powi(2);
     let seen: Vec<Seen> = placed.model.iter().map(|&at| Seen { at, model_sigma: 0.0, pixels }).collect();
-    let straight = nonlinearity(&placed.rig, &placed.object_from_camera, &seen, bound).is_some_and(|bent| bent <= 0.1);
-    straight && rival(placed, sigma_px) >= 64.0
+    nonlinearity(&placed.rig, &placed.object_from_camera, &seen, bound).unwrap_or(f64::INFINITY)
+}
+
+/// What the likelihood of the exact pixels leaves open about the true pose: the bound where it is straight, and where it is
+/// bent the second moment of its profile. It is a property of the layout, as the bound is. `None` where that has no value.
+pub fn foreseen(placed: &Placed, settings: &Layout) -> Option<Covariance6<Object, Camera>> {
+    let points = observations_of(placed, &placed.exact(settings.sigma_px), settings.model_sigma)?;
+    let data = Observations { points, rig: Some(&placed.rig) };
+    StereoReprojection::default().covariance(&data, &placed.object_from_camera).ok()
 }
 
 /// The least χ² of the exact pixels in any valley but the truth's, from 64 starts turned about the centroid; infinite

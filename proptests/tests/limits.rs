@@ -263,7 +263,8 @@ fn three_points_reach_the_bound_where_it_is_meaningful() {
 
 /// Four compact points whose layout may be any: some are seen as tilted either way, and some of their likelihoods are bent.
 /// What another valley explains as well is told apart at a confidence of 0.999 and counted; over the answers covariances hold
-/// all the same, and where the bound means something ([`is_meaningful`]) it is reached. 10 000 draws a seed and distance.
+/// all the same, m2 reaches the bound, m3 what the bent likelihood of the exact pixels foresees of it ([`monte_carlo::foreseen`](seafix_proptests::monte_carlo::foreseen)), and
+/// the bound itself where that means something ([`is_meaningful`]). 10 000 draws a seed and distance.
 ///
 /// Seen to fail with first-order covariances (coverage .941 of seeds 8 and 11 at 5 m), and where rivals are not asked for (.915,
 /// NEES 110).
@@ -275,6 +276,73 @@ fn four_compact_points_of_any_seed() {
     assert!(missed.is_empty(), "{} missed:\n{}", missed.len(), missed.join("\n"));
 }
 
+/// Three compact points, of which many layouts are tilted either way as well: what another valley explains as well is told, over
+/// the answers covariances hold, and m2 and m3 are within 1.25 of the bound of all layouts. 10 000 draws a distance.
+#[test]
+#[ignore = "6 cells: cargo test --release --workspace --test limits -- --ignored --nocapture three_compact"]
+fn three_compact_points_tell_what_is_as_likely() {
+    let missed: Vec<String> = [1.5, 3.25, 5.0].into_iter().flat_map(|distance| three_compact(distance, 500)).collect();
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// The same at 5 m, short.
+#[test]
+fn three_compact_points_far_away_are_told_apart_or_known() {
+    let missed = three_compact(5.0, 100);
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// What three compact points miss, `draws` of each of twenty layouts.
+#[allow(clippy::print_stdout, reason = "the long form prints its cells")]
+fn three_compact(distance: f64, draws: u64) -> Vec<String> {
+    let rig = cameras()[0].1.clone();
+    let settings = Layout { shape: Shape::Compact, points: 3, distance, sigma_px: 0.5, rig, ..Layout::default() };
+    let all = placed(&settings, 1, 20);
+    let mut missed = Vec::new();
+    for solver in ["p3p-stereo", "stereo-reprojection"] {
+        let c = cell_of(&*build(solver), &settings, &all, &Asked { draws, covariance: true, rivals: Some(CHI2_1) });
+        let line = format!(
+            "{distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere of {}; m3 over \
+             what the likelihood foresees {:.3}; bent by {:.2} at most",
+            c.m2,
+            c.m3,
+            c.nees,
+            c.coverage,
+            c.ambiguous,
+            c.refused,
+            c.elsewhere,
+            draws * 20,
+            c.m3_foreseen,
+            c.bent
+        );
+        println!("{line}");
+        if c.m2 > 1.25 || c.m3 > 1.25 || !is_known(&c, draws * 20) {
+            missed.push(line);
+        }
+    }
+    missed
+}
+
+/// Whether covariances hold over the answers of a cell of which other valleys were told: mean NEES, coverage, and how many were
+/// answered in another one. Of fewer draws than the long forms have, three standard errors more are allowed of the mean of so
+/// many χ²₆, and of a share of 0.95.
+fn is_known(c: &Cell, drawn: u64) -> bool {
+    let wide = allowance(drawn);
+    let consistent = (5.8 - wide..=6.3 + wide).contains(&c.nees);
+    let covers = (0.9428 - 0.06 * wide..=0.9571 + 0.06 * wide).contains(&c.coverage);
+    // Half of one in a thousand, and three standard errors.
+    let rare = f64::from(c.elsewhere) <= 0.0005 * drawn as f64 + 3.0 * (0.0005 * drawn as f64).sqrt();
+    consistent && covers && rare
+}
+
+/// By how many more three standard errors of a mean NEES of so few draws reach than those of 10 000.
+fn allowance(drawn: u64) -> f64 {
+    (3.0 * ((12.0_f64 / drawn as f64).sqrt() - (12.0_f64 / 10_000.0).sqrt())).max(0.0)
+}
+
+/// χ²₁ at 99.9 %.
+const CHI2_1: f64 = 10.827_566_170_662_733;
+
 /// The same of the two seeds with the worst layouts, short.
 #[test]
 fn four_compact_points_of_bad_layouts_are_told_apart_or_known() {
@@ -285,8 +353,6 @@ fn four_compact_points_of_bad_layouts_are_told_apart_or_known() {
 /// What four compact points of this seed miss, `draws` of each of twenty layouts.
 #[allow(clippy::print_stdout, reason = "the long form prints its cells")]
 fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
-    /// χ²₁ at 99.9 %.
-    const MOST: f64 = 10.827_566_170_662_733;
     let rig = cameras()[0].1.clone();
     let settings = Layout { shape: Shape::Compact, points: 4, distance, sigma_px: 0.5, rig, ..Layout::default() };
     let all = placed(&settings, seed, 20);
@@ -294,13 +360,14 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
     meant.retain(|placed| is_meaningful(placed, settings.sigma_px, &bound(placed, &settings)));
     let mut missed = Vec::new();
     for solver in ["mahalanobis", "stereo-reprojection"] {
-        let asked = Asked { draws, covariance: true, rivals: Some(MOST) };
+        let asked = Asked { draws, covariance: true, rivals: Some(CHI2_1) };
         let c = cell_of(&*build(solver), &settings, &all, &asked);
         let m = cell_of(&*build(solver), &settings, &meant, &asked);
         let drawn = draws * 20;
         let line = format!(
             "seed {seed} {distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere \
-             of {drawn}; of {} layouts m2 {:.3} m3 {:.3}",
+             of {drawn}; m3 over what the likelihood foresees {:.3}; bent by {:.2} at most; of {} layouts where the bound \
+             means something (bent by {:.2} at most) m2 {:.3} m3 {:.3}",
             c.m2,
             c.m3,
             c.nees,
@@ -308,19 +375,17 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
             c.ambiguous,
             c.refused,
             c.elsewhere,
+            c.m3_foreseen,
+            c.bent,
             meant.len(),
+            m.bent,
             m.m2,
             m.m3
         );
         println!("{line}");
-        // Three standard errors of the mean of so many χ²₆, and of a share of 0.95, more than the long form allows.
-        let wide =
-            if draws < 500 { 3.0 * ((12.0_f64 / drawn as f64).sqrt() - (12.0_f64 / 10_000.0).sqrt()) } else { 0.0 };
-        let consistent = (5.8 - wide..=6.3 + wide).contains(&c.nees);
-        let covers = (0.9428 - 0.06 * wide..=0.9571 + 0.06 * wide).contains(&c.coverage);
-        // Half of one in a thousand, and three standard errors.
-        let rare = f64::from(c.elsewhere) <= 0.0005 * drawn as f64 + 3.0 * (0.0005 * drawn as f64).sqrt();
-        if m.m2 > 1.05 + wide || m.m3 > 1.05 + wide || !consistent || !covers || !rare {
+        let wide = allowance(drawn);
+        let reached = [m.m2, m.m3, c.m2, c.m3_foreseen].iter().all(|ratio| *ratio <= 1.05 + wide);
+        if !reached || !is_known(&c, drawn) {
             missed.push(line);
         }
     }
@@ -408,17 +473,18 @@ fn model_error_makes_weights_no_worse_than_none() {
 
 /// Figure 3, 10 000 draws a cell.
 #[test]
-#[ignore = "66 cells, minutes: cargo test --release --workspace --test limits -- --ignored --nocapture model_error"]
+#[ignore = "36 cells, minutes: cargo test --release --workspace --test limits -- --ignored --nocapture model_error"]
 fn model_error_in_every_cell() {
-    println!("nearest to worse: {:.1} standard errors", weights_are_no_worse(10_000));
+    let (cells, worst) = weights_are_no_worse(10_000);
+    println!("{cells} cells, two solvers each; nearest to worse: {worst:.1} standard errors");
 }
 
 /// Figure 3: with 1, 3, 5 mm model error drawn afresh each draw, no solver that weighs by covariance errs more than
-/// Kabsch on the same draws: the mean of the paired differences of squared m2 and m3 is not above nought at 99.9 %. The
-/// greatest of them, in standard errors.
-fn weights_are_no_worse(draws: u64) -> f64 {
+/// Kabsch on the same draws: the mean of the paired differences of squared m2 and m3 is not above nought at 99.9 %. How many
+/// cells there are, and the greatest of the differences in standard errors.
+fn weights_are_no_worse(draws: u64) -> (usize, f64) {
     let kabsch = build("kabsch");
-    let mut worst: f64 = f64::NEG_INFINITY;
+    let (mut all, mut worst) = (0, f64::NEG_INFINITY);
     for (camera, rig) in cameras() {
         for shape in [Shape::Spread, Shape::Compact] {
             for distance in [1.5, 3.25, 5.0] {
@@ -427,6 +493,7 @@ fn weights_are_no_worse(draws: u64) -> f64 {
                     if settings.place(1).is_err() {
                         continue;
                     }
+                    all += 1;
                     for name in ["mahalanobis", "stereo-reprojection"] {
                         let z = paired(&*build(name), &*kabsch, &settings, 20, draws);
                         worst = z.iter().fold(worst, |worst, &z| worst.max(z));
@@ -437,5 +504,5 @@ fn weights_are_no_worse(draws: u64) -> f64 {
             }
         }
     }
-    worst
+    (all, worst)
 }
