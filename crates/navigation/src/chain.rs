@@ -2,7 +2,10 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 
-use crate::{Considered, Lasting, Local, lasting::Shares};
+use crate::{
+    Considered, Local,
+    lasting::{Shares, carried},
+};
 
 /// Where the camera is relative to an object, and how well that is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,23 +46,15 @@ impl Standing {
     /// the equation multiplies by the identity; this is what its text says.)
     ///
     /// The covariance is carried along and that of the step added, Σ' = A Σ Aᵀ + Σ_step, A = Ad(later_from_earlier), the
-    /// two taken as independent but for errors of the odometry that [last](Lasting).
+    /// two taken as independent but for errors of the odometry that [last](crate::Lasting).
     #[must_use]
     pub fn after(&self, step: &Local) -> Self {
-        let adjoint = step.motion.inverse().adjoint();
-        let mut covariance = adjoint * self.covariance.matrix * adjoint.transpose() + step.covariance.matrix;
-        let mut shares = Shares::zeros();
-        if let Some(Lasting { by, keep, with }) = &step.lasting {
-            let carried = adjoint * self.shares;
-            let common = carried * by.transpose();
-            covariance += common + common.transpose();
-            shares = Shares::from_fn(|row, k| carried[(row, k)] * keep[k]) + with;
-        }
+        let (covariance, shares) = carried(&self.covariance.matrix, &self.shares, step);
         Self {
             object_from_camera: (self.object_from_camera * step.motion).renormalized(),
             covariance: Covariance6::new(covariance),
             shares,
-            considered: self.considered.carried(&adjoint),
+            considered: self.considered.carried(&step.motion.inverse().adjoint()),
         }
     }
 

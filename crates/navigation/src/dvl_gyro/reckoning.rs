@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     Device, Journey, Lasting, Local, Lost, NotAfter, Outcome, Reading, Reckoning, Segment, StereoPair, Waypoint,
-    lasting::{LASTING, Shares},
+    lasting::{LASTING, Shares, Spread},
     odometry::Stamps,
 };
 
@@ -126,7 +126,8 @@ impl<'a> DeadReckoning<'a> {
         let across = motion.inverse().adjoint();
         let by = here.by - across * last.by;
         let (scale, bias) = (self.settings.scale.powi(2), (self.settings.instability.to_radians() / 3600.0).powi(2));
-        let lasting = Matrix4::from_diagonal(&Vector4::new(scale, bias, bias, bias));
+        let independent = Vector4::new(scale, bias, bias, bias);
+        let lasting = Matrix4::from_diagonal(&independent);
         let fades = libm::exp(-seconds(last.stamp_ns, here.stamp_ns) / self.settings.tau);
         let own: Matrix6<f64> = here.settled + here.held + across * last.held * across.transpose();
 
@@ -144,7 +145,13 @@ impl<'a> DeadReckoning<'a> {
         Local {
             motion: camera_from_body * motion * self.body_from_camera,
             covariance: Covariance6::new(covariance),
-            lasting: Some(Lasting { by: to_camera * shares, keep, with: to_camera * with }),
+            lasting: Some(Lasting {
+                by: to_camera * shares,
+                keep,
+                with: to_camera * with,
+                before: Spread { independent, held: last.held },
+                after: Spread { independent, held: here.held },
+            }),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use nalgebra::SVector;
+use nalgebra::{Matrix6, SVector, Vector4};
 use seafix_geometry::{Camera, Covariance6, StereoRig, Transform, World};
 use seafix_vision::{FrontEnd, Look, Threads};
 
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     Journey, Lasting, Local, Lost, NotAfter, Outcome, Reckoning, Segment, StereoPair, Waypoint,
-    lasting::{LASTING, Shares},
+    lasting::{LASTING, Shares, Spread},
     odometry::Stamps,
     times::Times,
     unusable::RawImages,
@@ -176,16 +176,19 @@ impl<'a> IcpReckoning<'a> {
         let (mut by, mut with) = (Shares::zeros(), Shares::zeros());
         by.fixed_view_mut::<6, 6>(0, 4).copy_from(&-across);
         with.fixed_view_mut::<6, 6>(0, 4).copy_from(&laid.covariance.matrix);
+        let held = |held| Spread { independent: Vector4::zeros(), held };
+        let mut after = held(laid.covariance.matrix);
         let share = laid.partners as f64 / key.len().min(ground.len()).max(1) as f64;
         let renewed = share < self.settings.keyframe_share;
         if renewed {
             // The next step begins at a key frame of its own and undoes nothing.
             with = Shares::zeros();
+            after = held(Matrix6::zeros());
         }
         let local = Local {
             motion,
             covariance: Covariance6::new(laid.covariance.matrix + across * before * across.transpose()),
-            lasting: Some(Lasting { by, keep: SVector::<f64, LASTING>::zeros(), with }),
+            lasting: Some(Lasting { by, keep: SVector::<f64, LASTING>::zeros(), with, before: held(before), after }),
         };
         let waypoint = Waypoint { stamp_ns, world_from_camera, local: Some(local) };
         self.segments.last_mut().expect("a segment was begun").poses.push(waypoint);

@@ -8,14 +8,17 @@
 use std::path::Path;
 
 use base64::{Engine, engine::general_purpose::STANDARD};
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::{Matrix3, Matrix6, SVector, Vector4};
 use seafix_component::Fault;
 use seafix_geometry::{Camera, Covariance6, Frame, Object, Pixel, Point, Transform, UncertainPoint, World};
 use seafix_vision::{Descriptors, Keypoint, Table};
 use serde::{Deserialize, Serialize};
 
-use super::{Fix, KeyFrame, Leg, Network, Recognition, Rough, Station};
-use crate::{Local, Navigated, Place, Standing};
+use super::{Fix, KeyFrame, Leg, Network, Recognition, Rough, Station, drift::Drift};
+use crate::{
+    Lasting, Local, Navigated, Place, Standing,
+    lasting::{LASTING, Shares, Spread},
+};
 
 const FORMAT: &str = "seafix-network/1";
 
@@ -86,6 +89,55 @@ struct RawLeg {
     to: usize,
     motion: Rows4,
     covariance: Rows6,
+    /// Absent where it errs independently of all others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    lasting: Option<RawLasting>,
+}
+
+/// Numbers of `Lasting`, under its names.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawLasting {
+    by: [[f64; LASTING]; 6],
+    keep: [f64; LASTING],
+    with: [[f64; LASTING]; 6],
+    before: RawSpread,
+    after: RawSpread,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSpread {
+    independent: [f64; 4],
+    held: Rows6,
+}
+
+impl RawLasting {
+    fn of(lasting: &Lasting) -> Self {
+        let rows = |shares: &Shares| std::array::from_fn(|row| std::array::from_fn(|k| shares[(row, k)]));
+        let spread = |spread: &Spread| RawSpread { independent: spread.independent.into(), held: rows6(&spread.held) };
+        Self {
+            by: rows(&lasting.by),
+            keep: lasting.keep.into(),
+            with: rows(&lasting.with),
+            before: spread(&lasting.before),
+            after: spread(&lasting.after),
+        }
+    }
+
+    fn cooked(&self) -> Result<Lasting, Wrong> {
+        let shares = |rows: &[[f64; LASTING]; 6]| Shares::from_fn(|row, k| rows[row][k]);
+        let spread = |raw: &RawSpread| {
+            let independent = Vector4::from(raw.independent);
+            let wrong = || ("no variances", format!("{:?}", raw.independent), "give numbers of 0 or more");
+            match independent.iter().all(|x| x.is_finite() && *x >= 0.0) {
+                true => Ok(Spread { independent, held: finite(&raw.held)? }),
+                false => Err(wrong()),
+            }
+        };
+        let (by, keep, with) = (shares(&self.by), SVector::from(self.keep), shares(&self.with));
+        Ok(Lasting { by, keep, with, before: spread(&self.before)?, after: spread(&self.after)? })
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -130,6 +182,7 @@ impl Network {
             to: leg.to,
             motion: leg.motion.motion.rows(),
             covariance: rows6(&leg.motion.covariance.matrix),
+            lasting: leg.motion.lasting.as_ref().map(RawLasting::of),
         };
         lines.extend(self.legs.iter().map(|one| Line::Leg(leg(one))));
         lines.extend(self.fixes.iter().map(|fix| {
@@ -263,7 +316,15 @@ impl Network {
             return Err(("a motion from a station to itself", from.to_string(), "name two stations"));
         }
         let covariance = Covariance6::new(covariance(&raw.covariance)?);
-        Ok(Leg { from, to, motion: Local::new(pose(&raw.motion)?, covariance) })
+        let lasting = raw.lasting.as_ref().map(RawLasting::cooked).transpose()?;
+        let motion = Local { motion: pose(&raw.motion)?, covariance, lasting };
+        if let Some(lasting) = &lasting
+            && Drift::of(&motion, lasting).is_err()
+        {
+            let value = format!("from station {from} to {to}");
+            return Err(("errors that last do not fit the covariance of their motion", value, "take the whole file"));
+        }
+        Ok(Leg { from, to, motion })
     }
 }
 
@@ -420,13 +481,25 @@ mod tests {
         network.lay(station(5, Some(keyframe)));
         network.lay(station(9, None));
         let motion = Local::new(pose(0.1 + 0.2).relabel(), Covariance6::isotropic(0.01, 0.02));
-        network.legs.push(Leg { from: 0, to: 1, motion });
+        network.legs.push(Leg { from: 0, to: 1, motion: Local { lasting: Some(lasting()), ..motion } });
         network.loops.push(Leg { from: 0, to: 1, motion });
         let standing = Standing::new(pose(9.0).relabel(), Covariance6::isotropic(1e-3, 2e-3));
         network.fixes.push(Fix { station: 1, navigated: Navigated { object: 0, standing } });
         let covariance = Covariance6::isotropic(0.1, 0.5);
         network.roughs.push(Rough { station: 0, world_from_camera: pose(4.1), covariance });
         network
+    }
+
+    /// A scale that makes a tenth of the motion's variance, and the rest of the numbers as a reading that is held has them.
+    fn lasting() -> Lasting {
+        let (mut by, mut with) = (Shares::zeros(), Shares::zeros());
+        (by[(3, 0)], with[(3, 0)]) = (0.1 + 0.2, (0.1 + 0.2) * 1e-6);
+        let mut keep = SVector::zeros();
+        keep[0] = 1.0;
+        let spread = |held| Spread { independent: Vector4::new(1e-6, 0.0, 0.0, 0.0), held };
+        let (before, after) = (spread(Matrix6::zeros()), spread(Matrix6::identity() * 1e-6));
+        with.fixed_view_mut::<6, 6>(0, 4).copy_from(&after.held);
+        Lasting { by, keep, with, before, after }
     }
 
     #[test]
@@ -436,6 +509,7 @@ mod tests {
         let again = Network::read(Path::new("n.jsonl"), &text, &recognition).unwrap();
         assert_eq!(again.stations[0].keyframe, network().stations[0].keyframe, "to the last bit");
         assert_eq!((again.stations.len(), again.legs.len(), again.loops.len(), again.fixes.len()), (2, 1, 1, 1));
+        assert_eq!(again.legs[0].motion.lasting, Some(lasting()), "to the last bit");
         let off = again.stations[0].world_from_camera.error_to(&network().stations[0].world_from_camera);
         assert!(off.norm() < 1e-12);
         assert_eq!(network().text(&recognition), text);
@@ -463,6 +537,8 @@ mod tests {
         assert!(with("\"sigma\":0.1", "\"sigma\":-0.1").contains("no standard deviation in n.jsonl:3: -0.1"));
         assert!(with("\"count\":2", "\"count\":3").contains("does not hold what it says in n.jsonl:3"));
         assert!(with("\"stamp_ns\"", "\"stamp\"").contains("unknown field"));
+        assert!(with("[1e-6,0.0", "[-1e-6,0.0").contains("no variances in n.jsonl:5: [-1e-6"));
+        assert!(with("[1e-6,0.0", "[1.0,0.0").contains("do not fit the covariance of their motion in n.jsonl:5: from"));
         let other =
             Recognition { points: 100, descriptor: seafix_component::Choice::named("orb"), ..recognition.clone() };
         let unlike = Network::read(Path::new("n.jsonl"), &text, &other).unwrap_err().to_string();

@@ -9,7 +9,11 @@ use nalgebra::{Matrix6, SMatrix, Vector6};
 use seafix_geometry::{Camera, Covariance6, Transform, World, right_jacobian_inverse};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::Local;
+use super::drift::{self, Drift, Numbers, SIDES, Square, Units};
+use crate::{
+    Local,
+    lasting::{LASTING, Shares, Spread},
+};
 
 /// A pose of the graph. Objects stand in it as cameras do; their frames are renamed where they come in.
 type Pose = Transform<World, Camera>;
@@ -18,6 +22,9 @@ type Pose = Transform<World, Camera>;
 ///
 /// - `between`: r = log(Z⁻¹ A⁻¹ B), Z the measured motion from A to B;
 /// - `prior`: r = log(Z⁻¹ A), Z the pose itself as something else measured it.
+///
+/// Errors that [last](crate::Lasting) are nodes too, and a motion that has them is a factor of four nodes, the poses and the
+/// errors at both ends of it (`drifting`).
 ///
 /// The estimate has the least Σ ρ(rᵀ Σ⁻¹ r). ρ is the identity, and for factors that may be wrong that of a switch:
 /// ρ(x) = s² x + (1 − s)² Φ with s = min(1, 2Φ/(Φ + x)), which gives up what contradicts everything else. Φ is the 99 %
@@ -32,6 +39,7 @@ type Pose = Transform<World, Camera>;
 #[derive(Debug, Clone, Default)]
 pub struct Graph {
     nodes: Vec<Node>,
+    lasting: Vec<Lasts>,
     factors: Vec<Factor>,
 }
 
@@ -41,14 +49,32 @@ struct Node {
     held: bool,
 }
 
+/// Errors that last, as they are at one time.
+#[derive(Debug, Clone)]
+struct Lasts {
+    numbers: Numbers,
+    units: Units,
+    /// What is known of them before anything is measured.
+    prior: Option<Square>,
+}
+
 #[derive(Debug, Clone)]
 struct Factor {
     /// The node it begins at; absent for a prior.
     from: Option<usize>,
     to: usize,
     measured: Pose,
-    information: Matrix6<f64>,
+    weight: Weight,
     doubtful: bool,
+}
+
+/// How a factor counts.
+#[derive(Debug, Clone)]
+enum Weight {
+    /// By the information of its own error.
+    Own(Matrix6<f64>),
+    /// Together with the errors that last at its beginning and at its end.
+    Drifting(Box<Drift>, [usize; 2]),
 }
 
 /// A covariance that is none.
@@ -91,7 +117,8 @@ impl Graph {
     /// [`NoCovariance`].
     pub fn prior(&mut self, node: usize, at: Pose, covariance: &Matrix6<f64>) -> Result<usize, NoCovariance> {
         let information = covariance.cholesky().ok_or(NoCovariance)?.inverse();
-        self.factors.push(Factor { from: None, to: node, measured: at, information, doubtful: false });
+        let weight = Weight::Own(information);
+        self.factors.push(Factor { from: None, to: node, measured: at, weight, doubtful: false });
         Ok(self.factors.len() - 1)
     }
 
@@ -103,8 +130,40 @@ impl Graph {
     pub fn between(&mut self, from: usize, to: usize, motion: &Local, doubtful: bool) -> Result<usize, NoCovariance> {
         let information = motion.covariance.matrix.cholesky().ok_or(NoCovariance)?.inverse();
         let measured = motion.motion.relabel();
-        self.factors.push(Factor { from: Some(from), to, measured, information, doubtful });
+        self.factors.push(Factor { from: Some(from), to, measured, weight: Weight::Own(information), doubtful });
         Ok(self.factors.len() - 1)
+    }
+
+    /// Errors that last, where a way begins: a node of them; its number.
+    ///
+    /// # Errors
+    /// [`NoCovariance`].
+    pub(super) fn begin_lasting(&mut self, spread: &Spread) -> Result<usize, NoCovariance> {
+        let (units, prior) = drift::prior(spread)?;
+        self.lasting.push(Lasts { numbers: Numbers::zeros(), units, prior: Some(prior) });
+        Ok(self.lasting.len() - 1)
+    }
+
+    /// What measured the motion from one node to another, with errors that last through it, those at its beginning the node
+    /// `before`: the node of those at its end. A motion without such errors is a factor of its own, and they end with it.
+    ///
+    /// # Errors
+    /// [`NoCovariance`].
+    pub(super) fn drifting(
+        &mut self,
+        from: usize,
+        to: usize,
+        motion: &Local,
+        before: Option<usize>,
+    ) -> Result<Option<usize>, NoCovariance> {
+        let Some(lasting) = &motion.lasting else { return self.between(from, to, motion, false).map(|_| None) };
+        let before = before.map_or_else(|| self.begin_lasting(&lasting.before), Ok)?;
+        let (drift, units) = Drift::of(motion, lasting)?;
+        self.lasting.push(Lasts { numbers: Numbers::zeros(), units, prior: None });
+        let after = self.lasting.len() - 1;
+        let (measured, weight) = (motion.motion.relabel(), Weight::Drifting(Box::new(drift), [before, after]));
+        self.factors.push(Factor { from: Some(from), to, measured, weight, doubtful: false });
+        Ok(Some(after))
     }
 
     /// The most likely poses, by Levenberg's and Marquardt's steps on the sparse normal equations. A part of the graph
@@ -157,15 +216,18 @@ impl Graph {
                 continue;
             };
             let step = factor.solve(&pull);
-            let size: f64 = (0..6 * free).map(|k| step[(k, 0)] * pull[(k, 0)]).sum();
+            let size: f64 = (0..self.unknowns(free)).map(|k| step[(k, 0)] * pull[(k, 0)]).sum();
             if !size.is_finite() {
                 return None;
             }
-            let before: Vec<Node> = self.nodes.clone();
+            let before = (self.nodes.clone(), self.lasting.clone());
             for (node, place) in self.nodes.iter_mut().zip(places) {
                 let Some(place) = place else { continue };
                 let xi = Vector6::from_fn(|row, _| step[(6 * place + row, 0)]);
                 node.pose = node.pose.perturbed(&xi).renormalized();
+            }
+            for (index, lasts) in self.lasting.iter_mut().enumerate() {
+                lasts.numbers += Numbers::from_fn(|row, _| step[(6 * free + LASTING * index + row, 0)]);
             }
             let next = self.cost(wide);
             if size < last {
@@ -183,7 +245,7 @@ impl Graph {
                     break;
                 }
             } else {
-                self.nodes = before;
+                (self.nodes, self.lasting) = before;
                 if size < 1e-12 {
                     break;
                 }
@@ -238,7 +300,17 @@ impl Graph {
     /// rᵀ Σ⁻¹ r.
     fn disagreement(&self, factor: &Factor) -> f64 {
         let r = self.residual(factor);
-        r.dot(&(factor.information * r))
+        match &factor.weight {
+            Weight::Own(information) => r.dot(&(information * r)),
+            Weight::Drifting(drift, [before, after]) => {
+                drift.disagreement(&r, &self.lasting[*before].numbers, &self.lasting[*after].numbers)
+            }
+        }
+    }
+
+    /// How many numbers are sought where so many poses move.
+    fn unknowns(&self, free: usize) -> usize {
+        6 * free + LASTING * self.lasting.len()
     }
 
     fn cost(&self, wide: f64) -> f64 {
@@ -247,7 +319,8 @@ impl Graph {
             let s = factor.switch(chi, wide);
             if s < 1.0 { s * s * chi + (1.0 - s) * (1.0 - s) * wide } else { chi }
         });
-        each.sum()
+        let known = self.lasting.iter().filter_map(|lasts| Some(lasts.numbers.dot(&(lasts.prior? * lasts.numbers))));
+        each.chain(known).sum()
     }
 
     /// The normal equations for all that move: the lower half of the matrix, and the right side.
@@ -258,14 +331,13 @@ impl Graph {
         damping: f64,
         wide: f64,
     ) -> Option<(SparseColMat<usize, f64>, Mat<f64>)> {
-        let mut pull = Mat::zeros(6 * free, 1);
+        let unknowns = self.unknowns(free);
+        let mut pull = Mat::zeros(unknowns, 1);
         let mut own = vec![Matrix6::zeros(); free];
+        let mut lasting = vec![Square::zeros(); self.lasting.len()];
         let mut entries = Vec::new();
         for factor in &self.factors {
             let r = self.residual(factor);
-            let chi = r.dot(&(factor.information * r));
-            let s = factor.switch(chi, wide);
-            let weight = factor.information * (s * s);
             let slope = right_jacobian_inverse(&r);
             // Z⁻¹ A⁻¹ B under A Exp(α), B Exp(β): r + J_r(r)⁻¹ (β − Ad(B⁻¹ A) α).
             let mut sides: [Option<(usize, Matrix6<f64>)>; 2] = [None, None];
@@ -274,6 +346,35 @@ impl Graph {
                 let to_from_from = self.nodes[factor.to].pose.inverse() * self.nodes[from].pose;
                 sides[1] = places[from].map(|place| (place, -slope * to_from_from.adjoint()));
             }
+            let information = match &factor.weight {
+                Weight::Own(information) => information,
+                Weight::Drifting(drift, [before, after]) => {
+                    let zero = Matrix6::zeros();
+                    let by = [1, 0].map(|side| sides[side].as_ref().map_or(&zero, |(_, by)| by));
+                    let [n, m] = [*before, *after].map(|lasts| &self.lasting[lasts].numbers);
+                    let (square, gradient) = drift.equations(&r, by, n, m);
+                    let first = |lasts: &usize| 6 * free + LASTING * lasts;
+                    let place = |side: usize| sides[side].as_ref().map(|(place, _)| 6 * place);
+                    let parts = [
+                        (0, 6, place(1)),
+                        (6, 6, place(0)),
+                        (12, LASTING, Some(first(before))),
+                        (12 + LASTING, LASTING, Some(first(after))),
+                    ];
+                    scatter(&parts, &square, &gradient, &mut entries, &mut pull);
+                    for (part, start) in [(1, 0), (0, 6)] {
+                        if let Some((place, _)) = sides[part] {
+                            own[place] += square.fixed_view::<6, 6>(start, start);
+                        }
+                    }
+                    lasting[*before] += square.fixed_view::<LASTING, LASTING>(12, 12);
+                    lasting[*after] += square.fixed_view::<LASTING, LASTING>(12 + LASTING, 12 + LASTING);
+                    continue;
+                }
+            };
+            let chi = r.dot(&(information * r));
+            let s = factor.switch(chi, wide);
+            let weight = information * (s * s);
             for (place, by) in sides.iter().flatten() {
                 own[*place] += by.transpose() * weight * by;
                 let gradient = by.transpose() * (weight * r);
@@ -289,7 +390,18 @@ impl Graph {
             (0..6).for_each(|k| block[(k, k)] *= 1.0 + damping);
             push(&mut entries, place, place, block);
         }
-        Some((SparseColMat::try_new_from_triplets(6 * free, 6 * free, &entries).ok()?, pull))
+        for (index, (lasts, square)) in self.lasting.iter().zip(&mut lasting).enumerate() {
+            let first = 6 * free + LASTING * index;
+            if let Some(prior) = &lasts.prior {
+                *square += prior;
+                let gradient = prior * lasts.numbers;
+                (0..LASTING).for_each(|row| pull[(first + row, 0)] -= gradient[row]);
+            }
+            (0..LASTING).for_each(|k| square[(k, k)] *= 1.0 + damping);
+            let lower = (0..LASTING).flat_map(|j| (j..LASTING).map(move |i| (i, j)));
+            entries.extend(lower.map(|(i, j)| Triplet::new(first + i, first + j, square[(i, j)])));
+        }
+        Some((SparseColMat::try_new_from_triplets(unknowns, unknowns, &entries).ok()?, pull))
     }
 }
 
@@ -305,6 +417,26 @@ fn push(entries: &mut Vec<Triplet<usize, usize, f64>>, row: usize, column: usize
         let first = if row == column { j } else { 0 };
         for i in first..6 {
             entries.push(Triplet::new(6 * row + i, 6 * column + j, block[(i, j)]));
+        }
+    }
+}
+
+/// Adds the gradient of a factor with these parts, (its first column, how many, the first of its unknowns), and the blocks
+/// of its square between two of them, to the lower half; those on the diagonal are left out.
+fn scatter(
+    parts: &[(usize, usize, Option<usize>)],
+    square: &SMatrix<f64, SIDES, SIDES>,
+    gradient: &nalgebra::SVector<f64, SIDES>,
+    entries: &mut Vec<Triplet<usize, usize, f64>>,
+    pull: &mut Mat<f64>,
+) {
+    for (own, count, first) in parts {
+        let Some(first) = first else { continue };
+        (0..*count).for_each(|k| pull[(first + k, 0)] -= gradient[own + k]);
+        for (other, others, low) in parts {
+            let Some(low) = low.filter(|low| low < first) else { continue };
+            let all = (0..*others).flat_map(|j| (0..*count).map(move |i| (i, j)));
+            entries.extend(all.map(|(i, j)| Triplet::new(first + i, low + j, square[(own + i, other + j)])));
         }
     }
 }
@@ -327,7 +459,7 @@ impl Solved {
 
     /// How well a node's pose is known, all else estimated too; nothing is as exact as what is held.
     pub fn covariance(&self, node: usize) -> Covariance6<World, Camera> {
-        Covariance6::new(self.joint(&[node]).fixed_view::<6, 6>(0, 0).into_owned())
+        Covariance6::new(self.joint(&[self.block(node)]).fixed_view::<6, 6>(0, 0).into_owned())
     }
 
     /// The motion from one node to another as the graph knows it, with what both errors have in common taken into
@@ -341,12 +473,24 @@ impl Solved {
         if from == to {
             return Some(Local::new(motion, Covariance6::new(Matrix6::zeros())));
         }
-        let joint = self.joint(&[from, to]);
-        let mut by = SMatrix::<f64, 6, 12>::zeros();
-        by.fixed_view_mut::<6, 6>(0, 0).copy_from(&-motion.inverse().adjoint());
-        by.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
+        let joint = self.joint(&[self.block(from), self.block(to)]);
+        let by = between(&motion);
         let joint = joint.fixed_view::<12, 12>(0, 0).into_owned();
         Some(Local::new(motion, Covariance6::new(by * joint * by.transpose())))
+    }
+
+    /// What the error of the motion from one node to another shares with errors that last, E\[ξ mᵀ\].
+    pub(super) fn shares(&self, from: usize, to: usize, lasting: usize) -> Shares {
+        let first = 6 * self.free + LASTING * lasting;
+        let joint = self.joint(&[self.block(from), self.block(to), (Some(first), LASTING)]);
+        let motion = self.pose(from).inverse() * *self.pose(to);
+        let in_units: Shares = between(&motion) * joint.fixed_view::<12, LASTING>(0, 12);
+        self.graph.lasting[lasting].units.own(&in_units)
+    }
+
+    /// The first unknown of a node, where it moves, and how many it has.
+    fn block(&self, node: usize) -> (Option<usize>, usize) {
+        (self.places[node].map(|place| 6 * place), 6)
     }
 
     /// rᵀ Σ⁻¹ r of a factor, six degrees of freedom.
@@ -360,26 +504,34 @@ impl Solved {
         s * s < 0.5
     }
 
-    /// The joint covariance of some nodes, six rows each.
-    fn joint(&self, nodes: &[usize]) -> nalgebra::DMatrix<f64> {
-        let mut all = nalgebra::DMatrix::zeros(6 * nodes.len(), 6 * nodes.len());
+    /// The joint covariance of some blocks of unknowns, one below the other.
+    fn joint(&self, blocks: &[(Option<usize>, usize)]) -> nalgebra::DMatrix<f64> {
+        let size = blocks.iter().map(|(_, count)| count).sum();
+        let mut all = nalgebra::DMatrix::zeros(size, size);
         let Some(factor) = &self.factor else { return all };
-        let free: Vec<(usize, usize)> =
-            nodes.iter().enumerate().filter_map(|(k, node)| Some((k, self.places[*node]?))).collect();
-        let mut units = Mat::<f64>::zeros(6 * self.free, 6 * free.len());
-        for (column, (_, place)) in free.iter().enumerate() {
-            (0..6).for_each(|i| units[(6 * place + i, 6 * column + i)] = 1.0);
+        // (row of the answer, unknown).
+        let mut rows = Vec::with_capacity(size);
+        let mut row = 0;
+        for (first, count) in blocks {
+            rows.extend((0..*count).filter_map(|k| Some((row + k, (*first)? + k))));
+            row += count;
         }
+        let mut units = Mat::<f64>::zeros(self.graph.unknowns(self.free), rows.len());
+        rows.iter().enumerate().for_each(|(column, (_, unknown))| units[(*unknown, column)] = 1.0);
         let columns = factor.solve(&units);
-        for (column, (b, _)) in free.iter().enumerate() {
-            for (a, place) in &free {
-                for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
-                    all[(6 * a + i, 6 * b + j)] = columns[(6 * place + i, 6 * column + j)];
-                }
-            }
+        for (column, (b, _)) in rows.iter().enumerate() {
+            rows.iter().for_each(|(a, unknown)| all[(*a, *b)] = columns[(*unknown, column)]);
         }
         all
     }
+}
+
+/// ξ = β − Ad(B⁻¹ A) α of the motion from A to B.
+fn between(motion: &Transform<Camera, Camera>) -> SMatrix<f64, 6, 12> {
+    let mut by = SMatrix::<f64, 6, 12>::zeros();
+    by.fixed_view_mut::<6, 6>(0, 0).copy_from(&-motion.inverse().adjoint());
+    by.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
+    by
 }
 
 impl Graph {

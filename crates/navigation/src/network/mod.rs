@@ -1,5 +1,6 @@
 //! Reference points where no object is: key frames laid on the way, found again, and joined in a graph.
 
+mod drift;
 mod file;
 mod footprint;
 mod graph;
@@ -8,6 +9,8 @@ mod recognise;
 #[cfg(test)]
 mod tests;
 mod traverse;
+
+use std::collections::BTreeMap;
 
 use nalgebra::Matrix6;
 use seafix_geometry::{Camera, Covariance6, Transform, World};
@@ -40,7 +43,8 @@ pub struct Leg {
     pub from: usize,
     /// The station where it ends.
     pub to: usize,
-    /// `from_from_to`.
+    /// `from_from_to`. Legs that follow each other share errors that [last](crate::Lasting): the Doppler log's scale, the
+    /// gyro's bias.
     pub motion: Local,
 }
 
@@ -93,6 +97,8 @@ pub struct Closed {
     /// The factor of each loop.
     loops: Vec<usize>,
     fixes: Vec<usize>,
+    /// Of a station, the node of errors that last.
+    lasting: BTreeMap<usize, usize>,
 }
 
 impl Network {
@@ -110,7 +116,10 @@ impl Network {
     /// The most likely poses of all stations and objects, every measurement taken into account. Fixes and loops may be
     /// wrong: those that contradict the rest are given up.
     ///
-    /// An object without a survey covariance stands exactly. `None` where the equations have no solution.
+    /// An object without a survey covariance stands exactly. Errors of the odometry that last are estimated along with the
+    /// poses, from leg to leg as long as one begins where the other ends; a new chain knows nothing of them.
+    ///
+    /// `None` where the equations have no solution.
     pub fn solve(&self) -> Option<Closed> {
         let mut graph = Graph::default();
         for (_, place) in &self.objects {
@@ -124,8 +133,12 @@ impl Network {
         for station in &self.stations {
             graph.node(station.world_from_camera);
         }
+        let mut lasting = BTreeMap::new();
         for leg in &self.legs {
-            graph.between(first + leg.from, first + leg.to, &leg.motion, false).ok()?;
+            let before = lasting.get(&leg.from).copied();
+            if let Some(after) = graph.drifting(first + leg.from, first + leg.to, &leg.motion, before).ok()? {
+                lasting.insert(leg.to, after);
+            }
         }
         for rough in &self.roughs {
             graph.prior(first + rough.station, rough.world_from_camera, &rough.covariance.matrix).ok()?;
@@ -140,7 +153,7 @@ impl Network {
         for leg in &self.loops {
             loops.push(graph.between(first + leg.from, first + leg.to, &leg.motion, true).ok()?);
         }
-        Some(Closed { solved: graph.solve()?, objects: first, loops, fixes })
+        Some(Closed { solved: graph.solve()?, objects: first, loops, fixes, lasting })
     }
 
     /// Closes its loops: every station moves to its most likely pose. What was found; `None` where the equations have no
@@ -181,9 +194,11 @@ impl Closed {
 
     /// A station relative to an object. `None` where nothing connects them.
     pub fn navigated(&self, object: usize, station: usize) -> Option<Navigated> {
-        let Local { motion, covariance, .. } = self.solved.relative(object, self.objects + station)?;
-        let covariance = Covariance6::new(covariance.matrix);
-        Some(Navigated { object, standing: Standing::new(motion.relabel(), covariance) })
+        let to = self.objects + station;
+        let Local { motion, covariance, .. } = self.solved.relative(object, to)?;
+        let standing = Standing::new(motion.relabel(), Covariance6::new(covariance.matrix));
+        let shares = self.lasting.get(&station).map(|lasting| self.solved.shares(object, to, *lasting));
+        Some(Navigated { object, standing: Standing { shares: shares.unwrap_or(standing.shares), ..standing } })
     }
 
     /// The loops that were given up: they contradict the rest.

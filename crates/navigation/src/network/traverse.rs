@@ -12,7 +12,7 @@ use super::{
     Candidate, Closed, Fix, Footprint, Glance, KeyFrame, Leg, Network, Recognised, Recogniser, Recognition, Rough,
     Station, Unrecognised, in_world,
 };
-use crate::{Local, Navigated, Place, Standing, StereoPair};
+use crate::{Local, Navigated, Place, StereoPair};
 
 /// When key frames are laid and sought.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -132,8 +132,8 @@ pub struct Traverse<'a> {
     laid_at: Vec<f64>,
     /// The last station, while the motion since is known.
     last: Option<usize>,
-    /// The motion since then; the station takes an object's place.
-    since: Standing,
+    /// The motion since then.
+    since: Local,
     way: f64,
     seconds: f64,
     sought_at: f64,
@@ -185,7 +185,7 @@ impl<'a> Traverse<'a> {
         match motion {
             Some(motion) => {
                 self.way += motion.motion.translation().norm();
-                self.since = self.since.after(motion);
+                self.since = self.since.then(motion);
             }
             None => self.last = None,
         }
@@ -239,9 +239,7 @@ impl<'a> Traverse<'a> {
 
     /// Where the camera is, as far as is known.
     fn world(&self, here: &Here) -> Option<Transform<World, Camera>> {
-        let by_way = self
-            .last
-            .map(|last| self.network.stations[last].world_from_camera * self.since.object_from_camera.relabel());
+        let by_way = self.last.map(|last| self.network.stations[last].world_from_camera * self.since.motion);
         let by_object = || here.navigated.as_ref().map(|navigated| in_world(navigated, &self.places()).0);
         by_way.or_else(by_object).or_else(|| here.rough.map(|(world, _)| world))
     }
@@ -294,11 +292,7 @@ impl<'a> Traverse<'a> {
         self.footprints.push(None);
         self.laid_at.push(self.way);
         match self.last {
-            Some(from) => {
-                let covariance = Covariance6::new(self.since.covariance.matrix);
-                let motion = Local::new(self.since.object_from_camera.relabel(), covariance);
-                self.network.legs.push(Leg { from, to: station, motion });
-            }
+            Some(from) => self.network.legs.push(Leg { from, to: station, motion: self.since }),
             // A chain hangs on something: until an object is fixed or a key frame recognised, on acoustics.
             None => {
                 if let Some((world_from_camera, covariance)) = here.rough {
@@ -420,6 +414,6 @@ impl<'a> Traverse<'a> {
 }
 
 /// No motion, exactly known.
-fn still() -> Standing {
-    Standing::new(Transform::identity(), Covariance6::new(nalgebra::Matrix6::zeros()))
+fn still() -> Local {
+    Local::new(Transform::identity(), Covariance6::new(nalgebra::Matrix6::zeros()))
 }
