@@ -3,8 +3,8 @@
 use seafix_component::{BuildError, Choice, Fault, Registry, in_range};
 use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, read_refinement,
-    read_triangulator,
+    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, StageChoices, TRIANGULATORS,
+    UnfitStage, read_refinement, read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
@@ -147,14 +147,21 @@ impl Pipeline {
     /// # Errors
     /// [`PipelineError`] names the setting.
     pub fn front_end(&self) -> Result<FrontEnd, PipelineError> {
-        Ok(FrontEnd {
-            filters: each_filter(&self.filters, build)?,
-            detector: build(&DETECTORS, &self.detector)?,
-            descriptor: build(&DESCRIPTORS, &self.descriptor)?,
-            matcher: build(&MATCHERS, &self.matcher)?,
-            locator: build(&LOCATORS, &self.locator)?,
-            refinement: build(&REFINEMENTS, &self.refine)?,
-            triangulator: build(&TRIANGULATORS, &self.triangulation)?,
+        let choices = StageChoices {
+            filters: &self.filters,
+            detector: &self.detector,
+            locator: &self.locator,
+            descriptor: &self.descriptor,
+            matcher: &self.matcher,
+            refine: &self.refine,
+            triangulation: &self.triangulation,
+        };
+        FrontEnd::build(&choices).map_err(|UnfitStage { stage, place, error }| {
+            let error = unfit(stage, &error);
+            match place {
+                Some(place) => in_list(place, error),
+                None => error,
+            }
         })
     }
 
@@ -210,12 +217,17 @@ fn each_filter<T>(
 }
 
 fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {
-    let key = error.key().filter(|&key| key != "name").map(str::to_owned);
     // Two stages had their names before they were components.
     let setting = match registry.kind() {
         "refinement" => "refine",
         "triangulator" => "triangulation",
         kind => kind,
     };
+    unfit(setting, error)
+}
+
+/// What is wrong with a component, as the fault of its setting.
+fn unfit(setting: &'static str, error: &BuildError) -> PipelineError {
+    let key = error.key().filter(|&key| key != "name").map(str::to_owned);
     PipelineError { setting, key, message: error.to_string() }
 }
