@@ -57,11 +57,12 @@ pub(super) fn admits(
         return true;
     }
     let members = decisive_members(taken);
+    let columns = volumes.columns(members);
     for (i, &a) in members.iter().enumerate() {
         for (k, &b) in members[..i].iter().enumerate() {
             let plane = volumes.plane([a, b, next]);
             *tests += k as u64;
-            if volumes.refuses_one(sense, &plane, &members[..k]) {
+            if volumes.refuses_one(sense, &plane, &members[..k], &columns) {
                 return false;
             }
         }

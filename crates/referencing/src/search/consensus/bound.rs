@@ -1,16 +1,22 @@
 //! How likely a set can be at best, from what its first members have in common.
 
-use nalgebra::Matrix6;
-
-use super::{
-    bits::{any, ones},
-    graph::Graph,
-    likelihood::{Terms, ln_volume},
-    rough::Rough,
-};
+use super::{bits::ones, graph::Graph, likelihood::Terms, rough::Rough};
 
 /// What the information of a set may fall short of that of as many average points (nats).
 const SLACK: f64 = 3.0;
+/// What rounding may cost a sum, as a share of it.
+const ROUNDING: f64 = 1e-12;
+
+/// A pair that may join others, with what may come after it.
+#[derive(Clone, Copy)]
+pub(in crate::search) struct Later {
+    pub(in crate::search) vertex: u32,
+    /// Of its model point.
+    pub(in crate::search) rank: u32,
+    /// Model points after its own in the same list, and what they bring at most.
+    more: u32,
+    bring: f64,
+}
 
 /// Bounds of the evidence of sets.
 ///
@@ -40,7 +46,6 @@ impl<'a> Bounds<'a> {
         let grows = libm::log(terms.ln_share.len() as f64) + 1.0;
         let gains = |i: usize| &terms.gain[graph.starts[i]..graph.starts[i + 1]];
         let top: Vec<f64> = (0..ranks).map(|i| gains(i).iter().copied().fold(grows, f64::max)).collect();
-        let volume = volumes(terms, rough, ranks);
         let share = &terms.ln_share;
         Self {
             graph,
@@ -50,7 +55,7 @@ impl<'a> Bounds<'a> {
             single: graph.vertices.len() == ranks,
             top,
             least,
-            of_number: (0..=ranks).map(|k| share[k] + rough.ln_peak + volume[k] + SLACK).collect(),
+            of_number: (0..=ranks).map(|k| share[k] + rough.ln_peak + terms.ln_volume[k] + SLACK).collect(),
         }
     }
 
@@ -74,46 +79,6 @@ impl<'a> Bounds<'a> {
         self.of_set(own + more, gains + self.greatest * more as f64)
     }
 
-    /// Whether the bound of [`with_common`](Self::with_common), of three pairs or more, is `enough`: known before all of it is,
-    /// since it grows with every model point.
-    pub(in crate::search) fn is_enough(
-        &self,
-        (own, gains): (usize, f64),
-        common: &[u64],
-        count: usize,
-        from: usize,
-        enough: f64,
-    ) -> bool {
-        let starts = &self.graph.starts;
-        let most = count.min(starts.len() - 1 - from);
-        if own + most < self.least || self.reach(own, gains, most) < enough {
-            return false;
-        }
-        if self.single {
-            return true;
-        }
-        let (mut k, mut sum) = (own, gains);
-        if k >= self.least && self.of_set(k, sum) >= enough {
-            return true;
-        }
-        let mut last = u32::MAX;
-        let first = starts[from] / 64;
-        for (word, &bits) in common.iter().enumerate().skip(first) {
-            let mut rest = if word == first { bits & (!0 << (starts[from] % 64)) } else { bits };
-            while rest != 0 {
-                let rank = self.graph.rank[word * 64 + rest.trailing_zeros() as usize];
-                rest &= rest - 1;
-                if rank != last {
-                    (k, sum, last) = (k + 1, sum + self.top[rank as usize], rank);
-                    if k >= self.least && self.of_set(k, sum) >= enough {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
-    }
-
     /// The bound of `own` pairs that bring `gains` and of the model points among the `count` pairs of `common`
     /// from rank `from` on; where even a rough bound is below `enough`, the rough one.
     pub(in crate::search) fn with_common(
@@ -134,32 +99,84 @@ impl<'a> Bounds<'a> {
             return reach;
         }
         let (mut k, mut sum) = (own, gains);
-        // Few bits are looked at one by one, many by model point.
-        if count < 2 * most {
-            let mut last = usize::MAX;
-            for rank in ones(common, starts[from]).map(|v| self.graph.rank[v] as usize) {
-                if rank != last {
-                    (k, sum, last) = (k + 1, sum + self.top[rank], rank);
-                }
-            }
-        } else {
-            for rank in (from..starts.len() - 1).filter(|&rank| any(common, starts[rank], starts[rank + 1])) {
-                (k, sum) = (k + 1, sum + self.top[rank]);
-            }
-        }
+        self.ranks(common, from, |rank| (k, sum) = (k + 1, sum + self.top[rank]));
         if k < self.least { f64::NEG_INFINITY } else { self.of_set(k, sum) }
     }
-}
 
-/// ln of the volumes that the posterior of 0…n points fills, taken for points that lie and are known as the
-/// candidates are on average: 3 ln 2π − ½ ln det (P + k H₁).
-fn volumes(terms: &Terms, rough: &Rough, n: usize) -> Vec<f64> {
-    let of = |h: Matrix6<f64>| h.cholesky().map_or(f64::INFINITY, |chol| ln_volume(&chol));
-    match &rough.known {
-        Some(known) => (0..=n).map(|k| of(known.information + terms.average * k as f64)).collect(),
-        None => {
-            let one = of(terms.average);
-            (0..=n).map(|k| one - 3.0 * libm::log(k.max(1) as f64)).collect()
+    /// The model points of some pairs from a rank on, by their ranks.
+    #[inline]
+    fn ranks(&self, of: &[u64], from: usize, mut each: impl FnMut(usize)) {
+        let starts = &self.graph.starts;
+        let mut word = starts[from] / 64;
+        let Some(mut rest) = of.get(word).map(|bits| bits & (!0 << (starts[from] % 64))) else { return };
+        loop {
+            while rest == 0 {
+                word += 1;
+                let Some(&bits) = of.get(word) else { return };
+                rest = bits;
+            }
+            let met = self.graph.rank[word * 64 + rest.trailing_zeros() as usize] as usize;
+            each(met);
+            let next = starts[met + 1];
+            if next / 64 != word {
+                word = next / 64;
+                let Some(&bits) = of.get(word) else { return };
+                rest = bits;
+            }
+            rest &= !0 << (next % 64);
         }
+    }
+
+    /// Whether the same bound of three pairs or more and of those of `later` that `joins` says is `enough`: known before all of it
+    /// is, since it grows with every model point.
+    pub(in crate::search) fn is_enough(
+        &self,
+        (own, gains): (usize, f64),
+        later: &[Later],
+        joins: impl Fn(&Later) -> bool,
+        enough: f64,
+    ) -> bool {
+        if self.single {
+            let count = later.iter().filter(|one| joins(one)).count();
+            return own + count >= self.least && self.reach(own, gains, count) >= enough;
+        }
+        let (mut k, mut sum) = (own, gains);
+        if k >= self.least && self.of_set(k, sum) >= enough {
+            return true;
+        }
+        let mut last = u32::MAX;
+        for one in later {
+            if one.rank != last && joins(one) {
+                (k, sum, last) = (k + 1, sum + self.top[one.rank as usize], one.rank);
+                if k >= self.least && self.of_set(k, sum) >= enough {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Lists the pairs that are set in `bits` from a rank on, each with what the model points after its own bring at most.
+    pub(in crate::search) fn list(&self, bits: &[u64], from: usize, later: &mut Vec<Later>) {
+        later.clear();
+        for v in ones(bits, self.graph.starts[from]) {
+            later.push(Later { vertex: v as u32, rank: self.graph.rank[v], more: 0, bring: 0.0 });
+        }
+        let (mut last, mut after, mut all) = (u32::MAX, (0, 0.0), (0, 0.0));
+        for one in later.iter_mut().rev() {
+            if one.rank != last {
+                (last, after) = (one.rank, all);
+                all = (all.0 + 1, all.1 + self.top[one.rank as usize]);
+            }
+            (one.more, one.bring) = after;
+        }
+    }
+
+    /// Whether `own` pairs that bring `gains`, one of which is `last`, fall short of what is asked for even with all that may come
+    /// after it.
+    pub(in crate::search) fn falls_short(&self, own: usize, gains: f64, last: &Later, enough: f64) -> bool {
+        let (k, sum) = (own + last.more as usize, gains + last.bring);
+        // Summed in another order than the bounds that decide.
+        k < self.least || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
     }
 }

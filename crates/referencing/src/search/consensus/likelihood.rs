@@ -38,8 +38,9 @@ pub(in crate::search) struct Terms {
     pub(in crate::search) gain: Vec<f64>,
     /// Of each model point: ln of the density of cloud points about its predicted place.
     pub(in crate::search) ln_density: Vec<f64>,
-    /// What one pair says of the motion on average: Jᵀ W J (about the centroid).
-    pub(in crate::search) average: Matrix6<f64>,
+    /// ln of the volumes that the posterior of 0…n points fills, taken for points that lie and are known as the candidates are on
+    /// average.
+    pub(in crate::search) ln_volume: Vec<f64>,
     /// ln B(k), k = 0…n.
     pub(in crate::search) ln_share: Vec<f64>,
 }
@@ -55,7 +56,7 @@ impl Terms {
             weight: Vec::with_capacity(count),
             gain: Vec::with_capacity(count),
             ln_density,
-            average: Matrix6::zeros(),
+            ln_volume: Vec::new(),
             ln_share: shares(n),
         };
         let turned = rough.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
@@ -64,6 +65,8 @@ impl Terms {
             Tolerance::Fixed(delta) => (0.02 * delta).powi(2),
             Tolerance::Sigmas(_) => (ROUNDING * extent(problem)).powi(2),
         };
+        // What one pair says of the motion on average: Jᵀ W J (about the centroid).
+        let mut average = Matrix6::zeros();
         // Many pairs share a covariance: the last inverse is kept.
         let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64)> = None;
         for pair in &graph.vertices {
@@ -79,9 +82,10 @@ impl Terms {
             terms.model.push(known.at.coords);
             terms.weight.push(weight);
             terms.gain.push(ln_peak - terms.ln_density[pair.model]);
-            terms.average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
+            average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
         }
-        terms.average /= count.max(1) as f64;
+        average /= count.max(1) as f64;
+        terms.ln_volume = volumes(&average, rough, graph.starts.len() - 1);
         terms
     }
 
@@ -96,6 +100,18 @@ impl Terms {
         let r = self.cloud[v] - motion.apply(&self.model[v]);
         let d2 = r.dot(&(self.weight[v] * r));
         (d2 <= FAR).then(|| self.gain[v] - 0.5 * d2)
+    }
+}
+
+/// 3 ln 2π − ½ ln det (P + k H₁) for k = 0…n, H₁ what one pair says on average.
+fn volumes(average: &Matrix6<f64>, rough: &Rough, n: usize) -> Vec<f64> {
+    let of = |h: Matrix6<f64>| factor_of(&h).map_or(f64::INFINITY, |chol| ln_volume(&chol));
+    match &rough.known {
+        Some(known) => (0..=n).map(|k| of(known.information + average * k as f64)).collect(),
+        None => {
+            let one = of(*average);
+            (0..=n).map(|k| one - 3.0 * libm::log(k.max(1) as f64)).collect()
+        }
     }
 }
 

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 
 use super::{
     Motion,
-    bits::{intersect, ones},
-    bound::Bounds,
+    bits::{intersect, is_set, ones},
+    bound::{Bounds, Later},
     graph::Graph,
     likelihood::{Mode, Terms},
     modes::Climb,
@@ -39,9 +39,12 @@ const COST_OF_A_PAIR: u64 = 4;
 /// Bound and vertices of two pairs.
 type Pair = (f32, u32, u32);
 
-/// The greatest bound first; of equals the first in the order of the graph.
-fn first(x: &Pair, y: &Pair) -> std::cmp::Ordering {
-    y.0.total_cmp(&x.0).then((x.1, x.2).cmp(&(y.1, y.2)))
+/// What sorts pairs so that the greatest bound comes first, of equals the first in the order of the graph.
+fn order(&(bound, a, b): &Pair) -> u128 {
+    // As `total_cmp` has it: of negative numbers the greater has the smaller bits.
+    let bits = bound.to_bits();
+    let ascending = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
+    u128::from(!ascending) << 64 | u128::from(a) << 32 | u128::from(b)
 }
 
 /// What came of the search for modes.
@@ -73,13 +76,13 @@ pub(in crate::search) struct Seeds<'a> {
     scouted: f64,
     /// The vertices to look at, one bit each.
     free: Vec<u64>,
-    /// The free neighbours of one vertex.
+    /// The free neighbours of one vertex, and of two.
     row: Vec<u64>,
-    /// What two pairs and three have in common.
     common: Vec<u64>,
-    third: Vec<u64>,
-    /// The third vertices to follow.
-    thirds: Vec<u64>,
+    /// The same as lists, and what three have in common.
+    of_one: Vec<Later>,
+    of_two: Vec<Later>,
+    of_three: Vec<usize>,
 }
 
 impl<'a> Seeds<'a> {
@@ -107,8 +110,9 @@ impl<'a> Seeds<'a> {
             free,
             row: vec![0; words],
             common: vec![0; words],
-            third: vec![0; words],
-            thirds: vec![0; words],
+            of_one: Vec::new(),
+            of_two: Vec::new(),
+            of_three: Vec::new(),
         }
     }
 
@@ -119,7 +123,11 @@ impl<'a> Seeds<'a> {
     }
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
-        let (pairs, mut complete) = self.pairs();
+        let (mut pairs, mut complete) = self.pairs();
+        pairs.retain(|(bound, ..)| f64::from(*bound) >= self.threshold());
+        if self.spent <= self.budget {
+            pairs.sort_unstable_by_key(order);
+        }
         for (bound, a, b) in pairs {
             if f64::from(bound) < self.threshold() {
                 break;
@@ -152,9 +160,8 @@ impl<'a> Seeds<'a> {
             intersect(&row, graph.row(b), 0, &mut common);
             let Some(&c) = self.best_connected(&common, &common, 1).first() else { continue };
             let after = graph.rank[c] as usize + 1;
-            self.third.fill(0);
-            intersect(&common, graph.row(c), graph.starts[after], &mut self.third);
-            self.follow([a, b, c], after);
+            self.of_three = ones(&common, graph.starts[after]).filter(|&v| is_set(graph.row(c), v)).collect();
+            self.follow([a, b, c]);
             let shared = |mode: &Mode| mode.members.iter().filter(|&&v| than.holds(v)).count();
             self.modes.retain(|mode| shared(mode) < LEAST);
             if !self.modes.is_empty() {
@@ -192,46 +199,47 @@ impl<'a> Seeds<'a> {
                 continue;
             }
             let (rank, own) = (graph.rank[a] as usize, self.bounds.gain(a));
-            let mut row = std::mem::take(&mut self.row);
-            self.spent += row.len() as u64;
-            let count = intersect(graph.row(a), &self.free, 0, &mut row);
-            if self.bounds.with_common((1, own), &row, count, rank + 1, self.threshold()) < self.threshold() {
-                self.row = row;
+            self.spent += self.row.len() as u64;
+            let count = intersect(graph.row(a), &self.free, 0, &mut self.row);
+            let threshold = self.threshold();
+            if self.bounds.with_common((1, own), &self.row, count, rank + 1, threshold) < threshold {
                 continue;
             }
-            for b in ones(&row, graph.starts[rank + 1]) {
-                let next = graph.rank[b] as usize + 1;
-                let gains = own + self.bounds.gain(b);
-                if self.bounds.reach(2, gains, ranks - next) < self.threshold() {
+            self.bounds.list(&self.row, rank + 1, &mut self.of_one);
+            for b in &self.of_one {
+                let gains = own + self.bounds.gain(b.vertex as usize);
+                if self.bounds.reach(2, gains, ranks - 1 - b.rank as usize) < threshold {
                     continue;
                 }
-                let count = self.meet(&row, b, next);
-                let bound = self.bounds.with_common((2, gains), &self.common, count, next, self.threshold());
-                if bound >= self.threshold() {
+                self.spent += self.words_from(b.rank as usize + 1);
+                if self.bounds.falls_short(2, gains, b, threshold) {
+                    continue;
+                }
+                let next = b.rank as usize + 1;
+                let row = graph.row(b.vertex as usize);
+                let count = intersect(&self.row, row, graph.starts[next], &mut self.common);
+                let bound = self.bounds.with_common((2, gains), &self.common, count, next, threshold);
+                if bound >= threshold {
                     // Rounded up, so that it stays a bound.
-                    pairs.push(((bound as f32).next_up(), a as u32, b as u32));
+                    pairs.push(((bound as f32).next_up(), a as u32, b.vertex));
                 }
             }
-            self.row = row;
             if self.spent > self.budget || pairs.len() > MOST_PAIRS {
                 complete = false;
                 break;
             }
         }
-        pairs.sort_unstable_by(first);
         (pairs, complete)
     }
 
-    /// What a row and that of `b` have in common from a rank on.
-    fn meet(&mut self, row: &[u64], b: usize, from: usize) -> usize {
-        let start = self.climb.graph.starts[from];
-        self.spent += (row.len().saturating_sub(start / 64) + 1) as u64;
-        intersect(row, self.climb.graph.row(b), start, &mut self.common)
+    /// Words of a row from a rank on.
+    fn words_from(&self, rank: usize) -> u64 {
+        (self.free.len().saturating_sub(self.climb.graph.starts[rank] / 64) + 1) as u64
     }
 
     /// Follows the most promising pair of one model point at once: a good pose known early spares the rest.
     fn scout(&mut self, pairs: &[Pair]) {
-        let Some(&(bound, a, b)) = pairs.iter().min_by(|x, y| first(x, y)) else { return };
+        let Some(&(bound, a, b)) = pairs.iter().min_by_key(|pair| order(pair)) else { return };
         if f64::from(bound) > self.scouted {
             self.scouted = f64::from(bound);
             self.follow_pair(a as usize, b as usize);
@@ -241,28 +249,41 @@ impl<'a> Seeds<'a> {
     fn follow_pair(&mut self, a: usize, b: usize) {
         let graph = self.climb.graph;
         let next = graph.rank[b] as usize + 1;
-        self.meet(graph.row(a), b, next);
+        self.spent += self.words_from(next);
+        intersect(graph.row(a), graph.row(b), graph.starts[next], &mut self.common);
         self.common.iter_mut().zip(&self.free).for_each(|(word, free)| *word &= free);
+        let mut common = std::mem::take(&mut self.of_two);
+        self.bounds.list(&self.common, next, &mut common);
         // Three members of a mode lead to it again.
-        let mut thirds = std::mem::take(&mut self.thirds);
-        thirds.clone_from(&self.common);
         let likely = self.modes.iter().take(COMPARED);
-        for v in likely.filter(|mode| mode.holds(a) && mode.holds(b)).flat_map(|mode| &mode.members) {
-            thirds[v / 64] &= !(1 << (v % 64));
-        }
+        let again: Vec<usize> =
+            likely.filter(|mode| mode.holds(a) && mode.holds(b)).flat_map(|mode| &mode.members).copied().collect();
         let gains = self.bounds.gain(a) + self.bounds.gain(b);
-        for c in ones(&thirds, graph.starts[next]) {
-            let after = graph.rank[c] as usize + 1;
-            let gains = gains + self.bounds.gain(c);
-            let start = graph.starts[after];
-            self.spent += (self.common.len().saturating_sub(start / 64) + 1) as u64;
-            let count = intersect(&self.common, graph.row(c), start, &mut self.third);
-            let promising = self.bounds.is_enough((3, gains), &self.third, count, after, self.threshold());
-            if promising && !self.known([a, b, c]) {
-                self.follow([a, b, c], after);
+        let mut later = 0;
+        for (place, c) in common.iter().enumerate() {
+            if place == later {
+                later = place + common[place..].iter().take_while(|other| other.rank == c.rank).count();
+            }
+            let vertex = c.vertex as usize;
+            if again.contains(&vertex) {
+                continue;
+            }
+            let gains = gains + self.bounds.gain(vertex);
+            self.spent += self.words_from(c.rank as usize + 1);
+            let threshold = self.threshold();
+            if self.bounds.falls_short(3, gains, c, threshold) {
+                continue;
+            }
+            let row = graph.row(vertex);
+            let joins = |other: &Later| is_set(row, other.vertex as usize);
+            if self.bounds.is_enough((3, gains), &common[later..], joins, threshold) && !self.known([a, b, vertex]) {
+                self.of_three.clear();
+                let joining = common[later..].iter().filter(|other| joins(other));
+                self.of_three.extend(joining.map(|other| other.vertex as usize));
+                self.follow([a, b, vertex]);
             }
         }
-        self.thirds = thirds;
+        self.of_two = common;
     }
 
     /// Whether a likely mode holds all three.
@@ -271,7 +292,7 @@ impl<'a> Seeds<'a> {
     }
 
     /// The pose of a three, what else fits it roughly, and the mode that this leads to.
-    fn follow(&mut self, three: [usize; 3], after: usize) {
+    fn follow(&mut self, three: [usize; 3]) {
         self.spent += COST_OF_A_POSE;
         let Climb { terms, graph, .. } = self.climb;
         let model = three.map(|v| &terms.model[v]);
@@ -282,7 +303,7 @@ impl<'a> Seeds<'a> {
         let mut gains: f64 = three.iter().map(|&v| self.bounds.gain(v)).sum();
         // Rank and distance of the last member.
         let mut last = (usize::MAX, 0.0);
-        for v in ones(&self.third, graph.starts[after]) {
+        for &v in &self.of_three {
             // The three points' errors grow with the lever.
             let lever = 1.0 + (terms.model[v] - centre).norm() / altitude;
             let r = terms.cloud[v] - motion.apply(&terms.model[v]);
