@@ -226,6 +226,8 @@ fn held(layouts: u64, acceptance: &Acceptance, shell: f64, available: u64) {
 
 /// P71, short: 20 000 draws at risk 1e-3. Levels are far above the errors, for whichever point may be wrong
 /// widens them; the two laws below come nearer.
+///
+/// Seen to fail when three points are given a level, and with levels of a tenth (11 897 beyond of 33).
 #[test]
 fn levels_hold() {
     held(40, &Acceptance { risk: 1e-3, ..Acceptance::default() }, SHELL, 5);
@@ -246,18 +248,26 @@ fn without_tests(risk: f64, wrong_match_rate: f64, two_wrong_rate: f64) -> Accep
 }
 
 /// P71 where in every draw a match is wrong by so little that nothing leaves it out.
+///
+/// Seen to fail when the separation is left out of the level (490 and 485 beyond of 461), when the radius of the fix without the point
+/// is (598 and 599), and when levels are the radius of the fix itself (1037 and 1058).
 #[test]
 fn levels_hold_where_wrong_matches_hide() {
     held(40, &without_tests(0.02, 1.0, 0.0), HIDDEN, 1);
 }
 
 /// P71 under two wrong matches, short: 10 000 draws at risk 1e-3, two wrong in one of ten and one in another.
+///
+/// Seen to fail with levels of a tenth (4404 beyond of 19); by less only the law below fails.
 #[test]
 fn levels_hold_under_two_wrong_matches() {
     held(20, &Acceptance { risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() }, SHELL, 3);
 }
 
 /// The same where in every draw two are wrong by little.
+///
+/// Seen to fail when sets of two are not left out (692 and 711 beyond of 461), and when levels are the radius of the fix itself
+/// (1070 and 1097).
 #[test]
 fn levels_hold_where_two_wrong_matches_hide() {
     held(40, &without_tests(0.02, 1e-12, 1.0), HIDDEN, 1);
