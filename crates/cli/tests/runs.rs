@@ -83,6 +83,17 @@ fn reports_are_verified_and_runs_compared() {
     fs::write(&page, text).unwrap();
     let (code, out, _) = seafix(folder, &["report", "a", "--out", "reports/a", "--verify"]);
     assert!(code == 1 && out.contains("report.html: printed"), "{out}");
+    for name in ["results.csv", "results.parquet"] {
+        let table = folder.join("b").join(name);
+        let bytes = fs::read(&table).unwrap();
+        fs::write(&table, [&bytes[..], b"\n"].concat()).unwrap();
+        let (code, out, _) = seafix(folder, &["report", "b", "--out", "reports/b", "--verify"]);
+        assert!(code == 1 && out.contains(&format!("b/{name}: another SHA-256")), "{out}");
+        fs::remove_file(&table).unwrap();
+        let (code, out, _) = seafix(folder, &["report", "b", "--out", "reports/b", "--verify"]);
+        assert!(code == 1 && out.contains("a file of the run that is gone"), "{out}");
+        fs::write(&table, bytes).unwrap();
+    }
 
     let (code, out, error) = seafix(folder, &["compare", "a", "b", "--out", "compared"]);
     assert!(code == 0 && folder.join("compared/compare.html").exists(), "{out}{error}");
@@ -200,6 +211,22 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
         assert!(code == 1 && out.contains("is not what the logs make"), "{file}: {out}");
         assert_eq!(publish(&["--logged"]).0, 0);
     }
+    let stray = folder.join("reports/old");
+    fs::create_dir(&stray).unwrap();
+    for name in ["report.html", "summary.txt"] {
+        fs::copy(folder.join("reports/b").join(name), stray.join(name)).unwrap();
+    }
+    let (code, out, error) = publish(&["--verify"]);
+    assert!(
+        code == 1 && out.contains("2 of 2 reports") && error.contains("reports/old: a report that is not"),
+        "{out}{error}"
+    );
+    fs::remove_dir_all(stray).unwrap();
+    fs::rename(folder.join("reports/a"), folder.join("a-away")).unwrap();
+    let (code, out, error) = publish(&["--verify"]);
+    assert!(code == 3 && out.contains("1 of 2 reports") && error.contains("reports/a/report.html"), "{out}{error}");
+    fs::rename(folder.join("a-away"), folder.join("reports/a")).unwrap();
+
     let (code, _, error) = publish(&["--only", "c"]);
     assert!(code == 2 && error.contains("`c` is not in list.toml; there are a, b"), "{error}");
     let (code, out, _) = seafix(folder, &["check", "list.toml"]);

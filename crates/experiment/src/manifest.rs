@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Plan, Trial,
+    dataset::sha256,
     run::{Group, Options, RunError},
 };
 
@@ -154,6 +155,25 @@ impl Manifest {
         std::fs::rename(&partial, &file).map_err(|error| RunError::unwritable(&file, error))
     }
 
+    /// What of the files in `folder` is not as the run wrote it, a fault each.
+    fn changed(&self, folder: &Path) -> Vec<Fault> {
+        let remedy = "`seafix run --overwrite` makes it again";
+        let fault = |(name, hash): (&String, &String)| {
+            let path = folder.join(name);
+            if !path.exists() {
+                return Some(Fault::new("a file of the run that is gone", &path).remedy(remedy));
+            }
+            match sha256(&path) {
+                Ok(found) if found == *hash => None,
+                Ok(_) => {
+                    Some(Fault::new("not the file that the run wrote", &path).value("another SHA-256").remedy(remedy))
+                }
+                Err(fault) => Some(fault),
+            }
+        };
+        self.outputs.iter().filter_map(fault).collect()
+    }
+
     /// What keeps this run from being the same as another: which of the things that the answer depends on differs.
     pub(crate) fn differs(&self, other: &Self) -> Option<&'static str> {
         let trials = |manifest: &Self| -> Vec<(String, usize)> {
@@ -171,6 +191,18 @@ impl Manifest {
         ];
         differing.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
     }
+}
+
+/// Logs, tables and networks of the run in `folder` that are not as the run wrote them, by the SHA-256 of its manifest; none
+/// where it has no manifest, or has not ended.
+///
+/// # Errors
+/// A manifest that cannot be read.
+pub fn changed_outputs(folder: &Path) -> Result<Vec<Fault>, Fault> {
+    if !folder.join(NAME).exists() {
+        return Ok(Vec::new());
+    }
+    Ok(Manifest::read(folder)?.changed(folder))
 }
 
 /// What is wrong with a folder that has logs and no manifest.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use seafix_log::Axis;
 
 use crate::{
-    ReportError, Summary, content, format,
+    Forms, ReportError, Summary, content, format,
     paired::{self, Comparison},
     print,
     run::{Run, Trial},
@@ -30,19 +30,19 @@ pub struct Compared {
 /// cannot be written.
 pub fn compare(folders: &[PathBuf], force: bool, out: Option<&Path>) -> Result<Compared, ReportError> {
     let mut runs: Vec<Run> = folders.iter().map(|folder| Run::read(folder)).collect::<Result<_, _>>()?;
-    if !force {
-        for (run, folder) in runs.iter().zip(folders).skip(1) {
-            let differences = differences(&runs[0], run);
-            if !differences.is_empty() {
-                return Err(ReportError::Incomparable {
-                    first: folders[0].clone(),
-                    other: folder.clone(),
-                    differences,
-                });
-            }
-        }
-    }
     let names = names(folders);
+    let mut forced = String::new();
+    for ((run, folder), name) in runs.iter().zip(folders).zip(&names).skip(1) {
+        let differences = differences(&runs[0], run);
+        if differences.is_empty() {
+            continue;
+        }
+        if !force {
+            return Err(ReportError::Incomparable { first: folders[0].clone(), other: folder.clone(), differences });
+        }
+        let differences = differences.join(", ");
+        forced += &format!("{} and {} saw different data: {differences}.\n", printed(&names[0]), printed(name));
+    }
     let keys = content::distinct(runs.iter().flat_map(|run| run.header().axes.iter().map(|axis| axis.key.clone())));
     for (run, name) in runs.iter_mut().zip(&names) {
         for trial in &mut run.trials {
@@ -60,10 +60,14 @@ pub fn compare(folders: &[PathBuf], force: bool, out: Option<&Path>) -> Result<C
     let comparisons = paired::comparisons(&run, &summary);
     let page = out.map(|folder| {
         let document = content::document(&run, &summary, false)?;
-        write(folder, "compare.html", print::html(&document, true).as_bytes())
+        write(
+            folder,
+            "compare.html",
+            print::html(&document, Forms { latex: false, pdf: false, ..Forms::ALL }).as_bytes(),
+        )
     });
     Ok(Compared {
-        table: format!("{summary}\n\n{}{}", same(&run, &names), lines(&comparisons)),
+        table: format!("{summary}\n\n{}{forced}{}", same(&run, &names), lines(&comparisons)),
         page: page.transpose()?,
         differ: comparisons.iter().any(|comparison| comparison.better().is_some()),
     })
@@ -94,12 +98,13 @@ fn joined(trial: &mut Trial, name: &str, keys: &[String]) {
 fn differences(first: &Run, other: &Run) -> Vec<String> {
     let mut found = Vec::new();
     let mut say = |what: &str, own: Vec<String>, its: Vec<String>| {
-        let only =
-            |a: &[String], b: &[String]| a.iter().filter(|line| !b.contains(line)).take(3).cloned().collect::<Vec<_>>();
+        let only = |a: &[String], b: &[String]| a.iter().filter(|line| !b.contains(line)).cloned().collect::<Vec<_>>();
         let (left, right) = (only(&own, &its), only(&its, &own));
         if !left.is_empty() || !right.is_empty() {
-            let show = |lines: Vec<String>| if lines.is_empty() { "–".to_owned() } else { lines.join(" and ") };
-            found.push(format!("{what}: {} against {}", show(left), show(right)));
+            let more = left.len().max(right.len()) - 1;
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let show = |lines: &[String]| lines.first().map_or_else(|| "–".to_owned(), |line| clipped(line));
+            found.push(format!("{what}: {} against {}{more}", show(&left), show(&right)));
         }
     };
     let of = |run: &Run, lines: fn(&Trial) -> Vec<String>| content::distinct(run.trials.iter().flat_map(lines));
@@ -131,6 +136,12 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
     found
 }
 
+/// As much of a line as tells what it is about.
+fn clipped(line: &str) -> String {
+    const MOST: usize = 60;
+    if line.chars().count() <= MOST { line.to_owned() } else { line.chars().take(MOST - 1).chain(['…']).collect() }
+}
+
 /// That runs gave the same results bit for bit, where they did: such a comparison says nothing of methods.
 fn same(run: &Run, names: &[String]) -> String {
     let of = |name: &String| -> Vec<&[u8]> {
@@ -138,10 +149,14 @@ fn same(run: &Run, names: &[String]) -> String {
         own.map(|trial| &trial.digest[..]).collect()
     };
     let alike = names.iter().skip(1).filter(|name| of(name) == of(&names[0]));
-    let printed = |name: &String| name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
     alike
         .map(|name| format!("{} and {} have the same results, bit for bit.\n", printed(&names[0]), printed(name)))
         .collect()
+}
+
+/// A name as a terminal may show it.
+fn printed(name: &str) -> String {
+    name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 /// The comparisons, a line each.

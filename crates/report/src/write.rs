@@ -23,7 +23,7 @@ pub struct Forms {
     pub latex: bool,
     /// `report.pdf`.
     pub pdf: bool,
-    /// What a repository keeps: a page with few and small pictures, the main figure, short tables as CSV.
+    /// What a repository keeps: a page with small pictures, the main figure, the tables as CSV.
     pub small: bool,
 }
 
@@ -32,6 +32,18 @@ impl Forms {
     pub const ALL: Self = Self { html: true, latex: true, pdf: true, small: false };
     /// What a repository keeps.
     pub const SMALL: Self = Self { html: true, latex: false, pdf: false, small: true };
+
+    /// As a page says with which other forms it was written.
+    pub(crate) fn words(self) -> String {
+        let words = [(self.html, "html"), (self.latex, "latex"), (self.pdf, "pdf"), (self.small, "small")];
+        words.iter().filter(|(is, _)| *is).map(|(_, word)| *word).collect::<Vec<_>>().join(" ")
+    }
+
+    /// What a page says of itself.
+    pub(crate) fn of_words(text: &str) -> Self {
+        let has = |word: &str| text.split(' ').any(|one| one == word);
+        Self { html: has("html"), latex: has("latex"), pdf: has("pdf"), small: has("small") }
+    }
 }
 
 /// A report that was written.
@@ -48,9 +60,6 @@ pub struct Report {
 /// So many trials are few.
 const FEW: usize = 8;
 
-/// Longer tables a small report leaves out: `seafix report` makes them of the logs.
-const KEPT_LINES: usize = 200;
-
 /// One file: its name in the folder of the report, and its bytes.
 pub(crate) type File = (String, Vec<u8>);
 
@@ -64,8 +73,8 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
     let run = Run::read(run_dir)?;
     let summary = Summary::of(&run);
     let files = files(&run, &summary, forms)?;
-    for part in ["figures", "tables"] {
-        clear(&folder.join(part), part, &files)?;
+    for path in strays(folder, &files) {
+        fs::remove_file(&path).map_err(|source| ReportError::Io { doing: "write", path, source })?;
     }
     for (name, bytes) in &files {
         write(folder, name, bytes)?;
@@ -78,7 +87,7 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
 /// Everything that a report consists of.
 pub(crate) fn files(run: &Run, summary: &Summary, forms: Forms) -> Result<Vec<File>, ReportError> {
     let document = content::document(run, summary, forms.small)?;
-    let html = || forms.html.then(|| print::html(&document, !forms.small).into_bytes());
+    let html = || forms.html.then(|| print::html(&document, forms).into_bytes());
     let latex = || forms.latex.then(|| print::latex(&document).into_bytes());
     let pdf = || forms.pdf.then(|| print::pdf(&document));
     let drawn = || if forms.small { Vec::new() } else { figures(&document) };
@@ -103,7 +112,7 @@ pub(crate) fn files(run: &Run, summary: &Summary, forms: Forms) -> Result<Vec<Fi
     Ok(files)
 }
 
-/// Of a small report: the main figure, the picture of a fix, and the tables that people read.
+/// Of a small report: the main figure, the picture of a fix, and every table and plotted number.
 fn kept(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
     if let Some(figure) = main_figure(document) {
         add("main.svg".to_owned(), print::standalone(&figure.drawing).into_bytes());
@@ -111,7 +120,7 @@ fn kept(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
     if let Some(fix) = document.pictures().find(|picture| picture.id == "fix") {
         add("fix.jpg".to_owned(), fix.jpeg.clone());
     }
-    for table in document.tables().filter(|table| table.lines.len() <= KEPT_LINES) {
+    for table in document.tables() {
         add(format!("tables/{}.csv", table.id), print::csv(table).into_bytes());
     }
 }
@@ -144,18 +153,21 @@ fn figures(document: &Document) -> Vec<File> {
     figures.par_iter().flat_map_iter(figure).chain(tables.par_iter().flat_map_iter(table)).collect()
 }
 
-/// Removes what an earlier report left in `folder` and this one does not write.
-fn clear(folder: &Path, part: &str, files: &[File]) -> Result<(), ReportError> {
-    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
-    for entry in entries.flatten() {
-        let name = format!("{part}/{}", entry.file_name().to_string_lossy());
-        let ours = [".svg", ".pdf", ".csv", ".json", ".partial"].iter().any(|end| name.ends_with(end));
-        if ours && !files.iter().any(|(known, _)| *known == name) {
-            let path = entry.path();
-            fs::remove_file(&path).map_err(|source| ReportError::Io { doing: "write", path, source })?;
+/// What `figures/` and `tables/` of the report in `folder` hold that is none of its `files`: of an earlier report, or put there.
+pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for part in ["figures", "tables"] {
+        let Ok(entries) = fs::read_dir(folder.join(part)) else { continue };
+        for entry in entries.flatten() {
+            let name = format!("{part}/{}", entry.file_name().to_string_lossy());
+            let ours = [".svg", ".pdf", ".csv", ".json", ".partial"].iter().any(|end| name.ends_with(end));
+            if ours && !files.iter().any(|(known, _)| *known == name) {
+                found.push(entry.path());
+            }
         }
     }
-    Ok(())
+    found.sort();
+    found
 }
 
 /// Writes a file whole or not at all.

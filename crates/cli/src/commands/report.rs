@@ -1,8 +1,9 @@
 //! `seafix report`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use seafix_experiment::changed_outputs;
 use seafix_report::{Forms, ReportError, Verified, index, report, verify};
 
 use crate::{
@@ -27,7 +28,7 @@ pub(crate) struct Report {
     /// The PDF.
     #[arg(long)]
     pdf: bool,
-    /// Write nothing: compute every printed number again from the logs, and say what differs.
+    /// Write nothing: compute every printed number again from the logs, and say what of the report and the run differs.
     #[arg(long, conflicts_with_all = ["html", "latex", "pdf", "index"])]
     verify: bool,
     /// Also write README.md into the folder of all reports: what the runs found.
@@ -79,9 +80,7 @@ impl Report {
     fn verify_all(&self, folders: &[PathBuf]) -> Ended {
         let mut code = DONE;
         for (run, folder) in self.runs.iter().zip(folders) {
-            let verified = verify(run, folder).map_err(failure)?;
-            print(&said(&verified, &folder.display().to_string()))?;
-            if !verified.holds() {
+            if !verified(run, folder)? {
                 code = FINDINGS;
             }
         }
@@ -89,18 +88,35 @@ impl Report {
     }
 }
 
+/// Verifies a report and the files of its run, and says what was found; whether all is as it was written.
+pub(crate) fn verified(run: &Path, folder: &Path) -> Result<bool, Failure> {
+    let verified = verify(run, folder).map_err(failure)?;
+    let changed = changed_outputs(run).map_err(|fault| Failure::faults(INPUT, &[fault]))?;
+    let changed: String = changed.iter().map(|fault| format!("{fault}\n")).collect();
+    print(&format!("{changed}{}", said(&verified, &folder.display().to_string())))?;
+    Ok(verified.holds() && changed.is_empty())
+}
+
 /// What a verification found, for people.
-pub(crate) fn said(verified: &Verified, folder: &str) -> String {
+fn said(verified: &Verified, folder: &str) -> String {
     let mut text = String::new();
     for wrong in &verified.mismatches {
         text += &format!("{}: printed {}, logged {}: {}\n", wrong.file, wrong.printed, wrong.logged, wrong.key);
     }
-    for file in &verified.changed {
-        text += &format!("{file} is not what the logs make\n");
+    let Verified { missing, changed, strays, .. } = verified;
+    let unlike =
+        [(missing, "is missing"), (changed, "is not what the logs make"), (strays, "is none of this report's")];
+    for (files, what) in unlike {
+        files.iter().for_each(|file| text += &format!("{file} {what}\n"));
     }
     let text: String = text.chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect();
     let equal = verified.numbers - verified.mismatches.len();
-    format!("{text}{folder}: {equal} of {} numbers equal to the last digit\n", verified.numbers)
+    let alike = verified.files - missing.len() - changed.len();
+    let more = if strays.is_empty() { String::new() } else { format!(", {} that are none of its", strays.len()) };
+    format!(
+        "{text}{folder}: {equal} of {} numbers equal to the last digit, {alike} of {} files as the logs make them{more}\n",
+        verified.numbers, verified.files
+    )
 }
 
 /// Logs that cannot be read are input, a report that cannot be written is output.

@@ -15,8 +15,6 @@ use crate::{
 const LISTED: usize = 10;
 /// Of them refusals at most, so that large errors are seen as well.
 const REFUSALS: usize = 5;
-/// Of so many a small report shows pictures.
-const SHOWN: usize = 2;
 /// Of more frames than this, wanted pictures are looked for in none: reading all images again takes too long.
 const SEARCHED: usize = 200_000;
 
@@ -54,9 +52,7 @@ pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section)
         let hash = source.bytes().fold(7_u64, |hash, byte| hash.wrapping_mul(131).wrapping_add(u64::from(byte)));
         let Some(marked) = pictures.get(&(*index, frame.stamp_ns)).filter(|_| !shown.contains(&hash)) else { continue };
         shown.push(hash);
-        if !small || shown.len() <= SHOWN {
-            section.add(failure(run, place + 1, (*index, frame, row), marked, small));
-        }
+        section.add(failure(run, place + 1, (*index, frame, row), marked, small));
     }
     Ok((first, section))
 }
@@ -231,7 +227,7 @@ fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Mark
         code(trial.file()),
         format!(", stamp {} ns.", frame.stamp_ns)
     ]);
-    let (scale, quality) = if small { (to_width(marked, 720.0), 68) } else { (to_width(marked, 960.0), 78) };
+    let (scale, quality) = if small { (to_width(marked, 600.0), 62) } else { (to_width(marked, 960.0), 78) };
     Block::Picture(Picture {
         id: format!("worst-{place}"),
         caption,

@@ -1,6 +1,8 @@
 //! What came of each object, where several were looked for.
 
-use super::{distinct, results, tell::Unit};
+use std::collections::BTreeSet;
+
+use super::{results, tell::Unit};
 use crate::{
     Field, Key, Number, Summary,
     document::{Block, Head, Section, Table, Text, text},
@@ -99,12 +101,14 @@ pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
     Some(said)
 }
 
-/// The objects that were looked for, in the order of their names; none where not all frames are logged.
+/// The objects that were looked for, in the order of their names; none where not all frames are logged, or where every
+/// attempt has an object of its own, as drawn problems have.
 fn objects(trial: &Trial) -> Vec<String> {
-    if trial.every() > 1 {
+    let names: BTreeSet<&str> = trial.attempts().map(|(_, row)| trial.object(row)).collect();
+    if trial.every() > 1 || 2 * names.len() > trial.attempts().count() {
         return Vec::new();
     }
-    let mut names = distinct(trial.attempts().map(|(_, row)| trial.object(row).to_owned()));
+    let mut names: Vec<String> = names.into_iter().map(str::to_owned).collect();
     names.sort();
     names
 }

@@ -43,6 +43,9 @@ pub(super) fn stroke(series: usize) -> Stroke {
     Stroke { ink: Ink::Series(series), width: 1.1, dash: series % 5 }
 }
 
+/// From this share on white words stand out more from a cell of a heat map than black ones: its luminance is below 0.21.
+const DARK: f64 = 0.9;
+
 impl Layer {
     /// Whether there is anything to draw, apart from guides.
     pub(crate) fn draws(&self) -> bool {
@@ -124,7 +127,7 @@ impl Layer {
                 for ([a, b, share], words) in values {
                     let ([left, top], [right, bottom]) = (place([a - 0.5, b + 0.5]), place([a + 0.5, b - 0.5]));
                     drawing.rectangle([left, top], [right - left, bottom - top], Some(Ink::Heat(*share)), None);
-                    let ink = if *share > 0.55 { Ink::OnDark } else { Ink::OnPale };
+                    let ink = if *share > DARK { Ink::OnDark } else { Ink::OnPale };
                     let [u, v] = place([*a, *b]);
                     drawing.shapes.push(Shape::Words {
                         at: [u, v + 2.6],

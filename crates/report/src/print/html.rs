@@ -5,12 +5,17 @@ use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
 
 use super::{fonts::Font, svg};
 use crate::{
-    Number,
+    Forms, Number,
     document::{Block, Cell, Document, Figure, Picture, Span, Table},
 };
 
-/// The whole page, with the face of its figures in it, or by faces of the same widths. Every name out of the logs is escaped by the macro that writes it, or by [`svg::escape`].
-pub(crate) fn html(document: &Document, face: bool) -> String {
+/// Where a page says with which forms it was written.
+pub(crate) const FORMS: &str = "seafix-forms";
+
+/// The whole page; a small one names faces of the same widths instead of holding the face of its figures. It says with which
+/// other forms it was written, so that a form that is gone is missed. Every name out of the logs is escaped by the macro that
+/// writes it, or by [`svg::escape`].
+pub(crate) fn html(document: &Document, forms: Forms) -> String {
     let page = markup! {
         (DOCTYPE)
         html lang="en" {
@@ -19,10 +24,11 @@ pub(crate) fn html(document: &Document, face: bool) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 meta name="generator" content={ "seafix-report " (env!("CARGO_PKG_VERSION")) };
+                meta name=(FORMS) content=(forms.words());
                 // Without an icon of its own a browser asks the server for one.
                 link rel="icon" href="data:,";
                 title { (plain(&document.title)) }
-                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(font(face))) (PreEscaped(svg::style())) }
+                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(font(!forms.small))) (PreEscaped(svg::style())) }
             }
             body {
                 header {

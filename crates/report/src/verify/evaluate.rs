@@ -284,7 +284,8 @@ fn inside(region: Region, row: &TargetRecord) -> bool {
 
 /// A share of attempts in percent, or an end of its interval.
 fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
-    let group = group.strip_suffix(" of attempted")?;
+    let fixes = group.strip_suffix(" of fixes");
+    let group = fixes.or_else(|| group.strip_suffix(" of attempted"))?;
     let all = || logs.iter().flat_map(|log| rows(log, span));
     let trajectory = logs.iter().any(|log| share::is_trajectory(&log.header));
     let thinned = logs.iter().any(|log| log.totals.as_ref().is_some_and(|totals| totals.every > 1));
@@ -298,6 +299,10 @@ fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log])
     };
     if let Some((field, bound)) = group.split_once("<=") {
         let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
+        if fixes.is_some() {
+            let own = all().filter(|row| row.0.outcome == Outcome::Referenced);
+            return Some(known(own.filter_map(|row| field.of(&row.0)).map(|value| value <= bound).collect()));
+        }
         return Some(known(all().map(|row| error(&row.0, field) <= bound).collect()));
     }
     if which != "percent" && trajectory && !thinned {

@@ -3,9 +3,17 @@
 mod evaluate;
 mod logs;
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
-use crate::{Forms, Key, Number, ReportError, Summary, run::Run, write::files};
+use crate::{
+    Forms, Key, Number, ReportError, Summary,
+    print::FORMS,
+    run::Run,
+    write::{files, strays},
+};
 use evaluate::evaluate;
 use logs::Logs;
 
@@ -16,8 +24,14 @@ pub struct Verified {
     pub numbers: usize,
     /// Those that are printed otherwise.
     pub mismatches: Vec<Mismatch>,
-    /// Files that differ from those that the logs make, numbers or not.
+    /// Files that the logs make.
+    pub files: usize,
+    /// Those of them that are not there.
+    pub missing: Vec<String>,
+    /// Those of them that are there and differ, by numbers or not.
     pub changed: Vec<String>,
+    /// Figures and tables that the logs do not make.
+    pub strays: Vec<String>,
 }
 
 /// A number that is not what the logs say.
@@ -36,7 +50,8 @@ pub struct Mismatch {
 impl Verified {
     /// Whether the report says what the logs say.
     pub fn holds(&self) -> bool {
-        self.mismatches.is_empty() && self.changed.is_empty()
+        let whole = self.missing.is_empty() && self.changed.is_empty() && self.strays.is_empty();
+        whole && self.mismatches.is_empty()
     }
 }
 
@@ -54,16 +69,22 @@ pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
         let path = folder.join(name);
         fs::read(&path).map_err(|source| ReportError::Io { doing: "read", path, source })
     };
-    let page = "report.html";
-    for (key, printed) in of_page(&String::from_utf8_lossy(&read(page)?)) {
-        verified.check(page, &key, &printed, &mut logs)?;
+    let name = "report.html";
+    let page = String::from_utf8_lossy(&read(name)?).into_owned();
+    for (key, printed) in of_page(&page) {
+        verified.check(name, &key, &printed, &mut logs)?;
     }
     let run = Run::read(run_dir)?;
     let summary = Summary::of(&run);
-    let exists = |name: &str| folder.join(name).exists();
-    let forms = Forms { html: true, latex: exists("report.tex"), pdf: exists("report.pdf"), small: !exists("run.bib") };
-    for (name, bytes) in files(&run, &summary, forms)? {
-        let there = read(&name).unwrap_or_default();
+    let made = files(&run, &summary, forms(&page))?;
+    verified.files = made.len();
+    let name_of = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).display().to_string();
+    verified.strays = strays(folder, &made).into_iter().map(name_of).collect();
+    for (name, bytes) in made {
+        let Ok(there) = read(&name) else {
+            verified.missing.push(name);
+            continue;
+        };
         if name.ends_with(".json") {
             for (key, printed) in of_table(&there) {
                 verified.check(&name, &key, &printed, &mut logs)?;
@@ -92,6 +113,13 @@ impl Verified {
         }
         Ok(())
     }
+}
+
+/// The forms with which a page says that it was written; all, where it does not say.
+fn forms(page: &str) -> Forms {
+    let told =
+        page.split_once(&format!("<meta name=\"{FORMS}\" content=\"")).and_then(|(_, rest)| rest.split_once('"'));
+    told.map_or(Forms::ALL, |(words, _)| Forms::of_words(words))
 }
 
 /// A value as it would be printed.

@@ -48,5 +48,6 @@ fn runs_of_other_data_are_refused() {
         }
         other => panic!("{other:?}"),
     }
-    assert!(compare(&runs, true, None).is_ok());
+    let forced = compare(&runs, true, None).unwrap().table;
+    assert!(forced.contains("a and b saw different data: seeds: experiment 1 against experiment 2."), "{forced}");
 }

@@ -46,6 +46,48 @@ fn a_changed_digit_is_found() {
     assert_eq!(verified.changed, ["report.html"]);
 }
 
+/// The folder and the ending of a file, and those at the top by themselves.
+fn kind(name: &str) -> String {
+    name.rsplit_once('/')
+        .map_or(name.to_owned(), |(folder, file)| format!("{folder}{}", file.rsplit('.').next().unwrap()))
+}
+
+/// Of every file of a report it is noticed that it is gone, changed or not its own, each by its name.
+#[test]
+fn every_file_is_missed_and_a_strange_one_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for forms in [Forms::ALL, Forms { latex: false, ..Forms::ALL }, Forms::SMALL] {
+        made(folder.path());
+        let report_of = folder.path().join("report");
+        fs::remove_dir_all(&report_of).unwrap();
+        report(folder.path(), &report_of, forms).unwrap();
+        let verified = verify(folder.path(), &report_of).unwrap();
+        assert!(verified.holds() && verified.files > 5, "{forms:?}: {verified:#?}");
+        let mut names = Vec::new();
+        for part in ["", "tables", "figures"] {
+            let Ok(entries) = fs::read_dir(report_of.join(part)) else { continue };
+            let entries = entries.flatten().map(|entry| entry.path()).filter(|path| path.is_file());
+            names.extend(entries.map(|path| path.strip_prefix(&report_of).unwrap().display().to_string()));
+        }
+        assert_eq!(names.len(), verified.files);
+        // The page itself says which others there are. One file of each kind is tried.
+        names.sort_by_key(|name| kind(name));
+        names.dedup_by_key(|name| kind(name));
+        for name in names.iter().filter(|name| *name != "report.html") {
+            let path = report_of.join(name);
+            let bytes = fs::read(&path).unwrap();
+            fs::remove_file(&path).unwrap();
+            assert_eq!(verify(folder.path(), &report_of).unwrap().missing, [name.as_str()], "{forms:?}");
+            fs::write(&path, b"0").unwrap();
+            assert_eq!(verify(folder.path(), &report_of).unwrap().changed, [name.as_str()], "{forms:?}");
+            fs::write(&path, bytes).unwrap();
+        }
+        fs::write(report_of.join("tables/more.csv"), b"0").unwrap();
+        let verified = verify(folder.path(), &report_of).unwrap();
+        assert!(!verified.holds() && verified.strays == ["tables/more.csv"], "{verified:#?}");
+    }
+}
+
 #[test]
 fn another_log_is_noticed() {
     let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());

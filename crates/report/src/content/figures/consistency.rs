@@ -1,11 +1,13 @@
 //! Whether covariances are honest.
 
-use super::{caption, figure};
+use super::{caption, distinct, figure};
 use crate::{
-    Field, Number,
+    Field, Number, Summary,
+    content::tell,
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
-    run::Run,
+    run::{Run, Trial},
+    share,
 };
 
 /// Width of a column of the histogram, and where it ends.
@@ -38,11 +40,7 @@ pub(super) fn histogram(run: &Run) -> Option<Figure> {
         columns.push([from, to, height]);
         let last = if index == COLUMNS - 1 { f64::INFINITY } else { to };
         let what = |name: &str| {
-            crate::content::tell::over(
-                &trials,
-                "/metrics/evaluation",
-                format!("{name} nees from {from} to {last} of found"),
-            )
+            tell::over(&trials, "/metrics/evaluation", format!("{name} nees from {from} to {last} of found"))
         };
         data.line(
             false,
@@ -67,4 +65,107 @@ pub(super) fn histogram(run: &Run) -> Option<Figure> {
         "Normalised error squared of {n} fixes found, of all trials: the curve is where an honest covariance puts it. The last column holds all beyond."
     );
     figure("nees", caption(&said, run), &chart, data)
+}
+
+/// The confidences at which bounds are tried (%).
+const LEVELS: [f64; 14] = [5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9];
+/// Fewer fixes say nothing of a share.
+const FEWEST: usize = 20;
+/// More lines than this hide each other: then all trials are one.
+const LINES: usize = 7;
+
+/// The share of fixes, wrong ones among them, that err by less than the bound of each confidence; on the diagonal where the
+/// covariance is honest, above it where it is too large.
+pub(super) fn coverage(run: &Run) -> Option<Figure> {
+    // Of a thinned log all failures are there and few of the others.
+    if run.trials.iter().any(|trial| trial.every() > 1) {
+        return None;
+    }
+    let mut names = distinct(run.trials.iter().map(|trial| Summary::name(run, trial)));
+    let apart = names.len() <= LINES;
+    if !apart {
+        names = vec!["all trials".to_owned()];
+    }
+    let heads = [Head::words("series"), Head::numbers("confidence (%)"), Head::numbers("NEES below")];
+    let heads = heads.into_iter().chain(["fixes within (%)", "low (%)", "high (%)"].map(Head::numbers));
+    let mut data = Table::new("coverage", text!["Every point of the curve of coverage."], heads.collect());
+    let (mut bands, mut lines, mut n) = (Vec::new(), Vec::new(), 0);
+    for (series, name) in names.iter().enumerate() {
+        let own = |trial: &&Trial| !apart || Summary::name(run, trial) == *name;
+        let trials: Vec<&Trial> = run.trials.iter().filter(own).collect();
+        let rows = trials.iter().flat_map(|trial| trial.attempts()).filter(|(_, row)| row.found() || row.wrong());
+        let nees: Vec<f64> = rows.filter_map(|(_, row)| row.get(Field::Nees)).collect();
+        if nees.len() < FEWEST {
+            continue;
+        }
+        n += nees.len();
+        let trajectory = trials.iter().any(|trial| share::is_trajectory(&trial.header));
+        let (mut line, mut band) = (Vec::new(), Vec::new());
+        for level in LEVELS {
+            // As printed: the key is computed again from it.
+            let bound = (quantile(level / 100.0) * 1e4).round() / 1e4;
+            let events: Vec<bool> = nees.iter().map(|nees| *nees <= bound).collect();
+            let within = 100.0 * events.iter().filter(|event| **event).count() as f64 / events.len() as f64;
+            let (low, high) = share::interval(trajectory, &events);
+            let [low, high] = [low, high].map(|share| 100.0 * share);
+            line.push([level, within]);
+            band.push([level, low, high]);
+            let told = |(what, value): (&str, f64)| {
+                let what = format!("{what} nees<={bound} of fixes");
+                Number::new(Some(value), 2, tell::over(&trials, "/metrics/evaluation", what)).into()
+            };
+            let mut cells = vec![name.clone().into(), level.to_string().into(), bound.to_string().into()];
+            cells.extend([("percent", within), ("low", low), ("high", high)].map(told));
+            data.line(false, cells);
+        }
+        bands.push(Layer::Band { series, values: band });
+        lines.push(Layer::Line { series, points: line });
+    }
+    if lines.is_empty() {
+        return None;
+    }
+    let banded = bands.len() <= 2;
+    let mut layers = if banded { bands } else { Vec::new() };
+    layers.push(Layer::Rule { points: vec![[0.0, 0.0], [100.0, 100.0]], dash: 2 });
+    layers.extend(lines);
+    let panel = Panel {
+        x: Axis::linear("confidence (%)").within([0.0, 100.0]),
+        y: Axis::linear("fixes within (%)").within([0.0, 104.0]),
+        layers,
+        ..Panel::default()
+    };
+    let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index));
+    let legend = if names.len() > 1 { legend.collect() } else { Vec::new() };
+    let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.8, legend };
+    let called = share::called(run.trials.iter().map(|trial| &trial.header));
+    let said = format!(
+        "Coverage: of {n} fixes, wrong ones among them, the share whose error is within the bound of each confidence by their own covariance{}. On the dashed diagonal the covariance is honest, above it too large, below it too small.",
+        if banded {
+            format!(", with {}", called.replace("intervals", "bands"))
+        } else {
+            format!("; the table has {called}")
+        }
+    );
+    figure("coverage", caption(&said, run), &chart, data)
+}
+
+/// The quantile of χ² with six degrees of freedom: its distribution is 1 − e^(−x/2) (1 + x/2 + x²/8).
+fn quantile(p: f64) -> f64 {
+    let below = |x: f64| 1.0 - (-x / 2.0).exp() * (1.0 + x / 2.0 + x * x / 8.0);
+    let (mut low, mut high) = (0.0, 100.0);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if below(middle) < p { low = middle } else { high = middle }
+    }
+    low
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        for (p, x) in [(0.5, 5.3481), (0.9, 10.6446), (0.95, 12.5916), (0.99, 16.8119)] {
+            assert!((super::quantile(p) - x).abs() < 1e-4, "{p}");
+        }
+    }
 }

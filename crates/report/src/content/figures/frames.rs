@@ -30,13 +30,16 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
         Table::new("error-over-frames", text!["Every point of the figure of error over frames."], heads.to_vec());
     let metrics = [(Field::M1, "m1, residual (mm)"), (Field::M2, "m2, model points (mm)")];
     let mut points = vec![vec![Vec::new(); names.len()]; 2];
+    // What errs alike in a frame stands side by side.
+    let aside = |index: usize| 0.6 * ((index as f64 + 0.5) / names.len() as f64 - 0.5);
     for trial in &run.trials {
         let index = series(&names, &Summary::name(run, trial));
         for (frame, row) in trial.attempts() {
             let place = (trial.object(row), frame.number, frame.stamp_ns);
             let told = |field| tell::value(trial, place, field, row.get(field), (Unit::Millimetres, 3));
             for (of, (field, _)) in metrics.iter().enumerate() {
-                points[of][index].extend(row.get(*field).map(|value| [frame.number as f64, value * 1e3]));
+                points[of][index]
+                    .extend(row.get(*field).map(|value| [frame.number as f64 + aside(index), value * 1e3]));
             }
             let at = tell::frame(trial, frame.number, frame.stamp_ns);
             let object = trial.object(row).to_owned();

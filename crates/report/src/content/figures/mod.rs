@@ -37,6 +37,7 @@ pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
         grid::figure(run, summary),
         way::figure(run),
         consistency::histogram(run),
+        consistency::coverage(run),
     ]
     .into_iter()
     .flatten()

@@ -16,9 +16,18 @@ const THRESHOLDS: [f64; 25] = [
     8.8388, 10.5112, 12.5, 14.865, 17.6777, 21.0224, 25.0, 29.7302, 35.3553, 42.0448, 50.0,
 ];
 
+/// So many bands can be told apart.
+const BANDS: usize = 3;
+
 /// Recall over the error m2, with 95 % bands; refused and wrong attempts are never below any bound.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
-    let groups = panels(run, 6);
+    let mut groups = panels(run, 6);
+    // More bands than a few in one panel hide each other.
+    if let [(_, members)] = &groups[..]
+        && members.len() > BANDS
+    {
+        groups = members.iter().map(|member| (member.0.clone(), vec![member.clone()])).collect();
+    }
     let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
     if names.len() > 7 {
         return None;

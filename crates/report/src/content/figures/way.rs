@@ -9,15 +9,23 @@ use crate::{
     figure::{Axis, Chart, Entry, Layer, Panel},
     place::matrix,
     run::Run,
+    share,
 };
+
+/// Of more frames than this some are left out: their places would lie on each other.
+const PLACES: usize = 1000;
 
 /// From above and from the side: truth, fixes, what was carried between them, feature points and the boxes around the objects; of the first trial.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
     let trial = &run.trials[0];
-    let truth: Vec<[f64; 3]> = trial.sample().take(3000).filter_map(|frame| frame.truth).collect();
-    let fixes: Vec<(u64, u64, String, [f64; 3])> = trial
-        .attempts()
-        .take(3000)
+    if !share::is_trajectory(&trial.header) {
+        return None;
+    }
+    let every = trial.sample().count().div_ceil(PLACES).max(1);
+    let frames = || trial.sample().step_by(every);
+    let truth: Vec<[f64; 3]> = frames().filter_map(|frame| frame.truth).collect();
+    let fixes: Vec<(u64, u64, String, [f64; 3])> = frames()
+        .flat_map(|frame| trial.attempts_of(frame).map(move |row| (frame, row)))
         .filter(|(_, row)| row.found() && row.estimate[0].is_finite())
         .map(|(frame, row)| (frame.number, frame.stamp_ns, trial.object(row).to_owned(), row.estimate))
         .collect();
@@ -26,7 +34,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
         return None;
     }
     // What a navigator carried, where there is one: by its fixes, and the first fix by odometry alone.
-    let sailed = || trial.sample().take(3000).filter_map(|frame| Some((frame, frame.sailed.as_ref()?)));
+    let sailed = || frames().filter_map(|frame| Some((frame, frame.sailed.as_ref()?)));
     let sails = sailed().next().is_some();
     let carried = |which: usize| {
         let places = sailed().map(move |(frame, sailed)| (frame, sailed.places[which]));
@@ -35,7 +43,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     let heads = [Head::words("what"), Head::words("name"), Head::numbers("frame")];
     let heads = heads.into_iter().chain(["north (m)", "east (m)", "down (m)"].map(Head::numbers));
     let mut data = Table::new("way", text!["Every place of the figure of the way."], heads.collect());
-    for (frame, at) in trial.sample().take(3000).filter_map(|frame| Some((frame, frame.truth?))) {
+    for (frame, at) in frames().filter_map(|frame| Some((frame, frame.truth?))) {
         data.line(false, line(trial, "truth", "", (frame.number, frame.stamp_ns), at));
     }
     for (which, what) in ["navigated", "odometry"].into_iter().enumerate() {
@@ -89,8 +97,9 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
         legend,
     };
     let said = format!(
-        "The way from above and from the side, equal scales: the true places of the left camera, those by the fixes found and the survey,{} the feature points and the min–max shells of their objects. Log {}.",
+        "The way from above and from the side, equal scales: the true places of the left camera, those by the fixes found and the survey,{} the feature points and the min–max shells of their objects. {}Log {}.",
         if sails { " the way that was navigated and the first fix carried on by odometry alone," } else { "" },
+        if every > 1 { format!("One frame in {every} is drawn. ") } else { String::new() },
         trial.file()
     );
     super::figure("way", caption(&said, run), &chart, data)
