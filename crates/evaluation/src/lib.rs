@@ -6,9 +6,11 @@ mod bound;
 mod fix;
 mod solved;
 mod statistics;
+mod surface;
 pub mod trajectory;
 
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
 pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
 pub use solved::Solved;
 pub use statistics::{Bootstrap, SignedRank, clopper_pearson, holm, mcnemar, median, quantile, signed_rank};
+pub use surface::{mean_distance, mean_nearest_distance, symmetric_distance};

@@ -1,0 +1,81 @@
+//! Errors of a fix as the benchmarks of object poses measure them, with E as for m2: how far points of the object's surface
+//! are from where they should be. An object that looks the same from several sides has several right poses.
+
+use seafix_geometry::{Camera, Object, Point, Transform};
+
+/// ADD: the mean of ‖E·p − p‖ over the points (m). `None` without points.
+///
+/// Source: Hinterstoisser et al., *Model based training, detection and pose estimation of texture-less 3D objects in heavily
+/// cluttered scenes*, ACCV 2012.
+pub fn mean_distance(
+    estimate: &Transform<Object, Camera>,
+    truth: &Transform<Object, Camera>,
+    points: &[Point<Object>],
+) -> Option<f64> {
+    let e = *estimate * truth.inverse();
+    mean(points.iter().map(|p| (e * *p).distance(p)))
+}
+
+/// ADI: the mean of min_q ‖E·p − q‖ over the points p, q any of them (m): what an object's symmetries exchange is no error.
+/// `None` without points. (Hinterstoisser et al.)
+pub fn mean_nearest_distance(
+    estimate: &Transform<Object, Camera>,
+    truth: &Transform<Object, Camera>,
+    points: &[Point<Object>],
+) -> Option<f64> {
+    let e = *estimate * truth.inverse();
+    let nearest = |p: &Point<Object>| {
+        let at = e * *p;
+        points.iter().map(|q| at.distance(q)).fold(f64::INFINITY, f64::min)
+    };
+    mean(points.iter().map(nearest))
+}
+
+/// MSSD: the least over the symmetries S, the identity among them, of the greatest ‖E·S·p − p‖ over the points (m).
+/// `symmetries` holds the others: motions that the object looks the same after. `None` without points.
+///
+/// Source: Hodaň et al., *BOP challenge 2020 on 6D object localization*, ECCV workshops 2020.
+pub fn symmetric_distance(
+    estimate: &Transform<Object, Camera>,
+    truth: &Transform<Object, Camera>,
+    points: &[Point<Object>],
+    symmetries: &[Transform<Object, Object>],
+) -> Option<f64> {
+    let e = *estimate * truth.inverse();
+    let greatest =
+        |moved: Transform<Object, Object>| points.iter().map(|p| (moved * *p).distance(p)).fold(0.0, f64::max);
+    let plain = (!points.is_empty()).then(|| greatest(e))?;
+    Some(symmetries.iter().map(|symmetry| greatest(e * *symmetry)).fold(plain, f64::min))
+}
+
+fn mean(distances: impl Iterator<Item = f64>) -> Option<f64> {
+    let (n, sum) = distances.fold((0_usize, 0.0), |(n, sum), d| (n + 1, sum + d));
+    (n > 0).then(|| sum / n as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use seafix_geometry::so3;
+
+    use super::*;
+
+    #[test]
+    fn a_square_turned_by_a_quarter_is_wrong_only_where_that_is_no_symmetry() {
+        let points = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]| Point::new(x, y, 0.0));
+        let truth = Transform::<Object, Camera>::identity();
+        let quarter = Transform::<Object, Object>::new(
+            so3::exp(&Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2)),
+            Vector3::zeros(),
+        );
+        let estimate = quarter * truth;
+        // Each corner is a side, 2 m, from its own place, and on another's.
+        assert!((mean_distance(&estimate, &truth, &points).unwrap() - 2.0).abs() < 1e-12);
+        assert!(mean_nearest_distance(&estimate, &truth, &points).unwrap() < 1e-12);
+        assert!((symmetric_distance(&estimate, &truth, &points, &[]).unwrap() - 2.0).abs() < 1e-12);
+        assert!(symmetric_distance(&estimate, &truth, &points, &[quarter.inverse()]).unwrap() < 1e-12);
+        assert_eq!(symmetric_distance(&estimate, &truth, &[], &[quarter]), None);
+        assert_eq!(mean_distance(&estimate, &truth, &[]), None);
+        assert_eq!(mean_nearest_distance(&estimate, &truth, &[]), None);
+    }
+}
