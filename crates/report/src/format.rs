@@ -1,5 +1,13 @@
 //! Numbers and names as people read them.
 
+/// The value of an axis as it can stand alone: a number with what it is.
+pub(crate) fn condition(axis: &seafix_log::Axis) -> String {
+    match axis.value.parse::<f64>() {
+        Ok(_) => format!("{} {}", short(&axis.key), axis.value),
+        Err(_) => axis.value.clone(),
+    }
+}
+
 /// The last part of a dotted key: `source.distance` is the distance, `pipeline.tolerance.fixed` the tolerance.
 pub(crate) fn short(key: &str) -> &str {
     let kind = [".fixed", ".sigmas"].into_iter().find_map(|kind| key.strip_suffix(kind));

@@ -92,7 +92,7 @@ pub(crate) fn names(run: &Run, members: &[usize]) -> (String, Vec<String>) {
         }
     }
     let name = |&index: &usize| {
-        let values: Vec<String> = differing.iter().map(|&place| axes(index)[place].value.clone()).collect();
+        let values: Vec<String> = differing.iter().map(|&place| format::condition(&axes(index)[place])).collect();
         if values.is_empty() { run.trials[index].method().join(" + ") } else { values.join(", ") }
     };
     (shared.join(", "), members.iter().map(name).collect())

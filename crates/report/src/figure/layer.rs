@@ -15,6 +15,8 @@ pub(crate) enum Layer {
     Spans { series: usize, values: Vec<[f64; 3]> },
     /// An area between two lines (x, low, high).
     Band { series: usize, values: Vec<[f64; 3]> },
+    /// The two lines around such an area (x, low, high).
+    Edges { series: usize, values: Vec<[f64; 3]> },
     /// A shaded range of the ordinate over the whole width, and what it is.
     Range { from: f64, to: f64, note: String },
     /// A thin grey line and what it is, said at its end.
@@ -61,7 +63,7 @@ impl Layer {
     pub(crate) fn reach(&self) -> Box<dyn Iterator<Item = [f64; 2]> + '_> {
         match self {
             Self::Line { points, .. } | Self::Marks { points, .. } => Box::new(points.iter().copied()),
-            Self::Whiskers { values, .. } | Self::Band { values, .. } => {
+            Self::Whiskers { values, .. } | Self::Band { values, .. } | Self::Edges { values, .. } => {
                 Box::new(values.iter().flat_map(|[x, low, high]| [[*x, *low], [*x, *high]]))
             }
             Self::Spans { values, .. } => Box::new(values.iter().flat_map(|[y, low, high]| [[*low, *y], [*high, *y]])),
@@ -102,6 +104,12 @@ impl Layer {
                 let lower = values.iter().rev().map(|&[at, low, _]| place([at, low]));
                 drawing.area(upper.chain(lower).collect(), Ink::Light(*series));
             }
+            Self::Edges { series, values } => {
+                for end in [1, 2] {
+                    let edge = values.iter().map(|value| place([value[0], value[end]]));
+                    drawing.line(edge, Stroke { width: 0.45, ..stroke(*series) });
+                }
+            }
             Self::Range { from, to, note } => {
                 let ([left, right], [low, high]) = (x.interval(), [y.at(*from), y.at(*to)]);
                 drawing.rectangle([left, high], [right - left, low - high], Some(Ink::Band), None);
@@ -110,8 +118,9 @@ impl Layer {
             Self::Guide { points, note, dash } => {
                 let seen: Vec<_> = points.iter().filter(|p| y.holds(p[1]) && x.holds(p[0])).copied().collect();
                 drawing.line(seen.iter().copied().map(place), Stroke { ink: Ink::Minor, width: 0.7, dash: *dash });
-                if let Some(&last) = seen.last() {
-                    let [a, b] = place(last);
+                // Before its end: there stand the bars of the last place.
+                if let Some(&near) = seen.get((7 * seen.len() / 8).min(seen.len().saturating_sub(1))) {
+                    let [a, b] = place(near);
                     drawing.words([a - 2.0, b - 3.0], Anchor::End, Ink::Minor, note.clone());
                 }
             }

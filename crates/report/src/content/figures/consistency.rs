@@ -118,14 +118,17 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
             cells.extend([("percent", within), ("low", low), ("high", high)].map(told));
             data.line(false, cells);
         }
-        bands.push(Layer::Band { series, values: band });
+        bands.push((series, band));
         lines.push(Layer::Line { series, points: line });
     }
     if lines.is_empty() {
         return None;
     }
-    let banded = bands.len() <= 2;
-    let mut layers = if banded { bands } else { Vec::new() };
+    let banded = bands.len() <= 3;
+    let band = |(series, values)| {
+        if names.len() == 1 { Layer::Band { series, values } } else { Layer::Edges { series, values } }
+    };
+    let mut layers: Vec<Layer> = if banded { bands.into_iter().map(band).collect() } else { Vec::new() };
     layers.push(Layer::Rule { points: vec![[0.0, 0.0], [100.0, 100.0]], dash: 2 });
     layers.extend(lines);
     let panel = Panel {

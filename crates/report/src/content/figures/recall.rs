@@ -16,7 +16,7 @@ const THRESHOLDS: [f64; 25] = [
     8.8388, 10.5112, 12.5, 14.865, 17.6777, 21.0224, 25.0, 29.7302, 35.3553, 42.0448, 50.0,
 ];
 
-/// So many bands can be told apart.
+/// So many lines between their bands can be told apart.
 const BANDS: usize = 3;
 
 /// Recall over the error m2, with 95 % bands; refused and wrong attempts are never below any bound.
@@ -63,8 +63,13 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
                 cells.extend([("percent", share), ("low", low), ("high", high)].map(told));
                 data.line(false, cells);
             }
-            bands.push(Layer::Band { series: series(&names, name), values: band });
-            lines.push(Layer::Line { series: series(&names, name), points: line });
+            // Areas of several would hide each other.
+            let series = series(&names, name);
+            bands.push(match members.len() {
+                1 => Layer::Band { series, values: band },
+                _ => Layer::Edges { series, values: band },
+            });
+            lines.push(Layer::Line { series, points: line });
         }
         bands.extend(lines);
         drawn.push(Panel {

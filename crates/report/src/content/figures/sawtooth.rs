@@ -5,22 +5,13 @@ use crate::{
     content::tell::{self, Unit},
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
-    format::short,
+    format::condition,
     run::{Run, Trial},
     sailed::{Counted, Sailed},
 };
 
 /// At most so many trials, one above the other.
 const PANELS: usize = 4;
-
-/// The conditions of a trial; a number with what it is.
-fn title(trial: &Trial) -> String {
-    let axis = |axis: &seafix_log::Axis| match axis.value.parse::<f64>() {
-        Ok(_) => format!("{} {}", short(&axis.key), axis.value),
-        Err(_) => axis.value.clone(),
-    };
-    trial.header.axes.iter().map(axis).collect::<Vec<_>>().join(", ")
-}
 
 /// Error of the camera's position over time: navigated, and the first fix carried by odometry alone; a mark at every fix.
 /// The gaps are stretches without a pose.
@@ -75,7 +66,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         // Where nearly every frame has a fix, marks would hide the line.
         layers.extend(few.then_some(Layer::Marks { series: 2, points: fixes, radius: 1.8 }));
         panels.push(Panel {
-            title: title(trial),
+            title: trial.header.axes.iter().map(condition).collect::<Vec<_>>().join(", "),
             x: Axis::linear("time (s)"),
             y: Axis::logarithmic("m3 (mm)"),
             layers,
