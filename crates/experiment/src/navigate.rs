@@ -8,7 +8,7 @@ use seafix_geometry::{Covariance6, Object, StereoRig};
 use seafix_log::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 use seafix_navigation::{
     Considered, Event, FUSIONS, Fusion, Navigated, Navigator, Network, ODOMETRIES, Odometry, Outcome as Followed,
-    POLICIES, Place, Policy, Reckoning, Standing, State, StereoPair,
+    POLICIES, Place, Policy, Reckoning, Standing, StereoPair,
 };
 use seafix_referencing::{Outcome, Prior, PriorBound, Target};
 use seafix_vision::Threads;
@@ -200,9 +200,14 @@ impl<'a> Voyage<'a> {
         let rough = sight.rough(self.targets);
         let priors = self.priors(&rough);
         let in_view = || self.targets.iter().zip(&priors).any(|(target, prior)| Stages::shows(target, prior, self.rig));
-        let in_view = here && in_view();
-        let due = here && self.navigator.due(in_view);
-        let sighting = match due {
+        let due = match here {
+            true => self.navigator.due(in_view()),
+            false => {
+                let ago = self.last.map_or(0.0, |(stamp_ns, _)| (sight.stamp_ns - stamp_ns) as f64 * 1e-9);
+                self.navigator.blind(ago, in_view())
+            }
+        };
+        let sighting = match here && due {
             true => self.look(sight, &priors, &rough, rng),
             false => Sighting::default(),
         };
@@ -214,7 +219,7 @@ impl<'a> Voyage<'a> {
         let pose = self.navigator.pose().filter(|_| here).cloned();
         let unreferenced = self.unreferenced.clone().filter(|_| here);
         let record = NavigationRecord {
-            state: (if here { self.navigator.state() } else { State::Rough }).to_string(),
+            state: self.navigator.state().to_string(),
             due,
             pose: pose.as_ref().map(|pose| self.record(pose)),
             unreferenced: unreferenced.as_ref().map(|pose| self.record(pose)),
@@ -290,7 +295,9 @@ impl<'a> Voyage<'a> {
                 .considering(Considered::of_model(attempt.target, shares));
             let fix = Navigated { object: attempt.target, standing };
             let event = self.navigator.fix(&fix);
-            if matches!(event, Event::Taken | Event::Left | Event::Relocated) {
+            // What is laid by an object that may have been moved would stand where it does not.
+            let sure = !self.navigator.is_disputed(attempt.target);
+            if sure && matches!(event, Event::Taken | Event::Left | Event::Relocated) {
                 taken.push(fix.clone());
             }
             match event {
@@ -298,6 +305,12 @@ impl<'a> Voyage<'a> {
                 Event::Left => events.push(format!("fix at {name} left: the last one, carried here, is better known")),
                 Event::Doubted(why) => events.push(format!("fix at {name} doubted: {why}")),
                 Event::Relocated => events.push(format!("fixes at {name} overrule what was known")),
+                Event::Disputed { objects, metres } => {
+                    let [one, other] = objects.map(|object| &self.targets[object].name);
+                    events.push(format!(
+                        "{one} or {other} stands {metres:.3} m from its place, one of the two; a third object will tell which"
+                    ));
+                }
                 Event::Displaced(found) => {
                     let shift = found.old_from_new.translation().norm();
                     events.push(format!("{} stands {shift:.3} m from its place", self.targets[found.object].name));

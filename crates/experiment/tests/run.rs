@@ -106,6 +106,24 @@ fn a_pose_is_carried_between_fixes() {
     assert_eq!(log, logs(folder.path(), VOYAGE, &[], 1).remove(0));
 }
 
+/// Black images where a fix is due: the pose stays known and waits, the frame says that it had no data, and the log how the
+/// state went on.
+///
+/// Seen to fail when a frame without a motion is called rough and not due.
+#[test]
+fn images_that_tell_nothing_leave_the_pose_known() {
+    let folder = TempDir::new().unwrap();
+    let dark = "source.faults=[{ device = 'images', kind = 'off', from = 30.9, to = 31.1, amount = 0.0 }]";
+    let log = logs(folder.path(), VOYAGE, &[dark], 2).remove(0);
+    let states: Vec<&str> = log.frames.iter().map(|frame| &*frame.navigation.as_ref().unwrap().state).collect();
+    assert_eq!(states, ["referenced", "dead reckoning", "dead reckoning", "dead reckoning", "referenced"]);
+    let black = &log.frames[3];
+    let known = black.navigation.as_ref().unwrap();
+    assert_eq!((&*black.targets[0].reason, known.due, &known.pose), ("no-data", true, &None), "{known:#?}");
+    let events: Vec<&String> = log.frames.iter().flat_map(|frame| &frame.navigation.as_ref().unwrap().events).collect();
+    assert!(events.iter().all(|event| !event.contains("→ rough")), "{events:#?}");
+}
+
 #[test]
 fn settings_of_navigation_are_checked() {
     let folder = TempDir::new().unwrap();

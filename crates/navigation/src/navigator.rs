@@ -45,7 +45,15 @@ pub enum Event {
     Doubted(Contradiction),
     /// It and those before it agree with each other and not with what was known of the same object.
     Relocated,
-    /// An object does not stand where the site says; from now on it stands where it was found.
+    /// It and those before it agree with each other, and not with another object: one of the two does not stand where the site
+    /// says, and no third has told yet which. Neither is moved.
+    Disputed {
+        /// The two.
+        objects: [usize; 2],
+        /// How far the second stands from its place if the first stands right (m).
+        metres: f64,
+    },
+    /// An object does not stand where the site says; from now on it stands where it was found. The fix is taken.
     Displaced(Box<Displacement>),
 }
 
@@ -83,6 +91,25 @@ struct Doubt {
     votes: usize,
 }
 
+/// Two objects of which one stands elsewhere than was believed.
+#[derive(Debug, Clone)]
+struct Dispute {
+    objects: [usize; 2],
+    /// Where each stands if it is the one that was moved.
+    moved: [Place; 2],
+}
+
+impl Dispute {
+    fn is_of(&self, a: usize, b: usize) -> bool {
+        self.objects == [a, b] || self.objects == [b, a]
+    }
+
+    /// Which of its two `object` is.
+    fn side(&self, object: usize) -> Option<usize> {
+        self.objects.iter().position(|&one| one == object)
+    }
+}
+
 /// Carries the last fix along, asks for the next, and joins it with what is known.
 #[derive(Debug)]
 pub struct Navigator<'a> {
@@ -92,8 +119,9 @@ pub struct Navigator<'a> {
     names: Vec<String>,
     known: Option<Navigated>,
     doubts: Vec<Option<Doubt>>,
-    /// With how many other objects each has agreed.
+    /// With which other objects each has agreed.
     agreed: Vec<Vec<usize>>,
+    disputes: Vec<Dispute>,
     state: State,
     seconds: f64,
     fixed_at: f64,
@@ -113,6 +141,7 @@ impl<'a> Navigator<'a> {
             known: None,
             doubts: vec![None; n],
             agreed: vec![Vec::new(); n],
+            disputes: Vec::new(),
             state: State::Rough,
             seconds: 0.0,
             fixed_at: f64::NEG_INFINITY,
@@ -143,9 +172,15 @@ impl<'a> Navigator<'a> {
         self.known.as_ref()
     }
 
-    /// The camera relative to any object of the site, by the site model.
+    /// The camera relative to any object of the site, by the site model; between two objects of which one was moved, by what
+    /// was found of them.
     pub fn pose_at(&self, object: usize) -> Option<Navigated> {
-        self.known.as_ref().map(|known| known.passed_to(object, &self.places))
+        self.known.as_ref().map(|known| self.passed(known, object))
+    }
+
+    /// Whether it is open whether an object stands where the site says.
+    pub fn is_disputed(&self, object: usize) -> bool {
+        self.disputes.iter().any(|dispute| dispute.side(object).is_some())
     }
 
     /// Where the objects stand, as far as is known by now.
@@ -166,25 +201,52 @@ impl<'a> Navigator<'a> {
         self.metres += motion.motion.translation().norm();
         if let Some(known) = &mut self.known {
             *known = known.after(motion);
-            self.turn(State::DeadReckoning, "carried along by odometry".to_owned());
+            // Whether it still searches is told when the next fix is asked for.
+            if self.state != State::Searching {
+                self.turn(State::DeadReckoning, "carried along by odometry".to_owned());
+            }
         }
         for doubt in self.doubts.iter_mut().flatten() {
             doubt.latest = doubt.latest.after(motion);
         }
     }
 
-    /// Whether a fix should be tried now; `in_view` says whether an object should be seen.
+    /// Whether a fix should be tried now; `in_view` says whether an object should be seen. It searches from then on, until a
+    /// fix is taken, none is due any more, or no object should be in view.
     pub fn due(&mut self, in_view: bool) -> bool {
+        let due = self.is_due(0.0, in_view);
+        if due && in_view {
+            self.turn(State::Searching, "a fix is due and an object should be in view".to_owned());
+        } else if self.state == State::Searching {
+            let why = if due { "no object should be in view any more" } else { "no fix is due any more" };
+            self.turn(self.carried(), why.to_owned());
+        }
+        due
+    }
+
+    /// An instant `seconds` after the last one whose images tell no motion: nothing is carried there, and nothing forgotten.
+    /// Whether a fix would have been due.
+    pub fn blind(&mut self, seconds: f64, in_view: bool) -> bool {
+        let due = self.is_due(seconds, in_view);
+        if self.state == State::Referenced || self.state == State::Searching && !(due && in_view) {
+            self.turn(self.carried(), "no motion to this instant: the last pose waits for one".to_owned());
+        }
+        due
+    }
+
+    /// Without a fix of this instant, and without looking for one.
+    fn carried(&self) -> State {
+        if self.known.is_some() { State::DeadReckoning } else { State::Rough }
+    }
+
+    /// Whether a fix is due `ahead` seconds from now.
+    fn is_due(&self, ahead: f64, in_view: bool) -> bool {
         let sigma = self.known.as_ref().map_or(f64::INFINITY, |known| {
             let position = known.standing.covariance.matrix.fixed_view::<3, 3>(3, 3).into_owned();
             position.symmetric_eigenvalues().max().max(0.0).sqrt()
         });
-        let due =
-            self.policy.due(&Situation { seconds: self.seconds - self.fixed_at, metres: self.metres, sigma, in_view });
-        if due && in_view && self.state == State::Rough {
-            self.turn(State::Searching, "a fix is due and an object should be in view".to_owned());
-        }
-        due
+        let seconds = self.seconds - self.fixed_at + ahead;
+        self.policy.due(&Situation { seconds, metres: self.metres, sigma, in_view })
     }
 
     /// A fix of one of the objects at this instant.
@@ -194,6 +256,21 @@ impl<'a> Navigator<'a> {
             self.take(fix.clone(), format!("first fix, at {}", self.names[object]));
             return Event::Taken;
         };
+        if self.disputes.iter().any(|dispute| dispute.is_of(object, known.object)) {
+            // Where each stands seen from the other is known, whichever was moved.
+            return match self.agrees(&known, fix, None) {
+                Ok(()) => {
+                    self.doubts[object] = None;
+                    self.take(fix.clone(), format!("fix at {}", self.names[object]));
+                    Event::Taken
+                }
+                Err(contradiction) => self.doubt(&known, fix, contradiction),
+            };
+        }
+        if let Some((moved, place)) = self.verdict(&known, fix) {
+            self.doubts[object] = None;
+            return self.displace(moved, place, fix);
+        }
         match self.fusion.take(&known.passed_to(object, &self.places).standing, &fix.standing) {
             Ok(pose) => {
                 if object != known.object {
@@ -240,17 +317,85 @@ impl<'a> Navigator<'a> {
             self.take(fix.clone(), why);
             return Event::Relocated;
         }
-        // Which of the two stands elsewhere? The one that no other object confirms.
-        let (moved, seen, still, by) = if self.agreed[known.object].is_empty() && !self.agreed[object].is_empty() {
-            (known.object, known, object, fix)
-        } else {
-            (object, fix, known.object, known)
+        // Where each stands if the other stands right.
+        let moved = [found(&self.places[object], fix, known), found(&self.places[known.object], known, fix)];
+        let others = |one: usize, other: usize| self.agreed[one].iter().any(|&third| third != other);
+        match (others(known.object, object), others(object, known.object)) {
+            (false, true) => self.displace(known.object, moved[0], fix),
+            (true, false) => self.displace(object, moved[1], fix),
+            // None other confirms just one of them: that the later was seen later says nothing.
+            _ => {
+                let metres = self.shift(object, &moved[1]).translation().norm();
+                let objects = [known.object, object];
+                self.disputes.retain(|dispute| !dispute.is_of(object, known.object));
+                self.disputes.push(Dispute { objects, moved });
+                for [one, other] in [objects, [objects[1], objects[0]]] {
+                    self.agreed[one].retain(|&third| third != other);
+                }
+                let names = objects.map(|one| self.names[one].as_str());
+                let why = format!("{} or {} stands {metres:.3} m from where it was surveyed", names[0], names[1]);
+                self.take(fix.clone(), why);
+                Event::Disputed { objects, metres }
+            }
+        }
+    }
+
+    /// Which object of an open dispute was moved, and where it stands: a fix passes between one of the two and a third, and it
+    /// agrees with the survey of that one or with its having been moved, not with both.
+    fn verdict(&self, known: &Navigated, fix: &Navigated) -> Option<(usize, Place)> {
+        self.disputes.iter().find_map(|dispute| {
+            let side = match (dispute.side(known.object), dispute.side(fix.object)) {
+                (Some(side), None) | (None, Some(side)) => side,
+                _ => return None,
+            };
+            let suspect = dispute.objects[side];
+            let as_surveyed = self.agrees(known, fix, None).is_ok();
+            let as_moved = self.agrees(known, fix, Some((suspect, dispute.moved[side]))).is_ok();
+            match (as_surveyed, as_moved) {
+                (true, false) => Some((dispute.objects[1 - side], dispute.moved[1 - side])),
+                (false, true) => Some((suspect, dispute.moved[side])),
+                _ => None,
+            }
+        })
+    }
+
+    /// Whether a fix agrees with what is known, where an object stands elsewhere than was believed.
+    fn agrees(&self, known: &Navigated, fix: &Navigated, moved: Option<(usize, Place)>) -> Result<(), Contradiction> {
+        let passed = match moved {
+            None => self.passed(known, fix.object),
+            Some((object, place)) => {
+                let mut places = self.places.clone();
+                places[object] = place;
+                known.passed_to(fix.object, &places)
+            }
         };
-        let place = found(&self.places[still], by, seen);
-        let old_from_new = self.places[moved].world_from_object.inverse() * place.world_from_object;
+        self.fusion.take(&passed.standing, &fix.standing).map(drop)
+    }
+
+    /// What is known, relative to another object.
+    fn passed(&self, known: &Navigated, object: usize) -> Navigated {
+        let Some(dispute) = self.disputes.iter().find(|dispute| dispute.is_of(object, known.object)) else {
+            return known.passed_to(object, &self.places);
+        };
+        let mut places = self.places.clone();
+        if let Some(side) = dispute.side(object) {
+            places[object] = dispute.moved[side];
+        }
+        known.passed_to(object, &places)
+    }
+
+    /// From where an object was believed to stand to `place`, in its own frame.
+    fn shift(&self, object: usize, place: &Place) -> Transform<Object, Object> {
+        self.places[object].world_from_object.inverse() * place.world_from_object
+    }
+
+    /// An object stands elsewhere; the fix that told is taken.
+    fn displace(&mut self, moved: usize, place: Place, fix: &Navigated) -> Event {
+        let old_from_new = self.shift(moved, &place);
         self.places[moved] = place;
         self.agreed[moved].clear();
         self.agreed.iter_mut().for_each(|others| others.retain(|&other| other != moved));
+        self.disputes.retain(|dispute| dispute.side(moved).is_none());
         let (shift, turn) = (old_from_new.translation().norm(), so3::angle(&old_from_new.rotation()).to_degrees());
         let name = &self.names[moved];
         self.take(fix.clone(), format!("{name} stands {shift:.3} m and {turn:.2}° from where it was surveyed"));
