@@ -99,3 +99,49 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
         assert!(out.is_empty(), "{arguments:?}");
     }
 }
+
+/// Nothing is judged across a break: a way that stands still while it is lost has no error within its segments.
+///
+/// Seen to fail when comments are passed over: legs run across the break.
+#[test]
+fn breaks_are_not_crossed() {
+    let folder = walks();
+    // The estimate misses ten seconds of the helix in the middle, as an odometry that was lost.
+    let text = fs::read_to_string(folder.path().join("truth.tum")).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    lines.iter_mut().skip(25).for_each(|line| {
+        let mut words: Vec<f64> = line.split(' ').map(|word| word.parse().unwrap()).collect();
+        words[1] += 2.0;
+        *line = words.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    });
+    lines.insert(25, "# broken: the motion to here is unknown".to_owned());
+    fs::write(folder.path().join("lost.tum"), lines.join("\n") + "\n").unwrap();
+    let (code, out, warned) = eval(folder.path(), &["truth.tum", "lost.tum", "--json", "--segments", "2"]);
+    let value: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(code, 0);
+    assert!(value["rpe"]["max"].as_f64().unwrap() < 1e-9, "{value}");
+    assert_eq!(value["rpe"]["pairs"], 48, "{value}");
+    let leg = &value["segments"][0];
+    assert!(leg["translation_percent"]["mean"].as_f64().unwrap() < 1e-6 && leg["legs"].as_u64().unwrap() > 30, "{leg}");
+    assert_eq!((&value["breaks"][0]["pose"], &value["end_m"]), (&25.into(), &Value::Null));
+    assert!(warned.contains("warning: the way is broken once"), "{warned}");
+    let (_, out, _) = eval(folder.path(), &["truth.tum", "lost.tum"]);
+    assert!(out.contains("segments   2, the way is broken between them"), "{out}");
+    // What is written says so again.
+    eval(folder.path(), &["truth.tum", "lost.tum", "--out", "again.tum"]);
+    assert!(fs::read_to_string(folder.path().join("again.tum")).unwrap().contains("# broken"));
+}
+
+/// Seen to fail when nobody looks at the order of a quaternion, or of the lines.
+#[test]
+fn orders_are_not_guessed() {
+    let folder = walks();
+    walk(folder.path(), "wxyz.tum", |t| format!("{t} {t} 0 0 1 0 0 0\n"));
+    let (code, _, error) = eval(folder.path(), &["truth.tum", "wxyz.tum"]);
+    assert!(code == 3 && error.contains("w first in wxyz.tum:1") && error.lines().count() == 1, "{error}");
+    fs::write(folder.path().join("mixed.tum"), "2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").unwrap();
+    let (code, _, error) = eval(folder.path(), &["truth.tum", "mixed.tum"]);
+    assert!(code == 3 && error.contains("mixed.tum:2"), "{error}");
+    let (code, out, _) = eval(folder.path(), &["truth.tum", "mixed.tum", "--repair", "--json"]);
+    assert_eq!((code, &serde_json::from_str::<Value>(&out).unwrap()["matched"]["poses"]), (0, &2.into()));
+}

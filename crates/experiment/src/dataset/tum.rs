@@ -13,14 +13,23 @@ pub type Stamped<A, B> = (u64, Transform<A, B>);
 ///
 /// # Errors
 /// The first line that is not eight numbers, has a quaternion off unit length by more than 1e-3, or
-/// a stamp not after the one before.
+/// a stamp not after the one before; or that the quaternions seem to have w first.
 pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<A, B>>, Fault> {
+    parse_lines(text.lines().enumerate().map(|(index, line)| (index + 1, line)), file)
+}
+
+/// As [`parse`], of lines with their numbers.
+pub(crate) fn parse_lines<'a, A: Frame, B: Frame>(
+    lines: impl Iterator<Item = (usize, &'a str)>,
+    file: &Path,
+) -> Result<Vec<Stamped<A, B>>, Fault> {
     let mut poses: Vec<Stamped<A, B>> = Vec::new();
-    for (index, line) in text.lines().enumerate() {
+    let mut order = Order::default();
+    for (number, line) in lines {
         let line = line.trim();
-        let fault = |what: &str, value: &str, remedy: &str| {
-            Fault::new(what, file).on_line(index + 1).value(value).remedy(remedy)
-        };
+        let fault =
+            |what: &str, value: &str, remedy: &str| Fault::new(what, file).on_line(number).value(value).remedy(remedy);
+        order.named |= line.starts_with('#') && line.contains("qx") && line.contains("qw");
         if line.starts_with('#') && matches!((line.find("qw"), line.find("qx")), (Some(w), Some(x)) if w < x) {
             return Err(fault("quaternions with w first", line, "TUM has qx qy qz qw: reorder the columns"));
         }
@@ -59,9 +68,49 @@ pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<
         if poses.last().is_some_and(|(last, _)| *last >= stamp) {
             return Err(fault("a stamp that is not after the one before", words[0], "sort the lines by time"));
         }
+        order.see(number, line, [qx, qy, qz, qw]);
         poses.push((stamp, Transform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(tx, ty, tz))));
     }
-    Ok(poses)
+    match order.suspect() {
+        None => Ok(poses),
+        Some((number, line)) => {
+            Err(Fault::new("quaternions that seem to have w first", file).on_line(number).value(line).remedy(
+                "the order is qx qy qz qw: reorder the columns, or, if it is that, say so in a comment above, \
+                 `# seconds tx ty tz qx qy qz qw`",
+            ))
+        }
+    }
+}
+
+/// Whether quaternions seem to be written w first: in every line the first of the four is near one, and nobody says that it is
+/// x. A camera that looks down and keeps its heading may have such numbers in the right order too; its file says so in a comment.
+#[derive(Default)]
+struct Order<'a> {
+    /// Whether a comment names the columns, in the order of TUM.
+    named: bool,
+    /// The first line and its number.
+    first: Option<(usize, &'a str)>,
+    lines: usize,
+    other: bool,
+}
+
+/// Turned by no more than fifty degrees, were it w.
+const NEAR_ONE: f64 = 0.9;
+/// So few lines say nothing of an order.
+const FEW: usize = 3;
+/// What names the columns.
+pub(crate) const COLUMNS: &str = "# seconds tx ty tz qx qy qz qw\n";
+
+impl<'a> Order<'a> {
+    fn see(&mut self, number: usize, line: &'a str, quaternion: [f64; 4]) {
+        self.first.get_or_insert((number, line));
+        self.lines += 1;
+        self.other |= quaternion[0].abs() < NEAR_ONE;
+    }
+
+    fn suspect(&self) -> Option<(usize, &'a str)> {
+        self.first.filter(|_| self.lines >= FEW && !self.other && !self.named)
+    }
 }
 
 /// The first line of a TUM text that [`parse`] reads whose quaternion is off unit length by more than the rounding of
@@ -75,9 +124,12 @@ pub(super) fn normalised(text: &str) -> Option<(usize, f64)> {
     })
 }
 
-/// The TUM text of these poses; reading it back gives the same poses to the last bit but rounding.
+/// The TUM text of these poses; reading it back gives the same poses to the last bit but rounding. It names its columns where
+/// their order could be doubted.
 pub fn print<A: Frame, B: Frame>(poses: &[Stamped<A, B>]) -> String {
-    poses
+    let doubtful = poses.len() >= FEW && poses.iter().all(|(_, pose)| pose.rotation().i.abs() >= NEAR_ONE);
+    let columns = if doubtful { COLUMNS } else { "" };
+    let lines: String = poses
         .iter()
         .map(|(stamp, pose)| {
             let (t, q) = (pose.translation(), pose.rotation());
@@ -94,7 +146,8 @@ pub fn print<A: Frame, B: Frame>(poses: &[Stamped<A, B>]) -> String {
                 q.w
             )
         })
-        .collect()
+        .collect();
+    columns.to_owned() + &lines
 }
 
 /// The pose nearest in time to `stamp`, if one is within a millisecond.
@@ -126,7 +179,7 @@ pub(crate) fn between<A: Frame, B: Frame>(
 }
 
 /// Decimal seconds as nanoseconds, digit by digit: a float would lose them from 2004 on.
-pub(super) fn nanoseconds(word: &str) -> Option<u64> {
+pub(crate) fn nanoseconds(word: &str) -> Option<u64> {
     if word.contains(['e', 'E']) {
         let seconds: f64 = word.parse().ok()?;
         return (seconds.is_finite() && (0.0..1.8e10).contains(&seconds)).then(|| (seconds * 1e9).round() as u64);
@@ -166,6 +219,19 @@ mod tests {
         assert!(message("1 0 0 0 0 0 0 0\n").contains("unit length"));
         assert!(message("1 NaN 0 0 0 0 0 1\n").contains("not a finite number"));
         assert!(message("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").contains("sort the lines"));
+    }
+
+    /// Seen to fail when nobody looks at the order.
+    #[test]
+    fn w_first_is_suspected_where_no_one_says_otherwise() {
+        let walk = |q: &str| (1..5).map(|t| format!("{t} {t} 0 0 {q}\n")).collect::<String>();
+        let said = read(&walk("0.99 0.1 0 0.0995")).unwrap_err().to_string();
+        assert!(said.starts_with("quaternions that seem to have w first in truth.tum:1"), "{said}");
+        assert!(read(&walk("1 0 0 0")).is_err());
+        let down = read(&(COLUMNS.to_owned() + &walk("1 0 0 0"))).unwrap();
+        assert_eq!(read(&print(&down)).unwrap(), down);
+        assert!(read(&(walk("1 0 0 0") + "9 0 0 0 0.5 0.5 0.5 0.5\n")).is_ok());
+        assert!(read(&walk("0 0 0 1")).is_ok() && read("1 0 0 0 1 0 0 0\n").is_ok());
     }
 
     #[test]

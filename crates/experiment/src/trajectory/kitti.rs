@@ -5,14 +5,14 @@ use std::path::Path;
 use nalgebra::Matrix3;
 use seafix_component::Fault;
 
-use super::{Pose, Trajectory, lines, number};
+use super::{Pose, Trajectory, holds_numbers, number};
 
 /// Files of the benchmark hold seven digits: their rotations are orthonormal to about 1e-6.
 const ORTHONORMAL: f64 = 1e-3;
 
-pub(super) fn parse(text: &str, file: &Path) -> Result<Trajectory, Fault> {
+pub(super) fn parse(lines: &[(usize, &str)], file: &Path) -> Result<Trajectory, Fault> {
     let mut poses = Vec::new();
-    for (line, text) in lines(text) {
+    for &(line, text) in lines.iter().filter(|(_, line)| holds_numbers(line)) {
         let words: Vec<&str> = text.split_whitespace().collect();
         if words.len() != 12 {
             let fault = Fault::new(format!("{} columns", words.len()), file).on_line(line).value(text);
@@ -31,7 +31,7 @@ pub(super) fn parse(text: &str, file: &Path) -> Result<Trajectory, Fault> {
         }
         poses.push(Pose { rotation, position: [m[3], m[7], m[11]].into() });
     }
-    Ok(Trajectory { stamps: None, poses })
+    Ok(Trajectory { stamps: None, poses, breaks: Vec::new() })
 }
 
 pub(super) fn print(trajectory: &Trajectory) -> String {

@@ -53,7 +53,7 @@ impl Trajectory {
             };
             return Err(Fault::new(what, file).remedy(remedy));
         }
-        Ok(Self { stamps: Some(stamps), poses })
+        Ok(Self { stamps: Some(stamps), poses, breaks: Vec::new() })
     }
 }
 

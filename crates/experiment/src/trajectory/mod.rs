@@ -11,6 +11,8 @@ use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use seafix_component::{Fault, read_text};
 use seafix_evaluation::trajectory::Pose;
 
+use crate::dataset::tum::nanoseconds;
+
 pub use log::Way;
 
 /// The poses of a body along its way, as a file holds them.
@@ -20,6 +22,9 @@ pub struct Trajectory {
     pub stamps: Option<Vec<u64>>,
     /// The poses: reference from body.
     pub poses: Vec<Pose>,
+    /// Where the way is broken, as places among the poses: the motion from the pose before to this one is unknown, as a line
+    /// `# broken: …` before it says.
+    pub breaks: Vec<usize>,
 }
 
 /// How a trajectory is written.
@@ -64,19 +69,33 @@ impl Trajectory {
         Self::parse(&read_text(file)?, file)
     }
 
+    /// The same of a file whose lines are out of order: they are sorted by time, and of each stamp the first is kept.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), but for the order.
+    pub fn read_repaired(file: &Path) -> Result<Self, Fault> {
+        let text = read_text(file)?;
+        Self::of_lines(&sorted(&text), &text, file)
+    }
+
     /// The trajectory of a text; `file` is named in faults.
     ///
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
+        Self::of_lines(&all_lines(text).collect::<Vec<_>>(), text, file)
+    }
+
+    fn of_lines(lines: &[(usize, &str)], text: &str, file: &Path) -> Result<Self, Fault> {
         let Some(format) = Format::of_text(text) else {
             return Err(Fault::new("a trajectory without poses", file).remedy("give TUM, KITTI or EuRoC lines"));
         };
-        match format {
-            Format::Tum => tum::parse(text, file),
-            Format::Kitti => kitti::parse(text, file),
-            Format::Euroc => euroc::parse(text, file),
-        }
+        let read = match format {
+            Format::Tum => tum::parse(lines, file),
+            Format::Kitti => kitti::parse(lines, file),
+            Format::Euroc => euroc::parse(lines, file),
+        };
+        Ok(Self { breaks: breaks(lines), ..read? })
     }
 
     /// The text of this trajectory in a format; poses without stamps are numbered by whole seconds.
@@ -93,10 +112,56 @@ impl Trajectory {
     }
 }
 
+/// How a line begins that says that the motion to the next pose is unknown.
+const BROKEN: &str = "# broken";
+
+/// The lines, and their numbers from 1.
+fn all_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()))
+}
+
+fn holds_numbers(line: &str) -> bool {
+    !line.is_empty() && !line.starts_with('#')
+}
+
 /// The lines with numbers, and their numbers from 1.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
-    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+    all_lines(text).filter(|(_, line)| holds_numbers(line))
+}
+
+/// The lines by the time of their stamps, of each stamp the first; comments stay before the line that they stood before.
+/// What has no stamp stays where it is: it is for the reader to refuse.
+fn sorted(text: &str) -> Vec<(usize, &str)> {
+    let mut groups: Vec<(Option<u64>, Vec<(usize, &str)>)> = Vec::new();
+    let mut group = Vec::new();
+    for (number, line) in all_lines(text) {
+        group.push((number, line));
+        if holds_numbers(line) {
+            let word = line.split([',', ' ', '\t']).next().unwrap_or_default();
+            let stamp = if line.contains(',') { word.parse().ok() } else { nanoseconds(word) };
+            groups.push((stamp, std::mem::take(&mut group)));
+        }
+    }
+    if groups.iter().all(|(stamp, _)| stamp.is_some()) {
+        groups.sort_by_key(|(stamp, _)| *stamp);
+        groups.dedup_by_key(|(stamp, _)| *stamp);
+    }
+    groups.into_iter().flat_map(|(_, lines)| lines).collect()
+}
+
+/// Before which poses the way is broken.
+fn breaks(lines: &[(usize, &str)]) -> Vec<usize> {
+    let (mut breaks, mut poses, mut broken) = (Vec::new(), 0, false);
+    for (_, line) in lines {
+        broken |= line.starts_with(BROKEN);
+        if holds_numbers(line) {
+            if std::mem::take(&mut broken) && poses > 0 {
+                breaks.push(poses);
+            }
+            poses += 1;
+        }
+    }
+    breaks
 }
 
 /// A number of a line, or the fault.
@@ -159,6 +224,26 @@ mod tests {
         assert_eq!(Format::of_text("# nothing\n\n"), None);
     }
 
+    /// Seen to fail when comments are passed over, and when a line that has no order is refused although it may be repaired.
+    #[test]
+    fn breaks_are_read_and_lines_sorted() {
+        let text =
+            "# broken: before all\n1 0 0 0 0 0 0 1\n# broken: x\n3 2 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n3 9 0 0 0 0 0 1\n";
+        assert!(read(text).unwrap_err().contains("walk:5"));
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("walk");
+        std::fs::write(&file, text).unwrap();
+        let way = Trajectory::read_repaired(&file).unwrap();
+        assert_eq!(way.poses.iter().map(|pose| pose.position.x).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
+        assert_eq!(way.breaks, [2]);
+        for format in [Format::Tum, Format::Euroc] {
+            assert_eq!(read(&way.print(format)).unwrap().breaks, [2], "{format:?}");
+        }
+        std::fs::write(&file, "2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 2\n").unwrap();
+        let said = Trajectory::read_repaired(&file).unwrap_err().to_string();
+        assert!(said.contains("unit length") && said.contains("walk:2"), "a fault keeps its line: {said}");
+    }
+
     #[test]
     fn faults_name_their_line() {
         assert!(read("").unwrap_err().starts_with("a trajectory without poses in walk"));
@@ -167,6 +252,14 @@ mod tests {
         assert!(read("1.5,0,0,0,0,0,0,1\n").unwrap_err().contains("not commas"));
         assert!(read("5,0,0,0,1,0,0,0\n5,0,0,0,1,0,0,0\n").unwrap_err().contains("in walk:2: 5; sort the lines"));
         assert!(read("1 0 0 0 0 1 0 0 0 0 -1 0\n").unwrap_err().contains("no rotation in walk:1"));
+        let header =
+            |quaternion: &str| format!("#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], {quaternion}\n");
+        let line = "1000000000000,1,2,3,0.1,-0.2,0.3,0.9273618495495704\n";
+        let xyzw = read(&(header("q_x [], q_y [], q_z [], q_w []") + line)).unwrap().poses[0];
+        let wxyz = read(&(header("q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []") + line)).unwrap().poses[0];
+        let tum = read("1000 1 2 3 0.1 -0.2 0.3 0.9273618495495704\n").unwrap().poses[0];
+        assert!((xyzw.rotation - tum.rotation).amax() < 1e-15);
+        assert!((xyzw.rotation - wxyz.rotation).amax() > 0.1, "the header says which is w");
         let wxyz = "# timestamp tx ty tz qw qx qy qz\n1 0 0 0 1 0 0 0\n";
         assert!(read(wxyz).unwrap_err().starts_with("quaternions with w first in walk:1"), "{wxyz}");
     }

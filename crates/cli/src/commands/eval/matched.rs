@@ -13,6 +13,8 @@ pub(super) struct Matched {
     pub(super) reference: Vec<Pose>,
     pub(super) estimate: Vec<Pose>,
     pub(super) stamps: Option<Vec<u64>>,
+    /// Where a stretch without a break begins, zero first: what lies in two stretches has no known motion between.
+    pub(super) stretches: Vec<usize>,
     /// How many poses the two files hold.
     pub(super) of: (usize, usize),
     /// The share of the reference's time between the first and the last matched pose.
@@ -25,10 +27,16 @@ impl Matched {
         self.reference.len() as f64 / self.of.0.min(self.of.1).max(1) as f64
     }
 
-    /// How far apart two ways end that begin in one pose (m).
-    pub(super) fn end(&self) -> f64 {
+    /// How far apart two ways end that begin in one pose (m); of a way that is broken none knows.
+    pub(super) fn end(&self) -> Option<f64> {
         let way = |poses: &[Pose]| poses[0].to(&poses[poses.len() - 1]).position;
-        (way(&self.reference) - way(&self.estimate)).norm()
+        (self.stretches.len() == 1).then(|| (way(&self.reference) - way(&self.estimate)).norm())
+    }
+
+    /// The stretches without a break, as places from and up to.
+    pub(super) fn stretches(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let ends = self.stretches.iter().skip(1).copied().chain([self.reference.len()]);
+        self.stretches.iter().copied().zip(ends).map(|(from, to)| from..to)
     }
 }
 
@@ -36,8 +44,12 @@ fn is_log(file: &Path) -> bool {
     file.extension().is_some_and(|ending| ending == "mcap")
 }
 
-fn read(file: &Path, way: Way) -> Result<Trajectory, Failure> {
-    let read = if is_log(file) { Trajectory::of_log(file, way) } else { Trajectory::read(file) };
+fn read(file: &Path, way: Way, repair: bool) -> Result<Trajectory, Failure> {
+    let read = match repair {
+        _ if is_log(file) => Trajectory::of_log(file, way),
+        true => Trajectory::read_repaired(file),
+        false => Trajectory::read(file),
+    };
     read.map_err(|fault| Failure::new(INPUT, fault))
 }
 
@@ -57,7 +69,8 @@ impl Eval {
         if self.estimate.is_none() && !is_log(&self.reference) {
             return Err(Failure::new(USAGE, "no trajectory to judge; give ESTIMATE, or a log for both"));
         }
-        let (reference, estimate) = (read(&self.reference, Way::True)?, read(self.estimate(), self.way.into())?);
+        let (reference, estimate) =
+            (read(&self.reference, Way::True, self.repair)?, read(self.estimate(), self.way.into(), self.repair)?);
         let of = (reference.poses.len(), estimate.poses.len());
         let refuse = |what: String| {
             let (a, b) = (self.reference.display(), self.estimate().display());
@@ -92,8 +105,14 @@ impl Eval {
                 of.1
             ));
         }
+        let broken = |before: &(usize, usize), now: &(usize, usize)| {
+            let between = |breaks: &[usize], from: usize, to: usize| breaks.iter().any(|&at| from < at && at <= to);
+            between(&reference.breaks, before.0, now.0) || between(&estimate.breaks, before.1, now.1)
+        };
+        let broken = (1..belong.len()).filter(|&k| broken(&belong[k - 1], &belong[k]));
+        let stretches = std::iter::once(0).chain(broken).collect();
         let (reference, estimate) = belong.iter().map(|&(i, j)| (reference.poses[i], estimate.poses[j])).unzip();
-        Ok(Matched { reference, estimate, stamps, of, covered })
+        Ok(Matched { reference, estimate, stamps, stretches, of, covered })
     }
 
     pub(super) fn alignment(&self, matched: &Matched) -> Result<Option<Alignment>, Failure> {

@@ -60,6 +60,9 @@ pub(crate) struct Eval {
     /// Poses further apart in time (s) do not belong together.
     #[arg(long, default_value_t = 0.01)]
     t_max_diff: f64,
+    /// Sort lines that are out of order by time, and keep the first of each stamp; otherwise such a file is refused.
+    #[arg(long)]
+    repair: bool,
     /// Added to the estimate's stamps (s).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     t_offset: f64,
@@ -133,9 +136,14 @@ struct Found {
     rpe: Summary,
     legs: Vec<Leg>,
     path: f64,
-    /// The distance of the last poses (m), the first laid on each other.
-    end: f64,
+    /// The distance of the last poses (m), the first laid on each other, where the way between is known.
+    end: Option<f64>,
     alignment: Option<Alignment>,
+}
+
+/// `once`, `2 times`.
+fn times(count: usize) -> String {
+    if count == 1 { "once".to_owned() } else { format!("{count} times") }
 }
 
 impl Eval {
@@ -149,15 +157,31 @@ impl Eval {
         let Name(relation) = self.relation;
         let absolute = relation.is_absolute().then(|| ape(&matched.reference, &matched.estimate, relation));
         let along = if self.pairs_from_reference { &matched.reference } else { &matched.estimate };
-        let pairs = pairs(along, delta, self.all_pairs, self.delta_tol);
+        // Across a break nothing is known, so nothing is judged.
+        let (mut both, mut legs) = (Vec::new(), Vec::new());
+        for stretch in matched.stretches() {
+            let from = stretch.start;
+            let own = pairs(&along[stretch.clone()], delta, self.all_pairs, self.delta_tol);
+            both.extend(own.into_iter().map(|(i, j)| (from + i, from + j)));
+            let (reference, estimate) = (&matched.reference[stretch.clone()], &matched.estimate[stretch]);
+            let own = drift(reference, estimate, &self.segments);
+            legs.extend(own.into_iter().map(|leg| Leg { from: from + leg.from, to: from + leg.to, ..leg }));
+        }
         let found = Found {
             ape: absolute.map(|errors| Summary::of(&errors)),
-            rpe: Summary::of(&rpe(&matched.reference, &matched.estimate, &pairs, relation)),
-            legs: drift(&matched.reference, &matched.estimate, &self.segments),
+            rpe: Summary::of(&rpe(&matched.reference, &matched.estimate, &both, relation)),
+            legs,
             path: path_lengths(&matched.reference).last().copied().unwrap_or(0.0),
             end: matched.end(),
             alignment,
         };
+        if matched.stretches.len() > 1 {
+            tell(&format!(
+                "warning: the way is broken {}; RPE and drift are taken between the breaks, APE speaks for the whole only if \
+                 nothing moved in them",
+                times(matched.stretches.len() - 1)
+            ));
+        }
         if matched.covered < MOSTLY {
             let (reference, estimate) = (self.reference.display(), self.estimate().display());
             let covered = 100.0 * matched.covered;
@@ -174,7 +198,8 @@ impl Eval {
             ));
         }
         if let Some(file) = &self.out {
-            let way = Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone() };
+            let breaks = matched.stretches[1..].to_vec();
+            let way = Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone(), breaks };
             whole::write(file, way.print(Format::of_name(file)))?;
         }
         print(&if self.json { self.machine(&matched, &found) } else { self.people(&matched, &found) })?;

@@ -25,9 +25,18 @@ impl Eval {
             Some(alignment) if self.scale => format!("alignment  similarity, scale {:.6}\n", alignment.scale),
             Some(_) => "alignment  rigid\n".to_owned(),
         };
-        text += &format!("path       {:.3} m of reference, {:.4} m apart at its end", found.path, found.end);
-        text +=
-            &if found.path > 0.0 { format!(" ({:.3} %)\n\n", 100.0 * found.end / found.path) } else { "\n\n".into() };
+        text += &match matched.stretches.len() {
+            1 => String::new(),
+            count => format!("segments   {count}, the way is broken between them\n"),
+        };
+        text += &format!("path       {:.3} m of reference", found.path);
+        if let Some(end) = found.end {
+            text += &format!(", {end:.4} m apart at its end");
+            if found.path > 0.0 {
+                text += &format!(" ({:.3} %)", 100.0 * end / found.path);
+            }
+        }
+        text += "\n\n";
         text += &format!("{:32}", format!("{} ({})", relation.name(), relation.unit()));
         text += &columns(&["rmse", "mean", "median", "std", "min", "max", "sse", "p95", "pairs"].map(str::to_owned));
         let mut row = |name: String, summary: &Summary| {
@@ -102,6 +111,10 @@ impl Eval {
             "ape": found.ape.as_ref().map(summary),
             "rpe": summary(&found.rpe),
             "segments": legs,
+            "breaks": matched.stretches[1..].iter().map(|&at| match &matched.stamps {
+                Some(stamps) => json!({ "pose": at, "stamp_ns": stamps[at] }),
+                None => json!({ "pose": at }),
+            }).collect::<Vec<Value>>(),
             "path_m": found.path,
             "end_m": found.end,
             "matched": {
