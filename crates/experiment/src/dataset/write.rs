@@ -19,11 +19,11 @@ use crate::source::{Eyes, Passage};
 
 /// Writes every frame of `passage` as a data set in `folder`, which must not exist: images, frames,
 /// site, truth, prior and visibility where they are known, and what sensors said, with the hash of every file. The folder
-/// has its name only when it is complete.
+/// has its name only when it is complete. `done` is called after every frame.
 ///
 /// # Errors
 /// A passage without images, a folder that exists, or a file that cannot be written.
-pub fn write(passage: &dyn Passage, folder: &Path, licence: &str) -> Result<(), Fault> {
+pub fn write(passage: &dyn Passage, folder: &Path, licence: &str, done: &dyn Fn()) -> Result<(), Fault> {
     if !passage.images() {
         return Err(
             Fault::new("a source without images", folder).remedy("choose one that renders or reads stereo pairs")
@@ -40,11 +40,11 @@ pub fn write(passage: &dyn Passage, folder: &Path, licence: &str) -> Result<(), 
     }
     fs::create_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
     let name = folder.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned());
-    fill(passage, &partial, &name, licence)?;
+    fill(passage, &partial, [&name, licence], done)?;
     fs::rename(&partial, folder).map_err(|error| failed(folder, &error))
 }
 
-fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Result<(), Fault> {
+fn fill(passage: &dyn Passage, folder: &Path, [name, licence]: [&str; 2], done: &dyn Fn()) -> Result<(), Fault> {
     let put =
         |name: &str, text: &str| fs::write(folder.join(name), text).map_err(|error| failed(&folder.join(name), &error));
     let mut frames = "stamp_ns,left,right\n".to_owned();
@@ -55,6 +55,7 @@ fn fill(passage: &dyn Passage, folder: &Path, name: &str, licence: &str) -> Resu
     let mut covariances = Vec::new();
     for index in 0..passage.frames() {
         let sight = passage.sight(index)?;
+        done();
         if let Eyes::Pair(left, right) = &sight.eyes {
             let (left_name, right_name) = (format!("left{index:03}.png"), format!("right{index:03}.png"));
             write_png(&folder.join(&left_name), left, passage.bits())?;
