@@ -357,7 +357,10 @@ fn displaced(dives: u64, objects: usize, metres: f64) -> [u64; 3] {
     for number in 0..dives {
         let mut sailing = voyage.set_out(number);
         let moved = (number as usize) % objects;
-        sailing.displace(moved, metres);
+        // One that is displaced is turned too, by however little it is shifted.
+        if metres > 0.0 {
+            sailing.displace(moved, metres);
+        }
         let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
         let (mut named, mut disputed) = (false, false);
         for step in 0..30 * objects {

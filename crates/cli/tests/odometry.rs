@@ -296,3 +296,80 @@ fn a_sound_way_is_not_doubted() {
     let all = Passage::new().json(&[]);
     assert!(all["agreement"].as_f64().unwrap() > 0.35 && all["warnings"].as_array().unwrap().is_empty(), "{all}");
 }
+
+/// Pairs that are out of order are refused, or sorted where that is asked for.
+#[test]
+fn pairs_out_of_order_are_sorted_on_request() {
+    let passage = Passage::new();
+    let sorted = Passage::ways(&passage.json(&[]));
+    passage.frames(&[(0, 0), (2, 2), (1, 1), (3, 3), (3, 5), (4, 4), (5, 5), (6, 6), (7, 7)]);
+    assert!(passage.refusal(&[], 3).contains("frames.csv:4"));
+    assert_eq!(Passage::ways(&passage.json(&["--repair"])), sorted);
+}
+
+/// Stamps that cannot be are named as such, not the images: by `check`, and by an odometry that finds no motion with them.
+///
+/// Seen to fail when nobody looks at the times.
+#[test]
+fn impossible_times_are_told() {
+    let passage = Passage::new();
+    let stamped = |stamp: &dyn Fn(u64) -> u64| {
+        let lines = (0..PAIRS as u64).map(|k| format!("{},l{k}.pgm,r{k}.pgm\n", stamp(k)));
+        passage.put("frames.csv", "stamp_ns,left,right\n".to_owned() + &lines.collect::<String>());
+        let checked = Command::cargo_bin("seafix").unwrap().arg("check").arg(passage.folder.path()).assert().success();
+        String::from_utf8(checked.get_output().stdout.clone()).unwrap()
+    };
+    let leap = stamped(&|k| 1_000_000_000 + k * 100_000_000 + if k < 4 { 0 } else { 1_000_000_000_000_000_000 });
+    assert!(leap.contains("warning: stamps that leap by more than a year in") && leap.contains("mixed?"), "{leap}");
+    let near = stamped(&|k| 1_000_000_000 + 100 * k);
+    assert!(near.contains("warning: pairs too near in time in") && near.contains("one of 7"), "{near}");
+    let said = passage.refusal(&[], 3);
+    assert!(said.contains("in 0.000 ms: are the stamps right?") && said.contains("check the stamps"), "{said}");
+    assert!(!stamped(&|k| 1_000_000_000 + k * 100_000_000).contains("warning"), "sound stamps");
+}
+
+/// A dive that is written as a data set names what its Doppler log and gyro said, and is reckoned by it.
+///
+/// Seen to fail when the command writes the tables and names them nowhere.
+#[test]
+fn a_dive_is_reckoned_by_its_readings() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("dive.toml");
+    let small = "frames = 6\nrate = 5.0\nrig.size = [256, 192]\nrig.focal = 125.0\n";
+    fs::write(&file, format!("question = 'Is it heard?'\n[source]\nname = 'dive'\n{small}")).unwrap();
+    let seafix = || {
+        let mut command = Command::cargo_bin("seafix").unwrap();
+        command.current_dir(folder.path());
+        command
+    };
+    seafix().args(["dive", "dive.toml", "--out", "set"]).assert().success();
+    let described = fs::read_to_string(folder.path().join("set/dataset.toml")).unwrap();
+    assert!(described.contains("seafix-dataset/1.2") && described.contains("doppler = \"doppler.csv\""), "{described}");
+    let ended = seafix().args(["odometry", "set", "--odometry", "dvl-gyro", "--json"]).assert().success();
+    let all: Value = serde_json::from_slice(&ended.get_output().stdout).unwrap();
+    assert!(all["poses"].as_u64().unwrap() >= 5 && all["length"].as_f64().unwrap() > 0.1, "{all}");
+}
+
+/// Where a part of the image that is fixed to the vehicle has as many points as the rest, nothing says which of the two moves:
+/// no motion is told, that there are two is.
+///
+/// Seen to fail when only the largest consensus is looked at: the vehicle stood still.
+#[test]
+fn two_motions_are_no_motion() {
+    let passage = Passage::new();
+    let [width, height] = SIZE;
+    let head = format!("P5\n{width} {height}\n255\n").len();
+    let fixed = [view(1.0), view(1.0 + BASELINE)];
+    for pair in 0..PAIRS {
+        for (side, name) in ["l", "r"].into_iter().enumerate() {
+            let mut image = view(STEP * pair as f64 + BASELINE * side as f64);
+            for row in 0..height {
+                let from = head + row * width;
+                image[from..from + width / 2].copy_from_slice(&fixed[side][from..from + width / 2]);
+            }
+            passage.put(&format!("{name}{pair}.pgm"), image);
+        }
+    }
+    let said = passage.refusal(&[], 3);
+    assert!(said.contains("agree on one motion") && said.contains("fixed to the vehicle"), "{said}");
+}

@@ -139,6 +139,28 @@ fn kitti_sequences_hold_the_same() {
     same(&Dataset::open(&kitti(folder.path())).unwrap(), 1e-12);
 }
 
+/// Seen to fail when only the stamps are counted.
+#[test]
+fn images_beyond_the_last_stamp_are_told() {
+    let folder = TempDir::new().unwrap();
+    let sequence = kitti(folder.path());
+    let count = own().frames.len();
+    assert!(Dataset::open(&sequence).unwrap().warnings.is_empty());
+    let more = |index: usize| {
+        for camera in [2, 3] {
+            let images = sequence.join(format!("image_{camera}"));
+            fs::copy(images.join("000000.png"), images.join(format!("{index:06}.png"))).unwrap();
+        }
+    };
+    more(count);
+    let all = Dataset::open(&sequence).unwrap();
+    let said = all.warnings[0].to_string();
+    assert_eq!(all.frames.len(), count);
+    assert!(said.contains(&format!("{count} stamps, {0} left and {0} right images", count + 1)), "{said}");
+    (count..=2 * count).for_each(more);
+    assert!(Dataset::open(&sequence).unwrap_err()[0].to_string().contains("images without a stamp"));
+}
+
 #[test]
 fn a_site_makes_them_sources() {
     let folder = TempDir::new().unwrap();

@@ -36,6 +36,9 @@ pub(crate) struct Odometer {
     /// Change a setting of the odometry: a dotted key and a TOML value, `detector.features=2000`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
+    #[arg(long)]
+    repair: bool,
     /// How many threads work; the poses do not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
@@ -61,8 +64,10 @@ struct Trip {
 impl Odometer {
     pub(crate) fn execute(&self) -> Ended {
         let (odometry, settings) = self.build()?;
-        let dataset = Dataset::open_pairs(&self.dataset).map_err(|faults| Failure::faults(INPUT, &faults))?;
-        dataset.warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+        let dataset =
+            Dataset::open_pairs(&self.dataset, self.repair).map_err(|faults| Failure::faults(INPUT, &faults))?;
+        let odd = dataset.odd_times();
+        dataset.warnings.iter().chain(&odd).for_each(|warning| tell(&format!("warning: {warning}")));
         if odometry.listens() && !dataset.hears() {
             let what = format!("no readings for odometry `{}`", self.odometry);
             let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
@@ -181,13 +186,25 @@ impl Trip {
         let reasons: Vec<Lost> = outcomes.iter().filter_map(skipped).chain(breaks).collect();
         let alike =
             |a: &Lost| reasons.iter().filter(|b| std::mem::discriminant(a) == std::mem::discriminant(b)).count();
+        // A pair that begins a segment is not left out, and no motion leads to it all the same.
+        let told = |a: &Lost| {
+            let same = |b: &Lost| std::mem::discriminant(a) == std::mem::discriminant(b);
+            let out = outcomes.iter().filter_map(skipped).filter(same).count();
+            match alike(a) - out {
+                0 => format!("{out} left out"),
+                breaks => format!("{out} left out, {breaks} without a motion to them"),
+            }
+        };
         // The first of the most frequent kind.
         let most = reasons.iter().rev().max_by_key(|lost| alike(lost));
         let unread = self.unread.len();
         Some(match most {
-            Some(lost) if alike(lost) >= unread => fault
-                .value(format!("{counts}; {} left out: {lost}", alike(lost)))
-                .remedy("check the images and that the rig is the one that took them"),
+            Some(lost) if alike(lost) >= unread => {
+                fault.value(format!("{counts}; {}: {lost}", told(lost))).remedy(match lost {
+                    Lost::Jump { .. } => "check the stamps of the pairs, and that the rig is the one that took them",
+                    _ => "check the images and that the rig is the one that took them",
+                })
+            }
             _ if unread > 0 => {
                 fault.value(format!("{counts}; {unread} cannot be read")).remedy("restore the images named above")
             }

@@ -11,7 +11,7 @@ use seafix_component::Fault;
 use seafix_vision::{Image, Sides};
 use sha2::{Digest, Sha256};
 
-use super::{Dataset, ImageLimits, folder::inside, picture::regular};
+use super::{Dataset, ImageLimits, SAME_INSTANT_NS, folder::inside, picture::regular};
 
 /// Reads the data set in `folder` and every file it names: decodes the images, compares their sizes
 /// with the calibration and, where hashes are given, every file with its hash.
@@ -26,12 +26,32 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     faults.extend(twins.fault(&dataset));
     faults.extend(hash_faults(&dataset));
     let mut warnings = dataset.warnings.clone();
+    warnings.extend(dataset.odd_times());
     if faults.is_empty() {
         let (sides, table) = (sides(&dataset), dataset.folder.join(&dataset.table));
         faults.extend(swapped_fault(sides, &table));
         warnings.extend(strangers(sides, &table));
     }
     (faults, warnings)
+}
+
+impl Dataset {
+    /// What is odd about the times of the pairs: a leap of more than a year, and pairs so near that a camera takes none such.
+    pub fn odd_times(&self) -> Vec<Fault> {
+        const YEAR_NS: u64 = 31_557_600_000_000_000;
+        let table = self.folder.join(&self.table);
+        let steps = || self.frames.windows(2).map(|two| [two[0].stamp_ns, two[1].stamp_ns]);
+        let told = |what: &str, odd: &dyn Fn(u64) -> bool, remedy: &str| {
+            let all: Vec<[u64; 2]> = steps().filter(|[before, after]| odd(after - before)).collect();
+            let [before, after] = all.first()?;
+            let value = format!("from {before} to {after} ns, one of {}", all.len());
+            Some(Fault::new(what, &table).value(value).remedy(remedy))
+        };
+        let leap =
+            told("stamps that leap by more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
+        let remedy = "a camera takes no two pairs within a millisecond: are they nanoseconds?";
+        leap.into_iter().chain(told("pairs too near in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
+    }
 }
 
 /// Pairs whose two images are the same, pixel by pixel.

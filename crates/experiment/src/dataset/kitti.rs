@@ -51,6 +51,7 @@ pub(super) fn is_one(folder: &Path) -> bool {
 pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<Dataset, Vec<Fault>> {
     let cameras = cameras.of(folder);
     let stamps = times(folder).map_err(|fault| vec![fault])?;
+    let unstamped = without_stamps(folder, cameras, stamps.len()).map_err(|fault| vec![fault])?;
     let (mut faults, mut frames) = (Vec::new(), Vec::with_capacity(stamps.len()));
     let table = folder.join("times.txt");
     for (index, stamp_ns) in stamps.iter().copied().enumerate() {
@@ -88,7 +89,32 @@ pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<
     }
     let table = "times.txt".to_owned();
     let body_from_camera = Transform::identity();
-    Ok(Foreign { folder: folder.to_owned(), rig, body_from_camera, frames, table, warnings: Vec::new() }.into())
+    Ok(Foreign {
+        folder: folder.to_owned(),
+        rig,
+        body_from_camera,
+        frames,
+        table,
+        warnings: unstamped.into_iter().collect(),
+    }
+    .into())
+}
+
+/// Images beyond the last stamp: a warning, or, of more than half of them, a fault.
+fn without_stamps(folder: &Path, cameras: [usize; 2], stamps: usize) -> Result<Option<Fault>, Fault> {
+    let count = |camera: usize| {
+        let entries = std::fs::read_dir(folder.join(format!("image_{camera}"))).into_iter().flatten();
+        entries.filter_map(Result::ok).filter(|entry| entry.path().extension().is_some_and(|end| end == "png")).count()
+    };
+    let [left, right] = cameras.map(count);
+    let images = left.max(right);
+    let fault = Fault::new("images without a stamp", &folder.join("times.txt"))
+        .value(format!("{stamps} stamps, {left} left and {right} right images"));
+    match () {
+        () if images <= stamps => Ok(None),
+        () if images > 2 * stamps => Err(fault.remedy("at least half must have one: a line a stereo pair, seconds")),
+        () => Ok(Some(fault.remedy("give one line a stereo pair; images beyond the last line are left out"))),
+    }
 }
 
 /// The stamps (ns).

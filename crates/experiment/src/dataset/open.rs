@@ -83,7 +83,16 @@ impl Dataset {
     /// # Errors
     /// Everything that is wrong with it, at once.
     pub fn open(folder: &Path) -> Result<Self, Vec<Fault>> {
-        Self::read(folder, false)
+        Self::read(folder, false, false)
+    }
+
+    /// The same, of our own format also where its pairs are not in order of time: they are sorted, and of each stamp the first
+    /// is kept.
+    ///
+    /// # Errors
+    /// Everything else that is wrong with it, at once.
+    pub fn open_repaired(folder: &Path) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, false, true)
     }
 
     /// Reads the KITTI sequence in `folder` with two of its cameras.
@@ -107,15 +116,16 @@ impl Dataset {
     }
 
     /// Reads what odometry may know of the data set in `folder`: rig, stereo pairs and readings. Site, truth and prior are
-    /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair).
+    /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair). `repair` as in
+    /// [`open_repaired`](Self::open_repaired).
     ///
     /// # Errors
     /// Everything else that is wrong with it, at once.
-    pub fn open_pairs(folder: &Path) -> Result<Self, Vec<Fault>> {
-        Self::read(folder, true)
+    pub fn open_pairs(folder: &Path, repair: bool) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, true, repair)
     }
 
-    fn read(folder: &Path, pairs_only: bool) -> Result<Self, Vec<Fault>> {
+    fn read(folder: &Path, pairs_only: bool, repair: bool) -> Result<Self, Vec<Fault>> {
         let file = folder.join("dataset.toml");
         if !folder.is_dir() {
             return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
@@ -138,7 +148,8 @@ impl Dataset {
             described.keep_pairs_only();
         }
         let (faults, warnings) = (Vec::new(), Vec::new());
-        Reader { folder, file: &file, source: &source, described: &described, pairs_only, faults, warnings }.read()
+        Reader { folder, file: &file, source: &source, described: &described, pairs_only, repair, faults, warnings }
+            .read()
     }
 }
 
@@ -230,6 +241,7 @@ struct Reader<'a> {
     source: &'a str,
     described: &'a Description,
     pairs_only: bool,
+    repair: bool,
     faults: Vec<Fault>,
     warnings: Vec<Fault>,
 }
@@ -251,7 +263,8 @@ impl Reader<'_> {
                 Transform::identity()
             }
         };
-        let frame_lines = self.table(&d.frames, tables::frames).unwrap_or_default();
+        let repair = self.repair;
+        let frame_lines = self.table(&d.frames, |text, file| tables::frames(text, file, repair)).unwrap_or_default();
         let site = d.site.as_deref().and_then(|name| self.site(name));
         let truth = d.truth.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
         let prior = d.prior.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();

@@ -26,18 +26,25 @@ pub(super) struct VisibleLine {
     pub(super) point: String,
 }
 
-/// `stamp_ns,left,right`, in order of time.
-pub(super) fn frames(text: &str, file: &Path) -> Table<FrameLine> {
+/// `stamp_ns,left,right`, in order of time; those that are not are refused, or, with `repair`, sorted, of each stamp the first
+/// kept.
+pub(super) fn frames(text: &str, file: &Path, repair: bool) -> Table<FrameLine> {
     let mut frames: Vec<FrameLine> = Vec::new();
     for (line, [stamp, left, right]) in rows(text, file, ["stamp_ns", "left", "right"])? {
         let stamp_ns = number(stamp, line, file)?;
-        if frames.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
+        if !repair && frames.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
             return Err(Fault::new("a stamp that is not after the one before", file)
                 .on_line(line)
                 .value(stamp)
-                .remedy("sort the lines by time, one a stereo pair"));
+                .remedy(
+                    "sort the lines by time, one a stereo pair; `repair` does it and keeps the first of each stamp",
+                ));
         }
         frames.push(FrameLine { line, stamp_ns, left: left.to_owned(), right: right.to_owned() });
+    }
+    if repair {
+        frames.sort_by_key(|frame| frame.stamp_ns);
+        frames.dedup_by_key(|frame| frame.stamp_ns);
     }
     if frames.is_empty() {
         return Err(Fault::new("no stereo pair", file).remedy("give one line a pair: stamp_ns,left,right"));
@@ -213,12 +220,16 @@ mod tests {
     #[test]
     fn tables_name_the_line_at_fault() {
         let file = Path::new("frames.csv");
-        let message = |text: &str| frames(text, file).map(|_| ()).unwrap_err().to_string();
+        let message = |text: &str| frames(text, file, false).map(|_| ()).unwrap_err().to_string();
         assert!(message("time,left,right\n").contains("the first line is `stamp_ns,left,right`"));
         assert!(message("stamp_ns,left,right\n1,a.png\n").starts_with("2 columns in frames.csv:2"));
         assert!(message("stamp_ns,left,right\nx,a.png,b.png\n").starts_with("not a number in frames.csv:2: x"));
         assert!(message("stamp_ns,left,right\n2,a,b\n1,c,d\n").contains("frames.csv:3"));
         assert!(message("stamp_ns,left,right\n").starts_with("no stereo pair"));
-        assert_eq!(frames("stamp_ns,left,right\n1,a.png,b.png\n\n", file).unwrap()[0].left, "a.png");
+        assert_eq!(frames("stamp_ns,left,right\n1,a.png,b.png\n\n", file, false).unwrap()[0].left, "a.png");
+        let mixed = "stamp_ns,left,right\n2,b,b\n1,a,a\n2,c,c\n";
+        assert!(message(mixed).contains("`repair` does it"));
+        let lefts: Vec<String> = frames(mixed, file, true).unwrap().into_iter().map(|frame| frame.left).collect();
+        assert_eq!(lefts, ["a", "b"]);
     }
 }

@@ -28,12 +28,21 @@ pub struct DatasetSource {
     /// Whether one image of another size than the calibration refuses the whole set; otherwise its pair is left out
     /// and counted, as long as at least half of the pairs stay.
     pub strict: bool,
+    /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
+    pub repair: bool,
 }
 
 impl Default for DatasetSource {
     fn default() -> Self {
         let ImageLimits { pixels, bytes } = ImageLimits::default();
-        Self { path: String::new(), site: String::new(), max_pixels: pixels, max_bytes: bytes, strict: false }
+        Self {
+            path: String::new(),
+            site: String::new(),
+            max_pixels: pixels,
+            max_bytes: bytes,
+            strict: false,
+            repair: false,
+        }
     }
 }
 
@@ -54,7 +63,9 @@ impl Component for DatasetSource {
 impl Source for DatasetSource {
     fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
         let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
-        let mut dataset = Dataset::open(&folder.join(&self.path))?.within(limits);
+        let path = folder.join(&self.path);
+        let read = if self.repair { Dataset::open_repaired(&path) } else { Dataset::open(&path) };
+        let mut dataset = read?.within(limits);
         if !self.strict {
             dataset.leave_out_misfits();
         }

@@ -40,7 +40,15 @@ impl Component for Kitti {
     fn check(&self) -> Result<(), String> {
         in_range(!self.site.is_empty(), "site", "''", "the file of a site, relative to the experiment file")?;
         let (path, site) = (self.path.clone(), self.site.clone());
-        DatasetSource { path, site, max_pixels: self.max_pixels, max_bytes: self.max_bytes, strict: true }.check()
+        DatasetSource {
+            path,
+            site,
+            max_pixels: self.max_pixels,
+            max_bytes: self.max_bytes,
+            strict: true,
+            repair: false,
+        }
+        .check()
     }
 }
 

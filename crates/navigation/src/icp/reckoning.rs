@@ -225,7 +225,7 @@ fn laid(settings: &Icp, key: &Ground, last: &Last, ground: &Ground, stamp_ns: u6
     let motion = last.key_from_camera.inverse() * laid.key_from_now;
     let speed = motion.translation().norm() / seconds;
     if speed > settings.most_speed {
-        return Err(Lost::Jump { speed, most: settings.most_speed });
+        return Err(Lost::Jump { speed, seconds, most: settings.most_speed });
     }
     Ok(Step { laid, motion, seconds })
 }

@@ -83,7 +83,8 @@ pub struct Stereo {
     pub most_sigma: f64,
     /// A longer time without a pair that can be followed breaks the segment (s).
     pub most_gap: f64,
-    /// A faster motion is not believed (m/s).
+    /// A faster motion is not believed (m/s). The default leaves room for a car's; a vehicle that inspects does not go 3 m/s, and
+    /// what it is told to be unable to do it cannot be misled into.
     pub most_speed: f64,
     /// What is drawn at random follows from this.
     pub seed: u64,

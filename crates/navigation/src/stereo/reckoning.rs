@@ -10,7 +10,7 @@ use seafix_vision::{Look, Threads, Workspace};
 
 use super::{
     Stages, Stereo,
-    consensus::{Consensus, Rules, consensus, seen_again},
+    consensus::{Rules, consensus, rival, seen_again},
     follow::{Followed, KeyFrame, follow},
     landmark::{Landmark, Sighting},
     look::Seen,
@@ -250,7 +250,7 @@ impl<'a> StereoReckoning<'a> {
         let motion = last.world_from_camera.inverse() * guess;
         let speed = motion.translation().norm() / seconds;
         if speed > settings.most_speed {
-            return Err(Lost::Jump { speed, most: settings.most_speed });
+            return Err(Lost::Jump { speed, seconds, most: settings.most_speed });
         }
         Ok(Step { world_from_camera: guess, local: Local::new(motion, covariance), seconds, sought, sightings })
     }
@@ -281,7 +281,13 @@ impl<'a> StereoReckoning<'a> {
         self.times.since("consensus", start);
         let found = best.as_ref().map_or(0, |best| best.inliers.len());
         match best {
-            Some(Consensus { motion, .. }) if found >= needed => Ok(motion.relabel()),
+            Some(best) if found >= needed => {
+                let other = rival(&data, self.rig, &rules, solvers, &best, &mut rng);
+                if other >= needed {
+                    return Err(Lost::TwoMotions { found, other });
+                }
+                Ok(best.motion.relabel())
+            }
             _ => Err(Lost::NoConsensus { found, matches: pairs.len(), needed }),
         }
     }
