@@ -65,6 +65,47 @@ fn runs_with_their_trials_in_another_order_are_the_same() {
     assert!(code == 3 && error.contains("a shard of a run") && error.contains("seafix merge"), "{error}");
 }
 
+/// A run is checked by its own manifest, its report by `report --verify`; what a damaged shard is told to do mends it.
+#[test]
+fn a_run_is_checked_by_what_it_wrote() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    assert_eq!(seafix(folder, &["run", "e.toml", "--out", "a"]).0, 0);
+    for of in ["a", "."] {
+        let (code, out, _) = seafix(folder, &["check", of]);
+        assert!(code == 0 && out.contains("a: in order") && !out.contains("fault"), "{of}: {out}");
+    }
+    let table = folder.join("a/results.csv");
+    let bytes = fs::read(&table).unwrap();
+    fs::write(&table, &bytes[..bytes.len() - 1]).unwrap();
+    let (code, out, _) = seafix(folder, &["check", "a"]);
+    assert!(code == 1 && out.contains("not the file that the run wrote in a/results.csv"), "{out}");
+    fs::write(&table, bytes).unwrap();
+    let manifest = folder.join("a/manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("\"finished\"", "\"running\"")).unwrap();
+    let (code, out, _) = seafix(folder, &["check", "a"]);
+    assert!(code == 1 && out.contains("a run that has not ended in a: running") && out.contains("--resume"), "{out}");
+
+    for k in ["1/2", "2/2"] {
+        assert_eq!(seafix(folder, &["run", "e.toml", "--untimed", "--shard", k, "--out", &k[..1]]).0, 0);
+    }
+    assert_eq!(seafix(folder, &["run", "e.toml", "--untimed", "--out", "whole"]).0, 0);
+    let rows = folder.join("1/pieces/000000/rows.csv");
+    let mut bytes = fs::read(&rows).unwrap();
+    bytes[0] ^= 1;
+    fs::write(&rows, bytes).unwrap();
+    let (code, _, error) = seafix(folder, &["merge", "1", "2", "--out", "merged"]);
+    assert!(code == 3 && error.contains("--resume"), "{error}");
+    assert_eq!(seafix(folder, &["run", "e.toml", "--untimed", "--shard", "1/2", "--out", "1", "--resume"]).0, 0);
+    let (code, _, error) = seafix(folder, &["merge", "1", "2", "--out", "merged"]);
+    assert_eq!(code, 0, "{error}");
+    assert!(
+        fs::read(folder.join("merged/results.csv")).unwrap() == fs::read(folder.join("whole/results.csv")).unwrap()
+    );
+}
+
 #[test]
 fn reports_are_verified_and_runs_compared() {
     let folder = tempfile::tempdir().unwrap();

@@ -36,7 +36,7 @@ pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
 pub use explore::Keyframes;
 pub use logging::{ImagesLogged, Logging};
-pub use manifest::changed_outputs;
+pub use manifest::{changed_outputs, check_run, is_run};
 pub use model::{HandModel, HandPoint, Mark, ModelByHand};
 pub use navigate::{Helm, Navigation};
 pub use odometry_fault::OdometryFault;

@@ -193,6 +193,26 @@ impl Manifest {
     }
 }
 
+/// Everything that is wrong with the run in `folder`: that it did not end, and what of its files is not as it wrote them.
+#[must_use]
+pub fn check_run(folder: &Path) -> Vec<Fault> {
+    let manifest = match Manifest::read(folder) {
+        Ok(manifest) => manifest,
+        Err(fault) => return vec![fault],
+    };
+    if ["finished", "shard"].contains(&&manifest.state[..]) {
+        return manifest.changed(folder);
+    }
+    let fault = Fault::new("a run that has not ended", folder).value(&manifest.state);
+    vec![fault.remedy("`seafix run --resume` goes on with it, `seafix recover` saves what is there")]
+}
+
+/// Whether `folder` is that of a run.
+#[must_use]
+pub fn is_run(folder: &Path) -> bool {
+    folder.join(NAME).is_file()
+}
+
 /// Logs, tables and networks of the run in `folder` that are not as the run wrote them, by the SHA-256 of its manifest; none
 /// where it has no manifest, or has not ended.
 ///

@@ -8,7 +8,7 @@ use seafix_log::LogError;
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder holds no log.
-    #[error("{} holds no *.mcap: it is not the folder of a run", .0.display())]
+    #[error("{} holds no *.mcap: {}", .0.display(), if .0.join("manifest.json").exists() { "its run has not ended; `seafix run --resume` goes on with it, `seafix recover` saves what is there" } else { "it is not the folder of a run" })]
     NoLogs(PathBuf),
     /// A run of a later program.
     #[error("{}: a manifest of format {found}, this program knows {known}; report the run with the program that made it", .path.display())]

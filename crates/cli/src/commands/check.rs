@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use seafix_component::Fault;
 use seafix_experiment::{
-    Plan,
+    Plan, check_run,
     dataset::{self, ImageLimits},
-    read_text,
+    is_run, read_text,
     source::check_recording,
 };
 use seafix_log::{LogError, Reader, Recording};
@@ -52,6 +52,12 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     let mut entries: Vec<PathBuf> =
         entries.into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
     entries.sort();
+    // A run: its manifest and logs; its report and pieces are made of them.
+    let run = path.is_dir() && is_run(path);
+    if run {
+        files.push(path.to_owned());
+        entries.retain(|entry| entry.extension().is_some_and(|end| end == "mcap"));
+    }
     for entry in entries {
         let name = entry.to_string_lossy();
         let known = [".toml", ".json", ".mcap"].iter().any(|end| name.ends_with(end)) && !name.ends_with(".truth.json");
@@ -63,7 +69,8 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) {
                 let here = files.len();
                 gather(&entry, files);
                 // A folder of other things says nothing.
-                files[here..].first().is_some_and(|first| *first == entry).then(|| files.truncate(here));
+                let other = files[here..].first().is_some_and(|first| *first == entry) && !is_run(&entry);
+                other.then(|| files.truncate(here));
             }
             false if known => files.push(entry),
             _ => {}
@@ -121,9 +128,12 @@ fn is_of_a_trial(path: &Path) -> bool {
 fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     let faults = |result: Result<(), Vec<Fault>>| (result.err().unwrap_or_default(), Vec::new());
     if path.is_dir() {
-        return dataset::check(path, limits);
+        return if is_run(path) { (check_run(path), Vec::new()) } else { dataset::check(path, limits) };
     }
     match path.extension().and_then(|extension| extension.to_str()) {
+        Some("json") if path.file_name().is_some_and(|name| name == "manifest.json") => {
+            (check_run(path.parent().unwrap_or(Path::new(""))), Vec::new())
+        }
         Some("json") => faults(problem_file::read(path).map(|_| ()).map_err(|fault| vec![fault])),
         _ => match read_text(path) {
             Err(fault) => (vec![fault], Vec::new()),

@@ -109,11 +109,13 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     let mine: Vec<&Piece> = pieces.iter().filter(|piece| options.takes(piece.number)).collect();
     let frames = |pieces: &[&Piece]| pieces.iter().map(|piece| piece.frames() * groups[piece.group].trials.len()).sum();
     observer.begins(frames(&mine), cut::bytes(&groups, &mine), &claim.folder);
-    if let Some(finished) = claim.finished {
+    // A shard is what it is made of: one whose pieces were damaged since is made again.
+    let whole = || mine.iter().all(|piece| Store::of(&claim.folder).sound(piece.number).is_some());
+    if let Some(finished) = claim.finished.as_ref().filter(|_| options.shard.is_none() || whole()) {
         if options.shard.is_none() {
             Store::of(&claim.folder).remove()?;
         }
-        return Ok(Finished { folder: claim.folder, rows: finished.rows });
+        return Ok(Finished { rows: finished.rows, folder: claim.folder });
     }
     // First: a folder without it holds no run.
     manifest.write(&claim.folder, "running")?;
