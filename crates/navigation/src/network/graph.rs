@@ -72,7 +72,7 @@ struct Factor {
 #[derive(Debug, Clone)]
 enum Weight {
     /// By the information of its own error.
-    Own(Matrix6<f64>),
+    Own(Box<Matrix6<f64>>),
     /// Together with the errors that last at its beginning and at its end.
     Drifting(Box<Drift>, [usize; 2]),
 }
@@ -117,7 +117,7 @@ impl Graph {
     /// [`NoCovariance`].
     pub fn prior(&mut self, node: usize, at: Pose, covariance: &Matrix6<f64>) -> Result<usize, NoCovariance> {
         let information = covariance.cholesky().ok_or(NoCovariance)?.inverse();
-        let weight = Weight::Own(information);
+        let weight = Weight::Own(Box::new(information));
         self.factors.push(Factor { from: None, to: node, measured: at, weight, doubtful: false });
         Ok(self.factors.len() - 1)
     }
@@ -130,7 +130,13 @@ impl Graph {
     pub fn between(&mut self, from: usize, to: usize, motion: &Local, doubtful: bool) -> Result<usize, NoCovariance> {
         let information = motion.covariance.matrix.cholesky().ok_or(NoCovariance)?.inverse();
         let measured = motion.motion.relabel();
-        self.factors.push(Factor { from: Some(from), to, measured, weight: Weight::Own(information), doubtful });
+        self.factors.push(Factor {
+            from: Some(from),
+            to,
+            measured,
+            weight: Weight::Own(Box::new(information)),
+            doubtful,
+        });
         Ok(self.factors.len() - 1)
     }
 
@@ -301,7 +307,7 @@ impl Graph {
     fn disagreement(&self, factor: &Factor) -> f64 {
         let r = self.residual(factor);
         match &factor.weight {
-            Weight::Own(information) => r.dot(&(information * r)),
+            Weight::Own(information) => r.dot(&(**information * r)),
             Weight::Drifting(drift, [before, after]) => {
                 drift.disagreement(&r, &self.lasting[*before].numbers, &self.lasting[*after].numbers)
             }
@@ -347,7 +353,7 @@ impl Graph {
                 sides[1] = places[from].map(|place| (place, -slope * to_from_from.adjoint()));
             }
             let information = match &factor.weight {
-                Weight::Own(information) => information,
+                Weight::Own(information) => information.as_ref(),
                 Weight::Drifting(drift, [before, after]) => {
                     let zero = Matrix6::zeros();
                     let by = [1, 0].map(|side| sides[side].as_ref().map_or(&zero, |(_, by)| by));
