@@ -126,17 +126,6 @@ pub enum Lost {
         /// How many are needed.
         needed: usize,
     },
-    /// Two motions explain much of what is in common, and nothing says which is the vehicle's.
-    #[error(
-        "{found} points in common agree on one motion and {other} of the others on another: is something fixed to the \
-         vehicle in view, or does something large move?"
-    )]
-    TwoMotions {
-        /// How many the best motion explains.
-        found: usize,
-        /// How many of the others the best motion of these explains.
-        other: usize,
-    },
     /// The motion that explains the points is not determined well enough.
     #[error("the motion is known to {0:.3} m only")]
     Weak(f64),
@@ -159,7 +148,7 @@ pub enum Lost {
         most: f64,
     },
     /// A motion faster than the vehicle can be.
-    #[error("a motion of {speed:.2} m/s; the vehicle moves at most at {most} m/s{}", stamps(.speed, .seconds))]
+    #[error("a motion of {speed:.2} m/s{}", unlikely(.seconds, .most))]
     Jump {
         /// How fast (m/s).
         speed: f64,
@@ -176,13 +165,13 @@ fn units(seconds: &f64) -> &'static str {
     if *seconds > YEAR { "; that is more than a year: are seconds and nanoseconds mixed?" } else { "" }
 }
 
-/// What a fast motion in hardly any time suggests: cameras take no two pairs within a millisecond.
-fn stamps(speed: &f64, seconds: &f64) -> String {
+/// What a motion too fast suggests: cameras take no two pairs within a millisecond, else it is the vehicle that cannot.
+fn unlikely(seconds: &f64, most: &f64) -> String {
     const AT_ONCE: f64 = 1e-3;
-    if *seconds > AT_ONCE {
-        return String::new();
+    if *seconds <= AT_ONCE {
+        return format!(", as {:.6} ms passed: are the stamps right?", 1e3 * seconds);
     }
-    format!("; that is {:.3} m in {:.3} ms: are the stamps right?", speed * seconds, 1e3 * seconds)
+    format!("; the vehicle moves at most at {most} m/s")
 }
 
 impl Journey {

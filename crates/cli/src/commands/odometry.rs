@@ -48,7 +48,7 @@ pub(crate) struct Odometer {
 }
 
 /// A smaller share of the landmarks that agree with the motion, in the median over the pairs, is worth a warning.
-const LITTLE_AGREEMENT: f64 = 0.35;
+const LITTLE_AGREEMENT: f64 = 0.45;
 
 /// What came of all pairs.
 struct Trip {
@@ -192,7 +192,7 @@ impl Trip {
             let out = outcomes.iter().filter_map(skipped).filter(same).count();
             match alike(a) - out {
                 0 => format!("{out} left out"),
-                breaks => format!("{out} left out, {breaks} without a motion to them"),
+                breaks => format!("{} without a motion", out + breaks),
             }
         };
         // The first of the most frequent kind.

@@ -129,10 +129,13 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     all_lines(text).filter(|(_, line)| holds_numbers(line))
 }
 
+/// Some lines of a text with their numbers.
+type Lines<'a> = Vec<(usize, &'a str)>;
+
 /// The lines by the time of their stamps, of each stamp the first; comments stay before the line that they stood before.
 /// What has no stamp stays where it is: it is for the reader to refuse.
-fn sorted(text: &str) -> Vec<(usize, &str)> {
-    let mut groups: Vec<(Option<u64>, Vec<(usize, &str)>)> = Vec::new();
+fn sorted(text: &str) -> Lines<'_> {
+    let mut groups: Vec<(Option<u64>, Lines<'_>)> = Vec::new();
     let mut group = Vec::new();
     for (number, line) in all_lines(text) {
         group.push((number, line));

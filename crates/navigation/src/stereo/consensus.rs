@@ -90,33 +90,6 @@ pub(crate) fn consensus(
     best
 }
 
-/// How many of the points that do not agree with a motion agree with each other on another one, if they are at least half as
-/// many as agree with it; else none. What the first consensus missed by a little is not another motion.
-pub(crate) fn rival(
-    data: &Observations<'_>,
-    rig: &StereoRig,
-    rules: &Rules,
-    solvers: (&dyn Solver, &dyn Solver),
-    best: &Consensus,
-    rng: &mut dyn Rng,
-) -> usize {
-    /// So many times the limit of a consensus is another place.
-    const ELSEWHERE: f64 = 3.0;
-    let far = ELSEWHERE * rules.px;
-    let by_best = best.motion.inverse();
-    let others: Vec<usize> = (0..data.points.len())
-        .filter(|&index| squared_distance(&data.points[index], rig, &by_best).is_none_or(|squared| squared > far * far))
-        .collect();
-    let enough = |count: usize| 2 * count >= best.inliers.len();
-    if !enough(others.len()) {
-        return 0;
-    }
-    let rest = subset(data, &others);
-    let still = [Transform::identity()];
-    let other = consensus(&rest, rig, rules, solvers, &still, rng).map_or(0, |other| other.inliers.len());
-    if enough(other) { other } else { 0 }
-}
-
 /// Some of the points.
 pub(crate) fn subset<'a>(data: &Observations<'a>, indices: &[usize]) -> Observations<'a> {
     Observations { points: indices.iter().map(|&index| data.points[index]).collect(), rig: data.rig }

@@ -10,7 +10,7 @@ use seafix_vision::{Look, Threads, Workspace};
 
 use super::{
     Stages, Stereo,
-    consensus::{Rules, consensus, rival, seen_again},
+    consensus::{Rules, consensus, seen_again},
     follow::{Followed, KeyFrame, follow},
     landmark::{Landmark, Sighting},
     look::Seen,
@@ -281,13 +281,7 @@ impl<'a> StereoReckoning<'a> {
         self.times.since("consensus", start);
         let found = best.as_ref().map_or(0, |best| best.inliers.len());
         match best {
-            Some(best) if found >= needed => {
-                let other = rival(&data, self.rig, &rules, solvers, &best, &mut rng);
-                if other >= needed {
-                    return Err(Lost::TwoMotions { found, other });
-                }
-                Ok(best.motion.relabel())
-            }
+            Some(best) if found >= needed => Ok(best.motion.relabel()),
             _ => Err(Lost::NoConsensus { found, matches: pairs.len(), needed }),
         }
     }
