@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use serde::Serialize;
 
 use super::{CoherenceProblem, read};
-use crate::{Acceptance, Alternative, Correspondence, Integrity, Outcome, Search, Solver};
+use crate::{Acceptance, Alternative, Correspondence, Integrity, Observations, Outcome, Search, Solver};
 
 /// The method that answers: what is used, and under which name it is reported.
 #[derive(Debug, Clone, Copy)]
@@ -98,6 +98,12 @@ pub struct Answer {
     pub covariance: Option<[[f64; 6]; 6]>,
     /// The identified pairs (model, cloud), if referenced.
     pub pairs: Option<Vec<[usize; 2]>>,
+    /// The scale of the model against the cloud that a similarity would have, of a solver that finds one, if referenced.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// The identified cloud points that lie behind the camera (z ≤ 0), if referenced and there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub behind: Vec<usize>,
     /// What was identified and is not believed (model, cloud), if not referenced: at the end of a budget the best so far.
     pub unbelieved: Option<Vec<[usize; 2]>>,
     /// What supports the fix beyond its covariance, if referenced.
@@ -163,6 +169,13 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
             std::array::from_fn(|row| std::array::from_fn(|column| reference.covariance.matrix[(row, column)]))
         }),
         pairs: reference.map(|reference| indices(&reference.pairs)),
+        scale: reference.and_then(|reference| {
+            solver.scale(&Observations::of(&reference.pairs, &problem.model, &problem.cloud, None))
+        }),
+        behind: reference.map_or_else(Vec::new, |reference| {
+            let clouds = reference.pairs.iter().map(|pair| pair.cloud);
+            clouds.filter(|&cloud| !(problem.cloud[cloud].position.at.coords.z > 0.0)).collect()
+        }),
         unbelieved: (reference.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
         integrity: reference.map(|reference| Support::from(&reference.integrity)),
         alternatives: match &attempt.outcome {

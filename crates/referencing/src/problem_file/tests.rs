@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::*;
-use crate::{Acceptance, Kabsch, MaximumClique, RigidConsensus};
+use crate::{Acceptance, Kabsch, MaximumClique, RigidConsensus, SOLVERS, Search};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use seafix_component::Fault;
+use seafix_component::{Choice, Fault};
 
 /// Five points seen from the origin of a camera 3 m in front of them, as exact numbers.
 const GOOD: &str = r#"{"format": "coherence-problem/1", "id": "x", "family": "t", "seed_set": "own", "seed": 1,
@@ -61,6 +61,54 @@ fn a_good_problem_is_answered_with_the_keys_of_the_format() {
     assert_eq!(answer["pairs"], serde_json::json!([[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]));
     assert!((answer["T_cam_obj"][2][3].as_f64().unwrap() - 3.0).abs() < 1e-12, "camera from object");
     assert_eq!(answer["covariance"].as_array().unwrap().len(), 6);
+}
+
+/// A model an eighth too large, under noise that lets it pass: umeyama tells 9/8, the other solvers nothing.
+#[test]
+fn the_scale_is_told_by_the_solver_that_finds_it() {
+    let mut problem = parse(&GOOD.replace("0.01", "0.1").replace("0.04", "0.3")).unwrap();
+    for point in &mut problem.model {
+        point.at.coords *= 1.125;
+    }
+    problem.prior = None;
+    problem.putative = Some((0..5).map(|k| (k, k)).collect());
+    // What is weak here is let pass: no search is under test.
+    let acceptance = Acceptance {
+        chance_budget: f64::INFINITY,
+        alert_limit: 1.0,
+        alert_share: 1.0,
+        attitude_limit: 1.0,
+        ..Acceptance::default()
+    };
+    let of = |name| {
+        let solver = SOLVERS.build(&Choice::named(name)).unwrap();
+        let (search, rng) = (MaximumClique::default(), &mut ChaCha8Rng::seed_from_u64(0));
+        let search = ("maximum-clique", &search as &dyn Search);
+        let method = Method { search, solver: (name, &*solver), acceptance: &acceptance, widen: false };
+        let answer = answer(&problem, Path::new("p.json"), &method, rng);
+        assert_eq!(answer.outcome, "referenced", "{answer:?}");
+        answer.scale
+    };
+    assert!((of("umeyama").unwrap() - 1.125).abs() < 1e-12);
+    assert_eq!(of("kabsch"), None);
+}
+
+/// A file knows no rig: a cloud behind the camera is answered as it is given, and its points are named.
+#[test]
+fn identified_points_behind_the_camera_are_named() {
+    assert!(solved(GOOD).get("behind").is_none());
+    let back = GOOD
+        .replace(
+            "[[0,0,3],[1,0,3],[0.25,-0.75,3],[0.5,0.5,4],[-0.5,0.25,3.5]]",
+            "[[0,0,-1],[1,0,-1],[0.25,-0.75,-1],[0.5,0.5,0],[-0.5,0.25,-0.5]]",
+        )
+        .replace("[0,0,1,3]", "[0,0,1,-1]");
+    let answer = solved(&back);
+    assert_eq!(
+        (answer["outcome"].as_str(), &answer["behind"]),
+        (Some("referenced"), &serde_json::json!([0, 1, 2, 3, 4])),
+        "{answer}"
+    );
 }
 
 #[test]

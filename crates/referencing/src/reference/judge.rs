@@ -9,7 +9,7 @@ use super::{
     rms_apart,
 };
 use crate::{
-    Correspondence, Degenerate, Identification, Observations, Prior, PriorBound, Problem, Solver,
+    Correspondence, Degenerate, Identification, ModelPoint, Observations, Prior, PriorBound, Problem, Solver,
     candidates::chi_square,
     chance::expected_sets,
     search::elsewhere,
@@ -233,7 +233,15 @@ impl Judge<'_> {
 
     /// Whether the camera of the pose sees the identified points from the sides from which they can be seen.
     fn seen_from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
-        if self.faces(hypothesis) { Ok(()) } else { Err(Fallen::Refused(Refusal::Behind)) }
+        if self.faces(hypothesis) {
+            return Ok(());
+        }
+        let camera = hypothesis.pose.translation();
+        let angle = |point: &ModelPoint| point.sight_angle(&camera).unwrap_or(0.0);
+        let points = hypothesis.pairs.iter().map(|pair| &self.problem.model[pair.model]);
+        let worst = points.max_by(|a, b| angle(a).total_cmp(&angle(b))).expect("a set that falls has points");
+        let (point, most) = (worst.id.clone(), ModelPoint::most_sight_angle());
+        Err(Fallen::Refused(Refusal::Behind { point, angle: angle(worst), most }))
     }
 
     /// The predicted error of the model points that the pose transfers: root mean square over all of

@@ -62,8 +62,18 @@ pub enum Refusal {
         limit: f64,
     },
     /// The camera of the pose would have to see points from behind.
-    #[error("the pose has the camera behind points that it identified")]
-    Behind,
+    #[error(
+        "the pose has the camera behind points that it identified: model point `{point}` would be seen {:.1}° from its normal; \
+         at most {:.1}° is possible", .angle.to_degrees(), .most.to_degrees()
+    )]
+    Behind {
+        /// The point that turns its back the most.
+        point: String,
+        /// The angle between its normal and the line of sight (rad).
+        angle: f64,
+        /// The greatest at which a point shows itself (rad).
+        most: f64,
+    },
     /// The pose contradicts the prior.
     #[error("the pose is {off:.3} times as far from the prior as the prior allows")]
     Prior {
@@ -79,7 +89,7 @@ impl Refusal {
             Self::Search(why) => why.reason(),
             Self::TooFew { .. } => "too-few",
             Self::Chance { .. } | Self::Absent { .. } => "chance",
-            Self::Residuals { .. } | Self::Behind | Self::Prior { .. } => "gate",
+            Self::Residuals { .. } | Self::Behind { .. } | Self::Prior { .. } => "gate",
             Self::Imprecise { .. } | Self::Attitude { .. } => "imprecise",
         }
     }

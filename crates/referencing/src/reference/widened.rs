@@ -39,7 +39,7 @@ fn nothing(outcome: &Outcome) -> bool {
             | Refusal::Chance { .. }
             | Refusal::Absent { .. }
             | Refusal::Residuals { .. }
-            | Refusal::Behind
+            | Refusal::Behind { .. }
             | Refusal::Prior { .. } => true,
             Refusal::Imprecise { .. } | Refusal::Attitude { .. } => false,
         },

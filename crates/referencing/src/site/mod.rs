@@ -20,6 +20,9 @@ pub use shell::Shell;
 pub(crate) use target::diameter;
 pub use target::{NoWorld, Target, TargetKind};
 
+/// Cosine of the angle between normal and line of sight below which a point shows its back.
+const BACK: f64 = -0.1;
+
 /// A feature point of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelPoint {
@@ -42,12 +45,21 @@ impl ModelPoint {
     /// Whether a camera there (object frame) sees it from the side from which it can be seen, or nearly: a surface and an
     /// attitude are known to some degrees.
     pub fn shows_itself(&self, camera: &Vector3<f64>) -> bool {
-        /// Cosine of the angle between normal and line of sight below which a point shows its back.
-        const BACK: f64 = -0.1;
         self.normal.is_none_or(|normal| {
             let sight = camera - self.at.coords;
             normal.dot(&sight) > BACK * normal.norm() * sight.norm()
         })
+    }
+
+    /// The angle (rad, 0 to π) between the normal and the line of sight to a camera there (object frame); `None` if the point
+    /// is seen from everywhere.
+    pub fn sight_angle(&self, camera: &Vector3<f64>) -> Option<f64> {
+        self.normal.map(|normal| normal.angle(&(camera - self.at.coords)))
+    }
+
+    /// The greatest angle (rad) between normal and line of sight at which a point still shows itself.
+    pub fn most_sight_angle() -> f64 {
+        libm::acos(BACK)
     }
 }
 

@@ -202,6 +202,13 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// [`Degenerate`]: the geometry determines no pose, with the number that failed.
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>;
 
+    /// The scale s of the model against the measured points, of least Σ ‖P_k − s C_k H‖²: a diagnostic of a solver that finds
+    /// it. A fix is rigid and does not use it. `None` of other solvers, and where `solve` refuses the geometry.
+    fn scale(&self, data: &Observations<'_>) -> Option<f64> {
+        let _ = data;
+        None
+    }
+
     /// Which of the points the pose rests on, as ascending indices: all of them, unless the solver
     /// says otherwise. Empty where `solve` would refuse.
     fn used(&self, data: &Observations<'_>) -> Vec<usize> {

@@ -58,6 +58,10 @@ impl Solver for Umeyama {
         }
     }
 
+    fn scale(&self, data: &Observations<'_>) -> Option<f64> {
+        check(data, self.minimum(), self.least_ratio).ok().map(|()| similarity(data).1)
+    }
+
     fn covariance(
         &self,
         data: &Observations<'_>,
