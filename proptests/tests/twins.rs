@@ -5,7 +5,8 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use seafix_component::Choice;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
 use seafix_referencing::{
-    Acceptance, Candidates, Kabsch, ModelPoint, Outcome, Prior, PriorBound, Problem, SEARCHES, Tolerance, reference,
+    Acceptance, Candidates, Kabsch, ModelPoint, Outcome, Prior, PriorBound, Problem, Refusal, SEARCHES, Tolerance,
+    reference,
 };
 
 const SIGMA: f64 = 0.002;
@@ -101,9 +102,16 @@ fn no_pose_shows_points_from_behind() {
     let solid =
         [[0.0, 0.9, 0.0], [0.4, 0.5, 0.3], [-0.4, 0.4, 0.1], [0.1, -0.8, 0.4], [0.5, -0.1, -0.2], [-0.6, -0.3, 0.2]];
     let solid = solid.map(Point::from);
+    let told = |normal| answers(&model(&solid, Some(normal)), Vector3::new(0.1, 0.2, -0.3), None);
+    let refused = told(Vector3::z()).into_iter().filter_map(|(_, outcome, _)| match outcome {
+        Outcome::Unidentified(Refusal::Behind { point, angle, most }) => Some((point, angle, most)),
+        _ => None,
+    });
+    let refused: Vec<_> = refused.collect();
+    assert!(!refused.is_empty() && refused.iter().all(|(_, angle, most)| angle > most), "{refused:?}");
     let found = |normal| {
-        let told = answers(&model(&solid, Some(normal)), Vector3::new(0.1, 0.2, -0.3), None);
-        told.into_iter()
+        told(normal)
+            .into_iter()
             .filter(|(_, outcome, _)| matches!(outcome, Outcome::Referenced(_)))
             .map(|(name, ..)| name)
             .collect()

@@ -99,6 +99,12 @@ fn people(answer: &Answer) -> String {
         let proved = if answer.optimal { ", proved largest" } else { "" };
         text += &format!(", {} points{proved}", pairs.len());
     }
+    if !answer.behind.is_empty() {
+        text += &format!(", cloud points behind the camera (z ≤ 0): {:?}", answer.behind);
+    }
+    if let Some(scale) = answer.scale {
+        text += &format!(", scale {scale:.6}");
+    }
     if let Some(why) = &answer.explanation {
         text += &format!(": {why}");
     }
