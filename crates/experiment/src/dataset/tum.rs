@@ -13,16 +13,34 @@ pub type Stamped<A, B> = (u64, Transform<A, B>);
 ///
 /// # Errors
 /// The first line that is not eight numbers, has a quaternion off unit length by more than 1e-3, or
-/// a stamp not after the one before; or that the quaternions seem to have w first.
+/// a stamp not after the one before; or a comment that names w first.
 pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<A, B>>, Fault> {
-    parse_lines(text.lines().enumerate().map(|(index, line)| (index + 1, line)), file)
+    Ok(lines_of(text.lines().enumerate().map(|(index, line)| (index + 1, line)), file)?.0)
 }
 
-/// As [`parse`], of lines with their numbers.
+/// As [`parse`], of lines with their numbers, of a file that anybody may have written: that its quaternions seem to have w
+/// first is refused as well. A data set says by its format what its files hold, and is not doubted.
 pub(crate) fn parse_lines<'a, A: Frame, B: Frame>(
     lines: impl Iterator<Item = (usize, &'a str)>,
     file: &Path,
 ) -> Result<Vec<Stamped<A, B>>, Fault> {
+    let (poses, order) = lines_of(lines, file)?;
+    match order.suspect() {
+        None => Ok(poses),
+        Some((number, line)) => {
+            Err(Fault::new("quaternions that seem to have w first", file).on_line(number).value(line).remedy(
+                "the order is qx qy qz qw: reorder the columns, or, if it is that, say so in a comment above, \
+                 `# seconds tx ty tz qx qy qz qw`",
+            ))
+        }
+    }
+}
+
+/// The poses, and what their lines say of the order of their quaternions.
+fn lines_of<'a, A: Frame, B: Frame>(
+    lines: impl Iterator<Item = (usize, &'a str)>,
+    file: &Path,
+) -> Result<(Vec<Stamped<A, B>>, Order<'a>), Fault> {
     let mut poses: Vec<Stamped<A, B>> = Vec::new();
     let mut order = Order::default();
     for (number, line) in lines {
@@ -71,15 +89,7 @@ pub(crate) fn parse_lines<'a, A: Frame, B: Frame>(
         order.see(number, line, [qx, qy, qz, qw]);
         poses.push((stamp, Transform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(tx, ty, tz))));
     }
-    match order.suspect() {
-        None => Ok(poses),
-        Some((number, line)) => {
-            Err(Fault::new("quaternions that seem to have w first", file).on_line(number).value(line).remedy(
-                "the order is qx qy qz qw: reorder the columns, or, if it is that, say so in a comment above, \
-                 `# seconds tx ty tz qx qy qz qw`",
-            ))
-        }
-    }
+    Ok((poses, order))
 }
 
 /// Whether quaternions seem to be written w first: in every line the first of the four is near one, and nobody says that it is
@@ -224,10 +234,15 @@ mod tests {
     /// Seen to fail when nobody looks at the order.
     #[test]
     fn w_first_is_suspected_where_no_one_says_otherwise() {
+        let read = |text: &str| -> Result<Vec<Stamped<World, Camera>>, Fault> {
+            parse_lines(text.lines().enumerate().map(|(index, line)| (index + 1, line)), Path::new("truth.tum"))
+        };
         let walk = |q: &str| (1..5).map(|t| format!("{t} {t} 0 0 {q}\n")).collect::<String>();
         let said = read(&walk("0.99 0.1 0 0.0995")).unwrap_err().to_string();
         assert!(said.starts_with("quaternions that seem to have w first in truth.tum:1"), "{said}");
         assert!(read(&walk("1 0 0 0")).is_err());
+        let of_a_data_set = parse::<World, Camera>(&walk("1 0 0 0"), Path::new("truth.tum"));
+        assert_eq!(of_a_data_set.unwrap().len(), 4, "a data set is not doubted");
         let down = read(&(COLUMNS.to_owned() + &walk("1 0 0 0"))).unwrap();
         assert_eq!(read(&print(&down)).unwrap(), down);
         assert!(read(&(walk("1 0 0 0") + "9 0 0 0 0.5 0.5 0.5 0.5\n")).is_ok());
