@@ -18,7 +18,7 @@ fn pairs() -> impl Strategy<Value = Vec<(f64, f64)>> {
     proptest::collection::vec((error(), error()), 0..90)
 }
 
-/// P70: the interval of the mean holds the mean.
+/// P70: the interval of the mean holds the mean. Seen to fail where blocks begin in the first third alone.
 #[test]
 fn an_interval_holds_its_estimate() {
     law(128, (values(12..60), 1..5_usize, any::<u64>()), |(values, block, seed)| {
@@ -30,7 +30,7 @@ fn an_interval_holds_its_estimate() {
     });
 }
 
-/// P70: with four times the values the interval is half as wide, within 10 %.
+/// P70: with four times the values the interval is half as wide, within 10 %. Seen to fail where only twenty are drawn.
 #[test]
 fn intervals_shrink_with_the_root_of_n() {
     law(48, (values(20..50), any::<u64>()), |(values, seed)| {
@@ -46,6 +46,7 @@ fn intervals_shrink_with_the_root_of_n() {
 }
 
 /// P70: adjusted values are no smaller than the raw ones and at most one; they keep the order.
+/// Seen to fail where a value may fall below the one before.
 #[test]
 fn adjusting_only_raises() {
     law(256, proptest::collection::vec(0.0..=1.0_f64, 1..20), |p| {

@@ -38,6 +38,7 @@ fn runs_of_the_same_data_are_compared() {
     assert!(!compared.differ && compared.table.contains("p 1.0000, not significant"), "{}", compared.table);
 }
 
+/// Seen to fail where nobody looks at what the runs saw.
 #[test]
 fn runs_of_other_data_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -7,6 +7,7 @@ use seafix_report::{Forms, report, summary};
 
 use crate::made_up::write_run;
 
+/// Seen to fail where characters that command a terminal are printed.
 #[test]
 fn names_command_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,6 +13,7 @@ fn made(folder: &Path) -> Verified {
     verify(folder, &folder.join("report")).unwrap()
 }
 
+/// Seen to fail where statistics are printed one per cent too large, and where refused attempts are not counted.
 #[test]
 fn all_numbers_are_computed_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -53,6 +54,8 @@ fn kind(name: &str) -> String {
 }
 
 /// Of every file of a report it is noticed that it is gone, changed or not its own, each by its name.
+///
+/// Seen to fail where strange files are passed over.
 #[test]
 fn every_file_is_missed_and_a_strange_one_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -107,6 +110,7 @@ fn another_log_is_noticed() {
     assert!(!verified.mismatches.is_empty() && !verified.holds());
 }
 
+/// Seen to fail where refused attempts are not counted.
 #[test]
 fn outcomes_add_up_and_every_attempt_counts_once() {
     let folder = tempfile::tempdir().unwrap();
