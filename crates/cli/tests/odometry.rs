@@ -86,6 +86,16 @@ impl Passage {
         self.folder.path().join(name)
     }
 
+    /// Writes dataset.toml with a right camera that is turned by so many degrees about x.
+    fn turn(&self, degrees: f64) {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let text = fs::read_to_string(self.path("dataset.toml")).unwrap();
+        let flat = "[0.0,1.0,0.0,0.0],[0.0,0.0,1.0,0.0]";
+        assert!(text.contains(flat), "{text}");
+        let turned = format!("[0.0,{cos},{},0.0],[0.0,{sin},{cos},0.0]", -sin);
+        self.put("dataset.toml", text.replace(flat, &turned));
+    }
+
     fn odometry(&self, more: &[&str]) -> assert_cmd::assert::Assert {
         let mut command = Command::cargo_bin("seafix").unwrap();
         command.arg("odometry").arg(self.folder.path()).args(more).assert()
@@ -120,6 +130,25 @@ impl Passage {
         let poses = segments.iter().flat_map(|segment| segment["poses"].as_array().unwrap());
         poses.map(|pose| pose["world_from_camera"][0][3].as_f64().unwrap()).collect()
     }
+}
+
+/// A rig whose right camera stands otherwise than it is written: that is told, and the way is found all the same; `--keep-rig`
+/// takes it as it is written, and then nothing is found.
+#[test]
+fn a_camera_that_is_turned_is_told_and_turned_back() {
+    let passage = Passage::new();
+    assert!(passage.json(&[])["realigned"].is_null());
+    passage.turn(1.0);
+    let all = passage.json(&[]);
+    let turn = &all["realigned"]["turn_deg"];
+    assert!((turn[0].as_f64().unwrap().abs() - 1.0).abs() < 0.02, "{turn}");
+    assert!(turn[1].as_f64().unwrap().abs() < 0.05, "{turn}");
+    assert!(all["warnings"][0].as_str().unwrap().contains("the images contradict the rig"), "{all}");
+    let ways = Passage::ways(&all);
+    assert_eq!(ways.len(), PAIRS);
+    assert!((ways[PAIRS - 1] - STEP * (PAIRS - 1) as f64).abs() < 0.005, "{ways:?}");
+    let said = passage.refusal(&["--keep-rig"], 3);
+    assert!(said.contains("no motion can be computed"), "{said}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Two cameras side by side (or one above the other, or any way), and the point both see.
 
-use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, Matrix4x3, UnitQuaternion, Vector3, Vector4};
 
 use crate::{Camera, Pinhole, Pixel, Point, RightCamera, Transform, UncertainPixels, so3::skew};
 
@@ -85,6 +85,14 @@ impl StereoRig {
         Self { left: self.right, right: self.left, right_from_left, essential }
     }
 
+    /// The same with the right camera turned where it stands: by the rotation vector `turn`, in its own frame (rad).
+    pub fn with_right_turned(&self, turn: &Vector3<f64>) -> Self {
+        let turn =
+            Transform::<RightCamera, RightCamera>::new(UnitQuaternion::from_scaled_axis(*turn), Vector3::zeros());
+        let right_from_left = turn * self.right_from_left;
+        Self::new(self.left, self.right, right_from_left).expect("the cameras are as far apart as they were")
+    }
+
     /// The left camera.
     pub fn left(&self) -> &Pinhole {
         &self.left
@@ -164,11 +172,16 @@ impl StereoRig {
     /// constraint x_rᵀ E x_l = 0 on undistorted directions, scaled by the mean focal length.
     /// `None` where a pixel lies beyond the lens model.
     pub fn epipolar_distance(&self, seen: &StereoPixels) -> Option<f64> {
+        self.epipolar_offset(seen).map(f64::abs)
+    }
+
+    /// The same with its sign, which tells the side of the epipolar line.
+    pub fn epipolar_offset(&self, seen: &StereoPixels) -> Option<f64> {
         let l = self.left.normalize(&seen.left)?.push(1.0);
         let r = self.right.normalize(&seen.right)?.push(1.0);
         let (line_r, line_l) = (self.essential * l, self.essential.transpose() * r);
         let slope = line_r.xy().norm_squared() + line_l.xy().norm_squared();
-        Some(self.mean_focal() * r.dot(&line_r).abs() / slope.sqrt())
+        Some(self.mean_focal() * r.dot(&line_r) / slope.sqrt())
     }
 
     /// The point that both pixels see, and how well it is known when their coordinates err as

@@ -23,16 +23,8 @@ impl OffLines {
 
     /// What two images say by their corners, found and described with the defaults.
     pub fn of_images(left: &Image, right: &Image, rig: &StereoRig) -> Self {
-        let corners = [left, right].map(|image| Harris::default().detect(image));
-        let described =
-            [(left, &corners[0]), (right, &corners[1])].map(|(image, at)| Surf::default().describe(image, at));
-        let view = |image, side: usize| View { image, keypoints: &corners[side], descriptors: &described[side] };
-        let mut found = Vec::new();
-        MutualRatio::default().match_into(&view(left, 0), &view(right, 1), rig, &mut Workspace::default(), &mut found);
-        let off = found.iter().filter_map(|pair| {
-            rig.epipolar_distance(&StereoPixels { left: corners[0][pair.left].at, right: pair.right })
-        });
-        let mut off: Vec<f64> = off.collect();
+        let seen = look_alikes(left, right, rig);
+        let mut off: Vec<f64> = seen.iter().filter_map(|seen| rig.epipolar_distance(seen)).collect();
         off.sort_by(f64::total_cmp);
         let nearer = &off[..off.len() - off.len() / 4];
         let squares: f64 = nearer.iter().map(|off| off * off).sum();
@@ -47,4 +39,14 @@ impl OffLines {
     pub fn contradict(&self) -> bool {
         self.matches >= Self::FEW && 4 * self.near < self.matches
     }
+}
+
+/// Corners that look alike in both images, found and described with the defaults; the rig plays no part in which.
+pub fn look_alikes(left: &Image, right: &Image, rig: &StereoRig) -> Vec<StereoPixels> {
+    let corners = [left, right].map(|image| Harris::default().detect(image));
+    let described = [(left, &corners[0]), (right, &corners[1])].map(|(image, at)| Surf::default().describe(image, at));
+    let view = |image, side: usize| View { image, keypoints: &corners[side], descriptors: &described[side] };
+    let mut found = Vec::new();
+    MutualRatio::default().match_into(&view(left, 0), &view(right, 1), rig, &mut Workspace::default(), &mut found);
+    found.iter().map(|pair| StereoPixels { left: corners[0][pair.left].at, right: pair.right }).collect()
 }

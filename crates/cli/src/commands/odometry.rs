@@ -11,10 +11,10 @@ use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
 use seafix_experiment::{
     changed,
-    dataset::{Dataset, DatasetFrame, are_twins, swapped_at_first, tum, twins_fault},
+    dataset::{Dataset, DatasetFrame, are_twins, realigned, swapped_at_first, tum, twins_fault},
 };
 use seafix_navigation::{Journey, Lost, ODOMETRIES, Odometry, Outcome, Segment, StereoPair};
-use seafix_vision::{Image, Threads};
+use seafix_vision::{Image, Realigned, Threads};
 use serde_json::{Value, json};
 
 use crate::{
@@ -39,6 +39,9 @@ pub(crate) struct Odometer {
     /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
     #[arg(long)]
     repair: bool,
+    /// Take the rig as it is written, even where the images say that its cameras are turned another way.
+    #[arg(long)]
+    keep_rig: bool,
     /// How many threads work; the poses do not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
@@ -64,7 +67,7 @@ struct Trip {
 impl Odometer {
     pub(crate) fn execute(&self) -> Ended {
         let (odometry, settings) = self.build()?;
-        let dataset =
+        let mut dataset =
             Dataset::open_pairs(&self.dataset, self.repair).map_err(|faults| Failure::faults(INPUT, &faults))?;
         let odd = dataset.odd_times();
         dataset.warnings.iter().chain(&odd).for_each(|warning| tell(&format!("warning: {warning}")));
@@ -84,16 +87,21 @@ impl Odometer {
         if let Some(fault) = swapped_at_first(&dataset) {
             return Err(Failure::new(INPUT, fault));
         }
+        let realigned = if self.keep_rig || odometry.listens() { None } else { realigned(&dataset) };
+        if let Some(found) = &realigned {
+            dataset.rig = found.rig;
+        }
         let trip = pool.install(|| self.travel(&*odometry, &dataset))?;
         if let Some(fault) = trip.motionless(&dataset.folder) {
             return Err(Failure::new(INPUT, fault));
         }
-        let warnings = trip.warnings();
+        let told = realigned.as_ref().map(|found| turned(found).to_string());
+        let warnings: Vec<String> = told.into_iter().chain(trip.warnings()).collect();
         warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
         if let Some(out) = out {
             out.finish(poses(&trip.journey))?;
         }
-        print(&if self.json { machines(&trip, &warnings, &settings) } else { people(&trip) })?;
+        print(&if self.json { machines(&trip, realigned.as_ref(), &warnings, &settings) } else { people(&trip) })?;
         Ok(DONE)
     }
 
@@ -148,6 +156,17 @@ impl Odometer {
         }
         Ok(Trip { journey: reckoning.journey(), given, unread, odometry_ms })
     }
+}
+
+/// A word on a rig that was turned.
+fn turned(found: &Realigned) -> String {
+    let [baseline, sight] = found.turn.map(f64::to_degrees);
+    format!(
+        "the images contradict the rig: what looks alike lies {:.1} px (median) off its epipolar lines; {:.1} px with the right \
+         camera turned by {baseline:.3}° about the baseline and {sight:.3}° about its line of sight, which was done \
+         (`--keep-rig` leaves it): calibrate again, for what epipolar lines do not tell may be wrong too",
+        found.given_px, found.left_px
+    )
 }
 
 /// The two images of a frame, which one image twice is not.
@@ -291,7 +310,7 @@ fn people(trip: &Trip) -> String {
 }
 
 /// For programs: everything.
-fn machines(trip: &Trip, warnings: &[String], settings: &Choice) -> String {
+fn machines(trip: &Trip, realigned: Option<&Realigned>, warnings: &[String], settings: &Choice) -> String {
     let journey = &trip.journey;
     let count = trip.given.len() as f64;
     let segments: Vec<Value> = journey.segments.iter().map(segment).collect();
@@ -307,6 +326,14 @@ fn machines(trip: &Trip, warnings: &[String], settings: &Choice) -> String {
         "left_out": left_out,
         "landmarks": trip.landmarks().map(|[least, found, sought]| json!({ "least": least, "found": found, "sought": sought })),
         "agreement": journey.agreement(),
+        "realigned": realigned.map(|found| json!({
+            "turn_deg": found.turn.map(f64::to_degrees),
+            "right_from_left": found.rig.right_from_left().rows(),
+            "pairs": found.pairs,
+            "agree": found.agree,
+            "given_px": found.given_px,
+            "left_px": found.left_px,
+        })),
         "warnings": warnings,
         "pairs_a_second": trip.pairs_a_second(),
         "times_ms": times,

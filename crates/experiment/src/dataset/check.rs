@@ -8,7 +8,8 @@ use std::{
 
 use rayon::prelude::*;
 use seafix_component::Fault;
-use seafix_vision::{Image, Sides};
+use seafix_geometry::StereoPixels;
+use seafix_vision::{Image, Realigned, Sides, look_alikes};
 use sha2::{Digest, Sha256};
 
 use super::{Dataset, ImageLimits, SAME_INSTANT_NS, folder::inside, picture::regular};
@@ -103,6 +104,8 @@ impl Twins {
 
 /// Frames whose images are looked at for their order.
 pub(crate) const LOOKED_AT: usize = 3;
+/// Pairs that are asked where the rig stands.
+const ASKED: usize = 8;
 
 /// Left and right images that have changed places, as three frames from the whole length of the set show.
 pub(crate) fn swapped(dataset: &Dataset) -> Option<Fault> {
@@ -129,6 +132,15 @@ pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
         }
     }
     swapped_fault(sides, &dataset.folder.join(&dataset.table))
+}
+
+/// The rig of `dataset` turned to where pairs of its images say that it stands, of so many of them, evenly over the set; `None`
+/// where they do not contradict it. Images that cannot be read say nothing.
+pub fn realigned(dataset: &Dataset) -> Option<Realigned> {
+    let apart = dataset.frames.len().div_ceil(ASKED).max(1);
+    let some = dataset.frames.iter().step_by(apart).filter_map(|frame| dataset.pair(frame).ok());
+    let seen: Vec<StereoPixels> = some.flat_map(|(left, right)| look_alikes(&left, &right, &dataset.rig)).collect();
+    Realigned::of(&seen, &dataset.rig)
 }
 
 /// What is wrong with the images of `file` if left and right have changed places.

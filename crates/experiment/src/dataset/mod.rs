@@ -17,7 +17,9 @@ pub mod tum;
 mod write;
 
 pub(crate) use check::{LOOKED_AT, hash_faults, hex, input_hashes, look_through, sha256, swapped};
-pub use check::{are_twins, check, partners_remedy, strangers, swapped_at_first, swapped_fault, twins_fault};
+pub use check::{
+    are_twins, check, partners_remedy, realigned, strangers, swapped_at_first, swapped_fault, twins_fault,
+};
 pub use kitti::Cameras;
 pub use open::{Dataset, DatasetFrame, DescribedRig, is_one, read_rig};
 pub(crate) use pairing::{SAME_INSTANT_NS, left_out, pairs};
