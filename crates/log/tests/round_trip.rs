@@ -37,6 +37,28 @@ fn images_can_be_left_out() {
     assert!(reader.has_images());
 }
 
+/// Bare frames are the frames without what they say that they leave out, and nothing else is lost.
+///
+/// Seen to fail without the truth, without the pixels and without the navigation.
+#[test]
+fn bare_frames_have_what_results_need() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.mcap");
+    synthetic::write(&path, 7);
+    for (number, bare) in Reader::open(&path).unwrap().without_images().bare().enumerate() {
+        let (mut bare, mut expected) = (bare.unwrap(), synthetic::frame(number as u64));
+        expected.images = None;
+        expected.prior = None;
+        if let Some(truth) = &mut expected.truth {
+            truth.visible.clear();
+        }
+        assert!(bare.cloud.iter().all(|point| point.at.iter().all(|x| x.is_nan())));
+        let pixels = |frame: &mut FrameRecord| frame.cloud.drain(..).map(|point| point.pixels).collect::<Vec<_>>();
+        assert_eq!(pixels(&mut bare), pixels(&mut expected));
+        assert_eq!(bare, expected);
+    }
+}
+
 #[test]
 fn frames_decoded_side_by_side_are_those_read_one_by_one() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,5 @@
 //! Which of two trials errs less, on the same frames.
 
-use std::collections::BTreeMap;
-
 use seafix_evaluation::{Bootstrap, holm, mcnemar, median, signed_rank};
 use seafix_log::Axis;
 
@@ -177,14 +175,37 @@ fn between(run: &Run) -> Vec<Comparison> {
 
 /// The errors m2 of both on the attempts that both made, in order of time; infinity where there is no right fix.
 pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
-    let of = |trial: &Trial| -> BTreeMap<(u64, String), f64> {
+    fn keyed(trial: &Trial) -> Vec<(u64, &str, f64)> {
         let attempts = trial.attempts();
-        let error = attempts
-            .map(|(frame, row)| ((frame.number, trial.object(row).to_owned()), row.error_or_failure(Field::M2)));
-        error.collect()
+        attempts.map(|(frame, row)| (frame.number, trial.object(row), row.error_or_failure(Field::M2))).collect()
+    }
+    matched(keyed(first), keyed(second))
+}
+
+/// The values of both under the keys that both have, in the order of the keys; of several under one key the last.
+fn matched<K: Ord>(first: Vec<(u64, K, f64)>, second: Vec<(u64, K, f64)>) -> Vec<(f64, f64)> {
+    let ordered = |mut keyed: Vec<(u64, K, f64)>| {
+        // Logs are in order as a rule, and then this costs a look.
+        keyed.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
+        keyed.dedup_by(|later, kept| {
+            let same = (later.0, &later.1) == (kept.0, &kept.1);
+            if same {
+                kept.2 = later.2;
+            }
+            same
+        });
+        keyed
     };
-    let other = of(second);
-    of(first).into_iter().filter_map(|(key, a)| Some((a, *other.get(&key)?))).collect()
+    let (first, second) = (ordered(first), ordered(second));
+    let mut other = second.into_iter().peekable();
+    let mut pairs = Vec::with_capacity(first.len());
+    for (number, key, value) in first {
+        while other.next_if(|(n, k, _)| (*n, k) < (number, &key)).is_some() {}
+        if let Some((_, _, theirs)) = other.next_if(|(n, k, _)| (*n, k) == (number, &key)) {
+            pairs.push((value, theirs));
+        }
+    }
+    pairs
 }
 
 /// One value a condition: the median of m2 over all attempts.
@@ -260,5 +281,21 @@ impl Statistics {
             effect: test.effect,
             alone: [alone(|(a, b)| [*a, *b]), alone(|(a, b)| [*b, *a])],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Only what both have, by key, in the order of the keys, however they came; of several under one key the last counts.
+    ///
+    /// Seen to fail when the first of them does, and when keys are compared by their numbers alone.
+    #[test]
+    fn values_are_paired_by_key() {
+        let first = vec![(2, "b", 5.0), (0, "a", 1.0), (2, "a", 3.0), (2, "a", 4.0), (7, "a", 6.0)];
+        let second = vec![(0, "a", 10.0), (1, "a", 20.0), (2, "a", 30.0), (2, "b", 40.0), (2, "c", 50.0)];
+        assert_eq!(matched(first, second), [(1.0, 10.0), (4.0, 30.0), (5.0, 40.0)]);
+        assert!(matched(vec![(1, "a", 1.0)], vec![(1, "b", 1.0)]).is_empty());
     }
 }

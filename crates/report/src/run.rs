@@ -136,7 +136,7 @@ impl Run {
 
 impl Trial {
     fn read(path: PathBuf) -> Result<Self, LogError> {
-        let mut reader = Reader::open(&path)?.without_images().without_inputs();
+        let mut reader = Reader::open(&path)?.without_images().without_inputs().bare();
         let mut trial = Self {
             label: path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             path,

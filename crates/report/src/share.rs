@@ -20,6 +20,16 @@ pub(crate) fn interval(trajectory: bool, events: &[bool]) -> (f64, f64) {
     clopper_pearson(events.iter().filter(|event| **event).count(), events.len(), 0.95)
 }
 
+/// The intervals of several shares of the same attempts.
+pub(crate) fn intervals(trajectory: bool, all: &[Vec<bool>]) -> Vec<(f64, f64)> {
+    match all.first() {
+        Some(first) if trajectory && !first.is_empty() => {
+            Bootstrap::of(first.len(), SEED).shares(all.iter().map(Vec::as_slice), 0.95)
+        }
+        _ => all.iter().map(|events| interval(trajectory, events)).collect(),
+    }
+}
+
 /// What a caption calls the intervals of these trials.
 pub(crate) fn called<'a>(mut headers: impl Iterator<Item = &'a TrialHeader>) -> &'static str {
     if headers.any(is_trajectory) { "95 % intervals (block bootstrap)" } else { "exact 95 % intervals" }

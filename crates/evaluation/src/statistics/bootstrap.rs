@@ -84,6 +84,7 @@ impl Bootstrap {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         let half = values.len().div_ceil(2);
+        let drawn = self.draw(values.len());
         // The least value that the median exceeds in no more than 1 − `share` of the resamples.
         let end = |share: f64| {
             let wanted = share * self.resamples.max(1) as f64;
@@ -91,7 +92,7 @@ impl Bootstrap {
             while low < high {
                 let middle = low.midpoint(high);
                 let below = |value: &f64| value.total_cmp(&sorted[middle]).is_le();
-                let sums = self.sums(values.iter().map(below));
+                let sums = drawn.sums(values.iter().map(below));
                 match sums.into_iter().filter(|sum| *sum >= half).count() as f64 >= wanted {
                     true => high = middle,
                     false => low = middle + 1,
@@ -115,38 +116,92 @@ impl Bootstrap {
     /// assert_eq!(bootstrap.share(&[true; 40], 0.95), clopper_pearson(10, 10, 0.95));
     /// ```
     pub fn share(&self, events: &[bool], confidence: f64) -> (f64, f64) {
-        let n = events.len();
-        let k = events.iter().filter(|event| **event).count();
-        if n == 0 {
-            return (f64::NAN, f64::NAN);
-        }
-        if k == 0 || k == n {
-            let blocks = n.div_ceil(self.block.max(1));
-            return clopper_pearson(if k == 0 { 0 } else { blocks }, blocks, confidence);
-        }
-        let mut drawn: Vec<f64> =
-            self.sums(events.iter().copied()).into_iter().map(|sum| sum as f64 / n as f64).collect();
-        let alpha = 1.0 - confidence;
-        (quantile(&mut drawn, 0.5 * alpha), quantile(&mut drawn, 1.0 - 0.5 * alpha))
+        self.shares([events], confidence)[0]
     }
 
-    /// How many events each resample has; of at least one trial.
+    /// The intervals of the shares of several events among the same trials: [`Self::share`] of each, all from the same
+    /// resamples, which are drawn once.
+    ///
+    /// # Panics
+    /// Where they are not of equally many trials.
+    pub fn shares<'a>(
+        &self,
+        all: impl IntoIterator<Item = &'a [bool], IntoIter: Clone>,
+        confidence: f64,
+    ) -> Vec<(f64, f64)> {
+        let all = all.into_iter();
+        let n = all.clone().next().map_or(0, <[bool]>::len);
+        let mut drawn: Option<Drawn> = None;
+        let alpha = 1.0 - confidence;
+        let share = |events: &[bool]| {
+            assert_eq!(events.len(), n, "events of other trials");
+            let k = events.iter().filter(|event| **event).count();
+            if n == 0 {
+                return (f64::NAN, f64::NAN);
+            }
+            if k == 0 || k == n {
+                let blocks = n.div_ceil(self.block.max(1));
+                return clopper_pearson(if k == 0 { 0 } else { blocks }, blocks, confidence);
+            }
+            let sums = drawn.get_or_insert_with(|| self.draw(n)).sums(events.iter().copied());
+            let mut shares: Vec<f64> = sums.into_iter().map(|sum| sum as f64 / n as f64).collect();
+            (quantile(&mut shares, 0.5 * alpha), quantile(&mut shares, 1.0 - 0.5 * alpha))
+        };
+        all.map(share).collect()
+    }
+
+    /// The blocks of every resample of n values; n is not zero.
+    fn draw(&self, n: usize) -> Drawn {
+        let block = self.block.clamp(1, n);
+        let resamples = self.resamples.max(1);
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let whole = n / block;
+        let mut begins = Vec::with_capacity(resamples * whole);
+        let mut rest = Vec::new();
+        for resample in 0..resamples as u64 {
+            begins.extend((0..whole).map(|_| (place_below(n, &mut random) as u64) << 32 | resample));
+            if n % block > 0 {
+                rest.push(place_below(n, &mut random));
+            }
+        }
+        begins.sort_unstable();
+        Drawn { n, block, resamples, begins, rest }
+    }
+}
+
+/// The blocks of all resamples, by where they begin: sums over them go through the values in order, not to and fro.
+struct Drawn {
+    n: usize,
+    block: usize,
+    resamples: usize,
+    /// Begin and resample of every whole block, 32 bits each: no memory holds more values than those count.
+    begins: Vec<u64>,
+    /// Where each resample's last block begins, if it is a shorter one.
+    rest: Vec<usize>,
+}
+
+impl Drawn {
+    /// How many events each resample has.
     fn sums(&self, events: impl Iterator<Item = bool>) -> Vec<usize> {
         // Events before each place.
-        let mut before = vec![0_usize];
+        let mut before = vec![0_u32];
         before.extend(events.scan(0, |sum, event| {
-            *sum += usize::from(event);
+            *sum += u32::from(event);
             Some(*sum)
         }));
-        let n = before.len() - 1;
+        let n = self.n;
         let within = |begin: usize, length: usize| {
             let end = begin + length;
             if end <= n { before[end] - before[begin] } else { before[n] - before[begin] + before[end - n] }
         };
-        let block = self.block.clamp(1, n);
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let sum = |_| (0..n).step_by(block).map(|at| within(place_below(n, &mut random), block.min(n - at))).sum();
-        (0..self.resamples.max(1)).map(sum).collect()
+        let mut sums = vec![0_usize; self.resamples];
+        for packed in &self.begins {
+            sums[*packed as u32 as usize] += within((*packed >> 32) as usize, self.block) as usize;
+        }
+        for (sum, begin) in sums.iter_mut().zip(&self.rest) {
+            *sum += within(*begin, n % self.block) as usize;
+        }
+        sums
     }
 }
 
@@ -184,6 +239,11 @@ mod tests {
         assert_eq!(bootstrap.share(&events, 0.95), bootstrap.interval(events.len(), 0.95, mean));
         assert_eq!(bootstrap.share(&[false; 9], 0.95), clopper_pearson(0, 3, 0.95));
         assert!(bootstrap.share(&[], 0.95).0.is_nan());
+        // Several at once are each as it is alone, whichever comes first.
+        let (rare, never): (Vec<bool>, Vec<bool>) = (0..50).map(|i| (i % 17 == 3, false)).unzip();
+        let all = [&never[..], &rare, &events];
+        let alone = all.map(|one| bootstrap.share(one, 0.95));
+        assert_eq!(bootstrap.shares(all, 0.95), alone);
     }
 
     /// Of many values the median's interval is found by halving, and is that of the resamples' medians.

@@ -60,13 +60,18 @@ pub(crate) fn frame_record(message: proto::Frame) -> Result<FrameRecord, Malform
 }
 
 fn point_record(message: proto::CloudPoint) -> Result<CloudPoint, Malformed> {
-    let pixels = match message.pixels[..] {
-        [] => None,
-        [u, v, ur, vr] => Some(PixelPair { left: [u, v], right: [ur, vr] }),
-        _ => return Err(Malformed(format!("cloud.pixels has {} numbers instead of 4", message.pixels.len()))),
-    };
+    let pixels = pixels(&message.pixels)?;
     let covariance = matrix("cloud.covariance", &message.covariance)?;
     Ok(CloudPoint { at: [message.x, message.y, message.z], covariance, pixels })
+}
+
+/// Where a point was seen, of its four numbers; none where it comes from no image.
+pub(super) fn pixels(numbers: &[f64]) -> Result<Option<PixelPair>, Malformed> {
+    match *numbers {
+        [] => Ok(None),
+        [u, v, ur, vr] => Ok(Some(PixelPair { left: [u, v], right: [ur, vr] })),
+        _ => Err(Malformed(format!("cloud.pixels has {} numbers instead of 4", numbers.len()))),
+    }
 }
 
 fn truth_record(message: proto::Truth) -> Result<TruthRecord, Malformed> {

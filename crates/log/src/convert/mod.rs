@@ -1,5 +1,6 @@
 //! Between plain records and this project's own messages, both ways and exactly.
 
+mod bare;
 mod frame;
 mod header;
 mod inputs;
@@ -8,6 +9,7 @@ mod navigation;
 mod result;
 mod totals;
 
+pub(crate) use bare::{BareFrame, bare_frame_record};
 pub(crate) use frame::{frame_message, frame_record};
 pub(crate) use header::{header_message, header_record};
 pub(crate) use inputs::{inputs_message, inputs_record};

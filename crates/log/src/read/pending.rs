@@ -18,9 +18,16 @@ pub(crate) struct Pending {
     inspection: Option<proto::Inspection>,
     timing: Option<proto::Timing>,
     inputs: Option<proto::Inputs>,
+    /// Whether the frame comes without what results do not need.
+    bare: bool,
 }
 
 impl Pending {
+    /// Nothing yet, of a frame that comes without what results do not need.
+    pub(crate) fn bare() -> Self {
+        Self { bare: true, ..Self::default() }
+    }
+
     /// Takes in one message; the whole frame, if it closes one.
     pub(crate) fn take(
         &mut self,
@@ -45,17 +52,26 @@ impl Pending {
             topic::INPUTS => self.inputs = Some(message.decode(path, "Inputs")?),
             topic::TIMING => self.timing = Some(message.decode(path, "Timing")?),
             topic::FRAME => {
-                let frame = message.decode(path, "Frame")?;
-                return std::mem::take(self).close(frame).map(Some).map_err(|what| foreign(path, message, &what));
+                let closed = if self.bare {
+                    let frame: convert::BareFrame = message.decode(path, "Frame")?;
+                    let closing = [frame.images, frame.results];
+                    convert::bare_frame_record(frame).map(|frame| (frame, closing))
+                } else {
+                    let frame: proto::Frame = message.decode(path, "Frame")?;
+                    let closing = [frame.images, frame.results];
+                    convert::frame_record(frame).map(|frame| (frame, closing))
+                };
+                let whole = closed.map_err(|error| error.0).and_then(|closed| std::mem::take(self).close(closed));
+                return whole.map(Some).map_err(|what| foreign(path, message, &what));
             }
             _ => {}
         }
         Ok(None)
     }
 
-    /// The frame that `closing` closes, or what it lacks.
-    fn close(self, closing: proto::Frame) -> Result<FrameRecord, String> {
-        let (number, images, results) = (closing.frame, closing.images as usize, closing.results as usize);
+    /// `frame` with all that it closes, so many images and results, or what it lacks.
+    fn close(self, (mut frame, closing): (FrameRecord, [u32; 2])) -> Result<FrameRecord, String> {
+        let (number, [images, results]) = (frame.frame, closing.map(|count| count as usize));
         let timing = self.timing.ok_or_else(|| format!("frame {number} has no times"))?;
         for (what, found, expected) in [
             ("images", self.images.len() + self.skipped_images, images),
@@ -69,7 +85,6 @@ impl Pending {
             }
         }
         let (times, target_times) = convert::target_times(&timing);
-        let mut frame = convert::frame_record(closing).map_err(|error| error.0)?;
         frame.times = times;
         if let Some(inputs) = self.inputs {
             if inputs.frame != number {

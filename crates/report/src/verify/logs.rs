@@ -71,7 +71,7 @@ impl Logs {
 
 impl Log {
     fn read(path: &Path) -> Result<Self, ReportError> {
-        let mut reader = Reader::open(path)?.without_images().without_inputs();
+        let mut reader = Reader::open(path)?.without_images().without_inputs().bare();
         let header = reader.header().clone();
         let (mut frames, mut disparity) = (Vec::new(), (0.0, 0));
         while let Some(frame) = reader.next().transpose()? {

@@ -46,10 +46,12 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             }
             let trajectory = share::is_trajectory(&trial.header);
             let (mut line, mut band) = (Vec::new(), Vec::new());
-            for threshold in THRESHOLDS {
-                let events: Vec<bool> = errors.iter().map(|error| *error <= threshold / 1e3).collect();
+            let below = |threshold: f64| errors.iter().map(|error| *error <= threshold / 1e3).collect();
+            let all: Vec<Vec<bool>> = THRESHOLDS.into_iter().map(below).collect();
+            for ((threshold, events), (low, high)) in
+                THRESHOLDS.into_iter().zip(&all).zip(share::intervals(trajectory, &all))
+            {
                 let k = events.iter().filter(|event| **event).count();
-                let (low, high) = share::interval(trajectory, &events);
                 // One rounding: of a tie another order of the two would print another last digit.
                 let share = 100.0 * k as f64 / n as f64;
                 let [low, high] = [low, high].map(|share| 100.0 * share);
