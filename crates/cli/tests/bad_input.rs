@@ -440,22 +440,22 @@ fn all_faults_of_an_experiment_at_once() {
         "e.toml:1:1: `sorce`; did you mean `source`?",
         "no question in",
         "`frames`: not a whole number of at least 0: string \"x\" in",
-        "e.toml:3:27",
+        "e.toml:3:36",
         "no setting `raet`, did you mean `rate`?",
         "e.toml:3:41",
         "no setting `water.attenuaton`, did you mean `attenuation`?",
         "e.toml:3:63",
         "no solver is called `kabsh`, did you mean `kabsch`?",
-        "e.toml:5:1",
+        "e.toml:5:10",
         "window = 0; give 1 to 1000",
-        "e.toml:6:3",
+        "e.toml:6:12",
         "search `icp`: setting `budget`: not a whole number",
-        "e.toml:7:26",
+        "e.toml:7:35",
         "search `icp` has no setting `x`",
         "e.toml:7:43",
         "e.toml:8:",
         "no search is called `gicpp`, did you mean `gicp`?",
-        "e.toml:9:1",
+        "e.toml:11:18",
         "an axis without values",
         "e.toml:14:1",
     ];
@@ -465,6 +465,78 @@ fn all_faults_of_an_experiment_at_once() {
     assert_eq!(said.lines().count(), 12, "{said}");
     for name in ["u64", "f64", "usize", "struct ", "enum ", "expected u", "variant"] {
         assert!(!said.contains(name), "{name} in {said}");
+    }
+}
+
+/// Each at the key or value itself, also where a component's name is misspelt, and on axes. Seen to fail where what is misspelt ends
+/// the search, and where an axis is told by its header.
+#[test]
+fn a_fault_is_told_where_it_stands() {
+    let start = "question = 'why'\n";
+    for (text, places) in [
+        (
+            "[source]\nframes = 0\nname = 'virtual-point'\ndistanse = 3\n",
+            &[("frames = 0", "3:10"), ("did you mean `virtual-points`?", "4:8"), ("did you mean `distance`?", "5:1")][..],
+        ),
+        ("source = 'virtual-points'\n[pipeline]\nsolver = 'kabch'\n", &[("did you mean `kabsch`?", "4:10")]),
+        (
+            "source = 'virtual-points'\n[pipeline]\nsolver = { name = 'tirad', chose = 'x' }\n[[vary]]\nkey = 'pipeline.slover'\n\
+             values = ['icp']\n[[vary]]\nkey = 'source.distance'\nvalues = [2.0, 'far', -1.0, 2]\n",
+            &[
+                ("did you mean `triad`?", "4:19"),
+                ("did you mean `choose`?", "4:28"),
+                ("`slover`, did you mean `solver`?", "6:7"),
+                ("not a number: string \"far\"", "10:16"),
+                ("distance = -1", "10:23"),
+                ("there twice", "10:29"),
+            ],
+        ),
+        (
+            "source = 'virtual-points'\n[[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'kabch', 'kabsch']\n\
+             [[vary]]\nkey = 'k'\nzip = { 'source.distance' = [2.0, 3.0], 'source.fraems' = [1, 2] }\n",
+            &[("did you mean `kabsch`?", "5:21"), ("there twice", "5:30"), ("did you mean `frames`?", "8:41")],
+        ),
+        (
+            "source = 'virtual-points'\n[[vary]]\nkey = 'k'\ncases = [\n{ label = 'a', set = { 'source.fraems' = 1 } },\n\
+             { label = 'a', set = { 'pipeline.serch' = 'icp', 'pipeline.gate' = { bx = 1.0 } } },\n]\n",
+            &[
+                ("did you mean `frames`?", "6:24"),
+                ("two cases of one name", "7:11"),
+                ("`serch`, did you mean `search`?", "7:24"),
+                ("unknown word `bx`, did you mean `box`?", "7:50"),
+            ],
+        ),
+        (
+            "source = 'virtual-points'\n[[vary]]\nkey = 'source.distance'\nrange = { from = 1.0, to = 2.0, step = 0.3 }\n\
+             [[vary]]\nkey = 'seed'\nrange = { from = 1, to = 5, count = 1 }\n",
+            &[("do not reach its end, 2; give 1.9 or 2.2", "5:28"), ("too few or too many", "8:37")],
+        ),
+        (
+            "source = 'virtual-points'\n[pipeline.acceptance]\nleast-points = 1\nconfidence = 2.0\n[pipeline.gate]\nbox = -1.0\n\
+             [[navigation.faults]]\nkind = 'off'\nfrom = 3.0\nto = 1.0\n[navigation.network.settings]\noverlap = 3.0\n\
+             recognition = { solver = 'kabch', draws = 0 }\n",
+            &[
+                ("least-points = 1", "4:16"),
+                ("confidence = 2", "5:14"),
+                ("box = -1", "7:7"),
+                ("faults[0].to = 1", "11:6"),
+                ("overlap = 3", "13:11"),
+                ("did you mean `kabsch`?", "14:26"),
+                ("draws = 0", "14:43"),
+            ],
+        ),
+    ] {
+        let (_folder, file) = experiment(&format!("{start}{text}"));
+        let check = Command::cargo_bin("seafix").unwrap().args(["check", &file]).output().unwrap();
+        let said = String::from_utf8(check.stdout).unwrap();
+        assert_eq!((check.status.code(), said.lines().count()), (Some(1), places.len()), "{said}");
+        for (what, place) in places {
+            let at = format!("e.toml:{place}");
+            let found = |line: &str| {
+                line.contains(what) && line.split([' ', ';']).any(|word| word.trim_end_matches(':').ends_with(&at))
+            };
+            assert!(said.lines().any(found), "no `{what}` at {place} in {said}");
+        }
     }
 }
 
@@ -512,7 +584,7 @@ fn dives_that_cannot_be() {
         ),
         (
             "[[source.faults]]\ndevice = 'images'\nkind = 'off'\nfrom = 3.0\nto = 1.0\n",
-            ["e.toml:10:1", "faults[0].to = 1", "not before `from`"],
+            ["e.toml:10:6", "faults[0].to = 1", "not before `from`"],
         ),
         ("current.speed = 3.0\n", ["off its route after 5.", "its thrusters do not hold it", "lower current.speed"]),
         (

@@ -106,6 +106,15 @@ impl fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
+/// What of a setting is at fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Its key: there is none of that name, or something is missing below it.
+    Key,
+    /// Its value.
+    Value,
+}
+
 /// The line (from 1) of the byte at `offset`.
 pub fn line_at(text: &str, offset: usize) -> usize {
     1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
@@ -122,13 +131,16 @@ pub fn place_at(text: &str, offset: usize) -> (usize, usize) {
 /// The line (from 1) of the key at `path` in a TOML text, or of the nearest table above it that
 /// exists; numbers in the path are places in arrays: `["object", "2", "id"]`.
 pub fn line_of(text: &str, path: &[&str]) -> Option<usize> {
-    place_of(text, path).map(|(_, (line, _))| line)
+    place_of(text, path, Part::Key).map(|(_, (line, _))| line)
 }
 
-/// The same with the column, behind how many steps of `path` lead to it: fewer than all where only a table above is there.
-pub fn place_of(text: &str, path: &[&str]) -> Option<(usize, (usize, usize))> {
+/// The same with the column, or of its value, behind how many steps of `path` lead to it: fewer than all where only a table above
+/// is there. The value of a table is what stands in it, so its key is told. A component that is written as its bare name has a
+/// `name`.
+pub fn place_of(text: &str, path: &[&str], part: Part) -> Option<(usize, (usize, usize))> {
     let (document, _) = toml::de::DeTable::parse_recoverable(text);
     let mut place = None;
+    let mut scalar: Option<usize> = None;
     let mut table = Some(document.get_ref());
     let mut array: Option<&toml::de::DeArray<'_>> = None;
     for (depth, step) in path.iter().enumerate() {
@@ -140,11 +152,19 @@ pub fn place_of(text: &str, path: &[&str]) -> Option<(usize, (usize, usize))> {
                 value
             })
         };
-        let Some(value) = value else { break };
-        if array.is_some() {
+        let Some(value) = value else {
+            // A bare name, or a value where a table should be.
+            if let Some(start) = scalar {
+                place = Some((depth + usize::from(*step == "name"), place_at(text, start)));
+            }
+            break;
+        };
+        let is_table = value.get_ref().is_table();
+        if array.is_some() || (part == Part::Value && !is_table && depth + 1 == path.len()) {
             place = Some((depth + 1, place_at(text, value.span().start)));
         }
         (table, array) = (value.get_ref().as_table(), value.get_ref().as_array());
+        scalar = (table.is_none() && array.is_none()).then(|| value.span().start);
     }
     place
 }
@@ -175,7 +195,14 @@ mod tests {
         assert_eq!(line_of(text, &["d", "1", "e"]), Some(7));
         assert_eq!(line_of(text, &["d", "1", "missing"]), Some(6));
         assert_eq!(line_of(text, &["nothing"]), None);
-        assert_eq!(place_of("é = 1\nb = { ü = 2, c = 3 }", &["b", "c", "x"]), Some((2, (2, 14))));
+        let table = "é = 1\nb = { ü = 2, c = 'd' }";
+        let place = |path: &[&str], part| place_of(table, path, part);
+        assert_eq!(place(&["b", "c"], Part::Key), Some((2, (2, 14))));
+        assert_eq!(place(&["b", "c"], Part::Value), Some((2, (2, 18))));
+        assert_eq!(place(&["b"], Part::Value), Some((1, (2, 1))));
+        assert_eq!(place(&["b", "c", "x"], Part::Key), Some((2, (2, 18))));
+        assert_eq!(place(&["b", "c", "name"], Part::Value), Some((3, (2, 18))));
+        assert_eq!(place(&["b", "x"], Part::Value), Some((1, (2, 1))));
         assert_eq!(place_at("ab\ncé d", 7), (2, 4));
     }
 

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::{Choice, plain, suggest::unknown};
+use crate::{Choice, Part, nearest, plain, suggest::unknown};
 
 /// What every component says of itself, whatever it does.
 ///
@@ -35,6 +35,8 @@ pub enum BuildError {
         kind: &'static str,
         /// The name that was asked for.
         name: String,
+        /// The name that was meant, where one is near enough.
+        near: Option<&'static str>,
         /// The nearest name and the list of all.
         hint: String,
     },
@@ -72,6 +74,16 @@ impl BuildError {
             Self::UnknownKey { key, .. } => Some(key),
             Self::BadValue { key, .. } => key.as_deref(),
         }
+    }
+
+    /// What of that key is at fault.
+    pub fn part(&self) -> Part {
+        if matches!(self, Self::UnknownKey { .. }) { Part::Key } else { Part::Value }
+    }
+
+    /// The name that was meant by one that nothing has.
+    pub fn near(&self) -> Option<&'static str> {
+        if let Self::UnknownName { near, .. } = self { *near } else { None }
     }
 }
 
@@ -188,7 +200,8 @@ fn culprit(
     }
 }
 
-fn inside<'a>(value: &'a mut toml::Value, step: &str) -> Option<&'a mut toml::Value> {
+/// What is one step below a value: in a table by its key, in a list by its place.
+pub fn inside<'a>(value: &'a mut toml::Value, step: &str) -> Option<&'a mut toml::Value> {
     match value {
         toml::Value::Table(table) => table.get_mut(step),
         toml::Value::Array(list) => list.get_mut(step.parse::<usize>().ok()?),
@@ -233,9 +246,39 @@ pub fn in_range(holds: bool, name: &str, value: impl std::fmt::Display, range: &
 }
 
 /// The setting, as a dotted key, that a message of [`in_range`] is about.
-fn out_of_range(message: &str) -> Option<String> {
+pub fn out_of_range(message: &str) -> Option<String> {
     let (name, _) = message.split_once(" = ")?;
     name.chars().all(|c| c.is_ascii_alphanumeric() || "-.[]".contains(c)).then(|| name.to_owned())
+}
+
+/// All that `check` finds in settings that are no component's: what it finds first is put back to its default, and the rest
+/// looked at.
+pub fn each_unfit<T: Clone + Serialize + DeserializeOwned>(
+    whole: &T,
+    check: fn(&T) -> Result<(), String>,
+) -> Vec<String> {
+    let (mut found, mut rest) = (Vec::new(), whole.clone());
+    while let Err(message) = check(&rest) {
+        // A default that is unfit by itself ends it.
+        let next = if found.contains(&message) { None } else { without(&rest, &message) };
+        found.push(message);
+        match next {
+            Some(next) => rest = next,
+            None => break,
+        }
+    }
+    found.dedup();
+    found
+}
+
+/// The settings without the one that a message is about, where they can do without.
+fn without<T: Serialize + DeserializeOwned>(whole: &T, message: &str) -> Option<T> {
+    let own = message.split_once(": ").map_or(message, |(_, own)| own);
+    let key = out_of_range(message).or_else(|| out_of_range(own))?;
+    let mut table = toml::Table::try_from(whole).ok()?;
+    let path: Vec<&str> = key.split(['.', '[', ']']).filter(|step| !step.is_empty()).collect();
+    take_out(&mut table, &path);
+    table.try_into().ok()
 }
 
 fn defaults<C: Component>() -> toml::Table {
@@ -307,10 +350,15 @@ impl<T: ?Sized> Registry<T> {
         })
     }
 
-    /// Everything that keeps `choice` from being built.
+    /// Everything that keeps `choice` from being built; of a misspelt name the settings are those of the one that was meant.
     pub fn faults(&self, choice: &Choice) -> Vec<BuildError> {
         match self.find(&choice.name) {
-            Err(error) => vec![error],
+            Err(error) => {
+                let meant =
+                    error.near().map(|near| Choice { name: near.to_owned(), settings: choice.settings.clone() });
+                let settings = meant.iter().flat_map(|meant| self.faults(meant)).collect::<Vec<_>>();
+                std::iter::once(error).chain(settings).collect()
+            }
             Ok(entry) => {
                 let errors = (entry.build)(choice.settings.clone()).err().unwrap_or_default();
                 errors.into_iter().map(|error| self.fault(entry, error)).collect()
@@ -353,6 +401,7 @@ impl<T: ?Sized> Registry<T> {
         self.entries.iter().find(|entry| entry.name == name).ok_or_else(|| BuildError::UnknownName {
             kind: self.kind,
             name: name.to_owned(),
+            near: nearest(name, self.names()),
             hint: unknown(name, &self.names().collect::<Vec<_>>()),
         })
     }
@@ -367,14 +416,14 @@ mod tests {
         fn area(&self) -> f64;
     }
 
-    #[derive(Debug, Serialize, Deserialize)]
+    #[derive(Debug, Clone, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
     struct Square {
         side_length: f64,
         frame: Frame,
     }
 
-    #[derive(Debug, Default, Serialize, Deserialize)]
+    #[derive(Debug, Clone, Default, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
     struct Frame {
         width: f64,
@@ -458,7 +507,27 @@ mod tests {
             assert!(all.contains(part), "no {part} in {all}");
         }
         assert!(SHAPES.faults(&Choice::named("square")).is_empty());
-        assert!(matches!(SHAPES.faults(&Choice::named("sqare"))[..], [BuildError::UnknownName { .. }]));
+        let misspelt = SHAPES.faults(&Choice::named("sqare").with("side", 1));
+        assert!(
+            matches!(misspelt[..], [BuildError::UnknownName { .. }, BuildError::UnknownKey { .. }]),
+            "{misspelt:?}"
+        );
+        assert!(matches!(
+            SHAPES.faults(&Choice::named("circle").with("side", 1))[..],
+            [BuildError::UnknownName { .. }]
+        ));
+    }
+
+    #[test]
+    fn settings_of_no_component_are_told_one_by_one_too() {
+        let check = |square: &Square| {
+            in_range(square.side_length > 0.0, "side-length", square.side_length, "a length")?;
+            in_range(square.frame.width >= 0.0, "frame.width", square.frame.width, "a width")
+        };
+        let wrong = Square { side_length: -1.0, frame: Frame { width: -2.0, holes: Vec::new() } };
+        assert_eq!(each_unfit(&wrong, check), ["side-length = -1; give a length", "frame.width = -2; give a width"]);
+        assert!(each_unfit(&Square::default(), check).is_empty());
+        assert_eq!(each_unfit(&wrong, |_| Err("side-length = 0; give more".to_owned())).len(), 1);
     }
 
     #[test]

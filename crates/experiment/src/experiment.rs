@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_component::{BuildError, Choice, Fault, take_out};
+use seafix_component::{BuildError, Choice, Fault, Part, inside, take_out};
 use seafix_log::looks_like;
 use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
@@ -136,14 +136,22 @@ pub struct Trial {
 /// A setting that no component can be built from, and its path in the file.
 struct Unfit {
     path: Vec<String>,
+    part: Part,
+    /// The component that was meant by a name that none has.
+    near: Option<&'static str>,
     message: String,
 }
 
 impl Unfit {
     fn new(path: &[&str], error: BuildError) -> Self {
         let mut path: Vec<String> = path.iter().map(|&step| step.to_owned()).collect();
-        path.extend(error.key().filter(|&key| key != "name").into_iter().flat_map(steps));
-        Self { path, message: error.to_string() }
+        path.extend(error.key().into_iter().flat_map(steps));
+        Self { path, part: error.part(), near: error.near(), message: error.to_string() }
+    }
+
+    /// What is said of this part of the setting at `path`.
+    fn of(path: &[&str], part: Part, message: String) -> Self {
+        Self { path: path.iter().map(|&step| step.to_owned()).collect(), part, near: None, message }
     }
 
     fn pipeline(error: PipelineError) -> Self {
@@ -158,8 +166,18 @@ impl Unfit {
         let path = [table.to_owned(), error.setting.to_owned()];
         Self {
             path: path.into_iter().chain(error.key.iter().flat_map(|key| steps(key))).collect(),
+            part: error.part,
+            near: error.near,
             message: error.message,
         }
+    }
+
+    /// It where the file has it: on the axis that sets it, at the point `cell` of the grid, or where the experiment itself does.
+    fn fault(&self, experiment: &Experiment, cell: &Cell, texts: &Texts) -> Fault {
+        let (path, part) = vary::written(&experiment.vary, cell, &self.path, self.part)
+            .unwrap_or_else(|| (self.path.clone(), self.part));
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        texts.fault(&path, part, &self.message)
     }
 }
 
@@ -219,13 +237,10 @@ impl Plan {
         texts: &Texts,
         settings: &[String],
     ) -> Result<Self, Vec<Fault>> {
-        let fault = |path: &[&str], what: &str| texts.fault(path, what);
-        let mut faults = vary::check(&experiment.vary, fault);
+        let fault = |path: &[&str], what: &str| texts.fault(path, Part::Value, what);
+        let mut faults = vary::check(&experiment.vary, |path, part, what| texts.fault(path, part, what));
         let unfit = experiment.unfit();
-        faults.extend(unfit.iter().map(|unfit| {
-            let path: Vec<&str> = unfit.path.iter().map(String::as_str).collect();
-            fault(&path, &unfit.message)
-        }));
+        faults.extend(unfit.iter().map(|unfit| unfit.fault(&experiment, &Vec::new(), texts)));
         if experiment.question.trim().is_empty() {
             faults.push(fault(&["question"], "no question").remedy("say in one sentence what the experiment asks"));
         }
@@ -255,11 +270,18 @@ impl Experiment {
     /// What is wrong with values of axes, looked at one by one, where something else is wrong too: that is left out.
     fn faults_of_axes(&self, unfit: &[Unfit], folder: &Path, texts: &Texts) -> Vec<Fault> {
         let mut table = toml::Table::try_from(self).expect("an experiment is a table of plain values");
-        let source_is_known = SOURCES.names().any(|name| name == self.source.name);
-        for Unfit { path, .. } in unfit {
-            match &path[..] {
-                [source] if source == "source" => drop(table.insert("source".to_owned(), "virtual-points".into())),
-                path => take_out(&mut table, path),
+        let mut source_is_known = true;
+        // Of lists the last first, so that the others keep their places.
+        for Unfit { path, near, .. } in unfit.iter().rev() {
+            let is_name = path.last().is_some_and(|last| last == "name");
+            match (&path[..], near) {
+                (_, Some(near)) => rename(&mut table, path, near),
+                ([source, ..], None) if source == "source" && (is_name || path.len() == 1) => {
+                    source_is_known = false;
+                    table.insert("source".to_owned(), "virtual-points".into());
+                }
+                (path, None) if is_name => take_out(&mut table, &path[..path.len() - 1]),
+                (path, None) => take_out(&mut table, path),
             }
         }
         let Ok(rest) = table.try_into::<Self>() else { return Vec::new() };
@@ -267,38 +289,37 @@ impl Experiment {
         if !rest.unfit().is_empty() {
             return Vec::new();
         }
-        let sound = |axis: &&Axis| {
-            let quiet = |_: &[&str], what: &str| Fault::new(what, Path::new(""));
-            vary::check(std::slice::from_ref(*axis), quiet).is_empty() && (source_is_known || !axis.touches("source"))
-        };
+        let sound = |axis: &&Axis| axis.is_bounded() && (source_is_known || !axis.touches("source"));
         let cells = self.vary.iter().filter(sound).flat_map(|axis| vary::grid(std::slice::from_ref(axis))).collect();
         trials(&rest, cells, folder, texts).err().unwrap_or_default()
     }
 }
 
+/// Puts a component's right name in the place of the wrong one.
+fn rename(table: &mut toml::Table, path: &[String], near: &str) {
+    let Some((first, below)) = path.split_first() else { return };
+    let place =
+        below.iter().try_fold(table.get_mut(first), |here, step| Some(here.and_then(|here| inside(here, step))));
+    if let Some(place) = place.flatten() {
+        *place = near.into();
+    }
+}
+
 /// The trials of these points of the grid, or what is wrong with all of them.
 fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts) -> Result<Vec<Trial>, Vec<Fault>> {
-    let base = experiment.resolved().map_err(|Unfit { path, message }| {
-        let path: Vec<&str> = path.iter().map(String::as_str).collect();
-        vec![texts.fault(&path, &message)]
-    })?;
+    let base = experiment.resolved().map_err(|unfit| vec![unfit.fault(experiment, &Vec::new(), texts)])?;
     let base = Experiment { vary: Vec::new(), repetitions: 1, ..base };
     let base = toml::Table::try_from(&base).expect("an experiment is a table of plain values");
     let (mut trials, mut faults) = (Vec::new(), Vec::new());
     for (index, cell) in grid.into_iter().enumerate() {
-        match trial(&base, index, cell, folder) {
+        match trial(&base, index, &cell, folder) {
             Ok(trial) => trials.push(trial),
-            Err(Unfit { path, message }) => {
-                // A fault in one point of the grid belongs to the axis whose key it is in, and is that of many points.
-                let at = path.join(".");
-                let axis = experiment.vary.iter().position(|axis| axis.touches(&at)).map(|axis| axis.to_string());
-                let path: Vec<&str> = match &axis {
-                    Some(axis) => vec!["vary", axis],
-                    None => path.iter().map(String::as_str).collect(),
-                };
-                let fault = texts.fault(&path, &message);
-                if !faults.contains(&fault) {
-                    faults.push(fault);
+            // A fault of an axis is that of many points.
+            Err(unfit) => {
+                for fault in unfit.iter().map(|unfit| unfit.fault(experiment, &cell, texts)) {
+                    if !faults.contains(&fault) {
+                        faults.push(fault);
+                    }
                 }
             }
         }
@@ -306,31 +327,65 @@ fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts
     if faults.is_empty() { Ok(trials) } else { Err(faults) }
 }
 
-/// The trial at one point of the grid.
-fn trial(base: &toml::Table, index: usize, cell: Cell, folder: &Path) -> Result<Trial, Unfit> {
-    let unfit = |message: String, path: &[&str]| Unfit { path: path.iter().map(|&s| s.to_owned()).collect(), message };
-    let mut table = base.clone();
-    for (key, value) in cell.iter().flat_map(|place| &place.set) {
-        vary::set(&mut table, key, value.clone()).map_err(|message| unfit(message, &[key]))?;
+/// The experiment `base` with what one point of the grid sets; without the settings that no experiment has, which are told.
+fn at(base: &toml::Table, cell: &Cell) -> (Option<Experiment>, Vec<Unfit>) {
+    let settings = || cell.iter().flat_map(|place| &place.set);
+    let with = |table: &toml::Table, key: &str, value: &toml::Value| -> Result<toml::Table, Unfit> {
+        let (mut table, path) = (table.clone(), steps(key).collect::<Vec<_>>());
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        let set = vary::set(&mut table, key, value.clone());
+        set.map_err(|message| Unfit::of(&path, Part::Key, message)).map(|()| table)
+    };
+    let all = settings().try_fold(base.clone(), |table, (key, value)| with(&table, key, value));
+    if let Some(experiment) = all.ok().and_then(|table| table.try_into().ok()) {
+        return (Some(experiment), Vec::new());
     }
-    let trial: Experiment = table.try_into().map_err(|error: toml::de::Error| {
-        let fault = Fault::in_toml(Path::new(""), "", &error);
-        let last: Vec<&str> = cell.last().map(|place| place.key.as_str()).into_iter().collect();
-        let parts = [fault.value, fault.remedy].into_iter().filter(|part| !part.is_empty());
-        unfit(std::iter::once(fault.what).chain(parts).collect::<Vec<_>>().join(", "), &last)
-    })?;
+    // One after the other, to know which it is.
+    let (mut table, mut unfit) = (base.clone(), Vec::new());
+    for (key, value) in settings() {
+        let read = with(&table, key, value).and_then(|more| match more.clone().try_into::<Experiment>() {
+            Ok(_) => Ok(more),
+            Err(error) => {
+                let Fault { what, value, remedy, .. } = Fault::in_toml(Path::new(""), "", &error);
+                let part = if what.starts_with("unknown key") { Part::Key } else { Part::Value };
+                let said: Vec<String> = [what, value, remedy].into_iter().filter(|part| !part.is_empty()).collect();
+                let path: Vec<String> = steps(key).collect();
+                Err(Unfit { path, part, near: None, message: said.join(", ") })
+            }
+        });
+        match read {
+            Ok(more) => table = more,
+            Err(error) => unfit.push(error),
+        }
+    }
+    (table.try_into().ok(), unfit)
+}
+
+/// The trial at one point of the grid, or everything that is wrong with it.
+fn trial(base: &toml::Table, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, Vec<Unfit>> {
+    let (trial, mut unfit) = at(base, cell);
+    unfit.extend(trial.iter().flat_map(Experiment::unfit));
+    match trial {
+        Some(trial) if unfit.is_empty() => built(trial, index, cell, folder).map_err(|unfit| vec![unfit]),
+        _ => Err(unfit),
+    }
+}
+
+/// The trial that a sound experiment is.
+fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, Unfit> {
+    let unfit = |message: String, path: &[&str]| Unfit::of(path, Part::Value, message);
     let mut trial = trial.resolved()?;
     let keyframes = trial.navigation.iter_mut().filter_map(|navigation| navigation.network.as_mut());
     keyframes.for_each(|keyframes| keyframes.pin(folder));
     let source = SOURCES.build(&trial.source).map_err(|error| unfit(error.to_string(), &["source"]))?;
-    let stages = trial.pipeline.build().map_err(|error| unfit(error.message, &["pipeline", error.setting]))?;
+    let stages = trial.pipeline.build().map_err(Unfit::pipeline)?;
     if stages.needs_pixels() && !source.has_pixels() {
         let (solver, source) = (&trial.pipeline.solver.name, &trial.source.name);
         let what = format!("solver `{solver}` needs pixels, which source `{source}` has not; use `mahalanobis`");
         return Err(unfit(what, &["pipeline", "solver"]));
     }
     let helm = trial.navigation.as_ref().map(Navigation::build).transpose();
-    let helm = helm.map_err(|error| unfit(error.message, &["navigation", error.setting]))?;
+    let helm = helm.map_err(Unfit::navigation)?;
     if helm.as_ref().is_some_and(Helm::listens) && !source.may_hear() {
         let source = &trial.source.name;
         let what = format!(
@@ -342,7 +397,7 @@ fn trial(base: &toml::Table, index: usize, cell: Cell, folder: &Path) -> Result<
         let what = "navigation goes from object to object; use target = \"object\"".to_owned();
         return Err(unfit(what, &["pipeline", "target"]));
     }
-    Ok(Trial { name: vary::name(index + 1, &cell), cell, resolved: trial, source, stages, helm })
+    Ok(Trial { name: vary::name(index + 1, cell), cell: cell.clone(), resolved: trial, source, stages, helm })
 }
 
 /// What a file is that is no experiment, by how it begins.
@@ -419,7 +474,7 @@ mod tests {
         assert!(
             plan(&text.replace("key = 'camera'", "key = 'camera'\nvalues = [1]")).unwrap_err().contains("and cases")
         );
-        assert!(plan(&text.replace("source.rig.focal", "source.rig.fokal")).unwrap_err().contains("e.toml:3"));
+        assert!(plan(&text.replace("source.rig.focal", "source.rig.fokal")).unwrap_err().contains("e.toml:6:52"));
     }
 
     #[test]
@@ -446,7 +501,7 @@ mod tests {
         assert_eq!(
             message("question = 'why'\nsource = 'virtual-points'\n\n[pipeline]\nsolver = 'kabsh'\n").trim(),
             format!(
-                "no solver is called `kabsh`, did you mean `kabsch`? There are {} in e.toml:5:1",
+                "no solver is called `kabsh`, did you mean `kabsch`? There are {} in e.toml:5:10",
                 seafix_referencing::SOLVERS.names().collect::<Vec<_>>().join(", ")
             )
         );
@@ -458,7 +513,7 @@ mod tests {
             message(
                 "question = 'why'\nsource = 'virtual-points'\n[[vary]]\nkey = 'pipeline.solvr'\nvalues = ['triad']\n"
             )
-            .contains("e.toml:3")
+            .contains("e.toml:4:7")
         );
         assert!(message("question = ''\nsource = 'virtual-points'\n").contains("no question in e.toml:1"));
         assert!(

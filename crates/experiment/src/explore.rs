@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix_component::{Fault, read_long_text};
+use seafix_component::{Fault, Part, each_unfit, read_long_text};
 use seafix_geometry::StereoRig;
 use seafix_navigation::{
     Displacement, Here, Local, Navigated, Navigator, Network, NetworkSettings, Recognition, StereoPair, Traverse,
@@ -12,7 +12,13 @@ use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEM
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::{PipelineError, dataset::hex, navigate::places, pipeline::resolve, source::Sight};
+use crate::{
+    PipelineError,
+    dataset::hex,
+    navigate::places,
+    pipeline::{faults, misfit, resolve},
+    source::Sight,
+};
 
 /// A network is read up to this length (bytes): some five thousand key frames.
 const MOST: u64 = 1 << 30;
@@ -51,14 +57,56 @@ impl Keyframes {
         Ok(Self { settings: NetworkSettings { recognition, ..self.settings.clone() }, ..self.clone() })
     }
 
-    /// Whether it can be worked with.
-    pub(crate) fn check(&self) -> Result<(), PipelineError> {
-        let wrong = |message| PipelineError { setting: "network", key: None, message };
-        self.settings.check().map_err(|said| wrong(format!("settings.{said}")))?;
-        if self.read.is_empty() && !self.sha256.is_empty() {
-            return Err(wrong("sha256 says which file is read; name it by `read`".to_owned()));
+    /// Everything that it cannot be worked with for.
+    pub(crate) fn unfit(&self) -> Vec<PipelineError> {
+        let r = &self.settings.recognition;
+        let filters =
+            r.filters.iter().enumerate().map(|(k, filter)| (format!("filters.{k}"), faults(&FILTERS, filter)));
+        let stages = [
+            ("detector", faults(&DETECTORS, &r.detector)),
+            ("locator", faults(&LOCATORS, &r.locator)),
+            ("descriptor", faults(&DESCRIPTORS, &r.descriptor)),
+            ("matcher", faults(&MATCHERS, &r.matcher)),
+            ("refine", faults(&REFINEMENTS, &r.refine)),
+            ("triangulation", faults(&TRIANGULATORS, &r.triangulation)),
+            ("between", faults(&MATCHERS, &r.between)),
+            ("minimal", faults(&SOLVERS, &r.minimal)),
+            ("solver", faults(&SOLVERS, &r.solver)),
+        ];
+        let stages = filters.chain(stages.map(|(stage, errors)| (stage.to_owned(), errors)));
+        let below = |(stage, errors): (String, Vec<PipelineError>)| {
+            errors.into_iter().map(move |error| {
+                let key =
+                    error.key.iter().fold(format!("settings.recognition.{stage}"), |all, key| format!("{all}.{key}"));
+                PipelineError { setting: "network", key: Some(key), ..error }
+            })
+        };
+        let mut all: Vec<PipelineError> = stages.flat_map(below).collect();
+        let mut rest = self.settings.clone();
+        if !all.is_empty() {
+            let Recognition {
+                points,
+                consensus_px,
+                draws,
+                least_points,
+                budget,
+                confidence,
+                most_sigma,
+                candidates,
+                ..
+            } = *r;
+            let own =
+                Recognition { points, consensus_px, draws, least_points, budget, confidence, ..Recognition::default() };
+            rest.recognition = Recognition { most_sigma, candidates, ..own };
         }
-        Ok(())
+        let own = each_unfit(&rest, NetworkSettings::check);
+        all.extend(own.into_iter().map(|said| misfit("network", format!("settings.{said}"))));
+        if self.read.is_empty() && !self.sha256.is_empty() {
+            let message = "sha256 says which file is read; name it by `read`".to_owned();
+            let (setting, key) = ("network", Some("sha256".to_owned()));
+            all.push(PipelineError { setting, key, part: Part::Key, near: None, message });
+        }
+        all
     }
 
     /// Writes down which file is read, where that is not said; a file that cannot be read is told of when it is opened.

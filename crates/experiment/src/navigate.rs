@@ -18,7 +18,7 @@ use crate::{
     Keyframes, PipelineError, Sighting, Stages,
     explore::Explorer,
     odometry_fault::{Motions, OdometryFault},
-    pipeline::{build, faults, resolve},
+    pipeline::{build, faults, misfit, resolve},
     record::rows6,
     source::{Eyes, Passage, Sight},
     stages::milliseconds,
@@ -74,15 +74,15 @@ impl Navigation {
         let mut all = faults(&ODOMETRIES, &self.odometry);
         all.extend(faults(&POLICIES, &self.policy));
         all.extend(faults(&FUSIONS, &self.fusion));
-        let own = [self.sound(), self.network.as_ref().map_or(Ok(()), Keyframes::check)];
-        all.extend(own.into_iter().filter_map(Result::err));
+        all.extend(self.unsound());
+        all.extend(self.network.iter().flat_map(Keyframes::unfit));
         all
     }
 
-    /// Whether the faults are faults.
-    fn sound(&self) -> Result<(), PipelineError> {
-        let all = self.faults.iter().enumerate().try_for_each(|(k, fault)| fault.check(k));
-        all.map_err(|message| PipelineError { setting: "faults", key: None, message })
+    /// The faults that are none.
+    fn unsound(&self) -> impl Iterator<Item = PipelineError> {
+        let all = self.faults.iter().enumerate().filter_map(|(k, fault)| fault.check(k).err());
+        all.map(|message| misfit("faults", message))
     }
 
     /// Ready to work.
@@ -90,8 +90,8 @@ impl Navigation {
     /// # Errors
     /// [`PipelineError`] names the setting.
     pub fn build(&self) -> Result<Helm, PipelineError> {
-        self.sound()?;
-        self.network.as_ref().map_or(Ok(()), Keyframes::check)?;
+        let unfit = self.unsound().chain(self.network.iter().flat_map(Keyframes::unfit)).next();
+        unfit.map_or(Ok(()), Err)?;
         Ok(Helm {
             odometry: build(&ODOMETRIES, &self.odometry)?,
             policy: build(&POLICIES, &self.policy)?,

@@ -1,6 +1,6 @@
 //! The settings of the way from a sight to fixes, and what is built from them.
 
-use seafix_component::{BuildError, Choice, Fault, Registry, in_range};
+use seafix_component::{BuildError, Choice, Fault, Part, Registry, each_unfit, in_range, out_of_range};
 use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
 use seafix_vision::{
     DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, StageChoices, TRIANGULATORS,
@@ -76,8 +76,12 @@ impl Default for Pipeline {
 pub struct PipelineError {
     /// The key below `pipeline`.
     pub setting: &'static str,
-    /// The key below that, where the component's setting is known.
+    /// The key below that, where it is known; of a component that does not exist its `name`.
     pub key: Option<String>,
+    /// What of that key it is.
+    pub part: Part,
+    /// The component that was meant by a name that none has.
+    pub near: Option<&'static str>,
     /// What is wrong, and the nearest right thing.
     pub message: String,
 }
@@ -126,14 +130,19 @@ impl Pipeline {
         all.extend(faults(&TRIANGULATORS, &self.triangulation));
         all.extend(faults(&SEARCHES, &self.search));
         all.extend(faults(&SOLVERS, &self.solver));
-        let own = [
-            fits("gate", self.gate.check()),
-            fits("tolerance", self.tolerance.check()),
-            fits("acceptance", self.acceptance.check()),
-            fits("window", in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000")),
-        ];
-        all.extend(own.into_iter().filter_map(Result::err));
+        all.extend(each_unfit(&self.gate, Gate::check).into_iter().map(|message| misfit("gate", message)));
+        all.extend(
+            each_unfit(&self.tolerance, Tolerance::check).into_iter().map(|message| misfit("tolerance", message)),
+        );
+        let acceptance = each_unfit(&self.acceptance, Acceptance::check);
+        all.extend(acceptance.into_iter().map(|message| misfit("acceptance", message)));
+        all.extend(self.window_fits().err());
         all
+    }
+
+    fn window_fits(&self) -> Result<(), PipelineError> {
+        let fits = in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000");
+        fits.map_err(|message| misfit("window", message))
     }
 
     /// Standard deviation of the coordinates of a key point that no corner was fitted to (px); none of a pipeline that
@@ -170,22 +179,28 @@ impl Pipeline {
     /// # Errors
     /// [`PipelineError`] names the setting.
     pub fn build(&self) -> Result<Stages, PipelineError> {
-        fits("gate", self.gate.check())?;
-        fits("tolerance", self.tolerance.check())?;
-        fits("acceptance", self.acceptance.check())?;
-        fits("window", in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000"))?;
+        self.gate.check().map_err(|message| misfit("gate", message))?;
+        self.tolerance.check().map_err(|message| misfit("tolerance", message))?;
+        self.acceptance.check().map_err(|message| misfit("acceptance", message))?;
+        self.window_fits()?;
         let (search, solver) = (build(&SEARCHES, &self.search)?, build(&SOLVERS, &self.solver)?);
         Ok(Stages::new(self.front_end()?, search, solver, self.clone()))
     }
 }
 
-fn fits(setting: &'static str, check: Result<(), String>) -> Result<(), PipelineError> {
+/// What a check of settings that are no component's says.
+pub(crate) fn misfit(setting: &'static str, message: String) -> PipelineError {
     // Some checks say by themselves whose they are.
-    let named = |message: String| match message.starts_with(&format!("{setting}: ")) {
-        true => message,
-        false => format!("{setting}: {message}"),
+    let own = message.strip_prefix(&format!("{setting}: ")).unwrap_or(&message);
+    // Settings of a list say their places: `faults[0].to`.
+    let (key, message) = match out_of_range(own) {
+        Some(key) => match key.strip_prefix(setting) {
+            Some(below) => (Some(below.to_owned()).filter(|below| !below.is_empty()), own.to_owned()),
+            None => (Some(key), format!("{setting}: {own}")),
+        },
+        None => (None, format!("{setting}: {own}")),
     };
-    check.map_err(|message| PipelineError { setting, key: None, message: named(message) })
+    PipelineError { setting, key, part: Part::Value, near: None, message }
 }
 
 pub(crate) fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice, PipelineError> {
@@ -228,6 +243,6 @@ fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> Pipelin
 
 /// What is wrong with a component, as the fault of its setting.
 fn unfit(setting: &'static str, error: &BuildError) -> PipelineError {
-    let key = error.key().filter(|&key| key != "name").map(str::to_owned);
-    PipelineError { setting, key, message: error.to_string() }
+    let key = error.key().map(str::to_owned);
+    PipelineError { setting, key, part: error.part(), near: error.near(), message: error.to_string() }
 }

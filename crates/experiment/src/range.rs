@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct Range {
     /// The first.
     pub from: Number,
-    /// The last; with `step`, none is beyond it.
+    /// The last; with `step`, so many steps lead to it.
     pub to: Number,
     /// How many there are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -49,13 +49,16 @@ impl Number {
 /// More are a mistake.
 const MOST: usize = 10_000;
 
+/// So much of a step is taken for rounding.
+const ROUNDING: f64 = 1e-9;
+
 impl Range {
     /// At equal steps.
     pub fn even(&self) -> impl Iterator<Item = toml::Value> + use<> {
         let (from, to) = (self.from.real(), self.to.real());
         let steps = match self.step {
             // A last step that rounding makes too long still counts.
-            Some(step) => ((to - from) / step.real() + 1e-9).floor() as usize,
+            Some(step) => ((to - from) / step.real() + ROUNDING).floor() as usize,
             None => self.count.unwrap_or(2).saturating_sub(1),
         };
         let step = self.step.map_or((to - from) / steps.max(1) as f64, Number::real);
@@ -75,28 +78,40 @@ impl Range {
     }
 
     /// Whether it can be, as one of ratios or of steps.
-    pub(crate) fn check(&self, ratios: bool) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// The key at fault and what is wrong with it.
+    pub(crate) fn check(&self, ratios: bool) -> Result<(), (&'static str, String)> {
         let (from, to) = (self.from.real(), self.to.real());
-        let refuse = |what: &str| Err(what.to_owned());
+        let refuse = |key, what: &str| Err((key, what.to_owned()));
         if !(from.is_finite() && to.is_finite()) || from == to {
-            return refuse("a range from a number to itself or to none; give two ends");
+            let key = if from.is_finite() { "to" } else { "from" };
+            return refuse(key, "a range from a number to itself or to none; give two ends");
         }
         if ratios && !(from > 0.0 && to > 0.0) {
-            return refuse("a log-range that touches zero; give two ends above zero");
+            let key = if from > 0.0 { "to" } else { "from" };
+            return refuse(key, "a log-range that touches zero; give two ends above zero");
         }
         match (self.count, self.step) {
             (Some(count), None) if (2..=MOST).contains(&count) => Ok(()),
-            (Some(_), None) => refuse("a range of too few or too many numbers; give a count from 2 to 10000"),
-            (None, Some(_)) if ratios => refuse("a log-range with a step; give a count"),
+            (Some(_), None) => refuse("count", "a range of too few or too many numbers; give a count from 2 to 10000"),
+            (None, Some(_)) if ratios => refuse("step", "a log-range with a step; give a count"),
             (None, Some(step)) => {
                 let steps = (to - from) / step.real();
-                if steps >= 1.0 && steps < MOST as f64 {
-                    Ok(())
-                } else {
-                    refuse("a step that does not lead from one end to the other in 1 to 10000 steps")
+                if !(steps >= 1.0 - ROUNDING && steps < MOST as f64) {
+                    return refuse("step", "a step that does not lead from one end to the other in 1 to 10000 steps");
                 }
+                if (steps - steps.round()).abs() <= ROUNDING {
+                    return Ok(());
+                }
+                let below = rounded(from + steps.floor() * step.real(), 12);
+                let beyond = rounded(below + step.real(), 12);
+                let what =
+                    format!("a range whose steps do not reach its end, {to}; give {below} or {beyond}, or a count");
+                Err(("to", what))
             }
-            _ => refuse("a range with a count and a step, or with neither; give one of them"),
+            (Some(_), Some(_)) => refuse("step", "a range with a count and a step; give one of them"),
+            (None, None) => refuse("from", "a range with neither count nor step; give one of them"),
         }
     }
 }
@@ -132,8 +147,20 @@ mod tests {
             "from = 0\nto = 1",
             "from = 0\nto = 1\nstep = -1",
             "from = 0\nto = 1\ncount = 1",
+            "from = 0\nto = nan\ncount = 2",
+            "from = 0\nto = 1\nstep = 0",
         ] {
             assert!(range(wrong).check(false).is_err(), "{wrong}");
+        }
+        let (key, what) = range("from = 1\nto = 2\nstep = 0.3").check(false).unwrap_err();
+        assert_eq!(key, "to");
+        assert!(what.contains("do not reach its end, 2; give 1.9 or 2.2"), "{what}");
+        for right in [
+            "from = 0.0\nto = 0.6\nstep = 0.2",
+            "from = 10\nto = 4\nstep = -2",
+            "from = 0.0\nto = 1e4\nstep = 1.1111111111111112",
+        ] {
+            assert!(range(right).check(false).is_ok(), "{right}");
         }
         assert!(range("from = 0\nto = 1\ncount = 3").check(true).is_err());
     }

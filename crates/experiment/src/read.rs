@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_component::{Fault, place_of, read_text};
+use seafix_component::{Fault, Part, place_of, read_text};
 use serde::Deserialize;
 use toml::{
     Spanned,
@@ -26,9 +26,9 @@ impl Texts {
         Self { files: vec![(file.to_owned(), text.to_owned())] }
     }
 
-    /// The fault `what` of the setting at `path`, in the file that says it.
-    pub(crate) fn fault(&self, path: &[&str], what: &str) -> Fault {
-        let places = self.files.iter().map(|(file, text)| (file, place_of(text, path)));
+    /// The fault `what` of this part of the setting at `path`, in the file that says it.
+    pub(crate) fn fault(&self, path: &[&str], part: Part, what: &str) -> Fault {
+        let places = self.files.iter().map(|(file, text)| (file, place_of(text, path, part)));
         // Where both say as much, the later word is that of the experiment's own file, which is first.
         let best = places.reduce(|best, next| match (&best.1, &next.1) {
             (Some((depth, _)), Some((deeper, _))) if deeper > depth => next,
@@ -55,29 +55,13 @@ pub(crate) struct Read {
 /// The experiment that `file`, whose text is `text`, holds. `base = "other.toml"` names a file whose settings hold where
 /// this one has none of its own.
 pub(crate) fn experiment(file: &Path, text: &str) -> Read {
-    let (mut texts, mut faults) = (Texts::of(file, text), Vec::new());
-    let mut whole = toml::Table::new();
-    if let Some(base) = DeTable::parse_recoverable(text).0.get_ref().get("base") {
-        match base_of(file, base.get_ref().as_str()) {
-            Ok((path, below)) => {
-                let (table, more) = sifted(&path, &below, &whole);
-                if table.contains_key("base") {
-                    let fault = Fault::new("a base that has a base of its own", &path);
-                    let place = place_of(&below, &["base"]).map(|(_, place)| place);
-                    faults.push(fault.at(place).remedy("an experiment has at most one"));
-                }
-                whole = table;
-                whole.remove("base");
-                faults.extend(more);
-                texts.files.push((path, below));
-            }
-            Err((what, remedy)) => {
-                let value = text.get(base.span()).unwrap_or_default();
-                faults.push(texts.fault(&["base"], &what).value(value).remedy(remedy));
-            }
-        }
+    let mut texts = Texts::of(file, text);
+    let Below { table: mut whole, mut faults, all, files } = below(file, text);
+    texts.files.extend(files);
+    let (mut own, mut told) = sifted(file, text, &whole);
+    if !all {
+        told.retain(|fault| !may_stand_below(fault));
     }
-    let (mut own, told) = sifted(file, text, &whole);
     own.remove("base");
     faults.splice(0..0, told);
     lay_over(&mut whole, own);
@@ -90,9 +74,9 @@ pub(crate) fn experiment(file: &Path, text: &str) -> Read {
         ),
     ] {
         if !whole.contains_key(key) {
-            // What was at fault has been told already.
-            let named = |(_, text): &(PathBuf, String)| place_of(text, &[key]).is_some();
-            if !texts.files.iter().any(named) && !faults.iter().any(|fault| fault.what.starts_with("no base")) {
+            // What was at fault has been told already, and what cannot be read may say it.
+            let named = |(_, text): &(PathBuf, String)| place_of(text, &[key], Part::Key).is_some();
+            if all && !texts.files.iter().any(named) {
                 faults.push(Fault::new(format!("no `{key}`"), file).remedy(remedy));
             }
             whole.insert(key.to_owned(), stand_in.into());
@@ -100,6 +84,64 @@ pub(crate) fn experiment(file: &Path, text: &str) -> Read {
     }
     let experiment = whole.try_into().map_err(|error| faults.push(Fault::in_toml(file, "", &error))).ok();
     Read { experiment, faults, texts }
+}
+
+/// What lies below an experiment's own settings.
+#[derive(Default)]
+struct Below {
+    /// The settings of the base.
+    table: toml::Table,
+    /// What is at fault in it, or with it.
+    faults: Vec<Fault>,
+    /// Whether nothing else stands below.
+    all: bool,
+    /// The base, its text, and the text of its own base.
+    files: Vec<(PathBuf, String)>,
+}
+
+/// What lies below the experiment that `file` holds. A base of a base is a fault, but read as well: what it says is not missing.
+fn below(file: &Path, text: &str) -> Below {
+    let Some(base) = written_base(text) else { return Below { all: true, ..Below::default() } };
+    let (path, own) = match base_of(file, base.as_deref()) {
+        Ok(found) => found,
+        Err((what, remedy)) => {
+            let value = base.map(|base| format!("\"{base}\"")).unwrap_or_default();
+            let fault = Texts::of(file, text).fault(&["base"], Part::Value, &what).value(value).remedy(remedy);
+            return Below { faults: vec![fault], ..Below::default() };
+        }
+    };
+    let (mut faults, mut lowest, mut all) = (Vec::new(), toml::Table::new(), true);
+    let mut files = vec![(path.clone(), own.clone())];
+    if let Some(second) = written_base(&own) {
+        let fault = Texts::of(&path, &own).fault(&["base"], Part::Value, "a base that has a base of its own");
+        faults.push(fault.remedy("an experiment has at most one"));
+        let below = base_of(&path, second.as_deref()).ok();
+        all = below.as_ref().is_some_and(|(_, text)| written_base(text).is_none());
+        if let Some((path, text)) = below {
+            lowest = sifted(&path, &text, &toml::Table::new()).0;
+            lowest.remove("base");
+            files.push((path, text));
+        }
+    }
+    let (mut table, mut told) = sifted(&path, &own, &lowest);
+    if !all {
+        told.retain(|fault| !may_stand_below(fault));
+    }
+    faults.extend(told);
+    table.remove("base");
+    lay_over(&mut lowest, table);
+    Below { table: lowest, faults, all, files }
+}
+
+/// What a text says its base is, if it says one: `None` of something that is no text.
+fn written_base(text: &str) -> Option<Option<String>> {
+    let document = DeTable::parse_recoverable(text).0;
+    document.get_ref().get("base").map(|base| base.get_ref().as_str().map(str::to_owned))
+}
+
+/// Whether this is no fault where something below could be read.
+fn may_stand_below(fault: &Fault) -> bool {
+    fault.what.contains("needs a `name`")
 }
 
 /// The file that `base` names, and its text.
@@ -308,9 +350,18 @@ mod tests {
         let other = other.experiment.unwrap();
         assert!(other.source.settings.is_empty());
 
-        assert!(said(&at("e.toml"), "base = 'bse.toml'\n")[0].contains("e.toml:1"));
+        let missing = said(&at("e.toml"), "base = 'bse.toml'\n[source]\nframes = 2\n");
+        assert!(missing.len() == 1 && missing[0].contains("e.toml:1:8: \"bse.toml\""), "{missing:?}");
         assert!(said(&at("e.toml"), "base = 'base.toml'\nseeds = 4\n")[0].contains("e.toml:2"));
         fs::write(at("base.toml"), "base = 'more.toml'\n").unwrap();
-        assert!(said(&at("e.toml"), "base = 'base.toml'\n")[0].contains("base.toml:1"));
+        let own = "base = 'base.toml'\nsource.frames = 2\n";
+        fs::write(at("more.toml"), base).unwrap();
+        for lowest in ["more.toml", "base.toml", "none.toml"] {
+            fs::write(at("base.toml"), format!("base = '{lowest}'\nsource = {{ rate = 2.0 }}\nsede = 2\n")).unwrap();
+            let said = said(&at("e.toml"), own);
+            assert!(said.len() == 2, "{said:?}");
+            assert!(said[0].contains("a base of its own in") && said[0].contains("base.toml:1:8"), "{said:?}");
+            assert!(said[1].contains("base.toml:3:1: `sede`; did you mean `seed`?"), "{said:?}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix_component::Fault;
+use seafix_component::{Fault, Part};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::range::Range;
@@ -50,6 +50,8 @@ pub struct Place {
     pub value: toml::Value,
     /// What is set, by dotted path.
     pub(crate) set: Vec<(String, toml::Value)>,
+    /// Its number in its list.
+    number: usize,
 }
 
 impl Axis {
@@ -59,20 +61,22 @@ impl Axis {
     }
 
     fn places(&self) -> Vec<Place> {
-        let one = |value: &toml::Value| Place {
+        let one = |(number, value): (usize, &toml::Value)| Place {
             key: self.key.clone(),
             value: value.clone(),
             set: vec![(self.key.clone(), value.clone())],
+            number,
         };
-        let several = |case: &Case| Place {
+        let several = |(number, case): (usize, &Case)| Place {
             key: self.key.clone(),
             value: case.label.clone().into(),
             set: case.set.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
+            number,
         };
         let ranges = self.range.iter().flat_map(Range::even).chain(self.log_range.iter().flat_map(Range::geometric));
         let numbers: Vec<toml::Value> = ranges.collect();
-        let listed = self.values.iter().chain(&numbers).map(one);
-        listed.chain(self.cases.iter().map(several)).chain(self.zipped()).collect()
+        let listed = self.values.iter().enumerate().chain(numbers.iter().enumerate()).map(one);
+        listed.chain(self.cases.iter().enumerate().map(several)).chain(self.zipped()).collect()
     }
 
     fn zipped(&self) -> Vec<Place> {
@@ -83,17 +87,72 @@ impl Axis {
             let set: Vec<(String, toml::Value)> =
                 lists.iter().map(|(key, list)| ((*key).clone(), list[k].clone())).collect();
             let words = set.iter().map(|(_, value)| value.as_str().map_or_else(|| value.to_string(), str::to_owned));
-            Place { key: self.key.clone(), value: words.collect::<Vec<_>>().join(", ").into(), set }
+            Place { key: self.key.clone(), value: words.collect::<Vec<_>>().join(", ").into(), set, number: k }
         };
         (0..length).map(place).collect()
     }
 
-    /// Whether one of its settings is at this path, above it or below.
-    pub(crate) fn touches(&self, path: &str) -> bool {
-        let near = |key: &str| key.starts_with(path) || path.starts_with(key);
-        near(&self.key)
-            || self.cases.iter().flat_map(|case| case.set.keys()).chain(self.zip.keys()).any(|key| near(key))
+    /// The settings that it varies.
+    fn keys(&self) -> impl Iterator<Item = &str> {
+        let own = (self.cases.is_empty() && self.zip.is_empty()).then_some(&self.key);
+        own.into_iter()
+            .chain(self.cases.iter().flat_map(|case| case.set.keys()))
+            .chain(self.zip.keys())
+            .map(String::as_str)
     }
+
+    /// Whether one of its settings is this one, or below it.
+    pub(crate) fn touches(&self, path: &str) -> bool {
+        self.keys().any(|key| key == path || key.strip_prefix(path).is_some_and(|below| below.starts_with('.')))
+    }
+
+    /// Whether its ranges have ends.
+    pub(crate) fn is_bounded(&self) -> bool {
+        let fits = |range: &Option<Range>, ratios| range.as_ref().is_none_or(|range| range.check(ratios).is_ok());
+        fits(&self.range, false) && fits(&self.log_range, true)
+    }
+
+    /// Where `key` of its place of this number stands in it, and what of that is the key, and where its value.
+    fn written(&self, number: usize, key: &str) -> ((Vec<String>, Part), Vec<String>) {
+        let path = |steps: &[&str]| steps.iter().map(|&step| step.to_owned()).collect::<Vec<_>>();
+        let number = number.to_string();
+        if !self.cases.is_empty() {
+            let case = path(&["cases", &number, "set", key]);
+            return ((case.clone(), Part::Key), case);
+        }
+        if !self.zip.is_empty() {
+            return ((path(&["zip", key]), Part::Key), path(&["zip", key, &number]));
+        }
+        let value = match (&self.range, &self.log_range) {
+            (Some(_), _) => path(&["range"]),
+            (_, Some(_)) => path(&["log-range"]),
+            _ => path(&["values", &number]),
+        };
+        // What it is called is the value of its key.
+        ((path(&["key"]), Part::Value), value)
+    }
+}
+
+/// Where the fault of the setting at `path` of one point of the grid stands in the experiment's file, if an axis sets it.
+pub(crate) fn written(axes: &[Axis], cell: &[Place], path: &[String], part: Part) -> Option<(Vec<String>, Part)> {
+    // The last word is that of the last axis.
+    for place in cell.iter().rev() {
+        let Some((index, axis)) = axes.iter().enumerate().find(|(_, axis)| axis.key == place.key) else { continue };
+        for (key, _) in &place.set {
+            let steps: Vec<&str> = key.split('.').collect();
+            let shared = steps.iter().zip(path).take_while(|(own, step)| *own == step).count();
+            if shared < steps.len().min(path.len()) {
+                continue;
+            }
+            let ((own, what), value) = axis.written(place.number, key);
+            let is_key = part == Part::Key && path.len() <= steps.len();
+            let (inside, part) = if is_key { (own, what) } else { (value, part) };
+            let below = path.iter().skip(steps.len()).cloned();
+            let whole = ["vary".to_owned(), index.to_string()].into_iter().chain(inside).chain(below).collect();
+            return Some((whole, part));
+        }
+    }
+    None
 }
 
 /// One point of the grid: a place on each axis, in the order of the axes.
@@ -176,8 +235,8 @@ pub(crate) fn name(number: usize, cell: &Cell) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || ".-_".contains(c) { c } else { '_' }).take(120).collect()
 }
 
-/// Axes that vary nothing are mistakes.
-pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], &str) -> Fault) -> Vec<Fault> {
+/// Axes that vary nothing, or something twice, are mistakes.
+pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], Part, &str) -> Fault) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (index, axis) in axes.iter().enumerate() {
         let place = index.to_string();
@@ -193,47 +252,94 @@ pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], &str) -> Fault) -> Ve
         .collect();
         match given[..] {
             [] => {
-                let fault = fault(&["vary", &place, "values"], "an axis without values");
+                let fault = fault(&["vary", &place, "values"], Part::Key, "an axis without values");
                 faults.push(fault.remedy("give values, range, log-range, cases or zip"));
             }
             [_] => {}
             [.., last] => {
                 let what = format!("an axis with {}", given.join(" and "));
-                faults.push(fault(&["vary", &place, last], &what).remedy("make them axes of their own"));
+                faults.push(fault(&["vary", &place, last], Part::Key, &what).remedy("make them axes of their own"));
             }
         }
         for (name, range, log) in [("range", &axis.range, false), ("log-range", &axis.log_range, true)] {
-            if let Some(Err(what)) = range.as_ref().map(|range| range.check(log)) {
-                faults.push(fault(&["vary", &place, name], &what));
+            if let Some(Err((key, what))) = range.as_ref().map(|range| range.check(log)) {
+                faults.push(fault(&["vary", &place, name, key], Part::Value, &what));
             }
         }
-        faults.extend(zip_fault(axis).map(|what| fault(&["vary", &place, "zip"], &what)));
+        faults.extend(zip_fault(axis).map(|(key, what)| fault(&["vary", &place, "zip", key], Part::Value, &what)));
         let labels: Vec<&str> = axis.cases.iter().map(|case| case.label.as_str()).collect();
-        if let Some(twice) = (1..labels.len()).find(|&k| labels[..k].contains(&labels[k])) {
-            let fault = fault(&["vary", &place, "cases"], "two cases of one name").value(labels[twice]);
+        for twice in (1..labels.len()).filter(|&k| labels[..k].contains(&labels[k])) {
+            let path = ["vary", &place, "cases", &twice.to_string(), "label"];
+            let fault = fault(&path, Part::Value, "two cases of one name").value(labels[twice]);
             faults.push(fault.remedy("name each case by what is special about it"));
         }
+        faults.extend(twice(axis).into_iter().map(|(inside, value)| {
+            let path: Vec<&str> = ["vary", &place].into_iter().chain(inside.iter().map(String::as_str)).collect();
+            let fault = fault(&path, Part::Value, "a value that is there twice").value(value);
+            fault.remedy("its trials would be made twice; `repetitions` makes all of them again with other seeds")
+        }));
         if axes[..index].iter().any(|other| other.key == axis.key) {
             faults.push(
-                fault(&["vary", &place, "key"], "an axis that is there twice")
+                fault(&["vary", &place, "key"], Part::Value, "an axis that is there twice")
                     .value(&axis.key)
                     .remedy("join their values"),
             );
+        } else if let Some(key) =
+            axis.keys().find(|&key| axes[..index].iter().any(|other| other.keys().any(|k| k == key)))
+        {
+            let what = format!("an axis that sets `{key}`, which another sets too");
+            faults
+                .push(fault(&["vary", &place, "key"], Part::Value, &what).remedy("the last would have the only word"));
         }
     }
     faults
 }
 
+/// The values of an axis that come again: where in it, and what they are.
+fn twice(axis: &Axis) -> Vec<(Vec<String>, String)> {
+    /// One number, one component, however it is written.
+    fn plain(value: &toml::Value) -> toml::Value {
+        match value {
+            toml::Value::Integer(whole) => (*whole as f64).into(),
+            toml::Value::Array(list) => toml::Value::Array(list.iter().map(plain).collect()),
+            toml::Value::Table(table) => match table.get("name") {
+                Some(name) if table.len() == 1 => name.clone(),
+                _ => toml::Value::Table(table.iter().map(|(key, value)| (key.clone(), plain(value))).collect()),
+            },
+            other => other.clone(),
+        }
+    }
+    let places = axis.places();
+    let same = |one: &Place, other: &Place| {
+        let values = |place: &Place| -> toml::Table {
+            place.set.iter().map(|(key, value)| (key.clone(), plain(value))).collect()
+        };
+        values(one) == values(other)
+    };
+    let again = (1..places.len()).filter(|&k| places[..k].iter().any(|place| same(place, &places[k])));
+    let told = again.filter_map(|k| {
+        let place = &places[k];
+        let (key, _) = place.set.first()?;
+        let at = match axis.cases.get(place.number) {
+            Some(_) => vec!["cases".to_owned(), place.number.to_string(), "set".to_owned()],
+            None => axis.written(place.number, key).1,
+        };
+        Some((at, place.value.to_string()))
+    });
+    told.collect()
+}
+
 /// Why the lists of an axis cannot go together.
-fn zip_fault(axis: &Axis) -> Option<String> {
+fn zip_fault(axis: &Axis) -> Option<(&str, String)> {
     let mut lengths = axis.zip.iter().map(|(key, list)| (key, list.as_array().map(Vec::len)));
     let first = lengths.next()?;
-    std::iter::once(first).chain(lengths).find_map(|(key, length)| match (length, first.1) {
+    let told = |(key, length): (&'_ String, Option<usize>)| match (length, first.1) {
         (None, _) => Some(format!("`{key}` is no list; give one value for each place")),
         (Some(0), _) => Some(format!("`{key}` has no values")),
         (Some(n), Some(m)) if n != m => Some(format!("`{}` has {m} values and `{key}` {n}; give as many", first.0)),
         _ => None,
-    })
+    };
+    std::iter::once(first).chain(lengths).find_map(|(key, length)| Some((key.as_str(), told((key, length))?)))
 }
 
 #[cfg(test)]
@@ -261,11 +367,11 @@ mod tests {
         assert_eq!(places[1].set, [("a.b".to_owned(), 2.into()), ("c".to_owned(), "y".into())]);
         let faults = |text: &str| {
             let axis: Axis = toml::from_str(text).unwrap();
-            check(&[axis], |_, what| Fault::new(what, Path::new("e.toml")))
+            check(&[axis], |_, _, what| Fault::new(what, Path::new("e.toml")))
         };
         assert!(faults("key = 'k'\nzip = { a = [1], b = [1, 2] }")[0].what.contains("give as many"));
         assert!(faults("key = 'k'\nzip = { a = 1 }")[0].what.contains("no list"));
-        assert!(faults("key = 'k'\nvalues = [1]\nrange = { from = 0, to = 1, count = 2 }").len() == 1);
+        assert!(faults("key = 'k'\nvalues = [3]\nrange = { from = 0, to = 1, count = 2 }").len() == 1);
         assert!(faults("key = 'k'\nlog-range = { from = 0, to = 1, count = 3 }")[0].what.contains("above zero"));
     }
 
@@ -282,7 +388,7 @@ mod tests {
 
     #[test]
     fn names_are_fit_for_files() {
-        let place = |key: &str, value: toml::Value| Place { key: key.to_owned(), value, set: Vec::new() };
+        let place = |key: &str, value: toml::Value| Place { key: key.to_owned(), value, set: Vec::new(), number: 0 };
         let cell = vec![place("source.distance", 2.5.into()), place("pipeline.solver", "../triad".into())];
         assert_eq!(name(3, &cell), "003-distance-2.5-solver-.._triad");
     }
