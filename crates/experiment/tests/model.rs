@@ -98,6 +98,29 @@ fn the_frame_is_that_of_the_base() {
     seafix_referencing::Site::parse(&found.site.to_toml(), Path::new("site.toml")).unwrap();
 }
 
+/// A right mark that is wrong along the epipolar line is a point like any other but for what the images show: 25 px are metres.
+/// Seen to fail where the two are not compared.
+#[test]
+fn a_right_mark_that_the_images_contradict_is_told() {
+    let passage = sample();
+    for frame in [0, 2, 4] {
+        let (_, text) = marks(&*passage, frame, 1.0, true);
+        let sound = model(&*passage, frame, &text, None).unwrap();
+        let untold: Vec<String> = sound.warnings.iter().map(ToString::to_string).collect();
+        assert!(untold.is_empty(), "{untold:?}");
+        let lines: Vec<&str> = text.lines().collect();
+        for (k, line) in lines.iter().enumerate().skip(1) {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            // In a rectified pair the epipolar line is the row.
+            cells[3] = (cells[3].parse::<f64>().unwrap() - 25.0).to_string();
+            let Ok(found) = model(&*passage, frame, &text.replace(line, &cells.join(",")), None) else { continue };
+            let told: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
+            let place = format!("clicks.csv:{}: `{}`", k + 1, cells[0]);
+            assert!(told.len() == 1 && told[0].contains(&place) && told[0].contains("px from where"), "{told:?}");
+        }
+    }
+}
+
 #[test]
 fn marks_that_mean_no_point_are_refused_with_their_line() {
     let passage = sample();

@@ -82,6 +82,7 @@ impl Model {
         let (reach, mark_sigma, object) = (self.reach, self.mark_sigma, self.id.clone());
         let by_hand = ModelByHand { front_end: &front_end, reach, mark_sigma, object, base };
         let model = by_hand.model([&left, &right], &rig, &text, &self.points).map_err(input)?;
+        model.warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
         let site = model.site.to_toml();
         if let Some(path) = &self.out {
             whole::write(path, &site)?;

@@ -42,6 +42,9 @@ pub struct HandModel {
     pub object_from_camera: Transform<Object, Camera>,
     /// The points, in the order of the marks.
     pub points: Vec<HandPoint>,
+    /// Right marks that the images contradict, a line each. An error along the epipolar line leaves no other trace: any two places
+    /// on it are some point before the cameras.
+    pub warnings: Vec<Fault>,
 }
 
 /// How one point of a model by hand came about.
@@ -97,6 +100,7 @@ impl ModelByHand<'_> {
                     .remedy("mark every corner once"));
             }
         }
+        let warnings = seen.iter().filter_map(|seen| self.doubt(seen, file)).collect();
         let base = self.base(&seen, file)?;
         let corner = base.map(|index| seen[index].measured.position.at);
         let camera_from_object: Transform<Camera, Object> = triad(&corner[0], &corner[1], &corner[2])
@@ -105,7 +109,7 @@ impl ModelByHand<'_> {
         let turn = object_from_camera.rotation_matrix();
         let points: Vec<HandPoint> = seen
             .into_iter()
-            .map(|Seen { mark, corner, aligned, measured }| {
+            .map(|Seen { mark, corner, aligned, measured, .. }| {
                 let at = object_from_camera * measured.position.at;
                 let at = Point::from(at.coords.map(|x| (x / GRAIN).round() * GRAIN));
                 let covariance = turn * measured.position.covariance * turn.transpose();
@@ -125,7 +129,7 @@ impl ModelByHand<'_> {
             interest: Vec::new(),
         };
         let site = Site { name: self.object.clone(), frame: 0, objects: vec![object], warnings: Vec::new() };
-        Ok(HandModel { site, object_from_camera, points })
+        Ok(HandModel { site, object_from_camera, points, warnings })
     }
 
     fn see(
@@ -151,6 +155,7 @@ impl ModelByHand<'_> {
                 Place::independent(sought, 1.0)
             }
         };
+        let sought = mark.right.and_then(|_| seek([left, right], place.at, rig));
         let pair = Pair { left: place, right: start };
         let aligned = self.front_end.refinement.refine(&[pair], left, right, rig).first().copied();
         let unaligned = || Unrefined::default().refine(&[pair], left, right, rig)[0];
@@ -164,7 +169,20 @@ impl ModelByHand<'_> {
             ))
             .remedy("mark the same corner in both images, or leave the right one empty and it is sought"));
         };
-        Ok(Seen { corner: corner.is_some(), aligned: aligned.is_some(), measured, mark })
+        let contradicted = sought.map(|sought| (sought, sought.distance(&pixels.at.right)));
+        Ok(Seen { corner: corner.is_some(), aligned: aligned.is_some(), measured, contradicted, mark })
+    }
+
+    /// What the images say against a right mark: what is like the left place is further away than a hand errs.
+    fn doubt(&self, seen: &Seen, file: &Path) -> Option<Fault> {
+        let (sought, off) = seen.contradicted.filter(|(_, off)| *off > self.reach)?;
+        let unaligned = if seen.aligned { "" } else { ", and the windows at the two marks are not alike" };
+        let what = format!(
+            "a right mark {off:.1} px from where the right image shows the left one best, {:.1}, {:.1}{unaligned}",
+            sought.u, sought.v
+        );
+        let fault = Fault::new(what, file).on_line(seen.mark.line).value(format!("`{}`", seen.mark.id));
+        Some(fault.remedy("look at it again; left empty, the right place is sought"))
     }
 
     /// The corner that a mark means: of those within reach the nearest.
@@ -221,6 +239,8 @@ struct Seen {
     corner: bool,
     aligned: bool,
     measured: MeasuredPoint,
+    /// Where the right place would be sought had none been marked, and how far that is from the one that was taken (px).
+    contradicted: Option<(Pixel, f64)>,
 }
 
 /// Where the right image shows a place of the left one.
