@@ -318,11 +318,38 @@ fn a_shard_that_is_missing_is_named() {
 fn a_folder_that_cannot_be_written() {
     let folder = experiment(4);
     fs::write(folder.path().join("file"), "").unwrap();
-    for out in ["/proc/nowhere", "file/below", "/dev/null"] {
+    let (_, error) = ended(&run(folder.path(), "file", &[]).output().unwrap());
+    assert!(error.contains("a file is there: name a new folder with --out"), "{error}");
+    for out in ["/proc/nowhere", "file/below", "/dev/null", "file"] {
         let (code, error) = ended(&run(folder.path(), out, &[]).output().unwrap());
         assert!(code == Some(4) && error.starts_with("error: "), "{error}");
         assert_eq!(error.lines().count(), 1, "before anything is computed: {error}");
     }
+}
+
+/// Seen to fail without the look at the lock.
+#[test]
+fn a_folder_that_goes_away_is_no_finished_run() {
+    let folder = experiment(20_000);
+    let folder = folder.path();
+    let mut child = run(folder, "out", &["--threads", "1"]).spawn().unwrap();
+    until_begun(&mut child, &folder.join("out"));
+    // Files are made meanwhile, so that it may take several goes.
+    while folder.join("out/.lock").exists() {
+        let _ = fs::remove_dir_all(folder.join("out"));
+    }
+    let (code, error) = ended(&child.wait_with_output().unwrap());
+    assert!(code == Some(4) && error.contains("error: "), "{code:?} {error}");
+    assert!(!error.contains("panicked"), "{error}");
+}
+
+#[test]
+fn an_empty_shard_says_so() {
+    let folder = experiment(30);
+    let (code, error) = ended(&run(folder.path(), "out", &["--shard", "7/7"]).output().unwrap());
+    assert!(code == Some(0) && error.contains("an empty shard in out: 7/7; the run has 2 pieces"), "{error}");
+    let (_, error) = ended(&run(folder.path(), "other", &["--shard", "1/7"]).output().unwrap());
+    assert!(!error.contains("empty"), "{error}");
 }
 
 #[test]

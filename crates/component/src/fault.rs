@@ -83,6 +83,9 @@ impl Fault {
     }
 }
 
+/// Of a value so many letters are told.
+const LONGEST_VALUE: usize = 120;
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut text = format!("{} in {}", self.what, self.file.display());
@@ -93,8 +96,9 @@ impl fmt::Display for Fault {
             text += &format!(":{column}");
         }
         if !self.value.is_empty() {
-            let short: String = self.value.chars().take(120).collect();
-            text += &format!(": {short}");
+            let short: String = self.value.chars().take(LONGEST_VALUE).collect();
+            let more = if self.value.chars().nth(LONGEST_VALUE).is_some() { "…" } else { "" };
+            text += &format!(": {short}{more}");
         }
         if !self.remedy.is_empty() {
             text += &format!("; {}", self.remedy);
@@ -210,5 +214,7 @@ mod tests {
     fn control_characters_do_not_reach_the_terminal() {
         let fault = Fault::new("bad name", Path::new("f")).value("\u{1b}[2J\nx");
         assert_eq!(fault.to_string(), "bad name in f:  [2J x");
+        let long = Fault::new("bad name", Path::new("f")).value("é".repeat(121)).to_string();
+        assert_eq!(long, format!("bad name in f: {}…", "é".repeat(120)));
     }
 }

@@ -114,7 +114,7 @@ fn log(path: &Path) -> Result<Option<Fault>, LogError> {
     let mut reader = Reader::open(path)?;
     reader.by_ref().try_for_each(|frame| frame.map(|_| ()))?;
     Ok(reader.recovered().map(|lost| {
-        let fault = Fault::new("a log that was saved of one that was not whole", path).value(lost);
+        let fault = Fault::new(format!("a log that was saved of one that was not whole ({lost})"), path);
         fault.remedy("what it lacks is in no result")
     }))
 }

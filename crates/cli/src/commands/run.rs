@@ -39,7 +39,9 @@ pub(crate) struct Place {
     /// The folder of the run; it must not exist or be empty [default: the next free one below runs/].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Go on with the run that is in the folder, if it is the same one; begin it if there is none.
+    /// Go on with the run that is in the folder, if it is the same one; begin it if there is none. Of a run that was killed the
+    /// pieces that were in work are made again: at most 8 frames a thread with images, 8192 without; where a trial navigates,
+    /// all frames of its source.
     #[arg(long, requires = "out", conflicts_with = "overwrite")]
     resume: bool,
     /// Remove the run that is in the folder first.

@@ -17,20 +17,23 @@ pub(super) struct Claim {
     pub(super) folder: PathBuf,
     /// The run that is finished already, where it is resumed.
     pub(super) finished: Option<Manifest>,
-    _lock: Lock,
+    lock: Lock,
 }
 
 /// A file that is locked as long as this lives.
 #[derive(Debug)]
 struct Lock {
     path: PathBuf,
-    _file: File,
+    file: File,
 }
 
 impl Drop for Lock {
     /// The file goes while it is still locked: whoever has opened it before sees that it has gone.
     fn drop(&mut self) {
-        let _ = fs::remove_file(&self.path);
+        // In a folder that was replaced it is another's.
+        if is_at(&self.file, &self.path) {
+            let _ = fs::remove_file(&self.path);
+        }
     }
 }
 
@@ -51,11 +54,11 @@ impl Claim {
         let Some(out) = &options.out else {
             let folder = next_free(name).map_err(RunError::Output)?;
             let lock = lock(&folder).map_err(RunError::Output)?;
-            return Ok(Self { folder, finished: None, _lock: lock });
+            return Ok(Self { folder, finished: None, lock });
         };
         look(options).map_err(RunError::Output)?;
         fs::create_dir_all(out).map_err(|error| RunError::Output(unmade(out, &error)))?;
-        let mut claim = Self { folder: out.clone(), finished: None, _lock: lock(out).map_err(RunError::Output)? };
+        let mut claim = Self { folder: out.clone(), finished: None, lock: lock(out).map_err(RunError::Output)? };
         // Again under the lock: another run may just have ended.
         if free(out).map_err(RunError::Output)? {
             return Ok(claim);
@@ -75,6 +78,19 @@ impl Claim {
                 Ok(claim)
             }
         }
+    }
+}
+
+impl Claim {
+    /// Whether the folder is still the one that was taken: what is made below a name does not tell that another has it since.
+    pub(super) fn holds(&self) -> Result<(), RunError> {
+        if is_at(&self.lock.file, &self.lock.path) {
+            return Ok(());
+        }
+        let fault = Fault::new("the output folder was removed or replaced while the run was made", &self.folder);
+        Err(RunError::Output(
+            fault.remedy("what is in it is not the whole run: run again with --overwrite, or with another --out"),
+        ))
     }
 }
 
@@ -101,8 +117,11 @@ fn taken(out: &Path) -> Fault {
 }
 
 fn unmade(path: &Path, error: &std::io::Error) -> Fault {
-    Fault::new(format!("cannot make the output folder ({error})"), path)
-        .remedy("choose another with --out, or make room and rights for it")
+    let fault = Fault::new(format!("cannot make the output folder ({error})"), path);
+    if path.is_file() {
+        return fault.remedy("a file is there: name a new folder with --out");
+    }
+    fault.remedy("choose another with --out, or make room and rights for it")
 }
 
 /// Takes the lock of a folder, or says who has it.
@@ -133,7 +152,7 @@ fn lock(folder: &Path) -> Result<Lock, Fault> {
     let text = format!("process {} on {}\n", std::process::id(), host());
     let write = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(text.as_bytes()));
     write.map_err(|error| failed(&error))?;
-    Ok(Lock { path, _file: file })
+    Ok(Lock { path, file })
 }
 
 /// Whether a file that is open is the one that has this name now.

@@ -107,6 +107,11 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
 
     let claim = Claim::new(options, &plan.name, &manifest)?;
     let mine: Vec<&Piece> = pieces.iter().filter(|piece| options.takes(piece.number)).collect();
+    if let (true, Some(shard)) = (mine.is_empty(), options.shard) {
+        let fault = Fault::new("an empty shard", &claim.folder).value(shard);
+        observer
+            .warns(&fault.remedy(format!("the run has {} pieces; more shards than that make nothing", pieces.len())));
+    }
     let frames = |pieces: &[&Piece]| pieces.iter().map(|piece| piece.frames() * groups[piece.group].trials.len()).sum();
     observer.begins(frames(&mine), cut::bytes(&groups, &mine), &claim.folder);
     // A shard is what it is made of: one whose pieces were damaged since is made again.
@@ -127,6 +132,7 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     }
     let pool = options.pool()?;
     let mut done = work::work(&groups, &missing, &store, &pool, options.timed, observer)?;
+    claim.holds()?;
     if done && options.shard.is_some() {
         manifest.write(&claim.folder, "shard")?;
         return Ok(Finished { folder: claim.folder, rows: 0 });
@@ -135,6 +141,7 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
         let pieces = pool.install(|| store.all());
         done = assemble::assemble(&claim.folder, &mut manifest, &pieces, &pool, observer)?;
     }
+    claim.holds()?;
     if !done {
         manifest.write(&claim.folder, "interrupted")?;
         return Err(RunError::Interrupted(claim.folder));
