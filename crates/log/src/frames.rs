@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use prost::bytes::Bytes;
+
 use crate::{
     Entry, FrameRecord, LogError, Recording, TrialHeader, convert,
     read::{Message, Pending, foreign},
@@ -102,6 +104,6 @@ fn message(recording: &Recording, entry: &Entry, wanted: bool) -> Result<Message
         encoding: topic.encoding.as_str().into(),
         sequence: entry.sequence,
         log_time: entry.log_time,
-        data: if wanted { recording.message(entry)? } else { Vec::new() },
+        data: if wanted { recording.message(entry)?.into() } else { Bytes::new() },
     })
 }

@@ -185,8 +185,10 @@ pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
 /// The values of both under the keys that both have, in the order of the keys; of several under one key the last.
 fn matched<K: Ord>(first: Vec<(u64, K, f64)>, second: Vec<(u64, K, f64)>) -> Vec<(f64, f64)> {
     let ordered = |mut keyed: Vec<(u64, K, f64)>| {
-        // Logs are in order as a rule, and then this costs a look.
-        keyed.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
+        // Logs are in order as a rule; to sort takes memory even then.
+        if !keyed.is_sorted_by(|a, b| (a.0, &a.1) <= (b.0, &b.1)) {
+            keyed.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
+        }
         keyed.dedup_by(|later, kept| {
             let same = (later.0, &later.1) == (kept.0, &kept.1);
             if same {

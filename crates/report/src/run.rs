@@ -49,6 +49,7 @@ pub(crate) struct Trial {
     /// SHA-256 of all results but the times.
     pub(crate) digest: Vec<u8>,
     rows: Vec<Attempt>,
+    inspected: Vec<Inspected>,
     words: Vec<String>,
 }
 
@@ -64,8 +65,7 @@ pub(crate) struct Frame {
     rows: (u32, u32),
     /// What the navigator knew, where the trial navigates.
     pub(crate) sailed: Option<Box<Underway>>,
-    /// The points of interest in view.
-    pub(crate) inspected: Vec<Inspected>,
+    inspected: (u32, u32),
 }
 
 /// A point of interest in view of a frame.
@@ -150,6 +150,7 @@ impl Trial {
             named: Default::default(),
             digest: Vec::new(),
             rows: Vec::new(),
+            inspected: Vec::new(),
             words: vec![String::new()],
         };
         let mut digest = Sha256::new();
@@ -167,6 +168,7 @@ impl Trial {
         trial.lacks = reader.recovered().map(str::to_owned);
         trial.frames.shrink_to_fit();
         trial.rows.shrink_to_fit();
+        trial.inspected.shrink_to_fit();
         Ok(trial)
     }
 
@@ -192,14 +194,12 @@ impl Trial {
                 values: values(target),
             });
         }
-        let inspected = frame
-            .inspected
-            .iter()
-            .map(|point| Inspected {
-                name: self.word(&looked::name(point), places),
-                values: Looked::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN)),
-            })
-            .collect();
+        let looked = self.inspected.len() as u32;
+        for point in &frame.inspected {
+            let name = self.word(&looked::name(point), places);
+            let values = Looked::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN));
+            self.inspected.push(Inspected { name, values });
+        }
         let times = &frame.times;
         self.frames.push(Frame {
             number: frame.frame,
@@ -224,7 +224,7 @@ impl Trial {
                     values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
                 })
             }),
-            inspected,
+            inspected: (looked, self.inspected.len() as u32),
         });
     }
 
@@ -286,8 +286,13 @@ impl Trial {
         self.words.get(row.object as usize).map_or("", String::as_str)
     }
 
+    /// Each point of interest in view of each frame of the sample.
+    pub(crate) fn views(&self) -> impl Iterator<Item = &Inspected> {
+        self.sample().flat_map(|frame| &self.inspected[frame.inspected.0 as usize..frame.inspected.1 as usize])
+    }
+
     /// What a point of interest is called, with its object.
-    pub(crate) fn inspected(&self, point: &Inspected) -> &str {
+    pub(crate) fn point(&self, point: &Inspected) -> &str {
         self.words.get(point.name as usize).map_or("", String::as_str)
     }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use seafix_evaluation::quantile;
 use seafix_log::{Axis, Outcome, Region, Totals};
 
@@ -196,7 +197,7 @@ impl Summary {
         Self {
             run: header.run.clone(),
             question: header.question.clone(),
-            rows: run.trials.iter().map(Row::of).collect(),
+            rows: run.trials.par_iter().map(Row::of).collect(),
             lacking: run.trials.iter().filter_map(Trial::lacking).collect(),
         }
     }

@@ -1,5 +1,7 @@
 //! Intervals without a model of the distribution: the bootstrap over blocks.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
@@ -11,6 +13,8 @@ use super::{clopper_pearson, median, quantile};
 const BLOCKS: usize = 400;
 /// From so many values on the median is found by halving, not by sorting every resample.
 const MANY: usize = 20_000;
+/// What was drawn last of more than [`MANY`]: a report asks for it again and again, from several threads.
+static LAST: Mutex<Option<Arc<Drawn>>> = Mutex::new(None);
 
 /// The percentile bootstrap over blocks of consecutive values (Politis and Romano, A circular block-resampling
 /// procedure for stationary data, 1992).
@@ -131,7 +135,7 @@ impl Bootstrap {
     ) -> Vec<(f64, f64)> {
         let all = all.into_iter();
         let n = all.clone().next().map_or(0, <[bool]>::len);
-        let mut drawn: Option<Drawn> = None;
+        let mut drawn: Option<Arc<Drawn>> = None;
         let alpha = 1.0 - confidence;
         let share = |events: &[bool]| {
             assert_eq!(events.len(), n, "events of other trials");
@@ -151,7 +155,22 @@ impl Bootstrap {
     }
 
     /// The blocks of every resample of n values; n is not zero.
-    fn draw(&self, n: usize) -> Drawn {
+    fn draw(&self, n: usize) -> Arc<Drawn> {
+        if n <= MANY {
+            return Arc::new(self.drawn(n));
+        }
+        let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*last {
+            Some(drawn) if drawn.of == (*self, n) => Arc::clone(drawn),
+            _ => {
+                // Given back first: two of them at once are the most that a report holds of anything.
+                *last = None;
+                Arc::clone(last.insert(Arc::new(self.drawn(n))))
+            }
+        }
+    }
+
+    fn drawn(&self, n: usize) -> Drawn {
         let block = self.block.clamp(1, n);
         let resamples = self.resamples.max(1);
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
@@ -160,20 +179,22 @@ impl Bootstrap {
         let mut rest = Vec::new();
         for resample in 0..resamples as u64 {
             begins.extend((0..whole).map(|_| (place_below(n, &mut random) as u64) << 32 | resample));
-            if n % block > 0 {
+            if !n.is_multiple_of(block) {
                 rest.push(place_below(n, &mut random));
             }
         }
         begins.sort_unstable();
-        Drawn { n, block, resamples, begins, rest }
+        Drawn { of: (*self, n), block, begins, rest }
     }
 }
 
 /// The blocks of all resamples, by where they begin: sums over them go through the values in order, not to and fro.
+#[derive(Debug)]
 struct Drawn {
-    n: usize,
+    /// What was asked to draw, and of how many values.
+    of: (Bootstrap, usize),
+    /// How long a block is here.
     block: usize,
-    resamples: usize,
     /// Begin and resample of every whole block, 32 bits each: no memory holds more values than those count.
     begins: Vec<u64>,
     /// Where each resample's last block begins, if it is a shorter one.
@@ -189,12 +210,12 @@ impl Drawn {
             *sum += u32::from(event);
             Some(*sum)
         }));
-        let n = self.n;
+        let (asked, n) = self.of;
         let within = |begin: usize, length: usize| {
             let end = begin + length;
             if end <= n { before[end] - before[begin] } else { before[n] - before[begin] + before[end - n] }
         };
-        let mut sums = vec![0_usize; self.resamples];
+        let mut sums = vec![0_usize; asked.resamples.max(1)];
         for packed in &self.begins {
             sums[*packed as u32 as usize] += within((*packed >> 32) as usize, self.block) as usize;
         }

@@ -4,8 +4,10 @@
 //! These messages have the fields of `Frame` and its parts under the same tags and leave those out; a decoder skips what
 //! it has no field for.
 
+use prost::bytes::Bytes;
+
 use super::{Malformed, frame_record};
-use crate::{FrameRecord, proto};
+use crate::{FrameRecord, PixelPair, proto};
 
 /// A [`proto::Frame`] without its prior.
 #[derive(Clone, PartialEq, prost::Message)]
@@ -31,8 +33,9 @@ pub(crate) struct BareFrame {
 /// A [`proto::CloudPoint`] by its pixels alone.
 #[derive(Clone, PartialEq, prost::Message)]
 struct BarePoint {
-    #[prost(double, repeated, tag = "5")]
-    pixels: Vec<f64>,
+    /// The bytes of its four numbers, as they stand in the message: a cloud has many points.
+    #[prost(bytes = "bytes", tag = "5")]
+    pixels: Bytes,
 }
 
 /// A [`proto::Truth`] without the points in view.
@@ -48,7 +51,7 @@ struct BareTruth {
 pub(crate) fn bare_frame_record(message: BareFrame) -> Result<FrameRecord, Malformed> {
     let mut seen = Vec::with_capacity(message.cloud.len());
     for point in &message.cloud {
-        seen.push(super::frame::pixels(&point.pixels)?);
+        seen.push(pixels(&point.pixels)?);
     }
     let truth = message.truth.map(|truth| proto::Truth {
         world_from_camera: truth.world_from_camera,
@@ -70,4 +73,16 @@ pub(crate) fn bare_frame_record(message: BareFrame) -> Result<FrameRecord, Malfo
     let point = |pixels| crate::CloudPoint { at: unknown, covariance: [unknown; 3], pixels };
     frame.cloud = seen.into_iter().map(point).collect();
     Ok(frame)
+}
+
+/// Where a point was seen, of the bytes of its numbers; none where it comes from no image.
+fn pixels(packed: &[u8]) -> Result<Option<PixelPair>, Malformed> {
+    match packed.as_chunks() {
+        ([], []) => Ok(None),
+        ([u, v, ur, vr], []) => {
+            let [u, v, ur, vr] = [u, v, ur, vr].map(|number| f64::from_le_bytes(*number));
+            Ok(Some(PixelPair { left: [u, v], right: [ur, vr] }))
+        }
+        _ => Err(Malformed(format!("cloud.pixels has {} bytes instead of 32", packed.len()))),
+    }
 }

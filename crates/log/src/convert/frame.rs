@@ -66,7 +66,7 @@ fn point_record(message: proto::CloudPoint) -> Result<CloudPoint, Malformed> {
 }
 
 /// Where a point was seen, of its four numbers; none where it comes from no image.
-pub(super) fn pixels(numbers: &[f64]) -> Result<Option<PixelPair>, Malformed> {
+fn pixels(numbers: &[f64]) -> Result<Option<PixelPair>, Malformed> {
     match *numbers {
         [] => Ok(None),
         [u, v, ur, vr] => Ok(Some(PixelPair { left: [u, v], right: [ur, vr] })),

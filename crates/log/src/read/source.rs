@@ -14,6 +14,7 @@ use mcap::{
     records::Record,
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
+use prost::bytes::Bytes;
 
 use super::foreign;
 use crate::{LogError, proto, topic};
@@ -26,25 +27,39 @@ pub(crate) struct Message {
     pub(crate) encoding: Arc<str>,
     pub(crate) sequence: u32,
     pub(crate) log_time: u64,
-    pub(crate) data: Vec<u8>,
+    /// Shared, so that what is decoded may refer to it.
+    pub(crate) data: Bytes,
 }
 
 impl Message {
     /// The content, which must be this project's own message `name`.
     pub(crate) fn decode<M: prost::Message + Default>(&self, path: &Path, name: &str) -> Result<M, LogError> {
-        self.decode_as(path, &format!("{}.{name}", proto::PACKAGE))
+        let own = self.schema.strip_prefix(proto::PACKAGE).and_then(|rest| rest.strip_prefix('.')) == Some(name);
+        self.decode_if(own, path, || format!("{}.{name}", proto::PACKAGE))
     }
 
     /// The content, which must have this schema.
     pub(crate) fn decode_as<M: prost::Message + Default>(&self, path: &Path, schema: &str) -> Result<M, LogError> {
-        if &*self.encoding != "protobuf" || &*self.schema != schema {
+        self.decode_if(&*self.schema == schema, path, || schema.to_owned())
+    }
+
+    /// The content, if its schema is the one that is `named`.
+    fn decode_if<M: prost::Message + Default>(
+        &self,
+        is: bool,
+        path: &Path,
+        named: impl Fn() -> String,
+    ) -> Result<M, LogError> {
+        if !is || &*self.encoding != "protobuf" {
             let what = format!(
-                "it is a `{}` in `{}`; this version reads `{schema}` in `protobuf`",
-                self.schema, self.encoding
+                "it is a `{}` in `{}`; this version reads `{}` in `protobuf`",
+                self.schema,
+                self.encoding,
+                named()
             );
             return Err(foreign(path, self, &what));
         }
-        M::decode(&self.data[..]).map_err(|error| foreign(path, self, &error.to_string()))
+        M::decode(self.data.clone()).map_err(|error| foreign(path, self, &error.to_string()))
     }
 }
 
@@ -179,8 +194,8 @@ impl Source {
                     self.messages += 1;
                     self.last_ns = header.log_time;
                     let data = match take(&channel.topic, header.log_time) {
-                        Take::Whole => data.into_owned(),
-                        Take::Mark => Vec::new(),
+                        Take::Whole => data.into_owned().into(),
+                        Take::Mark => Bytes::new(),
                         Take::Nothing => continue,
                     };
                     return Ok(Some(Message {

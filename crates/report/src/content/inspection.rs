@@ -8,7 +8,7 @@ use crate::{
     Key, Number, Summary,
     document::{Block, Head, Section, Table, Text, text},
     looked::Looked,
-    run::{Inspected, Run, Trial},
+    run::{Run, Trial},
 };
 
 /// The topic that the numbers come from.
@@ -16,8 +16,8 @@ const TOPIC: &str = "/metrics/inspection";
 
 /// The section, where any point of interest came into view.
 pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
-    let seen = |trial: &Trial| distinct(views(trial).map(|point| trial.inspected(point).to_owned()));
-    if run.trials.iter().all(|trial| views(trial).next().is_none()) {
+    let seen = |trial: &Trial| distinct(trial.views().map(|point| trial.point(point).to_owned()));
+    if run.trials.iter().all(|trial| trial.views().next().is_none()) {
         return None;
     }
     let caption = text![
@@ -38,7 +38,7 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
         let mut names = seen(trial);
         names.sort();
         for (place, name) in names.iter().enumerate() {
-            let own = || views(trial).filter(|point| trial.inspected(point) == name);
+            let own = || trial.views().filter(|point| trial.point(point) == name);
             let count = Key::of(trial, TOPIC, format!("count views at the point {name}"));
             let mut line = results::cells(row);
             line.push(name.clone().into());
@@ -66,10 +66,10 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| inspects(trial));
     let sentence = |(index, trial): (usize, &Trial)| {
         let errors = |point: &str| -> Vec<f64> {
-            let own = views(trial).filter(|seen| trial.inspected(seen) == point);
+            let own = trial.views().filter(|seen| trial.point(seen) == point);
             own.filter_map(|seen| seen.get(Looked::Error)).collect()
         };
-        let points = distinct(views(trial).map(|point| trial.inspected(point).to_owned()));
+        let points = distinct(trial.views().map(|point| trial.point(point).to_owned()));
         let median = |point: &String| {
             let mut errors = errors(point);
             (!errors.is_empty()).then(|| seafix_evaluation::quantile(&mut errors, 0.5))
@@ -90,11 +90,6 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
         Some(said)
     };
     trials.filter_map(sentence).collect()
-}
-
-/// Each point of interest in view of each frame.
-fn views(trial: &Trial) -> impl Iterator<Item = &Inspected> {
-    trial.sample().flat_map(|frame| &frame.inspected)
 }
 
 /// A statistic of a quantity of one point.

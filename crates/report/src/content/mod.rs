@@ -21,9 +21,11 @@ mod tell;
 mod threats;
 mod time;
 
+use rayon::prelude::*;
+
 use crate::{
     ReportError, Summary,
-    document::Document,
+    document::{Document, Section},
     paired::{self, Comparison},
     run::Run,
 };
@@ -33,36 +35,37 @@ use crate::{
 pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Document, ReportError> {
     let header = run.header();
     let title = if header.title.is_empty() { &header.run } else { &header.title };
-    let comparisons = paired::comparisons(run, summary);
-    let (picture, failures) = failures::section(run, small)?;
+    let (comparisons, failures) = rayon::join(|| paired::comparisons(run, summary), || failures::section(run, small));
+    let (picture, failures) = failures?;
     let mut method = method::section(run);
     method.blocks.splice(0..0, picture);
+    // Of a million rows some take a second each.
+    let made: [&(dyn Fn() -> Option<Section> + Sync); _] = [
+        &|| Some(data::section(run, summary, small)),
+        &|| Some(protocol::section(run, &comparisons)),
+        &|| Some(results::section(run, summary, &comparisons)),
+        &|| integrity::section(run, summary),
+        &|| objects::section(run, summary),
+        &|| navigation::section(run, summary),
+        &|| inspection::section(run, summary),
+        &|| significance::section(run, &comparisons),
+        &|| ablation::section(run, summary),
+    ];
+    let made: Vec<Option<Section>> = made.par_iter().map(|section| section()).collect();
+    let before = [hypotheses::section(run, &comparisons), method];
+    let after = [
+        failures,
+        time::section(run, summary),
+        threats::section(run, summary, &comparisons),
+        reproduce::section(run),
+        reproduce::configuration(run),
+    ];
     Ok(Document {
         title: sentence_case(title),
         run: header.run.clone(),
         question: header.question.clone(),
         summary: abstract_::section(run, summary, &comparisons),
-        sections: [
-            Some(hypotheses::section(run, &comparisons)),
-            Some(method),
-            Some(data::section(run, summary, small)),
-            Some(protocol::section(run, &comparisons)),
-            Some(results::section(run, summary, &comparisons)),
-            integrity::section(run, summary),
-            objects::section(run, summary),
-            navigation::section(run, summary),
-            inspection::section(run, summary),
-            significance::section(run, &comparisons),
-            ablation::section(run, summary),
-            Some(failures),
-            Some(time::section(run, summary)),
-            Some(threats::section(run, summary, &comparisons)),
-            Some(reproduce::section(run)),
-            Some(reproduce::configuration(run)),
-        ]
-        .into_iter()
-        .flatten()
-        .collect(),
+        sections: before.into_iter().chain(made.into_iter().flatten()).chain(after).collect(),
     })
 }
 

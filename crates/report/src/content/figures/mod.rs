@@ -11,6 +11,8 @@ mod sawtooth;
 mod tolerance;
 mod way;
 
+use rayon::prelude::*;
+
 use crate::{
     Summary,
     document::{Block, Figure, Text, text},
@@ -26,23 +28,22 @@ pub(super) use sawtooth::figure as sawtooth;
 
 /// Those that show results.
 pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
-    let main =
-        if super::limits::known(summary) { None } else { axis::errors(run, summary).or_else(|| frames::errors(run)) };
-    [
-        main,
-        rates::figure(run, summary),
-        axis::boxes(run, summary),
-        recall::figure(run),
-        tolerance::precision_recall(run, summary),
-        grid::figure(run, summary),
-        way::figure(run),
-        consistency::histogram(run),
-        consistency::coverage(run),
-    ]
-    .into_iter()
-    .flatten()
-    .map(Block::Figure)
-    .collect()
+    let main = || {
+        if super::limits::known(summary) { None } else { axis::errors(run, summary).or_else(|| frames::errors(run)) }
+    };
+    let all: [&(dyn Fn() -> Option<Figure> + Sync); _] = [
+        &main,
+        &|| rates::figure(run, summary),
+        &|| axis::boxes(run, summary),
+        &|| recall::figure(run),
+        &|| tolerance::precision_recall(run, summary),
+        &|| grid::figure(run, summary),
+        &|| way::figure(run),
+        &|| consistency::histogram(run),
+        &|| consistency::coverage(run),
+    ];
+    let drawn: Vec<Option<Figure>> = all.par_iter().map(|figure| figure()).collect();
+    drawn.into_iter().flatten().map(Block::Figure).collect()
 }
 
 /// Camera, noise and source of what all trials share, in one sentence.
