@@ -327,7 +327,6 @@ fn a_folder_that_cannot_be_written() {
     }
 }
 
-/// Seen to fail without the look at the lock.
 #[test]
 fn a_folder_that_goes_away_is_no_finished_run() {
     let folder = experiment(20_000);
@@ -343,6 +342,21 @@ fn a_folder_that_goes_away_is_no_finished_run() {
     assert!(!error.contains("panicked"), "{error}");
 }
 
+/// Seen to fail without the look at the lock: nothing else tells.
+#[test]
+fn a_folder_that_another_run_has_is_no_finished_run() {
+    let folder = experiment(2000);
+    let folder = folder.path();
+    let mut child = run(folder, "out", &["--threads", "1"]).spawn().unwrap();
+    until_begun(&mut child, &folder.join("out"));
+    let lock = folder.join("out/.lock");
+    fs::write(folder.join("another"), "").unwrap();
+    fs::rename(folder.join("another"), &lock).unwrap();
+    let (code, error) = ended(&child.wait_with_output().unwrap());
+    assert!(code == Some(4) && error.contains("removed or replaced"), "{code:?} {error}");
+}
+
+/// Seen to fail where nobody looks whether the shard has a piece.
 #[test]
 fn an_empty_shard_says_so() {
     let folder = experiment(30);
