@@ -18,7 +18,8 @@ const LIMIT: u64 = 64 << 20;
 /// An image whose pixels do not fill it.
 pub fn encode_png(image: &GreyImage) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
+    // To try all filters on every row takes half as long again and saves a hundredth.
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Avg)
         .write_image(&image.pixels, image.width, image.height, ExtendedColorType::L8)
         .map_err(|error| error.to_string())?;
     Ok(bytes)

@@ -64,6 +64,8 @@ impl Sink {
         };
         let mcap = WriteOptions::new()
             .compression(compression)
+            // Images are compressed already, and the rest hardly gains by more.
+            .compression_level(1)
             .library(concat!("seafix-log/", env!("CARGO_PKG_VERSION")))
             // The library's default depends on the machine's number of processors, and so do the bytes.
             .compression_threads(0)
