@@ -3,8 +3,16 @@
 /// The value of an axis as it can stand alone: a number with what it is.
 pub(crate) fn condition(axis: &seafix_log::Axis) -> String {
     match axis.value.parse::<f64>() {
-        Ok(_) => format!("{} {}", short(&axis.key), axis.value),
+        Ok(_) => placed(&axis.key, &axis.value),
         Err(_) => axis.value.clone(),
+    }
+}
+
+/// A value of an axis with what it is, and its unit where that is known.
+pub(crate) fn placed(key: &str, value: &str) -> String {
+    match unit(key) {
+        Some(unit) => format!("{} {value} {unit}", short(key)),
+        None => format!("{} {value}", short(key)),
     }
 }
 
@@ -23,6 +31,7 @@ pub(crate) fn unit(key: &str) -> Option<&'static str> {
         "attenuation" => Some("1/m"),
         "speed" => Some("m/s"),
         "seconds" => Some("s"),
+        "outliers" => Some("%"),
         "sigma-px" | "sigma_px" | "pixel-sigma" => Some("px"),
         _ => None,
     }

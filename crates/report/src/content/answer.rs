@@ -84,10 +84,7 @@ impl Labels {
     }
 
     fn place(&self, row: &Row, key: &str) -> String {
-        match format::unit(key) {
-            Some(unit) => format!("{} {} {unit}", format::short(key), value(row, key)),
-            None => format!("{} {}", format::short(key), value(row, key)),
-        }
+        format::placed(key, &value(row, key))
     }
 
     /// Whether each trial is worth a word: few, in one series or each a series of its own.
@@ -309,8 +306,10 @@ fn wrong(run: &Run, summary: &Summary, labels: &Labels) -> Option<Text> {
     if row.wrong == 0 || summary.rows.len() == 1 {
         return None;
     }
+    let alike = summary.rows.iter().filter(|other| other.wrong == row.wrong).count();
+    let began = if alike == 1 { "Most wrong fixes were made with" } else { "No trial has more wrong fixes than" };
     Some(text![
-        format!("Most wrong fixes were made with {}: ", labels.of_trial(row)),
+        format!("{began} {}: ", labels.of_trial(row)),
         tell::count(trial, "wrong", row.wrong),
         " of ",
         tell::count(trial, "attempted", row.attempted),
