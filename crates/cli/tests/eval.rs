@@ -132,6 +132,40 @@ fn breaks_are_not_crossed() {
     assert!(fs::read_to_string(folder.path().join("again.tum")).unwrap().contains("# broken"));
 }
 
+/// A log knows where its odometry was lost, too: a pair that was left out is gone over, a motion that did not come breaks the way.
+///
+/// Seen to fail when a lost motion leaves its pair out, and when no break is kept.
+#[test]
+fn breaks_of_a_log_are_not_crossed() {
+    let folder = tempfile::tempdir().unwrap();
+    // Pairs .2 s apart; the third is black, and the motion to the fifth is lost.
+    let dive = "question = 'Is a break crossed?'\nseed = 1\n\
+        [source]\nname = 'dive'\nframes = 7\nrate = 5.0\nstart = 30.4\n\
+        rig.size = [512, 384]\nrig.focal = 250.0\nwater.attenuation = 0.15\n\
+        faults = [{ device = 'images', kind = 'off', from = 30.7, to = 30.9, amount = 0.0 }]\n\
+        [navigation]\nfaults = [{ kind = 'off', from = 0.7, to = 0.9 }]\n";
+    fs::write(folder.path().join("dive.toml"), dive).unwrap();
+    let mut run = Command::cargo_bin("seafix").unwrap();
+    run.current_dir(folder.path()).args(["run", "dive.toml", "--out", "run"]).assert().success();
+    let log = fs::read_dir(folder.path().join("run")).unwrap().map(|entry| entry.unwrap().path());
+    let log = log.into_iter().find(|file| file.extension().is_some_and(|ending| ending == "mcap")).unwrap();
+    let log = log.to_str().unwrap();
+    let (code, out, warned) = eval(folder.path(), &[log, "--json", "--out", "way.tum"]);
+    let value: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(code, 0);
+    assert_eq!((&value["matched"]["estimate"], &value["rpe"]["pairs"]), (&6.into(), &4.into()), "{value}");
+    assert_eq!(
+        (&value["breaks"][0]["pose"], &value["breaks"][1], &value["end_m"]),
+        (&3.into(), &Value::Null, &Value::Null)
+    );
+    assert!(value["rpe"]["max"].as_f64().unwrap() < 0.02, "{value}");
+    assert!(warned.contains("warning: the way is broken once"), "{warned}");
+    // The same way as a file is judged alike.
+    let (_, of_file, _) = eval(folder.path(), &[log, "way.tum", "--json"]);
+    let of_file: Value = serde_json::from_str(&of_file).unwrap();
+    assert_eq!((&of_file["rpe"]["pairs"], &of_file["breaks"]), (&value["rpe"]["pairs"], &value["breaks"]));
+}
+
 /// Seen to fail when nobody looks at the order of a quaternion, or of the lines.
 #[test]
 fn orders_are_not_guessed() {

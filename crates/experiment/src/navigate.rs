@@ -24,6 +24,10 @@ use crate::{
     stages::milliseconds,
 };
 
+/// How the reason ends why no motion is known to a pair that the odometry goes on from. A pair that it left out has another
+/// reason; of that, the way goes on over it.
+pub(crate) const THE_WAY_IS_UNKNOWN: &str = "the way here is unknown";
+
 /// The settings of the way from fix to fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -253,7 +257,7 @@ impl<'a> Voyage<'a> {
         self.unreferenced = self.unreferenced.take().zip(motion).map(|(pose, motion)| pose.after(&motion));
         let Some(motion) = motion else {
             let why = if found.is_some() { "it failed" } else { "a new segment begins" };
-            return OdometryStep { lost: format!("{why}: the way here is unknown"), motion: None };
+            return OdometryStep { lost: format!("{why}: {THE_WAY_IS_UNKNOWN}"), motion: None };
         };
         OdometryStep { lost: String::new(), motion: Some((motion.motion.rows(), rows6(&motion.covariance.matrix))) }
     }

@@ -8,15 +8,17 @@ use seafix_evaluation::trajectory::Pose;
 use seafix_log::{FrameRecord, Matrix4, Reader, TrialHeader};
 
 use super::Trajectory;
+use crate::navigate::THE_WAY_IS_UNKNOWN;
 
 /// One of the ways of the left camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
     /// As it really went, in the world.
     True,
-    /// By odometry alone, from the first pair on; where the way was lost the next stretch begins where the last ended.
+    /// By odometry alone, from the first pair on; where the way was lost it is broken, and goes on where it ended.
     Odometry,
-    /// By the navigated pose and the survey of the object it is relative to, in the world.
+    /// By the navigated pose and the survey of the object it is relative to, in the world. It has no breaks: where odometry was
+    /// lost there is no pose until the next fix, which tells where that is.
     Navigated,
 }
 
@@ -30,13 +32,18 @@ impl Trajectory {
         let reader = Reader::open(file).map_err(unreadable)?.without_images();
         let header = reader.header().clone();
         let (mut stamps, mut poses): (Vec<u64>, Vec<Pose>) = (Vec::new(), Vec::new());
+        let mut breaks = Vec::new();
         let mut here = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
         for frame in reader {
             let frame = frame.map_err(unreadable)?;
             let found = match way {
                 Way::True => frame.truth.as_ref().map(|truth| pose(&truth.world_from_camera)),
                 Way::Odometry => step(&frame).map(|step| {
-                    here = after(&here, &step);
+                    match step {
+                        Step::Begin => {}
+                        Step::Go(motion) => here = after(&here, &motion),
+                        Step::Broken => breaks.push(poses.len()),
+                    }
                     here
                 }),
                 Way::Navigated => navigated(&header, &frame),
@@ -53,17 +60,27 @@ impl Trajectory {
             };
             return Err(Fault::new(what, file).remedy(remedy));
         }
-        Ok(Self { stamps: Some(stamps), poses, breaks: Vec::new() })
+        Ok(Self { stamps: Some(stamps), poses, breaks })
     }
 }
 
-/// The motion to a frame that the odometry reached; none where it began anew.
-fn step(frame: &FrameRecord) -> Option<Pose> {
+/// How the odometry reached a frame.
+enum Step {
+    /// It begins with it.
+    Begin,
+    /// By this motion from the frame that it reached before.
+    Go(Pose),
+    /// By a motion that nobody knows; it goes on from here.
+    Broken,
+}
+
+/// How the odometry reached a frame; none where it left the frame out.
+fn step(frame: &FrameRecord) -> Option<Step> {
     let odometry = &frame.navigation.as_ref()?.odometry;
     match &odometry.motion {
-        Some((motion, _)) => Some(pose(motion)),
-        None if odometry.lost.is_empty() => Some(Pose { rotation: Matrix3::identity(), position: Vector3::zeros() }),
-        None => None,
+        Some((motion, _)) => Some(Step::Go(pose(motion))),
+        None if odometry.lost.is_empty() => Some(Step::Begin),
+        None => odometry.lost.ends_with(THE_WAY_IS_UNKNOWN).then_some(Step::Broken),
     }
 }
 

@@ -35,7 +35,8 @@ pub struct NavigatedRecord {
 /// What the odometry made of a pair.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OdometryStep {
-    /// Why no motion to the pair is known; empty where one is, and at the beginning.
+    /// Why no motion to the pair is known; empty where one is, and at the beginning. It ends in `the way here is unknown` where the
+    /// way is broken and goes on from this pair; else the pair was left out, and the next motion leads over it.
     pub lost: String,
     /// The motion from the pair known before, `earlier_from_later`, and its covariance.
     pub motion: Option<(Matrix4, Matrix6)>,
