@@ -382,25 +382,62 @@ fn a_dive_is_reckoned_by_its_readings() {
     assert!(all["poses"].as_u64().unwrap() >= 5 && all["length"].as_f64().unwrap() > 0.1, "{all}");
 }
 
-/// Where a part of the image that is fixed to the vehicle has as many points as the rest, nothing says which of the two moves:
-/// that most points disagree is told.
-#[test]
-fn a_part_of_the_vehicle_in_view_is_told() {
-    let passage = Passage::new();
-    let [width, height] = SIZE;
-    let head = format!("P5\n{width} {height}\n255\n").len();
-    let fixed = [view(1.0), view(1.0 + BASELINE)];
-    for pair in 0..PAIRS {
-        for (side, name) in ["l", "r"].into_iter().enumerate() {
-            let mut image = view(STEP * pair as f64 + BASELINE * side as f64);
-            for row in 0..height {
-                let from = head + row * width;
-                image[from..from + width / 2].copy_from_slice(&fixed[side][from..from + width / 2]);
+impl Passage {
+    /// Lays, over a share of the columns of every pair's images, what cameras elsewhere see: where they are at each pair (m).
+    fn overlay(&self, share: f64, ways: impl Fn(usize) -> (f64, f64)) {
+        let [width, height] = SIZE;
+        let head = format!("P5\n{width} {height}\n255\n").len();
+        let columns = (share * width as f64) as usize;
+        for pair in 0..PAIRS {
+            let (ground, other) = ways(pair);
+            for (name, x) in [("l", 0.0), ("r", BASELINE)] {
+                let (mut image, over) = (view(ground + x), view(other + x));
+                for from in (0..height).map(|row| head + row * width) {
+                    image[from..from + columns].copy_from_slice(&over[from..from + columns]);
+                }
+                self.put(&format!("{name}{pair}.pgm"), image);
             }
-            passage.put(&format!("{name}{pair}.pgm"), image);
         }
     }
+}
+
+/// A part of the vehicle that has more points than the rest stands still in every image: that is not the vehicle's motion, and
+/// is not told as one.
+///
+/// Seen to fail when only the largest consensus is looked at: the vehicle stood still, and a warning said that much disagrees.
+#[test]
+fn a_part_of_the_vehicle_is_no_ground() {
+    let passage = Passage::new();
+    for share in [0.5, 0.65, 0.8] {
+        passage.overlay(share, |pair| (STEP * pair as f64, 1.0));
+        let said = passage.refusal(&[], 3);
+        assert!(said.contains("stand still in the image") && said.contains("fixed to the vehicle"), "{share}: {said}");
+    }
+}
+
+/// Where half of the image moves otherwise than the motion that is told, that is told too.
+///
+/// Seen to fail when the warning is held back.
+#[test]
+fn much_that_disagrees_is_told() {
+    let passage = Passage::new();
+    passage.overlay(0.5, |pair| (STEP * pair as f64, 1.0 - STEP * pair as f64));
     let ended = passage.odometry(&[]).code(0);
     let said = String::from_utf8(ended.get_output().stderr.clone()).unwrap();
     assert!(said.contains("of the landmarks agree with the motion") && said.contains("fixed to the vehicle"), "{said}");
+}
+
+/// What was seen to move before is no part of the vehicle: it stands still where the vehicle does, whatever passes by.
+///
+/// Seen to fail when nobody asks where landmarks were before, and when a pair that is passed by becomes a key frame.
+#[test]
+fn a_vehicle_that_stops_stands_still() {
+    let passage = Passage::new();
+    let stop = STEP * (PAIRS / 2) as f64;
+    passage.overlay(0.4, |pair| ((STEP * pair as f64).min(stop), 1.0 - 3.0 * STEP * pair as f64));
+    // With few key frames: those from before the stop are not given up for others that show the same.
+    let all = passage.json(&["--set", "window=3"]);
+    let ways = Passage::ways(&all);
+    assert_eq!((ways.len(), all["segments"].as_array().unwrap().len()), (PAIRS, 1), "{all}");
+    assert!(ways.iter().enumerate().all(|(pair, x)| (x - (STEP * pair as f64).min(stop)).abs() < 0.005), "{ways:?}");
 }

@@ -126,6 +126,14 @@ pub enum Lost {
         /// How many are needed.
         needed: usize,
     },
+    /// What stands still in the image may be a part of the vehicle: other points moved, and of it none has ever been seen to.
+    #[error("{still} points stand still in the image and {moving} agree on a motion: the vehicle's may be either")]
+    Still {
+        /// How many stand still.
+        still: usize,
+        /// How many of the others agree on a motion.
+        moving: usize,
+    },
     /// The motion that explains the points is not determined well enough.
     #[error("the motion is known to {0:.3} m only")]
     Weak(f64),

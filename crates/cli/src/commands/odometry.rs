@@ -220,6 +220,9 @@ impl Trip {
         Some(match most {
             Some(lost) if alike(lost) >= unread => {
                 fault.value(format!("{counts}; {}: {lost}", told(lost))).remedy(match lost {
+                    Lost::Still { .. } => {
+                        "see whether something fixed to the vehicle is in view, and paint it over in the images"
+                    }
                     Lost::Jump { .. } => "check the stamps of the pairs, and that the rig is the one that took them",
                     _ => "check the images and that the rig is the one that took them",
                 })

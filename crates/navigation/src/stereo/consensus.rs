@@ -25,6 +25,13 @@ pub(crate) struct Rules {
     pub(crate) draws: usize,
 }
 
+impl Rules {
+    /// The distance from which on a point is at another place, not at the same one badly measured (px).
+    pub(crate) fn elsewhere(&self) -> f64 {
+        3.0 * self.px
+    }
+}
+
 /// A motion, `earlier_from_later`, and the points that agree with it.
 pub(crate) struct Consensus {
     pub(crate) motion: Transform<Object, Camera>,
@@ -88,6 +95,31 @@ pub(crate) fn consensus(
         }
     }
     best
+}
+
+/// Whether a consensus is that nothing moves: what does not move at all explains what it explains.
+pub(crate) fn is_still(best: &Consensus, data: &Observations<'_>, rig: &StereoRig, rules: &Rules) -> bool {
+    /// The share of its points that stand still where nothing moves.
+    const STILL: f64 = 0.9;
+    let still = judge(data, rig, rules, Transform::identity()).inliers.len();
+    still as f64 >= STILL * best.inliers.len() as f64
+}
+
+/// How many of the points that are elsewhere than a motion expects them agree with each other on another one.
+pub(crate) fn rival(
+    best: &Consensus,
+    data: &Observations<'_>,
+    rig: &StereoRig,
+    rules: &Rules,
+    solvers: (&dyn Solver, &dyn Solver),
+    rng: &mut dyn Rng,
+) -> usize {
+    let far = rules.elsewhere();
+    let by_best = best.motion.inverse();
+    let others: Vec<usize> = (0..data.points.len())
+        .filter(|&index| squared_distance(&data.points[index], rig, &by_best).is_none_or(|squared| squared > far * far))
+        .collect();
+    consensus(&subset(data, &others), rig, rules, solvers, &[], rng).map_or(0, |other| other.inliers.len())
 }
 
 /// Some of the points.

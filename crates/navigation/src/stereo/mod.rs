@@ -32,6 +32,9 @@ use reckoning::StereoReckoning;
 /// covariances. Pairs that see too little of what the last key frame saw become key frames: they bring new landmarks, and
 /// the poses and landmarks of the last `window` key frames are adjusted together (bundle adjustment).
 ///
+/// A consensus of points that stand still in the image, beside others that agree on a motion, may be a part of the vehicle, sharp
+/// and always found again. It is believed where landmarks of it have been elsewhere in the image; else the pair is lost.
+///
 /// Points are projected through the lens model; images are neither rectified nor undistorted.
 ///
 /// Source: Nistér, Naroditsky and Bergen, *Visual odometry*, CVPR 2004; Torr and Zisserman, *MLESAC*, 2000; Forster et

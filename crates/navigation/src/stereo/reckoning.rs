@@ -10,7 +10,7 @@ use seafix_vision::{Look, Threads, Workspace};
 
 use super::{
     Stages, Stereo,
-    consensus::{Rules, consensus, seen_again},
+    consensus::{Rules, consensus, is_still, rival, seen_again},
     follow::{Followed, KeyFrame, follow},
     landmark::{Landmark, Sighting},
     look::Seen,
@@ -79,6 +79,8 @@ struct Step {
     sought: Vec<usize>,
     /// Landmarks that agree, and where they are.
     sightings: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
+    /// Whether other points moved while these stood still.
+    passed_by: bool,
 }
 
 impl Reckoning for StereoReckoning<'_> {
@@ -214,7 +216,7 @@ impl<'a> StereoReckoning<'a> {
         if seconds > settings.most_gap {
             return Err(Lost::Gap { seconds, most: settings.most_gap });
         }
-        let rough = self.rough(seen, last, seconds)?;
+        let (rough, beside) = self.rough(seen, last, seconds)?;
         let start = Instant::now();
         let mut guess = last.world_from_camera * rough;
         let calibration = self.stages.front_end.triangulator.rules().calibration_px;
@@ -243,6 +245,9 @@ impl<'a> StereoReckoning<'a> {
         if sightings.len() < needed {
             return Err(Lost::NoConsensus { found: sightings.len(), matches: sought.len(), needed });
         }
+        if beside > 0 && !self.were_elsewhere(&sightings, needed) {
+            return Err(Lost::Still { still: sightings.len(), moving: beside });
+        }
         let covariance = Covariance6::new(pose.covariance);
         if covariance.position_sigma() > settings.most_sigma {
             return Err(Lost::Weak(covariance.position_sigma()));
@@ -252,11 +257,29 @@ impl<'a> StereoReckoning<'a> {
         if speed > settings.most_speed {
             return Err(Lost::Jump { speed, seconds, most: settings.most_speed });
         }
-        Ok(Step { world_from_camera: guess, local: Local::new(motion, covariance), seconds, sought, sightings })
+        let local = Local::new(motion, covariance);
+        Ok(Step { world_from_camera: guess, local, seconds, sought, sightings, passed_by: beside > 0 })
     }
 
-    /// The motion that the points in common agree on, `earlier_from_later`.
-    fn rough(&mut self, seen: &Seen, last: &Last, seconds: f64) -> Result<Transform<Camera, Camera>, Lost> {
+    /// Whether enough landmarks have been at another place of the image before. What is fixed to the vehicle never has, however
+    /// sharp it is and however often it is found again.
+    fn were_elsewhere(&self, sightings: &[(usize, Vector4<f64>, Matrix4<f64>)], needed: usize) -> bool {
+        let far = self.rules().elsewhere();
+        let moved = |(index, pixels, _): &&(usize, Vector4<f64>, Matrix4<f64>)| {
+            let first = self.landmarks[*index].place;
+            libm::hypot(pixels[0] - first.u, pixels[1] - first.v) > far
+        };
+        sightings.iter().filter(moved).count() >= needed
+    }
+
+    fn rules(&self) -> Rules {
+        let Stereo { consensus_px: px, confidence, draws, .. } = *self.settings;
+        Rules { px, confidence, draws }
+    }
+
+    /// The motion that the points in common agree on, `earlier_from_later`; and where nothing moves by it, how many of the others
+    /// agree on a motion, zero where they are so few that chance may agree as well.
+    fn rough(&mut self, seen: &Seen, last: &Last, seconds: f64) -> Result<(Transform<Camera, Camera>, usize), Lost> {
         let settings = self.settings;
         let start = Instant::now();
         let pairs = seen.in_common(&last.seen, &self.stages, self.rig, &mut self.work);
@@ -269,7 +292,7 @@ impl<'a> StereoReckoning<'a> {
         let points =
             pairs.iter().map(|&(earlier, later)| seen_again(&last.seen.cloud[earlier].position, &seen.cloud[later]));
         let data = Observations { points: points.collect(), rig: Some(self.rig) };
-        let rules = Rules { px: settings.consensus_px, confidence: settings.confidence, draws: settings.draws };
+        let rules = self.rules();
         let mut guesses = vec![Transform::identity()];
         if let Some((motion, before)) = &last.motion {
             guesses.push(Transform::exp(&(motion.log() * (seconds / before))));
@@ -278,17 +301,24 @@ impl<'a> StereoReckoning<'a> {
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed ^ seen.stamp_ns);
         let solvers = (&*self.stages.minimal, &*self.stages.solver);
         let best = consensus(&data, self.rig, &rules, solvers, &guesses, &mut rng);
-        self.times.since("consensus", start);
         let found = best.as_ref().map_or(0, |best| best.inliers.len());
-        match best {
-            Some(best) if found >= needed => Ok(best.motion.relabel()),
+        let answer = match best {
+            Some(best) if found >= needed => {
+                let still = is_still(&best, &data, self.rig, &rules);
+                let beside = if still { rival(&best, &data, self.rig, &rules, solvers, &mut rng) } else { 0 };
+                // Three points always agree on a motion; as many again do not.
+                let beside = if beside >= 2 * self.stages.minimal.minimum() { beside } else { 0 };
+                Ok((best.motion.relabel(), beside))
+            }
             _ => Err(Lost::NoConsensus { found, matches: pairs.len(), needed }),
-        }
+        };
+        self.times.since("consensus", start);
+        answer
     }
 
     /// Makes `seen` part of the journey.
     fn accept(&mut self, seen: Seen, step: Step) {
-        let Step { world_from_camera, local, seconds, sought, sightings } = step;
+        let Step { world_from_camera, local, seconds, sought, sightings, passed_by } = step;
         for index in sought {
             self.landmarks[index].misses += 1;
         }
@@ -296,7 +326,9 @@ impl<'a> StereoReckoning<'a> {
             self.landmarks[*index].misses = 0;
         }
         let share = sightings.len() as f64 / self.seen_by_keyframe.max(1) as f64;
-        if share < self.settings.keyframe_share {
+        // What passes by hides landmarks; those of other places of the image are what vouches for the ground, and are kept.
+        let own = share < self.settings.keyframe_share && !passed_by;
+        if own {
             self.keyframe(&seen, world_from_camera, &sightings);
             let start = Instant::now();
             self.adjust();
@@ -304,7 +336,6 @@ impl<'a> StereoReckoning<'a> {
         }
         let frame = self.frames.len() - 1;
         // A key frame is its own reference, wherever the adjustment moved it.
-        let own = share < self.settings.keyframe_share;
         let frame_from_camera = match own {
             true => Transform::identity(),
             false => self.frames[frame].world_from_camera.inverse() * world_from_camera,
