@@ -383,13 +383,14 @@ fn a_dive_is_reckoned_by_its_readings() {
 }
 
 impl Passage {
-    /// Lays, over a share of the columns of every pair's images, what cameras elsewhere see: where they are at each pair (m).
-    fn overlay(&self, share: f64, ways: impl Fn(usize) -> (f64, f64)) {
+    /// Lays, over a share of the columns of every pair's images, what cameras elsewhere see: the share, and where the one and the
+    /// other are at each pair (m).
+    fn overlay(&self, ways: impl Fn(usize) -> (f64, f64, f64)) {
         let [width, height] = SIZE;
         let head = format!("P5\n{width} {height}\n255\n").len();
-        let columns = (share * width as f64) as usize;
         for pair in 0..PAIRS {
-            let (ground, other) = ways(pair);
+            let (share, ground, other) = ways(pair);
+            let columns = (share * width as f64) as usize;
             for (name, x) in [("l", 0.0), ("r", BASELINE)] {
                 let (mut image, over) = (view(ground + x), view(other + x));
                 for from in (0..height).map(|row| head + row * width) {
@@ -404,12 +405,14 @@ impl Passage {
 /// A part of the vehicle that has more points than the rest stands still in every image: that is not the vehicle's motion, and
 /// is not told as one.
 ///
-/// Seen to fail when only the largest consensus is looked at: the vehicle stood still, and a warning said that much disagrees.
+/// Seen to fail when only the largest consensus is looked at: the vehicle stood still, and a warning said that much disagrees. And
+/// when what was doubted is believed as soon as the ground is out of view.
 #[test]
 fn a_part_of_the_vehicle_is_no_ground() {
     let passage = Passage::new();
     for share in [0.5, 0.65, 0.8] {
-        passage.overlay(share, |pair| (STEP * pair as f64, 1.0));
+        // In the end the ground is out of view.
+        passage.overlay(|pair| (if pair < 5 { share } else { 0.97 }, STEP * pair as f64, 1.0));
         let said = passage.refusal(&[], 3);
         assert!(said.contains("stand still in the image") && said.contains("fixed to the vehicle"), "{share}: {said}");
     }
@@ -421,7 +424,7 @@ fn a_part_of_the_vehicle_is_no_ground() {
 #[test]
 fn much_that_disagrees_is_told() {
     let passage = Passage::new();
-    passage.overlay(0.5, |pair| (STEP * pair as f64, 1.0 - STEP * pair as f64));
+    passage.overlay(|pair| (0.5, STEP * pair as f64, 1.0 - STEP * pair as f64));
     let ended = passage.odometry(&[]).code(0);
     let said = String::from_utf8(ended.get_output().stderr.clone()).unwrap();
     assert!(said.contains("of the landmarks agree with the motion") && said.contains("fixed to the vehicle"), "{said}");
@@ -434,10 +437,25 @@ fn much_that_disagrees_is_told() {
 fn a_vehicle_that_stops_stands_still() {
     let passage = Passage::new();
     let stop = STEP * (PAIRS / 2) as f64;
-    passage.overlay(0.4, |pair| ((STEP * pair as f64).min(stop), 1.0 - 3.0 * STEP * pair as f64));
+    passage.overlay(|pair| (0.4, (STEP * pair as f64).min(stop), 1.0 - 3.0 * STEP * pair as f64));
     // With few key frames: those from before the stop are not given up for others that show the same.
     let all = passage.json(&["--set", "window=3"]);
     let ways = Passage::ways(&all);
     assert_eq!((ways.len(), all["segments"].as_array().unwrap().len()), (PAIRS, 1), "{all}");
     assert!(ways.iter().enumerate().all(|(pair, x)| (x - (STEP * pair as f64).min(stop)).abs() < 0.005), "{ways:?}");
+}
+
+/// Where nothing tells whether it stands, no motion is told; how it went on from there is, once it moves.
+///
+/// Seen to fail when such pairs break the way, and when standing is believed.
+#[test]
+fn a_vehicle_that_starts_is_followed_from_where_it_stood() {
+    let passage = Passage::new();
+    let start = |pair: usize| STEP * pair.saturating_sub(PAIRS / 2) as f64;
+    passage.overlay(|pair| (0.4, start(pair), 1.0 - 3.0 * STEP * pair as f64));
+    let all = passage.json(&[]);
+    let (ways, left_out) = (Passage::ways(&all), all["left_out"].as_array().unwrap().len());
+    assert_eq!((left_out, all["segments"].as_array().unwrap().len()), (PAIRS / 2, 1), "{all}");
+    let right = |(at, pair): (&f64, usize)| (at - start(pair)).abs() < 0.005;
+    assert!(ways[0] == 0.0 && ways[1..].iter().zip(PAIRS / 2 + 1..).all(right), "{ways:?}");
 }

@@ -33,7 +33,8 @@ use reckoning::StereoReckoning;
 /// the poses and landmarks of the last `window` key frames are adjusted together (bundle adjustment).
 ///
 /// A consensus of points that stand still in the image, beside others that agree on a motion, may be a part of the vehicle, sharp
-/// and always found again. It is believed where landmarks of it have been elsewhere in the image; else the pair is lost.
+/// and always found again. It is believed where landmarks of it have been elsewhere in the image; else pairs are left out until
+/// the vehicle is seen to move.
 ///
 /// Points are projected through the lens model; images are neither rectified nor undistorted.
 ///

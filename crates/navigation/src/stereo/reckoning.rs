@@ -38,6 +38,8 @@ pub(super) struct StereoReckoning<'a> {
     pending: Option<(Seen, usize, Lost)>,
     /// Why the way ended, while no pair was good enough to begin the next segment.
     broken: Option<Lost>,
+    /// How many points moved beside what stood still when that was doubted last; zero once the vehicle was seen to move.
+    doubted: usize,
     frames: Vec<KeyFrame>,
     /// The first key frame of the segment.
     first: usize,
@@ -129,6 +131,7 @@ impl<'a> StereoReckoning<'a> {
             last: None,
             pending: None,
             broken: None,
+            doubted: 0,
             frames: Vec::new(),
             first: 0,
             seen_by_keyframe: 0,
@@ -151,6 +154,11 @@ impl<'a> StereoReckoning<'a> {
                 self.pending = None;
                 self.outcomes.push(Outcome::Followed { sought: step.sought.len(), found: step.sightings.len() });
                 self.accept(seen, step);
+            }
+            // Where it stands may still be told by how it goes on from the last pair.
+            Err(lost @ Lost::Still { .. }) => {
+                self.outcomes.push(Outcome::Skipped(lost));
+                self.last = Some(last);
             }
             Err(lost) => match (self.pending.take(), lost) {
                 // Two pairs say that there is no way on: a segment begins with the first of them.
@@ -216,7 +224,7 @@ impl<'a> StereoReckoning<'a> {
         if seconds > settings.most_gap {
             return Err(Lost::Gap { seconds, most: settings.most_gap });
         }
-        let (rough, beside) = self.rough(seen, last, seconds)?;
+        let (rough, moving) = self.rough(seen, last, seconds)?;
         let start = Instant::now();
         let mut guess = last.world_from_camera * rough;
         let calibration = self.stages.front_end.triangulator.rules().calibration_px;
@@ -245,9 +253,13 @@ impl<'a> StereoReckoning<'a> {
         if sightings.len() < needed {
             return Err(Lost::NoConsensus { found: sightings.len(), matches: sought.len(), needed });
         }
+        // What was doubted is doubted until something tells: the others may be out of view meanwhile.
+        let beside = moving.map_or(0, |moving| if moving > 0 { moving } else { self.doubted });
         if beside > 0 && !self.were_elsewhere(&sightings, needed) {
+            self.doubted = beside;
             return Err(Lost::Still { still: sightings.len(), moving: beside });
         }
+        self.doubted = 0;
         let covariance = Covariance6::new(pose.covariance);
         if covariance.position_sigma() > settings.most_sigma {
             return Err(Lost::Weak(covariance.position_sigma()));
@@ -279,7 +291,12 @@ impl<'a> StereoReckoning<'a> {
 
     /// The motion that the points in common agree on, `earlier_from_later`; and where nothing moves by it, how many of the others
     /// agree on a motion, zero where they are so few that chance may agree as well.
-    fn rough(&mut self, seen: &Seen, last: &Last, seconds: f64) -> Result<(Transform<Camera, Camera>, usize), Lost> {
+    fn rough(
+        &mut self,
+        seen: &Seen,
+        last: &Last,
+        seconds: f64,
+    ) -> Result<(Transform<Camera, Camera>, Option<usize>), Lost> {
         let settings = self.settings;
         let start = Instant::now();
         let pairs = seen.in_common(&last.seen, &self.stages, self.rig, &mut self.work);
@@ -304,10 +321,10 @@ impl<'a> StereoReckoning<'a> {
         let found = best.as_ref().map_or(0, |best| best.inliers.len());
         let answer = match best {
             Some(best) if found >= needed => {
-                let still = is_still(&best, &data, self.rig, &rules);
-                let beside = if still { rival(&best, &data, self.rig, &rules, solvers, &mut rng) } else { 0 };
                 // Three points always agree on a motion; as many again do not.
-                let beside = if beside >= 2 * self.stages.minimal.minimum() { beside } else { 0 };
+                let enough = |count: &usize| *count >= 2 * self.stages.minimal.minimum();
+                let mut moving = || Some(rival(&best, &data, self.rig, &rules, solvers, &mut rng)).filter(enough);
+                let beside = is_still(&best, &data, self.rig, &rules).then(|| moving().unwrap_or(0));
                 Ok((best.motion.relabel(), beside))
             }
             _ => Err(Lost::NoConsensus { found, matches: pairs.len(), needed }),
