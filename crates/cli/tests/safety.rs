@@ -141,6 +141,7 @@ fn kill(times: u64, frames: usize) {
     println!("{killed} of {times} runs were killed, {lost} of them amid their pieces");
 }
 
+/// Seen to fail when pieces count as made whatever they are.
 #[test]
 fn a_run_that_is_killed_and_resumed_has_the_same_bytes() {
     kill(4, 200);
@@ -153,6 +154,7 @@ fn two_hundred_kills() {
     kill(200, 2000);
 }
 
+/// Seen to fail when signals are not heard.
 #[test]
 fn an_interrupted_run_ends_in_good_order() {
     let folder = experiment(1_000_000);
@@ -172,6 +174,7 @@ fn an_interrupted_run_ends_in_good_order() {
     }
 }
 
+/// Seen to fail when a lock that another holds is taken for granted.
 #[test]
 fn two_runs_in_one_folder() {
     let folder = experiment(1_000_000);
@@ -190,6 +193,7 @@ fn two_runs_in_one_folder() {
     assert_eq!(code, Some(0), "{error}");
 }
 
+/// Seen to fail where nobody looks into the folder.
 #[test]
 fn a_run_that_is_there_stays_unless_told_otherwise() {
     let folder = experiment(4);
@@ -296,6 +300,7 @@ fn a_finished_run_is_the_same_by_any_number_of_threads() {
     assert_eq!(manifest("one", "1"), manifest("three", "3"));
 }
 
+/// Seen to fail where pieces are not counted.
 #[test]
 fn a_shard_that_is_missing_is_named() {
     let folder = experiment(40);

@@ -52,6 +52,7 @@ fn a_further_frame_changes_no_earlier_one() {
     }
 }
 
+/// Seen to fail where the seed plays no part.
 #[test]
 fn another_seed_is_another_dive() {
     let folder = TempDir::new().unwrap();

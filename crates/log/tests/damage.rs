@@ -44,6 +44,7 @@ fn any_flipped_bit_is_noticed() {
     }
 }
 
+/// Seen to fail where the first bytes are not looked at.
 #[test]
 fn other_files_are_named_for_what_they_are() {
     let folder = tempfile::tempdir().unwrap();

@@ -8,6 +8,7 @@ use std::fs;
 
 use seafix_log::{FrameRecord, LogError, Reader, Totals, Writer, read};
 
+/// Seen to fail without a field of a result.
 #[test]
 fn every_record_comes_back() {
     let folder = tempfile::tempdir().unwrap();
@@ -82,6 +83,7 @@ fn frames_decoded_side_by_side_are_those_read_one_by_one() {
     assert!(matches!(cut_off, LogError::Truncated { .. }), "{cut_off}");
 }
 
+/// Seen to fail when messages bear the time of their writing.
 #[test]
 fn the_same_records_give_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
