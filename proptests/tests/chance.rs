@@ -196,6 +196,9 @@ fn small(family: Family) -> Box<dyn Fn(&u64) -> bool> {
     }
 }
 
+/// Drawn anew, candidates show as many sets as are predicted, bin by bin.
+///
+/// Seen to fail when 2.5 times as many are predicted, and when 2.5 times as few are.
 #[test]
 fn the_null_model_is_predicted() {
     let mut all = Bins::default();

@@ -62,6 +62,8 @@ fn clutter_that_imitates_the_object_is_not_referenced() {
 }
 
 /// A smaller second copy of the object is told: what is seen of it would be believed by itself.
+///
+/// Seen to fail when no second copy is believed.
 #[test]
 fn a_smaller_copy_is_not_passed_over() {
     for seed in 0..6 {
@@ -94,6 +96,8 @@ fn a_smaller_copy_is_not_passed_over() {
 }
 
 /// Answers have a pose to be held against where three pairs speak for one: it is elsewhere, and explains less.
+///
+/// Seen to fail when the other pose may be the answer itself.
 #[test]
 fn answers_are_held_against_a_pose_elsewhere() {
     let (mut answers, mut held) = (0, 0);
