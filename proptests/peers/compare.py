@@ -1,0 +1,75 @@
+"""compare.py PROBLEMS PAIRS SEAFIX DRIVERS FAMILY ROUNDS NAME…: times, answers and wrong ones of a family, ours first.
+
+In turns: each program through the whole family, so many rounds, one thread each. The median of the rounds, then over the problems
+of at most 6000 pairs; solved and wrong as the problems' README has them.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+problems, pairs, seafix, drivers, family, rounds, *names = sys.argv[1:]
+problems, pairs = Path(problems) / family, Path(pairs)
+ids = sorted(file.stem for file in pairs.glob(f"{family}???.txt"))
+ids = [name for name in ids if int((pairs / f"{name}.txt").open().readline().split()[1]) <= 6000]
+one_thread = dict(os.environ, OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+
+
+def ours():
+    files = [problems / f"{name}.json" for name in ids]
+    said = subprocess.run([seafix, "solve", "--json", *files], capture_output=True, text=True, env=one_thread).stdout
+    for name, line in zip(ids, said.splitlines(), strict=True):
+        answer = json.loads(line)
+        yield name, answer["time_ms"], answer["T_cam_obj"]
+
+
+def peer(program):
+    files = [pairs / f"{name}.txt" for name in ids]
+    said = subprocess.run([Path(drivers) / program, *files], capture_output=True, text=True, env=one_thread).stderr
+    for line in said.splitlines():
+        words = line.split()
+        if len(words) == 19 and words[0] in ids:
+            pose = np.array(words[3:], float).reshape(4, 4)
+            yield words[0], float(words[1]), pose if words[2] == "1" else None
+
+
+def right(name, pose):
+    """Whether the pose is the true one: three times the ideal error, or 5 cm and 2°, 1 cm in d."""
+    truth = json.loads((problems / f"{name}.truth.json").read_text())
+    model = np.array(json.loads((problems / f"{name}.json").read_text())["model"], float)[:, :3]
+    pose, true = np.array(pose), np.array(truth["T_cam_obj"])
+    off = model @ (pose - true)[:3, :3].T + (pose - true)[:3, 3]
+    rms = np.sqrt((off**2).sum(1).mean())
+    turn = np.degrees(np.arccos(np.clip((np.trace(pose[:3, :3].T @ true[:3, :3]) - 1) / 2, -1, 1)))
+    near = rms < 0.01 if family == "d" else np.linalg.norm(off.mean(0)) < 0.05 and turn < 2
+    ideal = truth.get("ideal_tre_rms")
+    return truth["pose_defined"] and (near or bool(ideal) and rms <= 3 * ideal)
+
+
+times = {name: {} for name in ["ours", *names]}
+poses = {name: {} for name in times}
+for _ in range(int(rounds)):
+    for name in times:
+        for problem, taken, pose in ours() if name == "ours" else peer(name):
+            times[name].setdefault(problem, []).append(taken)
+            poses[name][problem] = pose
+for name, of in times.items():
+    if not of:
+        print(family, name, "no answer")
+        continue
+    median = {problem: statistics.median(taken) for problem, taken in of.items()}
+    own = {problem: statistics.median(times["ours"][problem]) for problem in of}
+    ratio = statistics.median(own.values()) / statistics.median(median.values())
+    each = statistics.median(own[problem] / max(median[problem], 1e-9) for problem in of)
+    answers = {problem: pose for problem, pose in poses[name].items() if pose is not None}
+    solved = sum(right(problem, pose) for problem, pose in answers.items())
+    print(
+        f"{family} {name}: {statistics.median(median.values()):.4g} ms of {len(of)}, ours over it {ratio:.3f}, "
+        f"median of ratios {each:.3f}; solved {solved}, wrong {len(answers) - solved} of {len(answers)}",
+        flush=True,
+    )
