@@ -34,7 +34,7 @@ for part in PCR funcs registration; do
     -e 's/setNbThreads(6)/setNbThreads(1)/; s/omp_set_num_threads(12)/omp_set_num_threads(1)/' \
     "$from/mac/Linux/$part.cpp" >macs/$part.cpp
 done
-flags="$flags -I/usr/include/pcl-1.13 -I/usr/include/igraph -I$PWD/macs -include boost/random.hpp"
+flags="$flags -I/usr/include/pcl-1.13 -I/usr/include/igraph -I$PWD/macs -include boost/random.hpp -include iomanip"
 objects mac "$PWD"/macs/*.cpp
 driver mac mac/*.o -lpcl_common -lpcl_kdtree -lpcl_search -lpcl_io -lpcl_io_ply -lpcl_features -lpcl_filters -lpcl_surface \
   -lpcl_octree -lflann_cpp -llz4 -ligraph
