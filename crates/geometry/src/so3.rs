@@ -1,6 +1,6 @@
 //! Rotations: exponential, logarithm, and the Jacobians between them.
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 /// The matrix of the cross product: `skew(a) * b = a × b`.
 pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
@@ -21,6 +21,19 @@ pub fn log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let q = if rotation.w < 0.0 { -rotation.into_inner() } else { rotation.into_inner() };
     let sine = q.imag().norm();
     if sine < 1e-9 { q.imag() * 2.0 } else { q.imag() * (2.0 * libm::atan2(sine, q.w) / sine) }
+}
+
+/// The same of a rotation matrix, which is taken to be one.
+pub fn log_of_matrix(rotation: &Matrix3<f64>) -> Vector3<f64> {
+    // sin θ times the axis, and cos θ.
+    let r = rotation;
+    let axis = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12) * 0.5;
+    let (sine, cosine) = (axis.norm(), (r.trace() - 1.0) * 0.5);
+    if cosine < -0.5 {
+        // Near half a turn the sine loses the axis.
+        return log(&UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*r)));
+    }
+    if sine < 1e-9 { axis } else { axis * (libm::atan2(sine, cosine) / sine) }
 }
 
 /// The angle of `rotation`, in [0, π] (rad); never NaN.
@@ -53,6 +66,16 @@ mod tests {
         let turn = exp(&Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
         assert!((turn * Vector3::x() - Vector3::y()).norm() < 1e-15);
         assert!((log(&turn).z - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn matrices_and_quaternions_have_one_logarithm() {
+        let axis = Vector3::new(0.6, -0.48, 0.64);
+        for angle in [0.0, 1e-12, 1e-8, 1e-3, 0.5, 1.5, 2.0, 2.2, 3.0, 3.14159] {
+            let turn = exp(&(axis * angle));
+            let found = log_of_matrix(&turn.to_rotation_matrix().into_inner());
+            assert!((found - axis * angle).norm() < 1e-14 + 1e-12 * angle, "{angle}: {found}");
+        }
     }
 
     #[test]

@@ -62,16 +62,21 @@ impl Solve {
             .num_threads(usize::from(self.threads))
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
-        let mut failed = false;
-        // In groups, so that answers appear while the rest is worked on, in the order of the arguments.
-        for group in self.problems.chunks(usize::from(self.threads)) {
-            let lines: Vec<Line> = pool.install(|| group.par_iter().map(solve).collect());
-            for line in &lines {
-                failed |= matches!(line, Line::Failed { .. });
-                print(&self.text(line))?;
+        let groups = || {
+            let mut ended = DONE;
+            // In groups, so that answers appear while the rest is worked on, in the order of the arguments.
+            for group in self.problems.chunks(usize::from(self.threads)) {
+                let lines: Vec<Line> = group.par_iter().map(solve).collect();
+                for line in &lines {
+                    if matches!(line, Line::Failed { .. }) {
+                        ended = INPUT;
+                    }
+                    print(&self.text(line))?;
+                }
             }
-        }
-        Ok(if failed { INPUT } else { DONE })
+            Ok(ended)
+        };
+        pool.install(groups)
     }
 
     fn text(&self, line: &Line) -> String {

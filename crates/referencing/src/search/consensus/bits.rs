@@ -15,6 +15,28 @@ pub(in crate::search) fn ones(bits: &[u64], from: usize) -> impl Iterator<Item =
     })
 }
 
+/// Calls `each` with every set bit from `from` on, ascending: quick where most words are empty.
+#[inline]
+pub(in crate::search) fn each_one(bits: &[u64], from: usize, mut each: impl FnMut(usize)) {
+    let first = from / 64;
+    for (block, words) in bits.get(first..).unwrap_or_default().chunks(64).enumerate() {
+        // Which words hold any: known without a branch that nobody foresees.
+        let mut held = words.iter().enumerate().fold(0u64, |held, (i, &word)| held | u64::from(word != 0) << i);
+        while held != 0 {
+            let i = held.trailing_zeros() as usize;
+            held &= held - 1;
+            let mut rest = words[i];
+            if block + i == 0 {
+                rest &= !0 << (from % 64);
+            }
+            while rest != 0 {
+                each((first + 64 * block + i) * 64 + rest.trailing_zeros() as usize);
+                rest &= rest - 1;
+            }
+        }
+    }
+}
+
 /// Whether a bit is set.
 #[inline]
 pub(in crate::search) fn is_set(bits: &[u64], bit: usize) -> bool {
@@ -39,6 +61,19 @@ pub(in crate::search) fn intersect(a: &[u64], b: &[u64], from: usize, out: &mut 
     count - (out[first] & !(!0 << (from % 64))).count_ones() as usize
 }
 
+/// How many bits a ∧ b has from a bit on.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq+avx512vpopcntdq+popcnt",
+    "x86_64+avx2+bmi1+bmi2+popcnt"
+))]
+pub(in crate::search) fn shared(a: &[u64], b: &[u64], from: usize) -> usize {
+    let first = from / 64;
+    let (Some(a), Some(b)) = (a.get(first..), b.get(first..)) else { return 0 };
+    let (Some((head, a)), Some((other, b))) = (a.split_first(), b.split_first()) else { return 0 };
+    let rest: u32 = a.iter().zip(b).map(|(a, b)| (a & b).count_ones()).sum();
+    ((head & other & (!0 << (from % 64))).count_ones() + rest) as usize
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,6 +84,13 @@ mod tests {
         assert_eq!(ones(&bits, 0).collect::<Vec<_>>(), [63, 128, 130]);
         assert_eq!(ones(&bits, 129).collect::<Vec<_>>(), [130]);
         assert_eq!(ones(&bits, 192).count(), 0);
+        let mut many = vec![0; 130];
+        [0, 5, 64, 4095, 4096, 8319].into_iter().for_each(|bit| many[bit / 64] |= 1u64 << (bit % 64));
+        for from in [0, 1, 5, 6, 64, 4095, 4096, 4097, 8319, 8320, 9000] {
+            let mut each = Vec::new();
+            each_one(&many, from, |bit| each.push(bit));
+            assert_eq!(each, ones(&many, from.min(8320)).collect::<Vec<_>>(), "from {from}");
+        }
     }
 
     #[test]
@@ -59,6 +101,7 @@ mod tests {
         assert_eq!(intersect(&a, &b, 64, &mut out), 2);
         assert_eq!(intersect(&a, &b, 128, &mut out), 0);
         assert_eq!(out[1], 0b11 << 62);
+        assert_eq!([0, 2, 64, 127, 128].map(|from| shared(&a, &b, from)), [4, 3, 2, 1, 0]);
         assert!(is_set(&out, 127) && !is_set(&out, 0));
     }
 }

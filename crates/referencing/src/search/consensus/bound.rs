@@ -1,6 +1,11 @@
 //! How likely a set can be at best, from what its first members have in common.
 
-use super::{bits::ones, graph::Graph, likelihood::Terms, rough::Rough};
+use super::{
+    bits::{each_one, is_set, shared},
+    graph::Graph,
+    likelihood::Terms,
+    rough::Rough,
+};
 
 /// What the information of a set may fall short of that of as many average points (nats).
 const SLACK: f64 = 3.0;
@@ -44,8 +49,8 @@ impl<'a> Bounds<'a> {
     pub(in crate::search) fn of((terms, rough, graph): (&'a Terms, &Rough, &'a Graph), least: usize) -> Self {
         let ranks = graph.starts.len() - 1;
         let grows = libm::log(terms.ln_share.len() as f64) + 1.0;
-        let gains = |i: usize| &terms.gain[graph.starts[i]..graph.starts[i + 1]];
-        let top: Vec<f64> = (0..ranks).map(|i| gains(i).iter().copied().fold(grows, f64::max)).collect();
+        let of_rank = |i: usize| &terms.pairs[graph.starts[i]..graph.starts[i + 1]];
+        let top: Vec<f64> = (0..ranks).map(|i| of_rank(i).iter().map(|pair| pair.gain).fold(grows, f64::max)).collect();
         let share = &terms.ln_share;
         Self {
             graph,
@@ -61,7 +66,7 @@ impl<'a> Bounds<'a> {
 
     /// What one pair brings at most.
     pub(in crate::search) fn gain(&self, v: usize) -> f64 {
-        self.terms.gain[v].max(self.grows)
+        self.terms.pairs[v].gain.max(self.grows)
     }
 
     /// What a model point brings at most.
@@ -98,46 +103,27 @@ impl<'a> Bounds<'a> {
         if self.single || reach < enough {
             return reach;
         }
-        let (mut k, mut sum) = (own, gains);
-        self.ranks(common, from, |rank| (k, sum) = (k + 1, sum + self.top[rank]));
+        let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
+        each_one(common, starts[from], |v| {
+            let rank = self.graph.rank[v];
+            // Chosen rather than branched upon: no processor foresees it.
+            let (one, top) = if rank == last { (0, 0.0) } else { (1, self.top[rank as usize]) };
+            (k, sum, last) = (k + one, sum + top, rank);
+        });
         if k < self.least { f64::NEG_INFINITY } else { self.of_set(k, sum) }
     }
 
-    /// The model points of some pairs from a rank on, by their ranks.
-    #[inline]
-    fn ranks(&self, of: &[u64], from: usize, mut each: impl FnMut(usize)) {
-        let starts = &self.graph.starts;
-        let mut word = starts[from] / 64;
-        let Some(mut rest) = of.get(word).map(|bits| bits & (!0 << (starts[from] % 64))) else { return };
-        loop {
-            while rest == 0 {
-                word += 1;
-                let Some(&bits) = of.get(word) else { return };
-                rest = bits;
-            }
-            let met = self.graph.rank[word * 64 + rest.trailing_zeros() as usize] as usize;
-            each(met);
-            let next = starts[met + 1];
-            if next / 64 != word {
-                word = next / 64;
-                let Some(&bits) = of.get(word) else { return };
-                rest = bits;
-            }
-            rest &= !0 << (next % 64);
-        }
-    }
-
-    /// Whether the same bound of three pairs or more and of those of `later` that `joins` says is `enough`: known before all of it
-    /// is, since it grows with every model point.
+    /// Whether the same bound of three pairs or more and of those of `later`, which are set in `common`, that are set in `row` is
+    /// `enough`: known before all of it is, since it grows with every model point.
     pub(in crate::search) fn is_enough(
         &self,
         (own, gains): (usize, f64),
         later: &[Later],
-        joins: impl Fn(&Later) -> bool,
+        (common, row): (&[u64], &[u64]),
         enough: f64,
     ) -> bool {
         if self.single {
-            let count = later.iter().filter(|one| joins(one)).count();
+            let count = later.first().map_or(0, |first| shared(common, row, first.vertex as usize));
             return own + count >= self.least && self.reach(own, gains, count) >= enough;
         }
         let (mut k, mut sum) = (own, gains);
@@ -146,7 +132,7 @@ impl<'a> Bounds<'a> {
         }
         let mut last = u32::MAX;
         for one in later {
-            if one.rank != last && joins(one) {
+            if one.rank != last && is_set(row, one.vertex as usize) {
                 (k, sum, last) = (k + 1, sum + self.top[one.rank as usize], one.rank);
                 if k >= self.least && self.of_set(k, sum) >= enough {
                     return true;
@@ -159,9 +145,9 @@ impl<'a> Bounds<'a> {
     /// Lists the pairs that are set in `bits` from a rank on, each with what the model points after its own bring at most.
     pub(in crate::search) fn list(&self, bits: &[u64], from: usize, later: &mut Vec<Later>) {
         later.clear();
-        for v in ones(bits, self.graph.starts[from]) {
+        each_one(bits, self.graph.starts[from], |v| {
             later.push(Later { vertex: v as u32, rank: self.graph.rank[v], more: 0, bring: 0.0 });
-        }
+        });
         let (mut last, mut after, mut all) = (u32::MAX, (0, 0.0), (0, 0.0));
         for one in later.iter_mut().rev() {
             if one.rank != last {

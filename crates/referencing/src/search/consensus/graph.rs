@@ -24,6 +24,8 @@ pub(in crate::search) struct Graph {
     pub(in crate::search) vertices: Vec<Correspondence>,
     /// Where the pairs of each model point begin; one more than there are.
     pub(in crate::search) starts: Vec<usize>,
+    /// The cloud points of the pairs have smaller numbers.
+    pub(in crate::search) clouds: usize,
     /// Place of each vertex' model point in this order.
     pub(in crate::search) rank: Vec<u32>,
     /// Words a row.
@@ -48,7 +50,8 @@ impl Graph {
         let rank = (0..starts.len() - 1).flat_map(|i| vec![i as u32; starts[i + 1] - starts[i]]).collect();
         let columns = Columns::of(problem, rough, &vertices);
         let words = count.div_ceil(64);
-        let mut graph = Self { vertices, starts, rank, words, bits: vec![0; words * count], tests: 0 };
+        let clouds = vertices.iter().map(|pair| pair.cloud + 1).max().unwrap_or(0);
+        let mut graph = Self { vertices, starts, clouds, rank, words, bits: vec![0; words * count], tests: 0 };
         let turn = rough.known.as_ref().map_or(f64::MAX, |known| {
             // Beyond the first order a turn by ω moves a point by ω²/2 of its lever.
             let turn = TURN_SIGMAS * known.attitude;

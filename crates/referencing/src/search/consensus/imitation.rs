@@ -62,7 +62,7 @@ impl<'a> Occupied<'a> {
         let model = |v: &usize| graph.vertices[*v].model;
         let off = other.members.iter().map(|&v| slack(problem, graph.vertices[v])).fold(0.0, f64::max);
         let (own, free): (Vec<usize>, Vec<usize>) =
-            other.members.iter().partition(|&&v| self.near(&terms.cloud[v], off));
+            other.members.iter().partition(|&&v| self.near(&terms.pairs[v].cloud, off));
         let mut telling = self.telling.clone();
         free.iter().for_each(|v| telling[model(v)] = false);
         let mut seen = vec![false; telling.len()];

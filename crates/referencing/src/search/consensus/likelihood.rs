@@ -1,13 +1,14 @@
 //! How much better a pose explains the cloud than clutter alone.
 
-use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3, Vector6};
+use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3};
 use seafix_geometry::{Camera, UncertainPoint, so3::skew};
 
 use super::{
     Motion,
+    fit::fit,
     graph::Graph,
     rough::{Rough, box_volume},
-    six::{factor as factor_of, solve},
+    six::factor as factor_of,
 };
 use crate::{Correspondence, Problem, Tolerance};
 
@@ -18,10 +19,36 @@ pub(in crate::search) const HALF_LN_2PI: f64 = 0.918_938_533_204_672_7;
 /// A pair further from where the pose puts it than this is no part of it (χ²₃).
 const FAR: f64 = 25.0;
 
-/// A fit whose step is shorter than this (squared, in standard deviations) has converged.
-const CONVERGED: f64 = 1e-12;
 /// What rounding may cost a coordinate, as a share of the greatest.
 const ROUNDING: f64 = 1e-9;
+
+/// What one pair says.
+#[derive(Clone, Copy)]
+pub(in crate::search) struct Term {
+    /// Where it was measured.
+    pub(in crate::search) cloud: Vector3<f64>,
+    /// Where the model has it.
+    pub(in crate::search) model: Vector3<f64>,
+    /// What the measurement's error weighs.
+    pub(in crate::search) weight: Matrix3<f64>,
+    /// ln of the likelihood ratio without residual.
+    pub(in crate::search) gain: f64,
+}
+
+impl Term {
+    /// ln of the likelihood ratio with this residual (m); `None` where that is too great.
+    #[inline]
+    pub(in crate::search) fn of_residual(&self, r: &Vector3<f64>) -> Option<f64> {
+        let d2 = self.distance(r);
+        (d2 <= FAR).then(|| self.gain - 0.5 * d2)
+    }
+
+    /// χ² of a residual (m).
+    #[inline]
+    pub(in crate::search) fn distance(&self, r: &Vector3<f64>) -> f64 {
+        r.dot(&(self.weight * r))
+    }
+}
 
 /// What the pairs of a problem say when they are true.
 ///
@@ -30,12 +57,8 @@ const ROUNDING: f64 = 1e-9;
 /// is not known: all numbers are equally likely beforehand, and one set of k then has the share
 /// B(k) = k! (n − k)! / (n + 1)!.
 pub(in crate::search) struct Terms {
-    /// Of each vertex: where it was measured, where the model has it, what the measurement's error weighs.
-    pub(in crate::search) cloud: Vec<Vector3<f64>>,
-    pub(in crate::search) model: Vec<Vector3<f64>>,
-    pub(in crate::search) weight: Vec<Matrix3<f64>>,
-    /// ln of the likelihood ratio of a pair without residual.
-    pub(in crate::search) gain: Vec<f64>,
+    /// Of each vertex.
+    pub(in crate::search) pairs: Vec<Term>,
     /// Of each model point: ln of the density of cloud points about its predicted place.
     pub(in crate::search) ln_density: Vec<f64>,
     /// ln of the volumes that the posterior of 0…n points fills, taken for points that lie and are known as the candidates are on
@@ -50,15 +73,8 @@ impl Terms {
         let n = problem.candidates.lists.len();
         let ln_density = densities(problem, rough);
         let count = graph.vertices.len();
-        let mut terms = Self {
-            cloud: Vec::with_capacity(count),
-            model: Vec::with_capacity(count),
-            weight: Vec::with_capacity(count),
-            gain: Vec::with_capacity(count),
-            ln_density,
-            ln_volume: Vec::new(),
-            ln_share: shares(n),
-        };
+        let mut terms =
+            Self { pairs: Vec::with_capacity(count), ln_density, ln_volume: Vec::new(), ln_share: shares(n) };
         let turned = rough.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
         // Points that are called exact are taken to be as good as a twenty-fifth of what the tolerance allows each.
         let least = match problem.tolerance {
@@ -78,10 +94,8 @@ impl Terms {
                 _ => peak(&noise),
             };
             last = Some((noise, weight, ln_peak));
-            terms.cloud.push(seen.at.coords);
-            terms.model.push(known.at.coords);
-            terms.weight.push(weight);
-            terms.gain.push(ln_peak - terms.ln_density[pair.model]);
+            let gain = ln_peak - terms.ln_density[pair.model];
+            terms.pairs.push(Term { cloud: seen.at.coords, model: known.at.coords, weight, gain });
             average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
         }
         average /= count.max(1) as f64;
@@ -91,15 +105,14 @@ impl Terms {
 
     /// The log-likelihood ratio of one pair under a pose, however far it is from it.
     pub(in crate::search) fn residual_gain(&self, v: usize, motion: &Motion) -> f64 {
-        let r = self.cloud[v] - motion.apply(&self.model[v]);
-        self.gain[v] - 0.5 * r.dot(&(self.weight[v] * r))
+        let pair = &self.pairs[v];
+        pair.gain - 0.5 * pair.distance(&(pair.cloud - motion.apply(&pair.model)))
     }
 
     /// The log-likelihood ratio of one pair under a pose; `None` when it is too far from it.
     pub(in crate::search) fn of_pair(&self, v: usize, motion: &Motion) -> Option<f64> {
-        let r = self.cloud[v] - motion.apply(&self.model[v]);
-        let d2 = r.dot(&(self.weight[v] * r));
-        (d2 <= FAR).then(|| self.gain[v] - 0.5 * d2)
+        let pair = &self.pairs[v];
+        pair.of_residual(&(pair.cloud - motion.apply(&pair.model)))
     }
 }
 
@@ -145,14 +158,19 @@ fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
         .iter()
         .map(|(place, spread)| {
             let half = spread * super::rough::BOUND_SIGMAS;
-            let inside = |x: f64, y: f64, z: f64| {
-                ((x - place.x).abs() <= half.x) & ((y - place.y).abs() <= half.y) & ((z - place.z).abs() <= half.z)
-            };
-            let count = x.iter().zip(&y).zip(&z).filter(|((x, y), z)| inside(**x, **y, **z)).count();
+            let count = inside((&x, &y, &z), place, &half);
             libm::log(count.max(1) as f64)
                 - (half * 2.0).iter().map(|side| libm::log(side.max(f64::MIN_POSITIVE))).sum::<f64>()
         })
         .collect()
+}
+
+/// How many places lie in a box of these half sides about another.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn inside((x, y, z): (&[f64], &[f64], &[f64]), place: &Vector3<f64>, half: &Vector3<f64>) -> u64 {
+    let (place, half): ([f64; 3], [f64; 3]) = ((*place).into(), (*half).into());
+    let near = |x: f64, axis: usize| (x - place[axis]).abs() <= half[axis];
+    x.iter().zip(y).zip(z).map(|((x, y), z)| u64::from(near(*x, 0) & near(*y, 1) & near(*z, 2))).sum()
 }
 
 fn shares(n: usize) -> Vec<f64> {
@@ -205,7 +223,7 @@ impl Mode {
     /// The pairs, those that fit the motion best first.
     pub(in crate::search) fn closest_first(&self, terms: &Terms, graph: &Graph) -> Vec<Correspondence> {
         let mut members: Vec<(f64, usize)> =
-            self.members.iter().map(|&v| (terms.gain[v] - terms.residual_gain(v, &self.motion), v)).collect();
+            self.members.iter().map(|&v| (terms.pairs[v].gain - terms.residual_gain(v, &self.motion), v)).collect();
         members.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         members.into_iter().map(|(_, v)| graph.vertices[v]).collect()
     }
@@ -236,70 +254,6 @@ fn information(lever: &Vector3<f64>, w: &Matrix3<f64>) -> Matrix6<f64> {
     h.fixed_view_mut::<3, 3>(3, 0).copy_from(&sw.transpose());
     h.fixed_view_mut::<3, 3>(3, 3).copy_from(w);
     h
-}
-
-/// [lever]× w, without the products with its zeros.
-fn crossed(lever: &Vector3<f64>, w: &Matrix3<f64>) -> Matrix3<f64> {
-    let (x, y, z) = (lever.x, lever.y, lever.z);
-    let row = |a: f64, i: usize, b: f64, k: usize| {
-        [a * w[(i, 0)] + b * w[(k, 0)], a * w[(i, 1)] + b * w[(k, 1)], a * w[(i, 2)] + b * w[(k, 2)]]
-    };
-    let (first, second, third) = (row(-z, 1, y, 2), row(z, 0, -x, 2), row(-y, 0, x, 1));
-    Matrix3::from_fn(|i, k| [first, second, third][i][k])
-}
-
-/// The most likely motion of these pairs near one, and the factor of its information.
-pub(in crate::search) fn fit(
-    terms: &Terms,
-    rough: &Rough,
-    members: &[usize],
-    start: &Motion,
-    rounds: usize,
-) -> Option<(Motion, Cholesky<f64, U6>)> {
-    let mut motion = *start;
-    let mut factor = None;
-    for _ in 0..rounds {
-        let about = motion.apply(&rough.centroid);
-        let (mut turn, mut mixed, mut shift) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
-        let (mut torque, mut force) = (Vector3::zeros(), Vector3::zeros());
-        for &v in members {
-            let place = motion.apply(&terms.model[v]);
-            let (lever, w) = (place - about, terms.weight[v]);
-            let pull = w * (terms.cloud[v] - place);
-            let sw = crossed(&lever, &w);
-            // sw · [lever]×.
-            let (x, y, z) = (lever.x, lever.y, lever.z);
-            for i in 0..3 {
-                let row = [sw[(i, 0)], sw[(i, 1)], sw[(i, 2)]];
-                turn[(i, 0)] -= row[1] * z + row[2] * -y;
-                turn[(i, 1)] -= row[0] * -z + row[2] * x;
-                turn[(i, 2)] -= row[0] * y + row[1] * -x;
-            }
-            mixed += sw;
-            shift += w;
-            torque += lever.cross(&pull);
-            force += pull;
-        }
-        let mut h = Matrix6::zeros();
-        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-        h.fixed_view_mut::<3, 3>(0, 3).copy_from(&mixed);
-        h.fixed_view_mut::<3, 3>(3, 0).copy_from(&mixed.transpose());
-        h.fixed_view_mut::<3, 3>(3, 3).copy_from(&shift);
-        let mut g = Vector6::new(torque.x, torque.y, torque.z, force.x, force.y, force.z);
-        if let Some(known) = &rough.known {
-            h += known.information;
-            g -= known.information * rough.step_to(known, &motion);
-        }
-        let chol = factor_of(&h)?;
-        let step = solve(&chol, &g);
-        motion = motion.moved(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into(), &about);
-        factor = Some(chol);
-        // The Newton decrement: the square of the step in standard deviations.
-        if step.dot(&g) < CONVERGED {
-            break;
-        }
-    }
-    factor.map(|chol| (motion, chol))
 }
 
 /// ½ ln det of a matrix.

@@ -30,14 +30,14 @@ pub(in crate::search) fn mirror_image(
     let taken = BTreeSet::new();
     let climb = Climb { model, terms, rough: &rough, graph, taken: &taken, compared: Cell::new(0) };
     let count = mode.members.len() as f64;
-    let centre = mode.members.iter().map(|&v| terms.model[v]).sum::<Vector3<f64>>() / count;
-    let step = |v: &usize| terms.model[*v] - centre;
+    let centre = mode.members.iter().map(|&v| terms.pairs[v].model).sum::<Vector3<f64>>() / count;
+    let step = |v: &usize| terms.pairs[*v].model - centre;
     let spread: Matrix3<f64> = mode.members.iter().map(|v| step(v) * step(v).transpose()).sum();
     let eigen = spread.symmetric_eigen();
     let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     let rotation = mode.motion.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
     let reflected = Motion { rotation, translation: mode.motion.apply(&centre) - rotation * centre };
-    let own = climb.from(mode.members.clone(), &mode.motion, f64::NEG_INFINITY)?;
-    let image = climb.from(mode.members.clone(), &reflected, f64::NEG_INFINITY)?;
+    let own = climb.from(&mode.members, &mode.motion, f64::NEG_INFINITY, |_| false)?;
+    let image = climb.from(&mode.members, &reflected, f64::NEG_INFINITY, |_| false)?;
     (image.ln_evidence > own.ln_evidence + MARGIN).then_some(image)
 }

@@ -3,6 +3,7 @@
 mod bits;
 mod bound;
 mod crowd;
+mod fit;
 mod graph;
 mod imitation;
 mod likelihood;

@@ -1,16 +1,15 @@
 //! From a rough motion to the maximum of the posterior near it.
 
-use std::{
-    cell::Cell,
-    collections::{BTreeSet, HashSet},
-};
+use std::{cell::Cell, collections::BTreeSet};
 
 use nalgebra::{Cholesky, U6};
 
 use super::{
     Motion,
+    bits::is_set,
+    fit::{Linear, fit, fit_on},
     graph::Graph,
-    likelihood::{Mode, Terms, fit, ln_volume},
+    likelihood::{Mode, Terms, ln_volume},
     rough::Rough,
 };
 use crate::ModelPoint;
@@ -19,6 +18,8 @@ use crate::ModelPoint;
 const ROUNDS: usize = 8;
 /// What pairs may bring that join a set only when its motion is fitted (nats).
 const JOINING: f64 = 8.0;
+/// What turns that are not small may hide of a motion's worth (nats): of two million threes two hid more than this.
+const TURNING: f64 = 3.0;
 /// The least set that a pose can come from.
 const LEAST: usize = 3;
 
@@ -39,26 +40,41 @@ pub(in crate::search) struct Climb<'a> {
 impl Climb<'_> {
     /// Chooses pairs and fits in turn until the choice stands.
     ///
-    /// `None` as soon as no evidence of `least` (nats) is in sight.
-    pub(in crate::search) fn from(&self, members: Vec<usize>, start: &Motion, least: f64) -> Option<Mode> {
-        let mut members = members;
-        let mut motion = *start;
-        for round in 0..ROUNDS {
-            let (fitted, factor) = fit(self.terms, self.rough, &members, &motion, 2)?;
-            motion = fitted;
-            // What fitted three noisy points roughly often fits no motion: that is seen at once.
-            if round == 0 && self.promise(&members, &motion, &factor) < least {
-                return None;
-            }
-            let chosen = self.choose(&motion);
-            if chosen.len() < LEAST {
-                return None;
-            }
-            if chosen == members {
+    /// `None` as soon as no evidence of `least` (nats) is in sight, or where the first choice is one that was `climbed` from before.
+    pub(in crate::search) fn from(
+        &self,
+        members: &[usize],
+        start: &Motion,
+        least: f64,
+        climbed: impl FnOnce(&[usize]) -> bool,
+    ) -> Option<Mode> {
+        // What fitted three noisy points roughly mostly fits no motion: that is seen at once.
+        let first = Linear::at(self.terms, self.rough, members, start)?;
+        if self.foreseen(members, &first) + TURNING < least {
+            return None;
+        }
+        let (mut motion, factor) = fit_on(first, self.terms, self.rough, members, 2)?;
+        if self.promise(members, &motion, &factor) < least {
+            return None;
+        }
+        let mut chosen = self.choose(&motion);
+        if chosen.len() < LEAST || climbed(&chosen) {
+            return None;
+        }
+        let mut stands = chosen == members;
+        for _ in 1..ROUNDS {
+            if stands {
                 break;
             }
-            members = chosen;
+            (motion, _) = fit(self.terms, self.rough, &chosen, &motion, 2)?;
+            let next = self.choose(&motion);
+            if next.len() < LEAST {
+                return None;
+            }
+            stands = next == chosen;
+            chosen = next;
         }
+        let members = chosen;
         let (motion, factor) = fit(self.terms, self.rough, &members, &motion, 4)?;
         if !self.rough.holds(self.model, &motion, &factor) {
             return None;
@@ -71,13 +87,20 @@ impl Climb<'_> {
 
     /// About the evidence of those members that stay, and of one or two pairs that may join them.
     fn promise(&self, members: &[usize], motion: &Motion, factor: &Factor) -> f64 {
-        let gains: Vec<f64> = members.iter().filter_map(|&v| self.terms.of_pair(v, motion)).collect();
-        let k = gains.len();
-        if k < LEAST - 1 {
-            return f64::NEG_INFINITY;
-        }
-        let gains: f64 = gains.iter().sum();
-        gains + self.terms.ln_share[k] + self.rough.ln_density(motion) + ln_volume(factor) + JOINING
+        let gains = members.iter().filter_map(|&v| self.terms.of_pair(v, motion));
+        self.ln_share_of(gains) + self.rough.ln_density(motion) + ln_volume(factor) + JOINING
+    }
+
+    /// The same before the step is made.
+    fn foreseen(&self, members: &[usize], linear: &Linear) -> f64 {
+        let gains = members.iter().filter_map(|&v| linear.of_pair(self.terms, v));
+        self.ln_share_of(gains) + linear.ln_density(self.rough) + linear.ln_volume() + JOINING
+    }
+
+    /// What pairs gain, with the share of their number; nothing where too few of them are left.
+    fn ln_share_of(&self, gains: impl Iterator<Item = f64>) -> f64 {
+        let (k, sum) = gains.fold((0, 0.0), |(k, sum), gain| (k + 1, sum + gain));
+        if k < LEAST - 1 { f64::NEG_INFINITY } else { sum + self.terms.ln_share[k] }
     }
 
     /// The likeliest one-to-one set under a motion: of each model point its best pair, of pairs that share a
@@ -85,7 +108,7 @@ impl Climb<'_> {
     fn choose(&self, motion: &Motion) -> Vec<usize> {
         self.compared.set(self.compared.get() + self.graph.vertices.len() as u64);
         let starts = &self.graph.starts;
-        let mut best: Vec<(f64, usize)> = Vec::new();
+        let mut best: Vec<(f64, usize)> = Vec::with_capacity(starts.len());
         // The image of a model has no sides.
         let camera = (motion.rotation.determinant() > 0.0).then(|| motion.origin());
         for i in 0..starts.len() - 1 {
@@ -93,9 +116,11 @@ impl Climb<'_> {
             if camera.is_some_and(|camera| !point.shows_itself(&camera)) {
                 continue;
             }
+            let place = motion.apply(&point.at.coords);
             let mut top: Option<(f64, usize)> = None;
             for v in starts[i]..starts[i + 1] {
-                if let Some(gain) = self.terms.of_pair(v, motion)
+                let pair = &self.terms.pairs[v];
+                if let Some(gain) = pair.of_residual(&(pair.cloud - place))
                     && top.is_none_or(|(known, _)| gain > known)
                     && !self.taken.contains(&self.graph.vertices[v].cloud)
                 {
@@ -105,8 +130,13 @@ impl Climb<'_> {
             best.extend(top);
         }
         best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut used = HashSet::with_capacity(best.len());
-        best.retain(|&(_, v)| used.insert(self.graph.vertices[v].cloud));
+        let mut used = vec![0; self.graph.clouds.div_ceil(64)];
+        best.retain(|&(_, v)| {
+            let cloud = self.graph.vertices[v].cloud;
+            let first = !is_set(&used, cloud);
+            used[cloud / 64] |= 1u64 << (cloud % 64);
+            first
+        });
         let (mut sum, mut most, mut keep) = (0.0, f64::NEG_INFINITY, LEAST.min(best.len()));
         for (k, (gain, _)) in best.iter().enumerate() {
             sum += gain;

@@ -1,7 +1,7 @@
 //! The rough pose as a density over rigid motions.
 
-use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, Rotation3, U6, UnitQuaternion, Vector3, Vector6};
-use seafix_geometry::so3::{log, skew};
+use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, U6, Vector3, Vector6};
+use seafix_geometry::so3::{log_of_matrix, skew};
 
 use super::{
     super::association::reach,
@@ -77,8 +77,7 @@ impl Rough {
 
     /// η of a motion.
     pub(in crate::search) fn step_to(&self, known: &Known, motion: &Motion) -> Vector6<f64> {
-        let turn = Rotation3::from_matrix_unchecked(motion.rotation * known.motion.rotation.transpose());
-        let phi = log(&UnitQuaternion::from_rotation_matrix(&turn));
+        let phi = log_of_matrix(&(motion.rotation * known.motion.rotation.transpose()));
         let tau = motion.apply(&self.centroid) - known.motion.apply(&self.centroid);
         Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
     }
@@ -112,10 +111,12 @@ impl Rough {
 
     /// ln of the density at a motion.
     pub(in crate::search) fn ln_density(&self, motion: &Motion) -> f64 {
-        self.known.as_ref().map_or(self.ln_peak, |known| {
-            let eta = self.step_to(known, motion);
-            self.ln_peak - 0.5 * eta.dot(&(known.information * eta))
-        })
+        self.known.as_ref().map_or(self.ln_peak, |known| self.ln_density_of(known, &self.step_to(known, motion)))
+    }
+
+    /// ln of the density of η.
+    pub(in crate::search) fn ln_density_of(&self, known: &Known, eta: &Vector6<f64>) -> f64 {
+        self.ln_peak - 0.5 * eta.dot(&(known.information * eta))
     }
 }
 

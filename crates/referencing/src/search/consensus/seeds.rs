@@ -79,10 +79,15 @@ pub(in crate::search) struct Seeds<'a> {
     /// The free neighbours of one vertex, and of two.
     row: Vec<u64>,
     common: Vec<u64>,
-    /// The same as lists, and what three have in common.
+    /// The members of the likeliest modes that hold two.
+    again: Vec<u64>,
+    /// The free neighbours of one vertex, and of two, as lists, and what three have in common.
     of_one: Vec<Later>,
     of_two: Vec<Later>,
     of_three: Vec<usize>,
+    /// The set that is begun, and the sets that were climbed from: they lead to the same mode again.
+    members: Vec<usize>,
+    climbed: BTreeSet<Vec<usize>>,
 }
 
 impl<'a> Seeds<'a> {
@@ -110,9 +115,12 @@ impl<'a> Seeds<'a> {
             free,
             row: vec![0; words],
             common: vec![0; words],
+            again: vec![0; words],
             of_one: Vec::new(),
             of_two: Vec::new(),
             of_three: Vec::new(),
+            members: Vec::new(),
+            climbed: BTreeSet::new(),
         }
     }
 
@@ -255,9 +263,9 @@ impl<'a> Seeds<'a> {
         let mut common = std::mem::take(&mut self.of_two);
         self.bounds.list(&self.common, next, &mut common);
         // Three members of a mode lead to it again.
-        let likely = self.modes.iter().take(COMPARED);
-        let again: Vec<usize> =
-            likely.filter(|mode| mode.holds(a) && mode.holds(b)).flat_map(|mode| &mode.members).copied().collect();
+        let likely = self.modes.iter().take(COMPARED).filter(|mode| mode.holds(a) && mode.holds(b));
+        self.again.fill(0);
+        likely.flat_map(|mode| &mode.members).for_each(|&v| self.again[v / 64] |= 1 << (v % 64));
         let gains = self.bounds.gain(a) + self.bounds.gain(b);
         let mut later = 0;
         for (place, c) in common.iter().enumerate() {
@@ -265,7 +273,7 @@ impl<'a> Seeds<'a> {
                 later = place + common[place..].iter().take_while(|other| other.rank == c.rank).count();
             }
             let vertex = c.vertex as usize;
-            if again.contains(&vertex) {
+            if is_set(&self.again, vertex) {
                 continue;
             }
             let gains = gains + self.bounds.gain(vertex);
@@ -275,11 +283,11 @@ impl<'a> Seeds<'a> {
                 continue;
             }
             let row = graph.row(vertex);
-            let joins = |other: &Later| is_set(row, other.vertex as usize);
-            if self.bounds.is_enough((3, gains), &common[later..], joins, threshold) && !self.known([a, b, vertex]) {
+            let after = &common[later..];
+            if self.bounds.is_enough((3, gains), after, (&self.common, row), threshold) && !self.known([a, b, vertex]) {
                 self.of_three.clear();
-                let joining = common[later..].iter().filter(|other| joins(other));
-                self.of_three.extend(joining.map(|other| other.vertex as usize));
+                let joining = after.iter().map(|other| other.vertex as usize).filter(|&other| is_set(row, other));
+                self.of_three.extend(joining);
                 self.follow([a, b, vertex]);
             }
         }
@@ -295,19 +303,21 @@ impl<'a> Seeds<'a> {
     fn follow(&mut self, three: [usize; 3]) {
         self.spent += COST_OF_A_POSE;
         let Climb { terms, graph, .. } = self.climb;
-        let model = three.map(|v| &terms.model[v]);
-        let Some(motion) = Motion::of_three(model, three.map(|v| &terms.cloud[v])) else { return };
+        let model = three.map(|v| &terms.pairs[v].model);
+        let Some(motion) = Motion::of_three(model, three.map(|v| &terms.pairs[v].cloud)) else { return };
         let centre: Vector3<f64> = (model[0] + model[1] + model[2]) / 3.0;
         let altitude = altitude(model);
-        let mut members = three.to_vec();
+        let mut members = std::mem::take(&mut self.members);
+        members.clear();
+        members.extend(three);
         let mut gains: f64 = three.iter().map(|&v| self.bounds.gain(v)).sum();
         // Rank and distance of the last member.
         let mut last = (usize::MAX, 0.0);
         for &v in &self.of_three {
             // The three points' errors grow with the lever.
-            let lever = 1.0 + (terms.model[v] - centre).norm() / altitude;
-            let r = terms.cloud[v] - motion.apply(&terms.model[v]);
-            let d2 = r.dot(&(terms.weight[v] * r)) / (lever * lever);
+            let pair = &terms.pairs[v];
+            let lever = 1.0 + (pair.model - centre).norm() / altitude;
+            let d2 = pair.distance(&(pair.cloud - motion.apply(&pair.model))) / (lever * lever);
             let rank = graph.rank[v] as usize;
             let again = last.0 == rank;
             if d2 > LOOSE * LOOSE || (again && last.1 <= d2) {
@@ -322,14 +332,16 @@ impl<'a> Seeds<'a> {
             last = (rank, d2);
         }
         self.spent += 4 * members.len() as u64;
-        if self.bounds.of_set(members.len(), gains) < self.threshold() {
-            return;
+        if self.bounds.of_set(members.len(), gains) >= self.threshold() {
+            self.spent += COST_OF_A_MODE;
+            let threshold = self.threshold();
+            let climbed = |set: &[usize]| !self.climbed.insert(set.to_vec());
+            if let Some(mode) = self.climb.from(&members, &motion, threshold, climbed) {
+                self.keep(mode);
+            }
+            self.spent += COST_OF_A_PAIR * self.climb.compared.take();
         }
-        self.spent += COST_OF_A_MODE;
-        if let Some(mode) = self.climb.from(members, &motion, self.threshold()) {
-            self.keep(mode);
-        }
-        self.spent += COST_OF_A_PAIR * self.climb.compared.take();
+        self.members = members;
     }
 
     fn keep(&mut self, mode: Mode) {

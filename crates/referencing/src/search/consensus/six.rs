@@ -2,7 +2,8 @@
 
 use nalgebra::{Cholesky, Matrix6, U6, Vector6};
 
-/// The Cholesky factor, bit for bit as nalgebra's, whose loops over six rows are not unrolled.
+/// The Cholesky factor of a matrix of which the lower triangle is read, bit for bit as nalgebra's, whose loops over six rows are not unrolled.
+#[inline]
 pub(super) fn factor(matrix: &Matrix6<f64>) -> Option<Cholesky<f64, U6>> {
     let mut l = *matrix;
     for j in 0..6 {
@@ -26,6 +27,7 @@ pub(super) fn factor(matrix: &Matrix6<f64>) -> Option<Cholesky<f64, U6>> {
 }
 
 /// The solution with this factor, bit for bit as nalgebra's.
+#[inline]
 pub(super) fn solve(factor: &Cholesky<f64, U6>, of: &Vector6<f64>) -> Vector6<f64> {
     let (l, mut x) = (factor.l_dirty(), *of);
     for i in 0..6 {
