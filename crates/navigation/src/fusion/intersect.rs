@@ -19,13 +19,13 @@ use crate::Standing;
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Intersect {
-    /// The share of right fixes that passes the gate.
+    /// The share of right fixes that passes the gate, as [`Fuse`](super::Fuse) has it.
     pub confidence: f64,
 }
 
 impl Default for Intersect {
     fn default() -> Self {
-        Self { confidence: 0.9999 }
+        Self { confidence: 0.999 }
     }
 }
 
