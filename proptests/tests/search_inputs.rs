@@ -180,7 +180,7 @@ fn a_huge_cloud_ends() {
             ) => {
                 assert!(bound >= 3, "{}", search.name);
             }
-            Err(Unidentified::Mirrored { best }) => assert_eq!(best, 4, "{}", search.name),
+            Err(Unidentified::Mirrored { best, .. }) => assert_eq!(best, 4, "{}", search.name),
             Err(other) => panic!("{}: {other}", search.name),
         }
     }

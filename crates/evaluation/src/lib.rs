@@ -12,5 +12,7 @@ pub mod trajectory;
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
 pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
 pub use solved::Solved;
-pub use statistics::{Bootstrap, SignedRank, clopper_pearson, holm, mcnemar, median, quantile, signed_rank};
+pub use statistics::{
+    Bootstrap, SignedRank, clopper_pearson, clustered, holm, mcnemar, median, of_blocks, quantile, signed_rank,
+};
 pub use surface::{mean_distance, mean_nearest_distance, symmetric_distance};

@@ -219,7 +219,7 @@ fn check_exact(
         }
         Err(Unidentified::NoConsensus { best, .. }) => assert!(best < 3 && best == size, "case {seed}"),
         // Three points have no orientation; what was refused is a larger set of opposite sign.
-        Err(Unidentified::Mirrored { best }) => {
+        Err(Unidentified::Mirrored { best, .. }) => {
             assert!(orientation && size == 3, "case {seed}");
             let (coherent, larger) = brute_force(&problem, false);
             assert_eq!(coherent, best, "case {seed}");

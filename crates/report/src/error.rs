@@ -20,6 +20,14 @@ pub enum ReportError {
         /// What is known.
         known: &'static str,
     },
+    /// A log of a finished run is gone.
+    #[error("{} names the log {log}, which is not there: a report would leave its trial out without a word; put it back, or run the experiment again", .path.display())]
+    Gone {
+        /// The manifest.
+        path: PathBuf,
+        /// The log.
+        log: String,
+    },
     /// Logs of different experiments.
     #[error("{} varies other keys than {}: they belong to different runs; keep them in folders of their own", .other.display(), .first.display())]
     Mixed {

@@ -267,9 +267,13 @@ pub(crate) struct Statistics {
 impl Statistics {
     /// Of pairs in the order of time, or of conditions, which have none.
     pub(crate) fn of(errors: &[(f64, f64)], conditions: bool) -> Self {
-        // Two failures differ by nothing.
-        let differences: Vec<f64> = errors.iter().map(|(a, b)| if a == b { 0.0 } else { a - b }).collect();
-        let bootstrap = Bootstrap::of(errors.len(), SEED);
+        // Where both fail neither errs less.
+        let told = errors.iter().filter(|(a, b)| a.is_finite() || b.is_finite());
+        let mut differences: Vec<f64> = told.map(|(a, b)| a - b).collect();
+        if differences.is_empty() {
+            differences.push(0.0);
+        }
+        let bootstrap = Bootstrap::of(differences.len(), SEED);
         let bootstrap = if conditions { Bootstrap { block: 1, ..bootstrap } } else { bootstrap };
         let interval = bootstrap.median(&differences, 0.95);
         let test = signed_rank(errors);
@@ -277,7 +281,7 @@ impl Statistics {
             errors.iter().map(one).filter(|[own, other]| own.is_finite() && !other.is_finite()).count()
         };
         Self {
-            difference: median(&mut differences.clone()),
+            difference: median(&mut differences),
             interval,
             p: test.p,
             effect: test.effect,

@@ -81,6 +81,8 @@ pub(crate) struct Underway {
     /// Where the navigated pose and the survey put the left camera in the world, and where the first fix carried by odometry
     /// alone does (m); NaN where unknown.
     pub(crate) places: [[f64; 3]; 2],
+    /// What was told of objects that stand elsewhere than surveyed.
+    pub(crate) displaced: Vec<String>,
     counted: [bool; Counted::ALL.len()],
     values: [f64; Sailed::ALL.len()],
 }
@@ -97,6 +99,9 @@ pub(crate) struct Attempt {
     reason: u32,
     values: [f64; Field::ALL.len()],
 }
+
+/// What the log says of an object that stands elsewhere than surveyed, and of two one of which does.
+const ELSEWHERE: &str = " m from its place";
 
 impl Run {
     /// Reads every `*.mcap` in `folder`.
@@ -220,6 +225,7 @@ impl Trial {
                 Box::new(Underway {
                     places: [&record.pose, &record.unreferenced]
                         .map(|pose| place::carried(&self.header, pose.as_ref())),
+                    displaced: record.events.iter().filter(|event| event.contains(ELSEWHERE)).cloned().collect(),
                     counted: Counted::ALL.map(|counted| counted.holds(record)),
                     values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
                 })
@@ -361,7 +367,8 @@ impl Attempt {
     }
 }
 
-/// That the run's manifest, if it has one, is of a format that is known: a later minor version only adds.
+/// That the run's manifest, if it has one, is of a format that is known, a later minor version only adding, and that a finished
+/// run has all its logs.
 fn known_manifest(folder: &Path) -> Result<(), ReportError> {
     const KNOWN: &str = "seafix-manifest/1";
     let path = folder.join("manifest.json");
@@ -369,9 +376,15 @@ fn known_manifest(folder: &Path) -> Result<(), ReportError> {
         fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
     match manifest.as_ref().and_then(|manifest| manifest["format"].as_str()) {
         Some(found) if found != KNOWN && !found.starts_with("seafix-manifest/1.") => {
-            Err(ReportError::Newer { path, found: found.to_owned(), known: KNOWN })
+            return Err(ReportError::Newer { path, found: found.to_owned(), known: KNOWN });
         }
-        _ => Ok(()),
+        _ => {}
+    }
+    let Some(manifest) = manifest.filter(|manifest| manifest["state"] == "finished") else { return Ok(()) };
+    let logs = manifest["trials"].as_array().into_iter().flatten().filter_map(|trial| trial["log"].as_str());
+    match logs.into_iter().find(|log| !folder.join(log).is_file()) {
+        Some(log) => Err(ReportError::Gone { path, log: log.to_owned() }),
+        None => Ok(()),
     }
 }
 

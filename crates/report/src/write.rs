@@ -170,6 +170,22 @@ pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     found
 }
 
+/// Every file below `folder` that is none of the report's `files`, whoever put it there.
+pub(crate) fn strangers(folder: &Path, files: &[File]) -> Vec<PathBuf> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(next) = folders.pop() {
+        for path in fs::read_dir(&next).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            if path.is_dir() && !path.is_symlink() {
+                folders.push(path);
+            } else if !files.iter().any(|(known, _)| folder.join(known) == path) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
 /// Writes a file whole or not at all.
 pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, ReportError> {
     let (path, partial) = (folder.join(name), folder.join(format!("{name}.partial")));

@@ -7,7 +7,7 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-use super::{clopper_pearson, median, quantile};
+use super::{median, quantile};
 
 /// From so many blocks on an interval gains nothing by more of them: its ends are sure to 4 % of its width.
 const BLOCKS: usize = 400;
@@ -108,52 +108,6 @@ impl Bootstrap {
         (end(0.5 * alpha), end(1.0 - 0.5 * alpha))
     }
 
-    /// The interval of the share of events among n trials in a row, `events` saying of each whether it is one; NaN where
-    /// there are none.
-    ///
-    /// Where all are events, or none is, every resample says the same, and that is no certainty: the interval is then
-    /// [`clopper_pearson`]'s with every block as one trial.
-    ///
-    /// ```
-    /// use seafix_evaluation::{Bootstrap, clopper_pearson};
-    /// let bootstrap = Bootstrap { resamples: 1000, block: 4, seed: 1 };
-    /// assert_eq!(bootstrap.share(&[true; 40], 0.95), clopper_pearson(10, 10, 0.95));
-    /// ```
-    pub fn share(&self, events: &[bool], confidence: f64) -> (f64, f64) {
-        self.shares([events], confidence)[0]
-    }
-
-    /// The intervals of the shares of several events among the same trials: [`Self::share`] of each, all from the same
-    /// resamples, which are drawn once.
-    ///
-    /// # Panics
-    /// Where they are not of equally many trials.
-    pub fn shares<'a>(
-        &self,
-        all: impl IntoIterator<Item = &'a [bool], IntoIter: Clone>,
-        confidence: f64,
-    ) -> Vec<(f64, f64)> {
-        let all = all.into_iter();
-        let n = all.clone().next().map_or(0, <[bool]>::len);
-        let mut drawn: Option<Arc<Drawn>> = None;
-        let alpha = 1.0 - confidence;
-        let share = |events: &[bool]| {
-            assert_eq!(events.len(), n, "events of other trials");
-            let k = events.iter().filter(|event| **event).count();
-            if n == 0 {
-                return (f64::NAN, f64::NAN);
-            }
-            if k == 0 || k == n {
-                let blocks = n.div_ceil(self.block.max(1));
-                return clopper_pearson(if k == 0 { 0 } else { blocks }, blocks, confidence);
-            }
-            let sums = drawn.get_or_insert_with(|| self.draw(n)).sums(events.iter().copied());
-            let mut shares: Vec<f64> = sums.into_iter().map(|sum| sum as f64 / n as f64).collect();
-            (quantile(&mut shares, 0.5 * alpha), quantile(&mut shares, 1.0 - 0.5 * alpha))
-        };
-        all.map(share).collect()
-    }
-
     /// The blocks of every resample of n values; n is not zero.
     fn draw(&self, n: usize) -> Arc<Drawn> {
         if n <= MANY {
@@ -249,22 +203,6 @@ mod tests {
         assert_eq!(Bootstrap::of(21, 1).block, 3);
         assert_eq!(Bootstrap::of(0, 1).block, 1);
         assert_eq!(Bootstrap::of(1_000_000, 1).block, 2500);
-    }
-
-    /// The sums of blocks are those of the places drawn.
-    #[test]
-    fn a_share_is_a_mean_of_resamples() {
-        let events: Vec<bool> = (0_u32..50).map(|i| i.wrapping_mul(2_654_435_761) % 7 < 3 || i > 43).collect();
-        let bootstrap = Bootstrap { resamples: 500, block: 4, seed: 2 };
-        let mean = |at: &[usize]| at.iter().filter(|&&i| events[i]).count() as f64 / at.len() as f64;
-        assert_eq!(bootstrap.share(&events, 0.95), bootstrap.interval(events.len(), 0.95, mean));
-        assert_eq!(bootstrap.share(&[false; 9], 0.95), clopper_pearson(0, 3, 0.95));
-        assert!(bootstrap.share(&[], 0.95).0.is_nan());
-        // Several at once are each as it is alone, whichever comes first.
-        let (rare, never): (Vec<bool>, Vec<bool>) = (0..50).map(|i| (i % 17 == 3, false)).unzip();
-        let all = [&never[..], &rare, &events];
-        let alone = all.map(|one| bootstrap.share(one, 0.95));
-        assert_eq!(bootstrap.shares(all, 0.95), alone);
     }
 
     /// Of many values the median's interval is found by halving, and is that of the resamples' medians.

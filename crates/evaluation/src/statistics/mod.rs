@@ -4,6 +4,7 @@
 //! ranks and keeps it so: no failure is averaged away.
 
 mod bootstrap;
+mod clustered;
 mod holm;
 mod mcnemar;
 mod quantile;
@@ -11,6 +12,7 @@ mod rate;
 mod wilcoxon;
 
 pub use bootstrap::Bootstrap;
+pub use clustered::{clustered, of_blocks};
 pub use holm::holm;
 pub use mcnemar::mcnemar;
 pub use quantile::{median, quantile};

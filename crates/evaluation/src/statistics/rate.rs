@@ -13,12 +13,15 @@ use statrs::distribution::{Beta, ContinuousCDF};
 /// assert!((high - 0.01).abs() < 1e-4); // no event in 299 trials: below 1 % with 95 % one-sided confidence
 /// ```
 pub fn clopper_pearson(k: usize, n: usize, confidence: f64) -> (f64, f64) {
+    real_clopper_pearson(k as f64, n as f64, confidence)
+}
+
+/// The same of an effective number of trials, which need not be whole.
+pub(super) fn real_clopper_pearson(k: f64, n: f64, confidence: f64) -> (f64, f64) {
     let alpha = 1.0 - confidence;
-    let quantile = |a: usize, b: usize, p: f64| {
-        Beta::new(a as f64, b as f64).expect("both shape parameters are at least one").inverse_cdf(p)
-    };
-    let low = if k == 0 { 0.0 } else { quantile(k, n - k + 1, 0.5 * alpha) };
-    let high = if k >= n { 1.0 } else { quantile(k + 1, n - k, 1.0 - 0.5 * alpha) };
+    let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).expect("both shape parameters are positive").inverse_cdf(p);
+    let low = if k <= 0.0 { 0.0 } else { quantile(k, n - k + 1.0, 0.5 * alpha) };
+    let high = if k >= n { 1.0 } else { quantile(k + 1.0, n - k, 1.0 - 0.5 * alpha) };
     (low, high)
 }
 

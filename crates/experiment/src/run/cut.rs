@@ -1,7 +1,7 @@
 //! How a run is cut into pieces: by the plan alone.
 
 use super::group::Group;
-use crate::{Plan, thin::Thinned};
+use crate::thin::Thinned;
 
 /// Some successive frames of one source, led through every trial that shares it: what one thread makes at a time, what a
 /// kill costs at most, and what shards are made of.
@@ -50,15 +50,18 @@ impl Piece {
 const MOST_LOG: u64 = 900_000_000;
 
 /// The pieces of a run, source after source.
-pub(super) fn cut(plan: &Plan, groups: &[Group<'_>]) -> Vec<Piece> {
+pub(super) fn cut(groups: &[Group<'_>]) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
+    let points = groups.iter().filter(|group| !group.passage.images());
+    let most =
+        level(points.map(|group| (group.passage.frames() as u64 * group.frame_bytes, group.trials.len() as u64)));
     for (place, group) in groups.iter().enumerate() {
         let frames = group.passage.frames();
         let size = size(group, groups.len());
         let count = frames.div_ceil(size).max(1);
         let (every, failures) = match group.passage.images() {
             true => (1, 0),
-            false => thinning(frames as u64, group.frame_bytes, MOST_LOG / plan.trials.len() as u64),
+            false => thinning(frames as u64, group.frame_bytes, most),
         };
         for k in 0..count {
             // The failures that may be logged are dealt out evenly, so that pieces know nothing of each other.
@@ -69,6 +72,22 @@ pub(super) fn cut(plan: &Plan, groups: &[Group<'_>]) -> Vec<Piece> {
         }
     }
     pieces
+}
+
+/// The most (bytes) that a trial's log may have, so that all together stay below [`MOST_LOG`]: what small ones leave, large ones
+/// take. Of each group what a whole log of one of its trials would have, and how many trials there are.
+fn level(groups: impl Iterator<Item = (u64, u64)>) -> u64 {
+    let mut groups: Vec<(u64, u64)> = groups.collect();
+    groups.sort_unstable();
+    let (mut left, mut trials) = (MOST_LOG, groups.iter().map(|(_, trials)| trials).sum::<u64>());
+    for (bytes, own) in groups {
+        if bytes > left / trials.max(1) {
+            return left / trials;
+        }
+        left -= bytes * own;
+        trials -= own;
+    }
+    u64::MAX
 }
 
 /// How many frames a piece of `group`, one of `groups`, has: few enough that some dozen pieces keep all threads busy and
@@ -115,6 +134,14 @@ mod tests {
     #[test]
     fn many_groups_are_cut_into_fewer_pieces_each() {
         assert_eq!([1, 4, 12, 72, 500].map(pieces), [64, 64, 21, 3, 2]);
+    }
+
+    #[test]
+    fn large_logs_take_what_small_ones_leave() {
+        assert_eq!(level([(400_000_000, 2), (30_000_000, 3)].into_iter()), u64::MAX);
+        assert_eq!(level([(500_000_000, 2), (100_000_000, 1)].into_iter()), 400_000_000);
+        assert_eq!(level([(u64::MAX / 4, 3)].into_iter()), 300_000_000);
+        assert_eq!(level(std::iter::empty()), u64::MAX);
     }
 
     #[test]

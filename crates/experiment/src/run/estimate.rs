@@ -52,7 +52,7 @@ const LONGEST: Duration = Duration::from_secs(20);
 /// Everything that is wrong with the inputs, and a temporary folder that cannot be written.
 pub fn estimate(plan: &Plan) -> Result<Estimate, RunError> {
     let groups = group::open(plan)?;
-    let pieces = cut::cut(plan, &groups);
+    let pieces = cut::cut(&groups);
     let input = |fault: Fault| RunError::Input(vec![fault]);
     let place = Scratch::new()?;
     let mut estimate = Estimate {

@@ -101,7 +101,7 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     folder::look(options).map_err(RunError::Output)?;
     let groups = group::open(plan)?;
     groups.iter().flat_map(|group| group.passage.warnings()).for_each(|warning| observer.warns(warning));
-    let pieces = cut::cut(plan, &groups);
+    let pieces = cut::cut(&groups);
     let mut manifest =
         Manifest::new(plan, options, &groups, pieces.len()).map_err(|fault| RunError::Input(vec![fault]))?;
 

@@ -136,8 +136,8 @@ impl Attempt {
             Unidentified::Budget { bound, .. }
             | Unidentified::TooLarge { bound, .. }
             | Unidentified::NotFound { bound, .. } => Some(bound),
-            Unidentified::NoPrior => None,
-            Unidentified::NoConsensus { best, .. } | Unidentified::Mirrored { best } => Some(best),
+            Unidentified::NoPrior | Unidentified::Mirrored { proved: false, .. } => None,
+            Unidentified::NoConsensus { best, .. } | Unidentified::Mirrored { best, .. } => Some(best),
             Unidentified::TooFew { with_candidates, .. } => Some(with_candidates),
         };
         Self {

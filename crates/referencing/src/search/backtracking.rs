@@ -88,7 +88,7 @@ impl Search for Backtracking {
             run.sense = if size == NEEDED { Sense::Any } else { Sense::Mirrored };
             run.largest(size + 1, 1);
             if let Some(image) = run.found.first().map(|set| run.pairs(set)) {
-                let mirrored = Unidentified::Mirrored { best: image.len() };
+                let mirrored = Unidentified::Mirrored { best: image.len(), proved: complete };
                 match (size == NEEDED, wholly_mirrored(problem, &image)) {
                     (true, true) => return Err(mirrored),
                     (_, true) => undecided = Some(mirrored),

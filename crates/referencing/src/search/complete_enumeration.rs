@@ -8,12 +8,13 @@ use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::by_coordinates,
     bounded,
+    grow::{feasible, most_possible},
     structural_coherence::{Enumeration, Samples},
 };
 use crate::Problem;
 
 /// The baseline that shells are held against: every cloud point may be every model point, whatever the prior says, so that
-/// M^q choices stand behind every sample of q model points. Longest samples first, the first coherent one is the answer,
+/// M^q choices stand behind every sample of q model points. Of pairs that were given without a prior it takes those alone. Longest samples first, the first coherent one is the answer,
 /// as in `structural-coherence`.
 ///
 /// What it says is exact within the budget; Σ_q C(n, q) M^q choices, q! times as many with the paper's ordered samples.
@@ -49,6 +50,25 @@ impl Component for CompleteEnumeration {
 
 impl Search for CompleteEnumeration {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+        // Without a prior candidates are no shells: they say which pairs there may be.
+        if problem.prior.is_none() {
+            let points = by_coordinates(problem.model.iter().map(|point| point.at));
+            let at = |list: &[usize]| -> Vec<usize> {
+                by_coordinates(list.iter().map(|&j| problem.cloud[j].position.at))
+                    .into_iter()
+                    .map(|k| list[k])
+                    .collect()
+            };
+            feasible(problem, self.most_pairs)?;
+            let lists: Vec<(usize, Vec<usize>)> = points
+                .into_iter()
+                .map(|i| (i, at(&problem.candidates.lists[i])))
+                .filter(|(_, list)| !list.is_empty())
+                .collect();
+            let lists = lists.iter().map(|(i, list)| (*i, list.as_slice())).collect();
+            let longest = most_possible(problem);
+            return Enumeration::of(problem, lists, self.samples, self.orientation, self.budget).run(longest);
+        }
         let (points, cloud) = (problem.model.len(), problem.cloud.len());
         let with_candidates = if cloud > 0 { points } else { 0 };
         if with_candidates < NEEDED {

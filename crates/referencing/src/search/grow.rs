@@ -98,7 +98,7 @@ pub(super) fn conclude(
         let all: Vec<_> = pairs.iter().copied().chain(vertices(problem)).collect();
         let image = grow(problem, &all, Sense::Mirrored, &mut tests);
         if image.len() > pairs.len() && wholly_mirrored(problem, &image[..image.len().min(MOST_ORIENTED)]) {
-            let mirrored = Unidentified::Mirrored { best: image.len() };
+            let mirrored = Unidentified::Mirrored { best: image.len(), proved: false };
             if pairs.len() <= NEEDED {
                 return Err(mirrored);
             }

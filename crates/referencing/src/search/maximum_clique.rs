@@ -131,7 +131,9 @@ impl MaximumClique {
         let coherent = cliques.run(NEEDED + 1, 1);
         cliques.set_sense(Sense::Proper);
         match coherent.found.first().map(|clique| pairs_of(graph, clique)) {
-            Some(set) if wholly_mirrored(problem, &set) => Err(Unidentified::Mirrored { best: set.len() }),
+            Some(set) if wholly_mirrored(problem, &set) => {
+                Err(Unidentified::Mirrored { best: set.len(), proved: true })
+            }
             _ => Ok(()),
         }
     }
@@ -145,7 +147,7 @@ impl MaximumClique {
         cliques.set_sense(Sense::Mirrored);
         let images = cliques.run(size + 1, 1);
         cliques.set_sense(Sense::Proper);
-        images.found.first().map(|image| Unidentified::Mirrored { best: image.len() })
+        images.found.first().map(|image| Unidentified::Mirrored { best: image.len(), proved: false })
     }
 
     /// Puts the rivals that share the fewest pairs with the best set first.

@@ -93,6 +93,13 @@ impl Identification {
             belief: None,
         }
     }
+
+    /// The same of a search that may have ended at its budget: that, and what was spent.
+    fn ended(self, at: Option<(u64, u64)>) -> Self {
+        let (best, bound) = (self.pairs.len(), self.size_bound);
+        let ended = at.map(|(budget, tests)| Unidentified::Budget { budget, best, bound, tests });
+        Self { undecided: self.undecided.or(ended), ..self }
+    }
 }
 
 /// Why nothing was identified.
@@ -139,7 +146,7 @@ pub enum Unidentified {
         bound: usize,
     },
     /// A search that proves nothing found too small a set, or none.
-    #[error("no coherent set of {needed} points was found; at most {bound} are possible")]
+    #[error("no set of {needed} points was found that one pose explains; at most {bound} are possible")]
     NotFound {
         /// No set is larger than this.
         bound: usize,
@@ -150,17 +157,19 @@ pub enum Unidentified {
     #[error("there is no prior, and this search begins at one")]
     NoPrior,
     /// Only mirror images of the model were found.
-    #[error("the largest coherent set, {best} points, is a mirror image of the model")]
+    #[error("{} set, {best} points, is a mirror image of the model", if *proved { "the largest coherent" } else { "the likeliest or largest known" })]
     Mirrored {
         /// Its size.
         best: usize,
+        /// Whether it is proved that no coherent set of the object has more than three points.
+        proved: bool,
     },
 }
 
 impl Unidentified {
     /// Whether it says that there is nothing, and not only that nothing was found.
     pub fn is_proved(&self) -> bool {
-        matches!(self, Self::TooFew { .. } | Self::NoConsensus { .. } | Self::Mirrored { .. })
+        matches!(self, Self::TooFew { .. } | Self::NoConsensus { .. } | Self::Mirrored { proved: true, .. })
     }
 
     /// The reason as logs and tables have it, in kebab-case.

@@ -65,13 +65,14 @@ impl Search for PoseVote {
             problem.cloud[pair.cloud].position.at - camera_from_object * problem.model[pair.model].at
         };
         let votes = Votes::of(vertices.iter().map(offset).collect(), self.radius);
-        let mut tests = 0;
+        let (mut tests, mut ended) = (0, None);
         let mut support: Vec<(usize, usize)> = Vec::new();
         for v in 0..vertices.len() {
             let near = votes.near(v, &mut tests);
             // Vertices stand by model point.
             support.push((near.chunk_by(|&a, &b| vertices[a].model == vertices[b].model).count(), v));
             if tests >= self.budget {
+                ended = Some((self.budget, tests));
                 break;
             }
         }
@@ -89,10 +90,11 @@ impl Search for PoseVote {
                 best = (worth, explained);
             }
             if tests >= self.budget {
+                ended = Some((self.budget, tests));
                 break;
             }
         }
-        conclude(problem, &best.1, self.orientation, tests)
+        conclude(problem, &best.1, self.orientation, tests).map(|found| found.ended(ended))
     }
 }
 

@@ -85,6 +85,7 @@ impl Search for Ransac {
                 needed = libm::log(1.0 - self.confidence) / libm::log1p(-share.powi(3).min(1.0 - 1e-12));
             }
         }
+        let spent = tests;
         let Some(pose) = best.1 else {
             let bound = most_possible(problem);
             return match tests < self.budget {
@@ -96,7 +97,8 @@ impl Search for Ransac {
             };
         };
         let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
-        conclude(problem, &ranked, self.orientation, tests)
+        let ended = (spent >= self.budget && (trials as f64) < needed).then_some((self.budget, spent));
+        conclude(problem, &ranked, self.orientation, tests).map(|found| found.ended(ended))
     }
 }
 

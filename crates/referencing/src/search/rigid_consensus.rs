@@ -113,7 +113,7 @@ impl Search for RigidConsensus {
             return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, tests)) };
         };
         if let Some(image) = mirror_image(problem.model, parts, best) {
-            return Err(Unidentified::Mirrored { best: image.members.len() });
+            return Err(Unidentified::Mirrored { best: image.members.len(), proved: false });
         }
         // A second copy of the object in what is left of the cloud, and a pose to hold the likeliest against.
         let mut look_alike = None;

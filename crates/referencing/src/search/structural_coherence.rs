@@ -119,12 +119,12 @@ impl<'a> Enumeration<'a> {
             match self.samples_of(q) {
                 // Three points have no orientation: these are what is left of a mirror image.
                 Ok(Some(_)) if q == NEEDED && self.mirrored.is_some() => {
-                    return Err(Unidentified::Mirrored { best: self.mirrored.unwrap_or(q) });
+                    return Err(Unidentified::Mirrored { best: self.mirrored.unwrap_or(q), proved: true });
                 }
                 Ok(Some(mut pairs)) => {
                     pairs.sort_unstable();
                     // A longer sample was a mirror image: what is left of it is no fix.
-                    let undecided = self.mirrored.map(|best| Unidentified::Mirrored { best });
+                    let undecided = self.mirrored.map(|best| Unidentified::Mirrored { best, proved: false });
                     return Ok(Identification {
                         optimal: true,
                         undecided,

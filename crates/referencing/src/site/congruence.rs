@@ -13,7 +13,8 @@ const LEAST_POINTS: usize = 4;
 /// one answer; half of it is what a point may be off its image.
 const ALERT_LIMIT: f64 = 0.10;
 const ALERT_SHARE: f64 = 0.05;
-/// Second side of a triangle over its longest, and its height over that, below which it fixes no motion well.
+/// Second side of a triangle over its longest, and its height over that, below which it fixes no motion well. Of a slender model
+/// half of what the best of its triangles has.
 const LEAST_RATIO: f64 = 0.2;
 /// Comparisons of two points that the search may take; of models too large for all triangles these are
 /// taken evenly until it is spent.
@@ -75,18 +76,14 @@ impl Finder {
         // Of a large model a number of triangles that are far apart: the stride is odd, no multiple of a row.
         let triangles = n * (n - 1) * (n - 2) / 6;
         let stride = (triangles.saturating_mul(n * n) / (MOST_WORK / 4)).max(1) | 1;
-        let (mut number, mut work) = (0, 0);
-        for a in 0..n {
-            for b in a + 1..n {
-                for c in b + 1..n {
-                    number += 1;
-                    if number % stride == 0 && !flat([distance[a][b], distance[b][c], distance[a][c]]) {
-                        self.images([a, b, c], &distance, &mut found, &mut work);
-                    }
-                    if found.len() >= MOST_MOTIONS || work >= MOST_WORK {
-                        return found;
-                    }
-                }
+        let own = |[a, b, c]: [usize; 3]| ratio([distance[a][b], distance[b][c], distance[a][c]]);
+        let some = || triples(n).enumerate().filter(|(number, _)| (number + 1) % stride == 0).map(|(_, three)| three);
+        let least = some().map(own).fold(0.0, f64::max).min(2.0 * LEAST_RATIO) / 2.0;
+        let mut work = 0;
+        for three in some().filter(|three| own(*three) >= least && least > 0.0) {
+            self.images(three, &distance, &mut found, &mut work);
+            if found.len() >= MOST_MOTIONS || work >= MOST_WORK {
+                break;
             }
         }
         found
@@ -208,14 +205,20 @@ fn known(found: &[Congruence], pairs: &[(usize, usize); 3]) -> bool {
     found.iter().any(|congruence| pairs.iter().all(|pair| congruence.pairs.binary_search(pair).is_ok()))
 }
 
-/// Whether a triangle of these sides is too near a line, or two of its corners too near each other.
-fn flat(mut sides: [f64; 3]) -> bool {
+/// All threes of n places, ascending.
+fn triples(n: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..n).flat_map(move |a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])))
+}
+
+/// The lesser of second side and height over the longest side of a triangle of these sides: how far it is from a line, and its
+/// corners from each other. Zero of none.
+fn ratio(mut sides: [f64; 3]) -> f64 {
     sides.sort_by(f64::total_cmp);
     let [a, b, c] = sides;
     // Heron: 16 area² = (a + b + c)(−a + b + c)(a − b + c)(a + b − c); the height over c is 2 area/c.
     let square = (a + b + c) * (b + c - a) * (a + c - b) * (a + b - c);
     let height = 0.5 * square.max(0.0).sqrt() / c;
-    !(b >= LEAST_RATIO * c && height >= LEAST_RATIO * c)
+    if c > 0.0 { b.min(height) / c } else { 0.0 }
 }
 
 impl Congruence {

@@ -21,6 +21,8 @@ mod tell;
 mod threats;
 mod time;
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 
 use crate::{
@@ -93,9 +95,12 @@ fn sentence_case(text: &str) -> String {
 
 /// Whether `index` is better than every trial it was compared with, surely.
 fn best(comparisons: &[Comparison], index: usize) -> bool {
-    let mut own = comparisons
-        .iter()
-        .filter(|c| !c.over_conditions && !c.between_conditions && (c.first == index || c.second == index))
-        .peekable();
-    own.peek().is_some() && own.all(|c| c.better() == Some(index))
+    let is_of = |c: &&Comparison| !c.over_conditions && !c.between_conditions;
+    let own: Vec<&Comparison> =
+        comparisons.iter().filter(is_of).filter(|c| c.first == index || c.second == index).collect();
+    let Some(condition) = own.first().map(|c| &c.condition) else { return false };
+    // Of many trials each is compared with the first alone, and none is known to be the best.
+    let family = comparisons.iter().filter(is_of).filter(|c| c.condition == *condition);
+    let members: BTreeSet<usize> = family.flat_map(|c| [c.first, c.second]).collect();
+    own.len() + 1 == members.len() && own.iter().all(|c| c.better() == Some(index))
 }

@@ -57,7 +57,7 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     let sentence = |(index, trial): (usize, &Trial)| {
         let metres = |name: &str, quantity| statistic(trial, name, quantity, Unit::Millimetres);
         text![
-            format!("{}: the camera’s position errs by ", name(index)),
+            format!("{}: the camera’s position, relative to the object of its last fix, errs by ", name(index)),
             metres("rms", Sailed::Position),
             " mm (RMS) over the ",
             count(trial, Counted::Navigated),
@@ -69,9 +69,9 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
             metres("greatest", Sailed::Position),
             " mm, with fixes at ",
             count(trial, Counted::Referenced),
-            " of ",
+            " frames (due by the policy at ",
             count(trial, Counted::Tried),
-            " frames where one was due; the first fix, carried on by odometry alone over ",
+            "); the first fix, carried on by odometry alone over ",
             reached(trial),
             " frames, until it is lost or the dive ends, errs by ",
             metres("rms", Sailed::AlonePosition),
@@ -86,7 +86,43 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     if said.len() > 1 {
         said.push(text!["Each of these is one dive: how much another would differ is not in these numbers."]);
     }
+    said.extend(displaced(run, name));
     said
+}
+
+/// Which objects each trial told to stand elsewhere than surveyed, where any did: in the words of its log, the first time.
+fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
+    let told = |trial: &Trial| -> Vec<String> {
+        let mut objects: Vec<&str> = Vec::new();
+        let mut told = Vec::new();
+        for frame in trial.sample() {
+            for event in frame.sailed.iter().flat_map(|sailed| &sailed.displaced) {
+                let object = event.split(" stands ").next().unwrap_or(event);
+                if !objects.contains(&object) {
+                    objects.push(object);
+                    told.push(format!("at frame {}, “{event}”", frame.number));
+                }
+            }
+        }
+        told
+    };
+    let sails = |trial: &Trial| trial.sample().any(|frame| frame.sailed.is_some());
+    let all: Vec<(usize, Vec<String>)> = run
+        .trials
+        .iter()
+        .enumerate()
+        .filter(|(_, trial)| sails(trial))
+        .map(|(index, trial)| (index, told(trial)))
+        .collect();
+    if all.iter().all(|(_, told)| told.is_empty()) {
+        return Vec::new();
+    }
+    let sentence = |(index, told): (usize, Vec<String>)| {
+        let what =
+            if told.is_empty() { "that no object stands elsewhere than surveyed".to_owned() } else { told.join("; ") };
+        text![format!("{}: the navigator told {}.", name(index), what)]
+    };
+    all.into_iter().map(sentence).collect()
 }
 
 /// How many frames the first fix is carried on to by odometry alone.

@@ -13,10 +13,12 @@ fn intervals(run: &Run) -> String {
         return "Every frame is a draw by itself: the rates of a trial, and recall, carry exact (Clopper–Pearson) 95 % intervals.".to_owned();
     }
     let mut said = format!(
-        "Frames follow each other on one way, and neighbours are not independent: the 95 % intervals of a trial’s rates, and the bands of recall, are percentile bootstraps of 10 000 resamples, seed {SEED}, over blocks of consecutive attempts, the cube root of n long. Where all attempts are alike (0 % or 100 %) resamples say nothing: there stands the exact (Clopper–Pearson) interval with every block as one trial."
+        "Frames follow each other on one way, and neighbours are not independent: the 95 % intervals of a trial’s rates, and the bands of recall, are those of Clopper and Pearson for the effective number of attempts (Korn and Graubard, 1998): n over the design effect, by which sums of blocks of consecutive attempts, the cube root of n long, vary more than of independent ones, a standard error added. Where all attempts are alike (0 % or 100 %) every block is one trial. A band is widened where it would fall."
     );
     if run.trials.iter().any(|trial| trial.every() > 1) {
-        said.push_str(" Rates of a trial that logged only some of its frames carry the exact interval of all, as if they were independent.");
+        said.push_str(
+            " Where a trial logged only some of its frames the others are counted, and every block is one trial.",
+        );
     }
     said
 }

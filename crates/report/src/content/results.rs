@@ -117,9 +117,12 @@ fn errors(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Table {
     caption.push(Span::from(match (comparisons.first(), any_best) {
         (None, _) => "Nothing is compared: no two trials saw the same frames.",
         (Some(first), _) if first.between_conditions => "Conditions are compared below, frame by frame.",
-        (_, true) => "Bold: better than every trial it was compared with, significantly.",
-        _ => "No value is in bold: none is significantly better than all others on the same frames.",
+        (_, true) => "Bold: significantly better than every other trial on the same frames.",
+        _ => "No value is in bold: of none is it shown that it is significantly better than all others on the same frames.",
     }));
+    if run.trials.iter().any(|trial| trial.every() > 1) {
+        caption.push(Span::from(" Of a trial that logged one frame in k, all but n is over those."));
+    }
     let mut above = blank(summary, 1);
     above.extend(COLUMNS.iter().map(|column| Head::over(2, column.name)));
     above.extend([Head::words(""), Head::words("")]);

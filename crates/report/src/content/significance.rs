@@ -33,14 +33,45 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
 
 /// The surest differences in words, at most so many; that there is none, where some were tested.
 pub(super) fn sentences(run: &Run, comparisons: &[Comparison], most: usize) -> Vec<Text> {
-    let finite = |c: &&Comparison| c.difference.is_finite() && c.interval.0.is_finite() && c.interval.1.is_finite();
-    let mut sure: Vec<&Comparison> = comparisons.iter().filter(|c| c.better().is_some()).filter(finite).collect();
+    let mut sure: Vec<&Comparison> = comparisons.iter().filter(|c| c.better().is_some()).collect();
     sure.sort_by(|a, b| a.holm.total_cmp(&b.holm));
     if sure.is_empty() && !comparisons.is_empty() {
         let what = if comparisons[0].between_conditions { "Frame by frame" } else { "On the same attempts" };
-        return vec![text![format!("{what} no difference of m2 is both finite and significant.")]];
+        return vec![text![format!("{what} no difference of m2 is significant.")]];
     }
-    sure.into_iter().take(most).map(|comparison| sentence(run, comparison)).collect()
+    let told = |comparison: &Comparison| match comparison.difference.is_finite() && comparison.interval.0.is_finite() {
+        true if comparison.interval.1.is_finite() => sentence(run, comparison),
+        _ => sentence_of_failures(run, comparisons, comparison),
+    };
+    sure.into_iter().take(most).map(told).collect()
+}
+
+/// The same where the one fails so often that the difference, or an end of its interval, is infinite.
+fn sentence_of_failures(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> Text {
+    let [first, second] = &comparison.names;
+    let (better, worse) = if comparison.better() == Some(comparison.first) { (first, second) } else { (second, first) };
+    let told = |what: &str, n: usize| Number::new(Some(n as f64), 0, key(run, comparison, what));
+    let [own, other] = comparison.alone;
+    text![
+        format!("{}, {better} errs less than {worse} (p ", begin(comparison)),
+        holm(run, comparisons, comparison),
+        format!(" after Holm), or fails less: {first} alone finds "),
+        told("alone-first", own),
+        format!(" and {second} alone "),
+        told("alone-second", other),
+        " of ",
+        told("pairs", comparison.n),
+        "."
+    ]
+}
+
+fn begin(comparison: &Comparison) -> String {
+    match comparison.condition.as_str() {
+        "" if comparison.over_conditions => "Over the conditions".to_owned(),
+        "" if comparison.between_conditions => "Frame by frame".to_owned(),
+        "" => "On the same attempts".to_owned(),
+        condition => format!("At {condition}, on the same attempts"),
+    }
 }
 
 fn sentence(run: &Run, comparison: &Comparison) -> Text {
@@ -49,12 +80,7 @@ fn sentence(run: &Run, comparison: &Comparison) -> Text {
     let told =
         |what: &str, value: f64| Number::new(Some(real(value)), if over { 3 } else { 2 }, key(run, comparison, what));
     let [first, second] = &comparison.names;
-    let begin = match comparison.condition.as_str() {
-        "" if over => "Over the conditions".to_owned(),
-        "" if comparison.between_conditions => "Frame by frame".to_owned(),
-        "" => "On the same attempts".to_owned(),
-        condition => format!("At {condition}, on the same attempts"),
-    };
+    let begin = begin(comparison);
     let what = if over { "the median ratio of m2" } else { "the median difference of m2" };
     text![
         format!("{begin}, {what} of {first} and {second} is "),
@@ -82,7 +108,7 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
     let caption = text![if over {
         "Methods over conditions: n conditions, median ratio of the medians of m2 over all attempts with its 95 % interval, rank-biserial effect, p of the signed rank test adjusted after Holm. Bold: significant."
     } else {
-        "Paired comparisons on the same attempts: median of the differences of m2 (first − second) with its 95 % interval, rank-biserial effect (1: the first errs less in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted. Bold: significant."
+        "Paired comparisons on the same attempts: median of the differences of m2 (first − second), where not both fail, with its 95 % interval, rank-biserial effect (1: the first errs less in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted. Bold: significant."
     }];
     let mut heads = vec![Head::words("Condition"), Head::words("first"), Head::words("second"), Head::numbers("n")];
     heads.extend([Head::numbers(head), Head::numbers("interval"), Head::numbers("effect"), Head::numbers("p (Holm)")]);
@@ -142,10 +168,11 @@ fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
     let real = |value: f64| if over { value.exp() } else { value * 1e3 };
     let n = comparisons.len();
     let place = |index: usize| (n - 1 - index) as f64;
-    let names = comparisons.iter().rev().map(|c| {
+    let name = |c: &Comparison| {
         let condition = if c.condition.is_empty() { String::new() } else { format!("{}: ", c.condition) };
         format!("{condition}{} – {}", c.names[0], c.names[1])
-    });
+    };
+    let names = comparisons.iter().rev().map(name);
     let finite =
         |index: usize| [comparisons[index].interval.0, comparisons[index].interval.1].iter().all(|v| v.is_finite());
     let seen = || (0..n).filter(|&index| finite(index));
@@ -177,7 +204,7 @@ fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
     let mut data = Table::new("forest", text!["Every interval of the figure of comparisons."], heads.to_vec());
     for comparison in comparisons {
         let told = |what: &str, value: f64| Number::new(Some(real(value)), 4, key(run, comparison, what)).into();
-        let name = format!("{}: {} – {}", comparison.condition, comparison.names[0], comparison.names[1]);
+        let name = name(comparison);
         let (low, high) = comparison.interval;
         data.line(
             false,

@@ -60,11 +60,10 @@ fn is_of(row: &Attempt, group: &str) -> bool {
     }
 }
 
-/// The 95 % interval of the share of `group`, as [`share::interval`]; of a thinned log the exact one, for its other frames
-/// are only counted.
+/// The 95 % interval of the share of `group`, as [`share::interval`]; the other frames of a thinned log are only counted.
 fn ends(trial: &Trial, group: &str, k: usize, n: usize) -> (f64, f64) {
     if trial.every() > 1 || !share::is_trajectory(&trial.header) {
-        return seafix_evaluation::clopper_pearson(k, n, 0.95);
+        return share::interval_of_counts(share::is_trajectory(&trial.header), k, n);
     }
     let events: Vec<bool> = trial.attempts().map(|(_, row)| is_of(row, group)).collect();
     share::interval(true, &events)

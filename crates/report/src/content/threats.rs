@@ -5,6 +5,7 @@ use crate::{
     document::{Block, Section, Text, text},
     paired::Comparison,
     run::Run,
+    share,
 };
 
 pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Section {
@@ -30,15 +31,16 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
     }
     let least = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
     if least < 300 {
-        let bound = 100.0 * seafix_evaluation::clopper_pearson(0, least, 0.90).1;
+        let trajectory = headers().any(share::is_trajectory);
+        let bound = 100.0 * share::interval_of_counts(trajectory, 0, least).1;
         items.push(text![format!(
-            "Statistical: the smallest trial has {least} attempt{}. Where it shows no wrong fix, the rate may still be {bound:.1} % (95 %, one-sided).",
+            "Statistical: the smallest trial has {least} attempt{}. Where it shows no wrong fix, the rate may still be {bound:.1} % (the upper end of its 95 % interval).",
             if least == 1 { "" } else { "s" }
         )]);
     }
     if let Some(trial) = run.trials.iter().find(|trial| trial.every() > 1) {
         items.push(text![format!(
-            "Statistical: counts and root mean squares are over all {} frames of a trial, medians and quantiles over every {}th, which was logged.",
+            "Statistical: counts and root mean squares are over all {} frames of a trial, medians and quantiles over one frame in {}, which was logged.",
             trial.count(),
             trial.every()
         )]);

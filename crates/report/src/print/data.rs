@@ -10,10 +10,19 @@ use crate::{
 /// The cells as they are printed, one line each; a number under its head alone, never with its unit.
 pub(crate) fn csv(table: &Table) -> String {
     let mut out = line(table.names().iter().map(String::as_str));
+    // A first cell that is left empty says what the one above it says.
+    let mut above = String::new();
     for row in &table.lines {
         let mut cells: Vec<String> = Vec::new();
-        for cell in &row.cells {
-            cells.push(printed(cell));
+        for (place, cell) in row.cells.iter().enumerate() {
+            let mut own = printed(cell);
+            if place == 0 {
+                if own.is_empty() {
+                    own.clone_from(&above);
+                }
+                above.clone_from(&own);
+            }
+            cells.push(own);
             cells.extend(std::iter::repeat_n(String::new(), cell.width() - 1));
         }
         out += &line(cells.iter().map(String::as_str));
@@ -28,6 +37,8 @@ fn printed(cell: &Cell) -> String {
             Some(number) => number.value.map_or_else(String::new, |value| value.to_string()),
             None => cell.plain(),
         },
+        // Several numbers: as they read, with the minus that programs know.
+        spans if spans.iter().any(|span| span.number().is_some()) => cell.plain().replace('\u{2212}', "-"),
         _ => cell.plain(),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, rc::Rc};
 
-use seafix_evaluation::{clopper_pearson, holm, mcnemar, quantile};
+use seafix_evaluation::{holm, mcnemar, quantile};
 use seafix_log::{FrameTimes, Outcome, Region, TargetRecord};
 
 use super::logs::{Log, Logs};
@@ -303,7 +303,14 @@ fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log])
             let own = all().filter(|row| row.0.outcome == Outcome::Referenced);
             return Some(known(own.filter_map(|row| field.of(&row.0)).map(|value| value <= bound).collect()));
         }
-        return Some(known(all().map(|row| error(&row.0, field) <= bound).collect()));
+        let errors: Vec<f64> = all().map(|row| error(&row.0, field)).collect();
+        if which != "percent" {
+            // An end of a band follows from those of the other bounds.
+            let at = share::bounds().position(|(_, known)| known == bound)?;
+            let (low, high) = share::band(trajectory, &errors)[at];
+            return Some((!errors.is_empty()).then_some(100.0 * if which == "low" { low } else { high }));
+        }
+        return Some(known(errors.into_iter().map(|error| error <= bound).collect()));
     }
     if which != "percent" && trajectory && !thinned {
         let region = Region::ALL.into_iter().find(|region| region.name() == group);
@@ -316,7 +323,7 @@ fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log])
         return Some(known(all().map(|row| is(&row.0)).collect()));
     }
     let (k, n) = (pooled(logs, group, span)?, pooled(logs, "attempted", span)?);
-    let (low, high) = clopper_pearson(k, n, 0.95);
+    let (low, high) = share::interval_of_counts(trajectory, k, n);
     let value = match which {
         "percent" => 100.0 * k as f64 / n as f64,
         "low" => 100.0 * low,

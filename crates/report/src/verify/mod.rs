@@ -12,7 +12,7 @@ use crate::{
     Forms, Key, Number, ReportError, Summary,
     print::FORMS,
     run::Run,
-    write::{files, strays},
+    write::{files, strangers},
 };
 use evaluate::evaluate;
 use logs::Logs;
@@ -30,7 +30,7 @@ pub struct Verified {
     pub missing: Vec<String>,
     /// Those of them that are there and differ, by numbers or not.
     pub changed: Vec<String>,
-    /// Figures and tables that the logs do not make.
+    /// Files beside them that the logs do not make.
     pub strays: Vec<String>,
 }
 
@@ -79,7 +79,7 @@ pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
     let made = files(&run, &summary, forms(&page))?;
     verified.files = made.len();
     let name_of = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).display().to_string();
-    verified.strays = strays(folder, &made).into_iter().map(name_of).collect();
+    verified.strays = strangers(folder, &made).into_iter().map(name_of).collect();
     for (name, bytes) in made {
         let Ok(there) = read(&name) else {
             verified.missing.push(name);

@@ -10,12 +10,6 @@ use crate::{
     share,
 };
 
-/// Thresholds (mm): four a factor of two.
-const THRESHOLDS: [f64; 25] = [
-    0.78125, 0.9290, 1.1049, 1.3139, 1.5625, 1.8581, 2.2097, 2.6278, 3.125, 3.7163, 4.4194, 5.2556, 6.25, 7.4325,
-    8.8388, 10.5112, 12.5, 14.865, 17.6777, 21.0224, 25.0, 29.7302, 35.3553, 42.0448, 50.0,
-];
-
 /// So many lines between their bands can be told apart.
 const BANDS: usize = 3;
 
@@ -46,12 +40,8 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             }
             let trajectory = share::is_trajectory(&trial.header);
             let (mut line, mut band) = (Vec::new(), Vec::new());
-            let below = |threshold: f64| errors.iter().map(|error| *error <= threshold / 1e3).collect();
-            let all: Vec<Vec<bool>> = THRESHOLDS.into_iter().map(below).collect();
-            for ((threshold, events), (low, high)) in
-                THRESHOLDS.into_iter().zip(&all).zip(share::intervals(trajectory, &all))
-            {
-                let k = events.iter().filter(|event| **event).count();
+            for ((threshold, bound), (low, high)) in share::bounds().zip(share::band(trajectory, &errors)) {
+                let k = errors.iter().filter(|error| **error <= bound).count();
                 // One rounding: of a tie another order of the two would print another last digit.
                 let share = 100.0 * k as f64 / n as f64;
                 let [low, high] = [low, high].map(|share| 100.0 * share);
