@@ -130,10 +130,17 @@ impl Places {
 
     /// The points in a box about a place; its faces belong to it.
     fn within(&self, centre: &Point<Camera>, half: f64) -> Vec<usize> {
-        let (c, [x, y, z]) = (&centre.coords, &self.0);
-        let across = x.iter().zip(y).zip(z).enumerate();
-        let inside = |x: f64, y: f64, z: f64| (x - c.x).abs().max((y - c.y).abs()).max((z - c.z).abs()) <= half;
-        across.filter(|&(_, ((&x, &y), &z))| inside(x, y, z)).map(|(j, _)| j).collect()
+        let mut inside = vec![false; self.0[0].len()];
+        mark(&self.0, centre.coords.into(), half, &mut inside);
+        (0..inside.len()).filter(|&j| inside[j]).collect()
+    }
+}
+
+/// Marks the places in a box about one.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn mark([x, y, z]: &[Vec<f64>; 3], c: [f64; 3], half: f64, inside: &mut [bool]) {
+    for (((inside, x), y), z) in inside.iter_mut().zip(x).zip(y).zip(z) {
+        *inside = (x - c[0]).abs().max((y - c[1]).abs()).max((z - c[2]).abs()) <= half;
     }
 }
 

@@ -15,13 +15,22 @@ pub(in crate::search) fn ones(bits: &[u64], from: usize) -> impl Iterator<Item =
     })
 }
 
+/// Which of up to 64 words hold a bit: known without branches that no processor foresees.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn held(words: &[u64]) -> u64 {
+    let mut held = 0;
+    for (i, &word) in words.iter().enumerate() {
+        held |= u64::from(word != 0) << i;
+    }
+    held
+}
+
 /// Calls `each` with every set bit from `from` on, ascending: quick where most words are empty.
 #[inline]
 pub(in crate::search) fn each_one(bits: &[u64], from: usize, mut each: impl FnMut(usize)) {
     let first = from / 64;
     for (block, words) in bits.get(first..).unwrap_or_default().chunks(64).enumerate() {
-        // Which words hold any: known without a branch that nobody foresees.
-        let mut held = words.iter().enumerate().fold(0u64, |held, (i, &word)| held | u64::from(word != 0) << i);
+        let mut held = held(words);
         while held != 0 {
             let i = held.trailing_zeros() as usize;
             held &= held - 1;

@@ -126,15 +126,19 @@ fn twins(problem: &Problem<'_>, reach: f64) -> f64 {
 fn nearest(problem: &Problem<'_>, of: usize, counts: impl Fn(usize) -> bool) -> Vec<(f64, usize)> {
     let at = &problem.cloud[of].position.at.coords;
     let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(LOOKED_UP + 1);
+    let mut farthest = f64::INFINITY;
     for (j, point) in problem.cloud.iter().enumerate() {
         let square = (point.position.at.coords - at).norm_squared();
-        let far = nearest.len() == LOOKED_UP && !(square < nearest[LOOKED_UP - 1].0);
-        if j == of || far || !square.is_finite() || !counts(j) {
+        // Nothing is nearer than what is no number, and all is that is finite as long as few are known.
+        if !(square < farthest) || j == of || !counts(j) {
             continue;
         }
         let place = nearest.partition_point(|(known, _)| *known <= square);
         nearest.insert(place, (square, j));
         nearest.truncate(LOOKED_UP);
+        if nearest.len() == LOOKED_UP {
+            farthest = nearest[LOOKED_UP - 1].0;
+        }
     }
     nearest
 }

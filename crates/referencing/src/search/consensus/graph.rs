@@ -61,11 +61,12 @@ impl Graph {
         // Without a prior any turn is allowed; far beyond 2 it stays a finite number.
         let gate = Gate { turn: turn.min(1e6) as f32, rounding: ROUNDING * extent };
         let mut row = vec![0; words];
+        let twins = Twins::of(&graph.vertices, clouds);
         for a in 0..count {
             let from = graph.starts[graph.rank[a] as usize + 1];
             compatible(&columns, a, from / 64, gate, &mut row);
             graph.tests += (count - from) as u64;
-            graph.fill(problem, a, from, &row);
+            graph.fill(problem, a, from, &row, &twins);
         }
         graph
     }
@@ -76,25 +77,54 @@ impl Graph {
     }
 
     /// Takes over what passed the gate, less what shares a cloud point or fails the exact test.
-    fn fill(&mut self, problem: &Problem<'_>, a: usize, from: usize, near: &[u64]) {
-        let exact = matches!(problem.tolerance, Tolerance::Sigmas(_));
+    fn fill(&mut self, problem: &Problem<'_>, a: usize, from: usize, near: &[u64], twins: &Twins) {
         let (pair, words) = (self.vertices[a], self.words);
-        for (word, &near) in near.iter().enumerate().skip(from / 64) {
-            let mut bits = near;
-            if word == from / 64 {
-                bits &= !0 << (from % 64);
-            }
-            let mut rest = bits;
-            while rest != 0 {
-                let bit = rest.trailing_zeros() as usize;
-                rest &= rest - 1;
-                let other = self.vertices[word * 64 + bit];
-                if other.cloud == pair.cloud || (exact && !problem.coherent(pair, other)) {
-                    bits &= !(1 << bit);
+        let row = &mut self.bits[a * words..(a + 1) * words];
+        let Some(first) = row.get_mut(from / 64..) else { return };
+        first.copy_from_slice(&near[from / 64..]);
+        if let Some(word) = first.first_mut() {
+            *word &= !0 << (from % 64);
+        }
+        for &other in twins.of_cloud(pair.cloud) {
+            row[other as usize / 64] &= !(1 << (other % 64));
+        }
+        if matches!(problem.tolerance, Tolerance::Sigmas(_)) {
+            for word in from / 64..words {
+                let mut rest = row[word];
+                while rest != 0 {
+                    let bit = rest.trailing_zeros() as usize;
+                    rest &= rest - 1;
+                    if !problem.coherent(pair, self.vertices[word * 64 + bit]) {
+                        row[word] &= !(1 << bit);
+                    }
                 }
             }
-            self.bits[a * words + word] = bits;
         }
+    }
+}
+
+/// The vertices of each cloud point.
+struct Twins {
+    begins: Vec<u32>,
+    vertices: Vec<u32>,
+}
+
+impl Twins {
+    fn of(vertices: &[Correspondence], clouds: usize) -> Self {
+        let mut begins = vec![0; clouds + 1];
+        vertices.iter().for_each(|pair| begins[pair.cloud] += 1);
+        // From numbers to ends, and from ends to begins as the lists are filled from behind.
+        (1..=clouds).for_each(|cloud| begins[cloud] += begins[cloud - 1]);
+        let mut sorted = vec![0; vertices.len()];
+        for (v, pair) in vertices.iter().enumerate().rev() {
+            begins[pair.cloud] -= 1;
+            sorted[begins[pair.cloud] as usize] = v as u32;
+        }
+        Self { begins, vertices: sorted }
+    }
+
+    fn of_cloud(&self, cloud: usize) -> &[u32] {
+        &self.vertices[self.begins[cloud] as usize..self.begins[cloud + 1] as usize]
     }
 }
 
