@@ -28,6 +28,18 @@ fn held(words: &[u64]) -> u64 {
 /// Calls `each` with every set bit from `from` on, ascending: quick where most words are empty.
 #[inline]
 pub(in crate::search) fn each_one(bits: &[u64], from: usize, mut each: impl FnMut(usize)) {
+    each_held(bits, from, |begin, word| {
+        let mut rest = word;
+        while rest != 0 {
+            each(begin + rest.trailing_zeros() as usize);
+            rest &= rest - 1;
+        }
+    });
+}
+
+/// Calls `each` with every word that holds a bit from `from` on, and with the place of its first bit.
+#[inline]
+pub(in crate::search) fn each_held(bits: &[u64], from: usize, mut each: impl FnMut(usize, u64)) {
     let first = from / 64;
     for (block, words) in bits.get(first..).unwrap_or_default().chunks(64).enumerate() {
         let mut held = held(words);
@@ -38,10 +50,7 @@ pub(in crate::search) fn each_one(bits: &[u64], from: usize, mut each: impl FnMu
             if block + i == 0 {
                 rest &= !0 << (from % 64);
             }
-            while rest != 0 {
-                each((first + 64 * block + i) * 64 + rest.trailing_zeros() as usize);
-                rest &= rest - 1;
-            }
+            each((first + 64 * block + i) * 64, rest);
         }
     }
 }
