@@ -20,6 +20,14 @@ pub enum ReportError {
         /// What is known.
         known: &'static str,
     },
+    /// The folder is somebody else's.
+    #[error("{} holds `{other}` and no report: nothing was written; name a new folder, or remove what is there", .folder.display())]
+    Foreign {
+        /// The folder.
+        folder: PathBuf,
+        /// The first thing in it.
+        other: String,
+    },
     /// A log of a finished run is gone.
     #[error("{} names the log {log}, which is not there: a report would leave its trial out without a word; put it back, or run the experiment again", .path.display())]
     Gone {

@@ -68,9 +68,13 @@ pub(crate) type File = (String, Vec<u8>);
 /// `summary.txt`. Files of an earlier report that this one has not are removed from `figures/` and `tables/`.
 ///
 /// # Errors
-/// [`ReportError`] when there is no log, one cannot be read, or the report cannot be written.
+/// [`ReportError`] when there is no log, one cannot be read, the folder holds something and no report, or the report cannot be
+/// written.
 pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, ReportError> {
     let run = Run::read(run_dir)?;
+    if let Some(other) = foreign(folder) {
+        return Err(ReportError::Foreign { folder: folder.to_owned(), other });
+    }
     let summary = Summary::of(&run);
     let files = files(&run, &summary, forms)?;
     for path in strays(folder, &files) {
@@ -168,6 +172,14 @@ pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     }
     found.sort();
     found
+}
+
+/// Something in a folder that no report was written to yet: what is there is somebody else's.
+fn foreign(folder: &Path) -> Option<String> {
+    let names = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
+    let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
+    names.sort();
+    if names.iter().any(|name| name.starts_with("report.")) { None } else { names.into_iter().next() }
 }
 
 /// Every file below `folder` that is none of the report's `files`, whoever put it there.

@@ -92,9 +92,13 @@ impl Report {
 pub(crate) fn verified(run: &Path, folder: &Path) -> Result<bool, Failure> {
     let verified = verify(run, folder).map_err(failure)?;
     let changed = changed_outputs(run).map_err(|fault| Failure::faults(INPUT, &[fault]))?;
-    let changed: String = changed.iter().map(|fault| format!("{fault}\n")).collect();
+    let whole = changed.is_empty();
+    let mut changed: String = changed.iter().map(|fault| format!("{fault}\n")).collect();
+    if !run.join("manifest.json").exists() {
+        changed += &format!("note: {} has no manifest: its logs were read, its tables not looked at\n", run.display());
+    }
     print(&format!("{changed}{}", said(&verified, &folder.display().to_string())))?;
-    Ok(verified.holds() && changed.is_empty())
+    Ok(verified.holds() && whole)
 }
 
 /// What a verification found, for people.
@@ -121,6 +125,7 @@ fn said(verified: &Verified, folder: &str) -> String {
 
 /// Logs that cannot be read are input, a report that cannot be written is output.
 pub(crate) fn failure(error: ReportError) -> Failure {
-    let code = if matches!(error, ReportError::Io { doing: "write", .. }) { OUTPUT } else { INPUT };
+    let output = matches!(error, ReportError::Io { doing: "write", .. } | ReportError::Foreign { .. });
+    let code = if output { OUTPUT } else { INPUT };
     Failure::new(code, error)
 }

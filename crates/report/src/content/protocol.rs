@@ -12,9 +12,7 @@ fn intervals(run: &Run) -> String {
     if !run.trials.iter().any(|trial| share::is_trajectory(&trial.header)) {
         return "Every frame is a draw by itself: the rates of a trial, and recall, carry exact (Clopper–Pearson) 95 % intervals.".to_owned();
     }
-    let mut said = format!(
-        "Frames follow each other on one way, and neighbours are not independent: the 95 % intervals of a trial’s rates, and the bands of recall, are those of Clopper and Pearson for the effective number of attempts (Korn and Graubard, 1998): n over the design effect, by which sums of blocks of consecutive attempts, the cube root of n long, vary more than of independent ones, a standard error added. Where all attempts are alike (0 % or 100 %) every block is one trial. A band is widened where it would fall."
-    );
+    let mut said = "Frames follow each other on one way, and neighbours are not independent: the 95 % intervals of a trial’s rates, and the bands of recall, are those of Clopper and Pearson for the effective number of attempts (Korn and Graubard, 1998): n over the design effect, by which sums of blocks of consecutive attempts, the cube root of n long, vary more than of independent ones, a standard error added. Where all attempts are alike (0 % or 100 %) every block is one trial. A band is widened where it would fall.".to_owned();
     if run.trials.iter().any(|trial| trial.every() > 1) {
         said.push_str(
             " Where a trial logged only some of its frames the others are counted, and every block is one trial.",
@@ -76,7 +74,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     ];
     let mut section = Section::new("Protocol").with([
         Block::Paragraph(text![
-            "Metrics and thresholds were fixed beforehand. No frame is excluded: one without an answer stays in every denominator. Medians and quantiles are over the fixes found, and say so; no failure is averaged into an error."
+            "Metrics are defined below, thresholds stand in the configuration (last section). No frame is excluded: one without an answer stays in every denominator. Medians and quantiles are over the fixes found, and say so; no failure is averaged into an error."
         ]),
         Block::Terms(terms),
     ]);

@@ -89,13 +89,13 @@ impl Graph {
             row[other as usize / 64] &= !(1 << (other % 64));
         }
         if matches!(problem.tolerance, Tolerance::Sigmas(_)) {
-            for word in from / 64..words {
-                let mut rest = row[word];
+            for (word, bits) in row.iter_mut().enumerate().skip(from / 64) {
+                let mut rest = *bits;
                 while rest != 0 {
                     let bit = rest.trailing_zeros() as usize;
                     rest &= rest - 1;
                     if !problem.coherent(pair, self.vertices[word * 64 + bit]) {
-                        row[word] &= !(1 << bit);
+                        *bits &= !(1 << bit);
                     }
                 }
             }

@@ -40,7 +40,7 @@ impl Term {
     #[inline]
     pub(in crate::search) fn of_residual(&self, r: &Vector3<f64>) -> Option<f64> {
         let d2 = self.distance(r);
-        (d2 <= FAR).then(|| self.gain - 0.5 * d2)
+        (d2 <= FAR).then_some(self.gain - 0.5 * d2)
     }
 
     /// χ² of a residual (m).
