@@ -184,7 +184,7 @@ fn a_mirror_image_is_refused_by_name() {
     }
     let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
     let found = attempt(&model, &cloud, &candidates, None);
-    let expected = Refusal::Search(Unidentified::Mirrored { best: 7, proved: false });
+    let expected = Refusal::Search(Unidentified::Mirrored { best: 7, proved: true });
     assert_eq!(found.outcome, Outcome::Unidentified(expected));
     assert_eq!(found.outcome.reason(), Some("mirrored"));
     // The paper's distances alone accept it; no rigid motion then fits.

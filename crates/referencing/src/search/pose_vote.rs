@@ -94,7 +94,12 @@ impl Search for PoseVote {
                 break;
             }
         }
-        conclude(problem, &best.1, self.orientation, tests).map(|found| found.ended(ended))
+        match (conclude(problem, &best.1, self.orientation, tests), ended) {
+            (Err(Unidentified::NotFound { bound, .. }), Some((budget, tests))) => {
+                Err(Unidentified::Budget { budget, best: 0, bound, tests })
+            }
+            (concluded, ended) => concluded.map(|found| found.ended(ended)),
+        }
     }
 }
 

@@ -140,6 +140,17 @@ impl<'a> Enumeration<'a> {
                 }
             }
         }
+        // Two that agree and begin no sample of three were not met.
+        if self.best < 2 && self.lists.len() >= 2 {
+            match self.samples_of(2) {
+                Ok(Some(_)) => self.best = 2,
+                Ok(None) => {}
+                Err(Spent) => {
+                    let (budget, best) = (self.budget, self.best);
+                    return Err(Unidentified::Budget { budget, best, bound: 2, tests: self.tests });
+                }
+            }
+        }
         Err(Unidentified::NoConsensus { best: self.best, needed: NEEDED })
     }
 
