@@ -82,9 +82,9 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         let unit = if comparisons[0].over_conditions {
             "Methods are compared over conditions, one value each: the median of m2 over all attempts, failures as infinitely far off; the difference is the ratio of two such medians"
         } else if comparisons[0].between_conditions {
-            "Frame k of every trial is drawn from the same random numbers, so that only the condition differs: trials are compared frame by frame and target by target, as far as both attempted it, failures as infinitely far off, by the median of the paired differences of m2"
+            "Frame k of every trial is drawn from the same random numbers, so that only the condition differs: trials are compared frame by frame and target by target, as far as both attempted it, failures as infinitely far off, by the median of the paired differences of m2, where not both fail"
         } else {
-            "Trials that saw the same frames are compared attempt by attempt, failures as infinitely far off, by the median of the paired differences of m2"
+            "Trials that saw the same frames are compared attempt by attempt, failures as infinitely far off, by the median of the paired differences of m2, where not both fail"
         };
         section.say(text![format!(
             "{unit}. Its 95 % interval is the percentile bootstrap of 10 000 resamples, seed {SEED}, over {}. The test is Wilcoxon’s signed rank, two-sided, adjusted after Holm for the family of {} comparison{}; the effect is the matched-pairs rank-biserial correlation. A difference is called significant where the adjusted p is below {ALPHA} and the interval leaves out none at all. Success and failure are compared by McNemar’s exact test.",
