@@ -27,8 +27,8 @@ pub enum Samples {
 /// order, for each choice of one candidate a point, all q(q − 1)/2 distances are compared; the
 /// first sample that agrees in all is the answer.
 ///
-/// What the answer says is exact, what it costs is not bearable beyond some ten points: the budget
-/// ends it, and the refusal tells how far it came.
+/// Σ_q n!/(n − q)! m^q choices of m candidates a point; with combinations q! times fewer. What the answer says is exact,
+/// what it costs is not bearable beyond some ten points: the budget ends it, and the refusal tells how far it came.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StructuralCoherence {
