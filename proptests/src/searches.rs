@@ -2,9 +2,7 @@
 
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use seafix_geometry::Transform;
-use seafix_referencing::{
-    Candidates, Correspondence, Identification, Prior, PriorBound, Problem, SEARCHES, Search, Unidentified,
-};
+use seafix_referencing::{Correspondence, Identification, Prior, PriorBound, Problem, SEARCHES, Search, Unidentified};
 
 use crate::{
     problems::Planted,
@@ -22,19 +20,17 @@ pub struct Claims {
     pub exact: bool,
     /// That it names every other set of the same size, or says that it does not.
     pub ties: bool,
-    /// That it takes candidates as they are given; otherwise every cloud point may be every model point.
-    pub lists: bool,
     /// That it begins at a prior, and refuses without one.
     pub prior: bool,
 }
 
 /// The claims by name. One that is not listed claims the most.
 const CLAIMS: [(&str, Claims); 12] = {
-    const EXACT: Claims = Claims { exact: true, ties: true, lists: true, prior: false };
+    const EXACT: Claims = Claims { exact: true, ties: true, prior: false };
     const RANKS: Claims = Claims { exact: false, ties: false, ..EXACT };
     const FROM_PRIOR: Claims = Claims { prior: true, ..RANKS };
     [
-        ("complete-enumeration", Claims { ties: false, lists: false, ..EXACT }),
+        ("complete-enumeration", Claims { ties: false, ..EXACT }),
         ("gicp", FROM_PRIOR),
         ("gnc-tls", RANKS),
         ("icp", FROM_PRIOR),
@@ -61,17 +57,13 @@ pub struct Tried {
 
 /// Every search with every combination of its switches; its budget, if it has one, as given.
 pub fn searches(budget: i64) -> Vec<Tried> {
-    let most = Claims { exact: true, ties: true, lists: true, prior: false };
+    let most = Claims { exact: true, ties: true, prior: false };
     let claims = |name: &str| CLAIMS.iter().find(|(listed, _)| *listed == name).map_or(most, |(_, claims)| *claims);
     let tried = |variant: Variant<dyn Search>| {
         let component = variant.name.split(' ').next().unwrap_or_default();
         Tried { claims: claims(component), name: variant.name.clone(), variant }
     };
-    let mut all: Vec<Tried> = variants(&SEARCHES, &[("budget", budget)]).into_iter().map(tried).collect();
-    // Without shells everything takes so long that a small budget shows as much.
-    let short = variants(&SEARCHES, &[("budget", (budget / 20).max(1))]).into_iter().map(tried);
-    all.iter_mut().zip(short).filter(|(one, _)| !one.claims.lists).for_each(|(one, short)| *one = short);
-    all
+    variants(&SEARCHES, &[("budget", budget)]).into_iter().map(tried).collect()
 }
 
 impl Tried {
@@ -80,18 +72,14 @@ impl Tried {
         self.variant.switch("orientation").unwrap_or(true)
     }
 
+    /// Whether it has a budget.
+    pub fn has_budget(&self) -> bool {
+        self.variant.has("budget")
+    }
+
     /// The value of a switch; `None` where it has none.
     pub fn switch(&self, key: &str) -> Option<bool> {
         self.variant.switch(key)
-    }
-
-    /// What is planted, with the candidates that the search looks at.
-    pub fn seen(&self, planted: &Planted) -> Planted {
-        let mut seen = planted.clone();
-        if !self.claims.lists {
-            seen.candidates = Candidates::all(seen.model.len(), seen.cloud.len());
-        }
-        seen
     }
 
     /// Its answer; a search that begins at a prior is given the pose that was planted, within 10 m.

@@ -15,6 +15,11 @@ pub struct Variant<T: ?Sized> {
 }
 
 impl<T: ?Sized> Variant<T> {
+    /// Whether the component has a setting of this name.
+    pub fn has(&self, key: &str) -> bool {
+        self.choice.settings.contains_key(key)
+    }
+
     /// The value of a switch of this name; `None` where the component has none.
     pub fn switch(&self, key: &str) -> Option<bool> {
         self.choice.settings.get(key)?.as_bool()

@@ -61,10 +61,8 @@ fn too_few_points_are_no_pose() {
         for search in &searches {
             let answer = search.answer(&nothing);
             prop_assert!(matches!(answer, Err(Unidentified::TooFew { with_candidates: 0, .. })), "{}", search.name);
-            if search.claims.lists {
-                let answer = search.answer(&two);
-                prop_assert!(matches!(answer, Err(Unidentified::TooFew { .. })), "{}: {answer:?}", search.name);
-            }
+            let answer = search.answer(&two);
+            prop_assert!(matches!(answer, Err(Unidentified::TooFew { .. })), "{}: {answer:?}", search.name);
         }
         Ok(())
     });
@@ -116,7 +114,7 @@ fn a_tolerance_of_rounding_is_enough_for_exact_points() {
         noisy.cloud.iter_mut().zip(&points).for_each(|(c, (_, noise))| c.position.at = c.position.at + *noise);
         for search in &searches {
             let answer = search.answer(&exact);
-            if search.claims.exact && search.claims.lists {
+            if search.claims.exact {
                 let pairs = answer.as_ref().map(|found| &found.pairs);
                 prop_assert_eq!(pairs, Ok(&exact.truth), "{}", &search.name);
             }
@@ -146,7 +144,7 @@ fn absurd_tolerances_end() {
             for set in sets(&answer) {
                 assert!(set.len() >= 3 && delta >= 0.0, "{} at Δ = {delta}: {set:?}", search.name);
             }
-            if delta == 10.0 && search.claims.lists {
+            if delta == 10.0 {
                 let bound = match &answer {
                     Ok(found) => found.size_bound,
                     Err(
@@ -186,6 +184,22 @@ fn a_huge_cloud_ends() {
     }
 }
 
+/// A search whose budget of one test has ended says so: of what it names, as what leaves it undecided, or in its refusal.
+///
+/// Seen to fail where an iteration that the budget ended is taken for the last.
+#[test]
+fn a_spent_budget_is_told() {
+    let problem = clutter(8, 6, 40, 0.3);
+    for search in each(1).iter().filter(|search| search.has_budget()) {
+        let answer = search.answer(&problem);
+        let ended = match &answer {
+            Ok(found) => found.undecided.as_ref(),
+            Err(refusal) => Some(refusal),
+        };
+        assert!(matches!(ended, Some(Unidentified::Budget { .. })), "{}: {answer:?}", search.name);
+    }
+}
+
 /// B37. Fifty model points with a hundred candidates each: the best found and a bound, at the end of the budget.
 ///
 /// Seen to fail when the bound is the number of pairs.
@@ -197,7 +211,7 @@ fn a_blow_up_ends_at_the_budget() {
             Ok(found) => {
                 let (size, bound) = (found.pairs.len(), found.size_bound);
                 assert!(size <= bound && bound <= 50, "{}: {size}, {bound}", search.name);
-                let objection = objection(&search.seen(&problem).problem(), search.refuses_mirrors(), &found.pairs);
+                let objection = objection(&problem.problem(), search.refuses_mirrors(), &found.pairs);
                 assert_eq!(objection, None, "{}", search.name);
                 assert!(size >= 3 && !found.optimal, "{}: {size}", search.name);
             }

@@ -19,8 +19,7 @@ const BUDGET: i64 = 100_000;
 
 fn every_set_is_admissible(searches: &[Tried], planted: &Planted) -> TestCaseResult {
     for search in searches {
-        let planted = search.seen(planted);
-        for set in sets(&search.answer(&planted)) {
+        for set in sets(&search.answer(planted)) {
             let objection = objection(&planted.problem(), search.refuses_mirrors(), set);
             prop_assert!(objection.is_none(), "{}: {}", search.name, objection.unwrap_or_default());
         }
@@ -48,7 +47,7 @@ fn what_is_left_of_a_set_is_one() {
     let searches = searches(BUDGET);
     let looked_at = Cell::new(0);
     let cases = law(64, planted(SMALL), |planted| {
-        for search in searches.iter().filter(|search| search.claims.lists) {
+        for search in &searches {
             let answer = search.answer(&planted);
             for set in sets(&answer).take(3).filter(|set| set.len() > 3) {
                 for without in 0..set.len() {
@@ -95,7 +94,7 @@ fn a_difference_of_exactly_delta_is_coherent() {
         let model: Vec<_> = known.iter().map(|&p| ModelPoint::exact("P", Point::from(at(p)))).collect();
         let cloud: Vec<_> = seen.iter().map(|&p| measured(at(p))).collect();
         let candidates = Candidates::from_pairs(known.len(), (0..known.len()).map(|i| (i, i)));
-        for search in searches.iter().filter(|search| search.claims.exact && search.claims.lists) {
+        for search in searches.iter().filter(|search| search.claims.exact) {
             let size = |delta: f64| {
                 let tolerance = Tolerance::Fixed(delta);
                 let found = search.answer_to(&Problem {
@@ -137,18 +136,14 @@ fn no_admissible_set_is_larger() {
     let searches = searches(BUDGET);
     let [settled, refused, mirrored] = [0; 3].map(Cell::new);
     let cases = law(256, planted(SMALL), |planted| {
-        let whole =
-            Planted { candidates: Candidates::all(planted.model.len(), planted.cloud.len()), ..planted.clone() };
-        let brute = [&planted, &whole].map(|planted| [false, true].map(|mirrors| largest(&planted.problem(), mirrors)));
-        prop_assume!(!brute.iter().flatten().any(|largest| largest.doubtful));
+        let problem = planted.problem();
+        let brute = [false, true].map(|mirrors| largest(&problem, mirrors));
+        prop_assume!(!brute.iter().any(|largest| largest.doubtful));
         let mut proofs = 0;
         for search in &searches {
-            let planted = if search.claims.lists { &planted } else { &whole };
-            let problem = planted.problem();
-            let brute = &brute[usize::from(!search.claims.lists)];
             let coherent = &brute[0];
             let best = &brute[usize::from(search.refuses_mirrors())];
-            let answer = search.answer(planted);
+            let answer = search.answer(&planted);
             let name = &search.name;
             for set in sets(&answer) {
                 let objection = objection(&problem, search.refuses_mirrors(), set);
@@ -242,7 +237,6 @@ fn a_planted_set_is_not_missed() {
     let searches = searches(BUDGET);
     law(128, planted(LARGE), |planted| {
         for search in &searches {
-            let planted = search.seen(&planted);
             if objection(&planted.problem(), search.refuses_mirrors(), &planted.truth).is_some() {
                 continue;
             }
@@ -308,10 +302,7 @@ fn a_mirror_image_is_refused() {
         prop_assume!(solid);
         for search in &searches {
             let answer = search.answer(&planted);
-            if matches!(answer, Err(Unidentified::Budget { .. })) {
-                // Without shells a few points are too many.
-                prop_assert!(!search.claims.lists, "{}", search.name);
-            } else if !search.claims.exact {
+            if !search.claims.exact {
                 prop_assert!(answer.is_err() || !search.refuses_mirrors(), "{}: {:?}", &search.name, &answer);
             } else if search.refuses_mirrors() {
                 prop_assert_eq!(
@@ -347,7 +338,7 @@ fn a_flat_mirror_image_is_accepted() {
             })
             .collect();
         let planted = reflection(&flat, &normal, &|p| (pose * Point::from(p)).coords, delta);
-        for search in searches.iter().filter(|search| search.claims.exact && search.claims.lists) {
+        for search in searches.iter().filter(|search| search.claims.exact) {
             let answer = search.answer(&planted);
             let size = answer.as_ref().map_or(0, |found| found.pairs.len());
             prop_assert_eq!(size, flat.len(), "{}: {:?}", &search.name, &answer);
@@ -376,7 +367,7 @@ fn no_point_serves_twice() {
             contested.set(contested.get() + 1);
         }
         for search in &searches {
-            for set in sets(&search.answer(&search.seen(&planted))) {
+            for set in sets(&search.answer(&planted)) {
                 for (k, a) in set.iter().enumerate() {
                     let twice = set[..k].iter().any(|b| a.model == b.model || a.cloud == b.cloud);
                     prop_assert!(!twice, "{}: {:?} in {:?}", &search.name, a, set);

@@ -5,7 +5,7 @@ use std::time::Instant;
 use rand::Rng;
 use seafix_component::Choice;
 use seafix_geometry::{Covariance6, Object, StereoRig};
-use seafix_log::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
+use seafix_log::{ELSEWHERE, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 use seafix_navigation::{
     Considered, Event, FUSIONS, Fusion, Navigated, Navigator, Network, ODOMETRIES, Odometry, Outcome as Followed,
     POLICIES, Place, Policy, Reckoning, Standing, StereoPair,
@@ -312,12 +312,12 @@ impl<'a> Voyage<'a> {
                 Event::Disputed { objects, metres } => {
                     let [one, other] = objects.map(|object| &self.targets[object].name);
                     events.push(format!(
-                        "{one} or {other} stands {metres:.3} m from its place, one of the two; a third object will tell which"
+                        "{one} or {other} stands {metres:.3} {ELSEWHERE}, one of the two; a third object will tell which"
                     ));
                 }
                 Event::Displaced(found) => {
                     let shift = found.old_from_new.translation().norm();
-                    events.push(format!("{} stands {shift:.3} m from its place", self.targets[found.object].name));
+                    events.push(format!("{} stands {shift:.3} {ELSEWHERE}", self.targets[found.object].name));
                     self.explorer.iter_mut().for_each(|explorer| explorer.displaced(&found));
                 }
             }

@@ -74,11 +74,11 @@ pub use join::{join, join_lacking};
 pub use png::encode_png;
 pub use read::{Reader, TrialLog, looks_like, read};
 pub use record::{
-    Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, Evaluation, ExactPose, FrameRecord,
-    FrameTimes, GreyImage, Inputs, InspectedPoint, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord,
-    NavigationErrors, NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord, ProblemRecord, Region,
-    RigRecord, SensorReading, SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState,
-    TruthRecord, VisiblePoint,
+    Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, ELSEWHERE, Evaluation, ExactPose,
+    FrameRecord, FrameTimes, GreyImage, Inputs, InspectedPoint, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint,
+    NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord,
+    ProblemRecord, Region, RigRecord, SensorReading, SitePoint, TargetModel, TargetRecord, TargetTimes, Totals,
+    TrialHeader, TrueState, TruthRecord, VisiblePoint,
 };
 pub use recording::{Entry, Recording, Topic};
 pub use recover::{Recovered, recover};

@@ -294,6 +294,19 @@ impl Statistics {
 mod tests {
     use super::*;
 
+    /// Where both fail neither errs less: what one finds and the other does not is a difference, however many both miss.
+    ///
+    /// Seen to fail where two failures differ by zero.
+    #[test]
+    fn two_failures_say_nothing() {
+        let none = f64::INFINITY;
+        let errors: Vec<(f64, f64)> = (0..30).map(|i| (none, if i < 12 { 0.01 } else { none })).collect();
+        let found = Statistics::of(&errors, false);
+        assert_eq!((found.difference, found.interval), (none, (none, none)));
+        assert!(found.p < 1e-3 && found.alone == [0, 12]);
+        assert_eq!(Statistics::of(&[(none, none)], false).difference, 0.0);
+    }
+
     /// Only what both have, by key, in the order of the keys, however they came; of several under one key the last counts.
     ///
     /// Seen to fail when the first of them does, and when keys are compared by their numbers alone.

@@ -7,7 +7,7 @@ use std::{
 };
 
 use rayon::prelude::*;
-use seafix_log::{FrameRecord, LogError, Outcome, Reader, Region, TargetRecord, Totals, TrialHeader};
+use seafix_log::{ELSEWHERE, FrameRecord, LogError, Outcome, Reader, Region, TargetRecord, Totals, TrialHeader};
 use sha2::{Digest, Sha256};
 
 use crate::{
@@ -99,9 +99,6 @@ pub(crate) struct Attempt {
     reason: u32,
     values: [f64; Field::ALL.len()],
 }
-
-/// What the log says of an object that stands elsewhere than surveyed, and of two one of which does.
-const ELSEWHERE: &str = " m from its place";
 
 impl Run {
     /// Reads every `*.mcap` in `folder`.

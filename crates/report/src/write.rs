@@ -57,6 +57,8 @@ pub struct Report {
     pub summary: Summary,
 }
 
+/// The paper in its forms.
+const PAPERS: [&str; 3] = ["report.html", "report.tex", "report.pdf"];
 /// So many trials are few.
 const FEW: usize = 8;
 
@@ -96,9 +98,9 @@ pub(crate) fn files(run: &Run, summary: &Summary, forms: Forms) -> Result<Vec<Fi
     let pdf = || forms.pdf.then(|| print::pdf(&document));
     let drawn = || if forms.small { Vec::new() } else { figures(&document) };
     let ((html, latex), (pdf, drawn)) = rayon::join(|| rayon::join(html, latex), || rayon::join(pdf, drawn));
-    let papers = [("report.html", html), ("report.tex", latex), ("report.pdf", pdf)];
+    let papers = PAPERS.into_iter().zip([html, latex, pdf]);
     let mut files: Vec<File> =
-        papers.into_iter().filter_map(|(name, bytes)| Some((name.to_owned(), bytes?))).chain(drawn).collect();
+        papers.filter_map(|(name, bytes)| Some((name.to_owned(), bytes?))).chain(drawn).collect();
     let mut add = |name: String, bytes: Vec<u8>| files.push((name, bytes));
     if forms.small {
         kept(&document, &mut add);
@@ -179,7 +181,8 @@ fn foreign(folder: &Path) -> Option<String> {
     let names = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
     let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
     names.sort();
-    if names.iter().any(|name| name.starts_with("report.")) { None } else { names.into_iter().next() }
+    let report = |name: &String| PAPERS.iter().any(|paper| name.strip_suffix(".partial").unwrap_or(name) == *paper);
+    if names.iter().any(report) { None } else { names.into_iter().next() }
 }
 
 /// Every file below `folder` that is none of the report's `files`, whoever put it there.

@@ -30,18 +30,20 @@ pub fn clustered(events: &[bool], block: usize, confidence: f64) -> (f64, f64) {
     real_clopper_pearson(effective * k as f64 / n as f64, effective, confidence)
 }
 
-/// The same of `k` events in `n` trials that are only counted: every block of `block` of them is one trial.
+/// The interval of the share of `k` events in `n` trials in a row that are only counted: how they hang together is not known, and
+/// every `block` of them are one trial of [`clopper_pearson`](super::clopper_pearson). (0, 1) where there are none.
 pub fn of_blocks(k: usize, n: usize, block: usize, confidence: f64) -> (f64, f64) {
     let block = block.clamp(1, n.max(1)) as f64;
     real_clopper_pearson(k as f64 / block, n as f64 / block, confidence)
 }
 
+/// Not less than 1, nor more than the block's length; `k` of the events are.
 fn design_effect(events: &[bool], k: usize, block: usize) -> f64 {
     let n = events.len();
     let (longest, share) = (block as f64, k as f64 / n as f64);
     let rarer = 2 * k <= n;
     let runs = (0..n).filter(|&i| events[i] == rarer && (i == 0 || events[i - 1] != rarer)).count();
-    if runs == 0 || k == n {
+    if runs == 0 {
         return longest;
     }
     let mut sum = events[..block].iter().filter(|event| **event).count();
@@ -51,8 +53,8 @@ fn design_effect(events: &[bool], k: usize, block: usize) -> f64 {
         sum = sum + usize::from(events[(begin + block) % n]) - usize::from(events[begin]);
     }
     let alone = longest * share * (1.0 - share);
-    let found = square / n as f64 / alone;
-    found.max(1.0).mul_add((2.0 / runs as f64).sqrt(), found.max(1.0)).min(longest)
+    let found = (square / n as f64 / alone).max(1.0);
+    (found * (1.0 + (2.0 / runs as f64).sqrt())).min(longest)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ pub use frame::{CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, Prior
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
 pub use inspection::InspectedPoint;
-pub use navigation::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
+pub use navigation::{ELSEWHERE, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 pub use region::Region;
 pub use target::{Alternative, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
 pub use totals::Totals;

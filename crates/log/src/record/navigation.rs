@@ -2,6 +2,9 @@
 
 use super::{Matrix4, Matrix6};
 
+/// How an event ends that says how far an object stands from where it was surveyed, after the distance.
+pub const ELSEWHERE: &str = "m from its place";
+
 /// What a trial that navigates between fixes knew after a pair.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NavigationRecord {

@@ -23,19 +23,19 @@ where
     F: Fn(&[Correspondence]) -> Option<Transform<Object, Camera>>,
 {
     /// From `start`: each model point's nearest candidate, the pose of the nearest of these pairs, and again until
-    /// the pairs do not change. The last pose, all candidate pairs, and the distances computed.
+    /// the pairs do not change. The last pose, all candidate pairs, the distances computed, and whether the budget ended it.
     pub(super) fn run(
         &self,
         problem: &Problem<'_>,
         start: Transform<Object, Camera>,
-    ) -> (Transform<Object, Camera>, Vec<Correspondence>, u64) {
+    ) -> (Transform<Object, Camera>, Vec<Correspondence>, u64, bool) {
         let vertices = vertices(problem);
         let (mut pose, mut last, mut tests) = (start, Vec::new(), 0);
         for _ in 0..self.iterations {
-            tests += vertices.len() as u64;
-            if tests > self.budget {
-                break;
+            if tests + vertices.len() as u64 > self.budget {
+                return (pose, vertices, tests, true);
             }
+            tests += vertices.len() as u64;
             let groups = vertices.chunk_by(|a, b| a.model == b.model);
             let nearest = |same: &[Correspondence]| {
                 let off = same.iter().map(|&pair| ((self.distance)(&pose, pair), pair));
@@ -57,6 +57,6 @@ where
                 None => break,
             }
         }
-        (pose, vertices, tests)
+        (pose, vertices, tests, false)
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     BUDGET, Identification, Search, Unidentified, bounded,
     closest::Closest,
-    grow::{conclude, feasible},
+    grow::{conclude_within, feasible},
     pose::refined,
 };
 use crate::{Correspondence, Mahalanobis, Observations, Problem, Solver};
@@ -72,10 +72,11 @@ impl Search for Gicp {
         let solver = Mahalanobis::default();
         let fit =
             |pairs: &[Correspondence]| solver.solve(&Observations::of(pairs, problem.model, problem.cloud, None)).ok();
-        let (pose, vertices, mut tests) =
+        let (pose, vertices, mut tests, ended) =
             Closest { distance, fit, keep, iterations, budget }.run(problem, prior.object_from_camera);
+        let ended = ended.then_some((budget, tests));
         let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
-        conclude(problem, &ranked, self.orientation, tests)
+        conclude_within(problem, &ranked, self.orientation, tests, ended)
     }
 }
 

@@ -109,6 +109,31 @@ pub(super) fn conclude(
     Ok(Identification { undecided, ..Identification::unproved(pairs, most_possible(problem), tests) })
 }
 
+/// The same of a search that may have ended at its budget, having spent so many tests: that is why its set is not to be believed,
+/// or why there is none.
+///
+/// # Errors
+/// As [`conclude`], and [`Unidentified::Budget`] in place of [`Unidentified::NotFound`].
+pub(super) fn conclude_within(
+    problem: &Problem<'_>,
+    ranked: &[Correspondence],
+    orientation: bool,
+    tests: u64,
+    ended: Option<(u64, u64)>,
+) -> Result<Identification, Unidentified> {
+    let concluded = conclude(problem, ranked, orientation, tests);
+    let Some((budget, tests)) = ended else { return concluded };
+    let ended = |best, bound| Unidentified::Budget { budget, best, bound, tests };
+    match concluded {
+        Ok(found) => {
+            let ended = ended(found.pairs.len(), found.size_bound);
+            Ok(Identification { undecided: found.undecided.or(Some(ended)), ..found })
+        }
+        Err(Unidentified::NotFound { bound, .. }) => Err(ended(0, bound)),
+        Err(other) => Err(other),
+    }
+}
+
 /// What a search has that came to the end of its budget before it had found three pairs: the largest admissible set that grows
 /// from a few beginnings, unproved, with the reason why it is not to be believed.
 ///

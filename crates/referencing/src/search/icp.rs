@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     BUDGET, Identification, Search, Unidentified, bounded,
     closest::Closest,
-    grow::{conclude, feasible},
+    grow::{conclude_within, feasible},
     pose::{fitted, refined},
 };
 use crate::{Correspondence, Problem};
@@ -64,10 +64,11 @@ impl Search for Icp {
             (*pose * problem.cloud[pair.cloud].position.at).distance(&problem.model[pair.model].at)
         };
         let fit = |pairs: &[Correspondence]| fitted(problem, pairs);
-        let (pose, vertices, mut tests) =
+        let (pose, vertices, mut tests, ended) =
             Closest { distance, fit, keep, iterations, budget }.run(problem, prior.object_from_camera);
+        let ended = ended.then_some((budget, tests));
         let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
-        conclude(problem, &ranked, self.orientation, tests)
+        conclude_within(problem, &ranked, self.orientation, tests, ended)
     }
 }
 

@@ -17,8 +17,7 @@ use crate::{Correspondence, Observations, Problem, solve::least_squares};
 
 /// The largest admissible set of correspondences: every two coherent, one-to-one, no four of them a
 /// mirror image of the model. Exact within the budget; among sets of one size the least residual
-/// of a rigid fit decides, then the coordinates. O(K²) for the graph of K candidate pairs, then at worst exponential in its
-/// density; bitsets, colours and the n-partite bound keep it near the graph's cost where few pairs in ten agree.
+/// of a rigid fit decides, then the coordinates. O(K²) for the graph of K candidate pairs, then at worst exponential in K.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MaximumClique {

@@ -93,13 +93,6 @@ impl Identification {
             belief: None,
         }
     }
-
-    /// The same of a search that may have ended at its budget: that, and what was spent.
-    fn ended(self, at: Option<(u64, u64)>) -> Self {
-        let (best, bound) = (self.pairs.len(), self.size_bound);
-        let ended = at.map(|(budget, tests)| Unidentified::Budget { budget, best, bound, tests });
-        Self { undecided: self.undecided.or(ended), ..self }
-    }
 }
 
 /// Why nothing was identified.

@@ -9,7 +9,7 @@ use super::{
     BUDGET, Identification, Search, Unidentified,
     association::vertices,
     bounded,
-    grow::{conclude, feasible},
+    grow::{conclude_within, feasible},
     pose::{fitted, refined},
 };
 use crate::{Correspondence, Problem};
@@ -94,12 +94,7 @@ impl Search for PoseVote {
                 break;
             }
         }
-        match (conclude(problem, &best.1, self.orientation, tests), ended) {
-            (Err(Unidentified::NotFound { bound, .. }), Some((budget, tests))) => {
-                Err(Unidentified::Budget { budget, best: 0, bound, tests })
-            }
-            (concluded, ended) => concluded.map(|found| found.ended(ended)),
-        }
+        conclude_within(problem, &best.1, self.orientation, tests, ended)
     }
 }
 

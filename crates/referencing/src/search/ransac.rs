@@ -8,7 +8,7 @@ use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
     bounded,
-    grow::{conclude, feasible, most_possible, so_far},
+    grow::{conclude_within, feasible, most_possible, so_far},
     pose::{fitted, refined, share},
 };
 use crate::{Correspondence, Problem};
@@ -98,7 +98,7 @@ impl Search for Ransac {
         };
         let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
         let ended = (spent >= self.budget && (trials as f64) < needed).then_some((self.budget, spent));
-        conclude(problem, &ranked, self.orientation, tests).map(|found| found.ended(ended))
+        conclude_within(problem, &ranked, self.orientation, tests, ended)
     }
 }
 

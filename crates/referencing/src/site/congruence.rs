@@ -287,6 +287,14 @@ mod tests {
         assert!(found[35..].iter().all(|&size| size == 21), "{found:?}");
     }
 
+    /// Seen to fail where every triangle must be a fifth as high as it is long.
+    #[test]
+    fn a_zigzag_is_turned_and_shifted() {
+        let zigzag = model((0..8).map(|i| [0.3 * f64::from(i), 0.1 * f64::from(i % 2), 0.0]));
+        let found = sizes(&zigzag);
+        assert!(found.contains(&8) && found.contains(&6), "{found:?}");
+    }
+
     #[test]
     fn an_asymmetric_object_has_none() {
         let places =

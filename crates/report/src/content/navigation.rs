@@ -11,9 +11,13 @@ use crate::{
     sailed::{Counted, Sailed},
 };
 
+/// Whether a trial navigates.
+fn sails(trial: &Trial) -> bool {
+    trial.sample().any(|frame| frame.sailed.is_some())
+}
+
 /// The section, where any trial navigates.
 pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
-    let sails = |trial: &Trial| trial.sample().any(|frame| frame.sailed.is_some());
     if !run.trials.iter().any(sails) {
         return None;
     }
@@ -52,7 +56,6 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
 
 /// A sentence a trial that navigates; `name` says what the trial at a place is called. That it is one dive is said once.
 pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
-    let sails = |trial: &Trial| trial.sample().any(|frame| frame.sailed.is_some());
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial));
     let sentence = |(index, trial): (usize, &Trial)| {
         let metres = |name: &str, quantity| statistic(trial, name, quantity, Unit::Millimetres);
@@ -106,7 +109,6 @@ fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
         }
         told
     };
-    let sails = |trial: &Trial| trial.sample().any(|frame| frame.sailed.is_some());
     let all: Vec<(usize, Vec<String>)> = run
         .trials
         .iter()

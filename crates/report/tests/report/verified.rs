@@ -85,10 +85,52 @@ fn every_file_is_missed_and_a_strange_one_told() {
             assert_eq!(verify(folder.path(), &report_of).unwrap().changed, [name.as_str()], "{forms:?}");
             fs::write(&path, bytes).unwrap();
         }
-        fs::write(report_of.join("tables/more.csv"), b"0").unwrap();
-        let verified = verify(folder.path(), &report_of).unwrap();
-        assert!(!verified.holds() && verified.strays == ["tables/more.csv"], "{verified:#?}");
+        for stranger in ["extra.html", "of/another.txt", "tables/more.csv"] {
+            fs::create_dir_all(report_of.join(stranger).parent().unwrap()).unwrap();
+            fs::write(report_of.join(stranger), b"0").unwrap();
+            let verified = verify(folder.path(), &report_of).unwrap();
+            assert!(!verified.holds() && verified.strays == [stranger], "{verified:#?}");
+            fs::remove_file(report_of.join(stranger)).unwrap();
+        }
     }
+}
+
+/// B44. A folder with something in it and no report is left as it is; one with a report is written anew.
+///
+/// Seen to fail where nobody looks what is in the folder.
+#[test]
+fn what_is_no_report_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    write_run(folder.path(), &[2.0]);
+    let other = folder.path().join("other");
+    fs::create_dir_all(other.join("figures")).unwrap();
+    for name in ["figures/mine.svg", "summary.txt", "report.txt"] {
+        fs::write(other.join(name), b"mine").unwrap();
+        let refused = report(folder.path(), &other, Forms::ALL).unwrap_err().to_string();
+        assert!(refused.contains("other holds `figures` and no report"), "{refused}");
+        assert_eq!(fs::read(other.join(name)).unwrap(), b"mine");
+    }
+    let own = folder.path().join("report");
+    report(folder.path(), &own, Forms::ALL).unwrap();
+    report(folder.path(), &own, Forms::ALL).unwrap();
+}
+
+/// A finished run that has lost a log is no smaller run; one that was interrupted has what it has.
+///
+/// Seen to fail where the manifest is not asked for its logs.
+#[test]
+fn a_lost_log_is_missed() {
+    let folder = tempfile::tempdir().unwrap();
+    write_run(folder.path(), &[2.0]);
+    let manifest = |state: &str| {
+        let trials = r#"[{"log": "not-there.mcap"}]"#;
+        let text = format!(r#"{{"format": "seafix-manifest/1.1", "state": "{state}", "trials": {trials}}}"#);
+        fs::write(folder.path().join("manifest.json"), text).unwrap();
+        report(folder.path(), &folder.path().join("report"), Forms::ALL)
+    };
+    let refused = manifest("finished").unwrap_err().to_string();
+    assert!(refused.contains("names the log not-there.mcap, which is not there"), "{refused}");
+    manifest("interrupted").unwrap();
 }
 
 #[test]
