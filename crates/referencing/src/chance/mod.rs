@@ -23,7 +23,8 @@
 //! surface has proper motions only, so that mirror images are not counted; where S is nearly a line,
 //! the turn about it is bounded below by the noise ([`shape`]). The integral over translations is
 //! exact: the overlap of the shells moved to where the rotation takes them. Rotations, subsets and
-//! directions of e are sampled from fixed sequences: the answer is a function of the problem.
+//! directions of e are sampled from fixed sequences, of the points in an order of their own: the answer is a
+//! function of the problem, whatever the numbers of its points.
 //!
 //! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid
 //! point matches*, 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
@@ -84,7 +85,7 @@ pub fn expected_chance_sets(problem: &Problem<'_>, size: usize, chi2: f64) -> f6
     if size < 3 {
         return f64::INFINITY;
     }
-    let noise = Noise::of(problem);
+    let (noise, order) = (Noise::of(problem), order(problem));
     if chi2.is_nan() || noise.is_nan() {
         return f64::NAN;
     }
@@ -94,7 +95,8 @@ pub fn expected_chance_sets(problem: &Problem<'_>, size: usize, chi2: f64) -> f6
     let (mut sum, mut last) = (0.0, 0.0_f64);
     for j in (size..=available).take(MOST_SIZES) {
         let halved = (j - size).min(3);
-        let term = expected_of_size(problem, &null, &noise, j, chi2 * freedom(j) / freedom(size), halved, shared);
+        let term =
+            expected_of_size(problem, &order, &null, &noise, j, chi2 * freedom(j) / freedom(size), halved, shared);
         sum += term;
         // Not before the terms fall: among many candidates the larger sets may be the more.
         if term.is_nan() || (term <= NEGLIGIBLE * sum && term <= last.max(f64::MIN_POSITIVE)) {
@@ -112,9 +114,22 @@ fn freedom(size: usize) -> f64 {
     (3 * size - 6) as f64
 }
 
+/// The model points in an order of their own, whatever their numbers.
+fn order(problem: &Problem<'_>) -> Vec<usize> {
+    let key = |i: usize| (problem.model[i].at.coords, problem.candidates.lists[i].len());
+    let mut order: Vec<usize> = (0..problem.model.len()).collect();
+    order.sort_by(|&a, &b| {
+        let ((at, length), (other, others)) = (key(a), key(b));
+        let places = at.iter().zip(&other).map(|(x, y)| x.total_cmp(y));
+        places.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then).then(length.cmp(&others))
+    });
+    order
+}
+
 /// The expected number of such sets of exactly `size` pairs.
 fn expected_of_size(
     problem: &Problem<'_>,
+    order: &[usize],
     null: &Null<'_>,
     noise: &Noise,
     size: usize,
@@ -122,7 +137,7 @@ fn expected_of_size(
     halved: usize,
     shared: f64,
 ) -> f64 {
-    let lengths = problem.candidates.lists.iter().map(Vec::len);
+    let lengths = order.iter().map(|&i| (i, problem.candidates.lists[i].len()));
     let mut subsets = Subsets::new(lengths, size);
     let pairs = size * (size - 1) / 2;
     let wanted = (SAMPLES_A_POINT * problem.candidates.with_candidates()).min(MOST_SAMPLES) >> halved;

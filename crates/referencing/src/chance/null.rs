@@ -1,9 +1,12 @@
 //! The null model: where candidates lie if none of them is true.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::MeasuredPoint;
 
-use super::{coordinates, sequence::Sequence};
+use super::{
+    coordinates,
+    sequence::{Sequence, mixed},
+};
 use crate::{Prior, PriorBound, Problem, candidates::chi_square};
 
 /// The confidence of the shells that a Gaussian prior draws, as [`crate::Gate`] has it by default.
@@ -47,9 +50,14 @@ impl<'a> Null<'a> {
             });
             return Self::Box(bounds.map_or(Vector3::zeros(), |(low, high)| high - low).add_scalar(LEAST));
         }
-        let all: usize = lists.iter().map(Vec::len).sum();
-        let step = all.div_ceil(MOST_LOOKED_AT).max(1);
-        Self::Shuffled(lists.iter().flatten().step_by(step).map(|&j| &problem.cloud[j]).collect())
+        // Those that chance names first, whatever their numbers.
+        let mut named: Vec<(u64, usize)> = lists.iter().flatten().map(|&j| (name(&problem.cloud[j]), j)).collect();
+        if named.len() > MOST_LOOKED_AT {
+            named.select_nth_unstable(MOST_LOOKED_AT);
+            named.truncate(MOST_LOOKED_AT);
+        }
+        named.sort_unstable();
+        Self::Shuffled(named.into_iter().map(|(_, j)| &problem.cloud[j]).collect())
     }
 
     /// ln of the density of a candidate that is left out of the sampled densities.
@@ -64,6 +72,11 @@ impl<'a> Null<'a> {
     }
 }
 
+/// A number that looks random and depends on nothing but where the point is.
+fn name(point: &MeasuredPoint) -> u64 {
+    coordinates(point).iter().fold(0, |name, x| mixed(name ^ x.to_bits()))
+}
+
 /// The box of each model point. Of a Gaussian prior's ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ² it is the one
 /// of the same volume and proportions.
 fn shells(problem: &Problem<'_>, prior: &Prior) -> Vec<Shell> {
@@ -74,8 +87,9 @@ fn shells(problem: &Problem<'_>, prior: &Prior) -> Vec<Shell> {
             PriorBound::Box(half) => Vector3::repeat(*half),
             PriorBound::Gaussian(covariance) => {
                 let own = point.sigma * point.sigma;
-                let noise = list.first().map_or(nalgebra::Matrix3::zeros(), |&j| problem.cloud[j].position.covariance);
-                let s = covariance.of_point(&centre) + noise + nalgebra::Matrix3::identity() * own;
+                let noise = list.iter().map(|&j| problem.cloud[j].position.covariance).sum::<Matrix3<f64>>();
+                let noise = noise / list.len().max(1) as f64;
+                let s = covariance.of_point(&centre) + noise + Matrix3::identity() * own;
                 let axes = s.diagonal().map(|variance| variance.max(0.0).sqrt());
                 let volume = 4.0 / 3.0 * std::f64::consts::PI * chi_square(3, CONFIDENCE).powf(1.5);
                 let ellipsoid = volume * s.determinant().max(0.0).sqrt();

@@ -12,8 +12,6 @@ use crate::{Problem, Tolerance};
 
 /// Nothing is measured better (m).
 const FLOOR: f64 = 1e-9;
-/// Candidates whose covariances are averaged.
-const MOST_AVERAGED: usize = 64;
 /// Directions of the errors a sample of few points; of more points there is one.
 const DIRECTIONS: usize = 2;
 const FEW: usize = 5;
@@ -43,10 +41,8 @@ pub(super) struct Noise {
 impl Noise {
     pub(super) fn of(problem: &Problem<'_>) -> Self {
         let lists = &problem.candidates.lists;
-        let all: usize = lists.iter().map(Vec::len).sum();
-        let step = all.div_ceil(MOST_AVERAGED).max(1);
         let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
-        for &j in lists.iter().flatten().step_by(step) {
+        for &j in lists.iter().flatten() {
             sum += problem.cloud[j].position.covariance;
             count += 1.0;
         }

@@ -19,9 +19,9 @@ pub(super) struct Subsets {
 }
 
 impl Subsets {
-    pub(super) fn new(lengths: impl Iterator<Item = usize>, size: usize) -> Self {
-        let mut points: Vec<(usize, f64)> =
-            lengths.enumerate().filter(|&(_, m)| m > 0).map(|(i, m)| (i, m as f64)).collect();
+    /// Of model points with these numbers of candidates: what is drawn depends on the order in which they come.
+    pub(super) fn new(lengths: impl Iterator<Item = (usize, usize)>, size: usize) -> Self {
+        let mut points: Vec<(usize, f64)> = lengths.filter(|&(_, m)| m > 0).map(|(i, m)| (i, m as f64)).collect();
         let n = points.len();
         let mean = points.iter().map(|(_, m)| m).sum::<f64>() / n.max(1) as f64;
         points.iter_mut().for_each(|(_, m)| *m /= mean);
@@ -64,19 +64,20 @@ impl Subsets {
         self.ln_tuples
     }
 
-    /// The next subset, ascending.
+    /// The next subset, in the order of the points.
     pub(super) fn next(&mut self, sequence: &mut Sequence) -> &[usize] {
         self.set.clear();
         let mut u = sequence.even();
         let n = self.points.len();
         if self.table.is_empty() {
             while self.set.len() < self.size.min(n) {
-                let next = self.points[sequence.below(n)].0;
+                let next = sequence.below(n);
                 if !self.set.contains(&next) {
                     self.set.push(next);
                 }
             }
             self.set.sort_unstable();
+            self.set.iter_mut().for_each(|place| *place = self.points[*place].0);
             return &self.set;
         }
         // One number decodes the subset: each inclusion takes its share of the interval.
@@ -110,17 +111,17 @@ mod tests {
     #[test]
     fn subsets_are_weighed_by_their_lists() {
         // e_3 of (1, 2, 3, 4) = 6 + 8 + 12 + 24.
-        let mut subsets = Subsets::new([1, 2, 3, 0, 4].into_iter(), 3);
+        let mut subsets = Subsets::new([1, 2, 3, 0, 4].into_iter().enumerate(), 3);
         assert!((subsets.ln_tuples().exp() - 50.0).abs() < 1e-9);
         let mut sequence = Sequence::new(0);
         let last = (0..5000).filter(|_| subsets.next(&mut sequence) == [1, 2, 4]).count();
         assert!((last as f64 / 5000.0 - 24.0 / 50.0).abs() < 0.01, "{last}");
-        assert_eq!(Subsets::new([1, 1].into_iter(), 3).ln_tuples(), f64::NEG_INFINITY);
+        assert_eq!(Subsets::new([1, 1].into_iter().enumerate(), 3).ln_tuples(), f64::NEG_INFINITY);
     }
 
     #[test]
     fn lists_of_one_length_are_drawn_evenly() {
-        let mut subsets = Subsets::new([7; 5].into_iter(), 2);
+        let mut subsets = Subsets::new([7; 5].into_iter().enumerate(), 2);
         assert!((subsets.ln_tuples().exp() - 490.0).abs() < 1e-9);
         let mut sequence = Sequence::new(0);
         let first = (0..5000).filter(|_| subsets.next(&mut sequence) == [0, 1]).count();

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix3, Vector3};
-use rand::{RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
-use seafix_geometry::{Point, Transform, UncertainPoint};
+use seafix_geometry::{Covariance6, Point, Transform, UncertainPoint};
 
 use super::*;
 use crate::{Candidates, ModelPoint, Prior, PriorBound, Tolerance, search::mirrored};
@@ -137,6 +137,56 @@ fn candidates_anywhere() {
     for (size, each, frames) in [(3, 1.0, 15), (3, 5.0, 5)] {
         let ratio = ratio(size, each, 0.0424, frames, || anywhere(1.0, 40, &mut rng));
         assert!((0.7..1.4).contains(&ratio), "size {size}, chi2/dof {each}: {ratio} times");
+    }
+}
+
+/// The same frame with its points in any other order.
+fn renumbered(frame: &Frame, rng: &mut ChaCha8Rng) -> Frame {
+    let mut shuffled = |n: usize| {
+        let mut order: Vec<usize> = (0..n).collect();
+        order.shuffle(rng);
+        order
+    };
+    let (models, clouds) = (shuffled(frame.model.len()), shuffled(frame.cloud.len()));
+    let mut new = vec![0; clouds.len()];
+    clouds.iter().enumerate().for_each(|(k, &j)| new[j] = k);
+    let renamed = |list: &Vec<usize>| {
+        let mut list: Vec<usize> = list.iter().map(|&j| new[j]).collect();
+        list.sort_unstable();
+        list
+    };
+    Frame {
+        model: models.iter().map(|&i| frame.model[i].clone()).collect(),
+        cloud: clouds.iter().map(|&j| frame.cloud[j]).collect(),
+        candidates: Candidates { lists: models.iter().map(|&i| renamed(&frame.candidates.lists[i])).collect() },
+        prior: frame.prior.clone(),
+    }
+}
+
+/// What is expected does not depend on the numbers of the points.
+#[test]
+fn an_order_of_the_points_is_as_good_as_another() {
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let gaussian = |frame: Frame| {
+        let bound = PriorBound::Gaussian(Covariance6::isotropic(0.1, 0.1));
+        Frame { prior: frame.prior.map(|prior| Prior { bound, ..prior }), ..frame }
+    };
+    let frames = [
+        shells(0.3, 8, [0.008, 0.008, 0.024], &mut rng),
+        gaussian(shells(0.3, 12, [0.01; 3], &mut rng)),
+        anywhere(1.0, 40, &mut rng),
+        putative(60, &mut rng),
+        putative(500, &mut rng),
+    ];
+    for (number, frame) in frames.iter().enumerate() {
+        for size in [3, 5] {
+            let expected = expected_chance_sets(&frame.problem(0.05), size, freedom(size));
+            for _ in 0..5 {
+                let other = renumbered(frame, &mut rng);
+                let again = expected_chance_sets(&other.problem(0.05), size, freedom(size));
+                assert!((again / expected - 1.0).abs() < 1e-9, "frame {number}, size {size}: {expected}, {again}");
+            }
+        }
     }
 }
 
