@@ -23,6 +23,8 @@ const MOST_BYTES: u64 = 48 << 20;
 const MOST_POINTS: usize = 500_000;
 /// A point known worse than this (m) is not known, and the cube of its variance is still a number.
 const MOST_SIGMA: f64 = 1e15;
+/// Largest coordinate of a model (m): beyond, a double no longer tells micrometres. A cloud may have blunders farther away.
+const FARTHEST: f64 = 1e9;
 
 /// An identification problem, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +97,11 @@ impl CoherenceProblem {
                 let what = format!("{name} point {index} is not finite");
                 return Err(fault(&what).value(format!("{:?}", rows[index])).remedy("give finite numbers, in metres"));
             }
+        }
+        if let Some(index) = raw.model.iter().position(|row| row.iter().any(|x| x.abs() > FARTHEST)) {
+            let what = format!("model point {index} is no part of an object");
+            let remedy = format!("give metres, none beyond {FARTHEST:e}");
+            return Err(fault(&what).value(format!("{:?}", raw.model[index])).remedy(remedy));
         }
         let is_sigma = |sigma: f64| (0.0..=MOST_SIGMA).contains(&sigma);
         let of_sigma = || format!("give metres, zero to {MOST_SIGMA:e}");

@@ -140,6 +140,9 @@ fn every_fault_names_its_place() {
     assert!(parse(&GOOD.replacen("0.04", "0.81", 1)).is_ok());
     assert!(fault("0.01", "-0.01").starts_with("`sigma` is out of range"));
     assert!(fault("[0.5,0.5,1]", "[0.5,1e999,1]").contains("p.json:2"), "no finite number");
+    assert!(
+        fault("[0.5,0.5,1]", "[0.5,1e10,1]").starts_with("model point 3 is no part of an object in p.json: [0.5, 1")
+    );
     assert!(fault("[0.5,0.5,1]", "[0.5,NaN,1]").contains("p.json:2"), "no JSON");
     assert!(fault("[0.5,0.5,1]", "[0.5,1]").contains("p.json:2"), "two coordinates");
     assert!(fault("null}", "[[0,5]]}").starts_with("putative pair 0 points nowhere in p.json: [0, 5]"));
