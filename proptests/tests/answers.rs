@@ -11,7 +11,7 @@ use seafix_simulation::families::{Drawn, Family, Presence};
 
 /// Problems of each family, of those that have no more points than this, and other orders of each.
 const PROBLEMS: usize = 8;
-const MOST_POINTS: usize = 1000;
+const MOST_POINTS: usize = 300;
 const ORDERS: usize = 2;
 
 /// The numbers of the points of a problem in another order: the new place k has the old point order[k].

@@ -56,3 +56,28 @@ fn a_solver_of_pixels_is_refused_on_points_alone() {
         assert!(said.contains(name) && said.contains("`mahalanobis`") && output.stdout.is_empty(), "{said}");
     }
 }
+
+/// Seen to fail where what `--set` says is read and not used.
+#[test]
+fn settings_are_used_and_wrong_ones_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = problem(&folder);
+    let said = |settings: &[&str]| {
+        let output = solve(&[&["--json", &path], settings].concat());
+        let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+        (output.status.code().unwrap(), text)
+    };
+    let (code, text) = said(&["--search", "maximum-clique", "--set", "search.budget=1"]);
+    assert!(code == 0 && text.contains(r#""reason":"budget""#), "{text}");
+    let (code, text) = said(&["--set", "acceptance.least-points=100"]);
+    assert!(code == 0 && text.contains(r#""outcome":"unidentified""#), "{text}");
+    for (setting, named) in [
+        ("search.budgte=1", "`budgte`, did you mean `budget`?"),
+        ("search.budget=0", "budget"),
+        ("detector.sigma=1.5", "`detector`"),
+        ("acceptance.absence=2.0", "absence"),
+    ] {
+        let (code, text) = said(&["--set", setting]);
+        assert!(code == 2 && text.contains(named) && text.lines().count() == 1, "{setting}: {code} {text}");
+    }
+}

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use rayon::prelude::*;
 use seafix_component::Choice;
+use seafix_experiment::changed;
 use seafix_referencing::{
     Acceptance, SEARCHES, SOLVERS,
     problem_file::{Answer, Line, Method, solve_file},
 };
 use seafix_simulation::{Purpose, Stream};
+use serde::{Deserialize, Serialize};
 
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
@@ -27,6 +29,10 @@ pub(crate) struct Solve {
     /// The solver. These problems have no pixels, so it must take bare points.
     #[arg(long, default_value = "mahalanobis")]
     solver: String,
+    /// Change a setting of the search, the solver or of what is believed: a dotted key and a TOML value,
+    /// `search.budget=1000000`, `acceptance.absence=1e-3`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
     /// How many problems are worked on at a time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
@@ -38,20 +44,43 @@ pub(crate) struct Solve {
     json: bool,
 }
 
+/// What a problem is solved with.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Settings {
+    search: Choice,
+    solver: Choice,
+    acceptance: Acceptance,
+}
+
 impl Solve {
+    fn settings(&self) -> Result<Settings, Failure> {
+        let usage = |error| Failure::new(USAGE, error);
+        let named = Settings {
+            search: SEARCHES.resolve(&Choice::named(&self.search)).map_err(usage)?,
+            solver: SOLVERS.resolve(&Choice::named(&self.solver)).map_err(usage)?,
+            acceptance: Acceptance::default(),
+        };
+        let settings: Settings =
+            changed(&named, &self.set, "search.budget=1000000").map_err(|faults| Failure::faults(USAGE, &faults))?;
+        settings.acceptance.check().map_err(|what| Failure::new(USAGE, what))?;
+        Ok(settings)
+    }
+
     pub(crate) fn execute(&self) -> Ended {
         let usage = |error| Failure::new(USAGE, error);
-        let search = SEARCHES.build(&Choice::named(&self.search)).map_err(usage)?;
-        let solver = SOLVERS.build(&Choice::named(&self.solver)).map_err(usage)?;
+        let settings = self.settings()?;
+        let search = SEARCHES.build(&settings.search).map_err(usage)?;
+        let solver = SOLVERS.build(&settings.solver).map_err(usage)?;
         if solver.needs_pixels() {
-            let what = format!("solver `{}` needs pixels and a rig, which these problems have not", self.solver);
+            let what =
+                format!("solver `{}` needs pixels and a rig, which these problems have not", settings.solver.name);
             return Err(Failure::new(USAGE, format!("{what}; use `mahalanobis`")));
         }
-        let acceptance = Acceptance::default();
         let method = Method {
-            search: (&self.search, &*search),
-            solver: (&self.solver, &*solver),
-            acceptance: &acceptance,
+            search: (&settings.search.name, &*search),
+            solver: (&settings.solver.name, &*solver),
+            acceptance: &settings.acceptance,
             widen: self.widen,
         };
         let solve = |path: &PathBuf| {
