@@ -10,9 +10,10 @@ mod surface;
 pub mod trajectory;
 
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
-pub use fix::{alert_limit, attitude_error, nees, position_error, residual_rms, transfer_rms};
+pub use fix::{alert_limit, attitude_error, lever_arm_error, nees, position_error, residual_rms, transfer_rms};
 pub use solved::Solved;
 pub use statistics::{
-    Bootstrap, SignedRank, clopper_pearson, clustered, holm, mcnemar, median, of_blocks, quantile, signed_rank,
+    Bootstrap, SignedRank, clopper_pearson, clustered, holm, mcnemar, median, of_blocks, quantile, recall_area,
+    signed_rank,
 };
 pub use surface::{mean_distance, mean_nearest_distance, symmetric_distance};

@@ -37,6 +37,14 @@ pub(crate) fn unit(key: &str) -> Option<&'static str> {
     }
 }
 
+/// Whether a larger value of an axis makes the same task harder: of what surrounds the vehicle, not of how the method is set.
+pub(crate) fn harder(key: &str) -> bool {
+    let name = short(key);
+    let words =
+        ["clutter", "outliers", "noise", "attenuation", "turbidity", "distance", "altitude", "speed", "occlusion"];
+    words.contains(&name) || matches!(unit(key), Some("px"))
+}
+
 /// A key with its unit, as the head of a column.
 pub(crate) fn headed(key: &str) -> String {
     match unit(key) {

@@ -16,6 +16,7 @@ mod field;
 mod figure;
 mod format;
 mod index;
+mod lever;
 mod looked;
 mod number;
 mod paired;

@@ -7,11 +7,12 @@ use std::{
 };
 
 use rayon::prelude::*;
+use seafix_evaluation::lever_arm_error;
 use seafix_log::{ELSEWHERE, FrameRecord, LogError, Outcome, Reader, Region, TargetRecord, Totals, TrialHeader};
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Field, ReportError, disparity,
+    Field, ReportError, disparity, lever,
     looked::{self, Looked},
     place,
     sailed::{Counted, Sailed},
@@ -95,6 +96,9 @@ pub(crate) struct Attempt {
     pub(crate) points: u32,
     /// Where the left camera is in the world by this fix and the survey (m); NaN where unknown.
     pub(crate) estimate: [f64; 3],
+    /// How far the fix has the centroid of the points that it used from its place (m), and the angle by which it is turned
+    /// (rad); NaN where unknown.
+    displacement: [f64; 2],
     object: u32,
     reason: u32,
     values: [f64; Field::ALL.len()],
@@ -191,6 +195,7 @@ impl Trial {
                 wrong: target.evaluation.wrong,
                 points: target.pairs.len() as u32,
                 estimate: place::estimate(&self.header, target),
+                displacement: lever::displacement(&self.header, frame.truth.as_ref(), target),
                 object,
                 reason,
                 values: values(target),
@@ -356,6 +361,12 @@ impl Attempt {
     pub(crate) fn region(&self) -> Option<Region> {
         let (error, limit) = (self.get(Field::Position)?, self.get(Field::Limit)?);
         (self.outcome == Outcome::Referenced).then(|| Region::of(error, self.get(Field::Level), limit))
+    }
+
+    /// Its error at a lever arm of this length (m); `None` where it is not known.
+    pub(crate) fn at_arm(&self, arm: f64) -> Option<f64> {
+        let [displacement, angle] = self.displacement;
+        (!displacement.is_nan()).then(|| lever_arm_error(displacement, angle, arm))
     }
 
     /// What a comparison takes for its error: infinity where there is none, or a wrong one.

@@ -9,6 +9,7 @@ mod holm;
 mod mcnemar;
 mod quantile;
 mod rate;
+mod recall;
 mod wilcoxon;
 
 pub use bootstrap::Bootstrap;
@@ -17,4 +18,5 @@ pub use holm::holm;
 pub use mcnemar::mcnemar;
 pub use quantile::{median, quantile};
 pub use rate::clopper_pearson;
+pub use recall::recall_area;
 pub use wilcoxon::{SignedRank, signed_rank};

@@ -3,6 +3,7 @@
 mod ablation;
 mod abstract_;
 mod answer;
+mod breakdown;
 mod data;
 mod failures;
 mod figures;
@@ -14,12 +15,15 @@ mod method;
 mod navigation;
 mod objects;
 mod protocol;
+mod reach;
 mod reproduce;
 mod results;
 mod significance;
 mod tell;
 mod threats;
 mod time;
+
+pub(crate) use breakdown::BORNE;
 
 use std::collections::BTreeSet;
 

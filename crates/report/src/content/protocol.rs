@@ -1,7 +1,9 @@
 //! How it was judged: metrics, thresholds, trials, statistics, all fixed beforehand.
 
+use super::BORNE;
 use crate::{
     document::{Block, Section, italic, text},
+    format::harder,
     paired::{ALPHA, Comparison, SEED},
     run::Run,
     share,
@@ -23,7 +25,7 @@ fn intervals(run: &Run) -> String {
 
 pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     let [h, c, p, e] = ["H", "C", "P", "E"].map(italic);
-    let terms = vec![
+    let mut terms = vec![
         (
             text![italic("found, refused, wrong")],
             text![
@@ -63,7 +65,11 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         ),
         (
             text![italic("m3")],
-            text!["Error of the left camera’s position in the frame of the target, and the rotation angle of ", e, "."],
+            text![
+                "Error of the left camera’s position in the frame of the target, and the rotation angle of ",
+                e.clone(),
+                "."
+            ],
         ),
         (
             text![italic("NEES")],
@@ -72,6 +78,42 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             ],
         ),
     ];
+    if run.trials.iter().any(|trial| trial.frames.iter().any(|frame| frame.truth.is_some())) {
+        terms.push((
+            text![italic("area under recall")],
+            text![
+                "The mean over all attempts of max(0, 1 − error/bound): 1 for no error, 0 from the bound on and for every attempt refused or wrong. Bounds, set beforehand: 50 mm for m2, 5° for the attitude of m3."
+            ],
+        ));
+        terms.push((
+            text![italic("at a lever arm")],
+            text![
+                "Error of a point 1, 2 or 5 m from the centroid of the points that the fix used: the root mean square over all directions of the arm, √(‖",
+                e.clone(),
+                " ",
+                italic("c"),
+                " − ",
+                italic("c"),
+                "‖² + 8/3 ",
+                italic("a"),
+                "² sin²(θ/2)), ",
+                italic("c"),
+                " the centroid, ",
+                italic("a"),
+                " the arm, θ the angle of ",
+                e.clone(),
+                "."
+            ],
+        ));
+    }
+    if run.header().axes.iter().any(|axis| harder(&axis.key)) {
+        terms.push((
+            text![italic("borne")],
+            text![format!(
+                "A condition is borne where at least {BORNE} % of the attempts are found, a share set beforehand; the break-down point is the largest value up to which every one that was tried is."
+            )],
+        ));
+    }
     let mut section = Section::new("Protocol").with([
         Block::Paragraph(text![
             "Metrics are defined below, thresholds stand in the configuration (last section). No frame is excluded: one without an answer stays in every denominator. Medians and quantiles are over the fixes found, and say so; no failure is averaged into an error."

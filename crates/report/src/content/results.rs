@@ -1,7 +1,7 @@
 //! The tables of results.
 
 use super::{
-    best, figures, limits,
+    best, breakdown, figures, limits, reach,
     tell::{self, Unit},
 };
 use crate::{
@@ -19,7 +19,13 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
     if limits::known(summary) {
         section.blocks.extend(limits::blocks(run, summary));
     }
-    section.blocks.extend(figures::blocks(run, summary));
+    let mut drawn = figures::blocks(run, summary);
+    // The areas stand beside their curves.
+    let recall = drawn.iter().position(|block| matches!(block, Block::Figure(figure) if figure.id == "recall"));
+    let place = recall.map_or(drawn.len(), |place| place + 1);
+    drawn.splice(place..place, reach::table(run, summary));
+    section.blocks.extend(breakdown::block(run, summary));
+    section.blocks.extend(drawn);
     match refusals(run, summary) {
         Some(table) => section.add(Block::Table(table)),
         None => section.say(text!["No attempt was refused."]),

@@ -5,9 +5,11 @@ use std::{collections::BTreeMap, rc::Rc};
 use seafix_evaluation::{holm, mcnemar, quantile};
 use seafix_log::{FrameTimes, Outcome, Region, TargetRecord};
 
-use super::logs::{Log, Logs};
+use super::logs::{Log, Logs, Row};
 use crate::{
     Field, Key, ReportError,
+    content::BORNE,
+    lever::ARMS,
     looked::{self, Looked},
     paired::Statistics,
     sailed::{Counted, Sailed},
@@ -32,10 +34,7 @@ pub(super) fn evaluate(key: &Key, logs: &mut Logs) -> Result<Answer, ReportError
     Ok(answer(&key.what, key.span, &all).ok_or_else(|| format!("nobody knows what `{}` is", key.what)))
 }
 
-/// One attempt of a log, with the number of its candidates.
-type Row<'a> = &'a (TargetRecord, usize, [f64; 3]);
-
-fn rows(log: &Log, span: [u64; 2]) -> impl Iterator<Item = Row<'_>> {
+fn rows(log: &Log, span: [u64; 2]) -> impl Iterator<Item = &Row> {
     log.sample(span).flat_map(|frame| &frame.rows)
 }
 
@@ -72,11 +71,24 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     if let Some(of) = rest.strip_suffix(" half octaves of candidates") {
         let (field, bin) = of.split_once(" at ")?;
         let (field, bin): (Field, f64) = (Field::named(field)?, bin.parse().ok()?);
-        let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.1 > 0);
-        let own = own.filter(|row| (2.0 * (row.1 as f64).log2()).round() / 2.0 == bin);
-        return statistic(first, own.filter_map(|row| field.of(&row.0)).filter(|cost| *cost > 0.0).collect());
+        let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.candidates > 0);
+        let own = own.filter(|row| (2.0 * (row.candidates as f64).log2()).round() / 2.0 == bin);
+        return statistic(first, own.filter_map(|row| field.of(&row.record)).filter(|cost| *cost > 0.0).collect());
     }
     Some(match (first, rest) {
+        ("borne" | "surely-borne", of) => {
+            let key = of.strip_prefix("found along ")?;
+            let end = if first == "borne" { "percent" } else { "low" };
+            let mut largest = None;
+            for log in logs {
+                let share = share_of(end, "found of attempted", scale, span, &[log])?;
+                if share.is_none_or(|share| share < BORNE) {
+                    break;
+                }
+                largest = Some(log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok()?);
+            }
+            largest
+        }
         ("axis", key) => log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok(),
         ("every", _) => Some(log.totals.as_ref()?.every as f64),
         ("frame", _) => Some(at(log, span)?.number as f64),
@@ -95,8 +107,9 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let (which, size) = group.strip_suffix(" targets")?.split_once(" with ")?;
             let size: usize = size.parse().ok()?;
             let own = logs.iter().flat_map(|log| log.sample(span)).filter(|frame| frame.rows.len() == size);
-            Some(own.filter(|frame| which == "frames" || frame.rows.iter().any(|row| found(&row.0))).count() as f64)
+            Some(own.filter(|frame| which == "frames" || frame.rows.iter().any(|row| found(&row.record))).count() as f64)
         }
+        ("count", "logged") => Some(rows(log, span).count() as f64),
         ("count", group) => Some(pooled(logs, group, span)? as f64),
         ("percent" | "low" | "high", group) => share_of(first, group, scale, span, logs)?,
         ("sum", fields) => {
@@ -104,8 +117,8 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let (above, below) = fields.split_once(" by ")?;
             let (below, fixes) = below.strip_suffix(" of referenced").map_or((below, false), |below| (below, true));
             let (above, below) = (Field::named(above)?, Field::named(below)?);
-            let own = || rows(log, span).filter(|row| !fixes || row.0.outcome == Outcome::Referenced);
-            let sum = |field: Field| own().filter_map(|row| field.of(&row.0)).sum::<f64>();
+            let own = || rows(log, span).filter(|row| !fixes || row.record.outcome == Outcome::Referenced);
+            let sum = |field: Field| own().filter_map(|row| field.of(&row.record)).sum::<f64>();
             Some(sum(above) / sum(below))
         }
         ("rms", of) if of.ends_with(" of navigated") => {
@@ -118,10 +131,15 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         ("mean", "nees of judged") => totals(first, rest, log)?,
         ("value", of) => single(of, span, log)?.map(|value| value * scale),
         (place, of) if place.starts_with("place-") => located(place, of, span, log)?,
+        ("area", of) => {
+            let (field, bound) = of.strip_suffix(" of attempted")?.split_once("<=")?;
+            let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
+            area(rows(log, span).map(|row| &row.record), field, bound)
+        }
         ("all", of) => {
             let field = Field::named(of.strip_suffix(" of attempted")?)?;
-            let known = rows(log, span).any(|row| found(&row.0) && field.of(&row.0).is_some());
-            let mut values: Vec<f64> = rows(log, span).map(|row| error(&row.0, field)).collect();
+            let known = rows(log, span).any(|row| found(&row.record) && field.of(&row.record).is_some());
+            let mut values: Vec<f64> = rows(log, span).map(|row| error(&row.record, field)).collect();
             values.sort_by(f64::total_cmp);
             values.get(values.len().saturating_sub(1) / 2).filter(|_| known).map(|value| value * scale)
         }
@@ -129,12 +147,18 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let (field, group) = of.split_once(" of ")?;
             let values = match Field::named(field) {
                 Some(field) => {
-                    let own = rows(log, span).filter(|row| group == "attempted" || found(&row.0));
+                    let own = rows(log, span).filter(|row| group == "attempted" || found(&row.record));
                     own.filter_map(|row| value(row, field)).collect()
                 }
                 None if Sailed::named(field).is_some() => {
                     let quantity = Sailed::named(field)?;
                     log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?)).collect()
+                }
+                None if field.starts_with("arm_") => {
+                    let length: f64 = field.strip_prefix("arm_")?.parse().ok()?;
+                    let place = ARMS.iter().position(|arm| *arm == length)?;
+                    let own = rows(log, span).filter(|row| found(&row.record)).map(|row| row.arms[place]);
+                    own.filter(|error| !error.is_nan()).collect()
                 }
                 None => log.sample(span).filter_map(|frame| stage(&frame.times, field)).collect(),
             };
@@ -155,7 +179,7 @@ fn inspected(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log)
 
 /// `count GROUP on the object NAME`, `NAME FIELD of found on the object NAME`.
 fn on_object(name: &str, of: &str, object: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
-    let own = || rows(log, span).filter(|row| row.0.object == object);
+    let own = || rows(log, span).filter(|row| row.record.object == object);
     let is: fn(&TargetRecord) -> bool = match of {
         "attempted" => |_| true,
         "refused" => |row| row.outcome != Outcome::Referenced,
@@ -163,14 +187,14 @@ fn on_object(name: &str, of: &str, object: &str, span: [u64; 2], log: &Log) -> O
         _ => found,
     };
     if name == "count" {
-        return Some(Some(own().filter(|row| is(&row.0)).count() as f64));
+        return Some(Some(own().filter(|row| is(&row.record)).count() as f64));
     }
     let field = Field::named(of.strip_suffix(" of found")?)?;
-    statistic(name, own().filter(|row| found(&row.0)).filter_map(|row| value(row, field)).collect())
+    statistic(name, own().filter(|row| found(&row.record)).filter_map(|row| value(row, field)).collect())
 }
 
-fn value(row: Row<'_>, field: Field) -> Option<f64> {
-    if field == Field::Candidates { Some(row.1 as f64) } else { field.of(&row.0) }
+fn value(row: &Row, field: Field) -> Option<f64> {
+    if field == Field::Candidates { Some(row.candidates as f64) } else { field.of(&row.record) }
 }
 
 fn found(row: &TargetRecord) -> bool {
@@ -179,6 +203,19 @@ fn found(row: &TargetRecord) -> bool {
 
 fn error(row: &TargetRecord, field: Field) -> f64 {
     if found(row) { field.of(row).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
+}
+
+/// The area under recall up to `bound`, in percent, step by step of the curve; nothing where a fix has no error.
+fn area<'a>(attempts: impl Iterator<Item = &'a TargetRecord>, field: Field, bound: f64) -> Option<f64> {
+    let attempts: Vec<&TargetRecord> = attempts.collect();
+    if attempts.is_empty() || attempts.iter().any(|row| found(row) && field.of(row).is_none()) {
+        return None;
+    }
+    let mut errors: Vec<f64> = attempts.iter().map(|row| error(row, field).min(bound)).collect();
+    errors.sort_by(f64::total_cmp);
+    errors.push(bound);
+    let steps = errors.windows(2).enumerate().map(|(below, two)| (below + 1) as f64 * (two[1] - two[0]));
+    Some(100.0 * steps.sum::<f64>() / (attempts.len() as f64 * bound))
 }
 
 fn at(log: &Log, span: [u64; 2]) -> Option<&super::logs::Seen> {
@@ -223,7 +260,7 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
     if let Some(region) = Region::ALL.into_iter().find(|region| region.name() == group) {
         return Some(match log.totals.as_ref().and_then(|totals| totals.regions) {
             Some(counts) => counts[region as usize] as usize,
-            None => rows(log, span).filter(|row| inside(region, &row.0)).count(),
+            None => rows(log, span).filter(|row| inside(region, &row.record)).count(),
         });
     }
     if let Some(totals) = &log.totals {
@@ -241,9 +278,9 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
         };
         return usize::try_from(n).ok();
     }
-    let is = |of: fn(&TargetRecord) -> bool| rows(log, span).filter(|row| of(&row.0)).count();
+    let is = |of: fn(&TargetRecord) -> bool| rows(log, span).filter(|row| of(&row.record)).count();
     let frames =
-        |of: fn(&TargetRecord) -> bool| log.sample(span).filter(|f| f.rows.iter().any(|row| of(&row.0))).count();
+        |of: fn(&TargetRecord) -> bool| log.sample(span).filter(|f| f.rows.iter().any(|row| of(&row.record))).count();
     let fixed = |row: &TargetRecord| row.outcome == Outcome::Referenced;
     let wrong = |row: &TargetRecord| row.outcome == Outcome::Referenced && row.evaluation.wrong == Some(true);
     Some(match group {
@@ -257,10 +294,14 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
         "refused" => is(|row| row.outcome != Outcome::Referenced),
         _ => {
             let reason = group.strip_prefix("refused:")?;
-            let of = |row: Row<'_>| {
-                if row.0.reason.is_empty() { row.0.outcome.name() == reason } else { row.0.reason == reason }
+            let of = |row: &Row| {
+                if row.record.reason.is_empty() {
+                    row.record.outcome.name() == reason
+                } else {
+                    row.record.reason == reason
+                }
             };
-            rows(log, span).filter(|row| row.0.outcome != Outcome::Referenced && of(row)).count()
+            rows(log, span).filter(|row| row.record.outcome != Outcome::Referenced && of(row)).count()
         }
     })
 }
@@ -300,10 +341,10 @@ fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log])
     if let Some((field, bound)) = group.split_once("<=") {
         let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
         if fixes.is_some() {
-            let own = all().filter(|row| row.0.outcome == Outcome::Referenced);
-            return Some(known(own.filter_map(|row| field.of(&row.0)).map(|value| value <= bound).collect()));
+            let own = all().filter(|row| row.record.outcome == Outcome::Referenced);
+            return Some(known(own.filter_map(|row| field.of(&row.record)).map(|value| value <= bound).collect()));
         }
-        let errors: Vec<f64> = all().map(|row| error(&row.0, field)).collect();
+        let errors: Vec<f64> = all().map(|row| error(&row.record, field)).collect();
         if which != "percent" {
             // An end of a band follows from those of the other bounds.
             let at = share::bounds().position(|(_, known)| known == bound)?;
@@ -320,7 +361,7 @@ fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log])
             ("wrong", _) => row.outcome == Outcome::Referenced && !found(row),
             (_, region) => region.is_some_and(|region| inside(region, row)),
         };
-        return Some(known(all().map(|row| is(&row.0)).collect()));
+        return Some(known(all().map(|row| is(&row.record)).collect()));
     }
     let (k, n) = (pooled(logs, group, span)?, pooled(logs, "attempted", span)?);
     let (low, high) = share::interval_of_counts(trajectory, k, n);
@@ -336,8 +377,8 @@ fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log])
 fn histogram(which: &str, range: &str, span: [u64; 2], logs: &[&Log]) -> Option<f64> {
     let (from, to) = range.strip_prefix("nees from ")?.strip_suffix(" of found")?.split_once(" to ")?;
     let (from, to): (f64, f64) = (from.parse().ok()?, to.parse().ok()?);
-    let found = logs.iter().flat_map(|log| rows(log, span)).filter(|row| found(&row.0));
-    let all: Vec<f64> = found.filter_map(|row| row.0.evaluation.nees).collect();
+    let found = logs.iter().flat_map(|log| rows(log, span)).filter(|row| found(&row.record));
+    let all: Vec<f64> = found.filter_map(|row| row.record.evaluation.nees).collect();
     let inside = all.iter().filter(|nees| **nees >= from && **nees < to).count();
     // The last column is as wide as all others in the drawing.
     let width = if to.is_finite() { to - from } else { 1.5 };
@@ -374,7 +415,7 @@ fn single(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
         return Some(quantity.of(frame.navigation.as_deref()?));
     }
     let field = Field::named(field)?;
-    let row = frame.rows.iter().find(|row| row.0.object == object)?;
+    let row = frame.rows.iter().find(|row| row.record.object == object)?;
     Some(value(row, field))
 }
 
@@ -388,7 +429,7 @@ fn located(axis: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64
         "truth" => Some(frame.truth?[axis]),
         "navigated" => Some(frame.carried[0][axis]),
         "odometry" => Some(frame.carried[1][axis]),
-        _ => Some(frame.rows.iter().find(|row| row.0.object == object)?.2[axis]),
+        _ => Some(frame.rows.iter().find(|row| row.record.object == object)?.at[axis]),
     })
 }
 
@@ -432,7 +473,7 @@ fn once(logs: &[&Log], span: [u64; 2], conditions: bool) -> Rc<(usize, Statistic
 fn errors(first: &Log, second: &Log, span: [u64; 2]) -> Vec<(f64, f64)> {
     let of = |log: &Log| -> BTreeMap<(u64, String), f64> {
         let rows = log.sample(span).flat_map(|frame| frame.rows.iter().map(move |row| (frame.number, row)));
-        rows.map(|(number, row)| ((number, row.0.object.clone()), error(&row.0, Field::M2))).collect()
+        rows.map(|(number, row)| ((number, row.record.object.clone()), error(&row.record, Field::M2))).collect()
     };
     let second = of(second);
     of(first).into_iter().filter_map(|(key, error)| Some((error, *second.get(&key)?))).collect()

@@ -7,9 +7,11 @@ use std::{
     rc::Rc,
 };
 
-use seafix_log::{FrameTimes, InspectedPoint, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader};
+use seafix_log::{
+    FrameTimes, InspectedPoint, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader, TruthRecord,
+};
 
-use crate::{ReportError, disparity, paired::Statistics, place};
+use crate::{ReportError, disparity, lever, paired::Statistics, place};
 
 /// The logs of a run.
 pub(super) struct Logs {
@@ -40,8 +42,18 @@ pub(super) struct Seen {
     pub(super) inspected: Vec<InspectedPoint>,
     /// Key points, points, candidates, identified, used.
     pub(super) marks: [usize; 5],
-    /// Attempts, with the number of their candidates and where they put the camera.
-    pub(super) rows: Vec<(TargetRecord, usize, [f64; 3])>,
+    pub(super) rows: Vec<Row>,
+}
+
+/// One attempt.
+pub(super) struct Row {
+    pub(super) record: TargetRecord,
+    /// How many candidates its points have together.
+    pub(super) candidates: usize,
+    /// Where it puts the camera.
+    pub(super) at: [f64; 3],
+    /// Its error at each of the lever arms; NaN where unknown.
+    pub(super) arms: [f64; 3],
 }
 
 impl Logs {
@@ -91,10 +103,11 @@ impl Log {
             ];
             let rows = frame.targets.into_iter().filter(TargetRecord::attempted).map(|mut row| {
                 let lists = std::mem::take(&mut row.candidates);
+                let arms = lever::ARMS.map(|arm| moved(&header, frame.truth.as_ref(), &row, arm));
                 (row.pairs, row.used, row.alternatives) = Default::default();
                 place::limit(&header, &mut row);
                 let at = place::estimate(&header, &row);
-                (row, lists.iter().map(Vec::len).sum(), at)
+                Row { record: row, candidates: lists.iter().map(Vec::len).sum(), at, arms }
             });
             let carried = frame.navigation.as_deref().map_or([[f64::NAN; 3]; 2], |known| {
                 [&known.pose, &known.unreferenced].map(|pose| place::carried(&header, pose.as_ref()))
@@ -130,4 +143,15 @@ impl Log {
         let every = self.totals.as_ref().map_or(1, |totals| totals.every.max(1));
         self.frames.iter().filter(move |frame| frame.number % every == 0 && (from..=to).contains(&frame.stamp_ns))
     }
+}
+
+/// How far points are moved that stand around the centroid, six along the axes: their mean square is that of a sphere of them.
+fn moved(header: &TrialHeader, truth: Option<&TruthRecord>, row: &TargetRecord, arm: f64) -> f64 {
+    let Some((e, centroid)) = lever::misplaced(header, truth, row) else { return f64::NAN };
+    let ends = (0..6).map(|k| {
+        let mut end = centroid;
+        end[k / 2] += if k % 2 == 0 { arm } else { -arm };
+        (e.transform_point(&end.into()).coords - end).norm_squared()
+    });
+    (ends.sum::<f64>() / 6.0).sqrt()
 }

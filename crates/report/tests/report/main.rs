@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+mod breakdown;
 mod browser;
 mod compared;
 mod harmless;
@@ -9,4 +10,5 @@ mod integrity;
 mod made_up;
 mod objects;
 mod paper;
+mod reach;
 mod verified;

@@ -16,7 +16,7 @@ pub(in crate::content) fn numeric(summary: &Summary) -> Option<String> {
 }
 
 /// All conditions with numbers that vary.
-pub(super) fn keys(summary: &Summary) -> Vec<String> {
+pub(in crate::content) fn keys(summary: &Summary) -> Vec<String> {
     let axes = summary.rows.first().into_iter().flat_map(Row::conditions);
     let varies = |key: &String| {
         let values: Vec<Option<f64>> = summary.rows.iter().map(|row| on(row, key)).collect();
@@ -26,12 +26,12 @@ pub(super) fn keys(summary: &Summary) -> Vec<String> {
 }
 
 /// The value of a row on an axis.
-pub(super) fn on(row: &Row, key: &str) -> Option<f64> {
+pub(in crate::content) fn on(row: &Row, key: &str) -> Option<f64> {
     row.axes.iter().find(|axis| axis.key == key).and_then(|axis| axis.value.parse().ok())
 }
 
 /// What tells a row's line from the others of a figure over `key`.
-pub(super) fn name(row: &Row, key: &str) -> String {
+pub(in crate::content) fn name(row: &Row, key: &str) -> String {
     let others = row.conditions().filter(|axis| axis.key != key);
     others.fold(row.method(), |name, axis| format!("{name}, {} {}", short(&axis.key), axis.value))
 }

@@ -22,7 +22,7 @@ use crate::{
 
 use super::{data::baseline, distinct};
 
-pub(super) use axis::numeric;
+pub(super) use axis::{keys, name, numeric, on};
 pub(super) use cost::search_cost;
 pub(super) use sawtooth::figure as sawtooth;
 

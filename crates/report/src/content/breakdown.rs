@@ -1,0 +1,102 @@
+//! Up to where a method bears what makes its task harder.
+
+use super::{distinct, figures, tell};
+use crate::{
+    Key, Number, Row, Summary,
+    document::{Block, Cell, Head, Table, text},
+    format::{harder, headed},
+    run::{Run, Trial},
+};
+
+/// A method bears a condition at which it finds so many of its attempts (%).
+pub(crate) const BORNE: f64 = 95.0;
+
+/// A line for every series along every axis of which a larger value makes the task harder; a sentence where nothing is borne.
+pub(super) fn block(run: &Run, summary: &Summary) -> Option<Block> {
+    let heads = vec![
+        Head::words("series"),
+        Head::words("along"),
+        Head::numbers("from"),
+        Head::numbers("to"),
+        Head::numbers("largest borne"),
+        Head::numbers("found there (%)"),
+        Head::numbers("interval"),
+        Head::numbers("surely borne"),
+    ];
+    let caption = text![format!(
+        "Break-down points: the largest value at which at least {BORNE} % of the attempts are found, there and at every smaller value that was tried; surely borne: the same of the lower end of the 95 % interval of that share, which few attempts keep low. ≥: none larger was tried; –: not even the smallest is borne."
+    )];
+    let mut table = Table::new("breakdown", caption, heads);
+    let mut any = false;
+    for key in figures::keys(summary).into_iter().filter(|key| harder(key)) {
+        let names = distinct(summary.rows.iter().map(|row| figures::name(row, &key)));
+        for (place, name) in names.iter().enumerate() {
+            let own = summary.rows.iter().zip(&run.trials).filter(|(row, _)| figures::name(row, &key) == *name);
+            let mut steps: Vec<(f64, &Row, &Trial)> =
+                own.filter_map(|(row, trial)| Some((figures::on(row, &key)?, row, trial))).collect();
+            steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+            if steps.len() < 2 {
+                continue;
+            }
+            let (line, borne) = line(name, &key, &steps);
+            any |= borne;
+            table.line(place == 0 && !table.lines.is_empty(), line);
+        }
+    }
+    if table.lines.is_empty() {
+        return None;
+    }
+    Some(match any {
+        true => Block::Table(table),
+        false => Block::Paragraph(text![format!(
+            "Break-down point: at no value of {}, not even the smallest, are {BORNE} % of the attempts found.",
+            figures::keys(summary)
+                .iter()
+                .filter(|key| harder(key))
+                .map(|key| headed(key))
+                .collect::<Vec<_>>()
+                .join(" or ")
+        )]),
+    })
+}
+
+/// One series; whether it bears anything.
+fn line(name: &str, key: &str, steps: &[(f64, &Row, &Trial)]) -> (Vec<Cell>, bool) {
+    let trials: Vec<&Trial> = steps.iter().map(|step| step.2).collect();
+    let share = |end: &str, (_, row, trial): &(f64, &Row, &Trial)| {
+        tell::rate(trial, end, "found", (row.found, row.attempted), 1)
+    };
+    let digits = |(_, row, _): &(f64, &Row, &Trial)| {
+        let axis = row.axes.iter().find(|axis| axis.key == key);
+        axis.and_then(|axis| axis.value.split_once('.')).map_or(0, |(_, decimals)| decimals.len())
+    };
+    let borne = |end: &str| {
+        let borne = steps.iter().take_while(|step| share(end, step).value.is_some_and(|share| share >= BORNE)).count();
+        let last = borne.checked_sub(1).map(|last| &steps[last]);
+        let what = if end == "low" { "surely-borne" } else { "borne" };
+        let what = tell::over(&trials, "/metrics/evaluation", format!("{what} found along {key}"));
+        let number = Number::new(last.map(|step| step.0), last.map_or(0, digits), what);
+        let open = if borne == steps.len() { "≥ " } else { "" };
+        (
+            borne,
+            if open.is_empty() { Cell::from(number) } else { Cell { text: text![open, number], ..Cell::default() } },
+        )
+    };
+    let axis = |step: &(f64, &Row, &Trial)| {
+        let Number { value, key, .. } = tell::axis(step.2, key, Some(step.0));
+        Cell::from(Number::new(value, digits(step), Key::clone(&key)))
+    };
+    let ((n, largest), (_, surely)) = (borne("percent"), borne("low"));
+    let mut cells = vec![name.to_owned().into(), headed(key).into(), axis(&steps[0]), axis(&steps[steps.len() - 1])];
+    cells.push(largest);
+    match n.checked_sub(1).map(|last| &steps[last]) {
+        Some(step) => {
+            let [low, high] = tell::interval(step.2, "found", step.1.found, step.1.attempted);
+            cells.push(share("percent", step).into());
+            cells.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
+        }
+        None => cells.extend(["–", "–"].map(Cell::from)),
+    }
+    cells.push(surely);
+    (cells, n > 0)
+}

@@ -1,0 +1,94 @@
+//! Recall in one number, and what a fix errs by at a distance.
+
+use seafix_evaluation::recall_area;
+
+use super::{
+    results,
+    tell::{self, Unit},
+};
+use crate::{
+    Field, Key, Number, Spread, Summary,
+    document::{Block, Cell, Head, Table, Text, text},
+    lever::ARMS,
+    run::{Attempt, Run, Trial},
+};
+
+/// Up to where recall is summed up: the error, the bound as it is printed, its unit.
+const AREAS: [(Field, f64, Unit); 2] = [(Field::M2, 50.0, Unit::Millimetres), (Field::Attitude, 5.0, Unit::Degrees)];
+
+/// The table; nothing where no truth tells an error.
+pub(super) fn table(run: &Run, summary: &Summary) -> Option<Block> {
+    if !run.trials.iter().any(|trial| AREAS.iter().any(|area| found(trial).any(|row| row.get(area.0).is_some()))) {
+        return None;
+    }
+    let arms: Vec<[Option<Spread>; 3]> = run
+        .trials
+        .iter()
+        .map(|trial| ARMS.map(|arm| Spread::of(found(trial).filter_map(|row| row.at_arm(arm)))))
+        .collect();
+    let known = arms.iter().flatten().any(Option::is_some);
+    let mut above = results::blank(summary, 1);
+    above.push(Head::over(2, "area under recall (%)"));
+    let mut below = results::heads(summary);
+    below.extend(["n", "m2 to 50 mm", "m3 to 5°"].map(Head::numbers));
+    if known {
+        above.push(Head::words(""));
+        above.extend(ARMS.map(|arm| Head::over(2, format!("at {arm} m (mm)"))));
+        below.push(Head::numbers("fixes"));
+        below.extend(ARMS.iter().flat_map(|_| ["median", "p95"].map(Head::numbers)));
+    }
+    let digits: Vec<usize> = (0..ARMS.len())
+        .map(|place| tell::decimals(arms.iter().map(|of| of[place].map(|s| s.median)), Unit::Millimetres))
+        .collect();
+    let mut table =
+        Table { id: "reach".to_owned(), caption: caption(run, known), heads: vec![above, below], lines: Vec::new() };
+    for (index, ((row, trial), spreads)) in summary.rows.iter().zip(&run.trials).zip(&arms).enumerate() {
+        let mut line = results::cells(row);
+        let attempts = trial.attempts().count();
+        line.push(Number::count(attempts, Key::of(trial, "/metrics/evaluation", "count logged")).into());
+        line.extend(AREAS.map(|(field, bound, unit)| Cell::from(area(trial, field, bound, unit))));
+        if known {
+            let told = |arm: f64, name: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
+                let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
+                let key = Key::of(trial, "/referencing/result", format!("{name} arm_{arm} of found{suffix}"));
+                Number::new(value.map(|value| value * unit.scale()), decimals, key)
+            };
+            let count = spreads[0].map_or(0, |spread| spread.count) as f64;
+            line.push(told(ARMS[0], "sampled", Some(count), (Unit::Plain, 0)).into());
+            for ((arm, spread), &digits) in ARMS.into_iter().zip(spreads).zip(&digits) {
+                let unit = (Unit::Millimetres, digits);
+                line.push(told(arm, "median", spread.map(|s| s.median), unit).into());
+                line.push(Cell::minor(told(arm, "q95", spread.map(|s| s.p95), unit)));
+            }
+        }
+        table.line(results::breaks(summary, index), line);
+    }
+    Some(Block::Table(table))
+}
+
+fn caption(run: &Run, known: bool) -> Text {
+    let mut caption = text![
+        "Area under recall: the share of all n attempts whose error is below a bound, averaged over the bounds from none to 50 mm of m2 and to 5° of attitude (m3); 100 % if no fix erred, refused and wrong attempts add nothing."
+    ];
+    if known {
+        caption.push(" At 1, 2 and 5 m: error of the fixes found at a point that far from the centroid of the points they used, its rotation included, root mean square over all directions.".into());
+    }
+    if run.trials.iter().any(|trial| trial.every() > 1) {
+        caption.push(" Of a trial that logged one frame in k, over those.".into());
+    }
+    caption
+}
+
+fn found(trial: &Trial) -> impl Iterator<Item = &Attempt> {
+    trial.attempts().map(|(_, row)| row).filter(|row| row.found())
+}
+
+/// The area in percent; nothing where a fix has no error.
+fn area(trial: &Trial, field: Field, bound: f64, unit: Unit) -> Number {
+    let suffix = if unit == Unit::Degrees { "deg" } else { "mm" };
+    let what = format!("area {}<={bound} of attempted in {suffix}", field.name());
+    let errors: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(field)).collect();
+    let known = !errors.is_empty() && found(trial).all(|row| row.get(field).is_some());
+    let area = known.then(|| 100.0 * recall_area(&errors, bound / unit.scale()));
+    Number::new(area, 1, Key::of(trial, field.topic(), what))
+}

@@ -1,0 +1,37 @@
+//! How far a fix errs at a distance from the points that it rests on.
+
+use nalgebra::{Matrix3, Matrix4, Vector3};
+use seafix_log::{TargetRecord, TrialHeader, TruthRecord};
+
+use crate::place::matrix;
+
+/// Lengths of the lever arms (m).
+pub(crate) const ARMS: [f64; 3] = [1.0, 2.0, 5.0];
+
+/// The motion E that takes an object from where it really is to where the fix has it, in its own frame, and the centroid of the
+/// points that the fix used; `None` where one of pose, truth and points is not logged.
+pub(crate) fn misplaced(
+    header: &TrialHeader,
+    truth: Option<&TruthRecord>,
+    target: &TargetRecord,
+) -> Option<(Matrix4<f64>, Vector3<f64>)> {
+    let estimate = matrix(target.object_from_camera.as_ref()?);
+    let truth = truth?;
+    let (_, world_from_object) = truth.world_from_object.iter().find(|(id, _)| *id == target.object)?;
+    let camera_from_object = matrix(&truth.world_from_camera).try_inverse()? * matrix(world_from_object);
+    let points = &header.targets.iter().find(|model| model.id == target.object)?.points;
+    let used =
+        target.used.iter().map(|&place| Some(points.get(target.pairs.get(place as usize)?.model as usize)?.at.into()));
+    let used: Vec<Vector3<f64>> = used.collect::<Option<_>>()?;
+    let centroid = used.iter().sum::<Vector3<f64>>() / used.len() as f64;
+    (!used.is_empty()).then_some((estimate * camera_from_object, centroid))
+}
+
+/// How far the fix has that centroid from its place (m), and by which angle it turns the object (rad); NaN where not known.
+pub(crate) fn displacement(header: &TrialHeader, truth: Option<&TruthRecord>, target: &TargetRecord) -> [f64; 2] {
+    misplaced(header, truth, target).map_or([f64::NAN; 2], |(e, centroid)| {
+        // ‖R − I‖² = 8·sin²(θ/2): exact for small angles, where the trace is not.
+        let turn = (e.fixed_view::<3, 3>(0, 0) - Matrix3::identity()).norm() / 8_f64.sqrt();
+        [(e.transform_point(&centroid.into()).coords - centroid).norm(), 2.0 * turn.min(1.0).asin()]
+    })
+}
