@@ -27,6 +27,7 @@ mod run;
 mod sailed;
 mod share;
 mod summary;
+mod teeth;
 mod terminal;
 mod verify;
 mod write;

@@ -16,6 +16,7 @@ use crate::{
     looked::{self, Looked},
     place,
     sailed::{Counted, Sailed},
+    teeth::{self, Step},
 };
 
 /// All trials of a run, in the order of their names.
@@ -84,6 +85,8 @@ pub(crate) struct Underway {
     pub(crate) places: [[f64; 3]; 2],
     /// What was told of objects that stand elsewhere than surveyed.
     pub(crate) displaced: Vec<String>,
+    /// What it says of the growth of the error; `None` without a pose or truth.
+    pub(crate) step: Option<Step>,
     counted: [bool; Counted::ALL.len()],
     values: [f64; Sailed::ALL.len()],
 }
@@ -207,6 +210,10 @@ impl Trial {
             let values = Looked::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN));
             self.inspected.push(Inspected { name, values });
         }
+        let step = frame.navigation.as_deref().and_then(|record| {
+            let object = self.word(&record.pose.as_ref()?.object, places);
+            teeth::step(frame.stamp_ns, frame.truth.as_ref(), record, object)
+        });
         let times = &frame.times;
         self.frames.push(Frame {
             number: frame.frame,
@@ -228,6 +235,7 @@ impl Trial {
                     places: [&record.pose, &record.unreferenced]
                         .map(|pose| place::carried(&self.header, pose.as_ref())),
                     displaced: record.events.iter().filter(|event| event.contains(ELSEWHERE)).cloned().collect(),
+                    step,
                     counted: Counted::ALL.map(|counted| counted.holds(record)),
                     values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
                 })

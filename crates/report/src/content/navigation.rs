@@ -9,6 +9,7 @@ use crate::{
     document::{Block, Head, Section, Table, Text, text},
     run::{Run, Trial},
     sailed::{Counted, Sailed},
+    teeth::{drift, teeth},
 };
 
 /// Whether a trial navigates.
@@ -51,7 +52,44 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
         table.line(results::breaks(summary, index), line);
     }
     let figure = super::figures::sawtooth(run).map(Block::Figure);
-    Some(Section::new("Navigation").with([Block::Table(table)]).with(figure))
+    let saw = saw(run, summary).map(Block::Table);
+    Some(Section::new("Navigation").with([Block::Table(table)]).with(figure).with(saw))
+}
+
+/// How the error grows between fixes; nothing where no trial has a stretch without them, or truth.
+fn saw(run: &Run, summary: &Summary) -> Option<Table> {
+    let caption = text![
+        "The teeth of the saw: stretches from a fix to the last frame before the next, before the pose is lost or the dive ends. Amplitude: the greatest error (m3, position) of a tooth less the one at its fix. Drift: how far the error moved, as a vector in the frame of the object, from the fix to the end of the tooth; the sum of all teeth by their way, that of the camera by the truth, and by their time."
+    ];
+    let mut above = results::blank(summary, 3);
+    above.extend([Head::over(3, "amplitude (mm)"), Head::over(2, "drift")]);
+    let mut below = results::heads(summary);
+    below.extend(["teeth", "way (m)", "time (s)", "median", "p95", "most", "mm/m", "mm/s"].map(Head::numbers));
+    let mut table = Table { id: "saw".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
+    for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
+        let teeth = teeth(trial.sample().filter_map(|frame| frame.sailed.as_ref()).map(|sailed| sailed.step.as_ref()));
+        if teeth.is_empty() {
+            continue;
+        }
+        let told = |what: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
+            let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
+            let key = Key::of(trial, "/referencing/frame", format!("teeth {what} of navigated{suffix}"));
+            Number::new(value.map(|value| value * unit.scale()), decimals, key)
+        };
+        let mut line = results::cells(row);
+        line.push(told("count", Some(teeth.len() as f64), (Unit::Plain, 0)).into());
+        line.push(told("way", Some(teeth.iter().map(|tooth| tooth.way).sum()), (Unit::Plain, 1)).into());
+        line.push(told("seconds", Some(teeth.iter().map(|tooth| tooth.seconds).sum()), (Unit::Plain, 1)).into());
+        let mut amplitudes: Vec<f64> = teeth.iter().map(|tooth| tooth.amplitude).collect();
+        for (name, p) in [("median", 0.5), ("q95", 0.95), ("greatest", 1.0)] {
+            let value = seafix_evaluation::quantile(&mut amplitudes, p);
+            line.push(told(&format!("{name} amplitude"), Some(value), (Unit::Millimetres, 1)).into());
+        }
+        line.push(told("drift-per-metre", drift(&teeth, |tooth| tooth.way), (Unit::Millimetres, 2)).into());
+        line.push(told("drift-per-second", drift(&teeth, |tooth| tooth.seconds), (Unit::Millimetres, 2)).into());
+        table.line(results::breaks(summary, index), line);
+    }
+    (!table.lines.is_empty()).then_some(table)
 }
 
 /// A sentence a trial that navigates; `name` says what the trial at a place is called. That it is one dive is said once.

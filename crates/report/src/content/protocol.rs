@@ -106,6 +106,15 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             ],
         ));
     }
+    let sails = |trial: &crate::run::Trial| trial.sample().any(|frame| frame.sailed.is_some());
+    if run.trials.iter().any(sails) {
+        terms.push((
+            text![italic("amplitude, drift")],
+            text![
+                "Of a stretch from a fix to the last frame before the next: the greatest error of the navigated position less that at the fix, and the distance between the errors, as vectors, at its two ends, by the way and by the time between them."
+            ],
+        ));
+    }
     if run.header().axes.iter().any(|axis| harder(&axis.key)) {
         terms.push((
             text![italic("borne")],

@@ -14,6 +14,7 @@ use crate::{
     paired::Statistics,
     sailed::{Counted, Sailed},
     share,
+    teeth::{Tooth, teeth},
 };
 
 /// The value of a key, or why there is none.
@@ -136,6 +137,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
             area(rows(log, span).map(|row| &row.record), field, bound)
         }
+        ("teeth", of) => toothed(of.strip_suffix(" of navigated")?, span, log)?.map(|value| value * scale),
         ("all", of) => {
             let field = Field::named(of.strip_suffix(" of attempted")?)?;
             let known = rows(log, span).any(|row| found(&row.record) && field.of(&row.record).is_some());
@@ -203,6 +205,25 @@ fn found(row: &TargetRecord) -> bool {
 
 fn error(row: &TargetRecord, field: Field) -> f64 {
     if found(row) { field.of(row).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
+}
+
+/// Something about the teeth of the saw.
+fn toothed(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let steps = log.sample(span).filter(|frame| frame.navigation.is_some()).map(|frame| frame.step.as_ref());
+    let teeth = teeth(steps);
+    let sum = |what: fn(&Tooth) -> f64| teeth.iter().map(what).sum::<f64>();
+    let drift = sum(|tooth| tooth.drift);
+    Some(match of {
+        "count" => Some(teeth.len() as f64),
+        "seconds" => Some(sum(|tooth| tooth.seconds)),
+        "way" => Some(sum(|tooth| tooth.way)),
+        "drift-per-metre" => Some(drift / sum(|tooth| tooth.way)).filter(|drift| drift.is_finite()),
+        "drift-per-second" => Some(drift / sum(|tooth| tooth.seconds)).filter(|drift| drift.is_finite()),
+        _ => {
+            let name = of.strip_suffix(" amplitude")?;
+            statistic(name, teeth.iter().map(|tooth| tooth.amplitude).collect())?
+        }
+    })
 }
 
 /// The area under recall up to `bound`, in percent, step by step of the curve; nothing where a fix has no error.

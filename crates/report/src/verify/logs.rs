@@ -11,7 +11,12 @@ use seafix_log::{
     FrameTimes, InspectedPoint, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader, TruthRecord,
 };
 
-use crate::{ReportError, disparity, lever, paired::Statistics, place};
+use crate::{
+    ReportError, disparity, lever,
+    paired::Statistics,
+    place,
+    teeth::{self, Step},
+};
 
 /// The logs of a run.
 pub(super) struct Logs {
@@ -39,6 +44,8 @@ pub(super) struct Seen {
     pub(super) navigation: Option<Box<NavigationRecord>>,
     /// Where the navigated pose and the first fix carried by odometry put the camera in the world.
     pub(super) carried: [[f64; 3]; 2],
+    /// What it says of the growth of the error between fixes.
+    pub(super) step: Option<Step>,
     pub(super) inspected: Vec<InspectedPoint>,
     /// Key points, points, candidates, identified, used.
     pub(super) marks: [usize; 5],
@@ -112,7 +119,13 @@ impl Log {
             let carried = frame.navigation.as_deref().map_or([[f64::NAN; 3]; 2], |known| {
                 [&known.pose, &known.unreferenced].map(|pose| place::carried(&header, pose.as_ref()))
             });
+            let step = frame.navigation.as_deref().and_then(|record| {
+                let object = &record.pose.as_ref()?.object;
+                let known = header.targets.iter().position(|target| target.id == *object)?;
+                teeth::step(frame.stamp_ns, frame.truth.as_ref(), record, known as u32)
+            });
             frames.push(Seen {
+                step,
                 carried,
                 number: frame.frame,
                 stamp_ns: frame.stamp_ns,
