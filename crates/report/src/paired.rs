@@ -14,6 +14,15 @@ use crate::{
 pub(crate) const SEED: u64 = 20_211_038;
 /// Claims in a family are wrong with at most this chance.
 pub(crate) const ALPHA: f64 = 0.05;
+/// Two that are not significantly different are called equivalent where the 90 % interval of the median difference of m2 is
+/// within this margin (m); set beforehand.
+pub(crate) const MARGIN: f64 = 1e-3;
+/// The same of a ratio of medians over conditions.
+pub(crate) const MARGIN_RATIO: f64 = 1.1;
+/// So many in a group are all compared with each other; of more each with the first alone.
+pub(crate) const ALL_PAIRS: usize = 8;
+/// More comparisons than these nobody reads; then only groups of four or less are compared in all pairs.
+const READABLE: usize = 40;
 /// From so many conditions on they are the units, one value each, not the frames.
 const CONDITIONS: usize = 10;
 
@@ -42,9 +51,21 @@ pub(crate) struct Comparison {
     /// Fixes found by the one alone, and by the other alone.
     pub(crate) alone: [usize; 2],
     pub(crate) mcnemar: f64,
+    /// Where it is not significant: within how much of none at all the 90 % interval is (m, or the logarithm of a ratio). Two
+    /// one-sided tests at 5 % show equivalence within any margin beyond this.
+    pub(crate) margin: Option<f64>,
+    /// The errors of both, until everything is said of them.
+    errors: Vec<(f64, f64)>,
 }
 
 impl Comparison {
+    /// Whether the two are shown to be equivalent within the margin; `None` where they differ. Medians do not see that one finds
+    /// more than the other: where McNemar's test does, they are not.
+    pub(crate) fn equivalent(&self) -> Option<bool> {
+        let most = if self.over_conditions { MARGIN_RATIO.ln() } else { MARGIN };
+        self.margin.map(|margin| margin <= most && self.mcnemar >= ALPHA)
+    }
+
     /// The trial that errs less, if that is sure: by the test and by the interval.
     pub(crate) fn better(&self) -> Option<usize> {
         let (low, high) = self.interval;
@@ -105,18 +126,31 @@ pub(crate) fn comparisons(run: &Run, summary: &Summary) -> Vec<Comparison> {
         _ => over_conditions(run, summary, &groups),
     };
     let adjusted = holm(&family.iter().map(|c| c.p).collect::<Vec<_>>());
-    family.iter_mut().zip(adjusted).for_each(|(comparison, p)| comparison.holm = p);
+    for (comparison, p) in family.iter_mut().zip(adjusted) {
+        comparison.holm = p;
+        let errors = std::mem::take(&mut comparison.errors);
+        if comparison.better().is_none() {
+            comparison.margin = Some(Statistics::margin(&errors, comparison.over_conditions));
+        }
+    }
     family
 }
 
-/// Pairs of places: all of a few, each with the first of many.
-fn pairs(n: usize) -> Vec<(usize, usize)> {
-    let all = n <= 4;
+/// How many members groups of these sizes may have for all pairs of them to be compared.
+fn most_in_all_pairs(sizes: impl Iterator<Item = usize>) -> usize {
+    let pairs: usize = sizes.map(|n| if n <= ALL_PAIRS { n * n.saturating_sub(1) / 2 } else { n - 1 }).sum();
+    if pairs <= READABLE { ALL_PAIRS } else { 4 }
+}
+
+/// Pairs of places: all of up to `most`, each with the first of more.
+fn pairs(n: usize, most: usize) -> Vec<(usize, usize)> {
+    let all = n <= most;
     (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).filter(|(a, _)| all || *a == 0).collect()
 }
 
 fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
     let mut found = Vec::new();
+    let most = most_in_all_pairs(groups.iter().map(Vec::len));
     for members in groups {
         let (condition, names) = names(run, members);
         let axes = |place: usize| &run.trials[members[place]].header.axes[1..];
@@ -125,7 +159,7 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
             run.trials[members[a]].header.axes[0] != run.trials[members[b]].header.axes[0]
                 && axes(a).iter().zip(axes(b)).all(equal)
         };
-        let mut chosen = pairs(members.len());
+        let mut chosen = pairs(members.len(), most);
         if run.joined {
             // Of several runs, what differs in nothing but the run; where nothing does, all.
             let n = members.len();
@@ -140,7 +174,7 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
                 continue;
             }
             let names = [names[a].clone(), names[b].clone()];
-            found.push(of(condition.clone(), names, vec![first, second], false, &errors));
+            found.push(of(condition.clone(), names, vec![first, second], false, errors));
         }
     }
     found
@@ -162,11 +196,11 @@ fn between(run: &Run) -> Vec<Comparison> {
     let members: Vec<usize> = (0..run.trials.len()).collect();
     let (_, names) = names(run, &members);
     let mut found = Vec::new();
-    for (a, b) in pairs(members.len()) {
+    for (a, b) in pairs(members.len(), most_in_all_pairs([members.len()].into_iter())) {
         let errors = errors(&run.trials[a], &run.trials[b]);
         if !errors.is_empty() {
             let names = [names[a].clone(), names[b].clone()];
-            let comparison = of(String::new(), names, vec![a, b], false, &errors);
+            let comparison = of(String::new(), names, vec![a, b], false, errors);
             found.push(Comparison { between_conditions: true, ..comparison });
         }
     }
@@ -216,7 +250,7 @@ fn over_conditions(run: &Run, summary: &Summary, groups: &[Vec<usize>]) -> Vec<C
         groups.iter().map(|group| (group.clone(), names(run, group).1)).collect();
     let methods = distinct(named.iter().flat_map(|(_, names)| names.clone()));
     let mut found = Vec::new();
-    for (a, b) in pairs(methods.len()) {
+    for (a, b) in pairs(methods.len(), most_in_all_pairs([methods.len()].into_iter())) {
         let mut logs = Vec::new();
         for (group, names) in &named {
             let of = |method: &str| names.iter().position(|name| name == method).map(|place| group[place]);
@@ -227,14 +261,14 @@ fn over_conditions(run: &Run, summary: &Summary, groups: &[Vec<usize>]) -> Vec<C
         let m2 = |index: usize| summary.rows[index].m2_of_all.unwrap_or(f64::INFINITY).ln();
         let errors: Vec<(f64, f64)> = logs.chunks(2).map(|pair| (m2(pair[0]), m2(pair[1]))).collect();
         if !errors.is_empty() {
-            found.push(of(String::new(), [methods[a].clone(), methods[b].clone()], logs, true, &errors));
+            found.push(of(String::new(), [methods[a].clone(), methods[b].clone()], logs, true, errors));
         }
     }
     found
 }
 
-fn of(condition: String, names: [String; 2], logs: Vec<usize>, over: bool, errors: &[(f64, f64)]) -> Comparison {
-    let statistics = Statistics::of(errors, over);
+fn of(condition: String, names: [String; 2], logs: Vec<usize>, over: bool, errors: Vec<(f64, f64)>) -> Comparison {
+    let statistics = Statistics::of(&errors, over);
     Comparison {
         condition,
         names,
@@ -251,6 +285,8 @@ fn of(condition: String, names: [String; 2], logs: Vec<usize>, over: bool, error
         effect: statistics.effect,
         alone: statistics.alone,
         mcnemar: mcnemar(statistics.alone[0], statistics.alone[1]),
+        margin: None,
+        errors,
     }
 }
 
@@ -267,15 +303,8 @@ pub(crate) struct Statistics {
 impl Statistics {
     /// Of pairs in the order of time, or of conditions, which have none.
     pub(crate) fn of(errors: &[(f64, f64)], conditions: bool) -> Self {
-        // Where both fail neither errs less.
-        let told = errors.iter().filter(|(a, b)| a.is_finite() || b.is_finite());
-        let mut differences: Vec<f64> = told.map(|(a, b)| a - b).collect();
-        if differences.is_empty() {
-            differences.push(0.0);
-        }
-        let bootstrap = Bootstrap::of(differences.len(), SEED);
-        let bootstrap = if conditions { Bootstrap { block: 1, ..bootstrap } } else { bootstrap };
-        let interval = bootstrap.median(&differences, 0.95);
+        let mut differences = differences(errors);
+        let interval = bootstrap(differences.len(), conditions).median(&differences, 0.95);
         let test = signed_rank(errors);
         let alone = |one: fn(&(f64, f64)) -> [f64; 2]| {
             errors.iter().map(one).filter(|[own, other]| own.is_finite() && !other.is_finite()).count()
@@ -290,9 +319,55 @@ impl Statistics {
     }
 }
 
+impl Statistics {
+    /// Within how much of none at all the 90 % interval of the median difference is: where two one-sided tests at 5 % each find
+    /// that it is smaller than some margin, the margin is at least this.
+    pub(crate) fn margin(errors: &[(f64, f64)], conditions: bool) -> f64 {
+        let differences = differences(errors);
+        let (low, high) = bootstrap(differences.len(), conditions).median(&differences, 0.90);
+        // Between the two infinities a median is no number: nothing is shown.
+        if low.is_nan() || high.is_nan() { f64::INFINITY } else { low.abs().max(high.abs()) }
+    }
+}
+
+/// First less second, in their order. Where both fail neither errs less.
+fn differences(errors: &[(f64, f64)]) -> Vec<f64> {
+    let told = errors.iter().filter(|(a, b)| a.is_finite() || b.is_finite());
+    let differences: Vec<f64> = told.map(|(a, b)| a - b).collect();
+    if differences.is_empty() { vec![0.0] } else { differences }
+}
+
+/// Conditions have no order of time, so that each stands by itself.
+fn bootstrap(n: usize, conditions: bool) -> Bootstrap {
+    let bootstrap = Bootstrap::of(n, SEED);
+    if conditions { Bootstrap { block: 1, ..bootstrap } } else { bootstrap }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A method that fails half of the time, as another does at other times, is not shown to be as good; a small difference is.
+    #[test]
+    fn what_is_within_the_margin_is_shown_by_the_interval() {
+        let near: Vec<(f64, f64)> = (0..60).map(|i| (0.01, 0.01 + 1e-4 * f64::from(i % 7 - 3))).collect();
+        let margin = Statistics::margin(&near, false);
+        assert!(margin <= 2e-4, "{margin}");
+        let none = f64::INFINITY;
+        let apart: Vec<(f64, f64)> = (0..60).map(|i| if i % 2 == 0 { (none, 0.01) } else { (0.01, none) }).collect();
+        assert_eq!(Statistics::margin(&apart, false), none);
+        // The interval of 90 % is within that of 95 %.
+        let (low, high) = Statistics::of(&near, false).interval;
+        assert!(margin <= low.abs().max(high.abs()));
+    }
+
+    #[test]
+    fn all_pairs_of_few_and_the_first_with_each_of_many() {
+        assert_eq!(pairs(6, most_in_all_pairs([6].into_iter())).len(), 15);
+        assert_eq!(pairs(9, most_in_all_pairs([9].into_iter())).len(), 8);
+        let many = most_in_all_pairs([6; 7].into_iter());
+        assert_eq!((many, pairs(6, many).len(), pairs(4, many).len()), (4, 5, 6));
+    }
 
     /// Where both fail neither errs less: what one finds and the other does not is a difference, however many both miss.
     ///

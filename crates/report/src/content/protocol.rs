@@ -138,10 +138,11 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             "Trials that saw the same frames are compared attempt by attempt, failures as infinitely far off, by the median of the paired differences of m2, where not both fail"
         };
         section.say(text![format!(
-            "{unit}. Its 95 % interval is the percentile bootstrap of 10 000 resamples, seed {SEED}, over {}. The test is Wilcoxon’s signed rank, two-sided, adjusted after Holm for the family of {} comparison{}; the effect is the matched-pairs rank-biserial correlation. A difference is called significant where the adjusted p is below {ALPHA} and the interval leaves out none at all. Success and failure are compared by McNemar’s exact test.",
+            "{unit}. Its 95 % interval is the percentile bootstrap of 10 000 resamples, seed {SEED}, over {}. The test is Wilcoxon’s signed rank, two-sided, adjusted after Holm for the family of {} comparison{}; the effect is the matched-pairs rank-biserial correlation. A difference is called significant where the adjusted p is below {ALPHA} and the interval leaves out none at all. Success and failure are compared by McNemar’s exact test. Where no difference is significant, equivalence {} is tested, a margin set beforehand: it is shown where the 90 % interval, by the same bootstrap, is within it (two one-sided tests at 5 %, not adjusted) and McNemar’s test finds no difference.",
             if comparisons[0].over_conditions { "the conditions" } else { "blocks of consecutive attempts, ⌈∛n⌉ long, for neighbouring frames are not independent" },
             comparisons.len(),
             if comparisons.len() == 1 { "" } else { "s" },
+            super::significance::margin(comparisons),
         ).replace("⌈∛n⌉", "the cube root of n")]);
     }
     let frames: usize = run.trials.iter().map(crate::run::Trial::count).sum();

@@ -1,11 +1,13 @@
 //! Which differences are sure.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::{
     Key, Number,
     document::{Block, Cell, Figure, Head, Section, Span, Table, Text, text},
     figure::{Axis, Chart, Layer, Panel},
     format::decimals,
-    paired::Comparison,
+    paired::{Comparison, MARGIN, MARGIN_RATIO},
     run::{Run, Trial},
 };
 
@@ -14,9 +16,10 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
         return None;
     }
     let sure = comparisons.iter().filter(|comparison| comparison.better().is_some()).count();
+    let alike = comparisons.iter().filter(|comparison| comparison.equivalent() == Some(true)).count();
     let mut section = Section::new("Significance");
     section.say(text![format!(
-        "Of {} comparison{} {} significant. {}: the first errs less. An effect of 1: it does so in every pair, of −1: in none.",
+        "Of {} comparison{} {} significant{}. {}: the first errs less. An effect of 1: it does so in every pair, of −1: in none.{}",
         comparisons.len(),
         if comparisons.len() == 1 { "" } else { "s" },
         match sure {
@@ -24,11 +27,43 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
             1 => "one is".to_owned(),
             _ => format!("{sure} are"),
         },
-        if comparisons[0].over_conditions { "Ratios below one" } else { "Negative differences" }
+        match comparisons.len() - sure {
+            0 => String::new(),
+            rest => {
+                let shown = match alike {
+                    0 => "none shows".to_owned(),
+                    1 => "one shows".to_owned(),
+                    n if n == rest => "all show".to_owned(),
+                    n => format!("{n} show"),
+                };
+                format!("; of the {rest} that {} not, {shown} equivalence {}", if rest == 1 { "is" } else { "are" }, margin(comparisons))
+            }
+        },
+        if comparisons[0].over_conditions { "Ratios below one" } else { "Negative differences" },
+        if with_the_first_alone(comparisons) { " Of so many each is compared with the first alone: all pairs would fill no readable table." } else { "" }
     )]);
     section.add(Block::Table(table(run, comparisons)));
     section.blocks.extend(forest(run, comparisons).map(Block::Figure));
     Some(section)
+}
+
+/// The margin of equivalence, in words.
+pub(super) fn margin(comparisons: &[Comparison]) -> String {
+    match comparisons.first() {
+        Some(first) if first.over_conditions => format!("within a factor of {MARGIN_RATIO}"),
+        _ => format!("within {} mm", MARGIN * 1e3),
+    }
+}
+
+/// Whether the members of some group were compared with its first alone.
+fn with_the_first_alone(comparisons: &[Comparison]) -> bool {
+    let mut firsts: BTreeMap<&str, (BTreeSet<&str>, BTreeSet<&str>)> = BTreeMap::new();
+    for comparison in comparisons {
+        let (firsts, seconds) = firsts.entry(&comparison.condition).or_default();
+        firsts.insert(&comparison.names[0]);
+        seconds.insert(&comparison.names[1]);
+    }
+    firsts.values().any(|(firsts, seconds)| firsts.len() == 1 && seconds.len() > 1)
 }
 
 /// The surest differences in words, at most so many; that there is none, where some were tested.
@@ -104,19 +139,26 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
     let over = comparisons[0].over_conditions;
     let digits = decimals(comparisons.iter().map(|c| c.difference.abs() * 1e3));
     let (scale, digits) = if over { (1.0, 3) } else { (1e3, digits.min(3)) };
-    let head = if over { "ratio" } else { "difference (mm)" };
+    let head = if over { "first / second" } else { "first − second (mm)" };
+    let within = if over { format!("within {MARGIN_RATIO}×") } else { format!("within {} mm", MARGIN * 1e3) };
     let caption = text![if over {
-        "Methods over conditions: n conditions, median ratio of the medians of m2 over all attempts with its 95 % interval, rank-biserial effect, p of the signed rank test adjusted after Holm. Bold: significant."
+        "Methods over conditions: n conditions, median ratio of the medians of m2 over all attempts with its 95 % interval, rank-biserial effect (+: the first errs less), p of the signed rank test adjusted after Holm; where that is not significant, whether the two are shown to be equivalent, and within which factor the 90 % interval is. Bold: significant."
     } else {
-        "Paired comparisons on the same attempts: median of the differences of m2 (first − second), where not both fail, with its 95 % interval, rank-biserial effect (1: the first errs less in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted. Bold: significant."
+        "Paired comparisons on the same attempts: median of the differences of m2 (first − second), where not both fail, with its 95 % interval, rank-biserial effect (+: the first errs less, 1: in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted; where the difference is not significant, whether the two are shown to be equivalent, by the 90 % interval, which is within so many mm, and by McNemar’s test, which must find no difference. Bold: significant."
     }];
     let mut heads = vec![Head::words("Condition"), Head::words("first"), Head::words("second"), Head::numbers("n")];
-    heads.extend([Head::numbers(head), Head::numbers("interval"), Head::numbers("effect"), Head::numbers("p (Holm)")]);
+    heads.extend([
+        Head::numbers(head),
+        Head::numbers("interval"),
+        Head::numbers("effect (+: first less)"),
+        Head::numbers("p (Holm)"),
+    ]);
     if over {
         heads.remove(0);
     } else {
         heads.extend([Head::numbers("alone"), Head::numbers("p (McNemar)")]);
     }
+    heads.push(Head::numbers(within));
     let mut table = Table::new("comparisons", caption, heads);
     let mut before = None;
     for comparison in comparisons {
@@ -143,6 +185,13 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
             line.push(Cell { text: text![a, "/", b], ..Cell::default() });
             line.push(Number::probability(comparison.mcnemar, key(run, comparison, "mcnemar")).into());
         }
+        line.push(match comparison.margin.zip(comparison.equivalent()) {
+            None => "".into(),
+            Some((margin, shown)) => {
+                let margin = told("margin", real(margin), if over { 3 } else { digits.max(2) });
+                Cell { text: text![if shown { "yes, " } else { "not shown, " }, margin], ..Cell::default() }
+            }
+        });
         table.line(first && before.is_some(), line);
         before = Some(&comparison.condition);
     }

@@ -462,6 +462,12 @@ fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Opt
         let raw = logs.chunks(size.max(2)).map(|logs| once(logs, span, conditions).1.p);
         return Some(holm(&raw.collect::<Vec<_>>()).first().copied());
     }
+    if what == "margin" {
+        // The greatest that an end of the 90 % interval is off.
+        let pairs = if conditions { medians(logs, span) } else { errors(logs[0], logs[1], span) };
+        let margin = Statistics::margin(&pairs, conditions);
+        return Some(Some(if conditions { margin.exp() } else { margin * 1e3 }));
+    }
     let known = once(logs, span, conditions);
     let (pairs, statistics) = &*known;
     let real = |value: f64| if conditions { value.exp() } else { value * 1e3 };
