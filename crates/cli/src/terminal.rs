@@ -24,6 +24,11 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// How many columns standard output has: those of the terminal, or 80.
+pub(crate) fn width() -> usize {
+    terminal_size::terminal_size_of(stdout()).map_or(80, |(width, _)| usize::from(width.0))
+}
+
 /// Tells the person on standard error; a run does not stop because nobody listens.
 pub(crate) fn tell(line: &str) {
     let _ = writeln!(stderr(), "{line}");

@@ -9,6 +9,7 @@ use crate::{
     paired::{self, Comparison},
     print,
     run::{Run, Trial},
+    terminal::wrapped,
     write::write,
 };
 
@@ -28,7 +29,14 @@ pub struct Compared {
 /// # Errors
 /// [`ReportError::Incomparable`] with what differs, unless `force`; [`ReportError`] when a log cannot be read or the page
 /// cannot be written.
-pub fn compare(folders: &[PathBuf], force: bool, out: Option<&Path>) -> Result<Compared, ReportError> {
+///
+/// The table takes at most `width` columns, where that is given.
+pub fn compare(
+    folders: &[PathBuf],
+    force: bool,
+    out: Option<&Path>,
+    width: Option<usize>,
+) -> Result<Compared, ReportError> {
     let mut runs: Vec<Run> = folders.iter().map(|folder| Run::read(folder)).collect::<Result<_, _>>()?;
     let names = names(folders);
     let mut forced = String::new();
@@ -67,7 +75,12 @@ pub fn compare(folders: &[PathBuf], force: bool, out: Option<&Path>) -> Result<C
         )
     });
     Ok(Compared {
-        table: format!("{summary}\n\n{}{forced}{}", same(&run, &names), lines(&comparisons)),
+        table: {
+            let results = width.map_or_else(|| summary.to_string(), |width| format!("{summary:width$}"));
+            let said = [same(&run, &names), forced, lengths(&run, &names, &comparisons), lines(&comparisons)].concat();
+            let said: Vec<String> = said.lines().map(|line| wrapped(line, width, 2)).collect();
+            format!("{results}\n\n{}\n", said.join("\n"))
+        },
         page: page.transpose()?,
         differ: comparisons.iter().any(|comparison| comparison.better().is_some()),
     })
@@ -152,6 +165,30 @@ fn same(run: &Run, names: &[String]) -> String {
     alike
         .map(|name| format!("{} and {} have the same results, bit for bit.\n", printed(&names[0]), printed(name)))
         .collect()
+}
+
+/// What is compared of runs that are not of one length, in a line.
+fn lengths(run: &Run, names: &[String], comparisons: &[Comparison]) -> String {
+    let of = |name: &String| {
+        let own = run.trials.iter().filter(|trial| trial.header.axes[0].value == *name);
+        content::distinct(own.map(|trial| trial.count().to_string())).join(" or ")
+    };
+    let lengths: Vec<String> = names.iter().map(of).collect();
+    if lengths.iter().all(|length| *length == lengths[0]) {
+        return String::new();
+    }
+    let long =
+        names.iter().zip(&lengths).map(|(name, frames)| format!("{} has {frames} frames a trial", printed(name)));
+    let of = |index: usize| &run.trials[index].header.axes[0].value;
+    let n = || comparisons.iter().filter(|c| of(c.first) != of(c.second)).map(|comparison| comparison.n);
+    let what = match (n().min(), n().max()) {
+        (Some(least), Some(most)) if least < most => {
+            format!("compared are the attempts at the same frame and target that both made, {least} to {most} of them")
+        }
+        (Some(n), _) => format!("compared are the {n} attempts at the same frame and target that both made"),
+        _ => "no two of their trials saw the same, so nothing of the one is compared with the other".to_owned(),
+    };
+    format!("{}: {what}.\n", long.collect::<Vec<_>>().join(", "))
 }
 
 /// A name as a terminal may show it.

@@ -1,5 +1,7 @@
 //! Which of two trials errs less, on the same frames.
 
+use std::collections::BTreeMap;
+
 use seafix_evaluation::{Bootstrap, holm, mcnemar, median, signed_rank};
 use seafix_log::Axis;
 
@@ -81,7 +83,7 @@ impl Comparison {
 pub(crate) fn groups(run: &Run) -> Vec<Vec<usize>> {
     let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
     for (index, trial) in run.trials.iter().enumerate() {
-        let data = data(trial);
+        let data = data(trial, run.joined);
         match groups.iter_mut().find(|(known, _)| *known == data) {
             Some((_, members)) => members.push(index),
             None => groups.push((data, vec![index])),
@@ -90,12 +92,24 @@ pub(crate) fn groups(run: &Run) -> Vec<Vec<usize>> {
     groups.into_iter().map(|(_, members)| members).collect()
 }
 
-/// What a trial was given: the same text, the same frames.
-pub(crate) fn data(trial: &Trial) -> String {
+/// What a trial was given: the same text, the same frames. Of several runs one may have stopped sooner; how many frames it was to
+/// have is then no matter, what they saw is looked at by [`same_views`].
+fn data(trial: &Trial, joined: bool) -> String {
     let header = &trial.header;
-    let source = header.configuration.parse::<toml::Table>().ok().and_then(|table| table.get("source").cloned());
+    let mut source = header.configuration.parse::<toml::Table>().ok().and_then(|table| table.get("source").cloned());
+    if let Some(toml::Value::Table(source)) = source.as_mut().filter(|_| joined) {
+        source.remove("frames");
+    }
     let source = source.map_or_else(String::new, |source| source.to_string());
     format!("{}\n{source}\n{:?}\n{:?}\n{}", header.source, header.seeds, header.rig, header.site)
+}
+
+/// Whether two trials were at the same place at every frame that both have, as far as truth is logged: a dive of another length may
+/// take another way.
+fn same_views(first: &Trial, second: &Trial) -> bool {
+    let places = |trial: &Trial| trial.frames.iter().map(|frame| (frame.number, frame.truth)).collect::<Vec<_>>();
+    let theirs: BTreeMap<u64, Option<[f64; 3]>> = places(second).into_iter().collect();
+    places(first).iter().all(|(number, truth)| theirs.get(number).is_none_or(|other| other == truth))
 }
 
 /// What tells the trials of a group apart, one name a member, and what they share.
@@ -170,7 +184,7 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
         for (a, b) in chosen {
             let (first, second) = (members[a], members[b]);
             let errors = errors(&run.trials[first], &run.trials[second]);
-            if errors.is_empty() {
+            if errors.is_empty() || run.joined && !same_views(&run.trials[first], &run.trials[second]) {
                 continue;
             }
             let names = [names[a].clone(), names[b].clone()];

@@ -1,4 +1,4 @@
-//! The results as a table for a terminal.
+//! The results as a table for a terminal, as wide as they are, or with `{:80}` in as many columns.
 
 use std::fmt;
 
@@ -12,13 +12,31 @@ impl fmt::Display for Summary {
             .map(|row| row.conditions().map(|axis| format::headed(&axis.key)).collect())
             .unwrap_or_default();
 
+        // Where what tells trials apart would take most of a line it is said once, and numbered.
+        let names: Vec<Vec<String>> = self.rows.iter().map(|row| leading(row).collect()).collect();
+        let heads = ["method".to_owned()].into_iter().chain(conditions.iter().cloned());
+        let heads: Vec<String> = heads.collect();
+        let wide = Table { rows: [vec![heads.clone()], names.clone()].concat(), leading: heads.len() }.width();
+        let (heads, names) = match f.width() {
+            Some(most) if 2 * wide > most => {
+                for (index, row) in self.rows.iter().enumerate() {
+                    let parts = row.conditions().filter(|axis| axis.value != "–").map(format::condition);
+                    let line = [format!("{:>2}  {}", index + 1, row.method())].into_iter().chain(parts);
+                    let line = plain(&line.collect::<Vec<_>>().join(", "));
+                    writeln!(f, "{}", wrapped(&line, f.width(), 4))?;
+                }
+                writeln!(f)?;
+                (vec!["trial".to_owned()], (1..=names.len()).map(|number| vec![number.to_string()]).collect())
+            }
+            _ => (heads, names),
+        };
+        let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
         // Runs without durations say nothing of them.
         let timed = self.rows.iter().any(|row| row.times.total_ms.is_some());
         let mut results = Table::new(
-            ["method"]
+            &heads,
+            ["frames", "n", "found", "refused", "wrong", "m1 mm", "m2 mm", "m3 mm", "m3 deg"]
                 .into_iter()
-                .chain(conditions.iter().map(String::as_str))
-                .chain(["frames", "n", "found", "refused", "wrong", "m1 mm", "m2 mm", "m3 mm", "m3 deg"])
                 .chain(timed.then_some("ms")),
         );
         let column = |value: fn(&Row) -> Option<Spread>, scale: f64| {
@@ -41,57 +59,59 @@ impl fmt::Display for Summary {
             let counts = [frames, row.attempted.to_string(), row.found.to_string(), row.refused.to_string(), wrong];
             let errors = columns.iter().map(|column| column[index].clone());
             let total = format::number(row.times.total_ms, 1);
-            results.row(leading(row).chain(counts).chain(errors).chain(timed.then_some(total)));
+            results.row(names[index].iter().cloned().chain(counts).chain(errors).chain(timed.then_some(total)));
         }
         let paper = format!("{:.0}–{:.0}", PAPER_M1[0] * 1e3, PAPER_M1[1] * 1e3);
         let blank = |n| std::iter::repeat_n(String::new(), n);
         results.row(
             ["the paper".to_owned()]
                 .into_iter()
-                .chain(blank(conditions.len() + 5))
+                .chain(blank(heads.len() + 4))
                 .chain([paper])
                 .chain(blank(3 + usize::from(timed))),
         );
         results.write(f)?;
-        writeln!(
-            f,
-            "frames fixed of all, targets attempted (n); m1 residual C·H − P, m2 transferred model points, m3 camera position and attitude; medians of the fixes found."
-        )?;
+        let most = f.width();
+        let said = |text: &str| wrapped(text, most, 0);
+        let note = said(
+            "frames fixed of all, targets attempted (n); m1 residual C·H − P, m2 transferred model points, m3 camera position and attitude; medians of the fixes found.",
+        );
+        writeln!(f, "{note}")?;
 
         if self.rows.iter().any(|row| row.limits.is_some()) {
             writeln!(f)?;
-            self.limits(&conditions).write(f)?;
-            writeln!(
-                f,
-                "Root mean squares over all n fixes and their ratio to the Cramér–Rao bound; NEES is 6, and 0.95 of it below the 95 % quantile, where a covariance is honest."
-            )?;
+            self.limits(&heads, &names).write(f)?;
+            let note = said(
+                "Root mean squares over all n fixes and their ratio to the Cramér–Rao bound; NEES is 6, and 0.95 of it below the 95 % quantile, where a covariance is honest.",
+            );
+            writeln!(f, "{note}")?;
         }
 
         for lacking in &self.lacking {
-            writeln!(f, "warning: {lacking}")?;
+            writeln!(f, "{}", said(&format!("warning: {lacking}")))?;
         }
         if !timed {
             return Ok(());
         }
         let stages = self.rows.first().map(|row| row.times.stages().map(|(stage, _)| stage));
-        let mut times = Table::new(
-            ["method"].into_iter().chain(conditions.iter().map(String::as_str)).chain(stages.into_iter().flatten()),
-        );
-        for row in &self.rows {
-            times.row(leading(row).chain(row.times.stages().map(|(_, time)| format::number(time, 2))));
+        let mut times = Table::new(&heads, stages.into_iter().flatten());
+        for (row, name) in self.rows.iter().zip(&names) {
+            times.row(name.iter().cloned().chain(row.times.stages().map(|(_, time)| format::number(time, 2))));
         }
         writeln!(f)?;
         times.write(f)?;
-        write!(f, "Median milliseconds; the first seven stages a frame, the others a target.")
+        let note = wrapped("Median milliseconds; the first seven stages a frame, the others a target.", f.width(), 0);
+        write!(f, "{note}")
     }
 }
 
 impl Summary {
     /// Errors beside their bound.
-    fn limits(&self, conditions: &[String]) -> Table {
+    fn limits(&self, heads: &[&str], names: &[Vec<String>]) -> Table {
+        let leading = heads;
         let heads = ["n", "m2 RMSE mm", "bound mm", "ratio", "m3 RMSE mm", "bound mm", "ratio", "NEES", "below 95 %"];
-        let mut table = Table::new(["method"].into_iter().chain(conditions.iter().map(String::as_str)).chain(heads));
-        for row in &self.rows {
+        let mut table = Table::new(leading, heads);
+        for (row, name) in self.rows.iter().zip(names) {
             let Some(limits) = row.limits else { continue };
             let beside = |[rmse, bound]: [f64; 2]| {
                 [(rmse * 1e3, 3), (bound * 1e3, 3), (rmse / bound, 3)]
@@ -100,7 +120,7 @@ impl Summary {
             let consistency =
                 [(limits.nees, 3), (limits.coverage, 4)].map(|(x, digits)| format::number(Some(x), digits));
             let numbers = beside(limits.m2).into_iter().chain(beside(limits.m3)).chain(consistency);
-            table.row(leading(row).chain([limits.count.to_string()]).chain(numbers));
+            table.row(name.iter().cloned().chain([limits.count.to_string()]).chain(numbers));
         }
         table
     }
@@ -110,38 +130,131 @@ fn leading(row: &Row) -> impl Iterator<Item = String> {
     [row.method()].into_iter().chain(row.conditions().map(|axis| axis.value.clone()))
 }
 
+/// A text that moves no cursor.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// Breaks a line at blanks so that it takes no more than `most` columns, the later lines moved in by `indent`; a longer word is
+/// cut.
+pub(crate) fn wrapped(text: &str, most: Option<usize>, indent: usize) -> String {
+    let Some(most) = most.map(|most| most.max(indent + 8)) else { return text.to_owned() };
+    let mut lines = vec![String::new()];
+    let mut taken = 0;
+    for (place, word) in text.split(' ').enumerate() {
+        let mut rest: Vec<char> = word.chars().collect();
+        if place > 0 && taken + 1 + rest.len() > most {
+            lines.push(" ".repeat(indent));
+            taken = indent;
+        } else if place > 0 {
+            lines.last_mut().expect("there is a line").push(' ');
+            taken += 1;
+        }
+        while taken + rest.len() > most {
+            let cut = rest.drain(..most - taken).collect::<String>();
+            lines.last_mut().expect("there is a line").push_str(&cut);
+            lines.push(" ".repeat(indent));
+            taken = indent;
+        }
+        taken += rest.len();
+        lines.last_mut().expect("there is a line").extend(rest);
+    }
+    lines.join("\n")
+}
+
 /// Columns of text.
 struct Table {
     rows: Vec<Vec<String>>,
+    /// How many columns at the left say which row it is.
+    leading: usize,
 }
 
 impl Table {
-    fn new<'a>(heads: impl IntoIterator<Item = &'a str>) -> Self {
-        let mut table = Self { rows: Vec::new() };
-        table.row(heads.into_iter().map(str::to_owned));
+    fn new<'a>(leading: &[&'a str], heads: impl IntoIterator<Item = &'a str>) -> Self {
+        let mut table = Self { rows: Vec::new(), leading: leading.len() };
+        table.row(leading.iter().copied().chain(heads).map(str::to_owned));
         table
     }
 
     /// Names come from files: what could move the cursor becomes a blank.
     fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        let plain = |cell: String| cell.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-        self.rows.push(cells.into_iter().map(plain).collect());
+        self.rows.push(cells.into_iter().map(|cell| plain(&cell)).collect());
     }
 
-    /// The first column to the left, the others to the right.
-    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn widths(&self) -> Vec<usize> {
         let width = |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..self.rows[0].len()).map(width).collect();
-        for (index, row) in self.rows.iter().enumerate() {
-            let mut line = format!("{:<1$}", row[0], widths[0]);
-            for (cell, width) in row.iter().zip(&widths).skip(1) {
-                line += &format!("  {cell:>width$}");
+        (0..self.rows[0].len()).map(width).collect()
+    }
+
+    /// How many columns of a terminal it takes.
+    fn width(&self) -> usize {
+        let widths = self.widths();
+        widths.iter().sum::<usize>() + 2 * (widths.len() - 1)
+    }
+
+    /// The first column to the left, the others to the right; where they do not fit the rest stands below, led by the same names.
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let widths = self.widths();
+        let lead = widths[..self.leading].iter().map(|width| width + 2).sum::<usize>();
+        let mut parts: Vec<(Vec<usize>, usize)> = Vec::new();
+        for (column, width) in widths.iter().enumerate().skip(self.leading) {
+            let wide = width + 2;
+            match parts.last_mut() {
+                Some((part, taken)) if f.width().is_none_or(|most| *taken + wide - 2 <= most) => {
+                    part.push(column);
+                    *taken += wide;
+                }
+                _ => parts.push(((0..self.leading).chain([column]).collect(), lead + wide)),
             }
-            writeln!(f, "{}", line.trim_end())?;
-            if index == 0 {
-                writeln!(f, "{}", "─".repeat(widths.iter().sum::<usize>() + 2 * (widths.len() - 1)))?;
+        }
+        for (place, (columns, taken)) in parts.iter().enumerate() {
+            if place > 0 {
+                writeln!(f)?;
+            }
+            for (index, row) in self.rows.iter().enumerate() {
+                let mut line = format!("{:<1$}", row[columns[0]], widths[columns[0]]);
+                for &column in &columns[1..] {
+                    line += &format!("  {:>1$}", row[column], widths[column]);
+                }
+                writeln!(f, "{}", line.trim_end())?;
+                if index == 0 {
+                    writeln!(f, "{}", "─".repeat(taken - 2))?;
+                }
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Shown(Table);
+
+    impl fmt::Display for Shown {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            self.0.write(f)
+        }
+    }
+
+    #[test]
+    fn a_table_is_no_wider_than_it_may_be() {
+        let mut table = Table::new(&["method"], ["one", "two", "three", "four"]);
+        table.row(["some name", "1", "22222222", "3", "4"].map(str::to_owned));
+        let table = Shown(table);
+        assert_eq!(format!("{table}").lines().count(), 3);
+        for most in 20..60 {
+            let text = format!("{table:most$}");
+            assert!(text.lines().all(|line| line.chars().count() <= most), "{most}: {text}");
+            assert!(["22222222", "four"].iter().all(|cell| text.matches(cell).count() == 1), "{text}");
+        }
+    }
+
+    #[test]
+    fn lines_break_at_blanks() {
+        assert_eq!(wrapped("one two three", Some(8), 0), "one two\nthree");
+        assert_eq!(wrapped("one two three", None, 0), "one two three");
+        assert_eq!(wrapped("a bcdefghijklmn", Some(10), 2), "a\n  bcdefghi\n  jklmn");
     }
 }

@@ -8,7 +8,7 @@ use seafix_report::compare;
 use super::report::failure;
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, USAGE},
-    terminal::print,
+    terminal::{print, width},
 };
 
 #[derive(Debug, Args)]
@@ -31,7 +31,7 @@ impl Compare {
                 return Err(Failure::new(USAGE, format!("{} is named twice; name different runs", run.display())));
             }
         }
-        let compared = compare(&self.runs, self.force, self.out.as_deref()).map_err(failure)?;
+        let compared = compare(&self.runs, self.force, self.out.as_deref(), Some(width())).map_err(failure)?;
         print(&compared.table)?;
         if let Some(page) = &compared.page {
             print(&format!("page: {}\n", page.display()))?;

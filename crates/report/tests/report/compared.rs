@@ -9,13 +9,19 @@ use crate::made_up::{frame, header};
 
 /// A run of one trial: its errors are those of `solver`.
 fn run(folder: &Path, name: &str, solver: &str, seed: u64) -> PathBuf {
+    long(folder, name, solver, seed, 36)
+}
+
+/// The same of so many frames.
+fn long(folder: &Path, name: &str, solver: &str, seed: u64, frames: u64) -> PathBuf {
     let path = folder.join(name);
     std::fs::create_dir_all(&path).unwrap();
     let mut header = header(1, 3.0, solver);
     header.axes.clear();
     header.seeds = vec![("experiment".to_owned(), seed)];
+    header.configuration += &format!("[source]\nframes = {frames}\n");
     let mut writer = Writer::create(&path.join("001.mcap"), &header).unwrap();
-    for number in 0..36 {
+    for number in 0..frames {
         let mut frame = frame(&header, number, 3.0);
         frame.images = None;
         writer.frame(&frame).unwrap();
@@ -28,12 +34,12 @@ fn run(folder: &Path, name: &str, solver: &str, seed: u64) -> PathBuf {
 fn runs_of_the_same_data_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (run(folder.path(), "a", "triad", 1), run(folder.path(), "b", "kabsch", 1));
-    let compared = compare(&[first.clone(), second], false, Some(folder.path())).unwrap();
+    let compared = compare(&[first.clone(), second], false, Some(folder.path()), None).unwrap();
     assert!(compared.differ && compared.table.contains("significant"), "{}", compared.table);
     assert!(compared.page.unwrap().exists());
     let again = run(folder.path(), "c", "triad", 1);
     assert!(!compared.table.contains("bit for bit"), "{}", compared.table);
-    let compared = compare(&[first, again], false, None).unwrap();
+    let compared = compare(&[first, again], false, None, None).unwrap();
     assert!(compared.table.contains("a and c have the same results, bit for bit"), "{}", compared.table);
     assert!(!compared.differ && compared.table.contains("p 1.0000, not significant"), "{}", compared.table);
 }
@@ -43,12 +49,27 @@ fn runs_of_the_same_data_are_compared() {
 fn runs_of_other_data_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let runs = [run(folder.path(), "a", "triad", 1), run(folder.path(), "b", "kabsch", 2)];
-    match compare(&runs, false, None) {
+    match compare(&runs, false, None, None) {
         Err(ReportError::Incomparable { differences, .. }) => {
             assert_eq!(differences, ["seeds: experiment 1 against experiment 2"]);
         }
         other => panic!("{other:?}"),
     }
-    let forced = compare(&runs, true, None).unwrap().table;
+    let forced = compare(&runs, true, None, None).unwrap().table;
     assert!(forced.contains("a and b saw different data: seeds: experiment 1 against experiment 2."), "{forced}");
+}
+
+/// A run that is shorter is compared by the frames that both have, and that is said; no line is wider than the terminal.
+#[test]
+fn what_is_compared_of_a_shorter_run_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = [run(folder.path(), "a", "triad", 1), long(folder.path(), "b", "kabsch", 1, 24)];
+    assert!(matches!(compare(&runs, false, None, None), Err(ReportError::Incomparable { .. })));
+    let table = compare(&runs, true, None, None).unwrap().table;
+    let said = "a has 36 frames a trial, b has 24 frames a trial: compared are the 24 attempts at the same frame and target that both made.";
+    assert!(table.lines().any(|line| line == said) && table.contains("n 24, p "), "{table}");
+    for width in [40, 80, 120] {
+        let table = compare(&runs, true, None, Some(width)).unwrap().table;
+        assert!(table.lines().all(|line| line.chars().count() <= width), "{width}: {table}");
+    }
 }
