@@ -238,6 +238,7 @@ mod tests {
         }
     }
 
+    /// Seen to fail where all columns stand side by side.
     #[test]
     fn a_table_is_no_wider_than_it_may_be() {
         let mut table = Table::new(&["method"], ["one", "two", "three", "four"]);

@@ -60,6 +60,8 @@ fn runs_of_other_data_are_refused() {
 }
 
 /// A run that is shorter is compared by the frames that both have, and that is said; no line is wider than the terminal.
+///
+/// Seen to fail where nothing is compared, and where all columns stand side by side.
 #[test]
 fn what_is_compared_of_a_shorter_run_is_said() {
     let folder = tempfile::tempdir().unwrap();
