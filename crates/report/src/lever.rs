@@ -1,6 +1,6 @@
 //! How far a fix errs at a distance from the points that it rests on.
 
-use nalgebra::{Matrix3, Matrix4, Vector3};
+use nalgebra::{Matrix4, Vector3};
 use seafix_log::{TargetRecord, TrialHeader, TruthRecord};
 
 use crate::place::matrix;
@@ -27,11 +27,8 @@ pub(crate) fn misplaced(
     (!used.is_empty()).then_some((estimate * camera_from_object, centroid))
 }
 
-/// How far the fix has that centroid from its place (m), and by which angle it turns the object (rad); NaN where not known.
-pub(crate) fn displacement(header: &TrialHeader, truth: Option<&TruthRecord>, target: &TargetRecord) -> [f64; 2] {
-    misplaced(header, truth, target).map_or([f64::NAN; 2], |(e, centroid)| {
-        // ‖R − I‖² = 8·sin²(θ/2): exact for small angles, where the trace is not.
-        let turn = (e.fixed_view::<3, 3>(0, 0) - Matrix3::identity()).norm() / 8_f64.sqrt();
-        [(e.transform_point(&centroid.into()).coords - centroid).norm(), 2.0 * turn.min(1.0).asin()]
-    })
+/// How far the fix has that centroid from its place (m); NaN where not known.
+pub(crate) fn displacement(header: &TrialHeader, truth: Option<&TruthRecord>, target: &TargetRecord) -> f64 {
+    misplaced(header, truth, target)
+        .map_or(f64::NAN, |(e, centroid)| (e.transform_point(&centroid.into()).coords - centroid).norm())
 }

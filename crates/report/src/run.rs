@@ -99,9 +99,8 @@ pub(crate) struct Attempt {
     pub(crate) points: u32,
     /// Where the left camera is in the world by this fix and the survey (m); NaN where unknown.
     pub(crate) estimate: [f64; 3],
-    /// How far the fix has the centroid of the points that it used from its place (m), and the angle by which it is turned
-    /// (rad); NaN where unknown.
-    displacement: [f64; 2],
+    /// How far the fix has the centroid of the points that it used from its place (m); NaN where unknown.
+    displacement: f64,
     object: u32,
     reason: u32,
     values: [f64; Field::ALL.len()],
@@ -373,8 +372,8 @@ impl Attempt {
 
     /// Its error at a lever arm of this length (m); `None` where it is not known.
     pub(crate) fn at_arm(&self, arm: f64) -> Option<f64> {
-        let [displacement, angle] = self.displacement;
-        (!displacement.is_nan()).then(|| lever_arm_error(displacement, angle, arm))
+        let angle = self.get(Field::Attitude)?;
+        (!self.displacement.is_nan()).then(|| lever_arm_error(self.displacement, angle, arm))
     }
 
     /// What a comparison takes for its error: infinity where there is none, or a wrong one.

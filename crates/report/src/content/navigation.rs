@@ -100,7 +100,9 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
         text![
             format!("{}: the camera’s position, relative to the object of its last fix, errs by ", name(index)),
             metres("rms", Sailed::Position),
-            " mm (RMS) over the ",
+            " mm (RMS) and by ",
+            metres("last", Sailed::Position),
+            " mm at the last of the ",
             count(trial, Counted::Navigated),
             " frames with a pose of ",
             count(trial, Counted::Sailed),
@@ -125,10 +127,27 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     };
     let mut said: Vec<Text> = trials.map(sentence).collect();
     if said.len() > 1 {
+        said.extend(least(run, name));
         said.push(text!["Each of these is one dive: how much another would differ is not in these numbers."]);
     }
     said.extend(displaced(run, name));
     said
+}
+
+/// Which trial errs least, where all that navigate know as many poses.
+fn least(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
+    let rms = |trial: &Trial| -> (usize, f64) {
+        let errors = trial.sample().filter_map(|frame| frame.sailed.as_ref()?.get(Sailed::Position));
+        let (n, square) = errors.fold((0, 0.0), |(n, sum), error| (n + 1, sum + error * error));
+        (n, (square / n as f64).sqrt())
+    };
+    let all: Vec<(usize, &Trial)> = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial)).collect();
+    let known: Vec<(usize, f64)> = all.iter().map(|(_, trial)| rms(trial)).collect();
+    let comparable = known.iter().all(|(n, rms)| *n == known[0].0 && rms.is_finite());
+    let least = (0..all.len()).min_by(|&a, &b| known[a].1.total_cmp(&known[b].1)).filter(|_| comparable)?;
+    let (index, trial) = all[least];
+    let rms = statistic(trial, "rms", Sailed::Position, Unit::Millimetres);
+    Some(text![format!("Of these, {} errs least: ", name(index)), rms, " mm (RMS)."])
 }
 
 /// Which objects each trial told to stand elsewhere than surveyed, where any did: in the words of its log, the first time.

@@ -160,7 +160,8 @@ impl Log {
 
 /// How far points are moved that stand around the centroid, six along the axes: their mean square is that of a sphere of them.
 fn moved(header: &TrialHeader, truth: Option<&TruthRecord>, row: &TargetRecord, arm: f64) -> f64 {
-    let Some((e, centroid)) = lever::misplaced(header, truth, row) else { return f64::NAN };
+    let judged = lever::misplaced(header, truth, row).filter(|_| row.evaluation.m3_attitude.is_some());
+    let Some((e, centroid)) = judged else { return f64::NAN };
     let ends = (0..6).map(|k| {
         let mut end = centroid;
         end[k / 2] += if k % 2 == 0 { arm } else { -arm };

@@ -145,7 +145,10 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         let scale = worse * 0.001 * distance * distance * (1.0 + noise(seed + 3));
         row.outcome = Outcome::Referenced;
         row.reason.clear();
-        row.object_from_camera = Some(world_from_camera);
+        let turn = 1.1 * scale;
+        let mut turned = world_from_camera;
+        (turned[0], turned[1]) = ([turn.cos(), -turn.sin(), 0.0, 0.0], [turn.sin(), turn.cos(), 0.0, 0.0]);
+        row.object_from_camera = Some(turned);
         row.covariance = Some(std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e-5 } else { 0.0 })));
         row.pairs = (0..7).map(|i| Pair { model: i, cloud: i }).collect();
         row.used = if solver == "triad" { vec![0, 2, 6] } else { (0..7).collect() };
@@ -164,7 +167,7 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
             m1_unused_rms: (solver == "triad").then_some(1.3 * scale),
             m2_rms: Some(if wrong { 0.4 } else { 1.4 * scale }),
             m3_position: Some(4.0 * scale),
-            m3_attitude: Some(1.1 * scale),
+            m3_attitude: Some(turn),
             nees: Some(6.0 + 4.0 * noise(seed + 4)),
             ..Evaluation::default()
         };
