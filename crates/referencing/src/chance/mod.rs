@@ -85,18 +85,16 @@ pub fn expected_chance_sets(problem: &Problem<'_>, size: usize, chi2: f64) -> f6
     if size < 3 {
         return f64::INFINITY;
     }
-    let (noise, order) = (Noise::of(problem), order(problem));
+    let noise = Noise::of(problem);
     if chi2.is_nan() || noise.is_nan() {
         return f64::NAN;
     }
-    let null = Null::of(problem);
+    let frame = Frame { null: Null::of(problem), noise, order: order(problem), shared: shared(problem) };
     let available = problem.candidates.with_candidates();
-    let shared = shared(problem);
     let (mut sum, mut last) = (0.0, 0.0_f64);
     for j in (size..=available).take(MOST_SIZES) {
         let halved = (j - size).min(3);
-        let term =
-            expected_of_size(problem, &order, &null, &noise, j, chi2 * freedom(j) / freedom(size), halved, shared);
+        let term = expected_of_size(problem, &frame, j, chi2 * freedom(j) / freedom(size), halved);
         sum += term;
         // Not before the terms fall: among many candidates the larger sets may be the more.
         if term.is_nan() || (term <= NEGLIGIBLE * sum && term <= last.max(f64::MIN_POSITIVE)) {
@@ -114,6 +112,15 @@ fn freedom(size: usize) -> f64 {
     (3 * size - 6) as f64
 }
 
+/// What sets of all sizes have in common.
+struct Frame<'a> {
+    null: Null<'a>,
+    noise: Noise,
+    order: Vec<usize>,
+    /// See [`shared`].
+    shared: f64,
+}
+
 /// The model points in an order of their own, whatever their numbers.
 fn order(problem: &Problem<'_>) -> Vec<usize> {
     let key = |i: usize| (problem.model[i].at.coords, problem.candidates.lists[i].len());
@@ -127,25 +134,16 @@ fn order(problem: &Problem<'_>) -> Vec<usize> {
 }
 
 /// The expected number of such sets of exactly `size` pairs.
-fn expected_of_size(
-    problem: &Problem<'_>,
-    order: &[usize],
-    null: &Null<'_>,
-    noise: &Noise,
-    size: usize,
-    chi2: f64,
-    halved: usize,
-    shared: f64,
-) -> f64 {
-    let lengths = order.iter().map(|&i| (i, problem.candidates.lists[i].len()));
+fn expected_of_size(problem: &Problem<'_>, frame: &Frame<'_>, size: usize, chi2: f64, halved: usize) -> f64 {
+    let lengths = frame.order.iter().map(|&i| (i, problem.candidates.lists[i].len()));
     let mut subsets = Subsets::new(lengths, size);
     let pairs = size * (size - 1) / 2;
     let wanted = (SAMPLES_A_POINT * problem.candidates.with_candidates()).min(MOST_SAMPLES) >> halved;
     let samples = wanted.min(MOST_WORK / pairs).max(LEAST_SAMPLES);
     let mut sequence = Sequence::new(samples);
-    let mut shape = Shape::new(problem, null, noise, size, chi2);
+    let mut shape = Shape::new(problem, &frame.null, &frame.noise, size, chi2);
     // Candidates that two model points share can serve one of them only.
-    let apart = pairs as f64 * libm::log1p(-shared);
+    let apart = pairs as f64 * libm::log1p(-frame.shared);
     let ln_scale = subsets.ln_tuples() + shape.ln_scale() + apart;
     let (mut sum, mut taken) = (0.0, 0);
     while taken < samples {
