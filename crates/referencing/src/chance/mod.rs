@@ -29,6 +29,7 @@
 //! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid
 //! point matches*, 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
 
+mod dimension;
 mod null;
 mod sequence;
 mod shape;
@@ -37,6 +38,7 @@ mod subsets;
 use seafix_geometry::MeasuredPoint;
 
 use crate::{Correspondence, Kabsch, Observations, Problem, Solver, candidates::chi_square, solve::likelihood};
+pub(crate) use dimension::dimension;
 use null::Null;
 use sequence::Sequence;
 use shape::{Noise, Shape};

@@ -73,7 +73,7 @@ impl<'a> Null<'a> {
 }
 
 /// A number that looks random and depends on nothing but where the point is.
-fn name(point: &MeasuredPoint) -> u64 {
+pub(super) fn name(point: &MeasuredPoint) -> u64 {
     coordinates(point).iter().fold(0, |name, x| mixed(name ^ x.to_bits()))
 }
 

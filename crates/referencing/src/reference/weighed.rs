@@ -1,7 +1,10 @@
 //! What is believed of a search that weighs evidence.
 
 use super::{Alternative, Outcome, Refusal, judge::Judge};
-use crate::{Belief, Explanation, Identification, Problem, Shares, chance::expected_sets_as_good};
+use crate::{
+    Belief, Explanation, Identification, Problem, Shares,
+    chance::{dimension, expected_sets_as_good},
+};
 
 impl Judge<'_> {
     /// The pose of a search that weighs evidence: believed when little speaks for no object at all, little
@@ -10,13 +13,15 @@ impl Judge<'_> {
         let shares = belief.shares(self.problem.model, self.alert_limit);
         let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
         let runner_up = belief.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
-        let limit = self.absence_limit();
+        let (least, most) = self.absence_limits();
+        // What is believed by the lesser needs no look at the cloud.
+        let limit = if shares.absent > least && self.fills_space(found) { most } else { least };
         // Two things that are each the object by themselves: neither is the other's clutter.
         let even = shares.absent - shares.clutter;
         if let (true, Some(best), Some(copy)) = (
             even <= limit || self.rare(found, &shares),
             belief.explanations.first(),
-            belief.copy(self.problem.model, self.alert_limit, limit.max(even)),
+            belief.copy(self.problem.model, self.alert_limit, most.max(even)),
         ) {
             return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
         }
@@ -44,22 +49,29 @@ impl Judge<'_> {
         (outcome, runner_up)
     }
 
-    /// The largest probability of absence with which a pose is believed.
+    /// The largest probabilities of absence with which a pose is believed: where clutter lies on lines and surfaces, and where it
+    /// fills space.
     ///
-    /// Every number of visible points is equally likely beforehand, so that of a larger model each has less, and a cloud
-    /// without the object shows a stated evidence the more seldom.
-    fn absence_limit(&self) -> f64 {
-        let larger = (self.problem.model.len() + 1) as f64 / STATED_FOR;
+    /// Every number of visible points is equally likely beforehand, so that of a larger model each has less, and clutter that
+    /// fills space shows a stated evidence the more seldom. On lines and surfaces the evidence, a sum of as many terms as points
+    /// are visible, is too sure by something of each: the more, the larger the model.
+    fn absence_limits(&self) -> (f64, f64) {
+        let larger = ((self.problem.model.len() + 1) as f64 / STATED_FOR).max(1.0);
         let stated = self.acceptance.absence;
-        (stated * larger.max(1.0)).min(MOST_ABSENCE.max(stated))
+        (stated / (larger * larger), (stated * larger).min(MOST_ABSENCE.max(stated)))
+    }
+
+    /// Whether the candidates that are not the object's fill space, as the evidence takes clutter to do.
+    fn fills_space(&self, found: &Identification) -> bool {
+        dimension(self.problem, &found.pairs).is_some_and(|dimension| dimension >= FILLS_SPACE)
     }
 
     /// Whether chance gives sets as good so rarely that the pose is believed although absence is not as improbable as it
     /// should be.
     ///
     /// The probability of absence takes every number of visible points to be equally likely, which of a large model makes
-    /// few visible ones improbable beforehand; chance is counted without. Only of putative pairs is its count good enough
-    /// for that: partners that were shuffled lie wherever the cloud does, crowded or not, while clutter in shells lies on
+    /// few visible ones improbable beforehand; chance is counted without. Only of putative pairs whose points fill space is its
+    /// count good enough for that: partners that were shuffled lie wherever the cloud does, while clutter in shells lies on
     /// edges that look like the object's.
     fn rare(&self, found: &Identification, shares: &Shares) -> bool {
         let Problem { cloud, candidates, prior, .. } = self.problem;
@@ -67,16 +79,19 @@ impl Judge<'_> {
         putative
             && shares.absent <= IMPROBABLE
             && shares.alike <= self.acceptance.absence
+            && self.fills_space(found)
             && expected_sets_as_good(self.problem, &found.pairs) <= self.acceptance.rare
     }
 }
 
-// These three are no settings: they belong to the scale on which `acceptance.absence` and `acceptance.rare` are stated, and were
+// These four are no settings: they belong to the scale on which `acceptance.absence` and `acceptance.rare` are stated, and were
 // chosen with their defaults on drawn problems. Whoever wants to be stricter or laxer moves those two.
 
 /// An object is not believed whose absence is more probable than this.
 const IMPROBABLE: f64 = 0.05;
 /// The greatest limit of the probability of absence, whatever the model.
 const MOST_ABSENCE: f64 = 0.01;
+/// Clutter of fewer dimensions lies on lines and surfaces.
+const FILLS_SPACE: f64 = 2.3;
 /// The number of points, and one, of the models that [`Acceptance::absence`](super::Acceptance::absence) is stated for.
 const STATED_FOR: f64 = 9.0;

@@ -40,14 +40,11 @@ impl Crowd {
     pub(in crate::search) fn weigh(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, mode: &mut Mode) {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
         let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
-        let crowded: Vec<f64> = mode
-            .members
-            .iter()
-            .zip(&even)
-            .enumerate()
-            .map(|(at, (&v, gain))| {
+        let crowded: Vec<f64> = (0..members.len())
+            .map(|at| {
+                let v = mode.members[at];
                 let crowd = self.cost(problem, terms, graph, v, &members);
-                gain - crowd.max(self.twin(problem, terms, graph, v, &members[..at]))
+                any_of(terms, graph, v, mode, even[at]) - crowd.max(self.twin(problem, terms, graph, v, &members[..at]))
             })
             .collect();
         let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_share[even.len()];
@@ -101,6 +98,18 @@ impl Crowd {
         let times = libm::log(NEIGHBOURS as f64 / volume) - even;
         if times > libm::log(CROWDED) { times } else { 0.0 }
     }
+}
+
+/// ln of the likelihood ratio of a member's model point, whichever of its candidates it is: Σ_j r_ij over those near its place,
+/// r_ij the ratio of each and `own` ln of the member's.
+///
+/// Where clutter crowds, the best of several is as near as that by chance; only of their sum is the expectation without an
+/// object one.
+fn any_of(terms: &Terms, graph: &Graph, v: usize, mode: &Mode, own: f64) -> f64 {
+    let rank = graph.rank[v] as usize;
+    let others = (graph.starts[rank]..graph.starts[rank + 1]).filter(|&other| other != v);
+    let shares = others.filter_map(|other| terms.of_pair(other, &mode.motion)).map(|gain| libm::exp(gain - own));
+    own + libm::log1p(shares.sum())
 }
 
 /// The share of the candidates that have another within `reach` (m). Points that are nobody's candidates are none of this
