@@ -450,9 +450,10 @@ fn one_disparity_is_refused_with_the_number_that_failed() {
     assert!(matches!(named(&large), Outcome::Referenced(_)));
 }
 
-/// What is said of an object of seventeen points, six of them seen, with this evidence (nats) beside 120 other points that lie at
+/// What is said with this `acceptance.absence` of an object of seventeen points, six of them seen, with this evidence (nats), beside 120 other points that lie at
 /// (u, v, w), each uniform in 0…1.
-fn with_evidence(ln_evidence: f64, clutter: impl Fn([f64; 3]) -> Point<Camera>) -> Outcome {
+fn with_evidence(absence: f64, ln_evidence: f64, clutter: impl Fn([f64; 3]) -> Point<Camera>) -> Outcome {
+    let acceptance = Acceptance { absence, ..Acceptance::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut uniform = || [(); 3].map(|()| rng.random_range(0.0..1.0));
     let more: Vec<[f64; 3]> = (0..10).map(|_| uniform().map(|x| 4.0 * x - 2.0)).collect();
@@ -475,7 +476,7 @@ fn with_evidence(ln_evidence: f64, clutter: impl Fn([f64; 3]) -> Point<Camera>) 
     let belief = Some(Belief { explanations: vec![best], ..Belief::default() });
     let found = MaximumClique::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a set");
     let found = Identification { pairs, belief, undecided: None, ..found };
-    judge(&problem, Ok(found), &Kabsch::default(), &Acceptance::default(), None).outcome
+    judge(&problem, Ok(found), &Kabsch::default(), &acceptance, None).outcome
 }
 
 #[test]
@@ -488,11 +489,13 @@ fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
         other => panic!("{other:?}"),
     };
     // Twice as large as what the limit of 2e-5 is stated for.
-    assert!((limit(with_evidence(9.0, space)) - 4e-5).abs() < 1e-12);
+    assert!((limit(with_evidence(2e-5, 9.0, space)) - 4e-5).abs() < 1e-12);
     for clutter in [&surface as &dyn Fn([f64; 3]) -> Point<Camera>, &line] {
-        assert!((limit(with_evidence(9.0, clutter)) - 5e-6).abs() < 1e-12);
-        assert!((limit(with_evidence(11.0, clutter)) - 5e-6).abs() < 1e-12);
-        assert!(matches!(with_evidence(12.5, clutter), Outcome::Referenced(_)));
+        assert!((limit(with_evidence(2e-5, 9.0, clutter)) - 5e-6).abs() < 1e-9);
+        assert!((limit(with_evidence(2e-5, 11.0, clutter)) - 5e-6).abs() < 1e-9);
+        assert!(matches!(with_evidence(2e-5, 12.5, clutter), Outcome::Referenced(_)));
     }
-    assert!(matches!(with_evidence(11.0, space), Outcome::Referenced(_)));
+    assert!(matches!(with_evidence(2e-5, 11.0, space), Outcome::Referenced(_)));
+    // Who asks for nothing is refused nothing.
+    assert!(matches!(with_evidence(0.999_999, 0.0, line), Outcome::Referenced(_)));
 }

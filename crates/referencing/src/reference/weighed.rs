@@ -58,7 +58,9 @@ impl Judge<'_> {
     fn absence_limits(&self) -> (f64, f64) {
         let larger = ((self.problem.model.len() + 1) as f64 / STATED_FOR).max(1.0);
         let stated = self.acceptance.absence;
-        (stated / (larger * larger), (stated * larger).min(MOST_ABSENCE.max(stated)))
+        // The lesser by its odds: of what is stated to be hardly a limit at all, so little is asked of any model.
+        let odds = stated / (1.0 - stated) / (larger * larger);
+        (odds / (1.0 + odds), (stated * larger).min(MOST_ABSENCE.max(stated)))
     }
 
     /// Whether the candidates that are not the object's fill space, as the evidence takes clutter to do.
