@@ -1,7 +1,5 @@
 //! Of how many dimensions clutter looks.
 
-use std::collections::BTreeSet;
-
 use super::{coordinates, null::name};
 use crate::{Correspondence, Problem};
 
@@ -9,7 +7,7 @@ use crate::{Correspondence, Problem};
 const NEIGHBOURS: usize = 12;
 /// How far at least one looks about a point, in standard deviations of its place: nearer, noise has three dimensions of its own.
 const REACH: f64 = 6.0;
-/// About no more points than so many is looked: the dimension is then known to about a tenth.
+/// About no more points than so many is looked.
 const SAMPLE: usize = 256;
 
 /// The dimension of the candidates that are not used: 3 where they fill space, 2 where they lie on surfaces, 1 on lines.
@@ -24,22 +22,20 @@ const SAMPLE: usize = 256;
 /// (The correlation dimension of Grassberger and Procaccia, *Measuring the strangeness of strange attractors*, 1983, about each
 /// point at its own scale.)
 pub(crate) fn dimension(problem: &Problem<'_>, used: &[Correspondence]) -> Option<f64> {
-    let used: BTreeSet<usize> = used.iter().map(|pair| pair.cloud).collect();
-    let all: BTreeSet<usize> = problem.candidates.lists.iter().flatten().copied().collect();
-    let all: Vec<usize> = all.difference(&used).copied().collect();
+    let mut counts = vec![false; problem.cloud.len()];
+    problem.candidates.lists.iter().flatten().for_each(|&j| counts[j] = true);
+    used.iter().for_each(|pair| counts[pair.cloud] = false);
+    let mut all: Vec<usize> = (0..counts.len()).filter(|&j| counts[j]).collect();
     if all.len() <= NEIGHBOURS {
         return None;
     }
-    let mut sample = all.clone();
-    if sample.len() > SAMPLE {
-        sample.sort_by_cached_key(|&j| name(&problem.cloud[j]));
-        sample.truncate(SAMPLE);
+    if all.len() > SAMPLE {
+        all.sort_by_cached_key(|&j| name(&problem.cloud[j]));
     }
     let places: Vec<_> = all.iter().map(|&j| coordinates(&problem.cloud[j])).collect();
     let (mut near, mut far) = (0, 0);
     let mut squares = Vec::with_capacity(all.len());
-    for &j in &sample {
-        let here = coordinates(&problem.cloud[j]);
+    for (&j, here) in all.iter().zip(&places).take(SAMPLE) {
         squares.clear();
         squares.extend(places.iter().map(|at| (at - here).norm_squared()));
         // The nearest of all is the point itself.
@@ -89,12 +85,12 @@ mod tests {
     fn lines_surfaces_and_space_have_one_two_and_three() {
         let rng = &mut ChaCha8Rng::seed_from_u64(5);
         for axes in 1..=3 {
-            let found = of(&spread(axes, 0.0, rng), &[]).unwrap();
+            let found = of(&spread(axes, 0.0, rng), &[]).expect("it has some");
             // At the sides of what is filled the neighbours thin out less.
             assert!((found - axes as f64).abs() < 0.1 * axes as f64, "{axes}: {found}");
         }
         // Seven millimetres from each other along a line, and as far off it.
-        let rough = of(&spread(1, SIGMA, rng), &[]).unwrap();
+        let rough = of(&spread(1, SIGMA, rng), &[]).expect("it has some");
         assert!(rough < 1.2, "{rough}");
     }
 
@@ -102,15 +98,15 @@ mod tests {
     fn it_does_not_depend_on_how_points_are_numbered_nor_on_those_that_are_used() {
         let rng = &mut ChaCha8Rng::seed_from_u64(6);
         let mut places = spread(2, 0.05, rng);
-        let before = of(&places, &[]).unwrap();
+        let before = of(&places, &[]).expect("it has some");
         places.reverse();
-        assert!((of(&places, &[]).unwrap() - before).abs() < 1e-12);
+        assert!((of(&places, &[]).expect("it has some") - before).abs() < 1e-12);
         // Four hundred points of a line, all of them used.
         let line = (0..400).map(|k| Vector3::new(1.0, 0.01 * f64::from(k), 1.0));
         let with: Vec<Vector3<f64>> = places.iter().copied().chain(line).collect();
         let used: Vec<usize> = (600..1000).collect();
         assert!((of(&with, &used).unwrap() - before).abs() < 1e-12);
-        assert!(of(&with, &[]).unwrap() < before - 0.3);
+        assert!(of(&with, &[]).expect("it has some") < before - 0.3);
     }
 
     #[test]

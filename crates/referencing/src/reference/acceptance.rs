@@ -13,12 +13,14 @@ pub struct Acceptance {
     /// count.
     pub chance_budget: f64,
     /// Largest probability, by a search that weighs evidence, that the object is not there at all; of a model of eight
-    /// points. Of a larger one, of n points, (n + 1)/9 times as much, a hundredth at most, where the cloud fills space: its evidence
-    /// comes about by chance so much more seldom. Where the cloud lies on lines and surfaces, of less than 2.3 dimensions by the
-    /// distances of neighbours, odds of ((n + 1)/9)² times less: there each point's evidence is too sure by something.
+    /// points. Of a larger one, of n points, (n + 1)/9 times as much, a hundredth at most, where the cloud fills space: its
+    /// evidence comes about by chance so much more seldom. Where the cloud lies on lines and surfaces, of less than 2.3
+    /// dimensions by the distances of neighbours, odds of ((n + 1)/9)³ times less: there each point's evidence is too sure
+    /// by something.
     pub absence: f64,
-    /// Of putative pairs without a prior whose cloud fills space: largest expected number of chance sets as good as the one found with which a pose is
-    /// believed whose object is absent with a probability of more than that, but of a twentieth at most.
+    /// Of putative pairs without a prior whose cloud fills space: largest expected number of chance sets as good as the one
+    /// found with which a pose is believed whose object is absent with a probability of more than that, but of a twentieth
+    /// at most.
     pub rare: f64,
     /// Largest probability, by a search that weighs evidence, that a present object is elsewhere.
     pub doubt: f64,

@@ -1,5 +1,7 @@
 //! What is believed of a search that weighs evidence.
 
+use std::cell::LazyCell;
+
 use super::{Alternative, Outcome, Refusal, judge::Judge};
 use crate::{
     Belief, Explanation, Identification, Problem, Shares,
@@ -13,20 +15,22 @@ impl Judge<'_> {
         let shares = belief.shares(self.problem.model, self.alert_limit);
         let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
         let runner_up = belief.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
+        // Looked at where it decides, and once.
+        let fills_space = LazyCell::new(|| self.fills_space(found));
+        let rare = LazyCell::new(|| self.rare(found, &shares, || *fills_space));
         let (least, most) = self.absence_limits();
-        // What is believed by the lesser needs no look at the cloud.
-        let limit = if shares.absent > least && self.fills_space(found) { most } else { least };
+        let limit = if least < most && shares.absent > least && *fills_space { most } else { least };
         // Two things that are each the object by themselves: neither is the other's clutter.
         let even = shares.absent - shares.clutter;
         if let (true, Some(best), Some(copy)) = (
-            even <= limit || self.rare(found, &shares),
+            even <= limit || *rare,
             belief.explanations.first(),
             belief.copy(self.problem.model, self.alert_limit, most.max(even)),
         ) {
             return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
         }
         // Written so that a NaN is refused too.
-        if !(shares.absent <= limit || self.rare(found, &shares)) {
+        if !(shares.absent <= limit || *rare) {
             return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
         }
         if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
@@ -49,17 +53,20 @@ impl Judge<'_> {
         (outcome, runner_up)
     }
 
-    /// The largest probabilities of absence with which a pose is believed: where clutter lies on lines and surfaces, and where it
-    /// fills space.
+    /// The largest probabilities of absence with which a pose is believed: where clutter lies on lines and surfaces, and
+    /// where it fills space; of models as small as the limit is stated for they are one.
     ///
-    /// Every number of visible points is equally likely beforehand, so that of a larger model each has less, and clutter that
-    /// fills space shows a stated evidence the more seldom. On lines and surfaces the evidence, a sum of as many terms as points
-    /// are visible, is too sure by something of each: the more, the larger the model.
+    /// Every number of visible points is equally likely beforehand, so that of a larger model each has less, and clutter
+    /// that fills space shows a stated evidence the more seldom. On lines and surfaces the evidence, a sum of as many terms
+    /// as points are visible, is too sure by something of each: the more, the larger the model.
     fn absence_limits(&self) -> (f64, f64) {
-        let larger = ((self.problem.model.len() + 1) as f64 / STATED_FOR).max(1.0);
+        let larger = (self.problem.model.len() + 1) as f64 / STATED_FOR;
         let stated = self.acceptance.absence;
+        if larger <= 1.0 {
+            return (stated, stated);
+        }
         // The lesser by its odds: of what is stated to be hardly a limit at all, so little is asked of any model.
-        let odds = stated / (1.0 - stated) / (larger * larger);
+        let odds = stated / (1.0 - stated) / larger.powi(3);
         (odds / (1.0 + odds), (stated * larger).min(MOST_ABSENCE.max(stated)))
     }
 
@@ -75,13 +82,13 @@ impl Judge<'_> {
     /// few visible ones improbable beforehand; chance is counted without. Only of putative pairs whose points fill space is its
     /// count good enough for that: partners that were shuffled lie wherever the cloud does, while clutter in shells lies on
     /// edges that look like the object's.
-    fn rare(&self, found: &Identification, shares: &Shares) -> bool {
+    fn rare(&self, found: &Identification, shares: &Shares, fills_space: impl Fn() -> bool) -> bool {
         let Problem { cloud, candidates, prior, .. } = self.problem;
         let putative = prior.is_none() && candidates.lists.iter().any(|list| list.len() < cloud.len());
         putative
             && shares.absent <= IMPROBABLE
             && shares.alike <= self.acceptance.absence
-            && self.fills_space(found)
+            && fills_space()
             && expected_sets_as_good(self.problem, &found.pairs) <= self.acceptance.rare
     }
 }

@@ -151,3 +151,61 @@ fn nearest(problem: &Problem<'_>, of: usize, counts: impl Fn(usize) -> bool) -> 
     }
     nearest
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Vector3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use seafix_geometry::{MeasuredPoint, UncertainPoint};
+
+    use super::{
+        super::{Motion, rough::Rough},
+        *,
+    };
+    use crate::{Candidates, ModelPoint, Tolerance};
+
+    const SIGMA: f64 = 0.1;
+    const HALF: f64 = 1.0;
+
+    /// Of one model point at the origin, its candidates at these places: the likelihood ratio of the nearest, and of whichever.
+    fn ratios(places: &[Vector3<f64>]) -> (f64, f64) {
+        let measured = |at: &Vector3<f64>| MeasuredPoint {
+            position: UncertainPoint::isotropic((*at).into(), SIGMA),
+            pixels: None,
+        };
+        let cloud: Vec<MeasuredPoint> = places.iter().map(measured).collect();
+        let model = [ModelPoint::exact("a", [0.0; 3].into())];
+        let candidates = Candidates::all(1, cloud.len());
+        let tolerance = Tolerance::Sigmas(4.0);
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let rough = Rough::of(&problem).expect("there is no prior to refuse");
+        let graph = Graph::of(&problem, &rough);
+        let terms = Terms::of(&problem, &rough, &graph);
+        let motion = Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() };
+        let gain = |v: &usize| terms.residual_gain(*v, &motion);
+        let nearest = (0..cloud.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("there are some");
+        let mode = Mode { members: vec![nearest], motion, ln_evidence: 0.0, ln_crowd: 0.0 };
+        let own = gain(&nearest);
+        (libm::exp(own), libm::exp(any_of(&terms, &graph, nearest, &mode, own)))
+    }
+
+    /// Seen to fail when only the nearest counts, and when the member counts twice.
+    #[test]
+    fn without_an_object_the_ratio_of_whichever_candidate_is_one_on_average() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let frames = 4000;
+        let (mut nearest, mut whichever) = (0.0, 0.0);
+        for _ in 0..frames {
+            // Two corners, so that the box of the candidates is the one they are drawn in.
+            let mut places = vec![Vector3::repeat(-HALF), Vector3::repeat(HALF)];
+            places.extend((0..200).map(|_| Vector3::from_fn(|_, _| rng.random_range(-HALF..HALF))));
+            let (of_nearest, of_any) = ratios(&places);
+            nearest += of_nearest / f64::from(frames);
+            whichever += of_any / f64::from(frames);
+        }
+        // 200 of the 202 are drawn; its standard deviation is .015.
+        assert!((whichever - 1.0).abs() < 0.06, "{whichever}");
+        assert!(nearest < 0.9, "{nearest}");
+    }
+}

@@ -1,0 +1,51 @@
+//! Whether an object is believed to be there, by the clutter about it.
+
+use super::*;
+
+/// What is said with this `acceptance.absence` of an object of seventeen points, six of them seen, with this evidence (nats),
+/// beside 120 other points: where `clutter` puts three numbers that are uniform in 0…1.
+fn with_evidence(absence: f64, ln_evidence: f64, clutter: impl Fn([f64; 3]) -> Point<Camera>) -> Outcome {
+    let acceptance = Acceptance { absence, ..Acceptance::default() };
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut uniform = || [(); 3].map(|()| rng.random_range(0.0..1.0));
+    let more: Vec<[f64; 3]> = (0..10).map(|_| uniform().map(|x| 4.0 * x - 2.0)).collect();
+    let model = model_of(&[&MODEL[..], &more].concat());
+    let mut cloud = cloud_of(&model[..6], &mut ChaCha8Rng::seed_from_u64(8));
+    let measured = |at| MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None };
+    cloud.extend((0..120).map(|_| measured(clutter(uniform()))));
+    let candidates = Candidates::all(model.len(), cloud.len());
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Sigmas(4.0),
+        prior: None,
+    };
+    let pairs: Vec<Correspondence> = (0..6).map(|i| Correspondence { model: i, cloud: i }).collect();
+    let best = Explanation { pairs: pairs.clone(), object_from_camera: motion(), ln_evidence, ln_crowd: 0.0 };
+    let belief = Some(Belief { explanations: vec![best], ..Belief::default() });
+    let found = MaximumClique::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a set");
+    let found = Identification { pairs, belief, undecided: None, ..found };
+    judge(&problem, Ok(found), &Kabsch::default(), &acceptance, None).outcome
+}
+
+#[test]
+fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
+    let space = |[u, v, w]: [f64; 3]| Point::new(4.0 * u - 2.0, 4.0 * v - 2.0, 3.0 + 2.0 * w);
+    let surface = |[u, v, _]: [f64; 3]| Point::new(4.0 * u - 2.0, 4.0 * v - 2.0, 4.0 + 0.3 * u);
+    let line = |[u, v, _]: [f64; 3]| Point::new(4.0 * u - 2.0, (4.0 * v).floor() - 2.0, 4.0);
+    let limit = |outcome: Outcome| match outcome {
+        Outcome::Unidentified(Refusal::Absent { limit, .. }) => limit,
+        other => panic!("{other:?}"),
+    };
+    // Twice as large as what the limit of 2e-5 is stated for: twice it, or an eighth.
+    assert!((limit(with_evidence(2e-5, 9.0, space)) - 4e-5).abs() < 1e-12);
+    for clutter in [&surface as &dyn Fn([f64; 3]) -> Point<Camera>, &line] {
+        assert!((limit(with_evidence(2e-5, 9.0, clutter)) - 2.5e-6).abs() < 1e-10);
+        assert!((limit(with_evidence(2e-5, 11.0, clutter)) - 2.5e-6).abs() < 1e-10);
+        assert!(matches!(with_evidence(2e-5, 13.5, clutter), Outcome::Referenced(_)));
+    }
+    assert!(matches!(with_evidence(2e-5, 11.0, space), Outcome::Referenced(_)));
+    // Who asks for nothing is refused nothing.
+    assert!(matches!(with_evidence(0.999_999, 0.0, line), Outcome::Referenced(_)));
+}
