@@ -32,7 +32,7 @@ int main(int count, char** paths) {
     vector<double> overlaps;
     shown.setZero();
     // It takes ten times the resolution of the clouds as the bound.
-    const bool found = registration(source, target, all, overlaps, "", pairs.delta / 10, 0.9);
+    const bool found = registration(source, target, all, overlaps, ".", pairs.delta / 10, 0.9);
     pose = shown;
     return found && !pose.isZero();
   });

@@ -19,19 +19,23 @@ impl Judge<'_> {
         let fills_space = LazyCell::new(|| self.fills_space(found));
         let rare = LazyCell::new(|| self.rare(found, &shares, || *fills_space));
         let (least, most) = self.absence_limits();
-        let limit = if least < most && shares.absent > least && *fills_space { most } else { least };
+        // A pattern that looks like the object is no chance: how sure its odds are does not depend on where clutter lies.
+        let chance = shares.absent - shares.alike;
+        let limit = if least < most && chance > least && *fills_space { most } else { least };
+        let improbable = |absent: f64| absent - shares.alike <= limit && absent <= most;
         // Two things that are each the object by themselves: neither is the other's clutter.
         let even = shares.absent - shares.clutter;
         if let (true, Some(best), Some(copy)) = (
-            even <= limit || *rare,
+            improbable(even) || *rare,
             belief.explanations.first(),
             belief.copy(self.problem.model, self.alert_limit, most.max(even)),
         ) {
             return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
         }
         // Written so that a NaN is refused too.
-        if !(shares.absent <= limit || *rare) {
-            return (Outcome::Unidentified(Refusal::Absent { probability: shares.absent, limit }), runner_up);
+        if !(improbable(shares.absent) || *rare) {
+            let (probability, limit) = if chance <= limit { (shares.absent, most) } else { (chance, limit) };
+            return (Outcome::Unidentified(Refusal::Absent { probability, limit }), runner_up);
         }
         if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
             let all = belief.explanations.first().into_iter().chain(elsewhere);
