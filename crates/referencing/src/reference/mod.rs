@@ -8,6 +8,7 @@ use crate::{
     chance::expected_sets_as_good, site::diameter, solve::second_ratio,
 };
 
+mod absence;
 mod acceptance;
 mod exclusion;
 mod hypothesis;

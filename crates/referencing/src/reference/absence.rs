@@ -1,0 +1,100 @@
+//! Whether the object is there at all.
+
+use std::cell::OnceCell;
+
+use super::{Refusal, judge::Judge};
+use crate::{
+    Identification, Problem, Shares,
+    chance::{dimension, expected_sets_as_good},
+};
+
+/// What is asked of a frame before the object is believed to be there.
+pub(super) struct Absence<'a> {
+    judge: &'a Judge<'a>,
+    found: &'a Identification,
+    shares: &'a Shares,
+    /// Looked at where it decides, and once.
+    fills_space: OnceCell<bool>,
+    rare: OnceCell<bool>,
+}
+
+impl<'a> Absence<'a> {
+    pub(super) fn of(judge: &'a Judge<'a>, found: &'a Identification, shares: &'a Shares) -> Self {
+        Self { judge, found, shares, fills_space: OnceCell::new(), rare: OnceCell::new() }
+    }
+
+    /// Why the object is not believed to be there when its absence has this probability; `None` where it is.
+    ///
+    /// A pattern that looks like the object is no chance: how sure its odds are does not depend on where clutter lies.
+    pub(super) fn refusal(&self, absent: f64) -> Option<Refusal> {
+        let (least, most) = self.limits();
+        let chance = absent - self.shares.alike;
+        let limit = if least < most && chance > least && self.fills_space() { most } else { least };
+        // Written so that a NaN is refused too.
+        if (chance <= limit && absent <= most) || self.is_rare() {
+            return None;
+        }
+        let (probability, limit) = if chance <= limit { (absent, most) } else { (chance, limit) };
+        Some(Refusal::Absent { probability, limit })
+    }
+
+    /// The largest probability of absence with which any pose is believed.
+    pub(super) fn most(&self) -> f64 {
+        self.limits().1
+    }
+
+    /// The largest probabilities of absence with which a pose is believed: where clutter lies on lines and surfaces, and
+    /// where it fills space; of models as small as the limit is stated for they are one.
+    ///
+    /// Every number of visible points is equally likely beforehand, so that of a larger model each has less, and clutter
+    /// that fills space shows a stated evidence the more seldom. On lines and surfaces the evidence, a sum of as many terms
+    /// as points are visible, is too sure by something of each: the more, the larger the model.
+    fn limits(&self) -> (f64, f64) {
+        let larger = (self.judge.problem.model.len() + 1) as f64 / STATED_FOR;
+        let stated = self.judge.acceptance.absence;
+        if larger <= 1.0 {
+            return (stated, stated);
+        }
+        // The lesser by its odds: of what is stated to be hardly a limit at all, so little is asked of any model.
+        let odds = stated / (1.0 - stated) / larger.powi(3);
+        (odds / (1.0 + odds), (stated * larger).min(MOST_ABSENCE.max(stated)))
+    }
+
+    /// Whether the candidates that are not the object's fill space, as the evidence takes clutter to do.
+    fn fills_space(&self) -> bool {
+        let look = || dimension(self.judge.problem, &self.found.pairs).is_some_and(|of| of >= FILLS_SPACE);
+        *self.fills_space.get_or_init(look)
+    }
+
+    /// Whether chance gives sets as good so rarely that the pose is believed although absence is not as improbable as it
+    /// should be.
+    ///
+    /// The probability of absence takes every number of visible points to be equally likely, which of a large model makes
+    /// few visible ones improbable beforehand; chance is counted without. Only of putative pairs whose points fill space is
+    /// its count good enough for that: partners that were shuffled lie wherever the cloud does, while clutter in shells lies
+    /// on edges that look like the object's.
+    fn is_rare(&self) -> bool {
+        let Problem { cloud, candidates, prior, .. } = self.judge.problem;
+        let acceptance = self.judge.acceptance;
+        let putative = || prior.is_none() && candidates.lists.iter().any(|list| list.len() < cloud.len());
+        *self.rare.get_or_init(|| {
+            putative()
+                && self.shares.absent <= IMPROBABLE
+                && self.shares.alike <= acceptance.absence
+                && self.fills_space()
+                && expected_sets_as_good(self.judge.problem, &self.found.pairs) <= acceptance.rare
+        })
+    }
+}
+
+// These four are no settings: they belong to the scale on which `acceptance.absence` and `acceptance.rare` are stated, and were
+// chosen with their defaults on drawn problems. Whoever wants to be stricter or laxer moves those two.
+
+/// An object is not believed whose absence is more probable than this.
+const IMPROBABLE: f64 = 0.05;
+/// The greatest limit of the probability of absence, whatever the model.
+const MOST_ABSENCE: f64 = 0.01;
+/// Clutter of fewer dimensions lies on lines and surfaces.
+const FILLS_SPACE: f64 = 2.3;
+/// The number of points, and one, of the models that [`Acceptance::absence`](super::Acceptance::absence) is stated for.
+const STATED_FOR: f64 = 9.0;
