@@ -56,7 +56,7 @@ impl<'a> Absence<'a> {
             return (stated, stated);
         }
         // The lesser by its odds: of what is stated to be hardly a limit at all, so little is asked of any model.
-        let odds = stated / (1.0 - stated) / larger.powi(3);
+        let odds = stated / (1.0 - stated) / (larger * larger * larger.sqrt());
         (odds / (1.0 + odds), (stated * larger).min(MOST_ABSENCE.max(stated)))
     }
 

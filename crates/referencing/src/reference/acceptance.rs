@@ -15,7 +15,7 @@ pub struct Acceptance {
     /// Largest probability, by a search that weighs evidence, that the object is not there at all; of a model of eight
     /// points. Of a larger one, of n points, (n + 1)/9 times as much, a hundredth at most, where the cloud fills space: its
     /// evidence comes about by chance so much more seldom. Where the cloud lies on lines and surfaces, of less than 2.3
-    /// dimensions by the distances of neighbours, odds of ((n + 1)/9)³ times less: there each point's evidence is too sure
+    /// dimensions by the distances of neighbours, odds of ((n + 1)/9)^2.5 times less: there each point's evidence is too sure
     /// by something. A pattern that looks like the object is held to the former wherever clutter lies.
     pub absence: f64,
     /// Of putative pairs without a prior whose cloud fills space: largest expected number of chance sets as good as the one

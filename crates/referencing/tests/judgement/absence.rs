@@ -37,7 +37,7 @@ fn with_evidence(
     judge(&problem, Ok(found), &Kabsch::default(), &acceptance, None).outcome
 }
 
-/// Seen to fail when the limits are not of the cube, when a space is never or always seen, and when patterns count as chance.
+/// Seen to fail when the exponent is another, when a space is never or always seen, and when patterns count as chance.
 #[test]
 fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
     let space = |[u, v, w]: [f64; 3]| Point::new(4.0 * u - 2.0, 4.0 * v - 2.0, 3.0 + 2.0 * w);
@@ -47,20 +47,20 @@ fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
         Outcome::Unidentified(Refusal::Absent { limit, .. }) => limit,
         other => panic!("{other:?}"),
     };
-    // Twice as large as what the limit of 2e-5 is stated for: twice it, or an eighth.
+    // Twice as large as what the limit of 2e-5 is stated for: twice it, or 2^-2.5 of it.
     assert!((limit(with_evidence(2e-5, 9.0, None, space)) - 4e-5).abs() < 1e-12);
     for clutter in [&surface as &dyn Fn([f64; 3]) -> Point<Camera>, &line] {
-        assert!((limit(with_evidence(2e-5, 9.0, None, clutter)) - 2.5e-6).abs() < 1e-10);
-        assert!((limit(with_evidence(2e-5, 11.0, None, clutter)) - 2.5e-6).abs() < 1e-10);
+        assert!((limit(with_evidence(2e-5, 9.0, None, clutter)) - 3.5355e-6).abs() < 1e-9);
+        assert!((limit(with_evidence(2e-5, 11.0, None, clutter)) - 3.5355e-6).abs() < 1e-9);
         assert!(matches!(with_evidence(2e-5, 13.5, None, clutter), Outcome::Referenced(_)));
     }
     assert!(matches!(with_evidence(2e-5, 11.0, None, space), Outcome::Referenced(_)));
     // Who asks for nothing is refused nothing.
     assert!(matches!(with_evidence(0.999_999, 0.0, None, line), Outcome::Referenced(_)));
     // A pattern that looks like it is held to the same limit wherever clutter lies.
-    for (clutter, chance) in [(&space as &dyn Fn([f64; 3]) -> Point<Camera>, 4e-5), (&line, 2.5e-6)] {
+    for (clutter, chance) in [(&space as &dyn Fn([f64; 3]) -> Point<Camera>, 4e-5), (&line, 3.5355e-6)] {
         assert!(matches!(with_evidence(2e-5, 40.0, Some(29.5), clutter), Outcome::Referenced(_)));
         assert!((limit(with_evidence(2e-5, 40.0, Some(30.5), clutter)) - 4e-5).abs() < 1e-12);
-        assert!((limit(with_evidence(2e-5, 10.0, Some(0.0), clutter)) - chance).abs() < 1e-10);
+        assert!((limit(with_evidence(2e-5, 10.0, Some(0.0), clutter)) - chance).abs() < 1e-9);
     }
 }
