@@ -34,7 +34,8 @@ use crate::Problem;
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
-/// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. The bounds that
+/// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. A three whose distances
+/// differ much from the model's fits no pose well, and its bound falls by that. The bounds that
 /// prune take the points of a set to lie about as well as the model's do on average, so that nothing is
 /// proved: no answer is called optimal. Time O(K²) for the graph of K candidate pairs, then what the
 /// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends

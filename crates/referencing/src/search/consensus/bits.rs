@@ -1,17 +1,26 @@
 //! Sets as bits of words.
 
+use std::cmp::Ordering;
+
+/// The bits that are set in a word, ascending; the first is the bit `begin`.
+#[inline]
+pub(in crate::search) fn ones_of(begin: usize, word: u64) -> impl Iterator<Item = usize> {
+    let mut rest = word;
+    std::iter::from_fn(move || {
+        (rest != 0).then(|| {
+            let bit = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            begin + bit
+        })
+    })
+}
+
 /// The set bits from `from` on, ascending.
 pub(in crate::search) fn ones(bits: &[u64], from: usize) -> impl Iterator<Item = usize> + '_ {
     let first = from / 64;
     bits[first.min(bits.len())..].iter().enumerate().flat_map(move |(step, &word)| {
-        let mut rest = if step == 0 { word & (!0 << (from % 64)) } else { word };
-        std::iter::from_fn(move || {
-            (rest != 0).then(|| {
-                let bit = rest.trailing_zeros() as usize;
-                rest &= rest - 1;
-                (first + step) * 64 + bit
-            })
-        })
+        let after = if step == 0 { !0 << (from % 64) } else { !0 };
+        ones_of(64 * (first + step), word & after)
     })
 }
 
@@ -23,18 +32,6 @@ fn held(words: &[u64]) -> u64 {
         held |= u64::from(word != 0) << i;
     }
     held
-}
-
-/// Calls `each` with every set bit from `from` on, ascending: quick where most words are empty.
-#[inline]
-pub(in crate::search) fn each_one(bits: &[u64], from: usize, mut each: impl FnMut(usize)) {
-    each_held(bits, from, |begin, word| {
-        let mut rest = word;
-        while rest != 0 {
-            each(begin + rest.trailing_zeros() as usize);
-            rest &= rest - 1;
-        }
-    });
 }
 
 /// Calls `each` with every word that holds a bit from `from` on, and with the place of its first bit.
@@ -53,6 +50,58 @@ pub(in crate::search) fn each_held(bits: &[u64], from: usize, mut each: impl FnM
             each((first + 64 * block + i) * 64, rest);
         }
     }
+}
+
+/// A word of a set that holds a bit.
+#[derive(Clone, Copy)]
+pub(in crate::search) struct Held {
+    place: u32,
+    pub(in crate::search) bits: u64,
+}
+
+impl Held {
+    /// All of them from a bit on.
+    pub(in crate::search) fn list(set: &[u64], from: usize, held: &mut Vec<Self>) {
+        held.clear();
+        each_held(set, from, |begin, bits| held.push(Self { place: (begin / 64) as u32, bits }));
+    }
+
+    /// Which word it is.
+    #[inline]
+    pub(in crate::search) fn place(&self) -> usize {
+        self.place as usize
+    }
+
+    /// The place of its first bit.
+    #[inline]
+    pub(in crate::search) fn begin(&self) -> usize {
+        64 * self.place()
+    }
+
+    /// Its bits.
+    #[inline]
+    pub(in crate::search) fn ones(&self) -> impl Iterator<Item = usize> + use<> {
+        ones_of(self.begin(), self.bits)
+    }
+
+    /// What it shares with another set from a bit on.
+    #[inline]
+    pub(in crate::search) fn and(&self, other: &[u64], from: usize) -> u64 {
+        let after = match self.place().cmp(&(from / 64)) {
+            Ordering::Less => 0,
+            Ordering::Equal => !0 << (from % 64),
+            Ordering::Greater => !0,
+        };
+        self.bits & other[self.place()] & after
+    }
+}
+
+/// The groups of bits that hold one, each as its last bit, which is set in `lasts`.
+///
+/// Added to a group's bits but the last, all of these carry into the last where any is set, and never out of it.
+#[inline]
+pub(in crate::search) fn groups(word: u64, lasts: u64) -> u64 {
+    ((word & !lasts).wrapping_add(!lasts) | word) & lasts
 }
 
 /// Whether a bit is set.
@@ -105,10 +154,26 @@ mod tests {
         let mut many = vec![0; 130];
         [0, 5, 64, 4095, 4096, 8319].into_iter().for_each(|bit| many[bit / 64] |= 1u64 << (bit % 64));
         for from in [0, 1, 5, 6, 64, 4095, 4096, 4097, 8319, 8320, 9000] {
-            let mut each = Vec::new();
-            each_one(&many, from, |bit| each.push(bit));
+            let mut held = Vec::new();
+            Held::list(&many, from, &mut held);
+            let each: Vec<usize> = held.iter().flat_map(Held::ones).collect();
             assert_eq!(each, ones(&many, from.min(8320)).collect::<Vec<_>>(), "from {from}");
         }
+    }
+
+    #[test]
+    fn groups_are_found_that_hold_a_bit() {
+        // Of 1, 2, 5, 32, 23 bits and one.
+        let ends: [u32; 6] = [1, 3, 8, 40, 63, 64];
+        let lasts = ends.iter().fold(0, |lasts, end| lasts | 1 << (end - 1));
+        let last_of = |bit: u32| 1u64 << (ends.iter().find(|&&end| bit < end).expect("within") - 1);
+        for bit in 0..64 {
+            for other in 0..64 {
+                let held = groups(1 << bit | 1 << other, lasts);
+                assert_eq!(held, last_of(bit) | last_of(other), "bits {bit} and {other}");
+            }
+        }
+        assert_eq!((groups(0, lasts), groups(!0, lasts), groups(!0, !0)), (0, lasts, !0));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! How likely a set can be at best, from what its first members have in common.
 
 use super::{
-    bits::{each_held, each_one, is_set, shared},
+    bits::{Held, each_held, groups, shared},
     graph::Graph,
     likelihood::Terms,
     rough::Rough,
@@ -12,13 +12,9 @@ const SLACK: f64 = 3.0;
 /// What rounding may cost a sum, as a share of it.
 const ROUNDING: f64 = 1e-12;
 
-/// A pair that may join others, with what may come after it.
-#[derive(Clone, Copy)]
-pub(in crate::search) struct Later {
-    pub(in crate::search) vertex: u32,
-    /// Of its model point.
-    pub(in crate::search) rank: u32,
-    /// Model points after its own in the same list, and what they bring at most.
+/// What may come after a model point of a set: so many others, and what they bring at most.
+#[derive(Clone, Copy, Default)]
+pub(in crate::search) struct After {
     more: u32,
     bring: f64,
 }
@@ -105,13 +101,14 @@ impl<'a> Bounds<'a> {
         }
         let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
         each_held(common, starts[from], |begin, word| {
-            let mut rest = word;
+            let mut rest = groups(word, self.graph.lasts[begin / 64]);
             let mut v = begin;
             while rest != 0 {
                 // Two at a time, chosen rather than branched upon: no processor foresees how many a word holds.
                 for _ in 0..2 {
                     v = if rest == 0 { v } else { begin + rest.trailing_zeros() as usize };
                     rest &= rest.wrapping_sub(1);
+                    // A model point whose pairs go on in the next word counts once.
                     let rank = self.graph.rank[v];
                     let (one, top) = if rank == last { (0, 0.0) } else { (1, self.top[rank as usize]) };
                     (k, sum, last) = (k + one, sum + top, rank);
@@ -121,55 +118,61 @@ impl<'a> Bounds<'a> {
         if k < self.least { f64::NEG_INFINITY } else { self.of_set(k, sum) }
     }
 
-    /// Whether the same bound of three pairs or more and of those of `later`, which are set in `common`, that are set in `row` is
-    /// `enough`: known before all of it is, since it grows with every model point.
+    /// Whether the same bound of three pairs or more and of those of `common` from a bit on that are set in `row` is `enough`: known
+    /// before all of it is, since it grows with every model point.
     pub(in crate::search) fn is_enough(
         &self,
         (own, gains): (usize, f64),
-        later: &[Later],
-        (common, row): (&[u64], &[u64]),
+        (common, held): (&[u64], &[Held]),
+        (row, from): (&[u64], usize),
         enough: f64,
     ) -> bool {
         if self.single {
-            let count = later.first().map_or(0, |first| shared(common, row, first.vertex as usize));
+            let count = shared(common, row, from);
             return own + count >= self.least && self.reach(own, gains, count) >= enough;
         }
-        let (mut k, mut sum) = (own, gains);
+        let joining =
+            held.iter().map(|word| (word.begin(), groups(word.and(row, from), self.graph.lasts[word.place()])));
+        let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
         if k >= self.least && self.of_set(k, sum) >= enough {
             return true;
         }
-        let mut last = u32::MAX;
-        for one in later {
-            if one.rank != last && is_set(row, one.vertex as usize) {
-                (k, sum, last) = (k + 1, sum + self.top[one.rank as usize], one.rank);
-                if k >= self.least && self.of_set(k, sum) >= enough {
-                    return true;
+        for (begin, mut rest) in joining {
+            while rest != 0 {
+                let rank = self.graph.rank[begin + rest.trailing_zeros() as usize];
+                rest &= rest - 1;
+                if rank != last {
+                    (k, sum, last) = (k + 1, sum + self.top[rank as usize], rank);
+                    if k >= self.least && self.of_set(k, sum) >= enough {
+                        return true;
+                    }
                 }
             }
         }
         false
     }
 
-    /// Lists the pairs that are set in `bits` from a rank on, each with what the model points after its own bring at most.
-    pub(in crate::search) fn list(&self, bits: &[u64], from: usize, later: &mut Vec<Later>) {
-        later.clear();
-        each_one(bits, self.graph.starts[from], |v| {
-            later.push(Later { vertex: v as u32, rank: self.graph.rank[v], more: 0, bring: 0.0 });
-        });
-        let (mut last, mut after, mut all) = (u32::MAX, (0, 0.0), (0, 0.0));
-        for one in later.iter_mut().rev() {
-            if one.rank != last {
-                (last, after) = (one.rank, all);
-                all = (all.0 + 1, all.1 + self.top[one.rank as usize]);
+    /// Lists what may come after each model point of a set, by rank; those that it does not hold keep what they had.
+    pub(in crate::search) fn list(&self, set: &[Held], after: &mut Vec<After>) {
+        after.resize(self.top.len(), After::default());
+        let (mut last, mut all) = (u32::MAX, After::default());
+        for held in set.iter().rev() {
+            let mut rest = groups(held.bits, self.graph.lasts[held.place()]);
+            while rest != 0 {
+                let bit = rest.ilog2() as usize;
+                rest &= !(1 << bit);
+                let rank = self.graph.rank[held.begin() + bit];
+                if rank != last {
+                    (after[rank as usize], last) = (all, rank);
+                    all = After { more: all.more + 1, bring: all.bring + self.top[rank as usize] };
+                }
             }
-            (one.more, one.bring) = after;
         }
     }
 
-    /// Whether `own` pairs that bring `gains`, one of which is `last`, fall short of what is asked for even with all that may come
-    /// after it.
-    pub(in crate::search) fn falls_short(&self, own: usize, gains: f64, last: &Later, enough: f64) -> bool {
-        let (k, sum) = (own + last.more as usize, gains + last.bring);
+    /// Whether `own` pairs that bring `gains` fall short of what is asked for even with all that may come after the last of them.
+    pub(in crate::search) fn falls_short(&self, own: usize, gains: f64, after: After, enough: f64) -> bool {
+        let (k, sum) = (own + after.more as usize, gains + after.bring);
         // Summed in another order than the bounds that decide.
         k < self.least || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
     }

@@ -24,6 +24,8 @@ pub(in crate::search) struct Graph {
     pub(in crate::search) vertices: Vec<Correspondence>,
     /// Where the pairs of each model point begin; one more than there are.
     pub(in crate::search) starts: Vec<usize>,
+    /// The last pair of each model point, one bit each, and the last bit of each word.
+    pub(in crate::search) lasts: Vec<u64>,
     /// The cloud points of the pairs have smaller numbers.
     pub(in crate::search) clouds: usize,
     /// Place of each vertex' model point in this order.
@@ -51,7 +53,9 @@ impl Graph {
         let columns = Columns::of(problem, rough, &vertices);
         let words = count.div_ceil(64);
         let clouds = vertices.iter().map(|pair| pair.cloud + 1).max().unwrap_or(0);
-        let mut graph = Self { vertices, starts, clouds, rank, words, bits: vec![0; words * count], tests: 0 };
+        let mut lasts = vec![1 << 63; words];
+        starts[1..].iter().for_each(|end| lasts[(end - 1) / 64] |= 1 << ((end - 1) % 64));
+        let mut graph = Self { vertices, starts, lasts, clouds, rank, words, bits: vec![0; words * count], tests: 0 };
         let turn = rough.known.as_ref().map_or(f64::MAX, |known| {
             // Beyond the first order a turn by ω moves a point by ω²/2 of its lever.
             let turn = TURN_SIGMAS * known.attitude;

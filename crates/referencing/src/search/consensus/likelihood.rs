@@ -31,6 +31,8 @@ pub(in crate::search) struct Term {
     pub(in crate::search) model: Vector3<f64>,
     /// What the measurement's error weighs.
     pub(in crate::search) weight: Matrix3<f64>,
+    /// No less than the variance of the error along any direction (m²).
+    pub(in crate::search) variance: f64,
     /// ln of the likelihood ratio without residual.
     pub(in crate::search) gain: f64,
 }
@@ -84,18 +86,21 @@ impl Terms {
         // What one pair says of the motion on average: Jᵀ W J (about the centroid).
         let mut average = Matrix6::zeros();
         // Many pairs share a covariance: the last inverse is kept.
-        let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64)> = None;
+        let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64, f64)> = None;
         for pair in &graph.vertices {
             let (seen, known) = (&problem.cloud[pair.cloud].position, &problem.model[pair.model]);
             let own = known.sigma * known.sigma + least;
             let noise = seen.covariance + Matrix3::identity() * own;
-            let (weight, ln_peak) = match last {
-                Some((of, weight, ln_peak)) if of == noise => (weight, ln_peak),
-                _ => peak(&noise),
+            let (weight, ln_peak, variance) = match last {
+                Some((of, weight, ln_peak, variance)) if of == noise => (weight, ln_peak, variance),
+                _ => {
+                    let (weight, ln_peak) = peak(&noise);
+                    (weight, ln_peak, noise.symmetric_eigenvalues().max())
+                }
             };
-            last = Some((noise, weight, ln_peak));
+            last = Some((noise, weight, ln_peak, variance));
             let gain = ln_peak - terms.ln_density[pair.model];
-            terms.pairs.push(Term { cloud: seen.at.coords, model: known.at.coords, weight, gain });
+            terms.pairs.push(Term { cloud: seen.at.coords, model: known.at.coords, weight, variance, gain });
             average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
         }
         average /= count.max(1) as f64;

@@ -14,6 +14,7 @@ mod pattern;
 mod rough;
 mod seeds;
 mod six;
+mod strain;
 mod visible;
 
 pub(super) use crowd::Crowd;

@@ -6,12 +6,13 @@ use nalgebra::Vector3;
 
 use super::{
     Motion,
-    bits::{intersect, is_set, ones},
-    bound::{Bounds, Later},
+    bits::{Held, intersect, is_set, ones, ones_of},
+    bound::{After, Bounds},
     graph::Graph,
     likelihood::{Mode, Terms},
     modes::Climb,
     rough::Rough,
+    strain::{Edge, lost_to, strain_of_three},
 };
 use crate::ModelPoint;
 
@@ -81,9 +82,9 @@ pub(in crate::search) struct Seeds<'a> {
     common: Vec<u64>,
     /// The members of the likeliest modes that hold two.
     again: Vec<u64>,
-    /// The free neighbours of one vertex, and of two, as lists, and what three have in common.
-    of_one: Vec<Later>,
-    of_two: Vec<Later>,
+    /// The free neighbours of one vertex, or of two, by words, what comes after each of their model points, and what three have in common.
+    held: Vec<Held>,
+    after: Vec<After>,
     of_three: Vec<usize>,
     /// The set that is begun, and the sets that were climbed from: they lead to the same mode again.
     members: Vec<usize>,
@@ -116,8 +117,8 @@ impl<'a> Seeds<'a> {
             row: vec![0; words],
             common: vec![0; words],
             again: vec![0; words],
-            of_one: Vec::new(),
-            of_two: Vec::new(),
+            held: Vec::new(),
+            after: Vec::new(),
             of_three: Vec::new(),
             members: Vec::new(),
             climbed: BTreeSet::new(),
@@ -169,7 +170,7 @@ impl<'a> Seeds<'a> {
             let Some(&c) = self.best_connected(&common, &common, 1).first() else { continue };
             let after = graph.rank[c] as usize + 1;
             self.of_three = ones(&common, graph.starts[after]).filter(|&v| is_set(graph.row(c), v)).collect();
-            self.follow([a, b, c]);
+            self.follow([a, b, c], 0.0);
             let shared = |mode: &Mode| mode.members.iter().filter(|&&v| than.holds(v)).count();
             self.modes.retain(|mode| shared(mode) < LEAST);
             if !self.modes.is_empty() {
@@ -213,23 +214,23 @@ impl<'a> Seeds<'a> {
             if self.bounds.with_common((1, own), &self.row, count, rank + 1, threshold) < threshold {
                 continue;
             }
-            self.bounds.list(&self.row, rank + 1, &mut self.of_one);
-            for b in &self.of_one {
-                let gains = own + self.bounds.gain(b.vertex as usize);
-                if self.bounds.reach(2, gains, ranks - 1 - b.rank as usize) < threshold {
+            Held::list(&self.row, graph.starts[rank + 1], &mut self.held);
+            self.bounds.list(&self.held, &mut self.after);
+            for b in self.held.iter().flat_map(Held::ones) {
+                let gains = own + self.bounds.gain(b);
+                let next = graph.rank[b] as usize + 1;
+                if self.bounds.reach(2, gains, ranks - next) < threshold {
                     continue;
                 }
-                self.spent += self.words_from(b.rank as usize + 1);
-                if self.bounds.falls_short(2, gains, b, threshold) {
+                self.spent += words_from(graph, next);
+                if self.bounds.falls_short(2, gains, self.after[next - 1], threshold) {
                     continue;
                 }
-                let next = b.rank as usize + 1;
-                let row = graph.row(b.vertex as usize);
-                let count = intersect(&self.row, row, graph.starts[next], &mut self.common);
+                let count = intersect(&self.row, graph.row(b), graph.starts[next], &mut self.common);
                 let bound = self.bounds.with_common((2, gains), &self.common, count, next, threshold);
                 if bound >= threshold {
                     // Rounded up, so that it stays a bound.
-                    pairs.push(((bound as f32).next_up(), a as u32, b.vertex));
+                    pairs.push(((bound as f32).next_up(), a as u32, b as u32));
                 }
             }
             if self.spent > self.budget || pairs.len() > MOST_PAIRS {
@@ -238,11 +239,6 @@ impl<'a> Seeds<'a> {
             }
         }
         (pairs, complete)
-    }
-
-    /// Words of a row from a rank on.
-    fn words_from(&self, rank: usize) -> u64 {
-        (self.free.len().saturating_sub(self.climb.graph.starts[rank] / 64) + 1) as u64
     }
 
     /// Follows the most promising pair of one model point at once: a good pose known early spares the rest.
@@ -255,43 +251,51 @@ impl<'a> Seeds<'a> {
     }
 
     fn follow_pair(&mut self, a: usize, b: usize) {
-        let graph = self.climb.graph;
+        let Climb { graph, terms, .. } = self.climb;
         let next = graph.rank[b] as usize + 1;
-        self.spent += self.words_from(next);
+        self.spent += words_from(graph, next);
         intersect(graph.row(a), graph.row(b), graph.starts[next], &mut self.common);
         self.common.iter_mut().zip(&self.free).for_each(|(word, free)| *word &= free);
-        let mut common = std::mem::take(&mut self.of_two);
-        self.bounds.list(&self.common, next, &mut common);
+        let (mut common, mut later) = (std::mem::take(&mut self.held), std::mem::take(&mut self.after));
+        Held::list(&self.common, graph.starts[next], &mut common);
+        self.bounds.list(&common, &mut later);
         // Three members of a mode lead to it again.
         let likely = self.modes.iter().take(COMPARED).filter(|mode| mode.holds(a) && mode.holds(b));
         self.again.fill(0);
         likely.flat_map(|mode| &mode.members).for_each(|&v| self.again[v / 64] |= 1 << (v % 64));
         let gains = self.bounds.gain(a) + self.bounds.gain(b);
-        let mut later = 0;
-        for (place, c) in common.iter().enumerate() {
-            if place == later {
-                later = place + common[place..].iter().take_while(|other| other.rank == c.rank).count();
-            }
-            let vertex = c.vertex as usize;
-            if is_set(&self.again, vertex) {
-                continue;
-            }
-            let gains = gains + self.bounds.gain(vertex);
-            self.spent += self.words_from(c.rank as usize + 1);
-            let threshold = self.threshold();
-            if self.bounds.falls_short(3, gains, c, threshold) {
-                continue;
-            }
-            let row = graph.row(vertex);
-            let after = &common[later..];
-            if self.bounds.is_enough((3, gains), after, (&self.common, row), threshold) && !self.known([a, b, vertex]) {
-                self.of_three.clear();
-                let joining = after.iter().map(|other| other.vertex as usize).filter(|&other| is_set(row, other));
-                self.of_three.extend(joining);
-                self.follow([a, b, vertex]);
+        let (first, second) = (&terms.pairs[a], &terms.pairs[b]);
+        let side = Edge::of(first, second);
+        for (place, held) in common.iter().enumerate() {
+            for c in held.ones() {
+                if is_set(&self.again, c) {
+                    continue;
+                }
+                let rank = graph.rank[c] as usize;
+                let gains = gains + self.bounds.gain(c);
+                self.spent += words_from(graph, rank + 1);
+                let threshold = self.threshold();
+                if self.bounds.falls_short(3, gains, later[rank], threshold) {
+                    continue;
+                }
+                // Its own model point's pairs may go on in words to come.
+                let (row, from) = (graph.row(c), graph.starts[rank + 1]);
+                let after = &common[place..];
+                let enough = |gains| self.bounds.is_enough((3, gains), (&self.common, after), (row, from), threshold);
+                if !enough(gains) {
+                    continue;
+                }
+                let third = &terms.pairs[c];
+                let sides = [&side, &Edge::of(first, third), &Edge::of(second, third)];
+                let lost = lost_to(strain_of_three([first, second, third], sides));
+                if (lost == 0.0 || enough(gains - lost)) && !self.known([a, b, c]) {
+                    self.of_three.clear();
+                    self.of_three.extend(after.iter().flat_map(|held| ones_of(held.begin(), held.and(row, from))));
+                    self.follow([a, b, c], lost);
+                }
             }
         }
-        self.of_two = common;
+        (self.held, self.after) = (common, later);
     }
 
     /// Whether a likely mode holds all three.
@@ -299,8 +303,8 @@ impl<'a> Seeds<'a> {
         self.modes.iter().take(COMPARED).any(|mode| three.iter().all(|&v| mode.holds(v)))
     }
 
-    /// The pose of a three, what else fits it roughly, and the mode that this leads to.
-    fn follow(&mut self, three: [usize; 3]) {
+    /// The pose of a three that loses so much (nats) to its strain, what else fits it roughly, and the mode that this leads to.
+    fn follow(&mut self, three: [usize; 3], lost: f64) {
         self.spent += COST_OF_A_POSE;
         let Climb { terms, graph, .. } = self.climb;
         let model = three.map(|v| &terms.pairs[v].model);
@@ -310,7 +314,7 @@ impl<'a> Seeds<'a> {
         let mut members = std::mem::take(&mut self.members);
         members.clear();
         members.extend(three);
-        let mut gains: f64 = three.iter().map(|&v| self.bounds.gain(v)).sum();
+        let mut gains = three.iter().map(|&v| self.bounds.gain(v)).sum::<f64>() - lost;
         // Rank and distance of the last member.
         let mut last = (usize::MAX, 0.0);
         for &v in &self.of_three {
@@ -375,6 +379,11 @@ fn contradicting(terms: &Terms, graph: &Graph, pose: &Mode, free: bool) -> Vec<u
         }
     }
     bits
+}
+
+/// Words of a row from a rank on.
+fn words_from(graph: &Graph, rank: usize) -> u64 {
+    (graph.lasts.len().saturating_sub(graph.starts[rank] / 64) + 1) as u64
 }
 
 /// The least altitude of a triangle (m).
