@@ -26,18 +26,23 @@
 //! directions of e are sampled from fixed sequences, of the points in an order of their own: the answer is a
 //! function of the problem, whatever the numbers of its points.
 //!
+//! Shuffled partners lie as densely about a place as their neighbours do, which loses what is regular in a cloud: about the pose found
+//! they are counted themselves ([`coincidence`]), and the greater number holds.
+//!
 //! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid
 //! point matches*, 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
 
+mod coincidence;
 mod dimension;
 mod null;
 mod sequence;
 mod shape;
 mod subsets;
 
-use seafix_geometry::MeasuredPoint;
+use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
 
 use crate::{Correspondence, Kabsch, Observations, Problem, Solver, candidates::chi_square, solve::likelihood};
+use coincidence::expected_at;
 pub(crate) use dimension::dimension;
 use null::Null;
 use sequence::Sequence;
@@ -68,7 +73,8 @@ pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> 
     if found.len() < 3 {
         return f64::INFINITY;
     }
-    expected_chance_sets(problem, found.len(), chi_square(3 * found.len() - 6, CONFIDENCE))
+    let (_, pose) = best(problem, found);
+    expected_beside(problem, found.len(), chi_square(3 * found.len() - 6, CONFIDENCE), pose)
 }
 
 /// The expected number of such sets that are as good as `found`: with at most its residual. Of frames
@@ -77,7 +83,32 @@ pub fn expected_sets_as_good(problem: &Problem<'_>, found: &[Correspondence]) ->
     if found.len() < 3 {
         return f64::INFINITY;
     }
-    expected_chance_sets(problem, found.len(), least_chi2(problem, found))
+    let (chi2, pose) = best(problem, found);
+    expected_beside(problem, found.len(), chi2, pose)
+}
+
+/// The greater of what is expected over all poses and about this one.
+fn expected_beside(problem: &Problem<'_>, size: usize, chi2: f64, pose: Option<Transform<Object, Camera>>) -> f64 {
+    let anywhere = expected_chance_sets(problem, size, chi2);
+    match pose {
+        // Written so that a NaN stays one.
+        Some(pose) if shuffled(problem) && anywhere < 1.0 => anywhere.max(expected_at(problem, size, &pose)),
+        _ => anywhere,
+    }
+}
+
+/// The same at the pose of these putative pairs alone, and those like it: zero of pairs that are not putative.
+pub(crate) fn expected_at_their_pose(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
+    match best(problem, found) {
+        (_, Some(pose)) if shuffled(problem) && found.len() >= 3 => expected_at(problem, found.len(), &pose),
+        _ => 0.0,
+    }
+}
+
+/// Whether chance shuffles partners: without a prior pairs are given, and not each with each.
+fn shuffled(problem: &Problem<'_>) -> bool {
+    let lists = &problem.candidates.lists;
+    problem.prior.is_none() && lists.iter().any(|list| !list.is_empty() && list.len() < problem.cloud.len())
 }
 
 /// The expected number of admissible one-to-one sets that are no worse than one given, if no candidate of
@@ -172,15 +203,18 @@ fn shared(problem: &Problem<'_>) -> f64 {
     if different > 0.0 { (same / different).min(0.999) } else { 0.0 }
 }
 
-/// The least χ² of the pairs over rigid motions; of those that define none, what their size allows.
-fn least_chi2(problem: &Problem<'_>, pairs: &[Correspondence]) -> f64 {
+/// The least χ² of the pairs over rigid motions, and the motion; of those that define none, what their size allows.
+fn best(problem: &Problem<'_>, pairs: &[Correspondence]) -> (f64, Option<Transform<Object, Camera>>) {
     let data = Observations::of(pairs, problem.model, problem.cloud, None);
     if data.points.iter().any(|point| !point.is_finite()) {
-        return f64::NAN;
+        return (f64::NAN, None);
     }
     match (Kabsch { least_ratio: 0.0 }).solve(&data) {
-        Ok(start) => likelihood::maximum(&data, &start).cost,
-        Err(_) => f64::INFINITY,
+        Ok(start) => {
+            let best = likelihood::maximum(&data, &start);
+            (best.cost, Some(best.pose))
+        }
+        Err(_) => (f64::INFINITY, None),
     }
 }
 

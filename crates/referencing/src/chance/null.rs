@@ -6,6 +6,7 @@ use seafix_geometry::MeasuredPoint;
 use super::{
     coordinates,
     sequence::{Sequence, mixed},
+    shuffled,
 };
 use crate::{Prior, PriorBound, Problem, candidates::chi_square};
 
@@ -43,7 +44,7 @@ impl<'a> Null<'a> {
         if let Some(prior) = problem.prior {
             return Self::Shells(shells(problem, prior));
         }
-        if lists.iter().all(|list| list.is_empty() || list.len() == problem.cloud.len()) {
+        if !shuffled(problem) {
             let bounds = problem.cloud.iter().map(coordinates).fold(None, |bounds, at| match bounds {
                 None => Some((at, at)),
                 Some((low, high)) => Some((at.inf(&low), at.sup(&high))),

@@ -76,7 +76,7 @@ impl Frame {
 /// The admissible sets of `size` pairs or more with at most this χ² per degree of freedom, one by one.
 fn count(problem: &Problem<'_>, size: usize, each: f64) -> usize {
     fn grow(problem: &Problem<'_>, size: usize, each: f64, from: usize, set: &mut Vec<Correspondence>) -> usize {
-        let good = |set: &[Correspondence]| set.len() >= size && least_chi2(problem, set) <= each * freedom(set.len());
+        let good = |set: &[Correspondence]| set.len() >= size && best(problem, set).0 <= each * freedom(set.len());
         let mut found = usize::from(good(set));
         for model in from..problem.model.len() {
             for &cloud in &problem.candidates.lists[model] {

@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use super::{Refusal, judge::Judge};
 use crate::{
     Identification, Problem, Shares,
-    chance::{dimension, expected_sets_as_good},
+    chance::{dimension, expected_at_their_pose, expected_sets_as_good},
 };
 
 /// What is asked of a frame before the object is believed to be there.
@@ -15,12 +15,13 @@ pub(super) struct Absence<'a> {
     shares: &'a Shares,
     /// Looked at where it decides, and once.
     fills_space: OnceCell<bool>,
+    shuffled: OnceCell<f64>,
     rare: OnceCell<bool>,
 }
 
 impl<'a> Absence<'a> {
     pub(super) fn of(judge: &'a Judge<'a>, found: &'a Identification, shares: &'a Shares) -> Self {
-        Self { judge, found, shares, fills_space: OnceCell::new(), rare: OnceCell::new() }
+        Self { judge, found, shares, fills_space: OnceCell::new(), shuffled: OnceCell::new(), rare: OnceCell::new() }
     }
 
     /// Why the object is not believed to be there when its absence has this probability; `None` where it is.
@@ -28,7 +29,11 @@ impl<'a> Absence<'a> {
     /// A pattern that looks like the object is no chance: how sure its odds are does not depend on where clutter lies.
     pub(super) fn refusal(&self, absent: f64) -> Option<Refusal> {
         let (least, most) = self.limits();
-        let chance = absent - self.shares.alike;
+        // Shuffled partners that make sets as large at this very pose are an absence that the evidence does not know of.
+        let (chance, absent) = match self.shuffled() {
+            often if often > least => (often.min(1.0).max(absent - self.shares.alike), often.min(1.0).max(absent)),
+            _ => (absent - self.shares.alike, absent),
+        };
         let limit = if least < most && chance > least && self.fills_space() { most } else { least };
         // Written so that a NaN is refused too.
         if (chance <= limit && absent <= most) || self.is_rare() {
@@ -64,6 +69,11 @@ impl<'a> Absence<'a> {
     fn fills_space(&self) -> bool {
         let look = || dimension(self.judge.problem, &self.found.pairs).is_some_and(|of| of >= FILLS_SPACE);
         *self.fills_space.get_or_init(look)
+    }
+
+    /// How many sets as large shuffled partners are expected to make at the pose found and those like it.
+    fn shuffled(&self) -> f64 {
+        *self.shuffled.get_or_init(|| expected_at_their_pose(self.judge.problem, &self.found.pairs))
     }
 
     /// Whether chance gives sets as good so rarely that the pose is believed although absence is not as improbable as it
