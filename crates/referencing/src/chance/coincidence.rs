@@ -26,7 +26,7 @@ pub(super) fn expected_at(problem: &Problem<'_>, size: usize, object_from_camera
     let mut number = vec![0.0; size + 1];
     number[0] = 1.0;
     for (point, list) in problem.model.iter().zip(lists) {
-        let share: f64 = partners.near(point, &(camera_from_object * point.at).coords).map(|j| times[j] / all).sum();
+        let share: f64 = partners.near(point, (camera_from_object * point.at).coords).map(|j| times[j] / all).sum();
         let met = (list.len() as f64 * share).min(1.0);
         if met > 0.0 {
             number[size] += number[size - 1] * met;
@@ -39,38 +39,41 @@ pub(super) fn expected_at(problem: &Problem<'_>, size: usize, object_from_camera
     number[size] * ALIKE * problem.model.len() as f64
 }
 
-/// The cloud points that are anyone's partner, by their first coordinate.
+/// The cloud points that are anyone's partner.
 struct Partners<'a> {
     problem: &'a Problem<'a>,
-    sorted: Vec<usize>,
+    /// Their places and numbers, by the first coordinate.
+    sorted: Vec<(Vector3<f64>, usize)>,
     /// The greatest variance of one of them along any direction is not more (m²).
     variance: f64,
+    /// What is further away was not measured of a point (χ²₃).
+    far: f64,
 }
 
 impl<'a> Partners<'a> {
     fn of(problem: &'a Problem<'a>, times: &[f64]) -> Self {
-        let mut sorted: Vec<usize> = (0..times.len()).filter(|&j| times[j] > 0.0).collect();
-        sorted.sort_by(|&a, &b| coordinates(&problem.cloud[a]).x.total_cmp(&coordinates(&problem.cloud[b]).x));
-        let variance = sorted.iter().map(|&j| problem.cloud[j].position.covariance.trace()).fold(0.0, f64::max);
-        Self { problem, sorted, variance }
+        let used = (0..times.len()).filter(|&j| times[j] > 0.0);
+        let mut sorted: Vec<(Vector3<f64>, usize)> = used.map(|j| (coordinates(&problem.cloud[j]), j)).collect();
+        sorted.sort_unstable_by(|(a, i), (b, j)| a.x.total_cmp(&b.x).then(i.cmp(j)));
+        let variance = sorted.iter().map(|&(_, j)| problem.cloud[j].position.covariance.trace()).fold(0.0, f64::max);
+        Self { problem, sorted, variance, far: chi_square(3, CONFIDENCE) }
     }
 
     /// Those that may have been measured of a point at this place.
-    fn near(&self, point: &ModelPoint, place: &Vector3<f64>) -> impl Iterator<Item = usize> {
-        let (far, own) = (chi_square(3, CONFIDENCE), point.sigma * point.sigma);
-        let reach = (far * (self.variance + own)).sqrt();
-        let seen = |j: usize| &self.problem.cloud[j];
-        let begin = self.sorted.partition_point(|&j| coordinates(seen(j)).x < place.x - reach);
-        let within = self.sorted[begin..].iter().copied().take_while(|&j| coordinates(seen(j)).x <= place.x + reach);
-        let near: Vec<usize> = within
-            .filter(|&j| {
-                let off = coordinates(seen(j)) - place;
-                let noise = seen(j).position.covariance + Matrix3::identity() * own;
-                off.norm_squared() <= reach * reach
-                    && noise.cholesky().is_some_and(|factor| off.dot(&factor.solve(&off)) <= far)
+    fn near(&self, point: &ModelPoint, place: Vector3<f64>) -> impl Iterator<Item = usize> {
+        let own = point.sigma * point.sigma;
+        let reach = (self.far * (self.variance + own)).sqrt();
+        let begin = self.sorted.partition_point(|(at, _)| at.x < place.x - reach);
+        let within = self.sorted[begin..].iter().take_while(move |(at, _)| at.x <= place.x + reach);
+        within
+            .map(move |(at, j)| (at - place, *j))
+            .filter(move |(off, j)| {
+                off.norm_squared() <= reach * reach && {
+                    let noise = self.problem.cloud[*j].position.covariance + Matrix3::identity() * own;
+                    noise.cholesky().is_some_and(|factor| off.dot(&factor.solve(off)) <= self.far)
+                }
             })
-            .collect();
-        near.into_iter()
+            .map(|(_, j)| j)
     }
 }
 
@@ -105,7 +108,7 @@ mod tests {
     fn shuffled_partners_meet_a_pose_as_often_as_is_expected() {
         // No two distances alike, so that no motion maps it onto itself.
         let model: Vec<Vector3<f64>> = (0..12)
-            .map(|i| f64::from(i))
+            .map(f64::from)
             .map(|i| Vector3::new(0.3 * i, 0.011 * i * i * i, 1.7 * (i * i * 0.37).sin()))
             .collect();
         let (mut expected_all, mut met_all) = (0.0, 0);

@@ -26,20 +26,22 @@ impl<'a> Absence<'a> {
 
     /// Why the object is not believed to be there when its absence has this probability; `None` where it is.
     ///
-    /// A pattern that looks like the object is no chance: how sure its odds are does not depend on where clutter lies.
+    /// A pattern that looks like the object is no chance: how sure its odds are does not depend on where clutter lies. And shuffled
+    /// partners that often make a set as large at this very pose are an absence that the evidence does not know of.
     pub(super) fn refusal(&self, absent: f64) -> Option<Refusal> {
         let (least, most) = self.limits();
-        // Shuffled partners that make sets as large at this very pose are an absence that the evidence does not know of.
-        let (chance, absent) = match self.shuffled() {
-            often if often > least => (often.min(1.0).max(absent - self.shares.alike), often.min(1.0).max(absent)),
-            _ => (absent - self.shares.alike, absent),
-        };
+        let chance = absent - self.shares.alike;
         let limit = if least < most && chance > least && self.fills_space() { most } else { least };
         // Written so that a NaN is refused too.
-        if (chance <= limit && absent <= most) || self.is_rare() {
+        let likely = chance <= limit && absent <= most;
+        if (likely && self.shuffled() <= limit) || self.is_rare() {
             return None;
         }
-        let (probability, limit) = if chance <= limit { (absent, most) } else { (chance, limit) };
+        let (probability, limit) = match (likely, chance <= limit) {
+            (true, _) => (self.shuffled().min(1.0), limit),
+            (false, true) => (absent, most),
+            (false, false) => (chance, limit),
+        };
         Some(Refusal::Absent { probability, limit })
     }
 
