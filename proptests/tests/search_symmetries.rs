@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use seafix_geometry::{Camera, MeasuredPoint, Point, Transform, UncertainPoint};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{Camera, MeasuredPoint, Point, Transform, UncertainPoint, so3};
 use seafix_proptests::{
     admissible::{difference, largest, tolerance},
     law, not_idle,
@@ -10,7 +12,10 @@ use seafix_proptests::{
     problems::{LARGE, Planted, SMALL, planted},
     searches::{Answer, searches},
 };
-use seafix_referencing::{Candidates, Correspondence, Tolerance, Unidentified};
+use seafix_referencing::{
+    Acceptance, Candidates, Correspondence, Mahalanobis, ModelPoint, Outcome, Problem, RigidConsensus, Tolerance,
+    Unidentified, reference,
+};
 use std::cell::Cell;
 
 /// Pair tests that leave time for hundreds of cases.
@@ -257,21 +262,15 @@ fn a_point_that_comes_twice_is_the_first() {
     not_idle("sets found twice", held.get(), cases, 2);
 }
 
-/// P26. What shows nothing but the mirror image of a model of eight to thirty points is hardly ever referenced by the default search, though
-/// a few of its points always lie as the object's do: in less than one of a hundred.
-///
-/// `cargo test --release -p seafix-proptests --test search_symmetries -- --ignored`.
-#[test]
-#[ignore = "600 problems: seconds in release, minutes else"]
-fn a_mirror_image_of_many_points_is_hardly_ever_referenced() {
-    use rand::{RngExt, SeedableRng};
-    use seafix_referencing::{Acceptance, Mahalanobis, ModelPoint, Outcome, Problem, RigidConsensus, reference};
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-    let mut answered = 0;
-    for number in 0..600 {
+/// How many of so many clouds that show nothing but the mirror image of a model of eight to thirty points the default search
+/// takes for the object, by no more than three fifths of its points.
+fn mirror_images_referenced(clouds: usize) -> usize {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut referenced = 0;
+    for number in 0..clouds {
         let n = [8, 12, 20, 30][number % 4];
         let mut drawn = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
-        let turn = seafix_geometry::so3::exp(&drawn(1.8));
+        let turn = so3::exp(&drawn(1.8));
         let model: Vec<ModelPoint> = (0..n).map(|_| ModelPoint::exact("", drawn(0.6).into())).collect();
         let measured = |point: &ModelPoint| {
             let image = point.at.coords.component_mul(&Vector3::new(1.0, 1.0, -1.0));
@@ -284,8 +283,22 @@ fn a_mirror_image_of_many_points_is_hardly_ever_referenced() {
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
         let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
         let attempt = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
-        let few = |pairs: usize| 10 * pairs <= 6 * n;
-        answered += usize::from(matches!(&attempt.outcome, Outcome::Referenced(fix) if few(fix.pairs.len())));
+        let few = |pairs: usize| 5 * pairs <= 3 * n;
+        referenced += usize::from(matches!(&attempt.outcome, Outcome::Referenced(fix) if few(fix.pairs.len())));
     }
-    assert!(answered < 6, "{answered} of 600");
+    referenced
+}
+
+/// P26. A few points of a mirror image always lie as the object's do: they are no reason to believe that it is the object.
+///
+/// Seen to fail, with two of 600, where the model is reflected in one plane only, and with one where eight threes are reflected.
+#[test]
+fn a_mirror_image_of_many_points_is_not_referenced() {
+    assert_eq!(mirror_images_referenced(100), 0);
+}
+
+#[test]
+#[ignore = "the long form of the test above: cargo test --release -p seafix-proptests --test search_symmetries -- --ignored"]
+fn six_thousand_mirror_images_are_not_referenced() {
+    assert_eq!(mirror_images_referenced(6000), 0);
 }

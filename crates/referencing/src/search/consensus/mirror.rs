@@ -15,17 +15,20 @@ use crate::ModelPoint;
 
 /// An image must be likelier than the pose by this much (nats): a flat object is its own image.
 const MARGIN: f64 = 3.0;
-/// So many threes of the members are reflected.
-const MOST_THREES: usize = 8;
+/// Threes of so many members, spread evenly over all, are reflected: at most so many threes, and one to so many pairs where
+/// there are few.
+const SPREAD: usize = 10;
+const MOST_THREES: usize = 64;
+const PAIRS_A_THREE: usize = 8;
 /// What fits roughly what three noisy points say (χ²₃).
 const LOOSE: f64 = 50.0;
 
 /// The mirror image of the model that shares a flat part with the mode, where it explains the cloud better; such
 /// a mode is what is left of that image, and no pose of the object.
 ///
-/// The model is reflected in the plane that its members lie in best, and in those of some threes of them, in case that one of the
-/// members is not the image's; from where most pairs fit, pairs are chosen and the
-/// motion is fitted as for any pose. The prior says nothing of images: both are weighed without.
+/// The model is reflected in the plane that its members lie in best, and in those of some threes of them, in case that one of
+/// the members is not the image's; from where most pairs fit, pairs are chosen and the motion is fitted as for any pose. The
+/// prior says nothing of images: both are weighed without.
 pub(in crate::search) fn mirror_image(
     model: &[ModelPoint],
     (terms, rough, graph): (&Terms, &Rough, &Graph),
@@ -47,15 +50,17 @@ pub(in crate::search) fn mirror_image(
     };
     let of_all = reflected(&mode.motion, &centre, &normal);
     image(&mode.members, &of_all).or_else(|| {
-        let images = threes(&mode.members).filter_map(|three| {
+        let most = (graph.vertices.len() / PAIRS_A_THREE).clamp(1, MOST_THREES);
+        let mut largest: Option<(Vec<usize>, Motion)> = None;
+        for three in threes(&mode.members, most) {
             let model = three.map(|v| &terms.pairs[v].model);
-            let motion = Motion::of_three(model, three.map(|v| &terms.pairs[v].cloud))?;
-            let normal = (model[1] - model[0]).cross(&(model[2] - model[0])).try_normalize(0.0)?;
-            let motion = reflected(&motion, model[0], &normal);
-            Some((near(terms, graph, &motion), motion))
-        });
-        let (members, motion) = images.max_by_key(|(members, _)| members.len())?;
-        if members.len() > mode.members.len() { image(&members, &motion) } else { None }
+            let normal = (model[1] - model[0]).cross(&(model[2] - model[0]));
+            let motion = Motion::of_three(model, three.map(|v| &terms.pairs[v].cloud)).zip(normal.try_normalize(0.0));
+            let Some(motion) = motion.map(|(motion, normal)| reflected(&motion, model[0], &normal)) else { continue };
+            let known = largest.as_ref().map_or(mode.members.len(), |(members, _)| members.len());
+            largest = near(terms, graph, &motion, known).map(|members| (members, motion)).or(largest);
+        }
+        largest.and_then(|(members, motion)| image(&members, &motion))
     })
 }
 
@@ -65,26 +70,34 @@ fn reflected(motion: &Motion, through: &Vector3<f64>, normal: &Vector3<f64>) -> 
     Motion { rotation, translation: motion.apply(through) - rotation * through }
 }
 
-/// Some threes of the members.
-fn threes(members: &[usize]) -> impl Iterator<Item = [usize; 3]> + '_ {
-    let k = members.len();
-    (0..k)
-        .flat_map(move |i| [(1, 2), (k / 3, 2 * k / 3)].map(|(b, c)| [i, (i + b) % k, (i + c) % k]))
-        .filter(|[a, b, c]| a != b && b != c && a != c)
-        .take(MOST_THREES)
-        .map(|three| three.map(|i| members[i]))
+/// At most so many threes of the members, evenly spread.
+fn threes(members: &[usize], most: usize) -> impl Iterator<Item = [usize; 3]> {
+    let some: Vec<usize> = members.iter().copied().step_by(members.len().div_ceil(SPREAD).max(1)).collect();
+    let k = some.len();
+    let of = |a: usize| (a + 1..k).flat_map(move |b| (b + 1..k).map(move |c| [a, b, c]));
+    let all: Vec<[usize; 3]> = (0..k).flat_map(of).map(|three| three.map(|i| some[i])).collect();
+    let step = all.len().div_ceil(most).max(1);
+    all.into_iter().step_by(step)
 }
 
-/// Of each model point the pair that fits a motion best, if it fits it roughly.
-fn near(terms: &Terms, graph: &Graph, motion: &Motion) -> Vec<usize> {
-    let of_rank = |range: &[usize]| {
-        let fits = (range[0]..range[1]).map(|v| {
+/// Of each model point the pair that fits a motion best, if it fits it roughly; `None` as soon as they cannot be `more_than` so many.
+fn near(terms: &Terms, graph: &Graph, motion: &Motion, more_than: usize) -> Option<Vec<usize>> {
+    let ranks = graph.starts.len() - 1;
+    let mut near = Vec::new();
+    for (rank, range) in graph.starts.windows(2).enumerate() {
+        if near.len() + ranks - rank <= more_than {
+            return None;
+        }
+        let place = motion.apply(&terms.pairs[range[0]].model);
+        let fits = (range[0]..range[1]).filter_map(|v| {
             let pair = &terms.pairs[v];
-            (pair.distance(&(pair.cloud - motion.apply(&pair.model))), v)
+            let off = pair.cloud - place;
+            // χ² is no less than that of the greatest variance.
+            (off.norm_squared() <= LOOSE * pair.variance).then(|| (pair.distance(&off), v))
         });
-        fits.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(d2, _)| *d2 <= LOOSE).map(|(_, v)| v)
-    };
-    graph.starts.windows(2).filter_map(of_rank).collect()
+        near.extend(fits.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(d2, _)| *d2 <= LOOSE).map(|(_, v)| v));
+    }
+    (near.len() > more_than).then_some(near)
 }
 
 #[cfg(test)]
@@ -92,16 +105,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn threes_are_of_three_members() {
-        assert_eq!(threes(&[4, 7]).count(), 0);
-        assert_eq!(threes(&[4, 7, 9]).next(), Some([4, 7, 9]));
-        for k in 4..30 {
-            let members: Vec<usize> = (0..k).map(|v| 2 * v).collect();
-            let all: Vec<_> = threes(&members).collect();
-            assert_eq!(all.len(), MOST_THREES.min(all.len()), "of {k}");
-            assert!(
-                all.iter().all(|[a, b, c]| a != b && b != c && c != a && [a, b, c].iter().all(|v| members.contains(v)))
-            );
-        }
+    fn threes_are_spread_over_the_members() {
+        let of = |k: usize, most: usize| threes(&(0..k).map(|v| 2 * v).collect::<Vec<_>>(), most).collect::<Vec<_>>();
+        assert!(of(2, 64).is_empty());
+        assert_eq!(of(4, 64), [[0, 2, 4], [0, 2, 6], [0, 4, 6], [2, 4, 6]]);
+        assert_eq!(of(4, 2), [[0, 2, 4], [0, 4, 6]]);
+        // Every third of thirty, and every other of 120 threes of these.
+        let some = of(30, 64);
+        assert_eq!((some.len(), some[0], some[59]), (60, [0, 6, 12], [36, 48, 54]));
     }
 }
