@@ -25,7 +25,7 @@ pub(super) fn expected_at(problem: &Problem<'_>, size: usize, object_from_camera
     // P(so many points are met) of the points so far; the last of `size` or more.
     let mut number = vec![0.0; size + 1];
     number[0] = 1.0;
-    for (point, list) in problem.model.iter().zip(lists) {
+    for (point, list) in problem.model.iter().zip(lists).filter(|(_, list)| !list.is_empty()) {
         let share: f64 = partners.near(point, (camera_from_object * point.at).coords).map(|j| times[j] / all).sum();
         let met = (list.len() as f64 * share).min(1.0);
         if met > 0.0 {

@@ -1,6 +1,6 @@
 //! Of how many dimensions clutter looks.
 
-use super::{coordinates, null::name};
+use super::{coordinates, sample::spread_sample};
 use crate::{Correspondence, Problem};
 
 /// The neighbours of a point that tell how the points about it thin out.
@@ -18,24 +18,24 @@ const SAMPLE: usize = 256;
 ///
 /// N_i(r) the neighbours of point i nearer than r (m), r_i the distance of its twelfth, or six standard deviations of its place
 /// if that is more. `None` of fewer than 13 points, and of such that are at no place. Of more than [`SAMPLE`] those are
-/// looked at whose names come first, so that the answer does not depend on how the points are numbered. Time O(256 M).
+/// looked at that [`spread_sample`] chooses. Time O(256 M).
 /// (The correlation dimension of Grassberger and Procaccia, *Measuring the strangeness of strange attractors*, 1983, about each
 /// point at its own scale.)
 pub(crate) fn dimension(problem: &Problem<'_>, used: &[Correspondence]) -> Option<f64> {
     let mut counts = vec![false; problem.cloud.len()];
     problem.candidates.lists.iter().flatten().for_each(|&j| counts[j] = true);
     used.iter().for_each(|pair| counts[pair.cloud] = false);
-    let mut all: Vec<usize> = (0..counts.len()).filter(|&j| counts[j]).collect();
+    let all: Vec<usize> = (0..counts.len()).filter(|&j| counts[j]).collect();
     if all.len() <= NEIGHBOURS {
         return None;
     }
-    if all.len() > SAMPLE {
-        all.sort_by_cached_key(|&j| name(&problem.cloud[j]));
-    }
     let places: Vec<_> = all.iter().map(|&j| coordinates(&problem.cloud[j])).collect();
+    let mut sample = all;
+    spread_sample(problem.cloud, &mut sample, SAMPLE);
     let (mut near, mut far) = (0, 0);
-    let mut squares = Vec::with_capacity(all.len());
-    for (&j, here) in all.iter().zip(&places).take(SAMPLE) {
+    let mut squares = Vec::with_capacity(places.len());
+    for j in sample {
+        let here = coordinates(&problem.cloud[j]);
         squares.clear();
         squares.extend(places.iter().map(|at| (at - here).norm_squared()));
         // The nearest of all is the point itself.

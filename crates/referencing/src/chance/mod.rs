@@ -35,9 +35,12 @@
 mod coincidence;
 mod dimension;
 mod null;
+mod sample;
 mod sequence;
 mod shape;
 mod subsets;
+
+use std::cell::OnceCell;
 
 use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
 
@@ -73,35 +76,57 @@ pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> 
     if found.len() < 3 {
         return f64::INFINITY;
     }
-    let (_, pose) = best(problem, found);
-    expected_beside(problem, found.len(), chi_square(3 * found.len() - 6, CONFIDENCE), pose)
+    let anywhere = expected_chance_sets(problem, found.len(), chi_square(3 * found.len() - 6, CONFIDENCE));
+    Chance::of(problem, found).beside(anywhere)
 }
 
 /// The expected number of such sets that are as good as `found`: with at most its residual. Of frames
 /// without the object a share ε shows a set below ε of each size.
 pub fn expected_sets_as_good(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
-    if found.len() < 3 {
-        return f64::INFINITY;
-    }
-    let (chi2, pose) = best(problem, found);
-    expected_beside(problem, found.len(), chi2, pose)
+    Chance::of(problem, found).sets_as_good()
 }
 
-/// The greater of what is expected over all poses and about this one.
-fn expected_beside(problem: &Problem<'_>, size: usize, chi2: f64, pose: Option<Transform<Object, Camera>>) -> f64 {
-    let anywhere = expected_chance_sets(problem, size, chi2);
-    match pose {
+/// What chance gives in place of a set, each number computed where it is asked for, and once.
+pub(crate) struct Chance<'a> {
+    problem: &'a Problem<'a>,
+    found: &'a [Correspondence],
+    best: OnceCell<(f64, Option<Transform<Object, Camera>>)>,
+    at_their_pose: OnceCell<f64>,
+    as_good: OnceCell<f64>,
+}
+
+impl<'a> Chance<'a> {
+    pub(crate) fn of(problem: &'a Problem<'a>, found: &'a [Correspondence]) -> Self {
+        let (best, at_their_pose, as_good) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Self { problem, found, best, at_their_pose, as_good }
+    }
+
+    /// See [`expected_sets_as_good`].
+    pub(crate) fn sets_as_good(&self) -> f64 {
+        *self.as_good.get_or_init(|| match self.found.len() {
+            0..3 => f64::INFINITY,
+            size => self.beside(expected_chance_sets(self.problem, size, self.best().0)),
+        })
+    }
+
+    /// The expected number of sets as large at the pose of these putative pairs, and at those like it: zero of pairs that are not
+    /// putative.
+    pub(crate) fn at_their_pose(&self) -> f64 {
+        *self.at_their_pose.get_or_init(|| match self.best() {
+            (_, Some(pose)) if shuffled(self.problem) => expected_at(self.problem, self.found.len(), &pose),
+            _ => 0.0,
+        })
+    }
+
+    /// The greater of what is expected over all poses and about this one.
+    fn beside(&self, anywhere: f64) -> f64 {
         // Written so that a NaN stays one.
-        Some(pose) if shuffled(problem) && anywhere < 1.0 => anywhere.max(expected_at(problem, size, &pose)),
-        _ => anywhere,
+        if anywhere < 1.0 { anywhere.max(self.at_their_pose()) } else { anywhere }
     }
-}
 
-/// The same at the pose of these putative pairs alone, and those like it: zero of pairs that are not putative.
-pub(crate) fn expected_at_their_pose(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
-    match best(problem, found) {
-        (_, Some(pose)) if shuffled(problem) && found.len() >= 3 => expected_at(problem, found.len(), &pose),
-        _ => 0.0,
+    /// The least χ² of the pairs over rigid motions, and the motion.
+    fn best(&self) -> (f64, Option<Transform<Object, Camera>>) {
+        *self.best.get_or_init(|| best(self.problem, self.found))
     }
 }
 

@@ -3,11 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::MeasuredPoint;
 
-use super::{
-    coordinates,
-    sequence::{Sequence, mixed},
-    shuffled,
-};
+use super::{coordinates, sample::spread_sample, sequence::Sequence, shuffled};
 use crate::{Prior, PriorBound, Problem, candidates::chi_square};
 
 /// The confidence of the shells that a Gaussian prior draws, as [`crate::Gate`] has it by default.
@@ -51,14 +47,9 @@ impl<'a> Null<'a> {
             });
             return Self::Box(bounds.map_or(Vector3::zeros(), |(low, high)| high - low).add_scalar(LEAST));
         }
-        // Those that chance names first, whatever their numbers.
-        let mut named: Vec<(u64, usize)> = lists.iter().flatten().map(|&j| (name(&problem.cloud[j]), j)).collect();
-        if named.len() > MOST_LOOKED_AT {
-            named.select_nth_unstable(MOST_LOOKED_AT);
-            named.truncate(MOST_LOOKED_AT);
-        }
-        named.sort_unstable();
-        Self::Shuffled(named.into_iter().map(|(_, j)| &problem.cloud[j]).collect())
+        let mut partners: Vec<usize> = lists.iter().flatten().copied().collect();
+        spread_sample(problem.cloud, &mut partners, MOST_LOOKED_AT);
+        Self::Shuffled(partners.into_iter().map(|j| &problem.cloud[j]).collect())
     }
 
     /// ln of the density of a candidate that is left out of the sampled densities.
@@ -71,11 +62,6 @@ impl<'a> Null<'a> {
             Self::Shuffled(_) => 0.0,
         }
     }
-}
-
-/// A number that looks random and depends on nothing but where the point is.
-pub(super) fn name(point: &MeasuredPoint) -> u64 {
-    coordinates(point).iter().fold(0, |name, x| mixed(name ^ x.to_bits()))
 }
 
 /// The box of each model point. Of a Gaussian prior's ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ² it is the one

@@ -190,6 +190,26 @@ fn an_order_of_the_points_is_as_good_as_another() {
     }
 }
 
+/// Nor, of shuffled partners, where the camera's frame has its origin.
+///
+/// Seen to fail where partners are chosen by a hash of their coordinates.
+#[test]
+fn a_translation_of_the_cloud_changes_nothing() {
+    let mut rng = ChaCha8Rng::seed_from_u64(18);
+    for n in [60, 500] {
+        let frame = putative(n, &mut rng);
+        let expected = expected_chance_sets(&frame.problem(0.05), 3, freedom(3));
+        for _ in 0..5 {
+            let step = within(8.0, &mut rng);
+            let moved = |point: &MeasuredPoint| measured(point.position.at.coords + step, [0.01; 3]);
+            let (cloud, candidates) = (frame.cloud.iter().map(moved).collect(), frame.candidates.clone());
+            let moved = Frame { model: frame.model.clone(), cloud, candidates, prior: None };
+            let again = expected_chance_sets(&moved.problem(0.05), 3, freedom(3));
+            assert!((again / expected - 1.0).abs() < 1e-9, "{n} pairs: {expected}, {again}");
+        }
+    }
+}
+
 #[test]
 fn partners_shuffled() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);

@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use super::{Refusal, judge::Judge};
 use crate::{
     Identification, Problem, Shares,
-    chance::{dimension, expected_at_their_pose, expected_sets_as_good},
+    chance::{Chance, dimension},
 };
 
 /// What is asked of a frame before the object is believed to be there.
@@ -13,15 +13,20 @@ pub(super) struct Absence<'a> {
     judge: &'a Judge<'a>,
     found: &'a Identification,
     shares: &'a Shares,
+    chance: &'a Chance<'a>,
     /// Looked at where it decides, and once.
     fills_space: OnceCell<bool>,
-    shuffled: OnceCell<f64>,
     rare: OnceCell<bool>,
 }
 
 impl<'a> Absence<'a> {
-    pub(super) fn of(judge: &'a Judge<'a>, found: &'a Identification, shares: &'a Shares) -> Self {
-        Self { judge, found, shares, fills_space: OnceCell::new(), shuffled: OnceCell::new(), rare: OnceCell::new() }
+    pub(super) fn of(
+        judge: &'a Judge<'a>,
+        found: &'a Identification,
+        shares: &'a Shares,
+        chance: &'a Chance<'a>,
+    ) -> Self {
+        Self { judge, found, shares, chance, fills_space: OnceCell::new(), rare: OnceCell::new() }
     }
 
     /// Why the object is not believed to be there when its absence has this probability; `None` where it is.
@@ -34,11 +39,11 @@ impl<'a> Absence<'a> {
         let limit = if least < most && chance > least && self.fills_space() { most } else { least };
         // Written so that a NaN is refused too.
         let likely = chance <= limit && absent <= most;
-        if (likely && self.shuffled() <= limit) || self.is_rare() {
+        if (likely && self.chance.at_their_pose() <= limit) || self.is_rare() {
             return None;
         }
         let (probability, limit) = match (likely, chance <= limit) {
-            (true, _) => (self.shuffled().min(1.0), limit),
+            (true, _) => (self.chance.at_their_pose().min(1.0), limit),
             (false, true) => (absent, most),
             (false, false) => (chance, limit),
         };
@@ -73,11 +78,6 @@ impl<'a> Absence<'a> {
         *self.fills_space.get_or_init(look)
     }
 
-    /// How many sets as large shuffled partners are expected to make at the pose found and those like it.
-    fn shuffled(&self) -> f64 {
-        *self.shuffled.get_or_init(|| expected_at_their_pose(self.judge.problem, &self.found.pairs))
-    }
-
     /// Whether chance gives sets as good so rarely that the pose is believed although absence is not as improbable as it
     /// should be.
     ///
@@ -94,7 +94,7 @@ impl<'a> Absence<'a> {
                 && self.shares.absent <= IMPROBABLE
                 && self.shares.alike <= acceptance.absence
                 && self.fills_space()
-                && expected_sets_as_good(self.judge.problem, &self.found.pairs) <= acceptance.rare
+                && self.chance.sets_as_good() <= acceptance.rare
         })
     }
 }

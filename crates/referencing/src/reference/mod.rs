@@ -5,7 +5,7 @@ use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use crate::{
     Correspondence, Degenerate, Identification, ModelPoint, Problem, Search, Shell, Solver, Unidentified,
-    chance::expected_sets_as_good, site::diameter, solve::second_ratio,
+    chance::Chance, site::diameter, solve::second_ratio,
 };
 
 mod absence;
@@ -62,12 +62,13 @@ pub fn judge(
     let alert_limit = alert_limit(problem.model, acceptance);
     let largest = std::iter::once(&found.pairs).chain(&found.rivals).map(Vec::len).max().unwrap_or(0);
     let judge = Judge { problem, solver, acceptance, alert_limit, largest, searched: true, rig };
+    let chance = Chance::of(problem, &found.pairs);
     let likely = judge.size(&found.pairs).and_then(|()| match found.belief {
         Some(_) => Ok(()),
         None => judge.chance(&found.pairs),
     });
     let (outcome, runner_up) = match (likely, &found.belief) {
-        (Ok(()), Some(belief)) => judge.weighed(&found, belief),
+        (Ok(()), Some(belief)) => judge.weighed(&found, belief, &chance),
         (Ok(()), None) => judge.poses(&found),
         (Err(refusal), _) => (Outcome::Unidentified(refusal), None),
     };
@@ -82,12 +83,14 @@ pub fn judge(
         _ => outcome,
     };
     let outcome = on_a_line(problem).map_or(outcome, Outcome::Degenerate);
-    let believed = match &outcome {
-        Outcome::Referenced(reference) => &reference.pairs,
-        _ => &found.pairs,
+    let expected_chance_sets = match &outcome {
+        Outcome::Referenced(reference) if reference.pairs != found.pairs => {
+            Chance::of(problem, &reference.pairs).sets_as_good()
+        }
+        _ => chance.sets_as_good(),
     };
     Attempt {
-        expected_chance_sets: Some(expected_sets_as_good(problem, believed)),
+        expected_chance_sets: Some(expected_chance_sets),
         outcome,
         runner_up,
         optimal: found.optimal,

@@ -1,16 +1,21 @@
 //! What is believed of a search that weighs evidence.
 
 use super::{Alternative, Outcome, absence::Absence, judge::Judge};
-use crate::{Belief, Explanation, Identification};
+use crate::{Belief, Explanation, Identification, chance::Chance};
 
 impl Judge<'_> {
     /// The pose of a search that weighs evidence: believed when little speaks for no object at all, little
     /// for a pose elsewhere, and nothing for a second copy of the object.
-    pub(super) fn weighed(&self, found: &Identification, belief: &Belief) -> (Outcome, Option<Alternative>) {
+    pub(super) fn weighed(
+        &self,
+        found: &Identification,
+        belief: &Belief,
+        chance: &Chance<'_>,
+    ) -> (Outcome, Option<Alternative>) {
         let shares = belief.shares(self.problem.model, self.alert_limit);
         let elsewhere = belief.elsewhere(self.problem.model, self.alert_limit);
         let runner_up = belief.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
-        let absence = Absence::of(self, found, &shares);
+        let absence = Absence::of(self, found, &shares, chance);
         // Two things that are each the object by themselves: neither is the other's clutter.
         let even = shares.absent - shares.clutter;
         if absence.refusal(even).is_none()
