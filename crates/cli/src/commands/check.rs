@@ -134,7 +134,10 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
         Some("json") if path.file_name().is_some_and(|name| name == "manifest.json") => {
             (check_run(path.parent().unwrap_or(Path::new(""))), Vec::new())
         }
-        Some("json") => faults(problem_file::read(path).map(|_| ()).map_err(|fault| vec![fault])),
+        Some("json") => match problem_file::read(path) {
+            Ok(problem) => (Vec::new(), problem.warnings(path)),
+            Err(fault) => (vec![fault], Vec::new()),
+        },
         _ => match read_text(path) {
             Err(fault) => (vec![fault], Vec::new()),
             Ok(text) => match format(&text).as_deref() {

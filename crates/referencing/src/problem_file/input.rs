@@ -10,7 +10,9 @@ use serde::Deserialize;
 
 use crate::{
     Acceptance, Attempt, Candidates, Gate, ModelPoint, Prior, PriorBound, Problem, Search, Shell, Solver, Tolerance,
-    Unidentified, candidates, reference, site::diameter, until_found,
+    Unidentified, candidates, reference,
+    site::{COINCIDENT, SUSPICIOUS, diameter, nearest_two},
+    until_found,
 };
 
 /// The format this reader understands.
@@ -80,7 +82,7 @@ impl CoherenceProblem {
     ///
     /// # Errors
     /// The first fault: not JSON, an unknown key or format, a number that is not finite or out of
-    /// its range, an index that points nowhere, a prior that is no rigid motion.
+    /// its range, two model points in one place, an index that points nowhere, a prior that is no rigid motion.
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
         let raw: Raw = serde_json::from_str(text).map_err(|error| json(file, &error))?;
         let fault = |what: &str| Fault::new(what, file);
@@ -126,6 +128,10 @@ impl CoherenceProblem {
             .enumerate()
             .map(|(index, at)| ModelPoint::exact(index.to_string(), Point::from(*at)))
             .collect();
+        if let Some((i, k, _)) = nearest_two(&model).filter(|(.., distance)| *distance < COINCIDENT) {
+            let what = "two model points in one place";
+            return Err(fault(what).value(format!("points {i} and {k}")).remedy("remove one"));
+        }
         // Two points or fewer are answered "too few", whatever Δ says of them. The diameter is at least
         // the diagonal of the shell over √3: it is computed only where that does not settle it.
         let shell = Shell::around(model.iter().map(|point| point.at));
@@ -162,6 +168,29 @@ impl CoherenceProblem {
             prior: raw.prior.map(|prior| prior.checked(file)).transpose()?,
             putative,
         })
+    }
+
+    /// What is legal and hardly meant, of the content of `file`: points too few for a pose, or too near each other for Δ to tell
+    /// them apart; coordinates that look like other units than metres.
+    pub fn warnings(&self, file: &Path) -> Vec<Fault> {
+        let warning = |what: &str, value: String, remedy: &str| Fault::new(what, file).value(value).remedy(remedy);
+        let mut warnings = Vec::new();
+        if self.model.len() < 3 {
+            let value = format!("{} points", self.model.len());
+            warnings.push(warning("the model has too few points", value, "a pose needs at least three"));
+        }
+        let near = nearest_two(&self.model).filter(|(.., distance)| *distance < 2.0 * self.delta);
+        if let Some((i, k, distance)) = near {
+            let value = format!("points {i} and {k}, {distance:.4} m apart, and Δ = {} m", self.delta);
+            let remedy = "one may be taken for the other; keep model points 2Δ apart";
+            warnings.push(warning("model points are nearer than 2Δ", value, remedy));
+        }
+        let extent = diameter(&self.model);
+        if self.model.len() > 1 && !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
+            let value = format!("the model's points lie within {extent} m of each other");
+            warnings.push(warning("units?", value, "coordinates are in metres"));
+        }
+        warnings
     }
 
     /// Stage 1: which cloud points may be which model points.
@@ -248,7 +277,10 @@ impl RawPrior {
 /// What the JSON reader found wrong, with the nearest key to an unknown one.
 fn json(file: &Path, error: &serde_json::Error) -> Fault {
     let full = error.to_string();
-    let message = full.split(" at line ").next().unwrap_or_default();
+    let message = match full.split(" at line ").next().unwrap_or_default() {
+        "trailing characters" => "a row of too many numbers, or something after the end",
+        message => message,
+    };
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     let line = (error.line() > 0).then(|| error.line());
     match quoted.split_first() {

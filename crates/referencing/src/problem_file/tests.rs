@@ -129,6 +129,43 @@ fn candidates_come_from_pairs_shells_or_everything() {
     assert_eq!(pairs.candidates().unwrap().lists[2], [1, 4]);
 }
 
+/// B4 and B7.
+#[test]
+fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_told() {
+    assert_eq!(
+        fault("[1,0,0]", "[0.25,-0.75,1e-7]"),
+        "two model points in one place in p.json: points 1 and 2; remove one"
+    );
+    let warnings = |from: &str, to: &str| {
+        let problem = parse(&GOOD.replacen(from, to, 1)).unwrap();
+        problem.warnings(Path::new("p.json")).iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    assert!(warnings("[1,0,0]", "[1,0,0]").is_empty());
+    let near = "model points are nearer than 2Δ in p.json: points 1 and 2, 0.0700 m apart, and Δ = 0.04 m; one may be taken for the \
+                other; keep model points 2Δ apart";
+    assert_eq!(warnings("[1,0,0]", "[0.25,-0.68,0]"), [near]);
+    let units = warnings("[1,0,0]", "[1000,0,0]");
+    assert!(
+        units.len() == 1 && units[0].starts_with("units? in p.json: the model's points lie within 1000"),
+        "{units:?}"
+    );
+    let model = "[[0,0,0],[1,0,0],[0.25,-0.75,0],[0.5,0.5,1],[-0.5,0.25,0.5]]";
+    let few = warnings(model, "[]");
+    assert_eq!(few, ["the model has too few points in p.json: 0 points; a pose needs at least three"]);
+}
+
+#[test]
+fn the_nearest_two_of_many_points_are_found() {
+    use crate::{ModelPoint, site::nearest_two};
+    let step = |k: usize, at: f64| ((k as f64 * at).sin() * 43_758.545_3).fract();
+    let points: Vec<ModelPoint> =
+        (0..300).map(|k| ModelPoint::exact("", [step(k, 12.9898), step(k, 78.233), step(k, 37.719)].into())).collect();
+    let all = (0..300).flat_map(|k| (0..k).map(move |i| (i, k)));
+    let known = all.map(|(i, k)| (i, k, points[i].at.distance(&points[k].at))).min_by(|a, b| a.2.total_cmp(&b.2));
+    assert_eq!(nearest_two(&points), known);
+    assert_eq!((nearest_two(&points[..1]), nearest_two(&[])), (None, None));
+}
+
 #[test]
 fn every_fault_names_its_place() {
     assert_eq!(fault("\"delta\"", "\"delat\""), "unknown key in p.json:4: `delat`; did you mean `delta`?");

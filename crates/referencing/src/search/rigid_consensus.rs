@@ -27,10 +27,11 @@ use crate::Problem;
 /// fewer but closer points, or nearer to the prior, can outweigh one with more.
 ///
 /// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
-/// a box, in clumps), ρ_i is the density of the nearest points instead, and B(k) Π is summed over the subsets of the pairs,
-/// each model point's term over all candidates near its place: what fits in a crowd is as likely clutter. And beside the object and clutter alone stand more explanations: a pattern
-/// that the object repeats in part goes on, with the object in it or without; and where poses elsewhere explain what clutter
-/// spread evenly would not show, clutter imitates the object, which is among the imitations or not ([`Imitation`]).
+/// a box, in clumps), ρ_i is the density of the nearest points instead, and B(k) Π is summed over the subsets of the
+/// pairs, each model point's term over all candidates near its place: what fits in a crowd is as likely clutter. And
+/// beside the object and clutter alone stand more explanations: a pattern that the object repeats in part goes on, with
+/// the object in it or without; and where poses elsewhere explain what clutter spread evenly would not show, clutter
+/// imitates the object, which is among the imitations or not ([`Imitation`]).
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent

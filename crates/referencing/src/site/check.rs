@@ -13,7 +13,7 @@ use super::{
 };
 
 /// Feature points nearer than this (m) are one point written twice.
-const COINCIDENT: f64 = 1e-6;
+pub(crate) const COINCIDENT: f64 = 1e-6;
 /// Sine of the angle at P1 below which the base defines no frame.
 const COLLINEAR: f64 = 1e-3;
 /// Sine of the angle at P1 below which the base's frame is poorly defined.
@@ -21,7 +21,7 @@ const NEARLY_COLLINEAR: f64 = 0.1;
 /// How far base coordinates may be from the Fig. 2 rule (m).
 const RULE: f64 = 1e-6;
 /// Diameters (m) that make one suspect millimetres or kilometres, and those that no object has.
-const SUSPICIOUS: [f64; 2] = [0.01, 1e3];
+pub(crate) const SUSPICIOUS: [f64; 2] = [0.01, 1e3];
 const IMPOSSIBLE: [f64; 2] = [1e-4, 1e5];
 /// Standard deviations by which surveyed distances may differ from the model's.
 const SURVEY_SIGMAS: f64 = 4.0;

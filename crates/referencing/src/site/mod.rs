@@ -15,10 +15,11 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use seafix_component::Fault;
 use seafix_geometry::{Covariance6, Object, Point, Transform, World, triad};
 
+pub(crate) use check::{COINCIDENT, SUSPICIOUS};
 pub use congruence::Congruence;
 pub use shell::Shell;
-pub(crate) use target::diameter;
 pub use target::{NoWorld, Target, TargetKind};
+pub(crate) use target::{diameter, nearest_two};
 
 /// Cosine of the angle between normal and line of sight below which a point shows its back.
 const BACK: f64 = -0.1;
