@@ -115,7 +115,9 @@ pub enum Unidentified {
         needed: usize,
     },
     /// The search ended before it could answer.
-    #[error("the budget of {budget} pair tests, or as much other work, ended; best so far {best} points, at most {bound} are possible")]
+    #[error(
+        "the budget of {budget} pair tests, or as much other work, ended; best so far {best} points, at most {bound} are possible"
+    )]
     Budget {
         /// The budget (pair tests, or what the search counts in place of them).
         budget: u64,

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::{
     Motion,
-    bits::{Held, intersect, is_set, ones, ones_of},
+    bits::{Held, intersect, is_set, ones, ones_of, shared},
     bound::{After, Bounds},
     graph::Graph,
     likelihood::{Mode, Terms},
@@ -67,6 +67,8 @@ pub(in crate::search) struct Seeds<'a> {
     climb: Climb<'a>,
     bounds: Bounds<'a>,
     budget: u64,
+    /// Of so many pairs one is looked at.
+    every: usize,
     /// Words read, and as much other work.
     spent: u64,
     /// The likeliest first.
@@ -109,6 +111,7 @@ impl<'a> Seeds<'a> {
             climb: Climb { model, terms, rough, graph, taken, compared: Cell::new(0) },
             bounds: Bounds::of((terms, rough, graph), least),
             budget,
+            every: 1,
             spent: 0,
             modes: Vec::new(),
             floor,
@@ -148,6 +151,17 @@ impl<'a> Seeds<'a> {
             self.follow_pair(a as usize, b as usize);
         }
         Swept { modes: self.modes, complete, tests: self.spent }
+    }
+
+    /// Looks at so few of the pairs, evenly, that half of the budget is left for what they lead to: what many pairs lead to is found
+    /// all the same.
+    pub(in crate::search) fn thinned(mut self) -> Self {
+        let graph = self.climb.graph;
+        let edges: usize = ones(&self.free, 0).map(|a| shared(graph.row(a), &self.free, a)).sum();
+        // Rows are read from the second of a pair on: a third of them on average.
+        let cost = edges as u64 * self.row.len() as u64 / 3;
+        self.every = cost.div_ceil((self.budget / 2).max(1)).max(1) as usize;
+        self
     }
 
     /// Only pairs that contradict a pose begin another.
@@ -216,7 +230,7 @@ impl<'a> Seeds<'a> {
             }
             Held::list(&self.row, graph.starts[rank + 1], &mut self.held);
             self.bounds.list(&self.held, &mut self.after);
-            for b in self.held.iter().flat_map(Held::ones) {
+            for b in self.held.iter().flat_map(Held::ones).filter(|b| (a + b).is_multiple_of(self.every)) {
                 let gains = own + self.bounds.gain(b);
                 let next = graph.rank[b] as usize + 1;
                 if self.bounds.reach(2, gains, ranks - next) < threshold {
