@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Acceptance {
     /// Least number of identified points.
     pub least_points: usize,
-    /// Largest expected number of chance sets of the found size (a-contrario acceptance), for searches that
-    /// count.
+    /// Largest expected number of chance sets of the found size (a-contrario acceptance); of searches that weigh evidence, of
+    /// those that are as good as the found one.
     pub chance_budget: f64,
     /// Largest probability, by a search that weighs evidence, that the object is not there at all; of a model of eight
     /// points. Of a larger one, of n points, (n + 1)/9 times as much, a hundredth at most, where the cloud fills space: its

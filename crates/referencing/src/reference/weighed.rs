@@ -1,11 +1,11 @@
 //! What is believed of a search that weighs evidence.
 
-use super::{Alternative, Outcome, absence::Absence, judge::Judge};
+use super::{Alternative, Outcome, Refusal, absence::Absence, judge::Judge};
 use crate::{Belief, Explanation, Identification, chance::Chance};
 
 impl Judge<'_> {
     /// The pose of a search that weighs evidence: believed when little speaks for no object at all, little
-    /// for a pose elsewhere, and nothing for a second copy of the object.
+    /// for a pose elsewhere, nothing for a second copy of the object, and chance hardly ever gives as good a set.
     pub(super) fn weighed(
         &self,
         found: &Identification,
@@ -26,6 +26,11 @@ impl Judge<'_> {
         }
         if let Some(refusal) = absence.refusal(shares.absent) {
             return (Outcome::Unidentified(refusal), runner_up);
+        }
+        let (expected, budget) = (chance.sets_as_good(), self.acceptance.chance_budget);
+        // Written so that a NaN is refused too.
+        if !(expected <= budget) {
+            return (Outcome::Unidentified(Refusal::Chance { size: found.pairs.len(), expected, budget }), runner_up);
         }
         // Written so that a NaN is refused too.
         if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
