@@ -7,8 +7,8 @@ use super::coordinates;
 
 /// Leaves at most so many of the points, evenly spaced among all by their distance from the centroid of all, in this order.
 ///
-/// So a rigid motion of the cloud does not change which they are, nor do the numbers of the points. Distances of seven equal digits are
-/// equal, as sums in another order may differ in the last; of such points the coordinates decide.
+/// So the numbers of the points do not change which they are, nor does a rigid motion of the cloud, but for points equally far from the
+/// centroid to seven digits (as sums in another order may differ in the last): of these the coordinates decide.
 pub(super) fn spread_sample(cloud: &[MeasuredPoint], points: &mut Vec<usize>, most: usize) {
     let place = |j: usize| coordinates(&cloud[j]);
     let centroid = points.iter().map(|&j| place(j)).sum::<Vector3<f64>>() / points.len().max(1) as f64;

@@ -128,7 +128,7 @@ impl CoherenceProblem {
             .enumerate()
             .map(|(index, at)| ModelPoint::exact(index.to_string(), Point::from(*at)))
             .collect();
-        if let Some((i, k, _)) = nearest_two(&model).filter(|(.., distance)| *distance < COINCIDENT) {
+        if let Some((i, k, _)) = nearest_two(&model, COINCIDENT) {
             let what = "two model points in one place";
             return Err(fault(what).value(format!("points {i} and {k}")).remedy("remove one"));
         }
@@ -179,15 +179,15 @@ impl CoherenceProblem {
             let value = format!("{} points", self.model.len());
             warnings.push(warning("the model has too few points", value, "a pose needs at least three"));
         }
-        let near = nearest_two(&self.model).filter(|(.., distance)| *distance < 2.0 * self.delta);
-        if let Some((i, k, distance)) = near {
+        if let Some((i, k, distance)) = nearest_two(&self.model, 2.0 * self.delta) {
             let value = format!("points {i} and {k}, {distance:.4} m apart, and Δ = {} m", self.delta);
             let remedy = "one may be taken for the other; keep model points 2Δ apart";
             warnings.push(warning("model points are nearer than 2Δ", value, remedy));
         }
-        let extent = diameter(&self.model);
+        let extent =
+            Shell::around(self.model.iter().map(|point| point.at)).map_or(0.0, |shell| shell.max.distance(&shell.min));
         if self.model.len() > 1 && !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
-            let value = format!("the model's points lie within {extent} m of each other");
+            let value = format!("the model lies in a box of {extent} m from corner to corner");
             warnings.push(warning("units?", value, "coordinates are in metres"));
         }
         warnings

@@ -145,10 +145,7 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_told() {
                 other; keep model points 2Δ apart";
     assert_eq!(warnings("[1,0,0]", "[0.25,-0.68,0]"), [near]);
     let units = warnings("[1,0,0]", "[1000,0,0]");
-    assert!(
-        units.len() == 1 && units[0].starts_with("units? in p.json: the model's points lie within 1000"),
-        "{units:?}"
-    );
+    assert!(units.len() == 1 && units[0].starts_with("units? in p.json: the model lies in a box of 1000"), "{units:?}");
     let model = "[[0,0,0],[1,0,0],[0.25,-0.75,0],[0.5,0.5,1],[-0.5,0.25,0.5]]";
     let few = warnings(model, "[]");
     assert_eq!(few, ["the model has too few points in p.json: 0 points; a pose needs at least three"]);
@@ -162,8 +159,9 @@ fn the_nearest_two_of_many_points_are_found() {
         (0..300).map(|k| ModelPoint::exact("", [step(k, 12.9898), step(k, 78.233), step(k, 37.719)].into())).collect();
     let all = (0..300).flat_map(|k| (0..k).map(move |i| (i, k)));
     let known = all.map(|(i, k)| (i, k, points[i].at.distance(&points[k].at))).min_by(|a, b| a.2.total_cmp(&b.2));
-    assert_eq!(nearest_two(&points), known);
-    assert_eq!((nearest_two(&points[..1]), nearest_two(&[])), (None, None));
+    assert_eq!(nearest_two(&points, f64::INFINITY), known);
+    assert_eq!(nearest_two(&points, known.unwrap().2), None);
+    assert_eq!((nearest_two(&points[..1], 1.0), nearest_two(&[], 1.0)), (None, None));
 }
 
 #[test]

@@ -40,7 +40,9 @@ use crate::Problem;
 /// prune take the points of a set to lie about as well as the model's do on average, so that nothing is
 /// proved: no answer is called optimal. Time O(K²) for the graph of K candidate pairs, then what the
 /// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends
-/// the search. The tolerance and the prior's greatest rotation prune the graph; they do not judge the
+/// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one and
+/// imitations as far as a share of that work goes. So among much clutter a partly seen object beside a whole copy of it may be passed
+/// over, and nothing tells. The tolerance and the prior's greatest rotation prune the graph; they do not judge the
 /// pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]

@@ -143,19 +143,20 @@ pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
     most
 }
 
-/// The two nearest of the points, the first of them first, and how far apart they are (m); `None` of fewer than two.
+/// The two nearest of the points that are nearer than `limit` (m), the first of them first, and how far apart they are; `None` where
+/// there are none.
 ///
-/// Swept along a direction that no wall or row of points is square to: what is further off along it than the nearest two are apart
-/// need not be looked at.
-pub(crate) fn nearest_two(points: &[ModelPoint]) -> Option<(usize, usize, f64)> {
-    let direction = Vector3::new(0.48, 0.6, 0.64);
+/// Swept along a direction that no row of a lattice is square to, as its components have no rational ratio: what is further off along
+/// it than the nearest two are apart need not be looked at.
+pub(crate) fn nearest_two(points: &[ModelPoint], limit: f64) -> Option<(usize, usize, f64)> {
+    let direction = Vector3::new(1.0, 2f64.sqrt(), 3f64.sqrt()).normalize();
     let mut along: Vec<(f64, usize)> =
         points.iter().enumerate().map(|(i, point)| (direction.dot(&point.at.coords), i)).collect();
     along.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut nearest: Option<(usize, usize, f64)> = None;
     for (place, &(here, i)) in along.iter().enumerate() {
         for &(there, k) in along[..place].iter().rev() {
-            let most = nearest.map_or(f64::INFINITY, |(.., distance)| distance);
+            let most = nearest.map_or(limit, |(.., distance)| distance);
             if here - there > most || most == 0.0 {
                 break;
             }
