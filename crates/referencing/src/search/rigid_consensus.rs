@@ -83,10 +83,8 @@ const COPY: f64 = 9.0;
 /// What explains so many points fewer than the likeliest pose is no copy of the object but of a part of it. Where the object has a
 /// pattern that goes on, parts are to be seen beside it anyway, and are not looked for.
 const LEAD: usize = 4;
-/// The look for parts of a copy may always cost as much (words read: a fraction of a millisecond), where the whole was found at once,
-/// and half of what that took up to so much.
+/// The look for parts of a copy may always cost as much (words read: a fraction of a millisecond), where the whole was found at once.
 const LEAST_EFFORT: u64 = 50_000;
-const EFFORT: u64 = 250_000;
 /// Pair tests of the graph that take as long as a word read.
 const PAIRS_A_WORD: u64 = 16;
 
@@ -136,10 +134,9 @@ impl Search for RigidConsensus {
             let left = self.budget.saturating_sub(swept.tests);
             beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
             if beside.modes.is_empty() && pattern.is_none() {
-                // Parts of it, as far as half of what was spent on the whole goes, an eighth of much.
+                // Parts of it, as far as half of what was spent on the whole goes.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
-                let spent = swept.tests + graph.tests / PAIRS_A_WORD;
-                let effort = left.min((spent / 8).max(EFFORT.min(spent / 2)).max(LEAST_EFFORT));
+                let effort = left.min(((swept.tests + graph.tests / PAIRS_A_WORD) / 2).max(LEAST_EFFORT));
                 let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), effort).thinned().sweep();
                 beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
             }
