@@ -39,7 +39,7 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
     let truth = Transform::<Camera, Object>::from_rows(&drawn.truth.t_cam_obj).expect("it is a rigid motion").inverse();
     let rule = Solved { ideal_rms: drawn.truth.ideal_tre_rms, putative: file.putative.is_some() };
     let at: Vec<Point<Object>> = file.model.iter().map(|point| point.at).collect();
-    // Nor for what chance gives.
+    // Nothing is refused for what chance gives either: the default's row is judged by the default.
     let acceptance = Acceptance { absence: ANYTHING, chance_budget: f64::INFINITY, ..Acceptance::default() };
     let found = RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0));
     let belief = found.as_ref().ok().and_then(|found| found.belief.clone()).unwrap_or_default();

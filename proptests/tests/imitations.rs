@@ -62,30 +62,31 @@ fn clutter_that_imitates_the_object_is_not_referenced() {
     }
 }
 
-/// What a camera sees in the shells of an object of so many points.
+/// What a camera sees of an object of so many points and about it: in m, the noise 1 cm.
 struct Shown {
     points: Vec<Vector3<f64>>,
     camera_from_object: Transform<Camera, Object>,
-    half: f64,
+    /// Half the size of the shells; `None` where there is no prior.
+    half: Option<f64>,
     cloud: Vec<Vector3<f64>>,
 }
 
 impl Shown {
-    fn new(n: usize, half: f64, place: &mut impl FnMut(f64) -> Vector3<f64>) -> Self {
+    fn new(n: usize, half: Option<f64>, place: &mut impl FnMut(f64) -> Vector3<f64>) -> Self {
         let points = (0..n).map(|_| place(0.75)).collect();
         let at = Vector3::new(0.0, 0.0, 4.0) + place(0.5);
         Self { points, camera_from_object: Transform::new(so3::exp(&place(1.8)), at), half, cloud: Vec::new() }
     }
 
-    /// Each `every`-th point, moved in the object's frame and measured with a noise of 1 cm.
+    /// The first `count` of its points, moved in the object's frame, each with an error.
     fn shows(
         &mut self,
-        every: usize,
+        count: usize,
         moved: impl Fn(&Vector3<f64>) -> Vector3<f64>,
-        mut noise: impl FnMut() -> Vector3<f64>,
+        mut error: impl FnMut() -> Vector3<f64>,
     ) {
-        let seen = self.points.iter().step_by(every).map(|at| self.camera_from_object * Point::from(moved(at)));
-        self.cloud.extend(seen.map(|at| at.coords + noise()).collect::<Vec<_>>());
+        let seen = self.points.iter().take(count).map(|at| self.camera_from_object * Point::from(moved(at)));
+        self.cloud.extend(seen.map(|at| at.coords + error()));
     }
 
     fn attempt(&self, search: &dyn Search, acceptance: &Acceptance) -> Attempt {
@@ -95,10 +96,12 @@ impl Shown {
             pixels: None,
         };
         let cloud: Vec<MeasuredPoint> = self.cloud.iter().map(measured).collect();
-        let prior = Prior { object_from_camera: self.camera_from_object.inverse(), bound: PriorBound::Box(self.half) };
-        let candidates = candidates(&model, &cloud, Some(&prior), &Gate::default(), None);
+        let object_from_camera = self.camera_from_object.inverse();
+        let prior = self.half.map(|half| Prior { object_from_camera, bound: PriorBound::Box(half) });
+        let prior = prior.as_ref();
+        let candidates = candidates(&model, &cloud, prior, &Gate::default(), None);
         let tolerance = Tolerance::Fixed(0.0424);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: Some(&prior) };
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         reference(&problem, search, &Mahalanobis::default(), acceptance, None, &mut rng)
     }
@@ -119,10 +122,10 @@ fn a_set_that_chance_gives_is_no_answer() {
         for seed in 0..60 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let mut place = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
-            let mut shown = Shown::new(8, 0.5, &mut place);
+            let mut shown = Shown::new(8, Some(0.5), &mut place);
             let scale = [0.9, 0.95, 1.05, 1.1][seed as usize % 4];
-            shown.shows(1, |at| at * scale, || place(0.017));
-            (0..3).for_each(|_| shown.shows(1, |at| *at, || place(0.5)));
+            shown.shows(8, |at| at * scale, || place(0.017));
+            (0..3).for_each(|_| shown.shows(8, |at| *at, || place(0.5)));
             let attempt = shown.attempt(&*search, &acceptance);
             if matches!(attempt.outcome, Outcome::Referenced(_)) {
                 answers += 1;
@@ -168,26 +171,43 @@ fn a_smaller_copy_is_not_passed_over() {
     }
 }
 
+/// Of so many frames those that are answered where `seen` of an object's `n` points are seen beside a whole copy of it, 35 cm off, among
+/// `times` as many points of clutter.
+fn passed_over((n, seen): (usize, usize), times: usize, half: Option<f64>, frames: u64) -> usize {
+    let search = SEARCHES.build(&Choice::named("rigid-consensus")).expect("it is listed");
+    let answered = |seed: u64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut place = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+        let mut shown = Shown::new(n, half, &mut place);
+        let step = place(1.0).normalize() * 0.35;
+        shown.shows(seen, |at| *at, || place(0.017));
+        shown.shows(n, |at| at + step, || place(0.017));
+        (0..times).for_each(|_| shown.shows(n, |at| *at, || place(0.6)));
+        matches!(shown.attempt(&*search, &Acceptance::default()).outcome, Outcome::Referenced(_))
+    };
+    (0..frames).filter(|&seed| answered(seed)).count()
+}
+
 /// So is one of which ten points are seen, among a hundred of clutter: the whole beside it is found at once, and that is no
 /// reason to look for the half as shortly.
 ///
-/// Seen to fail, with 24 of 60, where a quarter of what was spent on the whole is spent on its parts.
+/// Seen to fail, with 21 of 60, where a quarter of what was spent on the whole is spent on its parts, and no least.
 #[test]
 fn half_a_copy_among_clutter_is_not_passed_over() {
-    let search = SEARCHES.build(&Choice::named("rigid-consensus")).expect("it is listed");
-    let mut passed_over = 0;
-    for seed in 0..60 {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut place = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
-        let mut shown = Shown::new(20, 0.6, &mut place);
-        let step = place(1.0).normalize() * 0.35;
-        shown.shows(2, |at| *at, || place(0.017));
-        shown.shows(1, |at| at + step, || place(0.017));
-        (0..5).for_each(|_| shown.shows(1, |at| *at, || place(0.6)));
-        let attempt = shown.attempt(&*search, &Acceptance::default());
-        passed_over += usize::from(matches!(attempt.outcome, Outcome::Referenced(_)));
+    assert_eq!(passed_over((20, 10), 5, Some(0.6), 60), 0);
+}
+
+#[test]
+#[ignore = "prints a table, four minutes: cargo test --release --workspace --test imitations copies -- --ignored --nocapture"]
+fn how_often_copies_are_passed_over() {
+    for (n, seen) in [(20, 8), (20, 10), (20, 14), (50, 12), (50, 20), (50, 30)] {
+        for (half, times) in [(Some(0.6), 5), (Some(0.6), 20), (None, 2), (None, 10)] {
+            let passed = passed_over((n, seen), times, half, 60);
+            println!(
+                "{seen} of {n} points seen, {times} times as many of clutter, half a shell {half:?}: {passed} of 60"
+            );
+        }
     }
-    assert_eq!(passed_over, 0);
 }
 
 /// Answers have a pose to be held against where three pairs speak for one: it is elsewhere, and explains less.

@@ -298,7 +298,7 @@ fn a_mirror_image_of_many_points_is_not_referenced() {
 }
 
 #[test]
-#[ignore = "the long form of the test above: cargo test --release -p seafix-proptests --test search_symmetries -- --ignored"]
+#[ignore = "the long form of the test above, 10 s in release: cargo test --release -p seafix-proptests --test search_symmetries -- --ignored"]
 fn six_thousand_mirror_images_are_not_referenced() {
     assert_eq!(mirror_images_referenced(6000), 0);
 }

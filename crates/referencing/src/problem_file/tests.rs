@@ -137,7 +137,7 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_told() {
         "two model points in one place in p.json: points 1 and 2; remove one"
     );
     let warnings = |from: &str, to: &str| {
-        let problem = parse(&GOOD.replacen(from, to, 1)).unwrap();
+        let problem = parse(&GOOD.replacen(from, to, 1)).expect("it is legal");
         problem.warnings(Path::new("p.json")).iter().map(ToString::to_string).collect::<Vec<_>>()
     };
     assert!(warnings("[1,0,0]", "[1,0,0]").is_empty());
@@ -159,8 +159,9 @@ fn the_nearest_two_of_many_points_are_found() {
         (0..300).map(|k| ModelPoint::exact("", [step(k, 12.9898), step(k, 78.233), step(k, 37.719)].into())).collect();
     let all = (0..300).flat_map(|k| (0..k).map(move |i| (i, k)));
     let known = all.map(|(i, k)| (i, k, points[i].at.distance(&points[k].at))).min_by(|a, b| a.2.total_cmp(&b.2));
-    assert_eq!(nearest_two(&points, f64::INFINITY), known);
-    assert_eq!(nearest_two(&points, known.unwrap().2), None);
+    let known = known.expect("there are three hundred");
+    assert_eq!(nearest_two(&points, f64::INFINITY), Some(known));
+    assert_eq!(nearest_two(&points, known.2), None);
     assert_eq!((nearest_two(&points[..1], 1.0), nearest_two(&[], 1.0)), (None, None));
 }
 

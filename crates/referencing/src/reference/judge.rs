@@ -46,9 +46,14 @@ impl Judge<'_> {
         if !self.searched {
             return Ok(());
         }
-        let (expected, budget) = (expected_sets(self.problem, pairs), self.acceptance.chance_budget);
+        self.rare(pairs.len(), expected_sets(self.problem, pairs))
+    }
+
+    /// Whether chance is expected to give few enough sets of this size.
+    pub(super) fn rare(&self, size: usize, expected: f64) -> Result<(), Refusal> {
+        let budget = self.acceptance.chance_budget;
         // Written so that a NaN is refused too.
-        if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size: pairs.len(), expected, budget }) }
+        if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size, expected, budget }) }
     }
 
     /// The pose of the set and of its rivals: the only one that passes, several, or none.

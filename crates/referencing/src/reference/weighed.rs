@@ -1,6 +1,6 @@
 //! What is believed of a search that weighs evidence.
 
-use super::{Alternative, Outcome, Refusal, absence::Absence, judge::Judge};
+use super::{Alternative, Outcome, absence::Absence, judge::Judge};
 use crate::{Belief, Explanation, Identification, chance::Chance};
 
 impl Judge<'_> {
@@ -27,10 +27,8 @@ impl Judge<'_> {
         if let Some(refusal) = absence.refusal(shares.absent) {
             return (Outcome::Unidentified(refusal), runner_up);
         }
-        let (expected, budget) = (chance.sets_as_good(), self.acceptance.chance_budget);
-        // Written so that a NaN is refused too.
-        if !(expected <= budget) {
-            return (Outcome::Unidentified(Refusal::Chance { size: found.pairs.len(), expected, budget }), runner_up);
+        if let Err(refusal) = self.rare(found.pairs.len(), chance.sets_as_good()) {
+            return (Outcome::Unidentified(refusal), runner_up);
         }
         // Written so that a NaN is refused too.
         if !(shares.elsewhere <= self.acceptance.doubt * (1.0 - shares.absent)) {
