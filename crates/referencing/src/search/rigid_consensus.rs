@@ -37,12 +37,13 @@ use crate::Problem;
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
 /// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. A three whose distances
 /// differ much from the model's fits no pose well, and its bound falls by that. The bounds that
-/// prune take the points of a set to lie about as well as the model's do on average, so that nothing is
+/// prune take the points of a set to lie about as well as the model's do on average, and to fit as noise lets them: what fits
+/// so well that only one set in a thousand does may be missed where it is hardly of interest. So nothing is
 /// proved: no answer is called optimal. Time O(K²) for the graph of K candidate pairs, then what the
 /// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends
-/// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one and
-/// imitations as far as a share of that work goes. So among much clutter a partly seen object beside a whole copy of it may be passed
-/// over, and nothing tells. The tolerance and the prior's greatest rotation prune the graph; they do not judge the
+/// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for up to
+/// three times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole copy of it may be
+/// passed over, and nothing tells. The tolerance and the prior's greatest rotation prune the graph; they do not judge the
 /// pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
@@ -83,7 +84,8 @@ const COPY: f64 = 9.0;
 /// What explains so many points fewer than the likeliest pose is no copy of the object but of a part of it. Where the object has a
 /// pattern that goes on, parts are to be seen beside it anyway, and are not looked for.
 const LEAD: usize = 4;
-/// The look for parts of a copy may always cost as much (words read: a fraction of a millisecond), where the whole was found at once.
+/// The looks for parts of a copy, and the tenth of it those for imitations, may always cost as much (words read: a fraction of a
+/// millisecond), where the whole was found at once.
 const LEAST_EFFORT: u64 = 50_000;
 /// Pair tests of the graph that take as long as a word read.
 const PAIRS_A_WORD: u64 = 16;
@@ -132,16 +134,18 @@ impl Search for RigidConsensus {
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
             let left = self.budget.saturating_sub(swept.tests);
+            let work = swept.tests + graph.tests / PAIRS_A_WORD;
+            let whole = work.max(LEAST_EFFORT);
             beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
             if beside.modes.is_empty() && pattern.is_none() {
-                // Parts of it, as far as half of what was spent on the whole goes.
+                // Parts of it: pairs are looked at for twice as long as the whole took, and followed for as long.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
-                let effort = left.min(((swept.tests + graph.tests / PAIRS_A_WORD) / 2).max(LEAST_EFFORT));
-                let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), effort).thinned().sweep();
+                let (look, follow) = (left.min(2 * whole), left.min(whole));
+                let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), follow).thinned(look).sweep();
                 beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
             }
-            // What poses elsewhere say of the clutter, those that are as likely as no object, as far as as much again goes.
-            let effort = left.min((swept.tests + graph.tests / PAIRS_A_WORD) / 4);
+            // What poses elsewhere say of the clutter, those that are as likely as no object, as far as an eighth of that goes.
+            let effort = left.min((work / 8).max(LEAST_EFFORT / 10));
             let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
             tests += others.tests;
             weighed(&mut others);

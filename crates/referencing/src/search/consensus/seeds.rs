@@ -25,6 +25,8 @@ const COMPARED: usize = 16;
 /// Beginnings of a pose that is sought whatever it is worth, and vertices compared for each.
 const BEGINNINGS: usize = 8;
 const COMPARED_BEGINNINGS: usize = 512;
+/// Pairs are counted at so many vertices or a few more.
+const COUNTED: usize = 256;
 /// The least set that a pose can come from.
 const LEAST: usize = 3;
 /// Modes kept.
@@ -153,14 +155,16 @@ impl<'a> Seeds<'a> {
         Swept { modes: self.modes, complete, tests: self.spent }
     }
 
-    /// Looks at so few of the pairs, evenly, that half of the budget is left for what they lead to: what many pairs lead to is found
-    /// all the same.
-    pub(in crate::search) fn thinned(mut self) -> Self {
+    /// Looks at as many of the pairs, evenly, as can be with so much work, which comes on top of the budget for what they lead to:
+    /// what many pairs lead to is found all the same.
+    pub(in crate::search) fn thinned(mut self, look: u64) -> Self {
         let graph = self.climb.graph;
-        let edges: usize = ones(&self.free, 0).map(|a| shared(graph.row(a), &self.free, a)).sum();
+        let some = (graph.vertices.len() / COUNTED).max(1);
+        let edges: usize = ones(&self.free, 0).step_by(some).map(|a| some * shared(graph.row(a), &self.free, a)).sum();
         // Rows are read from the second of a pair on: a third of them on average.
         let cost = edges as u64 * self.row.len() as u64 / 3;
-        self.every = cost.div_ceil((self.budget / 2).max(1)).max(1) as usize;
+        self.every = cost.div_ceil(look.max(1)).max(1) as usize;
+        self.budget += cost / self.every as u64;
         self
     }
 
