@@ -37,14 +37,14 @@ use crate::Problem;
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
 /// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. A three whose distances
 /// differ much from the model's fits no pose well, and its bound falls by that. The bounds that
-/// prune take the points of a set to lie about as well as the model's do on average, and to fit as noise lets them: what fits
-/// so well that only one set in a thousand does may be missed where it is hardly of interest. So nothing is
+/// prune take the points of a set to lie about as well as the model's do on average, and to fit no better than noise
+/// lets them, by up to four nats: what fits better may be missed where it is hardly of interest. So nothing is
 /// proved: no answer is called optimal. Time O(K²) for the graph of K candidate pairs, then what the
 /// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends
-/// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for up to
-/// three times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole copy of it may be
-/// passed over, and nothing tells. The tolerance and the prior's greatest rotation prune the graph; they do not judge the
-/// pose.
+/// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
+/// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
+/// copy of it may be passed over, and nothing tells. The tolerance and the prior's greatest rotation prune the graph; they
+/// do not judge the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RigidConsensus {
@@ -138,9 +138,9 @@ impl Search for RigidConsensus {
             let whole = work.max(LEAST_EFFORT);
             beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
             if beside.modes.is_empty() && pattern.is_none() {
-                // Parts of it: pairs are looked at for twice as long as the whole took, and followed for as long.
+                // Parts of it: pairs are looked at for twice as long as the whole took, and followed for half as long.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
-                let (look, follow) = (left.min(2 * whole), left.min(whole));
+                let (look, follow) = (left.min(2 * whole), left.min(whole / 2));
                 let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), follow).thinned(look).sweep();
                 beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
             }
