@@ -138,13 +138,13 @@ impl Search for RigidConsensus {
             let whole = work.max(LEAST_EFFORT);
             beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
             if beside.modes.is_empty() && pattern.is_none() {
-                // Parts of it: pairs are looked at for twice as long as the whole took, and followed for half as long.
+                // Parts of it: pairs are looked at for twice, and followed for half of the time that the whole took.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
                 let (look, follow) = (left.min(2 * whole), left.min(whole / 2));
                 let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), follow).thinned(look).sweep();
                 beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
             }
-            // What poses elsewhere say of the clutter, those that are as likely as no object, as far as an eighth of that goes.
+            // What poses elsewhere say of the clutter, those that are as likely as no object, in an eighth of that time.
             let effort = left.min((work / 8).max(LEAST_EFFORT / 10));
             let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
             tests += others.tests;
