@@ -191,6 +191,8 @@ fn integrity(it: &seafix_referencing::Integrity) -> Integrity {
         separation_two: it.separation_two,
         protection_position: it.protection.map(|level| level.position),
         protection_attitude: it.protection.map(|level| level.attitude),
+        stretch: it.stretch.map(|it| it.value),
+        stretch_sigma: it.stretch.map(|it| it.sigma),
     }
 }
 

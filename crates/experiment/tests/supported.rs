@@ -140,6 +140,8 @@ fn the_log_and_the_table_say_what_the_fix_says() {
             said.separation_two,
             said.protection.map(|level| level.position),
             said.protection.map(|level| level.attitude),
+            said.stretch.map(|it| it.value),
+            said.stretch.map(|it| it.sigma),
         ];
         let log_says = [
             target.residual_rms,
@@ -149,11 +151,21 @@ fn the_log_and_the_table_say_what_the_fix_says() {
             it.separation_two,
             it.protection_position,
             it.protection_attitude,
+            it.stretch,
+            it.stretch_sigma,
         ];
         assert_eq!(fix_says, log_says);
         assert!(fix_says.iter().all(Option::is_some), "{fix_says:?}");
-        let columns =
-            ["chi2", "chi2_limit", "separation", "separation_two", "protection_position", "protection_attitude"];
+        let columns = [
+            "chi2",
+            "chi2_limit",
+            "separation",
+            "separation_two",
+            "protection_position",
+            "protection_attitude",
+            "stretch",
+            "stretch_sigma",
+        ];
         assert_eq!(columns.map(|name| row[name].parse::<f64>().ok())[..], fix_says[1..]);
         // Residuals are C·H − P of each pair, and their root mean square is what is logged.
         for (pair, residual) in fix.pairs.iter().zip(&fix.residuals) {

@@ -35,4 +35,4 @@ pub use search::{
     Search, Shares, StructuralCoherence, Unidentified,
 };
 pub use site::{Congruence, Interest, ModelPoint, NoWorld, Shell, Site, SiteObject, Target, TargetKind};
-pub use solve::{Choose, Degenerate, Kabsch, Mahalanobis, Rival, SOLVERS, Solver, StereoReprojection, Triad};
+pub use solve::{Choose, Degenerate, Kabsch, Mahalanobis, Rival, SOLVERS, Solver, StereoReprojection, Stretch, Triad};

@@ -119,6 +119,9 @@ impl Solve {
     }
 }
 
+/// A stretch of so many standard deviations is told: of exact rigs and models one fix in fifteen thousand has it.
+const TOLD: f64 = 4.0;
+
 /// How far apart two poses put the object's origin.
 fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
     let Some(pose) = pose else { return "which is not believed either".to_owned() };
@@ -138,6 +141,13 @@ fn people(answer: &Answer) -> String {
     }
     if let Some(scale) = answer.scale {
         text += &format!(", scale {scale:.6}");
+    }
+    if let Some(stretch) = answer.integrity.as_ref().and_then(|it| it.stretch)
+        && stretch.value.abs() > TOLD * stretch.sigma
+    {
+        let (by, sigma) = (100.0 * stretch.value.abs(), 100.0 * stretch.sigma);
+        let longer = if stretch.value > 0.0 { "longer" } else { "shorter" };
+        text += &format!(", measured distances {by:.1} ± {sigma:.1} % {longer} than the model's: rig or survey is off");
     }
     if let Some(why) = &answer.explanation {
         text += &format!(": {why}");

@@ -122,6 +122,8 @@ pub static COLUMNS: &[Column] = columns![
     Real "separation_two" = |r: &Row<'_>| r.integrity()?.separation_two,
     Real "protection_position" = |r: &Row<'_>| r.integrity()?.protection_position,
     Real "protection_attitude" = |r: &Row<'_>| r.integrity()?.protection_attitude,
+    Real "stretch" = |r: &Row<'_>| r.integrity()?.stretch,
+    Real "stretch_sigma" = |r: &Row<'_>| r.integrity()?.stretch_sigma,
     Real "alert_limit" = |r: &Row<'_>| r.target.evaluation.alert_limit,
     Text "region" = |r: &Row<'_>| r.target.region().map_or_else(String::new, |region| region.name().to_owned()),
 ];

@@ -47,6 +47,8 @@ fn integrity_message(it: &Integrity) -> proto::Integrity {
         separation_two: it.separation_two,
         protection_position: it.protection_position,
         protection_attitude: it.protection_attitude,
+        stretch: it.stretch,
+        stretch_sigma: it.stretch_sigma,
     }
 }
 
@@ -60,6 +62,8 @@ fn integrity_record(it: proto::Integrity) -> Integrity {
         separation_two: it.separation_two,
         protection_position: it.protection_position,
         protection_attitude: it.protection_attitude,
+        stretch: it.stretch,
+        stretch_sigma: it.stretch_sigma,
     }
 }
 

@@ -739,6 +739,12 @@ pub struct Integrity {
     pub protection_position: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "8")]
     pub protection_attitude: ::core::option::Option<f64>,
+    /// By how much measured distances are longer than the model's, as a share of them, and its standard deviation; absent with
+    /// fewer than four points.
+    #[prost(double, optional, tag = "9")]
+    pub stretch: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "10")]
+    pub stretch_sigma: ::core::option::Option<f64>,
 }
 /// A point of the target and the cloud point believed to be it, by their indices.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]

@@ -174,6 +174,10 @@ pub struct Integrity {
     pub protection_position: Option<f64>,
     /// That of the attitude (rad).
     pub protection_attitude: Option<f64>,
+    /// By how much measured distances are longer than the model's, as a share of them.
+    pub stretch: Option<f64>,
+    /// Its standard deviation.
+    pub stretch_sigma: Option<f64>,
 }
 
 /// How an attempt compares with truth; `None` where truth or a pose is missing.

@@ -108,6 +108,8 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         separation_two: Some(0.02),
         protection_position: Some(0.03),
         protection_attitude: Some(0.004),
+        stretch: Some(-0.002),
+        stretch_sigma: Some(0.001),
     });
     fixed.evaluation = Evaluation {
         wrong: Some(false),

@@ -53,6 +53,17 @@ pub struct Support {
     pub separation_two: Option<f64>,
     /// Radii that the errors of position (m) and attitude (rad) exceed with no more than the stated risk.
     pub protection: Option<Levels>,
+    /// By how much measured distances are longer than the model's, as a share; null with fewer than four points.
+    pub stretch: Option<Estimate>,
+}
+
+/// A number and its standard deviation, as they are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
 }
 
 /// Protection levels, as they are printed.
@@ -74,6 +85,7 @@ impl From<&Integrity> for Support {
             separation: integrity.separation,
             separation_two: integrity.separation_two,
             protection: integrity.protection.map(|level| Levels { position: level.position, attitude: level.attitude }),
+            stretch: integrity.stretch.map(|it| Estimate { value: it.value, sigma: it.sigma }),
         }
     }
 }
@@ -122,6 +134,9 @@ pub struct Answer {
     pub expected_chance_sets: Option<f64>,
     /// Pair tests of the search.
     pub tests: Option<u64>,
+    /// Whether all was looked at that may lead to a second copy of the object, whole or in part; of searches that look for one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub copies_sought: Option<bool>,
     /// Everything derived from the file (ms); reading and parsing not counted.
     pub time_ms: f64,
     /// The search's name.
@@ -191,6 +206,7 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
         size_bound: attempt.size_bound,
         expected_chance_sets: attempt.expected_chance_sets.filter(|expected| expected.is_finite()),
         tests: attempt.tests,
+        copies_sought: attempt.copies_sought,
         time_ms,
         search: method.search.0.to_owned(),
         solver: method.solver.0.to_owned(),

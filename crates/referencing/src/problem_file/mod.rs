@@ -5,5 +5,5 @@ mod input;
 #[cfg(test)]
 mod tests;
 
-pub use answer::{Answer, Levels, Line, Method, OtherPose, Support, answer, solve_file};
+pub use answer::{Answer, Estimate, Levels, Line, Method, OtherPose, Support, answer, solve_file};
 pub use input::{CoherenceProblem, FORMAT, read};

@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
 
 use super::Acceptance;
-use crate::{Observations, candidates::chi_square, solve::deletion::Deletions};
+use crate::{Observations, Stretch, candidates::chi_square, solve::deletion::Deletions};
 
 /// What the number of points allows to know of a wrong match. A grade of the count alone, as three points are monitored by
 /// nothing whatever they are: whether these very points allow it, four in a row say, is told by the separation
@@ -68,6 +68,8 @@ pub struct Integrity {
     /// Protection levels at [`Acceptance::risk`]; `None` where nothing can vouch for the fix (three points, or a point
     /// that cannot be spared).
     pub protection: Option<Protection>,
+    /// Whether what was measured is as large as the model says; `None` with fewer than four points, any three of which fit.
+    pub stretch: Option<Stretch>,
 }
 
 /// How far the fix moves when points are left out, and what that protects.
@@ -79,6 +81,8 @@ pub(super) struct Separation {
     pub(super) two: Option<f64>,
     /// The levels.
     pub(super) protection: Option<Protection>,
+    /// See [`Integrity::stretch`].
+    pub(super) stretch: Option<Stretch>,
 }
 
 /// Protection levels by solution separation (Blanch and others, *Baseline advanced RAIM user algorithm*, 2015).
@@ -105,6 +109,7 @@ pub(super) fn protection(
     let Some(deletions) = Deletions::of(data) else {
         return Separation::default();
     };
+    let stretch = deletions.stretch;
     let mut watch = Watch { pose, deletions, level: own, spared: true };
     let twice = acceptance.two_wrong_rate > 0.0;
     let share = if twice { 0.25 } else { 0.5 } * acceptance.risk;
@@ -115,7 +120,7 @@ pub(super) fn protection(
         watch.farthest(twos, (share / acceptance.two_wrong_rate).min(1.0))
     });
     let available = watch.spared && (!twice || n >= 6);
-    Separation { one, two, protection: available.then_some(watch.level) }
+    Separation { one, two, protection: available.then_some(watch.level), stretch }
 }
 
 /// A fix, watched while points are left out.

@@ -1,6 +1,7 @@
 //! The tests that a set and its rivals must pass.
 
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+use nalgebra::Vector3;
+use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
 
 use super::{
     Acceptance, Alternative, Outcome, Reference, Refusal,
@@ -283,6 +284,24 @@ impl Judge<'_> {
         !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
     }
 
+    /// Whether the points are measured as large as the model says, or so nearly that what follows for the pose is within the alert
+    /// limit: a rig that stretches all it measures by ε has the object nearer or farther by ε of its distance.
+    fn as_large_as_modelled(&self, hypothesis: &Hypothesis, integrity: &Integrity) -> Result<(), Refusal> {
+        let Some(stretch) = integrity.stretch else { return Ok(()) };
+        // Where the residuals that it leaves are larger than their noise, so is the error of the scale.
+        let sigmas = stretch.value / stretch.sigma;
+        let left = (integrity.chi2 - sigmas * sigmas).max(0.0) / (integrity.freedom - 1) as f64;
+        let count = hypothesis.pairs.len() as f64;
+        let centre: Vector3<f64> =
+            hypothesis.pairs.iter().map(|pair| self.problem.model[pair.model].at.coords).sum::<Vector3<f64>>() / count;
+        let off = stretch.value.abs() * (hypothesis.pose.inverse() * Point::from(centre)).coords.norm();
+        let sure = sigmas.abs() > STRETCHED * left.max(1.0).sqrt();
+        match sure && off > self.alert_limit {
+            true => Err(Refusal::Stretched { stretch, off, limit: self.alert_limit }),
+            false => Ok(()),
+        }
+    }
+
     fn fix(&self, hypothesis: Hypothesis) -> Outcome {
         let data = self.observations(&hypothesis.pairs);
         let known = hypothesis.covariance.map_or_else(|| self.solver.covariance(&data, &hypothesis.pose), Ok);
@@ -300,7 +319,11 @@ impl Judge<'_> {
             separation: left_out.one,
             separation_two: left_out.two,
             protection: left_out.protection,
+            stretch: left_out.stretch,
         };
+        if let Err(refusal) = self.as_large_as_modelled(&hypothesis, &integrity) {
+            return Outcome::Unidentified(refusal);
+        }
         Outcome::Referenced(Box::new(Reference {
             object_from_camera: hypothesis.pose,
             covariance,
@@ -313,6 +336,9 @@ impl Judge<'_> {
         }))
     }
 }
+
+/// A scale other than one is no accident beyond so many of its standard deviations: one fix in fifteen thousand has that.
+const STRETCHED: f64 = 4.0;
 
 /// The hypotheses that passed every test, and those that did not.
 #[derive(Default)]

@@ -96,6 +96,7 @@ pub fn judge(
         optimal: found.optimal,
         size_bound: Some(found.size_bound),
         tests: Some(found.tests),
+        copies_sought: found.belief.as_ref().and_then(|belief| belief.copies_sought),
         identified: found.pairs,
     }
 }
@@ -125,6 +126,7 @@ pub fn judge_named(
         size_bound: None,
         expected_chance_sets: None,
         tests: None,
+        copies_sought: None,
     }
 }
 

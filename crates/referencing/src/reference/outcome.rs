@@ -112,6 +112,9 @@ pub struct Attempt {
     pub expected_chance_sets: Option<f64>,
     /// Pair tests spent by the search, where it says so.
     pub tests: Option<u64>,
+    /// Whether the search looked at all that may lead to a second copy of the object, whole or in part, beside the answer; `None`
+    /// where it looks for none, or nothing was likely enough to be believed.
+    pub copies_sought: Option<bool>,
 }
 
 impl Attempt {
@@ -148,6 +151,7 @@ impl Attempt {
             size_bound,
             expected_chance_sets: None,
             tests,
+            copies_sought: None,
         }
     }
 }

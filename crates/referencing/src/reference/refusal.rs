@@ -1,6 +1,6 @@
 //! Why an answer is not believed.
 
-use crate::Unidentified;
+use crate::{Stretch, Unidentified};
 
 /// Why an answer is not believed, or why there is none.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -74,6 +74,20 @@ pub enum Refusal {
         /// The greatest at which a point shows itself (rad).
         most: f64,
     },
+    /// All that is measured is longer or shorter than the model says, by more than the pose may be off for it.
+    #[error(
+        "measured distances are {:.1} % {} than the model's (one sigma {:.1} %): if the rig is at fault, the object is {off:.2} m \
+         from where it seems to be, and {limit:.2} m are allowed; look at baseline, focal length and survey",
+        100.0 * .stretch.value.abs(), if .stretch.value > 0.0 { "longer" } else { "shorter" }, 100.0 * .stretch.sigma
+    )]
+    Stretched {
+        /// By how much.
+        stretch: Stretch,
+        /// What that makes of the object's distance (m).
+        off: f64,
+        /// The alert limit (m).
+        limit: f64,
+    },
     /// The pose contradicts the prior.
     #[error("the pose is {off:.3} times as far from the prior as the prior allows")]
     Prior {
@@ -89,7 +103,7 @@ impl Refusal {
             Self::Search(why) => why.reason(),
             Self::TooFew { .. } => "too-few",
             Self::Chance { .. } | Self::Absent { .. } => "chance",
-            Self::Residuals { .. } | Self::Behind { .. } | Self::Prior { .. } => "gate",
+            Self::Residuals { .. } | Self::Behind { .. } | Self::Stretched { .. } | Self::Prior { .. } => "gate",
             Self::Imprecise { .. } | Self::Attitude { .. } => "imprecise",
         }
     }

@@ -41,7 +41,7 @@ fn nothing(outcome: &Outcome) -> bool {
             | Refusal::Residuals { .. }
             | Refusal::Behind { .. }
             | Refusal::Prior { .. } => true,
-            Refusal::Imprecise { .. } | Refusal::Attitude { .. } => false,
+            Refusal::Imprecise { .. } | Refusal::Attitude { .. } | Refusal::Stretched { .. } => false,
         },
     }
 }

@@ -35,6 +35,9 @@ pub struct Belief {
     pub explanations: Vec<Explanation>,
     /// What the cloud shows beside the likeliest: poses that explain points which it leaves, the likeliest first.
     pub beside: Vec<Explanation>,
+    /// Whether every second copy of the object, whole or in part, is among them, as far as bounds of evidence tell; `None` where none
+    /// was looked for, since nothing is likely enough to be believed.
+    pub copies_sought: Option<bool>,
     /// What a pattern that goes on beyond the object explains of the cloud; `None` of an object without one.
     pub look_alike: Option<LookAlike>,
     /// What shows most that clutter imitates the object; `None` where nothing does.

@@ -43,7 +43,7 @@ use crate::Problem;
 /// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends
 /// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
 /// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
-/// copy of it may be passed over, and nothing tells. The tolerance and the prior's greatest rotation prune the graph; they
+/// copy of it may be passed over: then [`Belief::copies_sought`] is false. The tolerance and the prior's greatest rotation prune the graph; they
 /// do not judge the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
@@ -125,7 +125,8 @@ impl Search for RigidConsensus {
         }
         // A second copy of the object in what is left of the cloud, and a pose to hold the likeliest against.
         let mut look_alike = None;
-        let mut beside = Swept { modes: Vec::new(), complete: true, tests: 0 };
+        let mut beside = Swept { modes: Vec::new(), complete: true, parts: true, tests: 0 };
+        let mut copies_sought = None;
         let mut imitation = None;
         let mut unlikely = None;
         if best.ln_evidence >= STRONG {
@@ -136,14 +137,16 @@ impl Search for RigidConsensus {
             let left = self.budget.saturating_sub(swept.tests);
             let work = swept.tests + graph.tests / PAIRS_A_WORD;
             let whole = work.max(LEAST_EFFORT);
-            beside = Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep();
-            if beside.modes.is_empty() && pattern.is_none() {
+            beside = if pattern.is_some() {
+                Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep()
+            } else {
                 // Parts of it: pairs are looked at for twice, and followed for half of the time that the whole took.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
-                let (look, follow) = (left.min(2 * whole), left.min(whole / 2));
-                let part = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), follow).thinned(look).sweep();
-                beside = Swept { complete: beside.complete, tests: beside.tests + part.tests, ..part };
-            }
+                let seeds = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), left);
+                seeds.with_parts(least, 2 * whole, whole / 2).sweep()
+            };
+            // Where the object has a pattern that goes on, parts of it are to be seen anyway.
+            copies_sought = Some(beside.complete && beside.parts && pattern.is_none());
             // What poses elsewhere say of the clutter, those that are as likely as no object, in an eighth of that time.
             let effort = left.min((work / 8).max(LEAST_EFFORT / 10));
             let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
@@ -188,6 +191,7 @@ impl Search for RigidConsensus {
             belief: Some(Belief {
                 explanations: explain(&swept),
                 beside: explain(&beside),
+                copies_sought,
                 look_alike,
                 imitation,
                 unlikely: unlikely.as_ref().map(explanation),
@@ -229,7 +233,8 @@ mod tests {
         let found = answered(None, |i| if i == 5 { Vector3::new(0.03, 0.03, 0.07) } else { Vector3::zeros() }).unwrap();
         let models: Vec<usize> = found.pairs.iter().map(|pair| pair.model).collect();
         assert_eq!(models, [0, 1, 2, 3, 4]);
-        assert!(found.undecided.is_none() && found.belief.is_some());
+        assert!(found.undecided.is_none());
+        assert_eq!(found.belief.expect("one is weighed").copies_sought, Some(true));
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use super::{
-    Mahalanobis,
+    Mahalanobis, Stretch,
     descent::{Linearized, linearize},
     mahalanobis::covariance,
+    stretch::stretch,
 };
 use crate::Observations;
 
@@ -15,6 +16,8 @@ pub(crate) struct Deletions<'a> {
     pose: Transform<Object, Camera>,
     all: Linearized,
     each: Vec<Linearized>,
+    /// Of all points, had the fit a scale besides; `None` where they fix none.
+    pub(crate) stretch: Option<Stretch>,
 }
 
 /// With fewer points left another valley may be the likeliest.
@@ -30,12 +33,12 @@ impl<'a> Deletions<'a> {
         let solved = Mahalanobis::default().solved(data, |pose, terms| {
             let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
             let each = (0..data.points.len()).map(one).collect::<Result<Vec<_>, _>>();
-            each.map(|each| (*pose, each))
+            each.map(|each| (*pose, each, stretch(&data.points, pose, terms)))
         });
-        let (pose, each) = solved.ok()?;
+        let (pose, each, stretch) = solved.ok()?;
         let mut all = *each.first()?;
         each[1..].iter().for_each(|one| all = all.plus(one));
-        Some(Self { data, pose, all, each })
+        Some(Self { data, pose, all, each, stretch })
     }
 
     /// The likeliest pose without the points `out`, and its covariance: one step from that of all points where it is

@@ -32,6 +32,7 @@ mod signs;
 mod spread;
 mod starts;
 mod stereo_reprojection;
+mod stretch;
 #[cfg(test)]
 mod tests;
 mod triad;
@@ -48,6 +49,7 @@ pub(crate) use normal::{inverse, rounding};
 pub(crate) use sightings::{Sightings, Target as PixelTarget};
 pub(crate) use spread::second_ratio;
 pub use stereo_reprojection::StereoReprojection;
+pub use stretch::Stretch;
 pub use triad::{Choose, Triad};
 
 /// Geometry that determines no pose.

@@ -85,24 +85,23 @@ impl<'a> Bounds<'a> {
         self.of_set(own + more, gains + self.greatest * more as f64)
     }
 
-    /// The bound of `own` pairs that bring `gains` and of the model points among the `count` pairs of `common`
-    /// from rank `from` on; where even a rough bound is below `enough`, the rough one.
+    /// How many pairs `own` ones that bring `gains` may come to with those of `common` from rank `from` on, `count` ones, and the
+    /// bound of these, if they come to `least`; where even rough ones fall short, the rough ones.
     pub(in crate::search) fn with_common(
         &self,
         (own, gains): (usize, f64),
-        common: &[u64],
-        count: usize,
+        (common, count): (&[u64], usize),
         from: usize,
-        enough: f64,
-    ) -> f64 {
+        (least, enough): (usize, f64),
+    ) -> (usize, f64) {
         let starts = &self.graph.starts;
         let most = count.min(starts.len() - 1 - from);
-        if own + most < self.least {
-            return f64::NEG_INFINITY;
+        if own + most < least {
+            return (own + most, f64::NEG_INFINITY);
         }
         let reach = self.reach(own, gains, most);
         if self.single || reach < enough {
-            return reach;
+            return (own + most, reach);
         }
         let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
         each_held(common, starts[from], |begin, word| {
@@ -120,7 +119,7 @@ impl<'a> Bounds<'a> {
                 }
             }
         });
-        if k < self.least { f64::NEG_INFINITY } else { self.of_set(k, sum) }
+        (k, if k < least { f64::NEG_INFINITY } else { self.of_set(k, sum) })
     }
 
     /// Whether the same bound of three pairs or more and of those of `common` from a bit on that are set in `row` is `enough`: known
@@ -176,10 +175,15 @@ impl<'a> Bounds<'a> {
     }
 
     /// Whether `own` pairs that bring `gains` fall short of what is asked for even with all that may come after the last of them.
-    pub(in crate::search) fn falls_short(&self, own: usize, gains: f64, after: After, enough: f64) -> bool {
+    pub(in crate::search) fn falls_short(
+        &self,
+        (own, gains): (usize, f64),
+        after: After,
+        (least, enough): (usize, f64),
+    ) -> bool {
         let (k, sum) = (own + after.more as usize, gains + after.bring);
         // Summed in another order than the bounds that decide.
-        k < self.least || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
+        k < least || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
     }
 }
 
@@ -243,7 +247,8 @@ mod tests {
                 let count = intersect(graph.row(a), graph.row(b), graph.starts[next], &mut common);
                 let gains = bounds.gain(a) + bounds.gain(b);
                 let known = one_by_one(&bounds, &[a, b], &common, next);
-                assert_eq!(bounds.with_common((2, gains), &common, count, next, f64::NEG_INFINITY), known);
+                let all = (bounds.least, f64::NEG_INFINITY);
+                assert_eq!(bounds.with_common((2, gains), (&common, count), next, all).1, known);
                 Held::list(&common, graph.starts[next], &mut held);
                 bounds.list(&held, &mut after);
                 for c in held.iter().flat_map(Held::ones) {
@@ -256,7 +261,10 @@ mod tests {
                             bounds.is_enough((3, gains), (&common, &held), (graph.row(c), from), enough),
                             reached
                         );
-                        assert!(!(reached && bounds.falls_short(3, gains, after[rank], enough)), "{known}");
+                        assert!(
+                            !(reached && bounds.falls_short((3, gains), after[rank], (bounds.least, enough))),
+                            "{known}"
+                        );
                     }
                     threes += 1;
                     spans += usize::from(graph.starts[rank] / 64 != (from - 1) / 64);

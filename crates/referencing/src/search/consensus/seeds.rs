@@ -31,8 +31,11 @@ const COUNTED: usize = 256;
 const LEAST: usize = 3;
 /// Modes kept.
 const KEPT: usize = 256;
-/// Pairs kept to be followed: 12 bytes each.
+/// Pairs kept to be followed, and parts of sets besides: 12 bytes each.
 const MOST_PAIRS: usize = 8_000_000;
+const MOST_PARTS: usize = 2_000_000;
+/// So many of them are sorted first.
+const SORTED: usize = 1024;
 /// What a pose from three points, the climb to its mode and each pair compared with a motion on the way cost, in
 /// words read.
 const COST_OF_A_POSE: u64 = 16;
@@ -56,6 +59,8 @@ pub(in crate::search) struct Swept {
     pub(in crate::search) modes: Vec<Mode>,
     /// Whether every three that could lead to a pose of interest was followed.
     pub(in crate::search) complete: bool,
+    /// Whether those were that could lead to a smaller one.
+    pub(in crate::search) parts: bool,
     /// Work done.
     pub(in crate::search) tests: u64,
 }
@@ -69,8 +74,15 @@ pub(in crate::search) struct Seeds<'a> {
     climb: Climb<'a>,
     bounds: Bounds<'a>,
     budget: u64,
-    /// Of so many pairs one is looked at.
+    /// Sets of fewer pairs are parts: they are looked for within limits.
+    whole: usize,
+    /// Of so many pairs that lead to no more than parts one is looked at.
     every: usize,
+    /// What parts may cost once all pairs are known, and what is spent when that is spent.
+    follow: u64,
+    parts_until: u64,
+    /// Whether there were too many of them to be kept.
+    dropped: bool,
     /// Words read, and as much other work.
     spent: u64,
     /// The likeliest first.
@@ -113,7 +125,11 @@ impl<'a> Seeds<'a> {
             climb: Climb { model, terms, rough, graph, taken, compared: Cell::new(0) },
             bounds: Bounds::of((terms, rough, graph), least),
             budget,
+            whole: least,
             every: 1,
+            follow: u64::MAX,
+            parts_until: u64::MAX,
+            dropped: false,
             spent: 0,
             modes: Vec::new(),
             floor,
@@ -137,34 +153,54 @@ impl<'a> Seeds<'a> {
     }
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
-        let (mut pairs, mut complete) = self.pairs();
-        pairs.retain(|(bound, ..)| f64::from(*bound) >= self.threshold());
-        if self.spent <= self.budget {
-            pairs.sort_unstable_by_key(order);
-        }
-        for (bound, a, b) in pairs {
-            if f64::from(bound) < self.threshold() {
-                break;
-            }
-            if self.spent > self.budget {
-                complete = false;
-                break;
-            }
-            self.follow_pair(a as usize, b as usize);
-        }
-        Swept { modes: self.modes, complete, tests: self.spent }
+        let (wholes, parts, complete) = self.pairs();
+        // The whole is looked for first of all: half of what is left is its own.
+        self.parts_until = self.spent + self.follow.min(self.budget.saturating_sub(self.spent) / 2);
+        let complete = self.follow_all(wholes, self.budget) && complete;
+        let known = self.follow_all(parts, self.parts_until) && self.every == 1 && !self.dropped;
+        let parts = known && self.spent <= self.parts_until;
+        Swept { modes: self.modes, complete, parts, tests: self.spent }
     }
 
-    /// Looks at as many of the pairs, evenly, as can be with so much work, which comes on top of the budget for what they lead to:
-    /// what many pairs lead to is found all the same.
-    pub(in crate::search) fn thinned(mut self, look: u64) -> Self {
+    /// Follows the pairs whose bound is of interest, the greatest first, until so much is spent; whether that was enough.
+    fn follow_all(&mut self, mut pairs: Vec<Pair>, most: u64) -> bool {
+        pairs.retain(|(bound, ..)| f64::from(*bound) >= self.threshold());
+        // Seldom all are followed: no more are sorted at a time than were followed before.
+        let (mut rest, mut sorted) = (&mut pairs[..], SORTED);
+        while !rest.is_empty() && self.spent <= most {
+            if sorted < rest.len() {
+                rest.select_nth_unstable_by_key(sorted, order);
+            }
+            let (next, others) = rest.split_at_mut(sorted.min(rest.len()));
+            next.sort_unstable_by_key(order);
+            for &(bound, a, b) in &*next {
+                if f64::from(bound) < self.threshold() {
+                    return true;
+                }
+                if self.spent > most {
+                    return false;
+                }
+                if self.spent > self.parts_until {
+                    self.bounds.least = self.whole;
+                }
+                self.follow_pair(a as usize, b as usize);
+            }
+            (rest, sorted) = (others, 2 * sorted);
+        }
+        rest.is_empty()
+    }
+
+    /// Sets of fewer than so many pairs are parts. Of the pairs that lead to no more than parts as many are looked at, evenly, as can
+    /// be with so much work, so that what many of them lead to is found all the same; and once all are known they are followed
+    /// with no more than so much, what leads to the others first.
+    pub(in crate::search) fn with_parts(mut self, whole: usize, look: u64, follow: u64) -> Self {
         let graph = self.climb.graph;
         let some = (graph.vertices.len() / COUNTED).max(1);
         let edges: usize = ones(&self.free, 0).step_by(some).map(|a| some * shared(graph.row(a), &self.free, a)).sum();
         // Rows are read from the second of a pair on: a third of them on average.
         let cost = edges as u64 * self.row.len() as u64 / 3;
         self.every = cost.div_ceil(look.max(1)).max(1) as usize;
-        self.budget += cost / self.every as u64;
+        (self.whole, self.follow) = (whole, follow);
         self
     }
 
@@ -210,12 +246,12 @@ impl<'a> Seeds<'a> {
         counted.into_iter().take(most).map(|(_, v)| v).collect()
     }
 
-    /// The compatible pairs (a, b) that may begin a set of interest, the greatest bound first, and whether these
-    /// are all.
-    fn pairs(&mut self) -> (Vec<Pair>, bool) {
+    /// The compatible pairs (a, b) that may begin a set of interest, those that may begin no more than a part of one, and
+    /// whether these are all.
+    fn pairs(&mut self) -> (Vec<Pair>, Vec<Pair>, bool) {
         let graph = self.climb.graph;
         let ranks = graph.starts.len() - 1;
-        let mut pairs: Vec<Pair> = Vec::new();
+        let (mut pairs, mut parts): (Vec<Pair>, Vec<Pair>) = (Vec::new(), Vec::new());
         let (mut begin, mut complete) = (0, true);
         for a in 0..graph.vertices.len() {
             if a > 0 && graph.rank[a] != graph.rank[a - 1] {
@@ -229,34 +265,44 @@ impl<'a> Seeds<'a> {
             self.spent += self.row.len() as u64;
             let count = intersect(graph.row(a), &self.free, 0, &mut self.row);
             let threshold = self.threshold();
-            if self.bounds.with_common((1, own), &self.row, count, rank + 1, threshold) < threshold {
+            let asked = (self.bounds.least, threshold);
+            if self.bounds.with_common((1, own), (&self.row, count), rank + 1, asked).1 < threshold {
                 continue;
             }
             Held::list(&self.row, graph.starts[rank + 1], &mut self.held);
             self.bounds.list(&self.held, &mut self.after);
-            for b in self.held.iter().flat_map(Held::ones).filter(|b| (a + b).is_multiple_of(self.every)) {
+            for b in self.held.iter().flat_map(Held::ones) {
+                let least = if (a + b).is_multiple_of(self.every) { self.bounds.least } else { self.whole };
                 let gains = own + self.bounds.gain(b);
                 let next = graph.rank[b] as usize + 1;
                 if self.bounds.reach(2, gains, ranks - next) < threshold {
                     continue;
                 }
+                let asked = (least, threshold);
                 self.spent += words_from(graph, next);
-                if self.bounds.falls_short(2, gains, self.after[next - 1], threshold) {
+                if self.bounds.falls_short((2, gains), self.after[next - 1], asked) {
                     continue;
                 }
                 let count = intersect(&self.row, graph.row(b), graph.starts[next], &mut self.common);
-                let bound = self.bounds.with_common((2, gains), &self.common, count, next, threshold);
+                let (most, bound) = self.bounds.with_common((2, gains), (&self.common, count), next, asked);
                 if bound >= threshold {
                     // Rounded up, so that it stays a bound.
-                    pairs.push(((bound as f32).next_up(), a as u32, b as u32));
+                    let pair = ((bound as f32).next_up(), a as u32, b as u32);
+                    if most >= self.whole { pairs.push(pair) } else { parts.push(pair) }
                 }
+            }
+            if parts.len() > MOST_PARTS {
+                // Those that lead to the least would hardly be followed.
+                parts.select_nth_unstable_by_key(MOST_PARTS / 2, order);
+                parts.truncate(MOST_PARTS / 2);
+                self.dropped = true;
             }
             if self.spent > self.budget || pairs.len() > MOST_PAIRS {
                 complete = false;
                 break;
             }
         }
-        (pairs, complete)
+        (pairs, parts, complete)
     }
 
     /// Follows the most promising pair of one model point at once: a good pose known early spares the rest.
@@ -293,7 +339,7 @@ impl<'a> Seeds<'a> {
                 let gains = gains + self.bounds.gain(c);
                 self.spent += words_from(graph, rank + 1);
                 let threshold = self.threshold();
-                if self.bounds.falls_short(3, gains, later[rank], threshold) {
+                if self.bounds.falls_short((3, gains), later[rank], (self.bounds.least, threshold)) {
                     continue;
                 }
                 // Its own model point's pairs may go on in words to come.

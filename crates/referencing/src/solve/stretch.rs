@@ -1,0 +1,95 @@
+//! Whether what was measured is as large as the model says.
+
+use nalgebra::{Vector3, Vector6};
+use seafix_geometry::{Camera, Object, Transform};
+
+use super::{descent::linearize, mahalanobis::Terms};
+use crate::Observation;
+
+/// By how much measured distances are longer than the model's, as a share of them, had the fit a scale besides the motion.
+///
+/// A wrong baseline or focal length stretches all that is measured, a wrong survey the model. No three points tell: any
+/// triangle is nearly rigid to its noise. Of many it shows in every distance, long before a single residual is out of bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// The estimate: measured distances are 1 + `value` times the model's.
+    pub value: f64,
+    /// Its standard deviation by the noise of the points.
+    pub sigma: f64,
+}
+
+/// The stretch of the points at their likeliest pose, one step of the fit with seven parameters.
+///
+/// A stretch ε moves the place p of a point by ε d, d = p − p̄ its lever from the mean of all. With J of the motion as in
+/// [`linearize`] and the pull W r of each point, ε = (Σ dᵀWr − cᵀ N⁻¹ Σ JᵀWr)/s and σ² = 1/s, N = Σ JᵀWJ, c = Σ JᵀWd,
+/// s = Σ dᵀWd − cᵀ N⁻¹ c. `None` where the points determine no motion, or no scale beside it.
+pub(super) fn stretch(points: &[Observation], pose: &Transform<Object, Camera>, terms: Terms<'_>) -> Option<Stretch> {
+    let all = linearize(points, pose, &terms).ok()?;
+    let covariance = all.covariance().ok()?;
+    let (r, t) = (pose.rotation_matrix(), pose.translation());
+    let places: Vec<Vector3<f64>> = points.iter().map(|point| r.tr_mul(&(point.model.coords - t))).collect();
+    let mean = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let (mut c, mut own, mut pull) = (Vector6::zeros(), 0.0, 0.0);
+    for (k, at) in places.iter().enumerate() {
+        let (said, d) = (terms(k, at)?, at - mean);
+        let weighed = said.information * d;
+        let turn = -at.cross(&weighed);
+        c += Vector6::new(turn.x, turn.y, turn.z, -weighed.x, -weighed.y, -weighed.z);
+        own += d.dot(&weighed);
+        pull += d.dot(&said.pull);
+    }
+    let by_motion = covariance * c;
+    let left = own - c.dot(&by_motion);
+    // What rounding leaves of points that are one place is no information.
+    (left > ROUNDING * own)
+        .then(|| Stretch { value: (pull - by_motion.dot(&all.gradient)) / left, sigma: (1.0 / left).sqrt() })
+}
+
+/// What rounding may leave of the information on the scale, as a share of all.
+const ROUNDING: f64 = 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use seafix_geometry::{Point, UncertainPoint};
+
+    use super::*;
+    use crate::{Mahalanobis, Observations};
+
+    const SIGMA: f64 = 0.002;
+
+    /// Points at the corners of a box of sides 2, 2 and 1 m, measured `by` times as far from the camera, or the first of them.
+    fn stretched(by: f64, points: usize) -> Option<Stretch> {
+        let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -5.0].into());
+        let corner = |k: usize| Point::new((k & 1) as f64 * 2.0, (k >> 1 & 1) as f64 * 2.0, (k >> 2 & 1) as f64);
+        let seen = |k: usize| Observation {
+            measured: UncertainPoint::isotropic(((pose.inverse() * corner(k)).coords * by).into(), SIGMA),
+            pixels: None,
+            model: corner(k),
+            model_sigma: 0.0,
+        };
+        let data = Observations { points: (0..points).map(seen).collect(), rig: None };
+        Mahalanobis::default().solved(&data, |pose, terms| Ok(stretch(&data.points, pose, terms))).unwrap()
+    }
+
+    /// Of eight corners Σ ‖d‖² = 8 · (1 + 1 + ¼) = 18 m², and no motion does what a stretch does: σ = 2 mm/√18 m.
+    #[test]
+    fn a_box_that_is_larger_is_told() {
+        let of_box = SIGMA / 18.0_f64.sqrt();
+        for by in [1.0, 1.01, 0.98] {
+            let found = stretched(by, 8).unwrap();
+            assert!(
+                (found.sigma / of_box - 1.0).abs() < 1e-9
+                    && (found.value - (by - 1.0)).abs() < 1e-3 * (by - 1.0).abs() + 1e-9,
+                "{by}: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn points_that_fix_no_motion_have_none() {
+        assert!(stretched(1.0, 3).is_some());
+        let data = Observations { points: Vec::new(), rig: None };
+        let pose = Transform::exp(&[0.0; 6].into());
+        assert_eq!(stretch(&data.points, &pose, &|_, _: &_| None), None);
+    }
+}
