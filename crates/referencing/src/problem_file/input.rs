@@ -12,6 +12,7 @@ use crate::{
     Acceptance, Attempt, Candidates, Gate, ModelPoint, Prior, PriorBound, Problem, Search, Shell, Solver, Tolerance,
     Unidentified, candidates, reference,
     site::{COINCIDENT, SUSPICIOUS, diameter, nearest_two},
+    solve::{ON_A_LINE, second_ratio},
     until_found,
 };
 
@@ -84,6 +85,10 @@ impl CoherenceProblem {
     /// The first fault: not JSON, an unknown key or format, a number that is not finite or out of
     /// its range, two model points in one place, an index that points nowhere, a prior that is no rigid motion.
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
+        if text.trim_start().starts_with('[') {
+            let fault = Fault::new("a list where an object is expected", file).on_line(1).value("`[`");
+            return Err(fault.remedy(format!("give one `{FORMAT}` a file, in braces")));
+        }
         let raw: Raw = serde_json::from_str(text).map_err(|error| json(file, &error))?;
         let fault = |what: &str| Fault::new(what, file);
         if raw.format != FORMAT {
@@ -165,13 +170,13 @@ impl CoherenceProblem {
             model,
             cloud: cloud.collect(),
             delta: raw.delta,
-            prior: raw.prior.map(|prior| prior.checked(file)).transpose()?,
+            prior: raw.prior.map(|prior| prior.checked(text, file)).transpose()?,
             putative,
         })
     }
 
-    /// What is legal and hardly meant, of the content of `file`: points too few for a pose, or too near each other for Δ to tell
-    /// them apart; coordinates that look like other units than metres.
+    /// What is legal and hardly meant, of the content of `file`: points too few for a pose, on a line, or too near each other for Δ to
+    /// tell them apart; points without noise; too few putative pairs; coordinates that look like other units than metres.
     pub fn warnings(&self, file: &Path) -> Vec<Fault> {
         let warning = |what: &str, value: String, remedy: &str| Fault::new(what, file).value(value).remedy(remedy);
         let mut warnings = Vec::new();
@@ -183,6 +188,28 @@ impl CoherenceProblem {
             let value = format!("points {i} and {k}, {distance:.4} m apart, and Δ = {} m", self.delta);
             let remedy = "one may be taken for the other; keep model points 2Δ apart";
             warnings.push(warning("model points are nearer than 2Δ", value, remedy));
+        }
+        let places = self.model.iter().map(|point| point.at.coords);
+        let ratio = if self.model.len() > 2 { second_ratio(places) } else { 1.0 };
+        if ratio < ON_A_LINE {
+            let value = format!("second extent over first {ratio:.1e}");
+            let remedy = "a turn about the line changes nothing that is measured; add a point beside it";
+            warnings.push(warning("the model's points lie on a line", value, remedy));
+        }
+        if let Some(exact) = self.cloud.iter().position(|point| point.position.covariance.trace() == 0.0) {
+            let value = format!("cloud point {exact}, 0 m");
+            let remedy = "nothing is measured better than a nanometre; give its standard deviation";
+            warnings.push(warning("points without noise", value, remedy));
+        }
+        if let Some(pairs) = &self.putative {
+            let mut models: Vec<usize> = pairs.iter().map(|(model, _)| *model).collect();
+            models.sort_unstable();
+            models.dedup();
+            if models.len() < 3 {
+                let value = format!("{} pairs of {} model points", pairs.len(), models.len());
+                let remedy = "a pose needs pairs of three; leave `putative` out to have all considered";
+                warnings.push(warning("`putative` has too few pairs", value, remedy));
+            }
         }
         let extent =
             Shell::around(self.model.iter().map(|point| point.at)).map_or(0.0, |shell| shell.max.distance(&shell.min));
@@ -262,12 +289,16 @@ impl CoherenceProblem {
 }
 
 impl RawPrior {
-    fn checked(&self, file: &Path) -> Result<Prior, Fault> {
+    fn checked(&self, text: &str, file: &Path) -> Result<Prior, Fault> {
+        // As JSON is read, the name stands before its value.
+        let line = |name: &str| text.find(name).map(|at| text[..at].lines().count().max(1));
         let matrix = Matrix4::from_fn(|row, column| self.t_cam_obj[row][column]);
-        let camera_from_object = Transform::<Camera, Object>::from_matrix(&matrix)
-            .map_err(|error| Fault::new(format!("`prior.T_cam_obj` is no rigid motion: {error}"), file))?;
+        let camera_from_object = Transform::<Camera, Object>::from_matrix(&matrix).map_err(|error| {
+            Fault::new(format!("`prior.T_cam_obj` is no rigid motion: {error}"), file).on_line(line("T_cam_obj"))
+        })?;
         if !(self.shell_half_m > 0.0 && self.shell_half_m.is_finite()) {
-            let fault = Fault::new("`prior.shell_half_m` is out of range", file).value(self.shell_half_m);
+            let fault = Fault::new("`prior.shell_half_m` is out of range", file);
+            let fault = fault.on_line(line("shell_half_m")).value(self.shell_half_m);
             return Err(fault.remedy("give a positive half-size in metres"));
         }
         Ok(Prior { object_from_camera: camera_from_object.inverse(), bound: PriorBound::Box(self.shell_half_m) })

@@ -149,6 +149,15 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_told() {
     let model = "[[0,0,0],[1,0,0],[0.25,-0.75,0],[0.5,0.5,1],[-0.5,0.25,0.5]]";
     let few = warnings(model, "[]");
     assert_eq!(few, ["the model has too few points in p.json: 0 points; a pose needs at least three"]);
+    let line = warnings(model, "[[0,0,0],[1,0,0],[2,0,0.0005],[3,0,0]]");
+    assert!(line.len() == 1 && line[0].starts_with("the model's points lie on a line in p.json: second"), "{line:?}");
+    let exact = warnings("\"sigma\": 0.01", "\"sigma\": 0");
+    assert!(
+        exact.len() == 1 && exact[0].starts_with("points without noise in p.json: cloud point 0, 0 m"),
+        "{exact:?}"
+    );
+    let few = warnings("null}", "[[0,0],[1,0],[0,1]]}");
+    assert!(few.len() == 1 && few[0].starts_with("`putative` has too few pairs in p.json: 3 pairs of 2"), "{few:?}");
 }
 
 #[test]
@@ -183,7 +192,12 @@ fn every_fault_names_its_place() {
     assert!(fault("[0.5,0.5,1]", "[0.5,1]").contains("p.json:2"), "two coordinates");
     assert!(fault("null}", "[[0,5]]}").starts_with("putative pair 0 points nowhere in p.json: [0, 5]"));
     assert!(fault("[[1,0,0,0.05]", "[[1.1,0,0,0.05]").starts_with("`prior.T_cam_obj` is no rigid motion"));
-    assert!(fault("0.1}", "0}").starts_with("`prior.shell_half_m` is out of range"));
+    assert!(fault("[[1,0,0,0.05]", "[[1.1,0,0,0.05]").contains("in p.json:5"));
+    assert!(fault("0.1}", "0}").starts_with("`prior.shell_half_m` is out of range in p.json:5: 0; give"));
+    assert_eq!(
+        fault("{\"format\"", "[\"format\""),
+        "a list where an object is expected in p.json:1: `[`; give one `coherence-problem/1` a file, in braces"
+    );
     assert!(
         fault("\"sigma\": 0.01", "\"sigma\": 0.01, \"sigma_xyz\": [[1,1,1]]").starts_with("`sigma_xyz` has the wrong")
     );

@@ -5,7 +5,9 @@ use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use crate::{
     Correspondence, Degenerate, Identification, ModelPoint, Problem, Search, Shell, Solver, Unidentified,
-    chance::Chance, site::diameter, solve::second_ratio,
+    chance::Chance,
+    site::diameter,
+    solve::{ON_A_LINE, second_ratio},
 };
 
 mod absence;
@@ -133,12 +135,11 @@ pub fn judge_named(
 /// That the model points with a candidate, three or more, lie on a line: whatever a search found of them, or did not, they
 /// determine no pose.
 fn on_a_line(problem: &Problem<'_>) -> Option<Degenerate> {
-    const LEAST: f64 = 1e-3;
     let lists = problem.candidates.lists.iter();
     let places: Vec<_> =
         problem.model.iter().zip(lists).filter(|(_, list)| !list.is_empty()).map(|(p, _)| p.at.coords).collect();
     let ratio = (places.len() >= 3).then(|| second_ratio(places.iter().copied()))?;
-    (ratio < LEAST).then_some(Degenerate::Collinear { ratio, least: LEAST })
+    (ratio < ON_A_LINE).then_some(Degenerate::Collinear { ratio, least: ON_A_LINE })
 }
 
 /// Poses further apart than this (m) are different answers: the alert limit, or its share of the model's diameter.

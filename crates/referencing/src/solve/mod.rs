@@ -47,7 +47,7 @@ pub(crate) use kabsch::fit as least_squares;
 pub use mahalanobis::Mahalanobis;
 pub(crate) use normal::{inverse, rounding};
 pub(crate) use sightings::{Sightings, Target as PixelTarget};
-pub(crate) use spread::second_ratio;
+pub(crate) use spread::{ON_A_LINE, second_ratio};
 pub use stereo_reprojection::StereoReprojection;
 pub use stretch::Stretch;
 pub use triad::{Choose, Triad};

@@ -35,6 +35,9 @@ fn clearly_wide(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone, lea
     minor(0, 1) + minor(0, 2) + minor(1, 2) > 4.0 * least * least * s.trace() * s.trace()
 }
 
+/// Points whose second extent is less than this share of the first lie on a line.
+pub(crate) const ON_A_LINE: f64 = 1e-3;
+
 /// Second singular value over the first of the points about their centroid: 0 on a line, 1 on a disc.
 pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> f64 {
     let scatter = scatter(points);
