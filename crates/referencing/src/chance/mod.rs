@@ -40,8 +40,9 @@ mod sequence;
 mod shape;
 mod subsets;
 
-use std::cell::OnceCell;
+use std::{cell::OnceCell, cmp::Ordering};
 
+use nalgebra::Vector3;
 use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
 
 use crate::{Correspondence, Kabsch, Observations, Problem, Solver, candidates::chi_square, solve::likelihood};
@@ -179,14 +180,21 @@ struct Frame<'a> {
     shared: f64,
 }
 
-/// The model points in an order of their own, whatever their numbers.
+/// The model points in an order of their own, whatever their numbers and the axes of the object: by their distance from their centroid.
+///
+/// Of points equally far to seven digits, as sums in another order may differ in the last, the length of the lists decides, then the
+/// coordinates.
 fn order(problem: &Problem<'_>) -> Vec<usize> {
-    let key = |i: usize| (problem.model[i].at.coords, problem.candidates.lists[i].len());
-    let mut order: Vec<usize> = (0..problem.model.len()).collect();
+    let at = |i: usize| problem.model[i].at.coords;
+    let count = problem.model.len();
+    let centroid = (0..count).map(at).sum::<Vector3<f64>>() / count.max(1) as f64;
+    let distance = |i: usize| (at(i) - centroid).norm_squared() as f32;
+    let key = |i: usize| (distance(i), problem.candidates.lists[i].len());
+    let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| {
-        let ((at, length), (other, others)) = (key(a), key(b));
-        let places = at.iter().zip(&other).map(|(x, y)| x.total_cmp(y));
-        places.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then).then(length.cmp(&others))
+        let ((near, few), (far, many)) = (key(a), key(b));
+        let places = || at(a).iter().zip(&at(b)).map(|(x, y)| x.total_cmp(y)).fold(Ordering::Equal, Ordering::then);
+        near.total_cmp(&far).then(few.cmp(&many)).then_with(places)
     });
     order
 }
@@ -244,7 +252,7 @@ fn best(problem: &Problem<'_>, pairs: &[Correspondence]) -> (f64, Option<Transfo
 }
 
 /// Where a point was measured, in the camera.
-fn coordinates(point: &MeasuredPoint) -> nalgebra::Vector3<f64> {
+fn coordinates(point: &MeasuredPoint) -> Vector3<f64> {
     point.position.at.coords
 }
 
