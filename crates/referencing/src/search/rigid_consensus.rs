@@ -143,7 +143,7 @@ impl Search for RigidConsensus {
                 // Parts of it: pairs are looked at for twice, and followed for half of the time that the whole took.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
                 let seeds = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), left);
-                seeds.with_parts(least, 2 * whole, whole / 2).sweep()
+                seeds.with_parts(least, left.min(2 * whole), left.min(whole / 2)).sweep()
             };
             // Where the object has a pattern that goes on, parts of it are to be seen anyway.
             copies_sought = Some(beside.complete && beside.parts && pattern.is_none());

@@ -65,6 +65,26 @@ pub(in crate::search) struct Swept {
     pub(in crate::search) tests: u64,
 }
 
+/// Sets of fewer pairs than the whole, and how far they are looked for.
+struct Parts {
+    /// Sets of so many pairs are no parts.
+    whole: usize,
+    /// Of so many pairs that lead to no more than parts one is looked at.
+    every: usize,
+    /// What parts may cost once all pairs are known, and what is spent in all when that is spent.
+    follow: u64,
+    until: u64,
+    /// Whether there were too many pairs to be kept.
+    dropped: bool,
+}
+
+impl Parts {
+    /// No limits: there are none.
+    fn none(least: usize) -> Self {
+        Self { whole: least, every: 1, follow: u64::MAX, until: u64::MAX, dropped: false }
+    }
+}
+
 /// Best-first branch and bound over the coherent threes (a, b, c).
 ///
 /// Any set is met at its first three members in the order of the graph. All others of it are common neighbours
@@ -74,15 +94,7 @@ pub(in crate::search) struct Seeds<'a> {
     climb: Climb<'a>,
     bounds: Bounds<'a>,
     budget: u64,
-    /// Sets of fewer pairs are parts: they are looked for within limits.
-    whole: usize,
-    /// Of so many pairs that lead to no more than parts one is looked at.
-    every: usize,
-    /// What parts may cost once all pairs are known, and what is spent when that is spent.
-    follow: u64,
-    parts_until: u64,
-    /// Whether there were too many of them to be kept.
-    dropped: bool,
+    parts: Parts,
     /// Words read, and as much other work.
     spent: u64,
     /// The likeliest first.
@@ -125,11 +137,7 @@ impl<'a> Seeds<'a> {
             climb: Climb { model, terms, rough, graph, taken, compared: Cell::new(0) },
             bounds: Bounds::of((terms, rough, graph), least),
             budget,
-            whole: least,
-            every: 1,
-            follow: u64::MAX,
-            parts_until: u64::MAX,
-            dropped: false,
+            parts: Parts::none(least),
             spent: 0,
             modes: Vec::new(),
             floor,
@@ -154,11 +162,11 @@ impl<'a> Seeds<'a> {
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
         let (wholes, parts, complete) = self.pairs();
-        // The whole is looked for first of all: half of what is left is its own.
-        self.parts_until = self.spent + self.follow.min(self.budget.saturating_sub(self.spent) / 2);
+        let until = self.spent.saturating_add(self.parts.follow);
+        self.parts.until = until;
         let complete = self.follow_all(wholes, self.budget) && complete;
-        let known = self.follow_all(parts, self.parts_until) && self.every == 1 && !self.dropped;
-        let parts = known && self.spent <= self.parts_until;
+        let followed = self.follow_all(parts, until) && self.spent <= until;
+        let parts = followed && self.parts.every == 1 && !self.parts.dropped;
         Swept { modes: self.modes, complete, parts, tests: self.spent }
     }
 
@@ -180,8 +188,8 @@ impl<'a> Seeds<'a> {
                 if self.spent > most {
                     return false;
                 }
-                if self.spent > self.parts_until {
-                    self.bounds.least = self.whole;
+                if self.spent > self.parts.until {
+                    self.bounds.least = self.parts.whole;
                 }
                 self.follow_pair(a as usize, b as usize);
             }
@@ -192,15 +200,16 @@ impl<'a> Seeds<'a> {
 
     /// Sets of fewer than so many pairs are parts. Of the pairs that lead to no more than parts as many are looked at, evenly, as can
     /// be with so much work, so that what many of them lead to is found all the same; and once all are known they are followed
-    /// with no more than so much, what leads to the others first.
+    /// with no more than so much, what leads to the others first. Both come on top of the budget.
     pub(in crate::search) fn with_parts(mut self, whole: usize, look: u64, follow: u64) -> Self {
         let graph = self.climb.graph;
         let some = (graph.vertices.len() / COUNTED).max(1);
         let edges: usize = ones(&self.free, 0).step_by(some).map(|a| some * shared(graph.row(a), &self.free, a)).sum();
         // Rows are read from the second of a pair on: a third of them on average.
         let cost = edges as u64 * self.row.len() as u64 / 3;
-        self.every = cost.div_ceil(look.max(1)).max(1) as usize;
-        (self.whole, self.follow) = (whole, follow);
+        let every = cost.div_ceil(look.max(1)).max(1) as usize;
+        self.budget += cost / every as u64 + follow;
+        self.parts = Parts { whole, every, follow, ..self.parts };
         self
     }
 
@@ -266,13 +275,19 @@ impl<'a> Seeds<'a> {
             let count = intersect(graph.row(a), &self.free, 0, &mut self.row);
             let threshold = self.threshold();
             let asked = (self.bounds.least, threshold);
-            if self.bounds.with_common((1, own), (&self.row, count), rank + 1, asked).1 < threshold {
+            let (most, bound) = self.bounds.with_common((1, own), (&self.row, count), rank + 1, asked);
+            if bound < threshold {
                 continue;
             }
+            let leads_to_whole = most >= self.parts.whole;
             Held::list(&self.row, graph.starts[rank + 1], &mut self.held);
             self.bounds.list(&self.held, &mut self.after);
             for b in self.held.iter().flat_map(Held::ones) {
-                let least = if (a + b).is_multiple_of(self.every) { self.bounds.least } else { self.whole };
+                let chosen = (a + b).is_multiple_of(self.parts.every);
+                if !chosen && !leads_to_whole {
+                    continue;
+                }
+                let least = if chosen { self.bounds.least } else { self.parts.whole };
                 let gains = own + self.bounds.gain(b);
                 let next = graph.rank[b] as usize + 1;
                 if self.bounds.reach(2, gains, ranks - next) < threshold {
@@ -288,14 +303,14 @@ impl<'a> Seeds<'a> {
                 if bound >= threshold {
                     // Rounded up, so that it stays a bound.
                     let pair = ((bound as f32).next_up(), a as u32, b as u32);
-                    if most >= self.whole { pairs.push(pair) } else { parts.push(pair) }
+                    if most >= self.parts.whole { pairs.push(pair) } else { parts.push(pair) }
                 }
             }
             if parts.len() > MOST_PARTS {
                 // Those that lead to the least would hardly be followed.
                 parts.select_nth_unstable_by_key(MOST_PARTS / 2, order);
                 parts.truncate(MOST_PARTS / 2);
-                self.dropped = true;
+                self.parts.dropped = true;
             }
             if self.spent > self.budget || pairs.len() > MOST_PAIRS {
                 complete = false;
