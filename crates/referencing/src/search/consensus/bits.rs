@@ -110,22 +110,24 @@ pub(in crate::search) fn is_set(bits: &[u64], bit: usize) -> bool {
     bits[bit / 64] >> (bit % 64) & 1 == 1
 }
 
-/// a ∧ b from a bit on, and how many bits that are; what comes before is left as it is.
+/// a ∧ b from a bit on, and how many groups hold one of these bits, word by word; what comes before is left as it is. `lasts` has
+/// the last bit of every group, and of every word.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512vl+avx512bw+avx512dq+avx512vpopcntdq+popcnt",
     "x86_64+avx2+bmi1+bmi2+popcnt"
 ))]
-pub(in crate::search) fn intersect(a: &[u64], b: &[u64], from: usize, out: &mut [u64]) -> usize {
+pub(in crate::search) fn intersect(a: &[u64], b: &[u64], lasts: &[u64], from: usize, out: &mut [u64]) -> usize {
     let first = from / 64;
     if first >= out.len() {
         return 0;
     }
     let mut count = 0;
-    for ((out, a), b) in out[first..].iter_mut().zip(&a[first..]).zip(&b[first..]) {
+    for (((out, a), b), &lasts) in out[first..].iter_mut().zip(&a[first..]).zip(&b[first..]).zip(&lasts[first..]) {
         *out = a & b;
-        count += out.count_ones() as usize;
+        count += groups(*out, lasts).count_ones() as usize;
     }
-    count - (out[first] & !(!0 << (from % 64))).count_ones() as usize
+    let of_first = |word: u64| groups(word, lasts[first]).count_ones() as usize;
+    count - of_first(out[first]) + of_first(out[first] & (!0 << (from % 64)))
 }
 
 /// How many bits a ∧ b has from a bit on.
@@ -180,9 +182,12 @@ mod tests {
     fn what_is_common_from_a_bit_on_is_counted() {
         let (a, b) = ([0b1110, !0], [0b0111, 0b11 << 62]);
         let mut out = [0; 2];
-        assert_eq!(intersect(&a, &b, 2, &mut out), 3);
-        assert_eq!(intersect(&a, &b, 64, &mut out), 2);
-        assert_eq!(intersect(&a, &b, 128, &mut out), 0);
+        // Groups of one bit each, and of three, one and sixty; of two, one and sixty-one.
+        let (single, lasts) = ([!0; 2], [1 << 63 | 0b1100, 1 << 63 | 0b110]);
+        for (lasts, counts) in [(&single, [3, 2]), (&lasts, [2, 1])] {
+            assert_eq!([2, 64].map(|from| intersect(&a, &b, lasts, from, &mut out)), counts);
+            assert_eq!(intersect(&a, &b, lasts, 128, &mut out), 0);
+        }
         assert_eq!(out[1], 0b11 << 62);
         assert_eq!([0, 2, 64, 127, 128].map(|from| shared(&a, &b, from)), [4, 3, 2, 1, 0]);
         assert!(is_set(&out, 127) && !is_set(&out, 0));

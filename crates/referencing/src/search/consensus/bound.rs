@@ -85,8 +85,8 @@ impl<'a> Bounds<'a> {
         self.of_set(own + more, gains + self.greatest * more as f64)
     }
 
-    /// How many pairs `own` ones that bring `gains` may come to with those of `common` from rank `from` on, `count` ones, and the
-    /// bound of these, if they come to `least`; where even rough ones fall short, the rough ones.
+    /// How many pairs `own` ones that bring `gains` may come to with those of `common` from rank `from` on, of no more than
+    /// `count` model points, and the bound of these, if they come to `least`; where even rough ones fall short, the rough ones.
     pub(in crate::search) fn with_common(
         &self,
         (own, gains): (usize, f64),
@@ -244,7 +244,7 @@ mod tests {
         for a in (0..graph.vertices.len()).step_by(7) {
             for b in ones(graph.row(a), graph.starts[graph.rank[a] as usize + 1]).step_by(5) {
                 let next = graph.rank[b] as usize + 1;
-                let count = intersect(graph.row(a), graph.row(b), graph.starts[next], &mut common);
+                let count = intersect(graph.row(a), graph.row(b), &graph.lasts, graph.starts[next], &mut common);
                 let gains = bounds.gain(a) + bounds.gain(b);
                 let known = one_by_one(&bounds, &[a, b], &common, next);
                 let all = (bounds.least, f64::NEG_INFINITY);

@@ -227,9 +227,9 @@ impl<'a> Seeds<'a> {
         let free = std::mem::take(&mut self.free);
         let (mut row, mut common) = (vec![0; free.len()], vec![0; free.len()]);
         for a in self.best_connected(&free, &free, BEGINNINGS) {
-            intersect(graph.row(a), &free, 0, &mut row);
+            intersect(graph.row(a), &free, &graph.lasts, 0, &mut row);
             let Some(&b) = self.best_connected(&row, &row, 1).first() else { continue };
-            intersect(&row, graph.row(b), 0, &mut common);
+            intersect(&row, graph.row(b), &graph.lasts, 0, &mut common);
             let Some(&c) = self.best_connected(&common, &common, 1).first() else { continue };
             let after = graph.rank[c] as usize + 1;
             self.of_three = ones(&common, graph.starts[after]).filter(|&v| is_set(graph.row(c), v)).collect();
@@ -272,7 +272,7 @@ impl<'a> Seeds<'a> {
             }
             let (rank, own) = (graph.rank[a] as usize, self.bounds.gain(a));
             self.spent += self.row.len() as u64;
-            let count = intersect(graph.row(a), &self.free, 0, &mut self.row);
+            let count = intersect(graph.row(a), &self.free, &graph.lasts, 0, &mut self.row);
             let threshold = self.threshold();
             let asked = (self.bounds.least, threshold);
             let (most, bound) = self.bounds.with_common((1, own), (&self.row, count), rank + 1, asked);
@@ -298,7 +298,7 @@ impl<'a> Seeds<'a> {
                 if self.bounds.falls_short((2, gains), self.after[next - 1], asked) {
                     continue;
                 }
-                let count = intersect(&self.row, graph.row(b), graph.starts[next], &mut self.common);
+                let count = intersect(&self.row, graph.row(b), &graph.lasts, graph.starts[next], &mut self.common);
                 let (most, bound) = self.bounds.with_common((2, gains), (&self.common, count), next, asked);
                 if bound >= threshold {
                     // Rounded up, so that it stays a bound.
@@ -333,7 +333,7 @@ impl<'a> Seeds<'a> {
         let Climb { graph, terms, .. } = self.climb;
         let next = graph.rank[b] as usize + 1;
         self.spent += words_from(graph, next);
-        intersect(graph.row(a), graph.row(b), graph.starts[next], &mut self.common);
+        intersect(graph.row(a), graph.row(b), &graph.lasts, graph.starts[next], &mut self.common);
         self.common.iter_mut().zip(&self.free).for_each(|(word, free)| *word &= free);
         let (mut common, mut later) = (std::mem::take(&mut self.held), std::mem::take(&mut self.after));
         Held::list(&self.common, graph.starts[next], &mut common);
