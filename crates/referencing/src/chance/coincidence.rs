@@ -16,18 +16,13 @@ const ALIKE: f64 = 2.0;
 /// partners is there with m_i q_i, and the number of points so met is a sum of independent ones. Every motion that maps the model onto itself
 /// leads to another such pose.
 pub(super) fn expected_at(problem: &Problem<'_>, size: usize, object_from_camera: &Transform<Object, Camera>) -> f64 {
-    let lists = &problem.candidates.lists;
-    let mut times = vec![0.0_f64; problem.cloud.len()];
-    lists.iter().flatten().for_each(|&j| times[j] += 1.0);
-    let all: f64 = times.iter().sum();
-    let partners = Partners::of(problem, &times);
+    let shuffled = Shuffled::of(problem);
     let camera_from_object = object_from_camera.inverse();
     // P(so many points are met) of the points so far; the last of `size` or more.
     let mut number = vec![0.0; size + 1];
     number[0] = 1.0;
-    for (point, list) in problem.model.iter().zip(lists).filter(|(_, list)| !list.is_empty()) {
-        let share: f64 = partners.near(point, (camera_from_object * point.at).coords).map(|j| times[j] / all).sum();
-        let met = (list.len() as f64 * share).min(1.0);
+    for (i, point) in problem.model.iter().enumerate() {
+        let met = shuffled.meets(i, (camera_from_object * point.at).coords);
         if met > 0.0 {
             number[size] += number[size - 1] * met;
             for k in (0..size).rev() {
@@ -37,6 +32,35 @@ pub(super) fn expected_at(problem: &Problem<'_>, size: usize, object_from_camera
         }
     }
     number[size] * ALIKE * problem.model.len() as f64
+}
+
+/// Putative pairs whose partners are shuffled over a cloud that stays as it is.
+pub(crate) struct Shuffled<'a> {
+    partners: Partners<'a>,
+    /// How often each cloud point is a partner, and all together.
+    times: Vec<f64>,
+    all: f64,
+}
+
+impl<'a> Shuffled<'a> {
+    pub(crate) fn of(problem: &'a Problem<'a>) -> Self {
+        let mut times = vec![0.0_f64; problem.cloud.len()];
+        problem.candidates.lists.iter().flatten().for_each(|&j| times[j] += 1.0);
+        let (partners, all) = (Partners::of(problem, &times), times.iter().sum());
+        Self { partners, times, all }
+    }
+
+    /// m q: the probability that one of the m partners of a model point lies where a pose puts that, q the share of all partners
+    /// there.
+    pub(crate) fn meets(&self, model: usize, place: Vector3<f64>) -> f64 {
+        let Problem { model: points, candidates, .. } = self.partners.problem;
+        let own = candidates.lists[model].len() as f64;
+        if own == 0.0 {
+            return 0.0;
+        }
+        let share: f64 = self.partners.near(&points[model], place).map(|j| self.times[j] / self.all).sum();
+        (own * share).min(1.0)
+    }
 }
 
 /// The cloud points that are anyone's partner.

@@ -46,6 +46,7 @@ use nalgebra::Vector3;
 use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
 
 use crate::{Correspondence, Kabsch, Observations, Problem, Solver, candidates::chi_square, solve::likelihood};
+pub(crate) use coincidence::Shuffled;
 use coincidence::expected_at;
 pub(crate) use dimension::dimension;
 use null::Null;
@@ -132,7 +133,7 @@ impl<'a> Chance<'a> {
 }
 
 /// Whether chance shuffles partners: without a prior pairs are given, and not each with each.
-fn shuffled(problem: &Problem<'_>) -> bool {
+pub(crate) fn shuffled(problem: &Problem<'_>) -> bool {
     let lists = &problem.candidates.lists;
     problem.prior.is_none() && lists.iter().any(|list| !list.is_empty() && list.len() < problem.cloud.len())
 }

@@ -31,7 +31,8 @@ use crate::Problem;
 /// pairs, each model point's term over all candidates near its place: what fits in a crowd is as likely clutter. And
 /// beside the object and clutter alone stand more explanations: a pattern that the object repeats in part goes on, with
 /// the object in it or without; and where poses elsewhere explain what clutter spread evenly would not show, clutter
-/// imitates the object, which is among the imitations or not ([`Imitation`]).
+/// imitates the object, which is among the imitations or not ([`Imitation`]). So do putative pairs that mistake points for their
+/// like, where the model stands as well in other ways on the same places: each of them is met by many.
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
 /// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
@@ -152,11 +153,12 @@ impl Search for RigidConsensus {
             let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
             tests += others.tests;
             weighed(&mut others);
-            others.modes.retain(elsewhere);
             let occupied = Occupied::of(problem, best, pattern.as_ref().and_then(Pattern::telling));
+            let mistaken = occupied.mistaken(problem, (&terms, &graph), &others.modes);
+            others.modes.retain(elsewhere);
             let imitations = others.modes.iter().map(|other| occupied.imitation(problem, parts, other));
             let weight = |of: &Imitation| of.ln_evidence + of.ln_alone;
-            imitation = imitations.max_by(|a, b| weight(a).total_cmp(&weight(b)));
+            imitation = imitations.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b)));
             weighed(&mut beside);
             tests += beside.tests;
             look_alike = pattern.map(|pattern| pattern.look_alike(problem, &terms, &graph, best));

@@ -26,7 +26,7 @@ pub struct Imitation {
 
 /// Where the likeliest pose has the object's points.
 pub(in crate::search) struct Occupied<'a> {
-    best: &'a Mode,
+    pub(super) best: &'a Mode,
     /// Along the first axis.
     places: Vec<Vector3<f64>>,
     /// Model points that no clutter imitates: those that do not repeat where others do.
@@ -45,6 +45,11 @@ impl<'a> Occupied<'a> {
         let from = self.places.partition_point(|p| p.x < place.x - off);
         let mut beside = self.places[from..].iter().take_while(|p| p.x <= place.x + off);
         beside.any(|p| (p - place).norm_squared() <= off * off)
+    }
+
+    /// Whether a pair's cloud point lies where the likeliest pose has the object.
+    pub(super) fn holds_place(&self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, v: usize) -> bool {
+        self.near(&terms.pairs[v].cloud, slack(problem, graph.vertices[v]))
     }
 
     /// What another pose says of the clutter.

@@ -6,6 +6,7 @@ mod crowd;
 mod fit;
 mod graph;
 mod imitation;
+mod labels;
 mod likelihood;
 mod mirror;
 mod modes;
