@@ -184,6 +184,9 @@ impl CoherenceProblem {
             let value = format!("{} points", self.model.len());
             warnings.push(warning("the model has too few points", value, "a pose needs at least three"));
         }
+        if self.cloud.is_empty() {
+            warnings.push(warning("the cloud has no points", "0 points".to_owned(), "nothing can be found in it"));
+        }
         if let Some((i, k, distance)) = nearest_two(&self.model, 2.0 * self.delta) {
             let value = format!("points {i} and {k}, {distance:.4} m apart, and Δ = {} m", self.delta);
             let remedy = "one may be taken for the other; keep model points 2Δ apart";

@@ -156,6 +156,8 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_told() {
         exact.len() == 1 && exact[0].starts_with("points without noise in p.json: cloud point 0, 0 m"),
         "{exact:?}"
     );
+    let cloud = "[[0,0,3],[1,0,3],[0.25,-0.75,3],[0.5,0.5,4],[-0.5,0.25,3.5]]";
+    assert_eq!(warnings(cloud, "[]"), ["the cloud has no points in p.json: 0 points; nothing can be found in it"]);
     let few = warnings("null}", "[[0,0],[1,0],[0,1]]}");
     assert!(few.len() == 1 && few[0].starts_with("`putative` has too few pairs in p.json: 3 pairs of 2"), "{few:?}");
 }

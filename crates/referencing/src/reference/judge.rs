@@ -284,18 +284,21 @@ impl Judge<'_> {
         !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
     }
 
-    /// Whether the points are measured as large as the model says, or so nearly that what follows for the pose is within the alert
-    /// limit: a rig that stretches all it measures by ε has the object nearer or farther by ε of its distance.
+    /// Whether the points are measured as large as the model says, by a test of the confidence of the others, or so nearly that what
+    /// follows for the pose is within the alert limit: a rig that stretches all it measures by ε has the object nearer or farther by
+    /// ε of its distance.
     fn as_large_as_modelled(&self, hypothesis: &Hypothesis, integrity: &Integrity) -> Result<(), Refusal> {
         let Some(stretch) = integrity.stretch else { return Ok(()) };
         // Where the residuals that it leaves are larger than their noise, so is the error of the scale.
         let sigmas = stretch.value / stretch.sigma;
         let left = (integrity.chi2 - sigmas * sigmas).max(0.0) / (integrity.freedom - 1) as f64;
+        let sure = sigmas * sigmas > chi_square(1, self.acceptance.confidence) * left.max(1.0);
         let count = hypothesis.pairs.len() as f64;
         let centre: Vector3<f64> =
             hypothesis.pairs.iter().map(|pair| self.problem.model[pair.model].at.coords).sum::<Vector3<f64>>() / count;
-        let off = stretch.value.abs() * (hypothesis.pose.inverse() * Point::from(centre)).coords.norm();
-        let sure = sigmas.abs() > STRETCHED * left.max(1.0).sqrt();
+        // Points that a stretch moved farthest are those that were not identified: what is left shows less of it.
+        let most = stretch.value.abs() + UNDERSTATED * stretch.sigma;
+        let off = most * (hypothesis.pose.inverse() * Point::from(centre)).coords.norm();
         match sure && off > self.alert_limit {
             true => Err(Refusal::Stretched { stretch, off, limit: self.alert_limit }),
             false => Ok(()),
@@ -337,8 +340,8 @@ impl Judge<'_> {
     }
 }
 
-/// A scale other than one is no accident beyond so many of its standard deviations: one fix in fifteen thousand has that.
-const STRETCHED: f64 = 4.0;
+/// A stretch may be greater than it seems by so many of its standard deviations.
+const UNDERSTATED: f64 = 2.0;
 
 /// The hypotheses that passed every test, and those that did not.
 #[derive(Default)]

@@ -76,14 +76,14 @@ pub enum Refusal {
     },
     /// All that is measured is longer or shorter than the model says, by more than the pose may be off for it.
     #[error(
-        "measured distances are {:.1} % {} than the model's (one sigma {:.1} %): if the rig is at fault, the object is {off:.2} m \
+        "measured distances are {:.1} % {} than the model's (one sigma {:.1} %): if the rig is at fault, the object may be {off:.2} m \
          from where it seems to be, and {limit:.2} m are allowed; look at baseline, focal length and survey",
         100.0 * .stretch.value.abs(), if .stretch.value > 0.0 { "longer" } else { "shorter" }, 100.0 * .stretch.sigma
     )]
     Stretched {
         /// By how much.
         stretch: Stretch,
-        /// What that makes of the object's distance (m).
+        /// What that, and two standard deviations more, makes of the object's distance (m).
         off: f64,
         /// The alert limit (m).
         limit: f64,

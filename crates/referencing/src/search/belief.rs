@@ -47,6 +47,9 @@ pub struct Belief {
     pub unlikely: Option<Explanation>,
 }
 
+/// What has this evidence (nats) beside the likeliest pose is a second copy of the object, whole or in part.
+pub(super) const COPY: f64 = 9.0;
+
 /// Clutter alone shows this much evidence (nats) in one frame of twenty: E Σ Λ = 1 where it is spread as the terms have it.
 const ACCIDENT: f64 = 3.0;
 
@@ -89,8 +92,10 @@ impl Belief {
     ///
     /// Where two poses are each beyond chance, clutter explains neither: it is not the evidence that decides between
     /// them, but which of two things is the object. Of that the cloud says only how much of each is seen.
+    /// Evidence of nine nats is another one in any case: where two things may be the object, less than certainty that the second is keeps
+    /// from choosing.
     pub fn copy(&self, model: &[ModelPoint], limit: f64, absence: f64) -> Option<&Explanation> {
-        let likely = libm::log((1.0 - absence) / absence);
+        let likely = libm::log((1.0 - absence) / absence).min(COPY);
         self.apart(&self.beside, model, limit).into_iter().find(|other| other.ln_evidence >= likely)
     }
 
@@ -156,6 +161,28 @@ impl Belief {
 mod tests {
     use super::*;
     use seafix_geometry::Transform;
+
+    /// Seen to fail where a copy must be believed by itself.
+    #[test]
+    fn nine_nats_are_a_copy_however_sure_a_first_one_must_be() {
+        let pose = |x: f64| Transform::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::new(x, 0.0, 0.0));
+        let at = |x: f64, ln_evidence: f64| Explanation {
+            pairs: Vec::new(),
+            object_from_camera: pose(x),
+            ln_evidence,
+            ln_crowd: 0.0,
+        };
+        let model = [ModelPoint::exact("", [0.0; 3].into())];
+        let told = |beside: Explanation, absence: f64| {
+            let (explanations, beside) = (vec![at(0.0, 40.0)], vec![beside]);
+            let belief = Belief { explanations, beside, ..Belief::default() };
+            belief.copy(&model, 0.1, absence).is_some()
+        };
+        // ln(1/2e-5) = 10.8, ln(1/1e-2) = 4.6.
+        assert_eq!([4.0, 5.0, 8.9, 9.1].map(|evidence| told(at(1.0, evidence), 2e-5)), [false, false, false, true]);
+        assert_eq!([4.0, 5.0, 8.9, 9.1].map(|evidence| told(at(1.0, evidence), 1e-2)), [false, true, true, true]);
+        assert!(!told(at(0.05, 30.0), 1e-2), "the same place");
+    }
 
     #[test]
     fn where_clutter_imitates_the_object_it_decides_how_the_places_are_filled() {

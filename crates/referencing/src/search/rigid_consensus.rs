@@ -7,7 +7,9 @@ use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Belief, Explanation, Identification, NEEDED, Search, Unidentified, bounded,
+    Belief, Explanation, Identification, NEEDED, Search, Unidentified,
+    belief::COPY,
+    bounded,
     consensus::{Crowd, Graph, Imitation, Mode, Occupied, Pattern, Rough, Seeds, Swept, Terms, mirror_image},
     grow::{feasible, grow, most_possible, so_far},
     orientation::Sense,
@@ -78,10 +80,9 @@ const FLOOR: f64 = 3.0;
 /// A pose that is more likely than no object by this much (nats) may be believed: only then what else the cloud shows is
 /// looked for.
 const STRONG: f64 = 5.0;
-/// What is found beside the likeliest pose matters where it is not less likely by this much (nats), and where it is as likely
-/// as this by itself: a second copy of the object, seen in part.
+/// What is found beside the likeliest pose matters where it is not less likely by this much (nats), and where it is a copy by itself
+/// ([`COPY`]).
 const BESIDE: f64 = 14.0;
-const COPY: f64 = 9.0;
 /// What explains so many points fewer than the likeliest pose is no copy of the object but of a part of it. Where the object has a
 /// pattern that goes on, parts are to be seen beside it anyway, and are not looked for.
 const LEAD: usize = 4;
