@@ -42,7 +42,8 @@ impl Occupied<'_> {
         if !shuffled(problem) {
             return None;
         }
-        let chance = Shuffled::of(problem);
+        // Seldom is there a pose to ask.
+        let mut chance = None;
         let variance = terms.pairs.iter().map(|pair| pair.variance).fold(0.0, f64::max);
         let (mut met, mut places, mut ln_chance, mut poses) = (0, 0, 0.0, 0);
         for other in others.iter().take(MOST) {
@@ -53,6 +54,7 @@ impl Occupied<'_> {
                 continue;
             }
             poses += 1;
+            let chance = chance.get_or_insert_with(|| Shuffled::of(problem));
             for (i, point) in problem.model.iter().enumerate() {
                 let (place, of_best) = (other.motion.apply(&point.at.coords), self.best.motion.apply(&point.at.coords));
                 let met_by_chance = chance.meets(i, place).min(MOST_LIKELY);
