@@ -4,7 +4,11 @@ use nalgebra::Matrix3;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
 
 use super::Acceptance;
-use crate::{Observations, Stretch, candidates::chi_square, solve::deletion::Deletions};
+use crate::{
+    Observations, Stretch,
+    candidates::chi_square,
+    solve::{deletion::Deletions, stretch::isotropic},
+};
 
 /// What the number of points allows to know of a wrong match. A grade of the count alone, as three points are monitored by
 /// nothing whatever they are: whether these very points allow it, four in a row say, is told by the separation
@@ -106,10 +110,11 @@ pub(super) fn protection(
     let (position, attitude) = semi_axes(covariance);
     let quiet = radius(0.5 * acceptance.risk);
     let own = Protection { position: quiet * position, attitude: quiet * attitude };
+    let even = || isotropic(&data.points, pose);
     let Some(deletions) = Deletions::of(data) else {
-        return Separation::default();
+        return Separation { stretch: even(), ..Separation::default() };
     };
-    let stretch = deletions.stretch;
+    let stretch = deletions.stretch.or_else(even);
     let mut watch = Watch { pose, deletions, level: own, spared: true };
     let twice = acceptance.two_wrong_rate > 0.0;
     let share = if twice { 0.25 } else { 0.5 } * acceptance.risk;

@@ -32,7 +32,7 @@ mod signs;
 mod spread;
 mod starts;
 mod stereo_reprojection;
-mod stretch;
+pub(crate) mod stretch;
 #[cfg(test)]
 mod tests;
 mod triad;

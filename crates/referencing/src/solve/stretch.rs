@@ -1,9 +1,12 @@
 //! Whether what was measured is as large as the model says.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{descent::linearize, mahalanobis::Terms};
+use super::{
+    descent::{Term, linearize},
+    mahalanobis::Terms,
+};
 use crate::Observation;
 
 /// By how much measured distances are longer than the model's, as a share of them, had the fit a scale besides the motion.
@@ -45,6 +48,17 @@ pub(super) fn stretch(points: &[Observation], pose: &Transform<Object, Camera>, 
         .then(|| Stretch { value: (pull - by_motion.dot(&all.gradient)) / left, sigma: (1.0 / left).sqrt() })
 }
 
+/// The same with every point as good in all directions as it is on average: where one coordinate is as good as exact, rounding leaves
+/// nothing of what the others say of the scale.
+pub(crate) fn isotropic(points: &[Observation], pose: &Transform<Object, Camera>) -> Option<Stretch> {
+    let term = |k: usize, at: &Vector3<f64>| {
+        let Observation { measured, model_sigma, .. } = &points[k];
+        let variance = measured.covariance.trace() / 3.0 + model_sigma * model_sigma;
+        (variance > 0.0).then(|| Term::of(Matrix3::identity() / variance, &(measured.at.coords - at)))
+    };
+    stretch(points, pose, &term)
+}
+
 /// What rounding may leave of the information on the scale, as a share of all.
 const ROUNDING: f64 = 1e-9;
 
@@ -83,6 +97,22 @@ mod tests {
                 "{by}: {found:?}"
             );
         }
+    }
+
+    /// One coordinate that is known to a tenth of a micrometre takes all weight from the others.
+    #[test]
+    fn an_exact_coordinate_does_not_hide_it() {
+        let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -5.0].into());
+        let seen = |k: usize| {
+            let corner = Point::new((k & 1) as f64 * 2.0, (k >> 1 & 1) as f64 * 2.0, (k >> 2 & 1) as f64);
+            let at: Point<Camera> = ((pose.inverse() * corner).coords * 1.015).into();
+            let mut measured = UncertainPoint::isotropic(at, SIGMA);
+            measured.covariance[(0, 0)] = if k == 0 { 1e-14 } else { SIGMA * SIGMA };
+            Observation { measured, pixels: None, model: corner, model_sigma: 0.0 }
+        };
+        let points: Vec<Observation> = (0..8).map(seen).collect();
+        let found = isotropic(&points, &pose).unwrap();
+        assert!((found.value - 0.015).abs() < 1e-3 && found.sigma < 1e-3, "{found:?}");
     }
 
     #[test]
