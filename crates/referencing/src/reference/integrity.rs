@@ -249,6 +249,24 @@ mod tests {
         assert!((noisy.position / level.position - 2.0).abs() < 1e-6);
     }
 
+    /// One coordinate that is as good as exact takes all weight from the others, and three points any of which fit say nothing.
+    #[test]
+    fn every_fix_of_four_points_has_a_stretch() {
+        let stretch = |count: usize, exact: bool| {
+            let (mut data, pose) = seen(count);
+            data.points[0].measured.covariance[(0, 0)] = if exact { 1e-16 } else { SIGMA * SIGMA };
+            let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
+            protection(&data, &pose, &covariance, &Acceptance::default()).stretch
+        };
+        assert_eq!(stretch(3, false), None);
+        for count in [4, 6] {
+            let [even, exact] = [false, true].map(|exact| stretch(count, exact).expect("four points or more"));
+            assert!(even.value.abs().max(exact.value.abs()) < 1e-6, "{count}: {even:?} {exact:?}");
+            // What the others say of the scale is left, and the exact one cannot say it all.
+            assert!((0.7..1.05).contains(&(exact.sigma / even.sigma)), "{count}: {even:?} {exact:?}");
+        }
+    }
+
     /// Seen to fail when the separation is left out of the level.
     #[test]
     fn one_wrong_match_is_within_the_level() {

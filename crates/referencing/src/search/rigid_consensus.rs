@@ -46,8 +46,8 @@ use crate::Problem;
 /// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends
 /// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
 /// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
-/// copy of it may be passed over, where [`Belief::copies_sought`] is false; and what shows less evidence than nine nats is no copy. The tolerance and the prior's greatest rotation prune the graph; they
-/// do not judge the pose.
+/// copy of it may be passed over, where [`Belief::copies_sought`] is false; and what shows less evidence than nine nats is no
+/// copy. The tolerance and the prior's greatest rotation prune the graph; they do not judge the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RigidConsensus {

@@ -59,7 +59,7 @@ pub(in crate::search) struct Swept {
     pub(in crate::search) modes: Vec<Mode>,
     /// Whether every three that could lead to a pose of interest was followed.
     pub(in crate::search) complete: bool,
-    /// Whether those were that could lead to a smaller one.
+    /// Whether every three was looked at and followed that could lead to a set of fewer pairs than the whole.
     pub(in crate::search) parts: bool,
     /// Work done.
     pub(in crate::search) tests: u64,
