@@ -190,14 +190,13 @@ fn order(problem: &Problem<'_>) -> Vec<usize> {
     let count = problem.model.len();
     let centroid = (0..count).map(at).sum::<Vector3<f64>>() / count.max(1) as f64;
     let distance = |i: usize| (at(i) - centroid).norm_squared() as f32;
-    let key = |i: usize| (distance(i), problem.candidates.lists[i].len());
-    let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|&a, &b| {
-        let ((near, few), (far, many)) = (key(a), key(b));
-        let places = || at(a).iter().zip(&at(b)).map(|(x, y)| x.total_cmp(y)).fold(Ordering::Equal, Ordering::then);
-        near.total_cmp(&far).then(few.cmp(&many)).then_with(places)
+    let mut order: Vec<(f32, usize, usize)> =
+        (0..count).map(|i| (distance(i), problem.candidates.lists[i].len(), i)).collect();
+    order.sort_unstable_by(|(near, few, a), (far, many, b)| {
+        let places = || at(*a).iter().zip(&at(*b)).map(|(x, y)| x.total_cmp(y)).fold(Ordering::Equal, Ordering::then);
+        near.total_cmp(far).then(few.cmp(many)).then_with(places).then(a.cmp(b))
     });
-    order
+    order.into_iter().map(|(_, _, i)| i).collect()
 }
 
 /// The expected number of such sets of exactly `size` pairs.

@@ -50,7 +50,7 @@ impl Default for Acceptance {
             chance_budget: 1e-3,
             absence: 2e-5,
             rare: 3e-5,
-            doubt: 0.05,
+            doubt: 0.01,
             confidence: 0.999,
             alert_limit: 0.10,
             alert_share: 0.05,

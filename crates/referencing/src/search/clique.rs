@@ -3,6 +3,7 @@
 use super::{
     association::Association,
     bitset::{BitSet, degrees},
+    fours::Fours,
     local::{Local, Workshop},
     orientation::Sense,
     volumes::Volumes,
@@ -40,6 +41,7 @@ pub(super) struct Cliques {
 pub(super) struct Search<'a> {
     graph: &'a Association,
     volumes: Volumes<'a>,
+    fours: Fours,
     /// What fours are refused.
     sense: Sense,
     /// Tests left: a vertex coloured, or four points tested for orientation.
@@ -76,6 +78,7 @@ impl<'a> Search<'a> {
         Self {
             graph,
             volumes: Volumes::of(problem, &graph.vertices),
+            fours: Fours::default(),
             sense,
             left: budget,
             degree,
@@ -238,18 +241,8 @@ impl<'a> Search<'a> {
             return false;
         }
         let members = decisive_members(clique);
-        let mut tests = 0;
-        let refused = members.iter().enumerate().any(|(i, &a)| {
-            members[..i].iter().enumerate().any(|(k, &b)| {
-                let plane = self.volumes.plane([a, b, vertex]);
-                members[..k].iter().any(|&c| {
-                    tests += 1;
-                    self.volumes.refuses(self.sense, &plane, c)
-                })
-            })
-        });
-        self.left = self.left.saturating_sub(tests);
-        refused
+        self.left = self.left.saturating_sub(Fours::count(members.len()));
+        self.fours.refused(&self.volumes, self.sense, members, vertex)
     }
 
     fn keep(&mut self, clique: &[usize]) {

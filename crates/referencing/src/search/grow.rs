@@ -6,6 +6,7 @@ use super::{
     Identification, NEEDED, Unidentified,
     association::vertices,
     clique::{MOST_ORIENTED, decisive_members},
+    fours::Fours,
     orientation::{Sense, unmirrored, wholly_mirrored},
     pose::share,
     volumes::Volumes,
@@ -28,20 +29,19 @@ pub(super) fn grow(
     tests: &mut u64,
 ) -> Vec<Correspondence> {
     let volumes = Volumes::of(problem, ranked);
-    let mut taken: Vec<usize> = Vec::new();
+    let (mut taken, mut fours) = (Vec::new(), Fours::default());
     for next in 0..ranked.len() {
-        if admits(problem, ranked, &volumes, sense, &taken, next, tests) {
+        if admits(&volumes, &mut fours, sense, &taken, next, tests) {
             taken.push(next);
         }
     }
     taken.into_iter().map(|place| ranked[place]).collect()
 }
 
-/// Whether a pair is coherent with every one taken and makes no refused four with three of them.
+/// Whether a vertex is coherent with every one taken and makes no refused four with three of them.
 pub(super) fn admits(
-    problem: &Problem<'_>,
-    pairs: &[Correspondence],
     volumes: &Volumes<'_>,
+    fours: &mut Fours,
     sense: Sense,
     taken: &[usize],
     next: usize,
@@ -49,7 +49,7 @@ pub(super) fn admits(
 ) -> bool {
     for &other in taken {
         *tests += 1;
-        if !problem.coherent(pairs[other], pairs[next]) {
+        if !volumes.coherent(other, next) {
             return false;
         }
     }
@@ -57,17 +57,8 @@ pub(super) fn admits(
         return true;
     }
     let members = decisive_members(taken);
-    let columns = volumes.columns(members);
-    for (i, &a) in members.iter().enumerate() {
-        for (k, &b) in members[..i].iter().enumerate() {
-            let plane = volumes.plane([a, b, next]);
-            *tests += k as u64;
-            if volumes.refuses_one(sense, &plane, &members[..k], &columns) {
-                return false;
-            }
-        }
-    }
-    true
+    *tests += Fours::count(members.len());
+    !fours.refused(volumes, sense, members, next)
 }
 
 /// The answer of a strategy that prefers these pairs in this order: the admissible set they grow into.

@@ -8,6 +8,7 @@ use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
     bounded,
+    fours::Fours,
     grow::{admits, conclude, feasible, most_possible, so_far},
     orientation::Sense,
     pose::{fitted, share},
@@ -66,6 +67,7 @@ impl Search for InterpretationTree {
             problem,
             vertices: &vertices,
             volumes: &volumes,
+            fours: Fours::default(),
             levels: &levels,
             settings: self,
             enough,
@@ -87,6 +89,7 @@ struct Tree<'a> {
     problem: &'a Problem<'a>,
     vertices: &'a [Correspondence],
     volumes: &'a Volumes<'a>,
+    fours: Fours,
     levels: &'a [&'a [usize]],
     settings: &'a InterpretationTree,
     enough: usize,
@@ -106,7 +109,7 @@ impl Tree<'_> {
         }
         let sense = if self.settings.orientation { Sense::Proper } else { Sense::Any };
         for &vertex in self.levels[level] {
-            if admits(self.problem, self.vertices, self.volumes, sense, taken, vertex, &mut self.tests) {
+            if admits(self.volumes, &mut self.fours, sense, taken, vertex, &mut self.tests) {
                 taken.push(vertex);
                 self.descend(level + 1, taken);
                 taken.pop();

@@ -9,6 +9,7 @@ use super::{
     BUDGET, Identification, NEEDED, Search, Unidentified,
     association::vertices,
     bounded,
+    fours::Fours,
     grow::{admits, conclude, feasible, most_possible, so_far},
     orientation::Sense,
     volumes::Volumes,
@@ -69,6 +70,7 @@ impl Search for JointCompatibility {
             problem,
             vertices: &vertices,
             volumes: &volumes,
+            fours: Fours::default(),
             levels: &levels,
             settings: self,
             limits,
@@ -102,6 +104,7 @@ struct Run<'a> {
     problem: &'a Problem<'a>,
     vertices: &'a [Correspondence],
     volumes: &'a Volumes<'a>,
+    fours: Fours,
     levels: &'a [&'a [usize]],
     settings: &'a JointCompatibility,
     /// Quantiles of χ² by degrees of freedom.
@@ -125,7 +128,7 @@ impl Run<'_> {
         }
         let sense = if self.settings.orientation { Sense::Proper } else { Sense::Any };
         for &vertex in self.levels[level] {
-            if !admits(self.problem, self.vertices, self.volumes, sense, taken, vertex, &mut self.tests) {
+            if !admits(self.volumes, &mut self.fours, sense, taken, vertex, &mut self.tests) {
                 continue;
             }
             if let Some(longer) = self.joined(joint, taken, vertex) {

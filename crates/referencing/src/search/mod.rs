@@ -16,6 +16,7 @@ mod closest;
 mod complete_enumeration;
 mod consensus;
 mod edges;
+mod fours;
 mod gicp;
 mod gnc_tls;
 mod grow;

@@ -43,6 +43,15 @@ pub(crate) enum Sense {
 }
 
 impl Sense {
+    /// The sign of the product of a four's volumes in model and cloud that does not contradict it; `None` where nothing does.
+    pub(super) fn sign(self) -> Option<f64> {
+        match self {
+            Self::Any => None,
+            Self::Proper => Some(1.0),
+            Self::Mirrored => Some(-1.0),
+        }
+    }
+
     /// Whether four pairs contradict it.
     pub(crate) fn refuses(self, problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
         match self {

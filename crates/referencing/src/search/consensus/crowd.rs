@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
+
 use super::{
     graph::Graph,
     likelihood::{Mode, Terms},
@@ -26,8 +28,8 @@ const TWINS: f64 = 5.0;
 pub(in crate::search) struct Crowd {
     /// Of the cloud points looked up: their nearest neighbours by the square of the distance (m²), ascending.
     nearest: BTreeMap<usize, Vec<(f64, usize)>>,
-    /// Without a prior, which cloud points are candidates: the others are no clutter of this search. Empty where all count.
-    candidates: Vec<bool>,
+    /// The cloud points that count.
+    counted: Option<Counted>,
     /// The share of the candidates that have another within a distance (m), where two members of a pose were so near.
     twins: Option<(f64, f64)>,
 }
@@ -74,12 +76,9 @@ impl Crowd {
     /// By how much the density about the cloud point of a vertex exceeds what was expected (nats).
     fn cost(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, v: usize, members: &[usize]) -> f64 {
         let pair = graph.vertices[v];
-        if problem.prior.is_none() && self.candidates.is_empty() {
-            self.candidates = vec![false; problem.cloud.len()];
-            problem.candidates.lists.iter().flatten().for_each(|&j| self.candidates[j] = true);
-        }
-        let counts = |j: usize| self.candidates.get(j).is_none_or(|counts| *counts);
-        let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| nearest(problem, pair.cloud, counts));
+        let counted = self.counted.get_or_insert_with(|| Counted::of(problem));
+        let place = &problem.cloud[pair.cloud].position.at.coords;
+        let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| counted.nearest(pair.cloud, place));
         let Some(&(square, _)) = nearest.iter().filter(|(_, j)| !members.contains(j)).nth(NEIGHBOURS - 1) else {
             return 0.0;
         };
@@ -91,8 +90,7 @@ impl Crowd {
             Some(_) => terms.ln_density[pair.model],
             None => {
                 let own = problem.candidates.lists[pair.model].len().max(1);
-                terms.ln_density[pair.model]
-                    + libm::log(self.candidates.iter().filter(|&&counts| counts).count() as f64 / own as f64)
+                terms.ln_density[pair.model] + libm::log(counted.points.len() as f64 / own as f64)
             }
         };
         let times = libm::log(NEIGHBOURS as f64 / volume) - even;
@@ -132,29 +130,61 @@ fn twins(problem: &Problem<'_>, reach: f64) -> f64 {
     twin.iter().filter(|twin| **twin).count() as f64 / all.len() as f64
 }
 
-fn nearest(problem: &Problem<'_>, of: usize, counts: impl Fn(usize) -> bool) -> Vec<(f64, usize)> {
-    let at = &problem.cloud[of].position.at.coords;
-    let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(LOOKED_UP + 1);
-    let mut farthest = f64::INFINITY;
-    for (j, point) in problem.cloud.iter().enumerate() {
-        let square = (point.position.at.coords - at).norm_squared();
-        // Nothing is nearer than what is no number, and all is that is finite as long as few are known.
-        if !(square < farthest) || j == of || !counts(j) {
-            continue;
-        }
-        let place = nearest.partition_point(|(known, _)| *known <= square);
-        nearest.insert(place, (square, j));
-        nearest.truncate(LOOKED_UP);
-        if nearest.len() == LOOKED_UP {
-            farthest = nearest[LOOKED_UP - 1].0;
-        }
+/// The cloud points that are clutter where they are not the object's: without a prior the candidates, else all.
+struct Counted {
+    points: Vec<usize>,
+    /// Where they are, axis by axis.
+    places: [Vec<f64>; 3],
+    /// Squares of their distances from a place (m²).
+    squares: Vec<f64>,
+}
+
+impl Counted {
+    fn of(problem: &Problem<'_>) -> Self {
+        let mut points: Vec<usize> = match problem.prior {
+            Some(_) => (0..problem.cloud.len()).collect(),
+            None => problem.candidates.lists.iter().flatten().copied().collect(),
+        };
+        points.sort_unstable();
+        points.dedup();
+        let column = |axis: usize| points.iter().map(|&j| problem.cloud[j].position.at.coords[axis]).collect();
+        let places = std::array::from_fn(column);
+        Self { places, squares: vec![0.0; points.len()], points }
     }
-    nearest
+
+    /// The nearest neighbours of a cloud point, and the squares of their distances.
+    fn nearest(&mut self, of: usize, at: &Vector3<f64>) -> Vec<(f64, usize)> {
+        squares(&self.places, at, &mut self.squares);
+        let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(LOOKED_UP + 1);
+        let mut farthest = f64::INFINITY;
+        for (&square, &j) in self.squares.iter().zip(&self.points) {
+            // Nothing is nearer than what is no number, and all is that is finite as long as few are known.
+            if !(square < farthest) || j == of {
+                continue;
+            }
+            let place = nearest.partition_point(|(known, _)| *known <= square);
+            nearest.insert(place, (square, j));
+            nearest.truncate(LOOKED_UP);
+            if nearest.len() == LOOKED_UP {
+                farthest = nearest[LOOKED_UP - 1].0;
+            }
+        }
+        nearest
+    }
+}
+
+/// The squares of the distances of some places from one.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn squares([x, y, z]: &[Vec<f64>; 3], at: &Vector3<f64>, squares: &mut [f64]) {
+    for (square, ((x, y), z)) in squares.iter_mut().zip(x.iter().zip(y).zip(z)) {
+        let (x, y, z) = (x - at.x, y - at.y, z - at.z);
+        *square = x * x + y * y + z * z;
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Vector3};
+    use nalgebra::Matrix3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::{MeasuredPoint, UncertainPoint};

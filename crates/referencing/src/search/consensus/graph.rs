@@ -56,19 +56,23 @@ impl Graph {
         let mut lasts = vec![1 << 63; words];
         starts[1..].iter().for_each(|end| lasts[(end - 1) / 64] |= 1 << ((end - 1) % 64));
         let mut graph = Self { vertices, starts, lasts, clouds, rank, words, bits: vec![0; words * count], tests: 0 };
-        let turn = rough.known.as_ref().map_or(f64::MAX, |known| {
+        let turn = rough.known.as_ref().map(|known| {
             // Beyond the first order a turn by ω moves a point by ω²/2 of its lever.
             let turn = TURN_SIGMAS * known.attitude;
-            turn + 0.5 * turn * turn
+            (turn + 0.5 * turn * turn) as f32
         });
+        // A turn moves nothing by more than twice its lever.
+        let turn = turn.filter(|turn| *turn < 2.0);
         let extent = columns.at[..6].iter().flatten().fold(0.0f32, |most, x| most.max(x.abs()));
-        // Without a prior any turn is allowed; far beyond 2 it stays a finite number.
-        let gate = Gate { turn: turn.min(1e6) as f32, rounding: ROUNDING * extent };
+        let rounding = ROUNDING * extent;
         let mut row = vec![0; words];
         let twins = Twins::of(&graph.vertices, clouds);
         for a in 0..count {
             let from = graph.starts[graph.rank[a] as usize + 1];
-            compatible(&columns, a, from / 64, gate, &mut row);
+            match turn {
+                None => coherent(&columns, a, from / 64, rounding, &mut row),
+                Some(turn) => compatible(&columns, a, from / 64, (rounding, turn), &mut row),
+            }
             graph.tests += (count - from) as u64;
             graph.fill(problem, a, from, &row, &twins);
         }
@@ -132,22 +136,36 @@ impl Twins {
     }
 }
 
-#[derive(Clone, Copy)]
-struct Gate {
-    /// The greatest angle between two pairs (rad).
-    turn: f32,
-    /// What rounding may cost a distance (m).
-    rounding: f32,
+/// Marks the vertices whose distance to vertex `a` agrees, from word `from` on, where rounding may cost a distance so much (m).
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn coherent(columns: &Columns, a: usize, from: usize, rounding: f32, row: &mut [u64]) {
+    let chunks = |column: usize| columns.at[column][from * LANES..].as_chunks::<LANES>().0;
+    let [cx, cy, cz, mx, my, mz] = [0, 1, 2, 3, 4, 5].map(chunks);
+    let reaches = columns.reach[from * LANES..].as_chunks::<LANES>().0;
+    let here: [f32; 6] = std::array::from_fn(|column| columns.at[column][a]);
+    let reach = columns.reach[a] + rounding;
+    for (word, out) in row[from..].iter_mut().enumerate() {
+        let mut near = [0u8; LANES];
+        let (cx, cy, cz) = (&cx[word], &cy[word], &cz[word]);
+        let (mx, my, mz) = (&mx[word], &my[word], &mz[word]);
+        let reaches = &reaches[word];
+        for k in 0..LANES {
+            let measured = square([cx[k] - here[0], cy[k] - here[1], cz[k] - here[2]]);
+            let known = square([mx[k] - here[3], my[k] - here[4], mz[k] - here[5]]);
+            near[k] = u8::from(agree(known, measured, reach + reaches[k]));
+        }
+        *out = packed(&near);
+    }
 }
 
-/// Marks the vertices that pass the gate with vertex `a`, from word `from` on.
+/// The same, and whose offset from the prediction differs by no more than a turn by such an angle (rad) makes of the lever.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn compatible(columns: &Columns, a: usize, from: usize, gate: Gate, row: &mut [u64]) {
+fn compatible(columns: &Columns, a: usize, from: usize, (rounding, turn): (f32, f32), row: &mut [u64]) {
     let chunks = |column: usize| columns.at[column][from * LANES..].as_chunks::<LANES>().0;
     let [cx, cy, cz, mx, my, mz, ox, oy, oz] = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(chunks);
     let reaches = columns.reach[from * LANES..].as_chunks::<LANES>().0;
     let here: [f32; 9] = std::array::from_fn(|column| columns.at[column][a]);
-    let reach = columns.reach[a] + gate.rounding;
+    let reach = columns.reach[a] + rounding;
     for (word, out) in row[from..].iter_mut().enumerate() {
         let mut near = [0u8; LANES];
         let (cx, cy, cz) = (&cx[word], &cy[word], &cz[word]);
@@ -155,19 +173,28 @@ fn compatible(columns: &Columns, a: usize, from: usize, gate: Gate, row: &mut [u
         let (ox, oy, oz) = (&ox[word], &oy[word], &oz[word]);
         let reaches = &reaches[word];
         for k in 0..LANES {
-            let (x, y, z) = (cx[k] - here[0], cy[k] - here[1], cz[k] - here[2]);
-            let measured = (x * x + y * y + z * z).sqrt();
-            let (x, y, z) = (mx[k] - here[3], my[k] - here[4], mz[k] - here[5]);
-            let known = (x * x + y * y + z * z).sqrt();
-            let (x, y, z) = (ox[k] - here[6], oy[k] - here[7], oz[k] - here[8]);
-            let moved = x * x + y * y + z * z;
+            let measured = square([cx[k] - here[0], cy[k] - here[1], cz[k] - here[2]]);
+            let known = square([mx[k] - here[3], my[k] - here[4], mz[k] - here[5]]);
+            let moved = square([ox[k] - here[6], oy[k] - here[7], oz[k] - here[8]]);
             let tolerance = reach + reaches[k];
-            let turn = gate.turn * known + 2.0 * tolerance;
-            let turned = moved <= turn * turn;
-            near[k] = u8::from(((known - measured).abs() <= tolerance) & turned);
+            let most = turn * known.sqrt() + 2.0 * tolerance;
+            near[k] = u8::from(agree(known, measured, tolerance) & (moved <= most * most));
         }
         *out = packed(&near);
     }
+}
+
+/// The square of a length.
+#[inline(always)]
+fn square([x, y, z]: [f32; 3]) -> f32 {
+    x * x + y * y + z * z
+}
+
+/// Whether the roots of two squares A and B differ by r at most: A + B ≤ r² or (A − B)² ≤ r² (2 (A + B) − r²).
+#[inline(always)]
+fn agree(known: f32, measured: f32, tolerance: f32) -> bool {
+    let (sum, difference, r2) = (known + measured, known - measured, tolerance * tolerance);
+    (sum <= r2) | (difference * difference <= r2 * (2.0 * sum - r2))
 }
 
 impl Columns {
@@ -199,17 +226,18 @@ fn vertices(problem: &Problem<'_>) -> (Vec<Correspondence>, Vec<usize>) {
     let by =
         |a: &Vector3<f64>, b: &Vector3<f64>| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
     let lists = &problem.candidates.lists;
-    let mut order: Vec<usize> = (0..lists.len()).filter(|&i| !lists[i].is_empty()).collect();
-    order.sort_by(|&i, &k| {
-        let at = |i: usize| &problem.model[i].at.coords;
-        lists[i].len().cmp(&lists[k].len()).then_with(|| by(at(i), at(k))).then(i.cmp(&k))
+    let at = |i: usize| &problem.model[i].at.coords;
+    let listed = lists.iter().enumerate().filter(|(_, list)| !list.is_empty());
+    let mut order: Vec<(usize, f64, usize)> = listed.map(|(i, list)| (list.len(), at(i).x, i)).collect();
+    order.sort_unstable_by(|(few, near, i), (many, far, k)| {
+        few.cmp(many).then(near.total_cmp(far)).then_with(|| by(at(*i), at(*k))).then(i.cmp(k))
     });
     let (mut vertices, mut starts) = (Vec::with_capacity(problem.candidates.pairs()), vec![0]);
-    for model in order {
+    for (_, _, model) in order {
         let begin = vertices.len();
         vertices.extend(lists[model].iter().map(|&cloud| Correspondence { model, cloud }));
         let at = |pair: &Correspondence| &problem.cloud[pair.cloud].position.at.coords;
-        vertices[begin..].sort_by(|a, b| by(at(a), at(b)).then(a.cloud.cmp(&b.cloud)));
+        vertices[begin..].sort_unstable_by(|a, b| by(at(a), at(b)).then(a.cloud.cmp(&b.cloud)));
         starts.push(vertices.len());
     }
     (vertices, starts)

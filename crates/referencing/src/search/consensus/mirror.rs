@@ -5,9 +5,11 @@ use std::{cell::Cell, collections::BTreeSet};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
+    super::edges::{LANES, packed},
     Motion,
+    bits::ones,
     graph::Graph,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, Term, Terms},
     modes::Climb,
     rough::Rough,
 };
@@ -51,6 +53,7 @@ pub(in crate::search) fn mirror_image(
     let of_all = reflected(&mode.motion, &centre, &normal);
     image(&mode.members, &of_all).or_else(|| {
         let most = (graph.vertices.len() / PAIRS_A_THREE).clamp(1, MOST_THREES);
+        let places = Places::of(terms);
         let mut largest: Option<(Vec<usize>, Motion)> = None;
         for three in threes(&mode.members, most) {
             let model = three.map(|v| &terms.pairs[v].model);
@@ -58,7 +61,7 @@ pub(in crate::search) fn mirror_image(
             let motion = Motion::of_three(model, three.map(|v| &terms.pairs[v].cloud)).zip(normal.try_normalize(0.0));
             let Some(motion) = motion.map(|(motion, normal)| reflected(&motion, model[0], &normal)) else { continue };
             let known = largest.as_ref().map_or(mode.members.len(), |(members, _)| members.len());
-            largest = near(terms, graph, &motion, known).map(|members| (members, motion)).or(largest);
+            largest = near(terms, graph, &places, &motion, known).map(|members| (members, motion)).or(largest);
         }
         largest.and_then(|(members, motion)| image(&members, &motion))
     })
@@ -80,24 +83,74 @@ fn threes(members: &[usize], most: usize) -> impl Iterator<Item = [usize; 3]> {
     all.into_iter().step_by(step)
 }
 
-/// Of each model point the pair that fits a motion best, if it fits it roughly; `None` as soon as they cannot be `more_than` so many.
-fn near(terms: &Terms, graph: &Graph, motion: &Motion, more_than: usize) -> Option<Vec<usize>> {
-    let ranks = graph.starts.len() - 1;
-    let mut near = Vec::new();
-    for (rank, range) in graph.starts.windows(2).enumerate() {
-        if near.len() + ranks - rank <= more_than {
-            return None;
-        }
-        let place = motion.apply(&terms.pairs[range[0]].model);
-        let fits = (range[0]..range[1]).filter_map(|v| {
-            let pair = &terms.pairs[v];
-            let off = pair.cloud - place;
-            // χ² is no less than that of the greatest variance.
-            (off.norm_squared() <= LOOSE * pair.variance).then(|| (pair.distance(&off), v))
-        });
-        near.extend(fits.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(d2, _)| *d2 <= LOOSE).map(|(_, v)| v));
+/// Of each model point the pair that fits a motion best, if it fits it roughly; `None` where these are not `more_than` so many.
+fn near(terms: &Terms, graph: &Graph, places: &Places, motion: &Motion, more_than: usize) -> Option<Vec<usize>> {
+    let mut within = Vec::new();
+    within_reach(places, motion, &mut within);
+    if within.iter().map(|word| word.count_ones() as usize).sum::<usize>() <= more_than {
+        return None;
     }
-    (near.len() > more_than).then_some(near)
+    let mut best: Vec<(f64, usize)> = Vec::new();
+    for v in ones(&within, 0) {
+        let pair = &terms.pairs[v];
+        let d2 = pair.distance(&(pair.cloud - motion.apply(&pair.model)));
+        if !(d2 <= LOOSE) {
+            continue;
+        }
+        match best.last_mut() {
+            Some(last) if graph.rank[last.1] == graph.rank[v] => {
+                if d2 < last.0 {
+                    *last = (d2, v);
+                }
+            }
+            _ => best.push((d2, v)),
+        }
+    }
+    (best.len() > more_than).then(|| best.into_iter().map(|(_, v)| v).collect())
+}
+
+/// Where each pair's points are in model and cloud, axis by axis, and how far (m²) its cloud point may be from where a motion puts
+/// its model point; in whole words, filled up with what is within reach of nothing.
+struct Places {
+    at: [Vec<f64>; 6],
+    reach2: Vec<f64>,
+}
+
+impl Places {
+    fn of(terms: &Terms) -> Self {
+        let whole = terms.pairs.len().next_multiple_of(LANES);
+        let filled = |value: &dyn Fn(&Term) -> f64| {
+            let mut column: Vec<f64> = terms.pairs.iter().map(value).collect();
+            column.resize(whole, f64::NAN);
+            column
+        };
+        // χ² is no less than that of the greatest variance.
+        Self {
+            at: std::array::from_fn(|axis| {
+                filled(&|pair| if axis < 3 { pair.model[axis] } else { pair.cloud[axis - 3] })
+            }),
+            reach2: filled(&|pair| LOOSE * pair.variance),
+        }
+    }
+}
+
+/// The pairs within reach of a motion, one bit each.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn within_reach(places: &Places, motion: &Motion, within: &mut Vec<u64>) {
+    let [mx, my, mz, cx, cy, cz] = places.at.each_ref().map(|column| column.as_chunks::<LANES>().0);
+    let (r, t) = (&motion.rotation, &motion.translation);
+    for (word, reach2) in places.reach2.as_chunks::<LANES>().0.iter().enumerate() {
+        let (mx, my, mz, cx, cy, cz) = (&mx[word], &my[word], &mz[word], &cx[word], &cy[word], &cz[word]);
+        let mut near = [0u8; LANES];
+        for k in 0..LANES {
+            let off = |row: usize, measured: f64| {
+                measured - (r[(row, 0)] * mx[k] + r[(row, 1)] * my[k] + r[(row, 2)] * mz[k] + t[row])
+            };
+            let (x, y, z) = (off(0, cx[k]), off(1, cy[k]), off(2, cz[k]));
+            near[k] = u8::from(x * x + y * y + z * z <= reach2[k]);
+        }
+        within.push(packed(&near));
+    }
 }
 
 #[cfg(test)]
