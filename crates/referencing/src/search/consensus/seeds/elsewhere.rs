@@ -1,0 +1,71 @@
+//! Poses beside one that is known.
+
+use super::{
+    super::{
+        bits::{intersect, is_set, ones},
+        graph::Graph,
+        likelihood::{Mode, Terms},
+    },
+    LEAST, Seeds,
+};
+
+/// Beginnings of a pose that is sought whatever it is worth, and vertices compared for each.
+const BEGINNINGS: usize = 8;
+const COMPARED_BEGINNINGS: usize = 512;
+
+impl Seeds<'_> {
+    /// Only pairs that contradict a pose begin another.
+    pub(in crate::search) fn contradicting(mut self, pose: &Mode) -> Self {
+        self.free = contradicting(self.climb.terms, self.climb.graph, pose, false);
+        self
+    }
+
+    /// A pose of three pairs that contradict this one, and what joins them: begun at the pairs that most others agree with,
+    /// whatever it is worth. `None` where no three of them agree.
+    pub(in crate::search) fn elsewhere(mut self, than: &Mode) -> Option<Mode> {
+        let graph = self.climb.graph;
+        self.free = contradicting(self.climb.terms, graph, than, true);
+        let free = std::mem::take(&mut self.free);
+        let (mut row, mut common) = (vec![0; free.len()], vec![0; free.len()]);
+        for a in self.best_connected(&free, &free, BEGINNINGS) {
+            intersect(graph.row(a), &free, &graph.lasts, 0, &mut row);
+            let Some(&b) = self.best_connected(&row, &row, 1).first() else { continue };
+            intersect(&row, graph.row(b), &graph.lasts, 0, &mut common);
+            let Some(&c) = self.best_connected(&common, &common, 1).first() else { continue };
+            let after = graph.rank[c] as usize + 1;
+            self.of_three = ones(&common, graph.starts[after]).filter(|&v| is_set(graph.row(c), v)).collect();
+            self.follow([a, b, c], 0.0);
+            let shared = |mode: &Mode| mode.members.iter().filter(|&&v| than.holds(v)).count();
+            self.modes.retain(|mode| shared(mode) < LEAST);
+            if !self.modes.is_empty() {
+                break;
+            }
+        }
+        self.modes.into_iter().next()
+    }
+
+    /// Of some vertices, taken evenly where they are many, those with the most later neighbours among others.
+    fn best_connected(&self, of: &[u64], among: &[u64], most: usize) -> Vec<usize> {
+        let graph = self.climb.graph;
+        let all: Vec<usize> = ones(of, 0).collect();
+        let neighbours =
+            |v: usize| -> u32 { graph.row(v).iter().zip(among).map(|(row, other)| (row & other).count_ones()).sum() };
+        let some = all.iter().step_by(all.len().div_ceil(COMPARED_BEGINNINGS).max(1));
+        let mut counted: Vec<(u32, usize)> = some.map(|&v| (neighbours(v), v)).collect();
+        counted.sort_unstable_by_key(|&(count, v)| (std::cmp::Reverse(count), v));
+        counted.into_iter().take(most).map(|(_, v)| v).collect()
+    }
+}
+
+/// The pairs that a pose does not explain, one bit each; `free` ones only, if their cloud point is in none of its pairs either.
+fn contradicting(terms: &Terms, graph: &Graph, pose: &Mode, free: bool) -> Vec<u64> {
+    let mut taken: Vec<usize> = pose.members.iter().map(|&v| graph.vertices[v].cloud).collect();
+    taken.sort_unstable();
+    let mut bits = vec![0; graph.vertices.len().div_ceil(64)];
+    for (v, pair) in graph.vertices.iter().enumerate() {
+        if (!free || taken.binary_search(&pair.cloud).is_err()) && terms.of_pair(v, &pose.motion).is_none() {
+            bits[v / 64] |= 1 << (v % 64);
+        }
+    }
+    bits
+}

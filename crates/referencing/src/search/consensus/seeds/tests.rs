@@ -1,0 +1,61 @@
+use nalgebra::Rotation3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{MeasuredPoint, UncertainPoint};
+
+use super::*;
+use crate::{Candidates, Problem, Tolerance};
+
+const POINTS: usize = 9;
+const SEEN: usize = 6;
+
+/// A whole copy of the object, the first points of another, and clutter.
+fn scene(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>) {
+    let mut place = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+    let model: Vec<ModelPoint> = (0..POINTS).map(|_| ModelPoint::exact("", place(1.0).into())).collect();
+    let copies = [(POINTS, place(0.5)), (SEEN, place(0.5))];
+    let mut at = Vec::new();
+    for (seen, turn) in copies {
+        let (turn, shift) = (Rotation3::from_scaled_axis(turn), place(0.4));
+        at.extend(model[..seen].iter().map(|point| turn * point.at.coords + shift + place(0.01)));
+    }
+    at.extend((0..30).map(|_| place(1.5)));
+    let measured =
+        |at: &Vector3<f64>| MeasuredPoint { position: UncertainPoint::isotropic((*at).into(), 0.01), pixels: None };
+    let cloud = at.iter().map(measured).collect();
+    (model, cloud)
+}
+
+/// What the points beside the whole copy show: to a sweep of all, to one in which the rest of the copy is a part of a whole without
+/// limits, and to one that may not follow parts.
+///
+/// Seen to fail where the pairs of parts are not followed, and where it is not told that they were not.
+#[test]
+fn a_part_is_found_where_there_are_no_limits_and_a_whole_in_any_case() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    for _ in 0..10 {
+        let (model, cloud) = scene(&mut rng);
+        let candidates = Candidates::all(POINTS, cloud.len());
+        let tolerance = Tolerance::Fixed(0.06);
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let rough = Rough::of(&problem).expect("a box");
+        let graph = Graph::of(&problem, &rough);
+        let terms = Terms::of(&problem, &rough, &graph);
+        let seeds = |taken, least| Seeds::new(&model, (&terms, &rough, &graph), taken, (least, 3.0), u64::MAX / 4);
+        let clouds = |swept: &Swept| -> Vec<usize> {
+            let best = swept.modes.first().map(|mode| mode.pairs(&graph)).unwrap_or_default();
+            best.iter().map(|pair| pair.cloud).collect()
+        };
+        let (none, whole): (_, BTreeSet<usize>) = (BTreeSet::new(), (0..POINTS).collect());
+        let part: Vec<usize> = (POINTS..POINTS + SEEN).collect();
+        let plain = seeds(&whole, LEAST).sweep();
+        let unlimited = seeds(&whole, LEAST).with_parts(SEEN + 2, u64::MAX, u64::MAX / 4).sweep();
+        assert_eq!((clouds(&plain), clouds(&unlimited)), (part.clone(), part));
+        assert!(plain.complete && unlimited.complete && unlimited.parts);
+        let wholes = seeds(&whole, LEAST).with_parts(SEEN + 2, 1, 0).sweep();
+        assert!(wholes.complete && !wholes.parts);
+        let all = seeds(&none, LEAST).with_parts(SEEN + 2, 1, 0).sweep();
+        assert_eq!(clouds(&all), (0..POINTS).collect::<Vec<_>>());
+        assert!(all.complete && all.tests < seeds(&none, LEAST).sweep().tests);
+    }
+}
