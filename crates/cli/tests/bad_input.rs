@@ -686,6 +686,75 @@ fn a_bad_problem_among_good_ones() {
     assert_eq!(lines[1]["outcome"], "referenced", "{}", lines[1]);
 }
 
+const PROBLEM: &str = r#"{"format": "coherence-problem/1", "id": "t",
+"model": [[0,0,0],[1,0,0],[0,2,0],[0,0,3]],
+"cloud": [[0,0,5],[1,0,5],[0,2,5],[0,0,8]],
+"sigma": 0.001, "delta": 0.01, "prior": null, "putative": null}"#;
+
+/// Each of these changes of a good problem is one line with the element, its place, the value and what to give: of `solve` an
+/// error, of `check` a finding.
+#[test]
+fn problems_that_cannot_be() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("p.json");
+    for (from, to, expected) in [
+        ("[1,0,5]", "[1,\"x\",5]", "`cloud[1][1]` is no number in p.json:3:22: \"x\"; give a number, in metres"),
+        ("[1,0,5]", "[1,NaN,5]", "`cloud[1][1]`: NaN is no JSON number in p.json:3:22; give a number, in metres"),
+        ("[1,0,5]", "[1,5]", "`cloud[1]` has 2 values in p.json:3:19: [1,5]; give three numbers x y z, in metres"),
+        ("\"delta\": 0.01, ", "", "`delta` is missing in p.json:1:1; give the tolerance of distances"),
+        ("0.01", "1e300", "`delta` is out of range in p.json:4:26: 1e300; allowed: above 0"),
+        (
+            "\"putative\": null",
+            "\"putative\": [[0,-1]]",
+            "`putative[0][1]` is no index in p.json:4:63: -1; give a whole",
+        ),
+        ("null}", "null}\nmore", "something after the end of the problem in p.json:5:1: more; give one problem a file"),
+    ] {
+        assert!(PROBLEM.contains(from), "no {from}");
+        fs::write(&file, PROBLEM.replacen(from, to, 1)).unwrap();
+        for (command, start, code) in [("solve", "error: ", 3), ("check", "fault: ", 1)] {
+            let output = Command::cargo_bin("seafix").unwrap().arg(command).arg(&file).output().unwrap();
+            let said = String::from_utf8(output.stdout).unwrap().replace(folder.path().to_str().unwrap(), "");
+            assert_eq!((output.status.code(), said.lines().count()), (Some(code), 1), "{said}");
+            assert!(said.replace("/p.json", "p.json").starts_with(&format!("{start}{expected}")), "{expected}\n{said}");
+        }
+    }
+}
+
+/// What is legal and hardly meant is told by `check`, and is no finding.
+#[test]
+fn problems_that_are_hardly_meant() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("p.json");
+    let prior = r#""prior": {"T_cam_obj": [[1,0,0,0],[0,1,0,0],[0,0,1,-9],[0,0,0,1]], "shell_half_m": 0.5}"#;
+    for (from, to, expected) in [
+        ("\"sigma\"", "\"sigma\"", ""),
+        (
+            "[[0,0,5],[1,0,5],[0,2,5],[0,0,8]]",
+            "[[0,0,5]]",
+            "the cloud has too few points in p.json: 1 point; a pose needs",
+        ),
+        ("0.001", "1", "`delta` is far below the noise in p.json: Δ = 0.01 m, σ = 1 m; "),
+        (
+            "\"prior\": null",
+            prior,
+            "the prior puts the whole object behind the camera in p.json: its foremost point has z = -6 m; ",
+        ),
+    ] {
+        assert!(PROBLEM.contains(from), "no {from}");
+        fs::write(&file, PROBLEM.replacen(from, to, 1)).unwrap();
+        let output = Command::cargo_bin("seafix").unwrap().arg("check").arg(&file).output().unwrap();
+        let said = String::from_utf8(output.stdout).unwrap().replace(folder.path().to_str().unwrap(), "");
+        let said = said.replace("/p.json", "p.json");
+        let warned = if expected.is_empty() {
+            said == "p.json: in order\n"
+        } else {
+            said.contains(&format!("warning: {expected}"))
+        };
+        assert!(output.status.code() == Some(0) && warned, "{expected}\n{said}");
+    }
+}
+
 #[test]
 fn an_unknown_search_of_solve() {
     refused(&["solve", "--search", "maximum-click", "x.json"], 2, &["did you mean `maximum-clique`?"]);

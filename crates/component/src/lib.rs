@@ -55,4 +55,4 @@ pub use registry::{
 };
 pub use suggest::{nearest, unknown};
 pub use text::{read_long_text, read_text};
-pub use words::plain;
+pub use words::{counted, number, plain};

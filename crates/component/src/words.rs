@@ -1,6 +1,32 @@
-//! What the reader of TOML says of a value, in the words of whoever writes the file.
+//! Words and numbers of a message, as whoever writes the file would put them.
 
 use crate::nearest;
+
+/// So many of a thing: `1 point`, `2 points`.
+///
+/// ```
+/// assert_eq!([0, 1, 2].map(|n| seafix_component::counted(n, "point")), ["0 points", "1 point", "2 points"]);
+/// ```
+pub fn counted(n: usize, one: &str) -> String {
+    format!("{n} {one}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A number to four decimals or digits, without zeros at its end; a very large or small one with a power of ten.
+///
+/// ```
+/// assert_eq!([0.0, -3.0, 1.23456, 0.04, 0.0034921].map(seafix_component::number), ["0", "-3", "1.2346", "0.04", "0.003492"]);
+/// assert_eq!([1e300, 0.00012345, f64::NAN].map(seafix_component::number), ["1e300", "1.2345e-4", "NaN"]);
+/// ```
+pub fn number(x: f64) -> String {
+    let short = |text: String| text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    match x.abs() {
+        size if size == 0.0 || (0.1..1e6).contains(&size) => return short(format!("{x:.4}")),
+        size if (1e-3..0.1).contains(&size) => return short(format!("{x:.6}")),
+        _ => {}
+    }
+    let text = format!("{x:.4e}");
+    text.split_once('e').map_or(text.clone(), |(digits, power)| format!("{}e{power}", short(digits.to_owned())))
+}
 
 /// The message of a deserialiser without names of Rust's types: `expected u64` becomes `expected a whole number, at least 0`.
 ///

@@ -2,8 +2,10 @@
 
 mod answer;
 mod input;
+mod json;
 #[cfg(test)]
 mod tests;
+mod warnings;
 
 pub use answer::{Answer, Estimate, Levels, Line, Method, OtherPose, Support, answer, solve_file};
 pub use input::{CoherenceProblem, FORMAT, read};

@@ -1,7 +1,7 @@
 //! Searches: which cloud points are which model points.
 
 use rand::Rng;
-use seafix_component::{Registry, entry, in_range};
+use seafix_component::{Registry, counted, entry, in_range};
 
 use crate::{Correspondence, Problem};
 
@@ -100,7 +100,7 @@ impl Identification {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unidentified {
     /// Fewer than three model points have a candidate.
-    #[error("{with_candidates} model points have a candidate; a pose needs {needed}")]
+    #[error("{} with a candidate; a pose needs {needed}", counted(*.with_candidates, "model point"))]
     TooFew {
         /// Model points with at least one candidate.
         with_candidates: usize,
@@ -108,7 +108,7 @@ pub enum Unidentified {
         needed: usize,
     },
     /// The largest coherent set is too small.
-    #[error("the largest coherent set has {best} points; {needed} are needed")]
+    #[error("the largest coherent set has {}; {needed} are needed", counted(*.best, "point"))]
     NoConsensus {
         /// Size of the largest set.
         best: usize,
@@ -117,7 +117,8 @@ pub enum Unidentified {
     },
     /// The search ended before it could answer.
     #[error(
-        "the budget of {budget} pair tests, or as much other work, ended; best so far {best} points, at most {bound} are possible"
+        "the budget of {budget} pair tests, or as much other work, ended; best so far {}, at most {bound} are possible",
+        counted(*.best, "point")
     )]
     Budget {
         /// The budget (pair tests, or what the search counts in place of them).

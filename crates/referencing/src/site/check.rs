@@ -3,7 +3,7 @@
 use std::{collections::HashMap, path::Path};
 
 use nalgebra::Vector3;
-use seafix_component::{Fault, line_of, nearest};
+use seafix_component::{Fault, counted, line_of, nearest};
 use seafix_geometry::{Object, Point, World, triad};
 
 use super::{
@@ -141,7 +141,7 @@ fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Opti
     check.unique(&format!("{of}: interest"), raw.interest.iter().map(|point| point.id.as_str()), item("interest"));
     if raw.points.len() < 3 {
         let fault = check.at(format!("{of} has too few points"), &["object", &number]);
-        check.fault(fault.value(format!("{} points", raw.points.len())).remedy("a pose needs at least three"));
+        check.fault(fault.value(counted(raw.points.len(), "point")).remedy("a pose needs at least three"));
     }
     let mut base = Vec::new();
     for name in &raw.base {
@@ -233,7 +233,7 @@ fn spread(check: &mut Checker<'_>, points: &[ModelPoint], of: &str, number: &str
     let extent = diameter(points);
     let fault = check
         .at(format!("{of}: units?"), &["object", number])
-        .value(format!("its points lie within {extent} m of each other"))
+        .value(format!("its points lie within {} m of each other", seafix_component::number(extent)))
         .remedy("coordinates are in metres");
     if !(IMPOSSIBLE[0]..=IMPOSSIBLE[1]).contains(&extent) {
         check.fault(fault);

@@ -1,0 +1,335 @@
+//! The problem as JSON: what its keys hold, and in which words a text that is not so is refused.
+
+use std::{fmt, marker::PhantomData, path::Path};
+
+use seafix_component::{Fault, counted, nearest, place_at};
+use serde::{
+    Deserialize, Deserializer,
+    de::{IgnoredAny, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
+};
+use serde_json::value::RawValue;
+use serde_path_to_error::Segment;
+
+use super::FORMAT;
+
+/// The keys of a problem, not yet checked.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Raw {
+    pub(super) format: String,
+    #[serde(default)]
+    pub(super) id: Option<String>,
+    #[serde(default, rename = "family")]
+    _family: IgnoredAny,
+    #[serde(default, rename = "seed_set")]
+    _seed_set: IgnoredAny,
+    #[serde(default, rename = "seed")]
+    _seed: IgnoredAny,
+    pub(super) model: Vec<[f64; 3]>,
+    pub(super) cloud: Vec<[f64; 3]>,
+    pub(super) sigma: f64,
+    #[serde(default)]
+    pub(super) sigma_xyz: Option<Vec<[f64; 3]>>,
+    pub(super) delta: f64,
+    #[serde(default)]
+    pub(super) prior: Option<InBraces<RawPrior>>,
+    #[serde(default)]
+    pub(super) putative: Option<Vec<[usize; 2]>>,
+}
+
+/// The keys of a rough pose, not yet checked.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawPrior {
+    #[serde(rename = "T_cam_obj")]
+    pub(super) t_cam_obj: [[f64; 4]; 4],
+    pub(super) shell_half_m: f64,
+}
+
+/// What is read of an object alone: a list of the values without their keys would pass for one otherwise.
+pub(super) struct InBraces<T>(pub(super) T);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for InBraces<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Keys<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Keys<T> {
+            type Value = T;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
+                T::deserialize(MapAccessDeserializer::new(map))
+            }
+        }
+        deserializer.deserialize_map(Keys(PhantomData)).map(Self)
+    }
+}
+
+/// The text of a problem and the file it is from: faults are placed by both.
+///
+/// A path leads to a value: keys, and of lists numbers, `["cloud", "3", "1"]`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Source<'a> {
+    pub(super) text: &'a str,
+    pub(super) file: &'a Path,
+}
+
+/// A path, and what the reader says of the value there.
+type Wrong = (Vec<String>, serde_json::Error);
+
+impl<'a> Source<'a> {
+    /// The keys of the problem.
+    ///
+    /// # Errors
+    /// Another format, or the first thing that is not JSON, or not what its key holds.
+    pub(super) fn read(self) -> Result<Raw, Fault> {
+        // A path costs time; it is followed only where something is wrong.
+        let read = serde_json::from_str(self.text).map(|InBraces(raw)| raw);
+        let raw = read.or_else(|_| self.follow()).map_err(|(path, error)| {
+            let path: Vec<&str> = path.iter().map(String::as_str).collect();
+            // Another format has other keys.
+            let format =
+                value_at(self.text, &["format"]).and_then(|format| serde_json::from_str::<String>(format).ok());
+            match format.filter(|format| format != FORMAT) {
+                Some(other) => self.unknown_format(&other),
+                None => self.wrong(&path, &error),
+            }
+        })?;
+        if raw.format == FORMAT { Ok(raw) } else { Err(self.unknown_format(&raw.format)) }
+    }
+
+    /// The same, with the path to what is wrong.
+    fn follow(self) -> Result<Raw, Wrong> {
+        let mut reader = serde_json::Deserializer::from_str(self.text);
+        let InBraces(raw) = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+            let steps = error.path().iter().map_while(|step| match step {
+                Segment::Seq { index } => Some(index.to_string()),
+                Segment::Map { key } => Some(key.clone()),
+                _ => None,
+            });
+            (steps.collect(), error.into_inner())
+        })?;
+        reader.end().map_err(|error| (Vec::new(), error))?;
+        Ok(raw)
+    }
+
+    /// The fault `what` of the value at `path`, with its place and as it is written.
+    pub(super) fn fault(self, what: impl Into<String>, path: &[&str]) -> Fault {
+        let fault = Fault::new(what, self.file);
+        match value_at(self.text, path) {
+            Some(value) => fault.at(Some(self.place(value))).value(shortened(value)),
+            None => fault,
+        }
+    }
+
+    fn unknown_format(self, format: &str) -> Fault {
+        let fault = self.fault("unknown format", &["format"]).value(format!("`{format}`"));
+        fault.remedy(format!("this reader knows `{FORMAT}`"))
+    }
+
+    /// Line and column of a part of the text.
+    fn place(self, part: &str) -> (usize, usize) {
+        place_at(self.text, part.as_ptr() as usize - self.text.as_ptr() as usize)
+    }
+
+    /// What the reader of JSON found wrong at `path`.
+    fn wrong(self, path: &[&str], error: &serde_json::Error) -> Fault {
+        let full = error.to_string();
+        let tail = format!(" at line {} column {}", error.line(), error.column());
+        let message = full.strip_suffix(&tail).unwrap_or(&full);
+        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        let about = |what: &str| message.starts_with(what);
+        if let (true, Some((key, known))) = (about("unknown field"), quoted.split_first()) {
+            let remedy = match nearest(key, known.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("there are {}", known.join(", ")),
+            };
+            return self.of_key("unknown key", key, error).value(format!("`{key}`")).remedy(remedy);
+        }
+        if let (true, Some(key)) = (about("duplicate field"), quoted.first()) {
+            return self.of_key("a key that is there twice", key, error).value(format!("`{key}`")).remedy("keep one");
+        }
+        if let (true, Some(key)) = (about("missing field"), quoted.first()) {
+            let path = [path, &[*key]].concat();
+            let within = value_at(self.text, &path[..path.len() - 1]).unwrap_or(self.text);
+            let fault = Fault::new(format!("`{}` is missing", name(&path)), self.file);
+            return fault.at(Some(self.place(within))).remedy(form(&path).1);
+        }
+        let value = value_at(self.text, path);
+        let length = |value: &str| serde_json::from_str::<Vec<IgnoredAny>>(value).map_or(0, |values| values.len());
+        if let (true, Some(value)) = (about("invalid length") || about("trailing characters"), value)
+            && !path.is_empty()
+        {
+            let what = format!("`{}` has {}", name(path), counted(length(value), "value"));
+            return self.fault(what, path).remedy(form(path).1);
+        }
+        let typed = ["invalid type", "invalid value", "invalid length", "number out of range"];
+        if typed.iter().any(|start| about(start)) {
+            let (noun, remedy) = form(path);
+            let what = match path {
+                [] => format!("no {noun}"),
+                path if about("number out of range") => format!("`{}` is beyond all numbers", name(path)),
+                path => format!("`{}` is no {noun}", name(path)),
+            };
+            // Where the text is not JSON further on, the value is what was read last.
+            let read = value.is_none() || path.is_empty();
+            return if read { self.near(what, error) } else { self.fault(what, path) }.remedy(remedy);
+        }
+        self.no_json(path, message, error)
+    }
+
+    /// A text that is no JSON.
+    fn no_json(self, path: &[&str], message: &str, error: &serde_json::Error) -> Fault {
+        let (noun, remedy) = form(path);
+        let at = |what: &str| match path {
+            [] => what.to_owned(),
+            path => format!("`{}`: {what}", name(path)),
+        };
+        let near = |what: &str| self.near(at(what), error);
+        if self.text.trim().is_empty() {
+            return Fault::new("an empty file", self.file).remedy(remedy);
+        }
+        match message {
+            "expected value" | "expected ident" | "invalid number" => {
+                let word = self.word(error);
+                if ["nan", "inf", "infinity"].contains(&word.trim_start_matches(['+', '-']).to_lowercase().as_str()) {
+                    let fault = Fault::new(at(&format!("{word} is no JSON number")), self.file);
+                    return fault.at(Some(self.place(word))).remedy(remedy);
+                }
+                near(if noun == "number" { "no JSON number" } else { "no JSON value" }).remedy(remedy)
+            }
+            message if message.starts_with("EOF") => {
+                near("the file ends too early").value("").remedy("it seems to be cut off; write it again")
+            }
+            "trailing comma" => near("a comma before the end").remedy("remove it"),
+            "key must be a string" => near("a key without double quotes").remedy("put it in double quotes"),
+            "trailing characters" if path.is_empty() => {
+                near("something after the end of the problem").remedy("give one problem a file")
+            }
+            "trailing characters" => near("expected `,` or `]`").remedy(remedy),
+            message => near(message).remedy(format!("give `{FORMAT}` as JSON")),
+        }
+    }
+
+    /// The fault `what` of a key that was just read.
+    fn of_key(self, what: &str, key: &str, error: &serde_json::Error) -> Fault {
+        let end = self.offset(error);
+        let start = end.saturating_sub(key.len() + 1);
+        let opens = self.text.as_bytes().get(start) == Some(&b'"');
+        Fault::new(what, self.file).at(Some(place_at(self.text, if opens { start } else { end })))
+    }
+
+    /// The fault `what` of the word at which the reader stopped.
+    fn near(self, what: String, error: &serde_json::Error) -> Fault {
+        let word = self.word(error);
+        Fault::new(what, self.file).at(Some(self.place(word))).value(shortened(word))
+    }
+
+    /// The byte at which the reader stopped.
+    fn offset(self, error: &serde_json::Error) -> usize {
+        let before = self.text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum::<usize>();
+        let mut at = (before + error.column().saturating_sub(1)).min(self.text.len());
+        while !self.text.is_char_boundary(at) {
+            at -= 1;
+        }
+        at
+    }
+
+    /// The word or number at which the reader stopped; where there is none, the letter.
+    fn word(self, error: &serde_json::Error) -> &'a str {
+        let (before, after) = self.text.split_at(self.offset(error));
+        let in_word = |c: char| c.is_alphanumeric() || "+-._".contains(c);
+        let start = before.trim_end_matches(in_word).len();
+        let end = self.text.len() - after.trim_start_matches(in_word).len();
+        let letter = after.chars().next().map_or(0, char::len_utf8);
+        &self.text[start..if end > start { end } else { start + letter }]
+    }
+}
+
+/// The value at `path` of a JSON text, as it is written.
+fn value_at<'t>(text: &'t str, path: &[&str]) -> Option<&'t str> {
+    let Some((step, rest)) = path.split_first() else { return Some(text.trim()) };
+    let value = serde_json::Deserializer::from_str(text).deserialize_any(Step(step)).ok()??;
+    value_at(value.get(), rest)
+}
+
+/// Keeps the first value of a key, or the value of a number in a list, and skips the others.
+struct Step<'p>(&'p str);
+
+impl<'de> Visitor<'de> for Step<'_> {
+    type Value = Option<&'de RawValue>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a list or an object")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+        let before = self.0.parse().unwrap_or(usize::MAX);
+        for _ in 0..before {
+            if list.next_element::<IgnoredAny>()?.is_none() {
+                return Ok(None);
+            }
+        }
+        let found = list.next_element()?;
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(found)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<Self::Value, A::Error> {
+        let mut found = None;
+        while let Some(key) = object.next_key::<String>()? {
+            if key == self.0 && found.is_none() {
+                found = Some(object.next_value()?);
+            } else {
+                object.next_value::<IgnoredAny>()?;
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// A value on one line; what is long is cut when it is printed, and need not be copied before.
+fn shortened(value: &str) -> String {
+    let start: String = value.chars().take(1000).collect();
+    start.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// A path as it is told: `cloud[3][1]`.
+fn name(path: &[&str]) -> String {
+    path.iter().fold(String::new(), |name, step| match step.parse::<usize>() {
+        Ok(index) => format!("{name}[{index}]"),
+        Err(_) if name.is_empty() => (*step).to_owned(),
+        Err(_) => format!("{name}.{step}"),
+    })
+}
+
+/// What the value at `path` must be, and what to give there.
+fn form(path: &[&str]) -> (&'static str, &'static str) {
+    match path {
+        ["format"] => ("text", "give \"coherence-problem/1\""),
+        ["id"] => ("text", "give a name in double quotes, or null"),
+        ["model"] => {
+            ("list of points", "give the feature points in the object frame, three numbers x y z each, in metres")
+        }
+        ["cloud"] => {
+            ("list of points", "give the measured points in the camera frame, three numbers x y z each, in metres")
+        }
+        ["model" | "cloud", _] => ("point", "give three numbers x y z, in metres"),
+        ["model" | "cloud" | "sigma_xyz", _, _] => ("number", "give a number, in metres"),
+        ["sigma"] => ("number", "give the standard deviation of a measured coordinate, a number in metres"),
+        ["sigma_xyz"] => ("list of rows", "give null, or a row a cloud point of three numbers each, in metres"),
+        ["sigma_xyz", _] => ("row of three numbers", "give three numbers, one a camera axis, in metres"),
+        ["delta"] => ("number", "give the tolerance of distances, a number in metres"),
+        ["prior"] => ("object", "give null, or `T_cam_obj` and `shell_half_m` in braces"),
+        ["prior", "T_cam_obj"] => ("matrix", "give a 4×4 matrix: four rows of four numbers"),
+        ["prior", "T_cam_obj", _] => ("row of four numbers", "give four numbers; the matrix is 4×4"),
+        ["prior", "T_cam_obj", ..] => ("number", "give a number; the matrix is 4×4"),
+        ["prior", "shell_half_m"] => ("number", "give the half-size of the shells, a number in metres"),
+        ["putative"] => ("list of pairs", "give null, or a list of pairs [model, cloud]"),
+        ["putative", _] => ("pair", "give two indices [model, cloud], from 0"),
+        ["putative", ..] => ("index", "give a whole number, from 0"),
+        _ => ("problem", "give one `coherence-problem/1` as JSON, in braces"),
+    }
+}

@@ -1,0 +1,285 @@
+//! What is legal in a problem and hardly meant.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+use seafix_component::{Fault, counted, number};
+
+use super::CoherenceProblem;
+use crate::{
+    PriorBound, RigidConsensus,
+    site::{COINCIDENT, SUSPICIOUS, nearest_two},
+    solve::{ON_A_LINE, second_ratio},
+};
+
+/// The least number of points that a pose needs.
+const NEEDED: usize = 3;
+/// A length below this share of the noise is far below it.
+const FAR_BELOW: f64 = 0.1;
+/// No object farther off than this (m) is seen.
+const OUT_OF_SIGHT: f64 = 1e6;
+
+/// The warnings of a file.
+struct Told<'a> {
+    file: &'a Path,
+    all: Vec<Fault>,
+}
+
+impl Told<'_> {
+    fn warn(&mut self, what: &str, value: impl Into<String>, remedy: &str) {
+        self.all.push(Fault::new(what, self.file).value(value.into()).remedy(remedy));
+    }
+}
+
+impl CoherenceProblem {
+    /// What is legal and hardly meant, of the content of `file`: points too few for a pose, on a line, or too near each other for Δ to
+    /// tell them apart; points without noise, or with so much that Δ is nothing beside it; putative pairs of which no pose follows; a
+    /// prior that has the object out of sight; coordinates that look like other units than metres; more candidates than are searched.
+    pub fn warnings(&self, file: &Path) -> Vec<Fault> {
+        let mut told = Told { file, all: Vec::new() };
+        self.of_the_model(&mut told);
+        self.of_the_cloud(&mut told);
+        self.of_the_noise(&mut told);
+        self.of_putative(&mut told);
+        let before = told.all.len();
+        self.of_the_prior(&mut told);
+        let sound = told.all.len() == before;
+        self.of_candidates(&mut told, sound);
+        told.all
+    }
+
+    fn of_the_model(&self, told: &mut Told<'_>) {
+        if self.model.len() < NEEDED {
+            let value = counted(self.model.len(), "point");
+            told.warn("the model has too few points", value, "a pose needs at least three");
+        }
+        if let Some((i, k, distance)) = nearest_two(&self.model, 2.0 * self.delta) {
+            let value = format!("points {i} and {k}, {} m apart, and Δ = {} m", number(distance), number(self.delta));
+            let remedy = "one may be taken for the other; keep model points 2Δ apart";
+            told.warn("model points are nearer than 2Δ", value, remedy);
+        }
+        if let Some(ratio) = on_a_line(&self.model_places()) {
+            let remedy = "a turn about the line changes nothing that is measured; add a point beside it";
+            told.warn("the model's points lie on a line", of_extents(ratio), remedy);
+        }
+        let extent = self.extent();
+        if self.model.len() > 1 && !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
+            let value = format!("the model lies in a box of {} m from corner to corner", number(extent));
+            told.warn("units?", value, "coordinates are in metres");
+        }
+    }
+
+    fn of_the_cloud(&self, told: &mut Told<'_>) {
+        match self.cloud.len() {
+            0 => return told.warn("the cloud has no points", "0 points", "nothing can be found in it"),
+            few if few < NEEDED => {
+                let value = counted(few, "point");
+                return told.warn("the cloud has too few points", value, "a pose needs at least three");
+            }
+            _ => {}
+        }
+        let places = self.cloud_places();
+        let (whole, half) = (extent(&places), extent(&nearer_half(&places)));
+        if whole < COINCIDENT {
+            let value = format!("{} in a box of {} m", counted(places.len(), "point"), number(whole));
+            return told.warn("the cloud's points lie in one place", value, "a pose needs three places");
+        }
+        if let Some(ratio) = most_on_a_line(&places) {
+            let remedy = "a turn about the line changes nothing that is measured; no pose follows";
+            told.warn("the cloud's points lie on a line", of_extents(ratio), remedy);
+        }
+        let nearest = nearest_two(&self.model, f64::INFINITY).map_or(0.0, |(.., distance)| distance);
+        if nearest > whole + self.delta {
+            let (whole, nearest) = (number(whole), number(nearest));
+            let value = format!("a box of {whole} m from corner to corner, and no two model points within {nearest} m");
+            told.warn("the cloud is smaller than the model", value, "coordinates of both are in metres");
+        } else if whole < SUSPICIOUS[0] || half > SUSPICIOUS[1] {
+            let (points, size) = if whole < SUSPICIOUS[0] { ("the cloud", whole) } else { ("half of the cloud", half) };
+            let value = format!("{points} lies in a box of {} m from corner to corner", number(size));
+            told.warn("units?", value, "coordinates are in metres");
+        } else if self.model.len() > 1 && all_apart(&places, self.extent() + self.delta) {
+            let value = format!("no two cloud points are within the {} m of the model's box", number(self.extent()));
+            told.warn("the cloud's points are too far apart", value, "coordinates of both are in metres");
+        }
+    }
+
+    fn of_the_noise(&self, told: &mut Told<'_>) {
+        let variances = || self.cloud.iter().map(|point| point.position.covariance.diagonal());
+        let remedy = "nothing is measured better than a nanometre; give its standard deviation";
+        if let Some(exact) = variances().position(|all| all.max() == 0.0) {
+            told.warn("points without noise", format!("cloud point {exact}, 0 m"), remedy);
+        }
+        if let Some((point, all)) = variances().enumerate().find(|(_, all)| all.min() == 0.0 && all.max() > 0.0) {
+            let row: Vec<String> = all.iter().map(|variance| number(variance.sqrt())).collect();
+            let value = format!("cloud point {point}, [{}] m", row.join(", "));
+            told.warn("an axis without noise beside others", value, remedy);
+        }
+        let (sigma, extent) = (self.typical_sigma(), self.extent());
+        if self.model.len() >= NEEDED && sigma > extent {
+            let value =
+                format!("σ = {} m, and the model's box has {} m from corner to corner", number(sigma), number(extent));
+            told.warn("noise larger than the model", value, "standard deviations are in metres");
+        } else if self.delta < FAR_BELOW * sigma {
+            let value = format!("Δ = {} m, σ = {} m", number(self.delta), number(sigma));
+            told.warn(
+                "`delta` is far below the noise",
+                value,
+                "hardly a true pair would agree; 3√2 σ lets nearly all agree",
+            );
+        }
+    }
+
+    fn of_putative(&self, told: &mut Told<'_>) {
+        let Some(pairs) = &self.putative else { return };
+        let models = distinct(pairs.iter().map(|(model, _)| *model));
+        let clouds = distinct(pairs.iter().map(|(_, cloud)| *cloud));
+        for (which, used) in [("model", &models), ("cloud", &clouds)] {
+            if used.len() < NEEDED {
+                let points = counted(used.len(), &format!("{which} point"));
+                let value = format!("{} of {points}", counted(pairs.len(), "pair"));
+                let remedy = "a pose needs pairs of three; leave `putative` out to have all considered";
+                return told.warn("`putative` has too few pairs", value, remedy);
+            }
+        }
+        for (which, used, all) in [("model", &models, self.model_places()), ("cloud", &clouds, self.cloud_places())] {
+            let places: Vec<Vector3<f64>> = used.iter().map(|&index| all[index]).collect();
+            // Of all points on a line it is told already.
+            if let Some(ratio) = most_on_a_line(&places).filter(|_| most_on_a_line(&all).is_none()) {
+                let value = format!("{} of {}, {}", used.len(), all.len(), of_extents(ratio));
+                let remedy = "no pose follows from pairs on a line; give pairs of a point beside it";
+                told.warn(&format!("the {which} points of `putative` lie on a line"), value, remedy);
+            }
+        }
+    }
+
+    fn of_the_prior(&self, told: &mut Told<'_>) {
+        let Some(prior) = &self.prior else { return };
+        if self.model.is_empty() {
+            return;
+        }
+        let camera_from_object = prior.object_from_camera.inverse();
+        let predicted = || self.model.iter().map(|point| (camera_from_object * point.at).coords);
+        let nearest = predicted().map(|place| place.amax()).fold(f64::INFINITY, f64::min);
+        let foremost = predicted().map(|place| place.z).fold(f64::NEG_INFINITY, f64::max);
+        if nearest > OUT_OF_SIGHT {
+            let value = format!("its nearest point is {} m off along an axis", number(nearest));
+            told.warn("the prior puts the object far away", value, "`T_cam_obj` is camera_from_object, in metres");
+        } else if foremost <= 0.0 {
+            let value = format!("its foremost point has z = {} m", number(foremost));
+            let remedy = "`T_cam_obj` is camera_from_object, z forward; is it the inverse?";
+            told.warn("the prior puts the whole object behind the camera", value, remedy);
+        }
+        if let PriorBound::Box(half) = prior.bound
+            && half < FAR_BELOW * self.typical_sigma()
+        {
+            let value = format!("{} m, σ = {} m", number(half), number(self.typical_sigma()));
+            let remedy = "hardly a true point would lie in its shell; give by how much the pose may be off";
+            told.warn("`prior.shell_half_m` is far below the noise", value, remedy);
+        }
+    }
+
+    /// What a search would not begin with; shells without points are told only of a prior with which nothing else is wrong.
+    fn of_candidates(&self, told: &mut Told<'_>, sound: bool) {
+        let search = RigidConsensus::default();
+        let remedy = "give a rough pose or smaller shells, or thin the cloud out";
+        match self.candidates() {
+            Err(refused) => told.warn("too many candidate pairs", refused.to_string(), remedy),
+            Ok(found) if found.pairs() > search.most_pairs => {
+                let value = format!("{}, and `rigid-consensus` takes {}", found.pairs(), search.most_pairs);
+                told.warn("too many candidate pairs", value, remedy);
+            }
+            Ok(found) => {
+                let enough = self.model.len() >= NEEDED && self.cloud.len() >= NEEDED;
+                let some = found.with_candidates();
+                if sound && enough && self.putative.is_none() && some < NEEDED {
+                    let value = format!("{some} of {} model points", self.model.len());
+                    let remedy = "a pose needs three; is `T_cam_obj` camera_from_object, and the shell large enough?";
+                    told.warn("too few shells of the prior hold a cloud point", value, remedy);
+                }
+            }
+        }
+    }
+
+    fn model_places(&self) -> Vec<Vector3<f64>> {
+        self.model.iter().map(|point| point.at.coords).collect()
+    }
+
+    fn cloud_places(&self) -> Vec<Vector3<f64>> {
+        self.cloud.iter().map(|point| point.position.at.coords).collect()
+    }
+
+    /// The diagonal of the model's box (m): at least its diameter.
+    fn extent(&self) -> f64 {
+        extent(&self.model_places())
+    }
+
+    /// The median over the cloud of the standard deviation an axis (m).
+    fn typical_sigma(&self) -> f64 {
+        let mut all: Vec<f64> =
+            self.cloud.iter().map(|point| (point.position.covariance.trace() / 3.0).sqrt()).collect();
+        let middle = all.len() / 2;
+        if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    }
+}
+
+/// The diagonal of the box of points (m).
+fn extent(places: &[Vector3<f64>]) -> f64 {
+    let corner =
+        |outer: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| places.iter().copied().reduce(|a, b| outer(&a, &b));
+    let (least, greatest) = (corner(Vector3::inf), corner(Vector3::sup));
+    least.zip(greatest).map_or(0.0, |(least, greatest)| (greatest - least).norm())
+}
+
+/// Second extent over first of three points or more that lie on a line, or in one place.
+fn on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
+    // Squares of the largest numbers are none.
+    let largest = places.iter().map(|at| at.amax()).fold(f64::MIN_POSITIVE, f64::max);
+    let ratio = || second_ratio(places.iter().map(|at| at / largest));
+    (places.len() >= NEEDED).then(ratio).filter(|&ratio| ratio < ON_A_LINE)
+}
+
+fn of_extents(ratio: f64) -> String {
+    format!("second extent over first {ratio:.1e}")
+}
+
+/// The same of points of which a few may be blunders: far away, they make any cloud long and thin.
+fn most_on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
+    on_a_line(places).filter(|_| on_a_line(&nearer_half(places)).is_some())
+}
+
+/// The half of the points, three at least, that is nearest to the middle.
+fn nearer_half(places: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let kept = places.len().div_ceil(2).max(NEEDED);
+    if kept >= places.len() {
+        return places.to_vec();
+    }
+    let middle = Vector3::from_fn(|axis, _| {
+        let mut all: Vec<f64> = places.iter().map(|at| at[axis]).collect();
+        *all.select_nth_unstable_by(kept, f64::total_cmp).1
+    });
+    let mut half = places.to_vec();
+    let off = |at: &Vector3<f64>| (at - middle).amax();
+    half.select_nth_unstable_by(kept, |a, b| off(a).total_cmp(&off(b)));
+    half.truncate(kept);
+    half
+}
+
+/// Whether no two points are within `limit` of each other.
+///
+/// Swept as [`nearest_two`] sweeps: what is further off along a direction need not be looked at.
+fn all_apart(places: &[Vector3<f64>], limit: f64) -> bool {
+    let direction = Vector3::new(1.0, 2f64.sqrt(), 3f64.sqrt()).normalize();
+    let mut along: Vec<(f64, &Vector3<f64>)> = places.iter().map(|at| (direction.dot(at), at)).collect();
+    along.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    along.iter().enumerate().all(|(place, (here, at))| {
+        let mut near = along[..place].iter().rev().take_while(|(there, _)| here - there <= limit);
+        near.all(|(_, other)| (*at - *other).norm() > limit)
+    })
+}
+
+fn distinct(numbers: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut all: Vec<usize> = numbers.collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
