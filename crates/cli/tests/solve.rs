@@ -43,6 +43,15 @@ fn a_fix_says_what_supports_it() {
     let level = integrity["protection"]["position"].as_f64().unwrap();
     assert!(level > 0.002 && level < 0.1, "{level}");
     assert!(integrity["protection"]["attitude"].as_f64().unwrap() > 0.0);
+    // A twentieth of the diameter, of some two metres, is no less than ten centimetres.
+    assert_eq!(integrity["alert_limit"], 0.1);
+    for (share, is) in [(1.01, "within"), (0.99, "beyond")] {
+        let limit = share * level;
+        let output = solve(&[&problem(&folder), "--set", &format!("acceptance.alert-limit={limit}")]);
+        let said = String::from_utf8(output.stdout).unwrap();
+        let expected = format!("; {is} the alert limit of {limit:.3} m");
+        assert!(said.contains(&format!("protection level {level:.3} m, ")) && said.contains(&expected), "{said}");
+    }
 }
 
 #[test]

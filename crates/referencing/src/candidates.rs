@@ -8,7 +8,10 @@ use seafix_geometry::{Camera, MeasuredPoint, Point};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::{ModelPoint, Prior, PriorBound};
+use crate::{
+    ModelPoint, Prior, PriorBound,
+    lanes::{LANES, ones_of, packed},
+};
 
 /// How the shell about the predicted place of a model point is drawn when the prior is Gaussian.
 ///
@@ -120,28 +123,38 @@ pub fn candidates(
     Candidates { lists: lists.collect() }
 }
 
-/// Where the points of a cloud are, coordinate by coordinate: every model point looks at all of them.
+/// Where the points of a cloud are, coordinate by coordinate, in whole words: every model point looks at all of them.
 struct Places([Vec<f64>; 3]);
 
 impl Places {
     fn of(cloud: &[MeasuredPoint]) -> Self {
-        Self([0, 1, 2].map(|axis| cloud.iter().map(|point| point.position.at.coords[axis]).collect()))
+        Self([0, 1, 2].map(|axis| {
+            let mut column: Vec<f64> = cloud.iter().map(|point| point.position.at.coords[axis]).collect();
+            // What fills up the last word is in no box.
+            column.resize(cloud.len().next_multiple_of(LANES), f64::NAN);
+            column
+        }))
     }
 
     /// The points in a box about a place; its faces belong to it.
     fn within(&self, centre: &Point<Camera>, half: f64) -> Vec<usize> {
-        let mut inside = vec![false; self.0[0].len()];
-        mark(&self.0, centre.coords.into(), half, &mut inside);
-        (0..inside.len()).filter(|&j| inside[j]).collect()
+        let [x, y, z] = self.0.each_ref().map(|column| column.as_chunks::<LANES>().0);
+        let words = x.iter().zip(y).zip(z).enumerate();
+        words
+            .flat_map(|(word, ((x, y), z))| ones_of(LANES * word, inside([x, y, z], centre.coords.into(), half)))
+            .collect()
     }
 }
 
-/// Marks the places in a box about one.
+/// Which of 64 places are in a box about one, a bit each.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn mark([x, y, z]: &[Vec<f64>; 3], c: [f64; 3], half: f64, inside: &mut [bool]) {
-    for (((inside, x), y), z) in inside.iter_mut().zip(x).zip(y).zip(z) {
-        *inside = (x - c[0]).abs().max((y - c[1]).abs()).max((z - c[2]).abs()) <= half;
+fn inside([x, y, z]: [&[f64; LANES]; 3], c: [f64; 3], half: f64) -> u64 {
+    let mut inside = [0u8; LANES];
+    for k in 0..LANES {
+        let near = |x: f64, c: f64| (x - c).abs() <= half;
+        inside[k] = u8::from(near(x[k], c[0]) & near(y[k], c[1]) & near(z[k], c[2]));
     }
+    packed(&inside)
 }
 
 /// The region about one predicted place in which cloud points are candidates.
@@ -233,6 +246,14 @@ mod tests {
         let found = candidates(&model, &cloud, Some(&boxed(0.25)), &Gate::default(), None);
         assert_eq!(found.lists, [vec![0, 2]]);
         assert_eq!((found.pairs(), found.with_candidates()), (2, 1));
+    }
+
+    #[test]
+    fn a_cloud_of_more_points_than_a_word_has_bits_is_looked_at_whole() {
+        let model = one_point([0.0, 0.0, 2.0]);
+        let places: Vec<[f64; 3]> = (0..150).map(|j| [0.01 * f64::from(j % 65) - 0.6, 0.0, 2.0]).collect();
+        let found = candidates(&model, &cloud(&places, 0.0), Some(&boxed(0.0301)), &Gate::default(), None);
+        assert_eq!(found.lists, [(0..150).filter(|j| (57..=63).contains(&(j % 65))).collect::<Vec<_>>()]);
     }
 
     #[test]

@@ -10,6 +10,7 @@
 mod candidates;
 mod chance;
 mod joint;
+mod lanes;
 mod observations;
 mod problem;
 pub mod problem_file;

@@ -8,7 +8,7 @@ use seafix_component::Choice;
 use seafix_experiment::changed;
 use seafix_referencing::{
     Acceptance, SEARCHES, SOLVERS,
-    problem_file::{Answer, Line, Method, solve_file},
+    problem_file::{Answer, Line, Method, Support, solve_file},
 };
 use seafix_simulation::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -163,5 +163,21 @@ fn people(answer: &Answer) -> String {
     for row in answer.t_cam_obj.iter().flatten().take(3) {
         text += &format!("  {:10.6} {:10.6} {:10.6} {:10.4}\n", row[0], row[1], row[2], row[3]);
     }
+    text += &answer.integrity.as_ref().map_or_else(String::new, |support| format!("  {}\n", protected(support)));
     text
+}
+
+/// By how much a fix may be off at the stated risk, beside what is too much.
+fn protected(support: &Support) -> String {
+    let limit = format!("the alert limit of {:.3} m", support.alert_limit);
+    match support.protection {
+        None => {
+            format!("no protection level: too few points, or one that cannot be spared; not known to be within {limit}")
+        }
+        Some(level) => {
+            let is = if level.position <= support.alert_limit { "within" } else { "beyond" };
+            let (position, attitude) = (level.position, level.attitude.to_degrees());
+            format!("protection level {position:.3} m, {attitude:.2}°; {is} {limit}")
+        }
+    }
 }

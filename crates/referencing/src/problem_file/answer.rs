@@ -7,7 +7,9 @@ use seafix_geometry::{Camera, Object, Transform};
 use serde::Serialize;
 
 use super::{CoherenceProblem, read};
-use crate::{Acceptance, Alternative, Correspondence, Integrity, Observations, Outcome, Search, Solver};
+use crate::{
+    Acceptance, Alternative, Correspondence, Integrity, Observations, Outcome, Search, Solver, reference::alert_limit,
+};
 
 /// The method that answers: what is used, and under which name it is reported.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +55,8 @@ pub struct Support {
     pub separation_two: Option<f64>,
     /// Radii that the errors of position (m) and attitude (rad) exceed with no more than the stated risk.
     pub protection: Option<Levels>,
+    /// The alert limit (m): a fix whose level of position is beyond it, or that has none, is not available where integrity counts.
+    pub alert_limit: f64,
     /// By how much measured distances are longer than the model's, as a share; null with fewer than four points.
     pub stretch: Option<Estimate>,
 }
@@ -75,8 +79,8 @@ pub struct Levels {
     pub attitude: f64,
 }
 
-impl From<&Integrity> for Support {
-    fn from(integrity: &Integrity) -> Self {
+impl Support {
+    fn of(integrity: &Integrity, alert_limit: f64) -> Self {
         Self {
             redundancy: integrity.redundancy.name(),
             chi2: integrity.chi2,
@@ -85,6 +89,7 @@ impl From<&Integrity> for Support {
             separation: integrity.separation,
             separation_two: integrity.separation_two,
             protection: integrity.protection.map(|level| Levels { position: level.position, attitude: level.attitude }),
+            alert_limit,
             stretch: integrity.stretch.map(|it| Estimate { value: it.value, sigma: it.sigma }),
         }
     }
@@ -192,7 +197,8 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
             clouds.filter(|&cloud| !(problem.cloud[cloud].position.at.coords.z > 0.0)).collect()
         }),
         unbelieved: (reference.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
-        integrity: reference.map(|reference| Support::from(&reference.integrity)),
+        integrity: reference
+            .map(|reference| Support::of(&reference.integrity, alert_limit(&problem.model, method.acceptance))),
         alternatives: match &attempt.outcome {
             Outcome::Ambiguous(all) => all.iter().map(OtherPose::from).collect(),
             _ => Vec::new(),

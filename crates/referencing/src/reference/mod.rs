@@ -143,7 +143,7 @@ fn on_a_line(problem: &Problem<'_>) -> Option<Degenerate> {
 }
 
 /// Poses further apart than this (m) are different answers: the alert limit, or its share of the model's diameter.
-fn alert_limit(model: &[ModelPoint], acceptance: &Acceptance) -> f64 {
+pub(crate) fn alert_limit(model: &[ModelPoint], acceptance: &Acceptance) -> f64 {
     let (most, share) = (acceptance.alert_limit, acceptance.alert_share);
     // The diameter is no less than the longest side of the shell, which is found at once.
     let side = Shell::around(model.iter().map(|point| point.at)).map_or(0.0, |shell| (shell.max - shell.min).amax());

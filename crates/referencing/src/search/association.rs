@@ -2,11 +2,11 @@
 
 use seafix_geometry::Point;
 
-use super::{
-    bitset::{BitMatrix, bits},
-    edges::{LANES, Sites},
+use super::{bitset::BitMatrix, edges::Sites};
+use crate::{
+    Correspondence, Problem, Tolerance,
+    lanes::{LANES, ones_of},
 };
-use crate::{Correspondence, Problem, Tolerance};
 
 /// A clique of this graph is a set of pairs that are all coherent with each other, each model point
 /// and each cloud point used at most once. Vertices stand in an order that depends on coordinates
@@ -55,7 +55,7 @@ impl Association {
             let row = adjacency.row_mut(a);
             for (word, look) in (first..).zip(&looks) {
                 let mut edges = look.near & look.sure;
-                for k in bits(0, look.near & !look.sure) {
+                for k in ones_of(0, look.near & !look.sure) {
                     let agree = problem.coherent(pair, vertices[word * LANES + k]);
                     edges |= u64::from(agree) << k;
                 }

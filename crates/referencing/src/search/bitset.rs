@@ -1,7 +1,6 @@
 //! Sets of small numbers as bits, and square matrices of them.
 
-/// Bits in a word.
-const WORD: usize = 64;
+use crate::lanes::{LANES as WORD, ones_of};
 
 /// Words that hold `count` bits.
 fn words(count: usize) -> usize {
@@ -128,16 +127,7 @@ fn count(bits: &[u64], width: usize, first: usize, members: &[u64], of: &[usize]
 
 /// The positions of the ones, ascending.
 fn ones(words: &[u64]) -> impl Iterator<Item = usize> + '_ {
-    words.iter().enumerate().flat_map(|(index, &word)| bits(index, word))
-}
-
-/// The positions of the ones of the word at `index`.
-pub(super) fn bits(index: usize, word: u64) -> impl Iterator<Item = usize> {
-    std::iter::successors((word != 0).then_some(word), |rest| {
-        let rest = rest & (rest - 1);
-        (rest != 0).then_some(rest)
-    })
-    .map(move |rest| index * WORD + rest.trailing_zeros() as usize)
+    words.iter().enumerate().flat_map(|(index, &word)| ones_of(index * WORD, word))
 }
 
 /// Transposes 64 × 64 bits: halves, quarters and so on change places across the diagonal.

@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-/// Vertices that are tested at once: the bits of a word.
-pub(super) const LANES: usize = 64;
+use crate::lanes::{LANES, packed};
 
 /// Model place, cloud place and reach of every vertex, coordinate by coordinate, filled up to whole words with
 /// places that no distance agrees with.
@@ -83,31 +82,9 @@ fn look(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, lo
     }
 }
 
-/// The bytes, each 0 or 1, as bits.
-#[inline(always)]
-pub(super) fn packed(bytes: &[u8; LANES]) -> u64 {
-    // Byte i of eight is moved to bit 56 + i by the one of its factor's bits that fits; nothing else lands there.
-    const GATHER: u64 = 0x0102_0408_1020_4080;
-    let mut word = 0;
-    for (eight, bytes) in bytes.as_chunks::<8>().0.iter().enumerate() {
-        word |= (u64::from_le_bytes(*bytes).wrapping_mul(GATHER) >> 56) << (8 * eight);
-    }
-    word
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bytes_become_bits_in_their_order() {
-        for k in 0..LANES {
-            let mut bytes = [0; LANES];
-            bytes[k] = 1;
-            assert_eq!(packed(&bytes), 1 << k);
-        }
-        assert_eq!(packed(&[1; LANES]), u64::MAX);
-    }
 
     #[test]
     fn distances_within_reach_are_near_and_surely_within_are_sure() {

@@ -1,10 +1,7 @@
 //! The fours that one vertex makes with others.
 
-use super::{
-    edges::{LANES, packed},
-    orientation::Sense,
-    volumes::Volumes,
-};
+use super::{orientation::Sense, volumes::Volumes};
+use crate::lanes::{LANES, ones_of, packed};
 
 /// Whether a vertex makes a four that contradicts a sense with some three members of a set.
 ///
@@ -55,12 +52,7 @@ impl Fours {
         (0..pairs(member)).step_by(LANES).flat_map(move |begin| {
             let normals = self.normals.each_ref().map(|column| &column[begin..]);
             let asked = !0 >> (LANES - (pairs(member) - begin).min(LANES));
-            let mut rest = asked & !clear(&normals, &place, sign, doubt);
-            std::iter::from_fn(move || {
-                let bit = rest.trailing_zeros() as usize;
-                rest &= rest.wrapping_sub(1);
-                (bit < LANES).then_some(begin + bit)
-            })
+            ones_of(begin, asked & !clear(&normals, &place, sign, doubt))
         })
     }
 }

@@ -2,8 +2,9 @@
 
 use super::{
     association::Association,
-    bitset::{BitMatrix, BitSet, bits, degrees},
+    bitset::{BitMatrix, BitSet, degrees},
 };
+use crate::lanes::{LANES, ones_of};
 
 /// The neighbours of one vertex as a graph of their own.
 #[derive(Debug, Default)]
@@ -72,7 +73,7 @@ impl Local {
             let row = graph.adjacency.row(v);
             let local = adjacency.row_mut(i);
             for (index, (word, other)) in members.words().iter().zip(row).enumerate() {
-                for w in bits(index, word & other) {
+                for w in ones_of(index * LANES, word & other) {
                     let place = work.place[w] as usize;
                     local[place / 64] |= 1 << (place % 64);
                 }

@@ -2,18 +2,7 @@
 
 use std::cmp::Ordering;
 
-/// The bits that are set in a word, ascending; the first is the bit `begin`.
-#[inline]
-pub(in crate::search) fn ones_of(begin: usize, word: u64) -> impl Iterator<Item = usize> {
-    let mut rest = word;
-    std::iter::from_fn(move || {
-        (rest != 0).then(|| {
-            let bit = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
-            begin + bit
-        })
-    })
-}
+use crate::lanes::ones_of;
 
 /// The set bits from `from` on, ascending.
 pub(in crate::search) fn ones(bits: &[u64], from: usize) -> impl Iterator<Item = usize> + '_ {

@@ -2,14 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{
-    super::{
-        association::reach,
-        edges::{LANES, packed},
-    },
-    rough::Rough,
+use super::{super::association::reach, rough::Rough};
+use crate::{
+    Correspondence, Problem, Tolerance,
+    lanes::{LANES, packed},
 };
-use crate::{Correspondence, Problem, Tolerance};
 
 /// So many standard deviations of the prior's rotation may lie between two pairs.
 const TURN_SIGMAS: f64 = 4.5;

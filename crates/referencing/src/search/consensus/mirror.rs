@@ -5,7 +5,6 @@ use std::{cell::Cell, collections::BTreeSet};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    super::edges::{LANES, packed},
     Motion,
     bits::ones,
     graph::Graph,
@@ -13,7 +12,10 @@ use super::{
     modes::Climb,
     rough::Rough,
 };
-use crate::ModelPoint;
+use crate::{
+    ModelPoint,
+    lanes::{LANES, packed},
+};
 
 /// An image must be likelier than the pose by this much (nats): a flat object is its own image.
 const MARGIN: f64 = 3.0;

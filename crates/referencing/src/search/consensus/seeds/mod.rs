@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 use super::{
     Motion,
-    bits::{Held, intersect, is_set, ones, ones_of, shared},
+    bits::{Held, intersect, is_set, ones, shared},
     bound::{After, Bounds},
     graph::Graph,
     likelihood::{Mode, Terms},
@@ -19,7 +19,7 @@ use super::{
     rough::Rough,
     strain::{Edge, lost_to, strain_of_three},
 };
-use crate::ModelPoint;
+use crate::{ModelPoint, lanes::ones_of};
 use queue::{Pair, Queue, order};
 
 /// Poses less likely than the best by this much (nats) are not looked for.
