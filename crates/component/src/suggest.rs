@@ -5,9 +5,11 @@
 /// ```
 /// assert_eq!(seafix_component::nearest("umeyma", ["horn", "umeyama"]), Some("umeyama"));
 /// assert_eq!(seafix_component::nearest("banana", ["horn", "umeyama"]), None);
+/// assert_eq!(seafix_component::nearest("a", ["id"]), None, "no letter of it is meant");
 /// ```
 pub fn nearest<'a>(word: &str, options: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let limit = (word.chars().count() / 3).max(2);
+    let length = word.chars().count();
+    let limit = (length / 3).max(2).min(length.saturating_sub(1));
     options
         .into_iter()
         .map(|option| (strsim::damerau_levenshtein(&word.to_lowercase(), &option.to_lowercase()), option))

@@ -122,11 +122,14 @@ impl Solve {
 /// A stretch of so many standard deviations is told: of exact rigs and models one fix in fifteen thousand has it.
 const TOLD: f64 = 4.0;
 
-/// How far apart two poses put the object's origin.
+/// How far apart two poses put the object.
 fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
     let Some(pose) = pose else { return "which is not believed either".to_owned() };
     let square: f64 = (0..3).map(|k| (pose[k][3] - other[k][3]).powi(2)).sum();
-    format!("whose origin is {:.2} m off", square.sqrt())
+    // The trace of RᵀS is 1 + 2 cos of the turn between R and S.
+    let trace: f64 = (0..3).flat_map(|i| (0..3).map(move |k| pose[i][k] * other[i][k])).sum();
+    let turn = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
+    format!("whose origin is {:.2} m off, turned by {turn:.0}°", square.sqrt())
 }
 
 /// An answer for people: what came of it, then the pose.

@@ -141,7 +141,10 @@ impl<'a> Source<'a> {
         let message = full.strip_suffix(&tail).unwrap_or(&full);
         let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         let about = |what: &str| message.starts_with(what);
-        if let (true, Some((key, known))) = (about("unknown field"), quoted.split_first()) {
+        // A key may hold backticks of its own; those after it do not.
+        let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.rsplit_once("`, expected "));
+        if let Some((key, known)) = unknown {
+            let known: Vec<&str> = known.split('`').skip(1).step_by(2).collect();
             let remedy = match nearest(key, known.iter().copied()) {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("there are {}", known.join(", ")),
@@ -209,6 +212,9 @@ impl<'a> Source<'a> {
                 near("something after the end of the problem").remedy("give one problem a file")
             }
             "trailing characters" => near("expected `,` or `]`").remedy(remedy),
+            message if message.starts_with("expected `,`") => {
+                near(message).remedy("values are parted by commas, and numbers stand without units")
+            }
             message => near(message).remedy(format!("give `{FORMAT}` as JSON")),
         }
     }

@@ -402,6 +402,9 @@ fn every_value_of_another_kind_is_named() {
 fn every_text_that_is_no_problem_is_told_with_its_place() {
     for (from, to, expected) in [
         ("\"delta\"", "\"delat\"", "unknown key in p.json:4:16: `delat`; did you mean `delta`?"),
+        ("\"delta\"", "\"a\"", "unknown key in p.json:4:16: `a`; there are format, id, "),
+        ("\"delta\"", "\"del`ta\"", "unknown key in p.json:4:16: `del`ta`; did you mean `delta`?"),
+        ("0.01, ", "0.01 m, ", "expected `,` or `}` in p.json:4:"),
         ("\"shell_half_m\"", "\"shell\"", "unknown key in p.json:5:70: `shell`; "),
         (
             "\"sigma\": 0.01, ",
@@ -415,7 +418,11 @@ fn every_text_that_is_no_problem_is_told_with_its_place() {
         ("0.04", "nan", "`delta`: nan is no JSON number in p.json:4:25; give the tolerance of distances"),
         ("[0.5,0.5,1]", "[0.5,1.,1]", "`model[3][1]`: no JSON number in p.json:2:47: 1.; give a number"),
         ("[0.5,0.5,1]", "[0.5,0.5,1,]", "`model[3]`: a comma before the end in p.json:2:53: ]; remove it"),
-        ("[0.5,0.5,1]", "[0.5,0.5 1]", "`model[3]`: expected `,` or `]` in p.json:2:51: 1; give"),
+        (
+            "[0.5,0.5,1]",
+            "[0.5,0.5 1]",
+            "`model[3]`: expected `,` or `]` in p.json:2:51: 1; values are parted by commas",
+        ),
         ("null}", "None}", "`putative`: no JSON value in p.json:6:13: None; give null, or a list of pairs"),
         ("\"putative\"", "putative", "a key without double quotes in p.json:6:1: putative; put it in double quotes"),
         ("null}", "null} x", "something after the end of the problem in p.json:6:19: x; give one problem a file"),
