@@ -8,12 +8,11 @@ use seafix_component::{Fault, counted, number};
 use super::CoherenceProblem;
 use crate::{
     PriorBound, RigidConsensus,
+    search::NEEDED,
     site::{COINCIDENT, SUSPICIOUS, nearest_two},
     solve::{ON_A_LINE, second_ratio},
 };
 
-/// The least number of points that a pose needs.
-const NEEDED: usize = 3;
 /// A length below this share of the noise is far below it.
 const FAR_BELOW: f64 = 0.1;
 /// No object farther off than this (m) is seen.
@@ -238,11 +237,12 @@ fn on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
     (places.len() >= NEEDED).then(ratio).filter(|&ratio| ratio < ON_A_LINE)
 }
 
+/// The same in words.
 fn of_extents(ratio: f64) -> String {
     format!("second extent over first {ratio:.1e}")
 }
 
-/// The same of points of which a few may be blunders: far away, they make any cloud long and thin.
+/// [`on_a_line`] of points of which a few may be blunders: far away, they make any cloud long and thin.
 fn most_on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
     on_a_line(places).filter(|_| on_a_line(&nearer_half(places)).is_some())
 }

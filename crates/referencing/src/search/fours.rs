@@ -15,7 +15,7 @@ pub(super) struct Fours {
     normals: [Vec<f64>; 6],
 }
 
-/// How many of n things are before the n-th when any two are put in a row.
+/// How many pairs n things make.
 fn pairs(n: usize) -> usize {
     n * n.saturating_sub(1) / 2
 }
