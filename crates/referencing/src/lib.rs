@@ -9,6 +9,7 @@
 
 mod candidates;
 mod chance;
+mod cloud_box;
 mod joint;
 mod lanes;
 mod observations;

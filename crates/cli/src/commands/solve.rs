@@ -173,11 +173,17 @@ fn people(answer: &Answer) -> String {
 /// By how much a fix may be off at the stated risk, beside what is too much.
 fn protected(support: &Support) -> String {
     let limit = format!("the alert limit of {:.3} m", support.alert_limit);
-    match support.protection {
-        None => {
+    match (support.protection, support.misidentified) {
+        (None, Some(mistaken)) if !(mistaken < support.risk) => {
+            let risk = support.risk;
+            format!(
+                "no protection level: the points may be others with a probability of {mistaken:.1e}, at a risk of {risk:.0e}; not known to be within {limit}"
+            )
+        }
+        (None, _) => {
             format!("no protection level: too few points, or one that cannot be spared; not known to be within {limit}")
         }
-        Some(level) => {
+        (Some(level), _) => {
             let is = if level.position <= support.alert_limit { "within" } else { "beyond" };
             let (position, attitude) = (level.position, level.attitude.to_degrees());
             format!("protection level {position:.3} m, {attitude:.2}°; {is} {limit}")

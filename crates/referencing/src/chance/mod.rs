@@ -3,7 +3,7 @@
 //! # Null model
 //!
 //! No candidate is true: each candidate of a model point lies anywhere in its shell; without a prior
-//! anywhere in the cloud's box; the partners of putative pairs are shuffled; all independent
+//! anywhere in the cloud's box ([`CloudBox`](crate::cloud_box::CloudBox)); the partners of putative pairs are shuffled; all independent
 //! ([`Null`]). Then
 //!
 //! E = Σ_{j ≥ k} Σ over j-subsets S of model points of Π_{i∈S} m_i · P(S),

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::MeasuredPoint;
 
 use super::{coordinates, sample::spread_sample, sequence::Sequence, shuffled};
-use crate::{Prior, PriorBound, Problem, candidates::chi_square};
+use crate::{Prior, PriorBound, Problem, candidates::chi_square, cloud_box::CloudBox, site::diameter};
 
 /// The confidence of the shells that a Gaussian prior draws, as [`crate::Gate`] has it by default.
 const CONFIDENCE: f64 = 0.99;
@@ -41,11 +41,8 @@ impl<'a> Null<'a> {
             return Self::Shells(shells(problem, prior));
         }
         if !shuffled(problem) {
-            let bounds = problem.cloud.iter().map(coordinates).fold(None, |bounds, at| match bounds {
-                None => Some((at, at)),
-                Some((low, high)) => Some((at.inf(&low), at.sup(&high))),
-            });
-            return Self::Box(bounds.map_or(Vector3::zeros(), |(low, high)| high - low).add_scalar(LEAST));
+            let of = CloudBox::of(problem.cloud.iter().map(coordinates), diameter(problem.model));
+            return Self::Box(of.lengths().add_scalar(LEAST));
         }
         let mut partners: Vec<usize> = lists.iter().flatten().copied().collect();
         spread_sample(problem.cloud, &mut partners, MOST_LOOKED_AT);

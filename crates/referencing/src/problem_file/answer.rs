@@ -53,7 +53,12 @@ pub struct Support {
     /// The same when two points are left out, where two wrong matches are assumed to happen.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation_two: Option<f64>,
-    /// Radii that the errors of position (m) and attitude (rad) exceed with no more than the stated risk.
+    /// The probability that the points are others, or none of the object's; null of searches that count and do not weigh.
+    pub misidentified: Option<f64>,
+    /// The probability with which the levels may be exceeded.
+    pub risk: f64,
+    /// Radii that the errors of position (m) and attitude (rad) exceed with no more than that risk; null where too few points
+    /// support them, or where the points are mistaken with a greater probability.
     pub protection: Option<Levels>,
     /// The alert limit (m): a fix whose level of position is beyond it, or that has none, is not available where integrity counts.
     pub alert_limit: f64,
@@ -80,7 +85,7 @@ pub struct Levels {
 }
 
 impl Support {
-    fn of(integrity: &Integrity, alert_limit: f64) -> Self {
+    fn of(integrity: &Integrity, risk: f64, alert_limit: f64) -> Self {
         Self {
             redundancy: integrity.redundancy.name(),
             chi2: integrity.chi2,
@@ -88,6 +93,8 @@ impl Support {
             chi2_limit: integrity.chi2_limit,
             separation: integrity.separation,
             separation_two: integrity.separation_two,
+            misidentified: integrity.misidentified,
+            risk,
             protection: integrity.protection.map(|level| Levels { position: level.position, attitude: level.attitude }),
             alert_limit,
             stretch: integrity.stretch.map(|it| Estimate { value: it.value, sigma: it.sigma }),
@@ -197,8 +204,10 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
             clouds.filter(|&cloud| !(problem.cloud[cloud].position.at.coords.z > 0.0)).collect()
         }),
         unbelieved: (reference.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
-        integrity: reference
-            .map(|reference| Support::of(&reference.integrity, alert_limit(&problem.model, method.acceptance))),
+        integrity: reference.map(|reference| {
+            let (risk, limit) = (method.acceptance.risk, alert_limit(&problem.model, method.acceptance));
+            Support::of(&reference.integrity, risk, limit)
+        }),
         alternatives: match &attempt.outcome {
             Outcome::Ambiguous(all) => all.iter().map(OtherPose::from).collect(),
             _ => Vec::new(),

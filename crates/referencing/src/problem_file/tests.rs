@@ -172,6 +172,11 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_told() {
             vec![(MODEL, "[[0,0,0],[1,0,0],[2,0,0.0005],[3,0,0]]"), no_prior],
             "the model's points lie on a line in p.json: second",
         ),
+        // A half-turn of four, a few millimetres off; of five none.
+        (
+            vec![(MODEL, "[[1,0.5,0],[-1,-0.502,0],[0.2,-0.7,0.6],[-0.201,0.7,0.6]]"), no_prior],
+            "the model is symmetric in p.json: turned by 180°, each point is within 0.001076 m of another",
+        ),
         // The cloud.
         (vec![(CLOUD, "[]")], "the cloud has no points in p.json: 0 points; nothing can be found in it"),
         (vec![(CLOUD, "[[0,0,3]]")], "the cloud has too few points in p.json: 1 point; a pose needs at least three"),
@@ -216,6 +221,10 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_told() {
         (
             vec![("\"shell_half_m\": 0.1", "\"shell_half_m\": 1e-30"), ("0.05]", "0]")],
             "`prior.shell_half_m` is far below the noise in p.json: 1e-30 m, σ = 0.01 m; hardly a true point",
+        ),
+        (
+            vec![("\"shell_half_m\": 0.1", "\"shell_half_m\": 100")],
+            "`prior.shell_half_m` leaves nothing out in p.json: 100 m, and half of the cloud lies in a box of",
         ),
         // Putative pairs.
         (vec![("null}", "[[0,0],[1,0],[0,1]]}")], "`putative` has too few pairs in p.json: 3 pairs of 2 model points;"),

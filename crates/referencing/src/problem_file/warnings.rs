@@ -9,14 +9,20 @@ use super::CoherenceProblem;
 use crate::{
     PriorBound, RigidConsensus,
     search::NEEDED,
-    site::{COINCIDENT, SUSPICIOUS, nearest_two},
+    site::{COINCIDENT, SUSPICIOUS, congruences, nearest_two},
     solve::{ON_A_LINE, second_ratio},
 };
 
 /// A length below this share of the noise is far below it.
 const FAR_BELOW: f64 = 0.1;
+/// A shell so many times as large as half of the cloud leaves nothing out.
+const FAR_ABOVE: f64 = 10.0;
 /// No object farther off than this (m) is seen.
 const OUT_OF_SIGHT: f64 = 1e6;
+/// Larger models are not looked through for symmetries: their triangles are too many.
+const MOST_LOOKED_THROUGH: usize = 100;
+/// A motion that leaves each point within so many standard deviations of another is not told from none.
+const TOLD_APART: f64 = 3.0;
 
 /// The warnings of a file.
 struct Told<'a> {
@@ -32,8 +38,9 @@ impl Told<'_> {
 
 impl CoherenceProblem {
     /// What is legal and hardly meant, of the content of `file`: points too few for a pose, on a line, or too near each other for Δ to
-    /// tell them apart; points without noise, or with so much that Δ is nothing beside it; putative pairs of which no pose follows; a
-    /// prior that has the object out of sight; coordinates that look like other units than metres; more candidates than are searched.
+    /// tell them apart; a symmetric model; points without noise, or with so much that Δ is nothing beside it; putative pairs of which
+    /// no pose follows; a prior that has the object out of sight, or bounds nothing; coordinates that look like other units than
+    /// metres; more candidates than are searched.
     pub fn warnings(&self, file: &Path) -> Vec<Fault> {
         let mut told = Told { file, all: Vec::new() };
         self.of_the_model(&mut told);
@@ -60,6 +67,15 @@ impl CoherenceProblem {
         if let Some(ratio) = on_a_line(&self.model_places()) {
             let remedy = "a turn about the line changes nothing that is measured; add a point beside it";
             told.warn("the model's points lie on a line", of_extents(ratio), remedy);
+        }
+        if let Some((degrees, off)) = self.symmetry() {
+            let value = format!(
+                "turned by {degrees:.0}°, each point is within {} m of another, and σ = {} m",
+                number(off),
+                number(self.typical_sigma())
+            );
+            let remedy = "both poses explain what is seen; only a prior tells them apart, or a point that has no image";
+            told.warn("the model is symmetric", value, remedy);
         }
         let extent = self.extent();
         if self.model.len() > 1 && !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
@@ -168,13 +184,30 @@ impl CoherenceProblem {
             let remedy = "`T_cam_obj` is camera_from_object, z forward; is it the inverse?";
             told.warn("the prior puts the whole object behind the camera", value, remedy);
         }
-        if let PriorBound::Box(half) = prior.bound
-            && half < FAR_BELOW * self.typical_sigma()
-        {
+        let PriorBound::Box(half) = prior.bound else { return };
+        let cloud = extent(&nearer_half(&self.cloud_places()));
+        if half < FAR_BELOW * self.typical_sigma() {
             let value = format!("{} m, σ = {} m", number(half), number(self.typical_sigma()));
             let remedy = "hardly a true point would lie in its shell; give by how much the pose may be off";
             told.warn("`prior.shell_half_m` is far below the noise", value, remedy);
+        } else if half > FAR_ABOVE * cloud && self.cloud.len() >= NEEDED {
+            let value = format!("{} m, and half of the cloud lies in a box of {} m", number(half), number(cloud));
+            let remedy =
+                "every point is in every shell; it is in metres, and a prior that bounds nothing is best left out";
+            told.warn("`prior.shell_half_m` leaves nothing out", value, remedy);
         }
+    }
+
+    /// A motion of the model onto itself that noise does not tell from none: its turn (°), and how far (m) its points then lie from
+    /// those whose places they take.
+    fn symmetry(&self) -> Option<(f64, f64)> {
+        if self.model.len() > MOST_LOOKED_THROUGH {
+            return None;
+        }
+        let whole = congruences(&self.model).into_iter().filter(|found| found.broken_by.is_empty());
+        let mut told =
+            whole.map(|found| (found.motion.rotation().angle().to_degrees(), found.farthest_off(&self.model)));
+        told.find(|(_, off)| *off <= TOLD_APART * self.typical_sigma())
     }
 
     /// What a search would not begin with; shells without points are told only of a prior with which nothing else is wrong.

@@ -69,8 +69,11 @@ pub struct Integrity {
     /// The same when two points are left out; `None` with fewer than five points, where two cannot be spared, or where
     /// [`Acceptance::two_wrong_rate`] is nought.
     pub separation_two: Option<f64>,
+    /// The probability that the points are others than those of the fix, or no points of the object at all, by a search that
+    /// weighs evidence; `None` of one that counts, which does not say.
+    pub misidentified: Option<f64>,
     /// Protection levels at [`Acceptance::risk`]; `None` where nothing can vouch for the fix (three points, or a point
-    /// that cannot be spared).
+    /// that cannot be spared), or where [`misidentified`](Self::misidentified) exceeds that risk.
     pub protection: Option<Protection>,
     /// Whether what was measured is as large as the model says; `None` with fewer than four points, any three of which fit.
     pub stretch: Option<Stretch>,
@@ -97,18 +100,26 @@ pub(super) struct Separation {
 /// the other half to one wrong match, or where two may be wrong in equal parts to one and to two. Radii are the greatest
 /// semi-axis times √χ²₃. x_I is the most likely pose, whatever solver gave x. Sets of two need five points at least,
 /// and six for a level: three that are left fit whatever they are.
+///
+/// Where all points are mistaken, no pose without some of them is right, and no radius holds: the probability `misidentified`
+/// that they are is taken from the risk first, and where nothing is left of it there is no level.
 pub(super) fn protection(
     data: &Observations<'_>,
     pose: &Transform<Object, Camera>,
     covariance: &Covariance6<Object, Camera>,
     acceptance: &Acceptance,
+    misidentified: f64,
 ) -> Separation {
     let n = data.points.len();
     if Redundancy::of(n) == Redundancy::Unmonitored {
         return Separation::default();
     }
     let (position, attitude) = semi_axes(covariance);
-    let quiet = radius(0.5 * acceptance.risk);
+    let left = acceptance.risk - misidentified;
+    // Written so that a NaN leaves nothing.
+    let identified = left > 0.0;
+    let risk = if identified { left } else { acceptance.risk };
+    let quiet = radius(0.5 * risk);
     let own = Protection { position: quiet * position, attitude: quiet * attitude };
     let even = || isotropic(&data.points, pose);
     let Some(deletions) = Deletions::of(data) else {
@@ -117,14 +128,14 @@ pub(super) fn protection(
     let stretch = deletions.stretch.or_else(even);
     let mut watch = Watch { pose, deletions, level: own, spared: true };
     let twice = acceptance.two_wrong_rate > 0.0;
-    let share = if twice { 0.25 } else { 0.5 } * acceptance.risk;
+    let share = if twice { 0.25 } else { 0.5 } * risk;
     let ones = (0..n).map(|out| [out]);
     let one = watch.farthest(ones, (share / acceptance.wrong_match_rate).min(1.0));
     let two = (twice && n >= 5).then_some(()).and_then(|()| {
         let twos = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j]));
         watch.farthest(twos, (share / acceptance.two_wrong_rate).min(1.0))
     });
-    let available = watch.spared && (!twice || n >= 6);
+    let available = identified && watch.spared && (!twice || n >= 6);
     Separation { one, two, protection: available.then_some(watch.level), stretch }
 }
 
@@ -221,7 +232,7 @@ mod tests {
     fn of(data: &Observations<'_>, acceptance: &Acceptance) -> (Option<f64>, Option<Protection>) {
         let witness = Mahalanobis::default();
         let pose = witness.solve(data).unwrap();
-        let all = protection(data, &pose, &witness.covariance(data, &pose).unwrap(), acceptance);
+        let all = protection(data, &pose, &witness.covariance(data, &pose).unwrap(), acceptance, 0.0);
         assert_eq!(all.two.is_some(), acceptance.two_wrong_rate > 0.0 && data.points.len() >= 5);
         (all.one, all.protection)
     }
@@ -249,6 +260,20 @@ mod tests {
         assert!((noisy.position / level.position - 2.0).abs() < 1e-6);
     }
 
+    /// Seen to fail where the whole risk is left to errors.
+    #[test]
+    fn what_the_points_may_be_mistaken_for_is_taken_from_the_risk() {
+        let (data, pose) = seen(6);
+        let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
+        let level = |risk: f64, misidentified: f64| {
+            let acceptance = Acceptance { risk, ..Acceptance::default() };
+            protection(&data, &pose, &covariance, &acceptance, misidentified).protection
+        };
+        assert_eq!(level(1e-4, 7e-5), level(1e-4 - 7e-5, 0.0));
+        assert!(level(1e-4, 9.9e-5).is_some());
+        assert_eq!([1e-4, 0.3, f64::NAN].map(|misidentified| level(1e-4, misidentified)), [None; 3]);
+    }
+
     /// One coordinate that is as good as exact takes all weight from the others, and three points any of which fit say nothing.
     #[test]
     fn every_fix_of_four_points_has_a_stretch() {
@@ -256,7 +281,7 @@ mod tests {
             let (mut data, pose) = seen(count);
             data.points[0].measured.covariance[(0, 0)] = if exact { 1e-16 } else { SIGMA * SIGMA };
             let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
-            protection(&data, &pose, &covariance, &Acceptance::default()).stretch
+            protection(&data, &pose, &covariance, &Acceptance::default(), 0.0).stretch
         };
         assert_eq!(stretch(3, false), None);
         for count in [4, 6] {

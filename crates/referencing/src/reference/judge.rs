@@ -57,8 +57,8 @@ impl Judge<'_> {
         if expected <= budget { Ok(()) } else { Err(Refusal::Chance { size, expected, budget }) }
     }
 
-    /// The pose of the set and of its rivals: the only one that passes, several, or none.
-    pub(super) fn poses(&self, found: &Identification) -> (Outcome, Option<Alternative>) {
+    /// The pose of the set and of its rivals: the only one that passes, several, or none; `misidentified` as [`Integrity`] has it.
+    pub(super) fn poses(&self, found: &Identification, misidentified: Option<f64>) -> (Outcome, Option<Alternative>) {
         let mut stand = Stand::default();
         // Of what fell, the set that the search prefers gives the reason.
         let mut first_fall: Option<(usize, Fallen)> = None;
@@ -111,7 +111,7 @@ impl Judge<'_> {
             }
             (Some(best), _) => {
                 let runner_up = stand.refused.into_iter().find(|other| self.apart(&best.pose, &other.pose));
-                (self.fix(best), runner_up.map(Hypothesis::alternative))
+                (self.fix(best, misidentified), runner_up.map(Hypothesis::alternative))
             }
             (None, Some((_, Fallen::Degenerate(why)))) => (Outcome::Degenerate(why), None),
             (None, Some((_, Fallen::Refused(why)))) => (Outcome::Unidentified(why), None),
@@ -305,14 +305,22 @@ impl Judge<'_> {
         }
     }
 
-    fn fix(&self, hypothesis: Hypothesis) -> Outcome {
+    /// How far a fix may be off, where its points are mistaken with this probability.
+    pub(super) fn protected(&self, fix: &mut Reference, misidentified: f64) {
+        let data = self.observations(&fix.pairs);
+        let pose = &fix.object_from_camera;
+        fix.integrity.protection = protection(&data, pose, &fix.covariance, self.acceptance, misidentified).protection;
+        fix.integrity.misidentified = Some(misidentified);
+    }
+
+    fn fix(&self, hypothesis: Hypothesis, misidentified: Option<f64>) -> Outcome {
         let data = self.observations(&hypothesis.pairs);
         let known = hypothesis.covariance.map_or_else(|| self.solver.covariance(&data, &hypothesis.pose), Ok);
         let covariance = match known {
             Ok(covariance) => covariance,
             Err(why) => return Outcome::Degenerate(why),
         };
-        let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance);
+        let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance, misidentified.unwrap_or(0.0));
         let freedom = 3 * hypothesis.pairs.len() - 6;
         let integrity = Integrity {
             redundancy: Redundancy::of(hypothesis.pairs.len()),
@@ -321,6 +329,7 @@ impl Judge<'_> {
             chi2_limit: chi_square(freedom, self.acceptance.confidence),
             separation: left_out.one,
             separation_two: left_out.two,
+            misidentified,
             protection: left_out.protection,
             stretch: left_out.stretch,
         };

@@ -71,7 +71,7 @@ pub fn judge(
     });
     let (outcome, runner_up) = match (likely, &found.belief) {
         (Ok(()), Some(belief)) => judge.weighed(&found, belief, &chance),
-        (Ok(()), None) => judge.poses(&found),
+        (Ok(()), None) => judge.poses(&found, None),
         (Err(refusal), _) => (Outcome::Unidentified(refusal), None),
     };
     let outcome = judge.told_apart(outcome, found.belief.is_some());
@@ -117,7 +117,7 @@ pub fn judge_named(
     let size_bound = pairs.len();
     let found = Identification::unproved(pairs, size_bound, 0);
     let (outcome, runner_up) = match judge.size(&found.pairs) {
-        Ok(()) => judge.poses(&found),
+        Ok(()) => judge.poses(&found, None),
         Err(refusal) => (Outcome::Unidentified(refusal), None),
     };
     Attempt {

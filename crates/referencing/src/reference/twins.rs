@@ -20,9 +20,9 @@ impl Judge<'_> {
     /// it explain the same measurements. Candidates, residuals, precision, prior and the visible sides of the points decide
     /// between them as between any sets; what passes all is an alternative. A search that weighs evidence must leave all
     /// alternatives together no more than [`Acceptance::doubt`](super::Acceptance::doubt), by the likelihood of the pairs and
-    /// the prior; of other searches none may pass.
-    pub(super) fn told_apart(&self, outcome: Outcome, weighs: bool) -> Outcome {
-        let Outcome::Referenced(reference) = &outcome else { return outcome };
+    /// the prior, and what it leaves them is taken from the fix's protection; of other searches none may pass.
+    pub(super) fn told_apart(&self, mut outcome: Outcome, weighs: bool) -> Outcome {
+        let Outcome::Referenced(reference) = &mut outcome else { return outcome };
         let sets = self.twins(&reference.pairs);
         if sets.is_empty() {
             return outcome;
@@ -38,7 +38,13 @@ impl Judge<'_> {
             }
         }
         let weight: f64 = others.iter().map(|other| (other.score - own.score).exp()).sum();
-        if others.is_empty() || (weighs && weight <= self.acceptance.doubt * (1.0 + weight)) {
+        if others.is_empty() {
+            return outcome;
+        }
+        if weighs && weight <= self.acceptance.doubt * (1.0 + weight) {
+            // The search may have counted some of them among the poses elsewhere: what is counted twice is on the safe side.
+            let known = reference.integrity.misidentified.unwrap_or(0.0);
+            self.protected(reference, known + weight / (1.0 + weight));
             return outcome;
         }
         Outcome::Ambiguous(std::iter::once(own).chain(others).map(Hypothesis::alternative).collect())

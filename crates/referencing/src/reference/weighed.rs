@@ -35,7 +35,7 @@ impl Judge<'_> {
             let all = belief.explanations.first().into_iter().chain(elsewhere);
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
         }
-        let (mut outcome, _) = self.poses(found);
+        let (mut outcome, _) = self.poses(found, Some(shares.elsewhere + shares.absent));
         if let (Outcome::Referenced(reference), Some(best)) = (&mut outcome, belief.explanations.first()) {
             // The solver has the pairs alone: what it makes of them must be the pose that was weighed.
             if self.apart(&reference.object_from_camera, &best.object_from_camera) {

@@ -30,11 +30,10 @@ impl Association {
         let vertices = vertices(problem);
         let mut adjacency = BitMatrix::zeros(vertices.len());
         // A cheap necessary condition first, and one that suffices; the exact test decides between them.
-        let extent = extent(problem, &vertices);
         let mut sites = Sites::default();
         for &pair in &vertices {
             let (model, cloud) = (problem.model[pair.model].at.coords, problem.cloud[pair.cloud].position.at.coords);
-            let (reach, sure) = reach(problem, pair, extent);
+            let (reach, sure) = reach(problem, pair);
             sites.push(&model, &cloud, reach, sure);
         }
         sites.pad();
@@ -80,18 +79,12 @@ impl Association {
     }
 }
 
-/// The largest coordinate (m).
-fn extent(problem: &Problem<'_>, vertices: &[Correspondence]) -> f64 {
-    let known = vertices.iter().map(|pair| problem.model[pair.model].at.coords.amax());
-    let measured = vertices.iter().map(|pair| problem.cloud[pair.cloud].position.at.coords.amax());
-    known.chain(measured).fold(0.0, f64::max)
-}
-
 /// Shares of bounds of Δ: that of two pairs is at most the sum of their first, by √(x² + y²) ≤ x + y, and at least
-/// the sum of their second; `extent` is the largest coordinate (m), which rounding is a share of.
-pub(super) fn reach(problem: &Problem<'_>, pair: Correspondence, extent: f64) -> (f64, f64) {
-    // Distances themselves are rounded.
-    let rounding = 1e-13 * extent;
+/// the sum of their second.
+pub(super) fn reach(problem: &Problem<'_>, pair: Correspondence) -> (f64, f64) {
+    // Distances themselves are rounded, by a share of the coordinates.
+    let (known, measured) = (problem.model[pair.model].at, problem.cloud[pair.cloud].position.at);
+    let rounding = 1e-13 * known.coords.amax().max(measured.coords.amax());
     match problem.tolerance {
         Tolerance::Fixed(delta) => (0.5 * delta * (1.0 + 1e-9) + rounding, 0.5 * delta * (1.0 - 1e-9) - rounding),
         Tolerance::Sigmas(k) => {

@@ -45,7 +45,7 @@ pub struct Congruence {
 /// models triangles are taken evenly as far as the work allows: each is mapped whole with a probability of
 /// at least a fifth, so that a motion is missed after ten with one of a tenth, after forty with 10⁻⁴.
 /// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
-pub(super) fn congruences(points: &[ModelPoint]) -> Vec<Congruence> {
+pub(crate) fn congruences(points: &[ModelPoint]) -> Vec<Congruence> {
     let n = points.len();
     if n < LEAST_POINTS {
         return Vec::new();
@@ -222,6 +222,12 @@ fn ratio(mut sides: [f64; 3]) -> f64 {
 }
 
 impl Congruence {
+    /// How far (m) the farthest of the points that it maps comes to lie from the one that it is mapped onto.
+    pub(crate) fn farthest_off(&self, points: &[ModelPoint]) -> f64 {
+        let off = |&(from, onto): &(usize, usize)| (self.motion * points[from].at).distance(&points[onto].at);
+        self.pairs.iter().map(off).fold(0.0, f64::max)
+    }
+
     /// What the motion does, for people: how far it turns and shifts the points.
     pub fn describe(&self, points: &[ModelPoint]) -> String {
         let degrees = self.motion.rotation().angle().to_degrees();

@@ -17,6 +17,7 @@ use seafix_geometry::{Covariance6, Object, Point, Transform, World, triad};
 
 pub(crate) use check::{COINCIDENT, SUSPICIOUS};
 pub use congruence::Congruence;
+pub(crate) use congruence::congruences;
 pub use shell::Shell;
 pub use target::{NoWorld, Target, TargetKind};
 pub(crate) use target::{diameter, nearest_two};

@@ -10,8 +10,10 @@ use crate::{
 
 /// So many standard deviations of the prior's rotation may lie between two pairs.
 const TURN_SIGMAS: f64 = 4.5;
-/// What rounding to single precision may cost a distance (m per metre of the cloud's extent).
+/// What rounding to single precision may cost a distance, half of it at either end (m per metre from the centre).
 const ROUNDING: f32 = 4e-7;
+/// Squares of longer distances from the centre (m) are no numbers in single precision: what is farther is compatible with nothing.
+const FARTHEST: f64 = 1e15;
 
 /// The candidate pairs with their compatibility.
 ///
@@ -39,6 +41,8 @@ pub(in crate::search) struct Graph {
 struct Columns {
     /// Measured place, model place, and measured minus predicted place.
     at: [Vec<f32>; 9],
+    /// Half of what a distance may differ by (m), and of what rounding may cost it: a point far from the centre is known less
+    /// well than the others, and costs them nothing.
     reach: Vec<f32>,
 }
 
@@ -60,15 +64,13 @@ impl Graph {
         });
         // A turn moves nothing by more than twice its lever.
         let turn = turn.filter(|turn| *turn < 2.0);
-        let extent = columns.at[..6].iter().flatten().fold(0.0f32, |most, x| most.max(x.abs()));
-        let rounding = ROUNDING * extent;
         let mut row = vec![0; words];
         let twins = Twins::of(&graph.vertices, clouds);
         for a in 0..count {
             let from = graph.starts[graph.rank[a] as usize + 1];
             match turn {
-                None => coherent(&columns, a, from / 64, rounding, &mut row),
-                Some(turn) => compatible(&columns, a, from / 64, (rounding, turn), &mut row),
+                None => coherent(&columns, a, from / 64, &mut row),
+                Some(turn) => compatible(&columns, a, from / 64, turn, &mut row),
             }
             graph.tests += (count - from) as u64;
             graph.fill(problem, a, from, &row, &twins);
@@ -133,14 +135,14 @@ impl Twins {
     }
 }
 
-/// Marks the vertices whose distance to vertex `a` agrees, from word `from` on, where rounding may cost a distance so much (m).
+/// Marks the vertices whose distance to vertex `a` agrees, from word `from` on.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn coherent(columns: &Columns, a: usize, from: usize, rounding: f32, row: &mut [u64]) {
+fn coherent(columns: &Columns, a: usize, from: usize, row: &mut [u64]) {
     let chunks = |column: usize| columns.at[column][from * LANES..].as_chunks::<LANES>().0;
     let [cx, cy, cz, mx, my, mz] = [0, 1, 2, 3, 4, 5].map(chunks);
     let reaches = columns.reach[from * LANES..].as_chunks::<LANES>().0;
     let here: [f32; 6] = std::array::from_fn(|column| columns.at[column][a]);
-    let reach = columns.reach[a] + rounding;
+    let reach = columns.reach[a];
     for (word, out) in row[from..].iter_mut().enumerate() {
         let mut near = [0u8; LANES];
         let (cx, cy, cz) = (&cx[word], &cy[word], &cz[word]);
@@ -157,12 +159,12 @@ fn coherent(columns: &Columns, a: usize, from: usize, rounding: f32, row: &mut [
 
 /// The same, and whose offset from the prediction differs by no more than a turn by such an angle (rad) makes of the lever.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn compatible(columns: &Columns, a: usize, from: usize, (rounding, turn): (f32, f32), row: &mut [u64]) {
+fn compatible(columns: &Columns, a: usize, from: usize, turn: f32, row: &mut [u64]) {
     let chunks = |column: usize| columns.at[column][from * LANES..].as_chunks::<LANES>().0;
     let [cx, cy, cz, mx, my, mz, ox, oy, oz] = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(chunks);
     let reaches = columns.reach[from * LANES..].as_chunks::<LANES>().0;
     let here: [f32; 9] = std::array::from_fn(|column| columns.at[column][a]);
-    let reach = columns.reach[a] + rounding;
+    let reach = columns.reach[a];
     for (word, out) in row[from..].iter_mut().enumerate() {
         let mut near = [0u8; LANES];
         let (cx, cy, cz) = (&cx[word], &cy[word], &cz[word]);
@@ -197,9 +199,15 @@ fn agree(known: f32, measured: f32, tolerance: f32) -> bool {
 impl Columns {
     fn of(problem: &Problem<'_>, rough: &Rough, vertices: &[Correspondence]) -> Self {
         let mut columns = Self::default();
-        let used = vertices.len().max(1) as f64;
         let cloud = |pair: &Correspondence| problem.cloud[pair.cloud].position.at.coords;
-        let centre = vertices.iter().map(cloud).sum::<Vector3<f64>>() / used;
+        // What lies far outside moves the centre of the others no further than they are.
+        let inside = |at: &Vector3<f64>| rough.candidates.as_ref().is_none_or(|of| of.holds(at));
+        let (sum, used) = vertices
+            .iter()
+            .map(cloud)
+            .filter(inside)
+            .fold((Vector3::zeros(), 0.0), |(sum, used), at| (sum + at, used + 1.0));
+        let centre = sum / f64::max(used, 1.0);
         for pair in vertices {
             let (at, model) = (cloud(pair), problem.model[pair.model].at.coords);
             let offset = rough.known.as_ref().map_or(Vector3::zeros(), |known| at - known.places[pair.model].0);
@@ -208,7 +216,10 @@ impl Columns {
                 columns.at[3 + axis].push((model[axis] - rough.centroid[axis]) as f32);
                 columns.at[6 + axis].push(offset[axis] as f32);
             }
-            columns.reach.push(reach(problem, *pair, 0.0).0 as f32);
+            let (seen, known) = ((at - centre).amax(), (model - rough.centroid).amax());
+            // No number at all where it is too far.
+            let reach = if seen <= FARTHEST { reach(problem, *pair).0 as f32 } else { f32::NAN };
+            columns.reach.push(reach + 0.5 * ROUNDING * seen.max(known) as f32);
         }
         // Nothing is compatible with what fills up the last word.
         let whole = vertices.len().next_multiple_of(LANES);

@@ -7,7 +7,7 @@ use super::{
     Motion,
     fit::fit,
     graph::Graph,
-    rough::{Rough, box_volume},
+    rough::{Rough, volume},
     six::factor as factor_of,
 };
 use crate::{Correspondence, Problem, Tolerance};
@@ -153,8 +153,8 @@ fn peak(noise: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
 fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
     let lists = &problem.candidates.lists;
     let Some(known) = &rough.known else {
-        let ln_volume = libm::log(box_volume(problem));
-        return lists.iter().map(|list| libm::log(list.len().max(1) as f64) - ln_volume).collect();
+        let volume = rough.candidates.as_ref().map_or(f64::INFINITY, |of| volume(problem, of));
+        return lists.iter().map(|list| libm::log(list.len().max(1) as f64) - libm::log(volume)).collect();
     };
     let column = |axis: usize| problem.cloud.iter().map(|point| point.position.at.coords[axis]).collect::<Vec<f64>>();
     let (x, y, z) = (column(0), column(1), column(2));

@@ -8,7 +8,7 @@ use super::{
     Motion,
     likelihood::{HALF_LN_2PI, half_ln_det},
 };
-use crate::{Correspondence, ModelPoint, Prior, PriorBound, Problem};
+use crate::{Correspondence, ModelPoint, Prior, PriorBound, Problem, cloud_box::CloudBox, site::diameter};
 
 /// A bound of the prior is taken for so many standard deviations: bounds are given so that they hold.
 pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
@@ -24,6 +24,8 @@ pub(in crate::search) struct Rough {
     pub(in crate::search) centroid: Vector3<f64>,
     /// ln of the density at its maximum.
     pub(in crate::search) ln_peak: f64,
+    /// The box of the candidates; `None` with a prior, which draws shells of its own.
+    pub(in crate::search) candidates: Option<CloudBox>,
 }
 
 /// A prior in these coordinates.
@@ -44,9 +46,10 @@ impl Rough {
         let n = problem.model.len().max(1) as f64;
         let centroid = problem.model.iter().map(|point| point.at.coords).sum::<Vector3<f64>>() / n;
         let Some(prior) = problem.prior else {
-            // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the cloud's box.
-            let ln_peak = -libm::log(box_volume(problem) * 8.0 * std::f64::consts::PI.powi(2));
-            return Some(Self { known: None, centroid, ln_peak });
+            // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the box of the candidates.
+            let candidates = candidates(problem);
+            let ln_peak = -libm::log(volume(problem, &candidates) * 8.0 * std::f64::consts::PI.powi(2));
+            return Some(Self { known: None, centroid, ln_peak, candidates: Some(candidates) });
         };
         let motion = Motion::of(&prior.object_from_camera.inverse());
         let at = motion.apply(&centroid);
@@ -72,7 +75,8 @@ impl Rough {
             PriorBound::Box(half) => Some(half),
             PriorBound::Gaussian(_) => None,
         };
-        Some(Self { known: Some(Known { motion, information, attitude, places, half }), centroid, ln_peak })
+        let known = Some(Known { motion, information, attitude, places, half });
+        Some(Self { known, centroid, ln_peak, candidates: None })
     }
 
     /// η of a motion.
@@ -138,20 +142,19 @@ fn covariance(problem: &Problem<'_>, prior: &Prior, motion: &Motion, at: &Vector
     }
 }
 
-/// All candidate pairs.
-fn candidates(problem: &Problem<'_>) -> impl Iterator<Item = Correspondence> {
-    let lists = problem.candidates.lists.iter().enumerate();
-    lists.flat_map(|(model, list)| list.iter().map(move |&cloud| Correspondence { model, cloud }))
+/// The box of all cloud points that are candidates.
+fn candidates(problem: &Problem<'_>) -> CloudBox {
+    let mut candidate = vec![false; problem.cloud.len()];
+    problem.candidates.lists.iter().flatten().for_each(|&j| candidate[j] = true);
+    let places = problem.cloud.iter().zip(candidate).filter(|(_, candidate)| *candidate);
+    CloudBox::of(places.map(|(point, _)| point.position.at.coords), diameter(problem.model))
 }
 
-/// Volume of the box (m³) of all cloud points that are candidates, each side at least as long as the greatest
-/// tolerance of one of them.
-pub(in crate::search) fn box_volume(problem: &Problem<'_>) -> f64 {
-    let (mut low, mut high) = (Vector3::from_element(f64::INFINITY), Vector3::from_element(f64::NEG_INFINITY));
-    for pair in candidates(problem) {
-        let at = &problem.cloud[pair.cloud].position.at.coords;
-        (low, high) = (low.inf(at), high.sup(at));
-    }
-    let least = candidates(problem).map(|pair| reach(problem, pair, 0.0).0).fold(f64::MIN_POSITIVE, f64::max);
-    (high - low).iter().map(|side| side.max(least)).product()
+/// Volume of a box of candidates (m³), each side at least as long as the greatest tolerance of one of those in it.
+pub(in crate::search) fn volume(problem: &Problem<'_>, of: &CloudBox) -> f64 {
+    let lists = problem.candidates.lists.iter().enumerate();
+    let pairs = lists.flat_map(|(model, list)| list.iter().map(move |&cloud| Correspondence { model, cloud }));
+    let inside = pairs.filter(|pair| of.holds(&problem.cloud[pair.cloud].position.at.coords));
+    let least = inside.map(|pair| reach(problem, pair).0).fold(f64::MIN_POSITIVE, f64::max);
+    of.lengths().iter().map(|side| side.max(least)).product()
 }
