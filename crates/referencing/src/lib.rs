@@ -9,10 +9,10 @@
 
 mod candidates;
 mod chance;
-mod cloud_box;
 mod joint;
 mod lanes;
 mod observations;
+mod parts;
 mod problem;
 pub mod problem_file;
 mod reference;

@@ -97,6 +97,18 @@ impl Problem<'_> {
         }
     }
 
+    /// The share of Δ that is due to one pair (m): that of two is no more than the sum of both, by √(x² + y²) ≤ x + y.
+    pub(crate) fn share_of_delta(&self, pair: Correspondence) -> f64 {
+        match self.tolerance {
+            Tolerance::Fixed(delta) => 0.5 * delta,
+            Tolerance::Sigmas(k) => {
+                // No direction has more variance than the Frobenius norm, whatever the matrix.
+                let measured = self.cloud[pair.cloud].position.covariance.norm().sqrt();
+                k * (measured + self.model[pair.model].sigma)
+            }
+        }
+    }
+
     /// Whether `a` and `b` are structurally coherent: two different model points, two different
     /// cloud points, and | |P_a P_b| − |C_a C_b| | ≤ Δ (closed).
     pub fn coherent(&self, a: Correspondence, b: Correspondence) -> bool {

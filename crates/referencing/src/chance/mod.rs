@@ -3,7 +3,7 @@
 //! # Null model
 //!
 //! No candidate is true: each candidate of a model point lies anywhere in its shell; without a prior
-//! anywhere in the cloud's box ([`CloudBox`](crate::cloud_box::CloudBox)); the partners of putative pairs are shuffled; all independent
+//! anywhere in the cloud's box, as dense as the set's part of the cloud ([`Parts`](crate::parts::Parts)); the partners of putative pairs are shuffled; all independent
 //! ([`Null`]). Then
 //!
 //! E = Σ_{j ≥ k} Σ over j-subsets S of model points of Π_{i∈S} m_i · P(S),
@@ -78,7 +78,7 @@ pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> 
     if found.len() < 3 {
         return f64::INFINITY;
     }
-    let anywhere = expected_chance_sets(problem, found.len(), chi_square(3 * found.len() - 6, CONFIDENCE));
+    let anywhere = expected_about(problem, found, found.len(), chi_square(3 * found.len() - 6, CONFIDENCE));
     Chance::of(problem, found).beside(anywhere)
 }
 
@@ -107,7 +107,7 @@ impl<'a> Chance<'a> {
     pub(crate) fn sets_as_good(&self) -> f64 {
         *self.as_good.get_or_init(|| match self.found.len() {
             0..3 => f64::INFINITY,
-            size => self.beside(expected_chance_sets(self.problem, size, self.best().0)),
+            size => self.beside(expected_about(self.problem, self.found, size, self.best().0)),
         })
     }
 
@@ -142,6 +142,11 @@ pub(crate) fn shuffled(problem: &Problem<'_>) -> bool {
 /// the problem were true: sets of `size` pairs or more whose χ² per degree of freedom is at most
 /// `chi2`/(3·size − 6).
 pub fn expected_chance_sets(problem: &Problem<'_>, size: usize, chi2: f64) -> f64 {
+    expected_about(problem, &[], size, chi2)
+}
+
+/// The same where the cloud is as dense as about these pairs; about none, as it is where most of it is.
+fn expected_about(problem: &Problem<'_>, pairs: &[Correspondence], size: usize, chi2: f64) -> f64 {
     if size < 3 {
         return f64::INFINITY;
     }
@@ -149,7 +154,7 @@ pub fn expected_chance_sets(problem: &Problem<'_>, size: usize, chi2: f64) -> f6
     if chi2.is_nan() || noise.is_nan() {
         return f64::NAN;
     }
-    let frame = Frame { null: Null::of(problem), noise, order: order(problem), shared: shared(problem) };
+    let frame = Frame { null: Null::of(problem, pairs), noise, order: order(problem), shared: shared(problem) };
     let available = problem.candidates.with_candidates();
     let (mut sum, mut last) = (0.0, 0.0_f64);
     for j in (size..=available).take(MOST_SIZES) {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::MeasuredPoint;
 
 use super::{coordinates, sample::spread_sample, sequence::Sequence, shuffled};
-use crate::{Prior, PriorBound, Problem, candidates::chi_square, cloud_box::CloudBox, site::diameter};
+use crate::{Correspondence, Prior, PriorBound, Problem, candidates::chi_square, parts::Parts};
 
 /// The confidence of the shells that a Gaussian prior draws, as [`crate::Gate`] has it by default.
 const CONFIDENCE: f64 = 0.99;
@@ -18,7 +18,7 @@ const LEAST: f64 = 1e-9;
 pub(super) enum Null<'a> {
     /// Anywhere in its shell: the centre of each in the camera and its half-sizes.
     Shells(Vec<Shell>),
-    /// Anywhere in the box of the cloud, of these lengths.
+    /// Anywhere in a box of these lengths, as dense as the cloud is about the set ([`Parts`]).
     Box(Vector3<f64>),
     /// Where any partner lies.
     Shuffled(Vec<&'a MeasuredPoint>),
@@ -35,14 +35,16 @@ pub(super) struct Shell {
 }
 
 impl<'a> Null<'a> {
-    pub(super) fn of(problem: &Problem<'a>) -> Self {
+    pub(super) fn of(problem: &Problem<'a>, about: &[Correspondence]) -> Self {
         let lists = &problem.candidates.lists;
         if let Some(prior) = problem.prior {
             return Self::Shells(shells(problem, prior));
         }
         if !shuffled(problem) {
-            let of = CloudBox::of(problem.cloud.iter().map(coordinates), diameter(problem.model));
-            return Self::Box(of.lengths().add_scalar(LEAST));
+            let parts = Parts::of(problem);
+            let about = about.first().map(|pair| pair.cloud).or_else(|| parts.in_largest());
+            let lengths = about.map_or(Vector3::zeros(), |about| parts.as_dense(about));
+            return Self::Box(lengths.add_scalar(LEAST));
         }
         let mut partners: Vec<usize> = lists.iter().flatten().copied().collect();
         spread_sample(problem.cloud, &mut partners, MOST_LOOKED_AT);

@@ -206,6 +206,16 @@ impl<'a> Source<'a> {
             message if message.starts_with("EOF") => {
                 near("the file ends too early").value("").remedy("it seems to be cut off; write it again")
             }
+            message if message.starts_with("control character") => {
+                near("a line break, tab or other control character in a text")
+                    .remedy("write it as `\\n`, `\\t` or `\\u` and four digits")
+            }
+            "invalid escape"
+            | "invalid unicode code point"
+            | "unexpected end of hex escape"
+            | "lone leading surrogate in hex escape" => {
+                near("no escape of JSON").remedy("write letters as they are, and a backslash twice")
+            }
             "trailing comma" => near("a comma before the end").remedy("remove it"),
             "key must be a string" => near("a key without double quotes").remedy("put it in double quotes"),
             "trailing characters" if path.is_empty() => {

@@ -434,6 +434,16 @@ fn every_text_that_is_no_problem_is_told_with_its_place() {
         ),
         ("null}", "None}", "`putative`: no JSON value in p.json:6:13: None; give null, or a list of pairs"),
         ("\"putative\"", "putative", "a key without double quotes in p.json:6:1: putative; put it in double quotes"),
+        (
+            "\"x\"",
+            "\"C:\\x\"",
+            "`id`: no escape of JSON in p.json:1:45: x; write letters as they are, and a backslash twice",
+        ),
+        (
+            "\"x\"",
+            "\"a\tb\"",
+            "`id`: a line break, tab or other control character in a text in p.json:1:42: a; write it as `\\n`",
+        ),
         ("null}", "null} x", "something after the end of the problem in p.json:6:19: x; give one problem a file"),
         ("null}", "null", "the file ends too early in p.json:6:13; it seems to be cut off; write it again"),
         // The first of two faults, and no JSON behind it.

@@ -52,6 +52,32 @@ pub struct Protection {
     pub attitude: f64,
 }
 
+impl Protection {
+    /// The radii that a fix with this covariance exceeds with such a probability each, where all of its points are right.
+    pub(super) fn quiet(covariance: &Covariance6<Object, Camera>, probability: f64) -> Self {
+        let (position, attitude) = semi_axes(covariance);
+        let quiet = radius(probability);
+        Self { position: quiet * position, attitude: quiet * attitude }
+    }
+
+    /// Raised so that it holds of another pose, known as well as `quiet` says, too.
+    pub(super) fn cover(&mut self, quiet: &Self, fix: &Transform<Object, Camera>, other: &Transform<Object, Camera>) {
+        let (moved, turned) = apart(fix, other);
+        *self = self.max(&Self { position: moved + quiet.position, attitude: turned + quiet.attitude });
+    }
+
+    /// The greater radii of two.
+    pub(super) fn max(&self, other: &Self) -> Self {
+        Self { position: self.position.max(other.position), attitude: self.attitude.max(other.attitude) }
+    }
+}
+
+/// How far apart two poses have the camera: its position (m) and attitude (rad).
+fn apart(one: &Transform<Object, Camera>, other: &Transform<Object, Camera>) -> (f64, f64) {
+    let moved = (one.translation() - other.translation()).norm();
+    (moved, so3::angle(&(one.rotation().inverse() * other.rotation())))
+}
+
 /// What supports a fix beyond its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Integrity {
@@ -69,8 +95,9 @@ pub struct Integrity {
     /// The same when two points are left out; `None` with fewer than five points, where two cannot be spared, or where
     /// [`Acceptance::two_wrong_rate`] is nought.
     pub separation_two: Option<f64>,
-    /// The probability that the points are others than those of the fix, or no points of the object at all, by a search that
-    /// weighs evidence; `None` of one that counts, which does not say.
+    /// The probability that the pose is another, farther off than the alert limit, as most of the points are others than those of the
+    /// fix, or that the object is not there at all, by a search that weighs evidence; `None` of one that counts, which does not
+    /// say.
     pub misidentified: Option<f64>,
     /// Protection levels at [`Acceptance::risk`]; `None` where nothing can vouch for the fix (three points, or a point
     /// that cannot be spared), or where [`misidentified`](Self::misidentified) exceeds that risk.
@@ -114,13 +141,11 @@ pub(super) fn protection(
     if Redundancy::of(n) == Redundancy::Unmonitored {
         return Separation::default();
     }
-    let (position, attitude) = semi_axes(covariance);
     let left = acceptance.risk - misidentified;
     // Written so that a NaN leaves nothing.
     let identified = left > 0.0;
     let risk = if identified { left } else { acceptance.risk };
-    let quiet = radius(0.5 * risk);
-    let own = Protection { position: quiet * position, attitude: quiet * attitude };
+    let own = Protection::quiet(covariance, 0.5 * risk);
     let even = || isotropic(&data.points, pose);
     let Some(deletions) = Deletions::of(data) else {
         return Separation { stretch: even(), ..Separation::default() };
@@ -159,8 +184,7 @@ impl Watch<'_> {
                 (self.spared, farthest) = (false, None);
                 continue;
             };
-            let moved = (self.pose.translation() - without.translation()).norm();
-            let turned = so3::angle(&(self.pose.rotation().inverse() * without.rotation()));
+            let (moved, turned) = apart(self.pose, &without);
             farthest = farthest.map(|farthest| farthest.max(moved));
             // Eigenvalues are asked for only where they may raise a level.
             if let Some(position) = longer_than((self.level.position - moved) / k, &block(&certainty, 3)) {

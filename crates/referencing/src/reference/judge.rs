@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
 use super::{
     Acceptance, Alternative, Outcome, Reference, Refusal,
     hypothesis::{Fallen, Hypothesis, by_score},
-    integrity::{Integrity, Redundancy, protection, semi_axes},
+    integrity::{Integrity, Protection, Redundancy, protection, semi_axes},
     rms_apart,
 };
 use crate::{
@@ -305,11 +305,26 @@ impl Judge<'_> {
         }
     }
 
-    /// How far a fix may be off, where its points are mistaken with this probability.
+    /// Raises the levels of a fix so that they hold of other poses within the alert limit too: of all that are not less likely than
+    /// the fix by [`COVERED`] of the risk.
+    pub(super) fn cover<'p>(
+        &self,
+        fix: &mut Reference,
+        others: impl Iterator<Item = (f64, &'p Transform<Object, Camera>)>,
+    ) {
+        let quiet = Protection::quiet(&fix.covariance, 0.5 * self.acceptance.risk);
+        let Some(level) = &mut fix.integrity.protection else { return };
+        let likely = others.filter(|(share, _)| !(*share < COVERED * self.acceptance.risk));
+        likely.for_each(|(_, other)| level.cover(&quiet, &fix.object_from_camera, other));
+    }
+
+    /// Raises the levels of a fix to where its points are mistaken with this probability; they may have been raised for others.
     pub(super) fn protected(&self, fix: &mut Reference, misidentified: f64) {
         let data = self.observations(&fix.pairs);
         let pose = &fix.object_from_camera;
-        fix.integrity.protection = protection(&data, pose, &fix.covariance, self.acceptance, misidentified).protection;
+        let level = protection(&data, pose, &fix.covariance, self.acceptance, misidentified).protection;
+        let known = fix.integrity.protection.take();
+        fix.integrity.protection = known.zip(level).map(|(known, level)| known.max(&level));
         fix.integrity.misidentified = Some(misidentified);
     }
 
@@ -348,6 +363,9 @@ impl Judge<'_> {
         }))
     }
 }
+
+/// Poses near a fix whose probability, over that of the fix, is no more than this share of the risk need not be within its levels.
+const COVERED: f64 = 0.01;
 
 /// A stretch may be greater than it seems by so many of its standard deviations.
 const UNDERSTATED: f64 = 2.0;

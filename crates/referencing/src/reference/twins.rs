@@ -5,7 +5,11 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{Outcome, hypothesis::Hypothesis, judge::Judge};
+use super::{
+    Outcome,
+    hypothesis::{Hypothesis, by_score},
+    judge::Judge,
+};
 use crate::{Correspondence, Kabsch, Observations, Solver};
 
 /// Pairs of model points that the first two measured points may be, beyond which other readings are not sought.
@@ -28,16 +32,22 @@ impl Judge<'_> {
             return outcome;
         }
         let Ok(own) = self.hypothesis(&reference.pairs) else { return outcome };
-        let mut others: Vec<Hypothesis> = Vec::new();
-        for mut other in sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok()) {
-            let new =
-                self.apart(&own.pose, &other.pose) && others.iter().all(|known| self.apart(&known.pose, &other.pose));
-            if new && self.faces(&other) && self.residuals(&other).is_ok() && self.precise_and_near(&mut other).is_ok()
+        let mut possible: Vec<Hypothesis> = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok()).collect();
+        possible.retain(|other| self.faces(other) && self.residuals(other).is_ok());
+        // The likeliest first: those near one that is known are the same pose.
+        possible.sort_by(by_score);
+        let (mut near, mut others): (Vec<Hypothesis>, Vec<Hypothesis>) = (Vec::new(), Vec::new());
+        for mut other in possible {
+            if others.iter().any(|known| !self.apart(&known.pose, &other.pose))
+                || self.precise_and_near(&mut other).is_err()
             {
-                others.push(other);
+                continue;
             }
+            if self.apart(&own.pose, &other.pose) { &mut others } else { &mut near }.push(other);
         }
-        let weight: f64 = others.iter().map(|other| (other.score - own.score).exp()).sum();
+        let share = |other: &Hypothesis| (other.score - own.score).exp();
+        self.cover(reference, near.iter().map(|other| (share(other), &other.pose)));
+        let weight: f64 = others.iter().map(share).sum();
         if others.is_empty() {
             return outcome;
         }

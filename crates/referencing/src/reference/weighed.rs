@@ -47,6 +47,11 @@ impl Judge<'_> {
                 return (Outcome::Ambiguous(vec![best.alternative(), solved]), None);
             }
             reference.score = best.ln_evidence;
+            let near = belief.explanations[1..]
+                .iter()
+                .map(|other| ((other.ln_evidence - best.ln_evidence).exp(), &other.object_from_camera));
+            let near = near.filter(|(_, other)| !self.apart(&reference.object_from_camera, other));
+            self.cover(reference, near.collect::<Vec<_>>().into_iter());
         }
         (outcome, runner_up)
     }

@@ -79,20 +79,17 @@ impl Association {
     }
 }
 
-/// Shares of bounds of Δ: that of two pairs is at most the sum of their first, by √(x² + y²) ≤ x + y, and at least
-/// the sum of their second.
+/// Shares of bounds of Δ: that of two pairs is at most the sum of their first, and at least the sum of their second.
 pub(super) fn reach(problem: &Problem<'_>, pair: Correspondence) -> (f64, f64) {
     // Distances themselves are rounded, by a share of the coordinates.
     let (known, measured) = (problem.model[pair.model].at, problem.cloud[pair.cloud].position.at);
     let rounding = 1e-13 * known.coords.amax().max(measured.coords.amax());
-    match problem.tolerance {
-        Tolerance::Fixed(delta) => (0.5 * delta * (1.0 + 1e-9) + rounding, 0.5 * delta * (1.0 - 1e-9) - rounding),
-        Tolerance::Sigmas(k) => {
-            // No direction has more variance than the Frobenius norm, whatever the matrix.
-            let measured = problem.cloud[pair.cloud].position.covariance.norm().sqrt();
-            (k * (measured + problem.model[pair.model].sigma) * (1.0 + 1e-9) + rounding, -1.0)
-        }
-    }
+    let most = problem.share_of_delta(pair) * (1.0 + 1e-9) + rounding;
+    let least = match problem.tolerance {
+        Tolerance::Fixed(delta) => 0.5 * delta * (1.0 - 1e-9) - rounding,
+        Tolerance::Sigmas(_) => -1.0,
+    };
+    (most, least)
 }
 
 /// For each vertex the later ones of the same cloud point.

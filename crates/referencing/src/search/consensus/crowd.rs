@@ -70,7 +70,7 @@ impl Crowd {
         };
         self.twins = Some((reach, share));
         let volume = 4.0 / 3.0 * std::f64::consts::PI * reach.powi(3);
-        (libm::log(share / volume) - terms.ln_density[pair.model]).max(0.0)
+        (libm::log(share / volume) - terms.ln_density_about(v, pair.model)).max(0.0)
     }
 
     /// By how much the density about the cloud point of a vertex exceeds what was expected (nats).
@@ -87,10 +87,10 @@ impl Crowd {
         let volume = 4.0 / 3.0 * std::f64::consts::PI * square.max(noise).max(f64::MIN_POSITIVE).powf(1.5);
         // Of candidates that were given without a prior, the others of the cloud are as near as they would be by chance.
         let even = match problem.prior {
-            Some(_) => terms.ln_density[pair.model],
+            Some(_) => terms.ln_density_about(v, pair.model),
             None => {
                 let own = problem.candidates.lists[pair.model].len().max(1);
-                terms.ln_density[pair.model] + libm::log(counted.points.len() as f64 / own as f64)
+                terms.ln_density_about(v, pair.model) + libm::log(counted.points.len() as f64 / own as f64)
             }
         };
         let times = libm::log(NEIGHBOURS as f64 / volume) - even;

@@ -138,46 +138,37 @@ impl Twins {
 /// Marks the vertices whose distance to vertex `a` agrees, from word `from` on.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn coherent(columns: &Columns, a: usize, from: usize, row: &mut [u64]) {
-    let chunks = |column: usize| columns.at[column][from * LANES..].as_chunks::<LANES>().0;
-    let [cx, cy, cz, mx, my, mz] = [0, 1, 2, 3, 4, 5].map(chunks);
-    let reaches = columns.reach[from * LANES..].as_chunks::<LANES>().0;
-    let here: [f32; 6] = std::array::from_fn(|column| columns.at[column][a]);
-    let reach = columns.reach[a];
-    for (word, out) in row[from..].iter_mut().enumerate() {
-        let mut near = [0u8; LANES];
-        let (cx, cy, cz) = (&cx[word], &cy[word], &cz[word]);
-        let (mx, my, mz) = (&mx[word], &my[word], &mz[word]);
-        let reaches = &reaches[word];
-        for k in 0..LANES {
-            let measured = square([cx[k] - here[0], cy[k] - here[1], cz[k] - here[2]]);
-            let known = square([mx[k] - here[3], my[k] - here[4], mz[k] - here[5]]);
-            near[k] = u8::from(agree(known, measured, reach + reaches[k]));
-        }
-        *out = packed(&near);
-    }
+    mark::<false>(columns, a, from, 0.0, row);
 }
 
 /// The same, and whose offset from the prediction differs by no more than a turn by such an angle (rad) makes of the lever.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn compatible(columns: &Columns, a: usize, from: usize, turn: f32, row: &mut [u64]) {
-    let chunks = |column: usize| columns.at[column][from * LANES..].as_chunks::<LANES>().0;
-    let [cx, cy, cz, mx, my, mz, ox, oy, oz] = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(chunks);
+    mark::<true>(columns, a, from, turn, row);
+}
+
+/// Both, compiled for each as it is called.
+#[inline(always)]
+fn mark<const TURNED: bool>(columns: &Columns, a: usize, from: usize, turn: f32, row: &mut [u64]) {
+    let chunks = columns.at.each_ref().map(|column| column[from * LANES..].as_chunks::<LANES>().0);
     let reaches = columns.reach[from * LANES..].as_chunks::<LANES>().0;
     let here: [f32; 9] = std::array::from_fn(|column| columns.at[column][a]);
     let reach = columns.reach[a];
     for (word, out) in row[from..].iter_mut().enumerate() {
         let mut near = [0u8; LANES];
-        let (cx, cy, cz) = (&cx[word], &cy[word], &cz[word]);
-        let (mx, my, mz) = (&mx[word], &my[word], &mz[word]);
-        let (ox, oy, oz) = (&ox[word], &oy[word], &oz[word]);
+        let [cx, cy, cz, mx, my, mz, ox, oy, oz] = chunks.map(|column| &column[word]);
         let reaches = &reaches[word];
         for k in 0..LANES {
             let measured = square([cx[k] - here[0], cy[k] - here[1], cz[k] - here[2]]);
             let known = square([mx[k] - here[3], my[k] - here[4], mz[k] - here[5]]);
-            let moved = square([ox[k] - here[6], oy[k] - here[7], oz[k] - here[8]]);
             let tolerance = reach + reaches[k];
-            let most = turn * known.sqrt() + 2.0 * tolerance;
-            near[k] = u8::from(agree(known, measured, tolerance) & (moved <= most * most));
+            let mut one = agree(known, measured, tolerance);
+            if TURNED {
+                let moved = square([ox[k] - here[6], oy[k] - here[7], oz[k] - here[8]]);
+                let most = turn * known.sqrt() + 2.0 * tolerance;
+                one &= moved <= most * most;
+            }
+            near[k] = u8::from(one);
         }
         *out = packed(&near);
     }
@@ -201,12 +192,12 @@ impl Columns {
         let mut columns = Self::default();
         let cloud = |pair: &Correspondence| problem.cloud[pair.cloud].position.at.coords;
         // What lies far outside moves the centre of the others no further than they are.
-        let inside = |at: &Vector3<f64>| rough.candidates.as_ref().is_none_or(|of| of.holds(at));
-        let (sum, used) = vertices
-            .iter()
-            .map(cloud)
-            .filter(inside)
-            .fold((Vector3::zeros(), 0.0), |(sum, used), at| (sum + at, used + 1.0));
+        let middle = rough.parts.as_ref().and_then(|parts| Some((parts, parts.in_largest()?)));
+        let inside = |pair: &&Correspondence| middle.is_none_or(|(parts, middle)| parts.together(pair.cloud, middle));
+        let (mut sum, mut used) = (Vector3::zeros(), 0.0);
+        for pair in vertices.iter().filter(inside) {
+            (sum, used) = (sum + cloud(pair), used + 1.0);
+        }
         let centre = sum / f64::max(used, 1.0);
         for pair in vertices {
             let (at, model) = (cloud(pair), problem.model[pair.model].at.coords);

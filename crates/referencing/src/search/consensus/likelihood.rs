@@ -3,14 +3,8 @@
 use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3};
 use seafix_geometry::{Camera, UncertainPoint, so3::skew};
 
-use super::{
-    Motion,
-    fit::fit,
-    graph::Graph,
-    rough::{Rough, volume},
-    six::factor as factor_of,
-};
-use crate::{Correspondence, Problem, Tolerance};
+use super::{Motion, fit::fit, graph::Graph, rough::Rough, six::factor as factor_of};
+use crate::{Correspondence, Problem, Tolerance, parts::Parts};
 
 /// ½ ln 2π: a Gaussian of d dimensions is exp(−d·½ ln 2π − ½ ln det Σ) at its maximum, and a maximum of a density with the
 /// information H fills exp(d·½ ln 2π − ½ ln det H).
@@ -61,8 +55,10 @@ impl Term {
 pub(in crate::search) struct Terms {
     /// Of each vertex.
     pub(in crate::search) pairs: Vec<Term>,
-    /// Of each model point: ln of the density of cloud points about its predicted place.
+    /// Of each model point: ln of the density of cloud points about its predicted place; without a prior of the whole cloud.
     pub(in crate::search) ln_density: Vec<f64>,
+    /// Of each vertex, without a prior: by how much the cloud is denser in its part (nats). Empty with one.
+    excess: Vec<f64>,
     /// ln of the volumes that the posterior of 0…n points fills, taken for points that lie and are known as the candidates are on
     /// average.
     pub(in crate::search) ln_volume: Vec<f64>,
@@ -75,8 +71,10 @@ impl Terms {
         let n = problem.candidates.lists.len();
         let ln_density = densities(problem, rough);
         let count = graph.vertices.len();
-        let mut terms =
-            Self { pairs: Vec::with_capacity(count), ln_density, ln_volume: Vec::new(), ln_share: shares(n) };
+        let of_parts = |parts: &Parts| graph.vertices.iter().map(|pair| parts.ln_excess(pair.cloud)).collect();
+        let excess = rough.parts.as_ref().map_or_else(Vec::new, of_parts);
+        let pairs = Vec::with_capacity(count);
+        let mut terms = Self { pairs, ln_density, excess, ln_volume: Vec::new(), ln_share: shares(n) };
         let turned = rough.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
         // Points that are called exact are taken to be as good as a twenty-fifth of what the tolerance allows each.
         let least = match problem.tolerance {
@@ -87,7 +85,7 @@ impl Terms {
         let mut average = Matrix6::zeros();
         // Many pairs share a covariance: the last inverse is kept.
         let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64, f64)> = None;
-        for pair in &graph.vertices {
+        for (v, pair) in graph.vertices.iter().enumerate() {
             let (seen, known) = (&problem.cloud[pair.cloud].position, &problem.model[pair.model]);
             let own = known.sigma * known.sigma + least;
             let noise = seen.covariance + Matrix3::identity() * own;
@@ -99,13 +97,18 @@ impl Terms {
                 }
             };
             last = Some((noise, weight, ln_peak, variance));
-            let gain = ln_peak - terms.ln_density[pair.model];
+            let gain = ln_peak - terms.ln_density_about(v, pair.model);
             terms.pairs.push(Term { cloud: seen.at.coords, model: known.at.coords, weight, variance, gain });
             average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
         }
         average /= count.max(1) as f64;
         terms.ln_volume = volumes(&average, rough, graph.starts.len() - 1);
         terms
+    }
+
+    /// ln of the density of clutter about a vertex of a model point.
+    pub(in crate::search) fn ln_density_about(&self, v: usize, model: usize) -> f64 {
+        self.ln_density[model] + self.excess.get(v).copied().unwrap_or(0.0)
     }
 
     /// The log-likelihood ratio of one pair under a pose, however far it is from it.
@@ -153,8 +156,8 @@ fn peak(noise: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
 fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
     let lists = &problem.candidates.lists;
     let Some(known) = &rough.known else {
-        let volume = rough.candidates.as_ref().map_or(f64::INFINITY, |of| volume(problem, of));
-        return lists.iter().map(|list| libm::log(list.len().max(1) as f64) - libm::log(volume)).collect();
+        let ln_volume = rough.parts.as_ref().map_or(f64::INFINITY, Parts::ln_whole);
+        return lists.iter().map(|list| libm::log(list.len().max(1) as f64) - ln_volume).collect();
     };
     let column = |axis: usize| problem.cloud.iter().map(|point| point.position.at.coords[axis]).collect::<Vec<f64>>();
     let (x, y, z) = (column(0), column(1), column(2));

@@ -38,7 +38,7 @@ pub(in crate::search) fn mirror_image(
     (terms, rough, graph): (&Terms, &Rough, &Graph),
     mode: &Mode,
 ) -> Option<Mode> {
-    let rough = Rough { known: None, centroid: rough.centroid, ln_peak: rough.ln_peak, candidates: rough.candidates };
+    let rough = Rough { known: None, centroid: rough.centroid, ln_peak: rough.ln_peak, parts: None };
     let taken = BTreeSet::new();
     let climb = Climb { model, terms, rough: &rough, graph, taken: &taken, compared: Cell::new(0) };
     let count = mode.members.len() as f64;

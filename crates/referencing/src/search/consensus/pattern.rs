@@ -120,8 +120,8 @@ impl Pattern {
         let own: f64 = mode.members.iter().filter(|v| !repeats(v)).map(|&v| terms.residual_gain(v, &mode.motion)).sum();
         let (n, all) = (self.repeats.len(), self.repeats.iter().filter(|&&repeats| repeats).count());
         let (k, seen) = (mode.members.len(), of_pattern.len());
-        let ln_clutter =
-            of_pattern.iter().map(|&v| terms.ln_density[graph.vertices[v].model]).sum::<f64>() / seen.max(1) as f64;
+        let ln_clutter = of_pattern.iter().map(|&v| terms.ln_density_about(v, graph.vertices[v].model)).sum::<f64>()
+            / seen.max(1) as f64;
         let (mut further, mut gains) = (0, 0.0);
         for place in self.beyond.iter().map(|place| mode.motion.apply(place)) {
             let free = problem

@@ -4,11 +4,10 @@ use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, U6, Vector3, Vector6};
 use seafix_geometry::so3::{log_of_matrix, skew};
 
 use super::{
-    super::association::reach,
     Motion,
     likelihood::{HALF_LN_2PI, half_ln_det},
 };
-use crate::{Correspondence, ModelPoint, Prior, PriorBound, Problem, cloud_box::CloudBox, site::diameter};
+use crate::{ModelPoint, Prior, PriorBound, Problem, parts::Parts};
 
 /// A bound of the prior is taken for so many standard deviations: bounds are given so that they hold.
 pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
@@ -24,8 +23,8 @@ pub(in crate::search) struct Rough {
     pub(in crate::search) centroid: Vector3<f64>,
     /// ln of the density at its maximum.
     pub(in crate::search) ln_peak: f64,
-    /// The box of the candidates; `None` with a prior, which draws shells of its own.
-    pub(in crate::search) candidates: Option<CloudBox>,
+    /// Where clutter lies; `None` with a prior, which draws shells of its own.
+    pub(in crate::search) parts: Option<Parts>,
 }
 
 /// A prior in these coordinates.
@@ -46,10 +45,10 @@ impl Rough {
         let n = problem.model.len().max(1) as f64;
         let centroid = problem.model.iter().map(|point| point.at.coords).sum::<Vector3<f64>>() / n;
         let Some(prior) = problem.prior else {
-            // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the box of the candidates.
-            let candidates = candidates(problem);
-            let ln_peak = -libm::log(volume(problem, &candidates) * 8.0 * std::f64::consts::PI.powi(2));
-            return Some(Self { known: None, centroid, ln_peak, candidates: Some(candidates) });
+            // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the boxes of the candidates' parts.
+            let parts = Parts::of(problem);
+            let ln_peak = -parts.ln_volume() - libm::log(8.0 * std::f64::consts::PI.powi(2));
+            return Some(Self { known: None, centroid, ln_peak, parts: Some(parts) });
         };
         let motion = Motion::of(&prior.object_from_camera.inverse());
         let at = motion.apply(&centroid);
@@ -76,7 +75,7 @@ impl Rough {
             PriorBound::Gaussian(_) => None,
         };
         let known = Some(Known { motion, information, attitude, places, half });
-        Some(Self { known, centroid, ln_peak, candidates: None })
+        Some(Self { known, centroid, ln_peak, parts: None })
     }
 
     /// η of a motion.
@@ -140,21 +139,4 @@ fn covariance(problem: &Problem<'_>, prior: &Prior, motion: &Motion, at: &Vector
             Matrix6::from_diagonal(&Vector6::new(phi * phi, phi * phi, phi * phi, tau * tau, tau * tau, tau * tau))
         }
     }
-}
-
-/// The box of all cloud points that are candidates.
-fn candidates(problem: &Problem<'_>) -> CloudBox {
-    let mut candidate = vec![false; problem.cloud.len()];
-    problem.candidates.lists.iter().flatten().for_each(|&j| candidate[j] = true);
-    let places = problem.cloud.iter().zip(candidate).filter(|(_, candidate)| *candidate);
-    CloudBox::of(places.map(|(point, _)| point.position.at.coords), diameter(problem.model))
-}
-
-/// Volume of a box of candidates (m³), each side at least as long as the greatest tolerance of one of those in it.
-pub(in crate::search) fn volume(problem: &Problem<'_>, of: &CloudBox) -> f64 {
-    let lists = problem.candidates.lists.iter().enumerate();
-    let pairs = lists.flat_map(|(model, list)| list.iter().map(move |&cloud| Correspondence { model, cloud }));
-    let inside = pairs.filter(|pair| of.holds(&problem.cloud[pair.cloud].position.at.coords));
-    let least = inside.map(|pair| reach(problem, pair).0).fold(f64::MIN_POSITIVE, f64::max);
-    of.lengths().iter().map(|side| side.max(least)).product()
 }
