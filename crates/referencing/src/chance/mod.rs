@@ -3,8 +3,8 @@
 //! # Null model
 //!
 //! No candidate is true: each candidate of a model point lies anywhere in its shell; without a prior
-//! anywhere in the cloud's box, as dense as the set's part of the cloud ([`Parts`](crate::parts::Parts)); the partners of putative pairs are shuffled; all independent
-//! ([`Null`]). Then
+//! anywhere in the cloud's box, as dense as the set's part of the cloud ([`Parts`](crate::parts::Parts));
+//! the partners of putative pairs are shuffled; all independent ([`Null`]). Then
 //!
 //! E = Σ_{j ≥ k} Σ over j-subsets S of model points of Π_{i∈S} m_i · P(S),
 //!

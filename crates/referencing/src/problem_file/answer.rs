@@ -53,7 +53,8 @@ pub struct Support {
     /// The same when two points are left out, where two wrong matches are assumed to happen.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation_two: Option<f64>,
-    /// The probability that the points are others, or none of the object's; null of searches that count and do not weigh.
+    /// The probability that the pose is another, farther off than the alert limit, or the object not there; null of searches that
+    /// count and do not weigh.
     pub misidentified: Option<f64>,
     /// The probability with which the levels may be exceeded.
     pub risk: f64,

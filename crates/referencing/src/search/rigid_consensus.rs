@@ -23,8 +23,9 @@ use crate::Problem;
 /// Λ = ∫ p(T) B(k) Π_i N(c_j(i) − T p_i; 0, Σ_j + σ_i² I)/ρ_i dT,
 ///
 /// over the sets of pairs and, by Laplace's method, about the best pose T of each: p(T) is the prior (a
-/// Gaussian; a box is read as three standard deviations; without a prior any attitude anywhere in the cloud's
-/// box), ρ_i the density of cloud points where model point i is predicted, and B(k) = k! (n − k)!/(n + 1)!
+/// Gaussian; a box is read as three standard deviations; without a prior any attitude anywhere in the boxes
+/// of the cloud's parts, between which no object reaches), ρ_i the density of cloud points where model point i is predicted, without
+/// a prior that of the part, and B(k) = k! (n − k)!/(n + 1)!
 /// the share of one set of k visible points when every number from 0 to n is equally likely. So a pose with
 /// fewer but closer points, or nearer to the prior, can outweigh one with more.
 ///
