@@ -238,7 +238,8 @@ fn far_points_change_nothing() {
 
 /// Without a prior a few cloud points far away, wrong matches of what is distant, keep no object from being found: it is as
 /// often as without them, and costs as much; but for those just believed, as the box of what is near reaches half of the object's
-/// length farther where it is not all there is (30, 30 and 30 of 32).
+/// length farther where it is not all there is (30, 30 and 30 of 32: for a pose in three times the volume one is absent with 4.5e-5
+/// instead of 1.6e-5, the other as with two points 40 cm outside its box and no far ones).
 ///
 /// Seen to fail where clutter is as thin as the box of all points is large (9, 0 and 0 of 32 are found), and where rounding
 /// is a share of the farthest coordinate, so that every distance agrees.

@@ -54,6 +54,40 @@ fn a_fix_says_what_supports_it() {
     }
 }
 
+/// Eight points that a half-turn maps onto each other, but for one that is so many millimetres off.
+fn nearly_symmetric(folder: &tempfile::TempDir, off: f64) -> String {
+    let half = [[0.6, 0.3, 0.1], [0.2, -0.7, 0.4], [0.5, 0.5, -0.3], [0.1, 0.4, -0.5]];
+    let mut model: Vec<[f64; 3]> = half.iter().flat_map(|&[x, y, z]| [[x, y, z], [-x, -y, z]]).collect();
+    model[0][2] += 1e-3 * off;
+    let cloud: Vec<[f64; 3]> = model.iter().map(|[x, y, z]| [x + 0.1, y - 0.2, z + 4.0]).collect();
+    let text = json!({
+        "format": "coherence-problem/1", "id": "symmetric", "family": "test", "seed_set": "test", "seed": 1,
+        "model": model, "cloud": cloud, "sigma": 0.002, "delta": 0.012, "prior": null, "putative": null,
+    });
+    let file = folder.path().join("symmetric.json");
+    std::fs::write(&file, text.to_string()).unwrap();
+    file.display().to_string()
+}
+
+/// The points may be others: of 4 mm, that is told; of 7 mm, as a probability and in place of a level; of 8 mm, there is a level again.
+#[test]
+fn a_level_that_is_missing_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |off| String::from_utf8(solve(&[&nearly_symmetric(&folder, off)]).stdout).unwrap();
+    assert!(said(4.0).contains("ambiguous"), "{}", said(4.0));
+    let file = nearly_symmetric(&folder, 7.0);
+    let answer: Value = serde_json::from_slice(&solve(&[&file, "--json"]).stdout).unwrap();
+    let integrity = &answer["integrity"];
+    let (mistaken, risk) = (integrity["misidentified"].as_f64().unwrap(), integrity["risk"].as_f64().unwrap());
+    assert!(mistaken > risk && mistaken < 0.01 && integrity["protection"].is_null(), "{integrity}");
+    let expected = format!(
+        "no protection level: the points may be others with a probability of {mistaken:.1e}, at a risk of {risk:.0e}; \
+         not known to be within the alert limit of 0.100 m"
+    );
+    assert!(said(7.0).contains(&expected), "{}", said(7.0));
+    assert!(said(8.0).contains("  protection level 0.0"), "{}", said(8.0));
+}
+
 #[test]
 fn a_solver_of_pixels_is_refused_on_points_alone() {
     let folder = tempfile::tempdir().unwrap();
