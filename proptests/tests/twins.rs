@@ -328,7 +328,7 @@ fn near_twin(stream: &mut Stream, wedge: bool) -> (Vec<ModelPoint>, Vec<Measured
 /// Where the points seen may be their twins and the pose is hardly another for it, the fix is given and its level holds of both; 150
 /// frames of a plate and 150 of a wedge, or `TWINS_FRAMES`.
 ///
-/// Seen to fail where levels are not raised over poses within the alert limit.
+/// Seen to fail where levels are not raised over poses within the alert limit: 12 of 113 are beyond.
 #[test]
 fn levels_hold_of_twins_within_the_alert_limit() {
     let frames = std::env::var("TWINS_FRAMES").map_or(150, |n| n.parse().expect("a number"));
@@ -353,8 +353,11 @@ fn levels_hold_of_twins_within_the_alert_limit() {
             let turned = fix.object_from_camera.rotation().angle_to(&truth.rotation());
             beyond += usize::from(apart > level.position || turned > level.attitude);
         }
-        println!("{name}: {answered} of {frames} answered, {twins} of them the twin; {protected} with a level, {beyond} beyond it");
+        println!(
+            "{name}: {answered} of {frames} answered, {twins} of them the twin; {protected} with a level, {beyond} beyond it"
+        );
         let (least, _) = clopper_pearson(beyond, protected, 0.99);
+        // The level of the position and that of the attitude are at that risk each.
         assert!(least <= 2.0 * acceptance.risk, "{name}: {beyond} of {protected} fixes are beyond a level");
         assert!(protected as u64 > frames / 8 && twins > 5, "{name}: too few to tell");
     }
