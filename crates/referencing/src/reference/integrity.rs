@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
 
-use super::Acceptance;
+use super::{Acceptance, transfer::Transfer};
 use crate::{
     Observations, Stretch,
     candidates::chi_square,
@@ -117,6 +117,9 @@ pub(super) struct Separation {
     pub(super) protection: Option<Protection>,
     /// See [`Integrity::stretch`].
     pub(super) stretch: Option<Stretch>,
+    /// The point that the pose hangs on most: its place in the set, and by how much the model points that the fix transfers are
+    /// off if it is a wrong match (m, RMS, one sigma); infinitely far where it cannot be spared. `None` with fewer than four.
+    pub(super) hinge: Option<(usize, f64)>,
 }
 
 /// Protection levels by solution separation (Blanch and others, *Baseline advanced RAIM user algorithm*, 2015).
@@ -135,6 +138,7 @@ pub(super) fn protection(
     pose: &Transform<Object, Camera>,
     covariance: &Covariance6<Object, Camera>,
     acceptance: &Acceptance,
+    transfer: &Transfer,
     misidentified: f64,
 ) -> Separation {
     let n = data.points.len();
@@ -148,10 +152,10 @@ pub(super) fn protection(
     let own = Protection::quiet(covariance, 0.5 * risk);
     let even = || isotropic(&data.points, pose);
     let Some(deletions) = Deletions::of(data) else {
-        return Separation { stretch: even(), ..Separation::default() };
+        return Separation { stretch: even(), hinge: Some((0, f64::INFINITY)), ..Separation::default() };
     };
     let stretch = deletions.stretch.or_else(even);
-    let mut watch = Watch { pose, deletions, level: own, spared: true };
+    let mut watch = Watch { pose, transfer, deletions, level: own, spared: true, hinge: None };
     let twice = acceptance.two_wrong_rate > 0.0;
     let share = if twice { 0.25 } else { 0.5 } * risk;
     let ones = (0..n).map(|out| [out]);
@@ -161,16 +165,19 @@ pub(super) fn protection(
         watch.farthest(twos, (share / acceptance.two_wrong_rate).min(1.0))
     });
     let available = identified && watch.spared && (!twice || n >= 6);
-    Separation { one, two, protection: available.then_some(watch.level), stretch }
+    Separation { one, two, protection: available.then_some(watch.level), stretch, hinge: watch.hinge }
 }
 
 /// A fix, watched while points are left out.
 struct Watch<'a> {
     pose: &'a Transform<Object, Camera>,
+    transfer: &'a Transfer,
     deletions: Deletions<'a>,
     level: Protection,
     /// Whether every set so far could be spared.
     spared: bool,
+    /// The single point without which the model points move most.
+    hinge: Option<(usize, f64)>,
 }
 
 impl Watch<'_> {
@@ -182,8 +189,11 @@ impl Watch<'_> {
         for out in sets {
             let Some((without, certainty)) = self.deletions.without(&out) else {
                 (self.spared, farthest) = (false, None);
+                self.hang(&out, f64::INFINITY);
                 continue;
             };
+            // Had the fix a wrong match, the others would be right: it is off by what it differs from them, and by their error.
+            self.hang(&out, self.transfer.between(self.pose, &without).hypot(self.transfer.rms(&certainty)));
             let (moved, turned) = apart(self.pose, &without);
             farthest = farthest.map(|farthest| farthest.max(moved));
             // Eigenvalues are asked for only where they may raise a level.
@@ -197,6 +207,15 @@ impl Watch<'_> {
             }
         }
         farthest
+    }
+
+    /// Keeps the single point that most hangs on.
+    fn hang(&mut self, out: &[usize], off: f64) {
+        if let &[point] = out
+            && self.hinge.is_none_or(|(_, most)| !(off <= most))
+        {
+            self.hinge = Some((point, off));
+        }
     }
 }
 
@@ -256,7 +275,8 @@ mod tests {
     fn of(data: &Observations<'_>, acceptance: &Acceptance) -> (Option<f64>, Option<Protection>) {
         let witness = Mahalanobis::default();
         let pose = witness.solve(data).unwrap();
-        let all = protection(data, &pose, &witness.covariance(data, &pose).unwrap(), acceptance, 0.0);
+        let covariance = witness.covariance(data, &pose).unwrap();
+        let all = protection(data, &pose, &covariance, acceptance, &Transfer::of(&[], &pose), 0.0);
         assert_eq!(all.two.is_some(), acceptance.two_wrong_rate > 0.0 && data.points.len() >= 5);
         (all.one, all.protection)
     }
@@ -291,7 +311,7 @@ mod tests {
         let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
         let level = |risk: f64, misidentified: f64| {
             let acceptance = Acceptance { risk, ..Acceptance::default() };
-            protection(&data, &pose, &covariance, &acceptance, misidentified).protection
+            protection(&data, &pose, &covariance, &acceptance, &Transfer::of(&[], &pose), misidentified).protection
         };
         assert_eq!(level(1e-4, 7e-5), level(1e-4 - 7e-5, 0.0));
         assert!(level(1e-4, 9.9e-5).is_some());
@@ -305,7 +325,7 @@ mod tests {
             let (mut data, pose) = seen(count);
             data.points[0].measured.covariance[(0, 0)] = if exact { 1e-16 } else { SIGMA * SIGMA };
             let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
-            protection(&data, &pose, &covariance, &Acceptance::default(), 0.0).stretch
+            protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), 0.0).stretch
         };
         assert_eq!(stretch(3, false), None);
         for count in [4, 6] {

@@ -8,6 +8,7 @@ use super::{
     hypothesis::{Fallen, Hypothesis, by_score},
     integrity::{Integrity, Protection, Redundancy, protection, semi_axes},
     rms_apart,
+    transfer::Transfer,
 };
 use crate::{
     Correspondence, Degenerate, Identification, ModelPoint, Observations, Prior, PriorBound, Problem, Solver,
@@ -198,7 +199,8 @@ impl Judge<'_> {
     /// Whether precision and prior let the pose pass.
     pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let covariance = self.covariance(hypothesis)?;
-        let (rms, limit) = (self.predicted_rms(hypothesis, &covariance), self.alert_limit);
+        let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
+        let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
         // Written so that a NaN is refused too.
         if !(2.0 * rms <= limit) {
             return Err(Fallen::Refused(Refusal::Imprecise { rms, limit }));
@@ -250,15 +252,6 @@ impl Judge<'_> {
         Err(Fallen::Refused(Refusal::Behind { point, angle: angle(worst), most }))
     }
 
-    /// The predicted error of the model points that the pose transfers: root mean square over all of
-    /// them, one standard deviation (m).
-    fn predicted_rms(&self, hypothesis: &Hypothesis, covariance: &Covariance6<Object, Camera>) -> f64 {
-        let camera_from_object = hypothesis.pose.inverse();
-        let model = self.problem.model;
-        let sum: f64 = model.iter().map(|point| covariance.of_point(&(camera_from_object * point.at)).trace()).sum();
-        (sum / model.len() as f64).sqrt()
-    }
-
     /// How far the identified model points, placed by the pose, are from where the prior places them:
     /// the largest step along a camera axis over the half-size and the noise allowed with it.
     fn off_box(
@@ -282,6 +275,20 @@ impl Judge<'_> {
     /// Whether two poses are different answers.
     pub(super) fn apart(&self, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> bool {
         !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
+    }
+
+    /// Whether the pose is as precise as is asked for whichever of its points is a wrong match, where a search found them.
+    ///
+    /// Where what is seen of a large model is small or in a row, the pose of these points alone has many others drift far: one of
+    /// them is then near some clutter, and that makes the pose look precise and puts it wrong. Three points need each other.
+    fn without_any_one(&self, hypothesis: &Hypothesis, hinge: Option<(usize, f64)>) -> Result<(), Refusal> {
+        let Some((place, rms)) = hinge.filter(|_| self.searched) else { return Ok(()) };
+        // Written so that a NaN is refused too.
+        if 2.0 * rms <= self.alert_limit {
+            return Ok(());
+        }
+        let point = self.problem.model[hypothesis.pairs[place].model].id.clone();
+        Err(Refusal::Hinge { point, rms, limit: self.alert_limit })
     }
 
     /// Whether the points are measured as large as the model says, by a test of the confidence of the others, or so nearly that what
@@ -322,7 +329,8 @@ impl Judge<'_> {
     pub(super) fn protected(&self, fix: &mut Reference, misidentified: f64) {
         let data = self.observations(&fix.pairs);
         let pose = &fix.object_from_camera;
-        let level = protection(&data, pose, &fix.covariance, self.acceptance, misidentified).protection;
+        let transfer = Transfer::of(self.problem.model, pose);
+        let level = protection(&data, pose, &fix.covariance, self.acceptance, &transfer, misidentified).protection;
         let known = fix.integrity.protection.take();
         fix.integrity.protection = known.zip(level).map(|(known, level)| known.max(&level));
         fix.integrity.misidentified = Some(misidentified);
@@ -335,7 +343,9 @@ impl Judge<'_> {
             Ok(covariance) => covariance,
             Err(why) => return Outcome::Degenerate(why),
         };
-        let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance, misidentified.unwrap_or(0.0));
+        let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
+        let mistaken = misidentified.unwrap_or(0.0);
+        let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, mistaken);
         let freedom = 3 * hypothesis.pairs.len() - 6;
         let integrity = Integrity {
             redundancy: Redundancy::of(hypothesis.pairs.len()),
@@ -348,7 +358,8 @@ impl Judge<'_> {
             protection: left_out.protection,
             stretch: left_out.stretch,
         };
-        if let Err(refusal) = self.as_large_as_modelled(&hypothesis, &integrity) {
+        let stands = self.without_any_one(&hypothesis, left_out.hinge);
+        if let Err(refusal) = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity)) {
             return Outcome::Unidentified(refusal);
         }
         Outcome::Referenced(Box::new(Reference {

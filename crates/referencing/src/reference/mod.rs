@@ -18,6 +18,7 @@ mod integrity;
 mod judge;
 mod outcome;
 mod refusal;
+mod transfer;
 mod twins;
 mod weighed;
 mod widened;
@@ -91,11 +92,13 @@ pub fn judge(
         }
         _ => chance.sets_as_good(),
     };
+    // What was proved of a set is not proved of what is left of it.
+    let thinned = matches!(&outcome, Outcome::Referenced(reference) if reference.pairs.len() < found.pairs.len());
     Attempt {
         expected_chance_sets: Some(expected_chance_sets),
         outcome,
         runner_up,
-        optimal: found.optimal,
+        optimal: found.optimal && !thinned,
         size_bound: Some(found.size_bound),
         tests: Some(found.tests),
         copies_sought: found.belief.as_ref().and_then(|belief| belief.copies_sought),

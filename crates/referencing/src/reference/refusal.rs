@@ -52,6 +52,17 @@ pub enum Refusal {
         /// The alert limit (m).
         limit: f64,
     },
+    /// If one point is a wrong match, the pose may be further off than the alert limit.
+    #[error("{}", hinge(.point, .rms, .limit))]
+    Hinge {
+        /// The model point.
+        point: String,
+        /// By how much the pose is off if that point is a wrong match: root mean square over the model points (m, one sigma);
+        /// infinite where the other points determine no pose.
+        rms: f64,
+        /// The alert limit (m).
+        limit: f64,
+    },
     /// By its own covariance the attitude is hardly determined: points near a line leave a turn about it free, which moves
     /// no point and yet the vehicle.
     #[error("the attitude is known to {:.1}° (one sigma, its worst axis); twice that exceeds {:.1}°", .sigma.to_degrees(), .limit.to_degrees())]
@@ -104,7 +115,7 @@ impl Refusal {
             Self::TooFew { .. } => "too-few",
             Self::Chance { .. } | Self::Absent { .. } => "chance",
             Self::Residuals { .. } | Self::Behind { .. } | Self::Stretched { .. } | Self::Prior { .. } => "gate",
-            Self::Imprecise { .. } | Self::Attitude { .. } => "imprecise",
+            Self::Imprecise { .. } | Self::Hinge { .. } | Self::Attitude { .. } => "imprecise",
         }
     }
 }
@@ -117,4 +128,17 @@ fn chance(size: &usize, expected: &f64, budget: &f64) -> String {
         );
     }
     format!("chance gives {expected:.2e} sets of {size} points; at most {budget:.1e} are accepted")
+}
+
+/// The sentence of [`Refusal::Hinge`].
+fn hinge(point: &str, rms: &f64, limit: &f64) -> String {
+    if !rms.is_finite() {
+        return format!(
+            "the pose hangs on model point `{point}`: the others determine none, should that be a wrong match"
+        );
+    }
+    format!(
+        "the pose hangs on model point `{point}`: should that be a wrong match, the model points are {rms:.3} m off (RMS, one sigma); \
+         twice that exceeds the alert limit of {limit:.3} m"
+    )
 }

@@ -1,8 +1,8 @@
 //! Other readings of the same measured points.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{
@@ -10,12 +10,19 @@ use super::{
     hypothesis::{Hypothesis, by_score},
     judge::Judge,
 };
-use crate::{Correspondence, Kabsch, Observations, Solver};
+use crate::{Correspondence, Kabsch, Observations, PriorBound, Solver, candidates::chi_square};
 
 /// Pairs of model points that the first two measured points may be, beyond which other readings are not sought.
 const MOST_BASES: usize = 1_000_000;
 /// More readings of one set are not needed to call it ambiguous.
 const MOST_TWINS: usize = 64;
+/// A point of a reading may lie so many standard deviations of its measurement outside a box;
+const BOX_EDGE: f64 = 4.0;
+/// of a Gaussian prior between the ellipsoids of these confidences. (What is nearer and no candidate was not proposed, by its looks.)
+const GAUSSIAN_EDGE: [f64; 2] = [0.9, 0.9999];
+
+/// The model points that each measured point of a set may be.
+type Admitted = BTreeMap<usize, Vec<usize>>;
 
 impl Judge<'_> {
     /// The outcome, or that it is ambiguous because the measured points of a fix are other points of the model as well.
@@ -67,13 +74,14 @@ impl Judge<'_> {
     fn twins(&self, pairs: &[Correspondence]) -> BTreeSet<Vec<Correspondence>> {
         let mut found = BTreeSet::new();
         let Some(base) = self.wide(pairs) else { return found };
-        let [first, second, third] = base.map(|cloud| self.admitted(cloud));
+        let admitted = self.admitted(pairs);
+        let [first, second, third] = base.map(|cloud| &admitted[&cloud]);
         if first.len().saturating_mul(second.len()) > MOST_BASES {
             return found;
         }
         let at = |model: usize, place: usize| Correspondence { model, cloud: base[place] };
         let known: BTreeSet<&Correspondence> = pairs.iter().collect();
-        for &i in &first {
+        for &i in first {
             for &j in second.iter().filter(|&&j| self.problem.coherent(at(i, 0), at(j, 1))) {
                 let meets = |k: usize| [at(i, 0), at(j, 1)].iter().all(|&other| self.problem.coherent(other, at(k, 2)));
                 for &k in third.iter().filter(|&&k| meets(k)) {
@@ -81,7 +89,7 @@ impl Judge<'_> {
                     if three.iter().all(|pair| known.contains(pair)) {
                         continue;
                     }
-                    found.extend(self.completed(three, pairs));
+                    found.extend(self.completed(three, pairs, &admitted));
                     if found.len() >= MOST_TWINS {
                         return found;
                     }
@@ -91,10 +99,36 @@ impl Judge<'_> {
         found
     }
 
-    /// The model points that a measured point may be.
-    fn admitted(&self, cloud: usize) -> Vec<usize> {
-        let lists = self.problem.candidates.lists.iter().enumerate();
-        lists.filter(|(_, list)| list.binary_search(&cloud).is_ok()).map(|(model, _)| model).collect()
+    /// The model points that each measured point of a set may be: its candidates, and those that a prior only just excludes. That
+    /// one of many points falls outside its shell by its noise does not exclude a pose that the prior as a whole allows.
+    fn admitted(&self, pairs: &[Correspondence]) -> Admitted {
+        let lists = &self.problem.candidates.lists;
+        let camera_from_object = self.problem.prior.map(|prior| prior.object_from_camera.inverse());
+        let places: Vec<_> =
+            self.problem.model.iter().filter_map(|point| Some(camera_from_object? * point.at)).collect();
+        let [near, far] = GAUSSIAN_EDGE.map(|confidence| chi_square(3, confidence));
+        let just_outside = |model: usize, cloud: usize| {
+            let (Some(prior), Some(place)) = (self.problem.prior, places.get(model)) else { return false };
+            let (seen, known) = (&self.problem.cloud[cloud].position, &self.problem.model[model]);
+            let step = seen.at - *place;
+            let noise = seen.covariance + Matrix3::identity() * (known.sigma * known.sigma);
+            match &prior.bound {
+                PriorBound::Box(half) => {
+                    let edge = |axis: usize| half + BOX_EDGE * noise[(axis, axis)].max(0.0).sqrt();
+                    step.amax() > *half && (0..3).all(|axis| step[axis].abs() <= edge(axis))
+                }
+                PriorBound::Gaussian(covariance) => {
+                    let spread = (covariance.of_point(place) + noise).cholesky();
+                    let chi2 = spread.map_or(f64::INFINITY, |spread| step.dot(&spread.solve(&step)));
+                    chi2 > near && chi2 <= far
+                }
+            }
+        };
+        let of = |cloud: usize| {
+            let may_be = |&model: &usize| lists[model].binary_search(&cloud).is_ok() || just_outside(model, cloud);
+            (0..lists.len()).filter(may_be).collect()
+        };
+        pairs.iter().map(|pair| (pair.cloud, of(pair.cloud))).collect()
     }
 
     /// Three of the measured points, far apart: one far from their middle, the farthest from that, and the one that makes the
@@ -114,13 +148,18 @@ impl Judge<'_> {
     }
 
     /// The set of all measured points of `pairs` that these three begin, if every other lies at a model point of its own.
-    fn completed(&self, three: [Correspondence; 3], pairs: &[Correspondence]) -> Option<Vec<Correspondence>> {
+    fn completed(
+        &self,
+        three: [Correspondence; 3],
+        pairs: &[Correspondence],
+        admitted: &Admitted,
+    ) -> Option<Vec<Correspondence>> {
         let pose =
             Kabsch::default().solve(&Observations::of(&three, self.problem.model, self.problem.cloud, None)).ok()?;
         let mut set = three.to_vec();
         let mut taken: BTreeSet<usize> = three.iter().map(|pair| pair.model).collect();
         for cloud in pairs.iter().map(|pair| pair.cloud).filter(|cloud| three.iter().all(|pair| pair.cloud != *cloud)) {
-            let model = self.nearest(&pose, cloud, &three)?;
+            let model = self.nearest(&pose, cloud, &three, &admitted[&cloud])?;
             if !taken.insert(model) {
                 return None;
             }
@@ -132,13 +171,19 @@ impl Judge<'_> {
 
     /// The model point nearest to where the pose places a measured point, of those that it may be and that are coherent with
     /// the three.
-    fn nearest(&self, pose: &Transform<Object, Camera>, cloud: usize, three: &[Correspondence; 3]) -> Option<usize> {
+    fn nearest(
+        &self,
+        pose: &Transform<Object, Camera>,
+        cloud: usize,
+        three: &[Correspondence; 3],
+        admitted: &[usize],
+    ) -> Option<usize> {
         let place = *pose * self.problem.cloud[cloud].position.at;
         let distance = |model: usize| self.problem.model[model].at.distance(&place);
         let coherent = |model: &usize| {
             three.iter().all(|&pair| self.problem.coherent(pair, Correspondence { model: *model, cloud }))
         };
-        self.admitted(cloud).into_iter().filter(coherent).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+        admitted.iter().copied().filter(coherent).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
     }
 
     /// Whether the camera sees the identified points from the sides from which they can be seen.

@@ -41,7 +41,10 @@ fn nothing(outcome: &Outcome) -> bool {
             | Refusal::Residuals { .. }
             | Refusal::Behind { .. }
             | Refusal::Prior { .. } => true,
-            Refusal::Imprecise { .. } | Refusal::Attitude { .. } | Refusal::Stretched { .. } => false,
+            Refusal::Imprecise { .. }
+            | Refusal::Hinge { .. }
+            | Refusal::Attitude { .. }
+            | Refusal::Stretched { .. } => false,
         },
     }
 }
