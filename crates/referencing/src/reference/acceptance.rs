@@ -28,7 +28,8 @@ pub struct Acceptance {
     pub confidence: f64,
     /// Poses further apart than this (m, RMS over the model points), or than [`alert_share`](Self::alert_share) of the
     /// model's diameter if that is less, are different answers; a pose that by its own covariance may be off
-    /// by as much is none.
+    /// by as much is none, and one of four points or more that is off by so much should any one of them be a wrong match
+    /// ([`Refusal::Hinge`](super::Refusal::Hinge)).
     pub alert_limit: f64,
     /// The share of the model's diameter that limits it where that is less.
     pub alert_share: f64,

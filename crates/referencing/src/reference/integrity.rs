@@ -212,7 +212,7 @@ impl Watch<'_> {
     /// Keeps the single point that most hangs on.
     fn hang(&mut self, out: &[usize], off: f64) {
         if let &[point] = out
-            && self.hinge.is_none_or(|(_, most)| !(off <= most))
+            && self.hinge.is_none_or(|(_, most)| !most.is_nan() && !(off <= most))
         {
             self.hinge = Some((point, off));
         }

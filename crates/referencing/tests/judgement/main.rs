@@ -2,14 +2,14 @@
 
 mod absence;
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint};
 use seafix_referencing::{
-    Acceptance, Attempt, Belief, Candidates, Correspondence, Explanation, Identification, Kabsch, Mahalanobis,
+    Acceptance, Attempt, Belief, Candidates, Correspondence, Explanation, Gate, Identification, Kabsch, Mahalanobis,
     MaximumClique, ModelPoint, Outcome, Prior, PriorBound, Problem, Refusal, Search, StructuralCoherence, Tolerance,
-    Unidentified, judge, judge_named, reference,
+    Unidentified, candidates, judge, judge_named, reference,
 };
 
 const SIGMA: f64 = 0.005;
@@ -415,6 +415,30 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     let pairs = (0..7).map(|i| Correspondence { model: i, cloud: i }).collect();
     let said = judge_named(&problem, pairs, &Kabsch::default(), &acceptance, None);
     assert!(matches!(said.outcome, Outcome::Referenced(_)), "{:?}", said.outcome);
+}
+
+/// Two like modules half a metre apart, one seen, and a box about the rough pose that excludes the other by one standard deviation of a
+/// point: that noise may have done. But pairs that were proposed are all there are.
+#[test]
+fn noise_at_the_edge_of_a_box_excludes_no_reading_but_what_was_proposed_does() {
+    let one = [[0.0, 0.0, 0.0], [0.2, 0.05, 0.1], [-0.1, 0.2, 0.15], [0.1, -0.2, 0.2], [-0.15, -0.1, 0.05]];
+    let model = model_of(&[one, one.map(|[x, y, z]| [x + 0.5, y, z])].concat());
+    let camera_from_object = Transform::<Camera, Object>::new(UnitQuaternion::identity(), Vector3::z() * 3.0);
+    let seen = |at: &[f64; 3]| UncertainPoint::isotropic(camera_from_object * Point::from(*at), SIGMA);
+    let cloud: Vec<_> = one.iter().map(|at| MeasuredPoint { position: seen(at), pixels: None }).collect();
+    let rough = Transform::<Camera, Object>::new(UnitQuaternion::identity(), Vector3::new(-0.2, 0.0, 3.0));
+    let prior = Prior { object_from_camera: rough.inverse(), bound: PriorBound::Box(0.3 - SIGMA) };
+    let acceptance = Acceptance { chance_budget: 1e300, alert_share: 1.0, ..Acceptance::default() };
+    let outcome = |candidates: Candidates| {
+        let scene = (model.clone(), cloud.clone(), candidates);
+        judged(&scene, Some(&prior), &acceptance, Vec::new()).outcome
+    };
+    let shells = candidates(&model, &cloud, Some(&prior), &Gate::default(), None);
+    assert!(shells.lists[5..].iter().enumerate().all(|(i, list)| !list.contains(&i)), "{shells:?}");
+    let both = outcome(shells);
+    assert!(matches!(both, Outcome::Ambiguous(_)), "{both:?}");
+    let proposed = outcome(Candidates::from_pairs(10, (0..5).map(|i| (i, i)).chain([(9, 0)])));
+    assert!(matches!(proposed, Outcome::Referenced(_)), "{proposed:?}");
 }
 
 #[test]
