@@ -209,6 +209,9 @@ fn a_run_that_is_there_stays_unless_told_otherwise() {
     assert!(files(&folder.join("out")) == before);
     assert_eq!(run(&["--overwrite", "--set", "seed=4"]).0, Some(0));
     assert!(files(&folder.join("out")) != before);
+    // A run over key frames leaves its network.
+    fs::write(folder.join("out/001-solver-kabsch.network"), "").unwrap();
+    assert_eq!(run(&["--overwrite"]).0, Some(0));
     fs::write(folder.join("out/thesis.txt"), "all my work").unwrap();
     let (code, error) = run(&["--overwrite"]);
     assert!(code == Some(4) && error.contains("thesis.txt"), "{error}");

@@ -8,7 +8,10 @@ use std::{
 
 use seafix_component::Fault;
 
-use super::{Existing, Options, RunError, store::Store};
+use super::{
+    Existing, Options, RunError,
+    store::{self, Store},
+};
 use crate::manifest::{self, Manifest};
 
 /// The folder of a run, locked as long as this lives.
@@ -189,7 +192,7 @@ fn clear(out: &Path) -> Result<(), RunError> {
     let own = |name: &str| {
         let name = name.trim_end_matches(".partial");
         [LOCK, manifest::NAME, "results.csv", "results.parquet", "pieces", "report"].contains(&name)
-            || name.ends_with(".mcap")
+            || [".mcap", store::NETWORK].iter().any(|end| name.ends_with(end))
     };
     if let Some(foreign) = names.iter().find(|name| !own(name)) {
         let fault = Fault::new("the output folder holds something that no run made", &out.join(foreign));

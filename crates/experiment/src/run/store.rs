@@ -81,9 +81,12 @@ impl Sealed {
     }
 }
 
+/// How the file of a trial's network ends.
+pub(super) const NETWORK: &str = ".network";
+
 /// The file of a trial's network.
 pub(super) fn network(trial: &str) -> String {
-    format!("{trial}.network")
+    format!("{trial}{NETWORK}")
 }
 
 const CSV: &str = "rows.csv";
