@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform, so3::skew};
 use crate::ModelPoint;
 
 /// The model points as seen from the camera, by their moments: of a small error ξ = (φ, ρ) of the pose the mean over the points of the
-/// square of what it moves each by is ξᵀ A ξ, A = mean of Jᵀ J, J = ([p]×, −I).
+/// square of what it moves each by is ξᵀ A ξ, A = mean of Jᵀ J, J = (\[p\]×, −I).
 pub(super) struct Transfer {
     moments: Matrix6<f64>,
 }
