@@ -302,14 +302,13 @@ fn near_twin(stream: &mut Stream, wedge: bool) -> (Vec<ModelPoint>, Vec<Measured
     let anywhere = |stream: &mut Stream, half: [f64; 3]| Vector3::from(half.map(|half| stream.between(-half, half)));
     let count = stream.rng().random_range(5..9);
     let near: Vec<_> = (0..count).map(|_| anywhere(stream, [0.5, 0.4, if wedge { 0.4 } else { 0.1 }])).collect();
-    let twin: Box<dyn Fn(&Vector3<f64>) -> Vector3<f64>> = if wedge {
+    let twin = if wedge {
         let turn = so3::exp(&(stream.normal3(1.0).normalize() * stream.between(0.03, 0.06)));
-        Box::new(move |at| turn * at)
+        Transform::<Object, Object>::new(turn, Vector3::zeros())
     } else {
-        let thickness = stream.between(0.025, 0.045);
-        Box::new(move |at| at + Vector3::z() * thickness)
+        Transform::new(so3::exp(&Vector3::zeros()), Vector3::z() * stream.between(0.025, 0.045))
     };
-    let far: Vec<_> = near.iter().map(twin).collect();
+    let far: Vec<_> = near.iter().map(|at| (twin * Point::from(*at)).coords).collect();
     let points: Vec<_> = near.into_iter().chain(far).map(Point::from).collect();
     let model = model(&points, None);
     let turn = so3::exp(&(stream.normal3(1.0).normalize() * stream.between(0.0, 3.1)));
