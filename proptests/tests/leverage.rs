@@ -100,7 +100,7 @@ fn one_accidental_far_point_makes_no_pose() {
 
 /// Points of all the object are evidence of where it is, and none of them is missed much.
 ///
-/// Seen to fail where every pose hangs on its farthest point.
+/// Seen to fail where every pose is taken to hang on a point.
 #[test]
 fn far_points_that_bear_each_other_out_make_one() {
     let off = |number: u64| {
