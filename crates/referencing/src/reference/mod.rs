@@ -12,6 +12,7 @@ use crate::{
 
 mod absence;
 mod acceptance;
+mod admitted;
 mod exclusion;
 mod hypothesis;
 mod integrity;

@@ -1,0 +1,72 @@
+//! Which model points a measured point may be when a set is read otherwise.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Matrix3;
+
+use super::judge::Judge;
+use crate::{Correspondence, PriorBound, candidates::chi_square};
+
+/// A point of a reading may lie so many standard deviations of its measurement outside a box;
+const BOX_EDGE: f64 = 4.0;
+/// of a Gaussian prior outside the ellipsoid of the lesser and inside that of the greater of these confidences.
+const GAUSSIAN_EDGE: [f64; 2] = [0.9, 0.9999];
+
+/// Where a measured point lies by the shell of a model point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Inside,
+    /// Outside, by no more than noise may do.
+    Edge,
+    Outside,
+}
+
+/// The model points that each measured point of a set may be.
+pub(super) type Admitted = BTreeMap<usize, Vec<usize>>;
+
+impl Judge<'_> {
+    /// The model points that each measured point of a set may be: its candidates, and those that a prior only just excludes. That
+    /// one of many points falls outside its shell by its noise does not exclude a pose that the prior as a whole allows.
+    pub(super) fn admitted(&self, pairs: &[Correspondence]) -> Admitted {
+        let lists = &self.problem.candidates.lists;
+        let camera_from_object = self.problem.prior.map(|prior| prior.object_from_camera.inverse());
+        let places: Vec<_> =
+            self.problem.model.iter().filter_map(|point| Some(camera_from_object? * point.at)).collect();
+        let [near, far] = GAUSSIAN_EDGE.map(|confidence| chi_square(3, confidence));
+        let place_of = |model: usize, cloud: usize| {
+            let (Some(prior), Some(place)) = (self.problem.prior, places.get(model)) else { return Place::Outside };
+            let (seen, known) = (&self.problem.cloud[cloud].position, &self.problem.model[model]);
+            let step = seen.at - *place;
+            let noise = seen.covariance + Matrix3::identity() * (known.sigma * known.sigma);
+            let (inside, edge) = match &prior.bound {
+                PriorBound::Box(half) => {
+                    let edge = |axis: usize| half + BOX_EDGE * noise[(axis, axis)].max(0.0).sqrt();
+                    (step.amax() <= *half, (0..3).all(|axis| step[axis].abs() <= edge(axis)))
+                }
+                PriorBound::Gaussian(covariance) => {
+                    let spread = (covariance.of_point(place) + noise).cholesky();
+                    let chi2 = spread.map_or(f64::INFINITY, |spread| step.dot(&spread.solve(&step)));
+                    (chi2 <= near, chi2 <= far)
+                }
+            };
+            match (inside, edge) {
+                (true, _) => Place::Inside,
+                (false, true) => Place::Edge,
+                (false, false) => Place::Outside,
+            }
+        };
+        let listed = |model: usize, cloud: usize| lists[model].binary_search(&cloud).is_ok();
+        let by_shells = |cloud: usize| (cloud, (0..lists.len()).map(|model| place_of(model, cloud)).collect());
+        let placed: Vec<(usize, Vec<Place>)> = pairs.iter().map(|pair| by_shells(pair.cloud)).collect();
+        // Where a shell holds what is no candidate, the candidates were proposed by more than the prior: nothing else is one.
+        let proposed = placed.iter().any(|(cloud, places)| {
+            let mut inside = (0..lists.len()).filter(|&model| places[model] == Place::Inside);
+            inside.any(|model| !lists[model].is_empty() && !listed(model, *cloud))
+        });
+        let of = |(cloud, places): (usize, Vec<Place>)| {
+            let may_be = |&model: &usize| listed(model, cloud) || (!proposed && places[model] == Place::Edge);
+            (cloud, (0..lists.len()).filter(may_be).collect())
+        };
+        placed.into_iter().map(of).collect()
+    }
+}
