@@ -28,6 +28,7 @@ pub mod rigs;
 pub mod scenes;
 pub mod searches;
 pub mod variants;
+pub mod views;
 pub mod voyage;
 
 pub use law::{law, not_idle, within};

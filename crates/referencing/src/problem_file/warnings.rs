@@ -7,8 +7,8 @@ use seafix_component::{Fault, counted, number};
 
 use super::CoherenceProblem;
 use crate::{
-    PriorBound, RigidConsensus,
-    search::NEEDED,
+    PriorBound, RigidConsensus, Unidentified,
+    search::{FEWER, NEEDED},
     site::{COINCIDENT, SUSPICIOUS, congruences, nearest_two},
     solve::{ON_A_LINE, second_ratio},
 };
@@ -212,14 +212,14 @@ impl CoherenceProblem {
 
     /// What a search would not begin with; shells without points are told only of a prior with which nothing else is wrong.
     fn of_candidates(&self, told: &mut Told<'_>, sound: bool) {
-        let search = RigidConsensus::default();
-        let remedy = "give a rough pose or smaller shells, or thin the cloud out";
+        let most = RigidConsensus::default().most_pairs;
+        let mut many = |pairs: String| {
+            told.warn("too many candidate pairs", format!("{pairs}, and `rigid-consensus` takes {most}"), FEWER);
+        };
         match self.candidates() {
-            Err(refused) => told.warn("too many candidate pairs", refused.to_string(), remedy),
-            Ok(found) if found.pairs() > search.most_pairs => {
-                let value = format!("{}, and `rigid-consensus` takes {}", found.pairs(), search.most_pairs);
-                told.warn("too many candidate pairs", value, remedy);
-            }
+            Err(Unidentified::TooLarge { size, .. }) => many(format!("{size} at least")),
+            Err(refused) => many(refused.to_string()),
+            Ok(found) if found.pairs() > most => many(found.pairs().to_string()),
             Ok(found) => {
                 let enough = self.model.len() >= NEEDED && self.cloud.len() >= NEEDED;
                 let some = found.with_candidates();

@@ -96,6 +96,9 @@ impl Identification {
     }
 }
 
+/// What to do about too many candidates.
+pub(crate) const FEWER: &str = "give a rough pose or smaller shells, or thin the cloud out";
+
 /// Why nothing was identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unidentified {
@@ -131,7 +134,7 @@ pub enum Unidentified {
         tests: u64,
     },
     /// More than the search holds in memory: it did not begin.
-    #[error("{size} {what} are more than the {most} that the search takes")]
+    #[error("{size} {what} are more than the {most} that the search takes; {}", FEWER)]
     TooLarge {
         /// How many there are.
         size: usize,

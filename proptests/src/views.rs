@@ -1,0 +1,102 @@
+//! An object before the camera, some of its points seen among clutter: what the default search is asked of scenes drawn for a law.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
+use seafix_referencing::{
+    Acceptance, Candidates, Gate, Mahalanobis, ModelPoint, Outcome, Prior, PriorBound, Problem, RigidConsensus,
+    Tolerance, candidates, reference,
+};
+use seafix_simulation::{Purpose, Stream};
+
+/// Anywhere in a box of these half-sizes about the origin, evenly.
+pub fn anywhere(stream: &mut Stream, half: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(half.map(|half| stream.between(-half, half)))
+}
+
+/// A turn by up to 3.1 rad about any axis.
+pub fn any_turn(stream: &mut Stream) -> UnitQuaternion<f64> {
+    so3::exp(&(stream.normal3(1.0).normalize() * stream.between(0.0, 3.1)))
+}
+
+/// A model of exact points that are seen from everywhere.
+pub fn exact_model(points: &[Vector3<f64>]) -> Vec<ModelPoint> {
+    let point = |(k, at): (usize, &Vector3<f64>)| ModelPoint::exact(format!("p{k}"), Point::from(*at));
+    points.iter().enumerate().map(point).collect()
+}
+
+/// What is measured of an object, and where it is.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// The object.
+    pub model: Vec<ModelPoint>,
+    /// The points seen of it, then clutter.
+    pub cloud: Vec<MeasuredPoint>,
+    /// The true pose.
+    pub truth: Transform<Object, Camera>,
+    /// A rough pose, if there is one.
+    pub prior: Option<Prior>,
+    sigma: f64,
+}
+
+impl View {
+    /// These points of a model as they are measured, each coordinate to `sigma` (m), without clutter and without a rough pose.
+    pub fn of(
+        stream: &mut Stream,
+        model: Vec<ModelPoint>,
+        camera_from_object: Transform<Camera, Object>,
+        seen: impl IntoIterator<Item = usize>,
+        sigma: f64,
+    ) -> Self {
+        let truth = camera_from_object.inverse();
+        let mut view = Self { model, cloud: Vec::new(), truth, prior: None, sigma };
+        for i in seen {
+            let at = camera_from_object * view.model[i].at + stream.normal3(sigma);
+            view.measure(at);
+        }
+        view
+    }
+
+    /// So many points of clutter beside them, anywhere in a box of these half-sizes (m), `distance` (m) ahead.
+    #[must_use]
+    pub fn among(mut self, stream: &mut Stream, count: usize, distance: f64, half: [f64; 3]) -> Self {
+        for _ in 0..count {
+            self.measure(Point::from(Vector3::z() * distance + anywhere(stream, half)));
+        }
+        self
+    }
+
+    /// A rough pose that has every model point within `half` (m) of its place along each camera axis: the true one, turned and then
+    /// moved by what `error` draws (rad about the camera's axes, m), of which the first that is near enough is taken.
+    #[must_use]
+    pub fn before(mut self, half: f64, mut error: impl FnMut() -> [Vector3<f64>; 2]) -> Self {
+        let camera_from_object = self.truth.inverse();
+        self.prior = Some(loop {
+            let [turn, step] = error();
+            let turned = so3::exp(&turn) * camera_from_object.rotation();
+            let rough = Transform::<Camera, Object>::new(turned, camera_from_object.translation() + step);
+            let off = |point: &ModelPoint| (rough * point.at - camera_from_object * point.at).amax();
+            if self.model.iter().all(|point| off(point) <= half) {
+                break Prior { object_from_camera: rough.inverse(), bound: PriorBound::Box(half) };
+            }
+        });
+        self
+    }
+
+    fn measure(&mut self, at: Point<Camera>) {
+        self.cloud.push(MeasuredPoint { position: UncertainPoint::isotropic(at, self.sigma), pixels: None });
+    }
+
+    /// What the default search and `mahalanobis` make of it, candidates by the rough pose, or all where there is none.
+    pub fn outcome(&self, delta: f64, acceptance: &Acceptance) -> Outcome {
+        let Self { model, cloud, prior, .. } = self;
+        let candidates = match prior {
+            Some(prior) => candidates(model, cloud, Some(prior), &Gate::default(), None),
+            None => Candidates::all(model.len(), cloud.len()),
+        };
+        let tolerance = Tolerance::Fixed(delta);
+        let problem = Problem { model, cloud, candidates: &candidates, tolerance, prior: prior.as_ref() };
+        let mut stream = Stream::new(0, 0, 0, Purpose::Search);
+        let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
+        reference(&problem, &search, &solver, acceptance, None, stream.rng()).outcome
+    }
+}
