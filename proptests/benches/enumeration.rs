@@ -18,7 +18,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_component::Choice;
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
-use seafix_referencing::{Candidates, Identification, ModelPoint, Problem, SEARCHES, Search, Tolerance, Unidentified};
+use seafix_referencing::{
+    Candidates, Identification, ModelPoint, Prior, PriorBound, Problem, SEARCHES, Search, Tolerance, Unidentified,
+};
 
 /// Pair tests before a strategy is stopped.
 const BUDGET: i64 = 100_000_000;
@@ -99,6 +101,8 @@ struct Planted {
     model: Vec<ModelPoint>,
     cloud: Vec<MeasuredPoint>,
     candidates: Candidates,
+    /// The true pose with its shells: what has a prior has shells to leave out.
+    prior: Prior,
 }
 
 impl Planted {
@@ -122,7 +126,8 @@ impl Planted {
             }
         }
         let pairs = lists.iter().enumerate().flat_map(|(i, list)| list.iter().map(move |&j| (i, j)));
-        Self { candidates: Candidates::from_pairs(n, pairs), model, cloud }
+        let prior = Prior { object_from_camera: camera_from_object.inverse(), bound: PriorBound::Box(SHELL) };
+        Self { candidates: Candidates::from_pairs(n, pairs), model, cloud, prior }
     }
 
     /// Pair tests, points found and seconds (the median of some runs).
@@ -132,7 +137,7 @@ impl Planted {
             cloud: &self.cloud,
             candidates: &self.candidates,
             tolerance: Tolerance::Fixed(3.0 * 2f64.sqrt() * SIGMA),
-            prior: None,
+            prior: Some(&self.prior),
         };
         let mut times = Vec::new();
         loop {

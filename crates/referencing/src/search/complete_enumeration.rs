@@ -14,8 +14,8 @@ use super::{
 use crate::Problem;
 
 /// The baseline that shells are held against: every cloud point may be every model point, whatever the prior says, so that
-/// M^q choices stand behind every sample of q model points. Of pairs that were given without a prior it takes those alone. Longest samples first, the first coherent one is the answer,
-/// as in `structural-coherence`.
+/// M^q choices stand behind every sample of q model points. Of pairs that were given without a prior it takes those alone.
+/// Longest samples first, the first coherent one is the answer, as in `structural-coherence`.
 ///
 /// What it says is exact within the budget; Σ_q C(n, q) M^q choices, q! times as many with the paper's ordered samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
