@@ -93,8 +93,13 @@ impl View {
             Some(prior) => candidates(model, cloud, Some(prior), &Gate::default(), None),
             None => Candidates::all(model.len(), cloud.len()),
         };
-        let tolerance = Tolerance::Fixed(delta);
-        let problem = Problem { model, cloud, candidates: &candidates, tolerance, prior: prior.as_ref() };
+        self.outcome_of(&candidates, delta, acceptance)
+    }
+
+    /// The same of these candidates.
+    pub fn outcome_of(&self, candidates: &Candidates, delta: f64, acceptance: &Acceptance) -> Outcome {
+        let Self { model, cloud, prior, .. } = self;
+        let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Fixed(delta), prior: prior.as_ref() };
         let mut stream = Stream::new(0, 0, 0, Purpose::Search);
         let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
         reference(&problem, &search, &solver, acceptance, None, stream.rng()).outcome

@@ -39,6 +39,17 @@ fn referenced(family: Family, seed: u64, number: u64, presence: Presence) -> boo
     matches!(attempt.outcome, Outcome::Referenced(_))
 }
 
+/// Points of a grid stand in rows, and three in a row fix no pose: the likeliest pose of most of its points is found all the same.
+///
+/// Seen to fail, in both frames, where model points with as many candidates stand in the order of their coordinates, row by row.
+#[test]
+fn no_pose_is_lost_where_points_stand_in_rows() {
+    for number in [19, 217] {
+        let (_, right) = believed(Family::E, 21, number, Presence::Present).expect("something is found");
+        assert!(right, "frame {number}: the likeliest pose is another");
+    }
+}
+
 /// Where the object is not there, no pose is given: 300 frames at the paper's scale, some at a site's, and some where the
 /// lattice that the object is a part of goes on about its place.
 ///

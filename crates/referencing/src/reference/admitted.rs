@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix3;
 
 use super::judge::Judge;
-use crate::{Correspondence, PriorBound, candidates::chi_square};
+use crate::{Correspondence, PriorBound, candidates::chi_square, chance::shuffled};
 
 /// A point of a reading may lie so many standard deviations of its measurement outside a box;
 const BOX_EDGE: f64 = 4.0;
@@ -21,12 +21,21 @@ enum Place {
     Outside,
 }
 
+/// Of larger models proposed pairs are taken at their word: to read them otherwise takes n² pairs of model points.
+const MOST_MISNAMED: usize = 100;
+
 /// The model points that each measured point of a set may be.
-pub(super) type Admitted = BTreeMap<usize, Vec<usize>>;
+pub(super) struct Admitted {
+    /// Of each measured point, by its number in the cloud.
+    pub(super) models: BTreeMap<usize, Vec<usize>>,
+    /// Whether candidates were proposed by more than a prior, so that the model points may be others than those proposed.
+    pub(super) proposed: bool,
+}
 
 impl Judge<'_> {
     /// The model points that each measured point of a set may be: its candidates, and those that a prior only just excludes. That
-    /// one of many points falls outside its shell by its noise does not exclude a pose that the prior as a whole allows.
+    /// one of many points falls outside its shell by its noise does not exclude a pose that the prior as a whole allows. Where
+    /// candidates were proposed by more than a prior, all that it allows: what proposes may mistake a point for its like.
     pub(super) fn admitted(&self, pairs: &[Correspondence]) -> Admitted {
         let lists = &self.problem.candidates.lists;
         let camera_from_object = self.problem.prior.map(|prior| prior.object_from_camera.inverse());
@@ -58,15 +67,20 @@ impl Judge<'_> {
         let listed = |model: usize, cloud: usize| lists[model].binary_search(&cloud).is_ok();
         let by_shells = |cloud: usize| (cloud, (0..lists.len()).map(|model| place_of(model, cloud)).collect());
         let placed: Vec<(usize, Vec<Place>)> = pairs.iter().map(|pair| by_shells(pair.cloud)).collect();
-        // Where a shell holds what is no candidate, the candidates were proposed by more than the prior: nothing else is one.
-        let proposed = placed.iter().any(|(cloud, places)| {
-            let mut inside = (0..lists.len()).filter(|&model| places[model] == Place::Inside);
-            inside.any(|model| !lists[model].is_empty() && !listed(model, *cloud))
-        });
+        // Where a shell holds what is no candidate, the candidates were proposed by more than the prior.
+        let proposed = shuffled(self.problem)
+            || placed.iter().any(|(cloud, places)| {
+                let mut inside = (0..lists.len()).filter(|&model| places[model] == Place::Inside);
+                inside.any(|model| !lists[model].is_empty() && !listed(model, *cloud))
+            });
+        let few = self.problem.model.len() <= MOST_MISNAMED;
         let of = |(cloud, places): (usize, Vec<Place>)| {
-            let may_be = |&model: &usize| listed(model, cloud) || (!proposed && places[model] == Place::Edge);
-            (cloud, (0..lists.len()).filter(may_be).collect())
+            let allowed = |model: usize| match proposed {
+                true => few && (self.problem.prior.is_none() || places[model] != Place::Outside),
+                false => places[model] == Place::Edge,
+            };
+            (cloud, (0..lists.len()).filter(|&model| listed(model, cloud) || allowed(model)).collect())
         };
-        placed.into_iter().map(of).collect()
+        Admitted { models: placed.into_iter().map(of).collect(), proposed }
     }
 }

@@ -140,11 +140,22 @@ impl Judge<'_> {
         }
     }
 
-    /// A pose elsewhere to hold a fix against, where the search named none: that of pairs that contradict it.
-    pub(super) fn elsewhere(&self, fix: &Reference) -> Option<Alternative> {
+    /// A fix held against a pose elsewhere, the likeliest of pairs that contradict it, where the search named none: what stands as well
+    /// as the fix, and is no less likely, leaves it ambiguous.
+    pub(super) fn against_elsewhere(&self, fix: Box<Reference>) -> (Outcome, Option<Alternative>) {
         let sets = elsewhere(self.problem, &fix.object_from_camera);
-        let mut others = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok());
-        others.find(|other| self.apart(&fix.object_from_camera, &other.pose)).map(Hypothesis::alternative)
+        let others = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok());
+        let apart = others.filter(|other| self.apart(&fix.object_from_camera, &other.pose));
+        let Some(mut other) = apart.min_by(by_score) else { return (Outcome::Referenced(fix), None) };
+        let stands = other.score >= fix.score
+            && self.residuals(&other).is_ok()
+            && self.precise_and_near(&mut other).is_ok()
+            && self.faces(&other);
+        let other = other.alternative();
+        if stands {
+            return (Outcome::Ambiguous(vec![other, (*fix).alternative()]), None);
+        }
+        (Outcome::Referenced(fix), Some(other))
     }
 
     fn observations(&self, pairs: &[Correspondence]) -> Observations<'_> {

@@ -17,6 +17,7 @@ mod exclusion;
 mod hypothesis;
 mod integrity;
 mod judge;
+mod misnamed;
 mod outcome;
 mod refusal;
 mod transfer;
@@ -77,9 +78,9 @@ pub fn judge(
         (Err(refusal), _) => (Outcome::Unidentified(refusal), None),
     };
     let outcome = judge.told_apart(outcome, found.belief.is_some());
-    let runner_up = match (&outcome, runner_up) {
-        (Outcome::Referenced(reference), None) if found.belief.is_none() => judge.elsewhere(reference),
-        (_, known) => known,
+    let (outcome, runner_up) = match (outcome, runner_up) {
+        (Outcome::Referenced(fix), None) if found.belief.is_none() => judge.against_elsewhere(fix),
+        known => known,
     };
     let outcome = match &found.undecided {
         Some(why @ Unidentified::Mirrored { .. }) => Outcome::Unidentified(why.clone().into()),

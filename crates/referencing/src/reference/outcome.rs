@@ -34,6 +34,11 @@ impl Reference {
     pub fn point_covariance(&self, point: &Point<Object>) -> Matrix3<f64> {
         self.covariance.of_point(&(self.object_from_camera.inverse() * *point))
     }
+
+    /// The same as one of several poses.
+    pub(super) fn alternative(self) -> Alternative {
+        Alternative { object_from_camera: self.object_from_camera, pairs: self.pairs, score: self.score }
+    }
 }
 
 /// Another pose that explains the data as well.

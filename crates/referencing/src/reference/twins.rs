@@ -24,10 +24,12 @@ impl Judge<'_> {
     /// it explain the same measurements. Candidates, residuals, precision, prior and the visible sides of the points decide
     /// between them as between any sets; what passes all is an alternative. A search that weighs evidence must leave all
     /// alternatives together no more than [`Acceptance::doubt`](super::Acceptance::doubt), by the likelihood of the pairs and
-    /// the prior, and what it leaves them is taken from the fix's protection; of other searches none may pass.
+    /// the prior, and what it leaves them is taken from the fix's protection; of other searches none may pass. What the candidates do
+    /// not propose counts as much as those who propose may have mistaken the points for their like ([`Judge::misnamed`]).
     pub(super) fn told_apart(&self, mut outcome: Outcome, weighs: bool) -> Outcome {
         let Outcome::Referenced(reference) = &mut outcome else { return outcome };
-        let sets = self.twins(&reference.pairs);
+        let admitted = self.admitted(&reference.pairs);
+        let sets = self.twins(&reference.pairs, &admitted);
         if sets.is_empty() {
             return outcome;
         }
@@ -47,14 +49,19 @@ impl Judge<'_> {
         }
         let share = |other: &Hypothesis| (other.score - own.score).exp();
         self.cover(reference, near.iter().map(|other| (share(other), &other.pose)));
-        let weight: f64 = others.iter().map(share).sum();
-        if others.is_empty() {
-            return outcome;
-        }
-        if weighs && weight <= self.acceptance.doubt * (1.0 + weight) {
-            // The search may have counted some of them among the poses elsewhere: what is counted twice is on the safe side.
-            let known = reference.integrity.misidentified.unwrap_or(0.0);
-            self.protected(reference, known + weight / (1.0 + weight));
+        let mut weight = 0.0;
+        others.retain(|other| {
+            let misnamed = if admitted.proposed { self.misnamed(&own, other) } else { 1.0 };
+            let of_other = misnamed * share(other);
+            weight += of_other;
+            weighs || misnamed >= 1.0 || of_other > self.acceptance.doubt
+        });
+        if others.is_empty() || (weighs && weight <= self.acceptance.doubt * (1.0 + weight)) {
+            if weight > 0.0 && weighs {
+                // The search may have counted some of them among the poses elsewhere: what is counted twice is on the safe side.
+                let known = reference.integrity.misidentified.unwrap_or(0.0);
+                self.protected(reference, known + weight / (1.0 + weight));
+            }
             return outcome;
         }
         Outcome::Ambiguous(std::iter::once(own).chain(others).map(Hypothesis::alternative).collect())
@@ -64,11 +71,10 @@ impl Judge<'_> {
     /// as they have one, is laid on every triangle of the model that is coherent with it, and each of the others must come to
     /// lie at a model point of its own.
     /// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
-    fn twins(&self, pairs: &[Correspondence]) -> BTreeSet<Vec<Correspondence>> {
+    fn twins(&self, pairs: &[Correspondence], admitted: &Admitted) -> BTreeSet<Vec<Correspondence>> {
         let mut found = BTreeSet::new();
         let Some(base) = self.wide(pairs) else { return found };
-        let admitted = self.admitted(pairs);
-        let [first, second, third] = base.map(|cloud| &admitted[&cloud]);
+        let [first, second, third] = base.map(|cloud| &admitted.models[&cloud]);
         if first.len().saturating_mul(second.len()) > MOST_BASES {
             return found;
         }
@@ -82,7 +88,7 @@ impl Judge<'_> {
                     if three.iter().all(|pair| known.contains(pair)) {
                         continue;
                     }
-                    found.extend(self.completed(three, pairs, &admitted));
+                    found.extend(self.completed(three, pairs, admitted));
                     if found.len() >= MOST_TWINS {
                         return found;
                     }
@@ -120,7 +126,7 @@ impl Judge<'_> {
         let mut set = three.to_vec();
         let mut taken: BTreeSet<usize> = three.iter().map(|pair| pair.model).collect();
         for cloud in pairs.iter().map(|pair| pair.cloud).filter(|cloud| three.iter().all(|pair| pair.cloud != *cloud)) {
-            let model = self.nearest(&pose, cloud, &three, &admitted[&cloud])?;
+            let model = self.nearest(&pose, cloud, &three, &admitted.models[&cloud])?;
             if !taken.insert(model) {
                 return None;
             }

@@ -39,11 +39,7 @@ impl Judge<'_> {
         if let (Outcome::Referenced(reference), Some(best)) = (&mut outcome, belief.explanations.first()) {
             // The solver has the pairs alone: what it makes of them must be the pose that was weighed.
             if self.apart(&reference.object_from_camera, &best.object_from_camera) {
-                let solved = Alternative {
-                    object_from_camera: reference.object_from_camera,
-                    pairs: reference.pairs.clone(),
-                    score: reference.score,
-                };
+                let solved = reference.clone().alternative();
                 return (Outcome::Ambiguous(vec![best.alternative(), solved]), None);
             }
             reference.score = best.ln_evidence;

@@ -41,6 +41,7 @@ pub(crate) use grow::elsewhere;
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]
 pub(crate) use orientation::mirrored;
+pub(crate) use pose::share;
 pub use rigid_consensus::RigidConsensus;
 pub use structural_coherence::{Samples, StructuralCoherence};
 

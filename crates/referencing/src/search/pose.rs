@@ -11,7 +11,7 @@ pub(super) fn fitted(problem: &Problem<'_>, pairs: &[Correspondence]) -> Option<
 }
 
 /// How far a pair is from where the pose puts it, as a share of what it may be off.
-pub(super) fn share(problem: &Problem<'_>, pose: &Transform<Object, Camera>, pair: Correspondence) -> f64 {
+pub(crate) fn share(problem: &Problem<'_>, pose: &Transform<Object, Camera>, pair: Correspondence) -> f64 {
     let off = (*pose * problem.cloud[pair.cloud].position.at).distance(&problem.model[pair.model].at);
     off / slack(problem, pair)
 }

@@ -17,8 +17,9 @@ const FARTHEST: f64 = 1e15;
 
 /// The candidate pairs with their compatibility.
 ///
-/// Stands in an order that depends on coordinates alone: model points with few candidates first, of equals by
-/// coordinates, so that a search from the front meets each set at the points that are ambiguous least.
+/// Stands in an order that depends on coordinates alone: model points with few candidates first, of equals those farthest from their
+/// centroid, so that a search from the front meets each set at points that are ambiguous least and far apart: three in a row, as along
+/// an edge or a line of a grid, fix no pose.
 pub(in crate::search) struct Graph {
     pub(in crate::search) vertices: Vec<Correspondence>,
     /// Where the pairs of each model point begin; one more than there are.
@@ -226,9 +227,12 @@ fn vertices(problem: &Problem<'_>) -> (Vec<Correspondence>, Vec<usize>) {
         |a: &Vector3<f64>, b: &Vector3<f64>| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
     let lists = &problem.candidates.lists;
     let at = |i: usize| &problem.model[i].at.coords;
-    let listed = lists.iter().enumerate().filter(|(_, list)| !list.is_empty());
-    let mut order: Vec<(usize, f64, usize)> = listed.map(|(i, list)| (list.len(), at(i).x, i)).collect();
-    order.sort_unstable_by(|(few, near, i), (many, far, k)| {
+    let listed: Vec<usize> = (0..lists.len()).filter(|&i| !lists[i].is_empty()).collect();
+    let centroid = listed.iter().map(|&i| at(i)).sum::<Vector3<f64>>() / listed.len().max(1) as f64;
+    // To seven digits: of points equally far, as sums in another order may differ in the last.
+    let lever = |i: usize| (at(i) - centroid).norm_squared() as f32;
+    let mut order: Vec<(usize, f32, usize)> = listed.into_iter().map(|i| (lists[i].len(), lever(i), i)).collect();
+    order.sort_unstable_by(|(few, far, i), (many, near, k)| {
         few.cmp(many).then(near.total_cmp(far)).then_with(|| by(at(*i), at(*k))).then(i.cmp(k))
     });
     let (mut vertices, mut starts) = (Vec::with_capacity(problem.candidates.pairs()), vec![0]);
