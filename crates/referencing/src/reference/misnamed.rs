@@ -31,7 +31,26 @@ impl Judge<'_> {
             !own_clouds.contains(&cloud) && share(self.problem, &other.pose, Correspondence { model, cloud }) <= 1.0
         };
         let b = (0..lists.len()).filter(|&model| lists[model].iter().any(|&cloud| agrees(model, cloud))).count();
-        let (a, b) = (a as f64 + 1.0, b as f64 + 1.0);
-        beta_reg(a, b, 0.5) / beta_reg(b, a, 0.5)
+        odds(a, b)
+    }
+}
+
+/// I½(a + 1, b + 1)/I½(b + 1, a + 1).
+fn odds(a: usize, b: usize) -> f64 {
+    let (a, b) = (a as f64 + 1.0, b as f64 + 1.0);
+    beta_reg(a, b, 0.5) / beta_reg(b, a, 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::odds;
+
+    /// I½(a + 1, b + 1) is the share of the outcomes of a + b + 1 tosses that have more than a heads: of nine all nine, one of 512; of
+    /// nine seven or more, 36 + 9 + 1 of 512.
+    #[test]
+    fn proposals_have_the_odds_of_tossed_coins() {
+        for (a, b, expected) in [(4, 4, 1.0), (8, 0, 1.0 / 511.0), (6, 2, 46.0 / 466.0), (0, 8, 511.0)] {
+            assert!((odds(a, b) / expected - 1.0).abs() < 1e-9, "{a} against {b}: {}", odds(a, b));
+        }
     }
 }
