@@ -136,7 +136,11 @@ fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
 fn people(answer: &Answer) -> String {
     let mut text = format!("{}: {}", answer.file, answer.outcome);
     if let Some(pairs) = &answer.pairs {
-        let proved = if answer.optimal { ", proved largest" } else { "" };
+        let proved = match (answer.optimal, answer.evidence_gap) {
+            (true, None) => ", proved largest",
+            (true, Some(_)) => ", proved likeliest",
+            (false, _) => "",
+        };
         text += &format!(", {} points{proved}", pairs.len());
     }
     if !answer.behind.is_empty() {

@@ -139,7 +139,7 @@ pub struct Answer {
     pub runner_up: Option<OtherPose>,
     /// Difference of the scores of the best and the next.
     pub margin: Option<f64>,
-    /// Whether it is proved that no admissible set is larger.
+    /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
     pub optimal: bool,
     /// No admissible set has more pairs.
     pub size_bound: Option<usize>,
@@ -150,6 +150,9 @@ pub struct Answer {
     /// Whether all was looked at that may lead to a second copy of the object, whole or in part; of searches that look for one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copies_sought: Option<bool>,
+    /// No admissible set is likelier by more than this (nats); of searches that were asked to prove it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evidence_gap: Option<f64>,
     /// Everything derived from the file (ms); reading and parsing not counted.
     pub time_ms: f64,
     /// The search's name.
@@ -223,6 +226,7 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
         expected_chance_sets: attempt.expected_chance_sets.filter(|expected| expected.is_finite()),
         tests: attempt.tests,
         copies_sought: attempt.copies_sought,
+        evidence_gap: attempt.evidence_gap,
         time_ms,
         search: method.search.0.to_owned(),
         solver: method.solver.0.to_owned(),

@@ -104,6 +104,7 @@ pub fn judge(
         size_bound: Some(found.size_bound),
         tests: Some(found.tests),
         copies_sought: found.belief.as_ref().and_then(|belief| belief.copies_sought),
+        evidence_gap: found.belief.as_ref().and_then(|belief| belief.evidence_gap),
         identified: found.pairs,
     }
 }
@@ -134,6 +135,7 @@ pub fn judge_named(
         expected_chance_sets: None,
         tests: None,
         copies_sought: None,
+        evidence_gap: None,
     }
 }
 

@@ -109,7 +109,7 @@ pub struct Attempt {
     /// The best pose that differs from the answer by more than the alert limit, though it was not
     /// believed; for comparison only.
     pub runner_up: Option<Alternative>,
-    /// Whether it is proved that no admissible set is larger.
+    /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
     pub optimal: bool,
     /// No admissible set has more pairs than this, where the search says so.
     pub size_bound: Option<usize>,
@@ -120,6 +120,8 @@ pub struct Attempt {
     /// Whether the search looked at all that may lead to a second copy of the object, whole or in part, beside the answer; `None`
     /// where it looks for none, or nothing was likely enough to be believed.
     pub copies_sought: Option<bool>,
+    /// No admissible set is likelier by more than this (nats); `None` where that was not asked.
+    pub evidence_gap: Option<f64>,
 }
 
 impl Attempt {
@@ -157,6 +159,7 @@ impl Attempt {
             expected_chance_sets: None,
             tests,
             copies_sought: None,
+            evidence_gap: None,
         }
     }
 }

@@ -45,6 +45,9 @@ pub struct Belief {
     /// The likeliest of what else was met elsewhere, or, where that is nothing, of what was followed however unlikely it is: the
     /// answer is held against it.
     pub unlikely: Option<Explanation>,
+    /// No admissible set has more evidence than the likeliest pose by more than this (nats), clutter being spread evenly: zero where that
+    /// is the most likely, proved. `None` where no proof was sought.
+    pub evidence_gap: Option<f64>,
 }
 
 /// What has this evidence (nats) beside the likeliest pose is a second copy of the object, whole or in part.

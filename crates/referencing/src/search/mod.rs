@@ -67,7 +67,7 @@ pub struct Identification {
     pub rivals: Vec<Vec<Correspondence>>,
     /// Whether `rivals` holds every other set of the same size.
     pub rivals_complete: bool,
-    /// Whether it is proved that no admissible set is larger.
+    /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
     pub optimal: bool,
     /// No admissible set has more pairs than this.
     pub size_bound: usize,

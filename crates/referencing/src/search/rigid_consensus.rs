@@ -10,7 +10,9 @@ use super::{
     Belief, Explanation, Identification, NEEDED, Search, Unidentified,
     belief::COPY,
     bounded,
-    consensus::{Crowd, Graph, Imitation, Mode, Occupied, Pattern, Rough, Seeds, Swept, Terms, mirror_image},
+    consensus::{
+        Crowd, Graph, Imitation, Mode, Occupied, Pattern, Proved, Rough, Seeds, Swept, Terms, mirror_image, prove,
+    },
     grow::{feasible, grow, most_possible, so_far},
     orientation::Sense,
 };
@@ -42,10 +44,11 @@ use crate::Problem;
 /// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. A three whose distances
 /// differ much from the model's fits no pose well, and its bound falls by that. The bounds that
 /// prune take the points of a set to lie about as well as the model's do on average, and to fit no better than noise
-/// lets them, by up to four nats: what fits better may be missed where it is hardly of interest. So nothing is
-/// proved: no answer is called optimal. Time O(K²) for the graph of K candidate pairs, then what the
-/// bounds leave: seldom more than for the graph, and never more than the budget, which is told when it ends
-/// the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
+/// lets them, by up to four nats: what fits better may be missed where it is hardly of interest. With `prove`, bounds that hold are
+/// used to look at all coherent sets that could be likelier, of clutter that is spread evenly: what is found joins the poses, and
+/// where nothing is left open the answer is optimal. Time O(K²) for the graph of K candidate pairs, then what the
+/// bounds leave: seldom more than for the graph, for the proof at worst exponential in K, and never more than the budget, which
+/// is told when it ends the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
 /// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
 /// copy of it may be passed over, where [`Belief::copies_sought`] is false; and what shows less evidence than nine nats is no
 /// copy. The tolerance and the prior's greatest rotation prune the graph; they do not judge the pose.
@@ -57,11 +60,13 @@ pub struct RigidConsensus {
     /// More candidate pairs than this are not searched: their graph would not fit into memory
     /// (40 000 take 200 MB).
     pub most_pairs: usize,
+    /// Whether it is proved that no set is likelier, as far as what is left of the budget does: then the answer is called optimal.
+    pub prove: bool,
 }
 
 impl Default for RigidConsensus {
     fn default() -> Self {
-        Self { budget: 400_000_000, most_pairs: 40_000 }
+        Self { budget: 400_000_000, most_pairs: 40_000, prove: false }
     }
 }
 
@@ -90,6 +95,8 @@ const LEAD: usize = 4;
 /// The looks for parts of a copy, and the tenth of it those for imitations, may always cost as much (words read: a fraction of a
 /// millisecond), where the whole was found at once.
 const LEAST_EFFORT: u64 = 50_000;
+/// Sums in another order differ by less (nats).
+const ROUNDING: f64 = 1e-9;
 /// Pair tests of the graph that take as long as a word read.
 const PAIRS_A_WORD: u64 = 16;
 
@@ -105,8 +112,15 @@ impl Search for RigidConsensus {
         let none = BTreeSet::new();
         let mut swept = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget).sweep();
         let mut tests = graph.tests + swept.tests;
-        let mut crowd = Crowd::default();
         let strong = |swept: &Swept| swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG);
+        // What nothing makes believe needs no proof.
+        let proved = if self.prove && strong(&swept) {
+            prove(problem.model, parts, &mut swept, self.budget.saturating_sub(tests))
+        } else {
+            None
+        };
+        tests += proved.as_ref().map_or(0, |proved| proved.tests);
+        let mut crowd = Crowd::default();
         let mut weighed = |swept: &mut Swept| {
             for mode in &mut swept.modes {
                 crowd.weigh(problem, &terms, &graph, mode);
@@ -128,7 +142,7 @@ impl Search for RigidConsensus {
         }
         // A second copy of the object in what is left of the cloud, and a pose to hold the likeliest against.
         let mut look_alike = None;
-        let mut beside = Swept { modes: Vec::new(), complete: true, parts: true, tests: 0 };
+        let mut beside = Swept { complete: true, parts: true, ..Swept::default() };
         let mut copies_sought = None;
         let mut imitation = None;
         let mut unlikely = None;
@@ -170,6 +184,8 @@ impl Search for RigidConsensus {
             }
         }
         let complete = swept.complete && beside.complete;
+        let gap = |proved: Proved| Some(proved.bound - best.ln_even).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
+        let evidence_gap = proved.map(gap);
         // What is returned is coherent throughout: of twenty true points some two are usually further from each
         // other than the tolerance, and the worst fitting give way. The belief keeps them.
         let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut tests);
@@ -187,8 +203,7 @@ impl Search for RigidConsensus {
         Ok(Identification {
             rivals: Vec::new(),
             rivals_complete: false,
-            // Neither is the largest set looked for, nor do the bounds prove a likelihood.
-            optimal: false,
+            optimal: evidence_gap == Some(0.0),
             size_bound: bound,
             tests,
             undecided: (!complete).then(|| ended(pairs.len(), tests)),
@@ -199,6 +214,7 @@ impl Search for RigidConsensus {
                 look_alike,
                 imitation,
                 unlikely: unlikely.as_ref().map(explanation),
+                evidence_gap,
             }),
             pairs,
         })
@@ -219,6 +235,14 @@ mod tests {
 
     /// The points 3 m before the camera, as far off as `wrong` says, each its own candidate.
     fn answered(prior: Option<&Prior>, wrong: impl Fn(usize) -> Vector3<f64>) -> Result<Identification, Unidentified> {
+        answered_by(&RigidConsensus::default(), prior, wrong)
+    }
+
+    fn answered_by(
+        search: &RigidConsensus,
+        prior: Option<&Prior>,
+        wrong: impl Fn(usize) -> Vector3<f64>,
+    ) -> Result<Identification, Unidentified> {
         let model: Vec<ModelPoint> = PLACES.iter().map(|at| ModelPoint::exact("", Point::from(*at))).collect();
         let cloud: Vec<MeasuredPoint> = (0..PLACES.len())
             .map(|i| Vector3::from(PLACES[i]) + Vector3::new(0.0, 0.0, 3.0) + wrong(i))
@@ -227,7 +251,20 @@ mod tests {
         let candidates = Candidates::from_pairs(PLACES.len(), (0..PLACES.len()).map(|i| (i, i)));
         let tolerance = Tolerance::Fixed(0.04);
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
-        RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0))
+        search.search(&problem, &mut ChaCha8Rng::seed_from_u64(0))
+    }
+
+    /// Seen to fail where nothing is asked of the proof, and where the gap is that to no object.
+    #[test]
+    fn an_answer_is_optimal_where_that_is_asked_and_proved() {
+        let proving = RigidConsensus { prove: true, ..RigidConsensus::default() };
+        let noise = |i: usize| Vector3::new(0.01, -0.01, 0.005) * (i as f64 - 2.5);
+        let [plain, proved] = [&RigidConsensus::default(), &proving].map(|by| answered_by(by, None, noise).unwrap());
+        let gap = |found: &Identification| found.belief.as_ref().expect("one is weighed").evidence_gap;
+        assert_eq!((plain.optimal, gap(&plain)), (false, None));
+        assert_eq!((proved.optimal, gap(&proved)), (true, Some(0.0)));
+        assert_eq!(plain.pairs, proved.pairs);
+        assert!(proved.tests > plain.tests);
     }
 
     #[test]

@@ -24,6 +24,13 @@ pub(in crate::search) struct After {
     bring: f64,
 }
 
+impl After {
+    /// With so many others before, and what they bring.
+    pub(in crate::search) fn with(&self, (k, gains): (usize, f64)) -> (usize, f64) {
+        (k + self.more as usize, gains + self.bring)
+    }
+}
+
 /// Bounds of the evidence of sets.
 ///
 /// A set has one pair a model point, each with that point's greatest gain at most, the share B(k) of its number, and
@@ -47,12 +54,28 @@ pub(in crate::search) struct Bounds<'a> {
 }
 
 impl<'a> Bounds<'a> {
+    /// Bounds that prune, taken from what sets are on average.
     pub(in crate::search) fn of((terms, rough, graph): (&'a Terms, &Rough, &'a Graph), least: usize) -> Self {
+        let of_number = |k: usize| terms.ln_share[k] + rough.ln_peak + terms.ln_volume[k] + SLACK - misfit(k);
+        Self::with((terms, graph), least, of_number)
+    }
+
+    /// Bounds that hold: whatever fits, `ln_filled` (k) being no less than ln of the share of the prior that the posterior of k pairs
+    /// fills.
+    pub(in crate::search) fn proved((terms, graph): (&'a Terms, &'a Graph), ln_filled: &[f64]) -> Self {
+        let mut bounds = Self::with((terms, graph), 0, |k| terms.ln_share[k] + ln_filled[k]);
+        // A smaller set may be worth more by its volume than a larger one that holds it: no bound is less than that.
+        for k in 1..bounds.of_number.len() {
+            bounds.of_number[k] = bounds.of_number[k].max(bounds.of_number[k - 1] - bounds.grows);
+        }
+        bounds
+    }
+
+    fn with((terms, graph): (&'a Terms, &'a Graph), least: usize, of_number: impl Fn(usize) -> f64) -> Self {
         let ranks = graph.starts.len() - 1;
         let grows = libm::log(terms.ln_share.len() as f64) + 1.0;
         let of_rank = |i: usize| &terms.pairs[graph.starts[i]..graph.starts[i + 1]];
         let top: Vec<f64> = (0..ranks).map(|i| of_rank(i).iter().map(|pair| pair.gain).fold(grows, f64::max)).collect();
-        let share = &terms.ln_share;
         Self {
             graph,
             terms,
@@ -61,18 +84,39 @@ impl<'a> Bounds<'a> {
             single: graph.vertices.len() == ranks,
             top,
             least,
-            of_number: (0..=ranks).map(|k| share[k] + rough.ln_peak + terms.ln_volume[k] + SLACK - misfit(k)).collect(),
+            of_number: (0..=ranks).map(of_number).collect(),
         }
+    }
+
+    /// What a model point brings to a bound with a pair that gains so much.
+    pub(in crate::search) fn brings(&self, gain: f64) -> f64 {
+        gain.max(self.grows)
     }
 
     /// What one pair brings at most.
     pub(in crate::search) fn gain(&self, v: usize) -> f64 {
-        self.terms.pairs[v].gain.max(self.grows)
+        self.brings(self.terms.pairs[v].gain)
+    }
+
+    /// What each model point brings at most, by rank.
+    pub(in crate::search) fn tops(&self) -> &[f64] {
+        &self.top
     }
 
     /// What a model point brings at most.
     pub(in crate::search) fn gain_of_rank(&self, rank: usize) -> f64 {
         self.top[rank]
+    }
+
+    /// What is added to the gains of `k` pairs.
+    pub(in crate::search) fn of_number(&self, k: usize) -> f64 {
+        self.of_number[k]
+    }
+
+    /// By how much these are above others of the same problem at most (nats), where they are `enough`.
+    pub(in crate::search) fn above(&self, other: &Self, enough: f64) -> f64 {
+        let reaching = (other.least..self.of_number.len()).filter(|&k| self.reach(0, 0.0, k) > enough);
+        reaching.map(|k| self.of_number[k] - other.of_number[k]).fold(0.0, f64::max)
     }
 
     /// The bound of `k` pairs that bring `gains`.
@@ -103,8 +147,14 @@ impl<'a> Bounds<'a> {
         if self.single || reach < enough {
             return (own + most, reach);
         }
+        let (k, sum) = self.joined((own, gains), common, from);
+        (k, if k < least { f64::NEG_INFINITY } else { self.of_set(k, sum) })
+    }
+
+    /// `own` pairs that bring `gains` and the best of each model point of `common` from rank `from` on: how many, and what they bring.
+    pub(in crate::search) fn joined(&self, (own, gains): (usize, f64), common: &[u64], from: usize) -> (usize, f64) {
         let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
-        each_held(common, starts[from], |begin, word| {
+        each_held(common, self.graph.starts[from], |begin, word| {
             let mut rest = groups(word, self.graph.lasts[begin / 64]);
             let mut v = begin;
             while rest != 0 {
@@ -119,7 +169,7 @@ impl<'a> Bounds<'a> {
                 }
             }
         });
-        (k, if k < least { f64::NEG_INFINITY } else { self.of_set(k, sum) })
+        (k, sum)
     }
 
     /// Whether the same bound of three pairs or more and of those of `common` from a bit on that are set in `row` is `enough`: known
@@ -158,6 +208,11 @@ impl<'a> Bounds<'a> {
 
     /// Lists what may come after each model point of a set, by rank; those that it does not hold keep what they had.
     pub(in crate::search) fn list(&self, set: &[Held], after: &mut Vec<After>) {
+        self.list_of(set, &self.top, after);
+    }
+
+    /// The same where model points bring no more than `top` of their rank.
+    pub(in crate::search) fn list_of(&self, set: &[Held], top: &[f64], after: &mut Vec<After>) {
         after.resize(self.top.len(), After::default());
         let (mut last, mut all) = (u32::MAX, After::default());
         for held in set.iter().rev() {
@@ -168,7 +223,7 @@ impl<'a> Bounds<'a> {
                 let rank = self.graph.rank[held.begin() + bit];
                 if rank != last {
                     (after[rank as usize], last) = (all, rank);
-                    all = After { more: all.more + 1, bring: all.bring + self.top[rank as usize] };
+                    all = After { more: all.more + 1, bring: all.bring + top[rank as usize] };
                 }
             }
         }
@@ -181,7 +236,7 @@ impl<'a> Bounds<'a> {
         after: After,
         (least, enough): (usize, f64),
     ) -> bool {
-        let (k, sum) = (own + after.more as usize, gains + after.bring);
+        let (k, sum) = after.with((own, gains));
         // Summed in another order than the bounds that decide.
         k < least || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
     }

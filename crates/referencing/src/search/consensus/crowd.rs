@@ -215,7 +215,7 @@ mod tests {
         let motion = Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() };
         let gain = |v: &usize| terms.residual_gain(*v, &motion);
         let nearest = (0..cloud.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("there are some");
-        let mode = Mode { members: vec![nearest], motion, ln_evidence: 0.0, ln_crowd: 0.0 };
+        let mode = Mode { members: vec![nearest], motion, ln_evidence: 0.0, ln_even: 0.0, ln_crowd: 0.0 };
         let own = gain(&nearest);
         (libm::exp(own), libm::exp(any_of(&terms, &graph, nearest, &mode, own)))
     }

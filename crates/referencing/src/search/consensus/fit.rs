@@ -83,6 +83,16 @@ impl Linear {
         self.motion.moved(&self.step.fixed_rows::<3>(0).into(), &self.step.fixed_rows::<3>(3).into(), &self.about)
     }
 
+    /// By how much the step lowers what residuals and prior cost (nats), if turns were small.
+    pub(in crate::search) fn gained(&self) -> f64 {
+        0.5 * self.decrement
+    }
+
+    /// Of the information.
+    pub(in crate::search) fn factor(&self) -> &Cholesky<f64, U6> {
+        &self.factor
+    }
+
     /// Whether the step leads nowhere else.
     fn converged(&self) -> bool {
         self.decrement < CONVERGED

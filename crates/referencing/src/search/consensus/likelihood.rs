@@ -220,6 +220,8 @@ pub(in crate::search) struct Mode {
     /// ln of its evidence against "no object here", by Laplace: the likelihood ratio and the prior density at
     /// the maximum, times the volume (2π)³/√det H that the posterior fills.
     pub(in crate::search) ln_evidence: f64,
+    /// The same where clutter is spread evenly.
+    pub(in crate::search) ln_even: f64,
     /// What of it crowded clutter took (nats).
     pub(in crate::search) ln_crowd: f64,
 }

@@ -2,7 +2,7 @@
 
 use std::{cell::Cell, collections::BTreeSet};
 
-use nalgebra::{Cholesky, U6};
+use nalgebra::{Cholesky, U6, Vector3};
 
 use super::{
     Motion,
@@ -75,15 +75,37 @@ impl Climb<'_> {
             stands = next == chosen;
             chosen = next;
         }
-        let members = chosen;
-        let (motion, factor) = fit(self.terms, self.rough, &members, &motion, 4)?;
-        if !self.rough.holds(self.model, &motion, &factor) {
+        let (motion, factor) = fit(self.terms, self.rough, &chosen, &motion, 4)?;
+        self.mode(chosen, motion, &factor)
+    }
+
+    /// These pairs, ascending, under their most likely motion; `None` where it is none that a prior's box allows.
+    pub(in crate::search) fn mode(&self, members: Vec<usize>, motion: Motion, factor: &Factor) -> Option<Mode> {
+        if !self.rough.holds(self.model, &motion, factor) {
             return None;
         }
         let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();
         let score = gains + self.terms.ln_share[members.len()] + self.rough.ln_density(&motion);
-        let ln_evidence = score + ln_volume(&factor);
-        ln_evidence.is_finite().then_some(Mode { members, motion, ln_evidence, ln_crowd: 0.0 })
+        // No posterior fills more than all attitudes and places: of points nearly in a row the first order says that.
+        let filled = ln_volume(factor);
+        let ln_evidence = score + if self.rough.known.is_none() { filled.min(-self.rough.ln_peak) } else { filled };
+        ln_evidence.is_finite().then_some(Mode { members, motion, ln_evidence, ln_even: ln_evidence, ln_crowd: 0.0 })
+    }
+
+    /// Whether each of some pairs may be seen under a motion, and is not too far from it.
+    pub(in crate::search) fn allows(&self, members: &[usize], motion: &Motion) -> bool {
+        let camera = self.sides(motion);
+        members.iter().all(|&v| self.terms.of_pair(v, motion).is_some() && self.shows(v, camera.as_ref()))
+    }
+
+    /// Where the camera is; `None` for the image of a model, which has no sides.
+    fn sides(&self, motion: &Motion) -> Option<Vector3<f64>> {
+        (motion.rotation.determinant() > 0.0).then(|| motion.origin())
+    }
+
+    /// Whether the model point of a vertex shows itself to the camera.
+    fn shows(&self, v: usize, camera: Option<&Vector3<f64>>) -> bool {
+        camera.is_none_or(|camera| self.model[self.graph.vertices[v].model].shows_itself(camera))
     }
 
     /// About the evidence of those members that stay, and of one or two pairs that may join them.
@@ -104,38 +126,37 @@ impl Climb<'_> {
         if k < LEAST - 1 { f64::NEG_INFINITY } else { sum + self.terms.ln_share[k] }
     }
 
-    /// The likeliest one-to-one set under a motion: of each model point its best pair, of pairs that share a
-    /// cloud point the better, and of these as many as the likelihood gains by.
+    /// The likeliest one-to-one set under a motion: of pairs that share a model point or a cloud point the better, so that a model point
+    /// that loses its best pair to another has its next, and of these as many as the likelihood gains by.
     fn choose(&self, motion: &Motion) -> Vec<usize> {
         self.compared.set(self.compared.get() + self.graph.vertices.len() as u64);
         let starts = &self.graph.starts;
         let mut best: Vec<(f64, usize)> = Vec::with_capacity(starts.len());
-        // The image of a model has no sides.
-        let camera = (motion.rotation.determinant() > 0.0).then(|| motion.origin());
+        let camera = self.sides(motion);
         for i in 0..starts.len() - 1 {
-            let point = &self.model[self.graph.vertices[starts[i]].model];
-            if camera.is_some_and(|camera| !point.shows_itself(&camera)) {
+            if !self.shows(starts[i], camera.as_ref()) {
                 continue;
             }
-            let place = motion.apply(&point.at.coords);
-            let mut top: Option<(f64, usize)> = None;
+            let place = motion.apply(&self.model[self.graph.vertices[starts[i]].model].at.coords);
             for v in starts[i]..starts[i + 1] {
                 let pair = &self.terms.pairs[v];
                 if let Some(gain) = pair.of_residual(&(pair.cloud - place))
-                    && top.is_none_or(|(known, _)| gain > known)
                     && !self.taken.contains(&self.graph.vertices[v].cloud)
                 {
-                    top = Some((gain, v));
+                    best.push((gain, v));
                 }
             }
-            best.extend(top);
         }
         best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut used = vec![0; self.graph.clouds.div_ceil(64)];
+        let mut clouds = vec![0; self.graph.clouds.div_ceil(64)];
+        let mut ranks = vec![0; starts.len().div_ceil(64)];
         best.retain(|&(_, v)| {
-            let cloud = self.graph.vertices[v].cloud;
-            let first = !is_set(&used, cloud);
-            used[cloud / 64] |= 1u64 << (cloud % 64);
+            let (cloud, rank) = (self.graph.vertices[v].cloud, self.graph.rank[v] as usize);
+            let first = !is_set(&clouds, cloud) && !is_set(&ranks, rank);
+            if first {
+                clouds[cloud / 64] |= 1u64 << (cloud % 64);
+                ranks[rank / 64] |= 1u64 << (rank % 64);
+            }
             first
         });
         let (mut sum, mut most, mut keep) = (0.0, f64::NEG_INFINITY, LEAST.min(best.len()));
@@ -149,5 +170,40 @@ impl Climb<'_> {
         let mut members: Vec<usize> = best[..keep].iter().map(|&(_, v)| v).collect();
         members.sort_unstable();
         members
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Vector3};
+    use seafix_geometry::{MeasuredPoint, UncertainPoint};
+
+    use super::*;
+    use crate::{Candidates, Problem, Tolerance};
+
+    /// Two model points 10 cm apart are both nearest to a cloud point between them; the second has another 7 cm beyond.
+    ///
+    /// Seen to fail where each model point has but its best pair.
+    #[test]
+    fn a_model_point_that_loses_its_best_pair_to_another_has_its_next() {
+        let places = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [1.0, 0.0, 0.2], [0.0, 1.0, -0.3], [-0.8, -0.5, 0.4]];
+        let model: Vec<ModelPoint> = places.iter().map(|at| ModelPoint::exact("", Vector3::from(*at).into())).collect();
+        let seen = [[0.04, 0.0, 0.0], [0.17, 0.0, 0.0], [1.0, 0.0, 0.2], [0.0, 1.0, -0.3], [-0.8, -0.5, 0.4]];
+        let measured = |at: &[f64; 3]| UncertainPoint::isotropic(Vector3::from(*at).into(), 0.03);
+        let cloud: Vec<MeasuredPoint> =
+            seen.iter().map(|at| MeasuredPoint { position: measured(at), pixels: None }).collect();
+        let candidates = Candidates::all(5, 5);
+        let tolerance = Tolerance::Fixed(0.2);
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let rough = Rough::of(&problem).expect("a box");
+        let graph = Graph::of(&problem, &rough);
+        let terms = Terms::of(&problem, &rough, &graph);
+        let (taken, compared) = (BTreeSet::new(), Cell::new(0));
+        let climb = Climb { model: &model, terms: &terms, rough: &rough, graph: &graph, taken: &taken, compared };
+        let chosen = climb.choose(&Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() });
+        let mut pairs: Vec<(usize, usize)> =
+            chosen.iter().map(|&v| (graph.vertices[v].model, graph.vertices[v].cloud)).collect();
+        pairs.sort_unstable();
+        assert_eq!(pairs, [(0, 0), (1, 1), (2, 2), (3, 3), (4, 4)]);
     }
 }

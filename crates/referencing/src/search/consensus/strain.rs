@@ -40,6 +40,13 @@ impl Edge {
     }
 }
 
+/// ½ χ² of the distance of two pairs: no pose that both fit has less of a residual (nats).
+#[inline]
+pub(in crate::search) fn strain_of_two(a: &Term, b: &Term) -> f64 {
+    let edge = Edge::of(a, b);
+    0.5 * edge.stretch * edge.stretch / edge.variance
+}
+
 /// ½ χ² of the three distances of three pairs: dᵀ (J Σ Jᵀ)⁻¹ d / 2, J what the errors of three places make of their distances.
 /// No pose that all fit has less of a residual (nats), errors taken to be small beside the distances.
 #[inline]

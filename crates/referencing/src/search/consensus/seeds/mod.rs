@@ -20,7 +20,8 @@ use super::{
     strain::{Edge, lost_to, strain_of_three},
 };
 use crate::{ModelPoint, lanes::ones_of};
-use queue::{Pair, Queue, order};
+pub(in crate::search) use queue::Pair;
+use queue::{Queue, order};
 
 /// Poses less likely than the best by this much (nats) are not looked for.
 const MARGIN: f64 = 10.0;
@@ -44,15 +45,42 @@ const COST_OF_A_MODE: u64 = 64;
 const COST_OF_A_PAIR: u64 = 4;
 
 /// What came of the search for modes.
+#[derive(Default)]
 pub(in crate::search) struct Swept {
     /// The likeliest first.
     pub(in crate::search) modes: Vec<Mode>,
     /// Whether every three that could lead to a pose of interest was followed.
     pub(in crate::search) complete: bool,
+    /// The pairs that were left to be followed when all were known, each with the bound of what it begins.
+    pub(in crate::search) pairs: Vec<Pair>,
+    /// What bounds (nats) they had to reach.
+    pub(in crate::search) looked_for: f64,
     /// Whether every three was looked at and followed that could lead to a set of fewer pairs than the whole.
     pub(in crate::search) parts: bool,
     /// Work done.
     pub(in crate::search) tests: u64,
+}
+
+impl Swept {
+    /// Modes that were met later.
+    pub(in crate::search) fn insert(&mut self, modes: Vec<Mode>) {
+        for mode in modes {
+            insert(&mut self.modes, mode);
+        }
+    }
+}
+
+/// Keeps a mode in its place, unless it is known.
+fn insert(modes: &mut Vec<Mode>, mode: Mode) {
+    if modes.iter().any(|known| known.members == mode.members) {
+        return;
+    }
+    let before = |known: &Mode| {
+        known.ln_evidence.total_cmp(&mode.ln_evidence).reverse().then_with(|| known.members.cmp(&mode.members)).is_lt()
+    };
+    let place = modes.partition_point(before);
+    modes.insert(place, mode);
+    modes.truncate(KEPT);
 }
 
 /// Sets of fewer pairs than the whole, and how far they are looked for.
@@ -154,28 +182,31 @@ impl<'a> Seeds<'a> {
         let (wholes, parts, complete) = self.pairs();
         let until = self.spent.saturating_add(self.parts.follow);
         self.parts.until = until;
-        let complete = self.follow_all(wholes, self.budget) && complete;
-        let followed = self.follow_all(parts, until) && self.spent <= until;
+        let looked_for = self.threshold();
+        let (pairs, followed) = self.follow_all(wholes, self.budget);
+        let complete = followed && complete;
+        let followed = self.follow_all(parts, until).1 && self.spent <= until;
         let parts = followed && self.parts.every == 1 && !self.parts.dropped;
-        Swept { modes: self.modes, complete, parts, tests: self.spent }
+        Swept { modes: self.modes, complete, pairs, looked_for, parts, tests: self.spent }
     }
 
-    /// Follows the pairs whose bound is of interest, the greatest first, until so much is spent; whether that was enough.
-    fn follow_all(&mut self, mut pairs: Vec<Pair>, most: u64) -> bool {
+    /// Follows the pairs whose bound is of interest, the greatest first, until so much is spent; these pairs, and whether that was enough.
+    fn follow_all(&mut self, mut pairs: Vec<Pair>, most: u64) -> (Vec<Pair>, bool) {
         pairs.retain(|(bound, ..)| f64::from(*bound) >= self.threshold());
-        for (bound, a, b) in Queue::of(pairs) {
+        let mut queue = Queue::of(pairs);
+        while let Some((bound, a, b)) = queue.next() {
             if f64::from(bound) < self.threshold() {
-                return true;
+                break;
             }
             if self.spent > most {
-                return false;
+                return (queue.into_pairs(), false);
             }
             if self.spent > self.parts.until {
                 self.bounds.least = self.parts.whole;
             }
             self.follow_pair(a as usize, b as usize);
         }
-        true
+        (queue.into_pairs(), true)
     }
 
     /// Sets of fewer than so many pairs are parts. Of the pairs that lead to no more than parts as many are looked at, evenly, as can
@@ -366,22 +397,9 @@ impl<'a> Seeds<'a> {
     }
 
     fn keep(&mut self, mode: Mode) {
-        let small = mode.members.len() < self.bounds.least;
-        if small || mode.ln_evidence < self.threshold() || self.modes.iter().any(|known| known.members == mode.members)
-        {
-            return;
+        if mode.members.len() >= self.bounds.least && mode.ln_evidence >= self.threshold() {
+            insert(&mut self.modes, mode);
         }
-        let before = |known: &Mode| {
-            known
-                .ln_evidence
-                .total_cmp(&mode.ln_evidence)
-                .reverse()
-                .then_with(|| known.members.cmp(&mode.members))
-                .is_lt()
-        };
-        let place = self.modes.partition_point(before);
-        self.modes.insert(place, mode);
-        self.modes.truncate(KEPT);
     }
 }
 

@@ -4,7 +4,7 @@
 const SORTED: usize = 1024;
 
 /// Bound and vertices of two pairs.
-pub(super) type Pair = (f32, u32, u32);
+pub(in crate::search) type Pair = (f32, u32, u32);
 
 /// What sorts pairs so that the greatest bound comes first, of equals the first in the order of the graph.
 pub(super) fn order(&(bound, a, b): &Pair) -> u128 {
@@ -24,6 +24,11 @@ pub(super) struct Queue {
 impl Queue {
     pub(super) fn of(pairs: Vec<Pair>) -> Self {
         Self { pairs, taken: 0, sorted: 0 }
+    }
+
+    /// All of them, taken or not, in no order.
+    pub(super) fn into_pairs(self) -> Vec<Pair> {
+        self.pairs
     }
 
     fn sort_more(&mut self) {
