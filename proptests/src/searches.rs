@@ -104,3 +104,8 @@ pub fn sets(answer: &Answer) -> impl Iterator<Item = &Vec<Correspondence>> {
 pub fn nowhere() -> Transform<seafix_geometry::Object, seafix_geometry::Camera> {
     Transform::identity()
 }
+
+/// Whether a set is called the largest; a search by likelihood calls it the likeliest.
+pub fn is_proved_largest(found: &Identification) -> bool {
+    found.optimal && found.belief.is_none()
+}

@@ -151,7 +151,8 @@ impl Search for RigidConsensus {
             let elsewhere = |mode: &Mode| mode.members.iter().filter(|&&v| best.holds(v)).count() < NEEDED;
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
-            let left = self.budget.saturating_sub(swept.tests);
+            let spent = swept.tests + proved.as_ref().map_or(0, |proved| proved.tests);
+            let left = self.budget.saturating_sub(spent);
             let work = swept.tests + graph.tests / PAIRS_A_WORD;
             let whole = work.max(LEAST_EFFORT);
             beside = if pattern.is_some() {

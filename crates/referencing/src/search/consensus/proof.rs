@@ -16,14 +16,16 @@ use super::{
     modes::Climb,
     rough::Rough,
     seeds::Swept,
-    strain::{Edge, strain_of_three, strain_of_two},
+    strain::strain_of_two,
 };
 use crate::{ModelPoint, lanes::ones_of};
 
 /// Evidence that differs by less (nats) is equal: fits end somewhere near their maximum.
 const EQUAL: f64 = 1e-3;
 /// Steps of a fit from the pose of all members but the last.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 6;
+/// A fit that would gain more by its next step (nats) has not come to its end.
+const CONVERGED: f64 = 1e-2;
 /// Poses known better than this (rad, the root of the sum of the variances) put their points where the first order has them.
 const FIRST_ORDER: f64 = 0.1;
 /// What second order may add to a variance, as a share of it.
@@ -62,6 +64,8 @@ struct Prover<'a> {
     best: Mode,
     /// Likelier poses than the first, as they were met.
     better: Vec<Mode>,
+    /// Whether a set was met of which it is not known how likely it is.
+    unsettled: bool,
     budget: u64,
     spent: u64,
     members: Vec<usize>,
@@ -119,7 +123,8 @@ struct Level {
 }
 
 /// Proves that no coherent set has more evidence than the likeliest pose, as far as so much work does; likelier poses that it meets join
-/// the others. `None` where there is no pose.
+/// the others. Sets with a point that their pose hides, or puts too far off or out of the prior's box, are none. `None` where there is
+/// no pose.
 pub(in crate::search) fn prove(
     model: &[ModelPoint],
     (terms, rough, graph): (&Terms, &Rough, &Graph),
@@ -149,6 +154,7 @@ impl<'a> Prover<'a> {
             bounds: Bounds::proved((terms, graph), &ln_filled(model, (terms, rough, graph))),
             best: best.clone(),
             better: Vec::new(),
+            unsettled: false,
             budget,
             spent: 0,
             members: Vec::new(),
@@ -162,7 +168,7 @@ impl<'a> Prover<'a> {
     }
 
     fn ended(&self) -> bool {
-        self.spent > self.budget
+        self.unsettled || self.spent > self.budget
     }
 
     /// Looks at the sets that begin with the pairs that were left when all were known, each with a bound that is no more than this below
@@ -228,12 +234,10 @@ impl<'a> Prover<'a> {
     fn join(&mut self, begun: &Begun, v: usize) -> Begun {
         let terms = self.climb.terms;
         let of = |v: usize| &terms.pairs[v];
+        // Of three the distances hang together, but by the first order alone.
         let strain = match self.members[..] {
             [a] => strain_of_two(of(a), of(v)),
-            [a, b] => {
-                let sides = [Edge::of(of(a), of(b)), Edge::of(of(a), of(v)), Edge::of(of(b), of(v))];
-                strain_of_three([of(a), of(b), of(v)], sides.each_ref())
-            }
+            [a, b] => strain_of_two(of(a), of(v)).max(strain_of_two(of(b), of(v))),
             _ => 0.0,
         };
         self.members.push(v);
@@ -247,7 +251,11 @@ impl<'a> Prover<'a> {
 
     /// The bound of so many pairs that bring so much, the first of which are begun.
     fn bound(&self, begun: &Begun, (k, bring): (usize, f64)) -> f64 {
-        let of_begun = begun.known.map_or(f64::INFINITY, |known| self.climb.terms.ln_share[k] + known.ln_filled);
+        // How much a pose leaves open depends on its attitude, where the noise does.
+        let of_begun = begun
+            .known
+            .filter(Posterior::is_of_first_order)
+            .map_or(f64::INFINITY, |known| self.climb.terms.ln_share[k] + known.ln_filled);
         bring - begun.cost + self.bounds.of_number(k).min(of_begun)
     }
 
@@ -273,7 +281,7 @@ impl<'a> Prover<'a> {
         let mut level = std::mem::take(&mut self.levels[count]);
         let none = self.each_of(&begun, reach, later, &mut level);
         self.levels[count] = level;
-        none
+        none && !self.unsettled
     }
 
     /// The same where a set of interest is in reach.
@@ -329,16 +337,33 @@ impl<'a> Prover<'a> {
                 (cost, Posterior::of(linear.moved(), linear.factor(), rough))
             }
             known => {
-                let start = known.map(|known| known.motion).or_else(|| self.of_any_three());
-                let fit = start.and_then(|start| fit(terms, rough, &self.members, &start, ROUNDS));
-                let Some((motion, factor)) = fit else { return *begun };
-                (self.cost(&motion), Posterior::of(motion, &factor, rough))
+                let Some(least) = self.least_cost(known.map(|known| known.motion)) else { return *begun };
+                least
             }
         };
         {
             self.meet(begun.gains - cost + terms.ln_share[count] + known.ln_filled, &known.motion);
         }
-        Begun { cost: begun.cost.max(cost), known: Some(known), ..*begun }
+        Begun { cost, known: Some(known), ..*begun }
+    }
+
+    /// The least that the members cost under a pose, from that of the members before and from that of three of them, and that pose;
+    /// `None` where a fit does not come to an end.
+    fn least_cost(&self, before: Option<Motion>) -> Option<(f64, Posterior)> {
+        let Climb { terms, rough, .. } = self.climb;
+        let mut least: Option<(f64, Posterior)> = None;
+        for start in before.into_iter().chain(self.of_any_three()) {
+            let (motion, _) = fit(terms, rough, &self.members, &start, ROUNDS)?;
+            let linear = Linear::at(terms, rough, &self.members, &motion)?;
+            if !(linear.gained() < CONVERGED) {
+                return None;
+            }
+            let cost = self.cost(&motion) - linear.gained();
+            if least.as_ref().is_none_or(|(known, _)| cost < *known) {
+                least = Some((cost, Posterior::of(motion, linear.factor(), rough)));
+            }
+        }
+        least
     }
 
     /// What residuals and prior cost the members under a motion (nats).
@@ -426,7 +451,10 @@ impl<'a> Prover<'a> {
         let Climb { terms, rough, .. } = self.climb;
         let mut members = self.members.clone();
         members.sort_unstable();
-        let Some((motion, factor)) = fit(terms, rough, &members, motion, ROUNDS) else { return };
+        let Some((motion, factor)) = fit(terms, rough, &members, motion, ROUNDS) else {
+            self.unsettled = true;
+            return;
+        };
         let led = self.climb.from(&members, &motion, f64::NEG_INFINITY, |_| false);
         let allowed = self.climb.allows(&members, &motion);
         let own = allowed.then(|| self.climb.mode(members, motion, &factor)).flatten();
