@@ -48,7 +48,7 @@ use crate::Problem;
 /// used to look at all coherent sets that could be likelier, of clutter that is spread evenly: what is found joins the poses, and
 /// where nothing is left open the answer is optimal. Time O(K²) for the graph of K candidate pairs, then what the
 /// bounds leave: seldom more than for the graph, for the proof at worst exponential in K, and never more than the budget, which
-/// is told when it ends the search. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
+/// is told when it ends the search; the proof has as much again. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
 /// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
 /// copy of it may be passed over, where [`Belief::copies_sought`] is false; and what shows less evidence than nine nats is no
 /// copy. The tolerance and the prior's greatest rotation prune the graph; they do not judge the pose.
@@ -60,7 +60,7 @@ pub struct RigidConsensus {
     /// More candidate pairs than this are not searched: their graph would not fit into memory
     /// (40 000 take 200 MB).
     pub most_pairs: usize,
-    /// Whether it is proved that no set is likelier, as far as what is left of the budget does: then the answer is called optimal.
+    /// Whether it is proved that no set is likelier, as far as the budget again does: then the answer is called optimal.
     pub prove: bool,
 }
 
@@ -114,11 +114,8 @@ impl Search for RigidConsensus {
         let mut tests = graph.tests + swept.tests;
         let strong = |swept: &Swept| swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG);
         // What nothing makes believe needs no proof.
-        let proved = if self.prove && strong(&swept) {
-            prove(problem.model, parts, &mut swept, self.budget.saturating_sub(tests))
-        } else {
-            None
-        };
+        let proved =
+            if self.prove && strong(&swept) { prove(problem.model, parts, &mut swept, self.budget) } else { None };
         tests += proved.as_ref().map_or(0, |proved| proved.tests);
         let mut crowd = Crowd::default();
         let mut weighed = |swept: &mut Swept| {
@@ -151,8 +148,7 @@ impl Search for RigidConsensus {
             let elsewhere = |mode: &Mode| mode.members.iter().filter(|&&v| best.holds(v)).count() < NEEDED;
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
-            let spent = swept.tests + proved.as_ref().map_or(0, |proved| proved.tests);
-            let left = self.budget.saturating_sub(spent);
+            let left = self.budget.saturating_sub(swept.tests);
             let work = swept.tests + graph.tests / PAIRS_A_WORD;
             let whole = work.max(LEAST_EFFORT);
             beside = if pattern.is_some() {
