@@ -62,9 +62,10 @@ pub(in crate::search) struct Swept {
 }
 
 impl Swept {
-    /// Modes that were met later.
+    /// Modes that were met later, and fitted better where they were known.
     pub(in crate::search) fn insert(&mut self, modes: Vec<Mode>) {
         for mode in modes {
+            self.modes.retain(|known| known.members != mode.members);
             insert(&mut self.modes, mode);
         }
     }
