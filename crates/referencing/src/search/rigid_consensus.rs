@@ -44,11 +44,15 @@ use crate::Problem;
 /// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. A three whose distances
 /// differ much from the model's fits no pose well, and its bound falls by that. The bounds that
 /// prune take the points of a set to lie about as well as the model's do on average, and to fit no better than noise
-/// lets them, by up to four nats: what fits better may be missed where it is hardly of interest. With `prove`, bounds that hold are
-/// used to look at all coherent sets that could be likelier, of clutter that is spread evenly: what is found joins the poses, and
-/// where nothing is left open the answer is optimal. Time O(K²) for the graph of K candidate pairs, then what the
-/// bounds leave: seldom more than for the graph, for the proof at worst exponential in K, and never more than the budget, which
-/// is told when it ends the search; the proof has as much again. What is looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
+/// lets them, by up to four nats: what fits better may be missed where it is hardly of interest.
+///
+/// With `prove`, and where five nats of evidence make the likeliest believable, bounds that hold decide instead which coherent sets are
+/// looked at, of clutter that is spread evenly and by geometry of the first order: what is found joins the poses, and where nothing is
+/// left open the answer is optimal.
+///
+/// Time O(K²) for the graph of K candidate pairs, then what the bounds leave: seldom more than for the graph, for the proof at worst
+/// exponential in K, and never more than the budget, which is told when it ends the search; the proof has as much again. What is
+/// looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
 /// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
 /// copy of it may be passed over, where [`Belief::copies_sought`] is false; and what shows less evidence than nine nats is no
 /// copy. The tolerance and the prior's greatest rotation prune the graph; they do not judge the pose.
@@ -117,6 +121,8 @@ impl Search for RigidConsensus {
         let proved =
             if self.prove && strong(&swept) { prove(problem.model, parts, &mut swept, self.budget) } else { None };
         tests += proved.as_ref().map_or(0, |proved| proved.tests);
+        // Up to a hundred megabytes that nobody needs from here on.
+        swept.pairs = Vec::new();
         let mut crowd = Crowd::default();
         let mut weighed = |swept: &mut Swept| {
             for mode in &mut swept.modes {

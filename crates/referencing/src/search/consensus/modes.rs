@@ -86,9 +86,8 @@ impl Climb<'_> {
         }
         let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();
         let score = gains + self.terms.ln_share[members.len()] + self.rough.ln_density(&motion);
-        // No posterior fills more than all attitudes and places: of points nearly in a row the first order says that.
-        let filled = ln_volume(factor);
-        let ln_evidence = score + if self.rough.known.is_none() { filled.min(-self.rough.ln_peak) } else { filled };
+        // No posterior fills more than the prior: of points nearly in a row, without one, the first order says that.
+        let ln_evidence = score + ln_volume(factor).min(-self.rough.ln_peak);
         ln_evidence.is_finite().then_some(Mode { members, motion, ln_evidence, ln_even: ln_evidence, ln_crowd: 0.0 })
     }
 

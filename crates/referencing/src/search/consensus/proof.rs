@@ -3,7 +3,6 @@
 use std::{cell::Cell, collections::BTreeSet};
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3};
-use seafix_geometry::so3::skew;
 
 use super::{
     Motion,
@@ -14,7 +13,7 @@ use super::{
     graph::Graph,
     likelihood::{Mode, Terms, ln_volume},
     modes::Climb,
-    rough::Rough,
+    rough::{Rough, spread},
     seeds::Swept,
     strain::strain_of_two,
 };
@@ -53,7 +52,7 @@ pub(in crate::search) struct Proved {
 ///
 /// over its pairs and the best of each model point among their later common neighbours: c what the residuals of the pairs cost under
 /// their own pose, and more than that under any other; v the volume of the posterior of these pairs against that of the
-/// prior, of which more pairs leave less; v(k) that of any k pairs ([`ln_filled`]). What a neighbour's residual costs in
+/// prior, of which more pairs leave less, where the pose is known well; v(k) that of any k pairs ([`ln_filled`]). What a neighbour's residual costs in
 /// addition is at least what it costs by itself: those with which the bound falls short join no set of interest.
 ///
 /// Where the pose of the pairs is fitted, the maximum that the fit comes to is taken for the greatest, and volumes for equal under
@@ -341,9 +340,7 @@ impl<'a> Prover<'a> {
                 least
             }
         };
-        {
-            self.meet(begun.gains - cost + terms.ln_share[count] + known.ln_filled, &known.motion);
-        }
+        self.meet(begun.gains - cost + terms.ln_share[count] + known.ln_filled, &known.motion);
         Begun { cost, known: Some(known), ..*begun }
     }
 
@@ -402,8 +399,6 @@ impl<'a> Prover<'a> {
         let (enough, all, first) = (self.enough(), self.bound(begun, reach), graph.starts[next]);
         let more = (reach.0 - self.members.len()) as f64;
         let covariance = known.covariance * (1.0 + CURVED);
-        let (turn, mixed) = (covariance.fixed_view::<3, 3>(0, 0), covariance.fixed_view::<3, 3>(0, 3));
-        let shift = covariance.fixed_view::<3, 3>(3, 3);
         top.resize(self.bounds.tops().len(), 0.0);
         let (mut k, mut bring, mut last) = (self.members.len(), begun.bring, usize::MAX);
         let mut compared = 0;
@@ -417,10 +412,7 @@ impl<'a> Prover<'a> {
                     *word &= !(1 << (v % 64));
                     continue;
                 };
-                // Where the first order puts it: τ − [lever]× φ.
-                let lever = skew(&(at - about));
-                let cross = lever * mixed;
-                let spread = shift - lever * turn * lever - cross - cross.transpose();
+                let spread = spread(&covariance, &(at - about));
                 let r = pair.cloud - at;
                 let alone = 0.5 * distance(&(noise + spread), &r);
                 let (rank, own) = (graph.rank[v] as usize, self.bounds.gain(v));
@@ -490,6 +482,8 @@ mod tests {
     };
 
     const POINTS: usize = 6;
+    /// Work without an end.
+    const FREE: u64 = u64::MAX / 4;
 
     /// Some of the points of an object, each as far off as it is known, and clutter; the true pose, and how well each is known.
     fn scene(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>, Motion) {
@@ -588,10 +582,11 @@ mod tests {
         assert!(greatest > 0.5, "{greatest}");
     }
 
-    /// Of every coherent set of small problems: none has more evidence than the bound, whether the work sufficed or not.
+    /// Of every coherent set of small problems: none has more evidence than the bound, whether the work sufficed or not, and whether the
+    /// search had found the likeliest or is taken to have missed all but the least likely of what it found.
     fn compare(rounds: u64) {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let (mut sets, mut proved, mut open) = (0, 0, 0);
+        let [mut sets, mut proved, mut open, mut found_again] = [0; 4];
         for round in 0..rounds {
             let (model, cloud, truth) = scene(&mut rng);
             let candidates = Candidates::all(POINTS, cloud.len());
@@ -604,40 +599,40 @@ mod tests {
             let graph = Graph::of(&problem, &rough);
             let terms = Terms::of(&problem, &rough, &graph);
             let (parts, none) = ((&terms, &rough, &graph), BTreeSet::new());
-            let mut swept = Seeds::new(&model, parts, &none, (LEAST, -3.0), u64::MAX / 4).sweep();
-            for budget in [200 * (round % 5), u64::MAX / 4] {
-                let Some(found) = prove(&model, parts, &mut swept, budget) else { continue };
+            for (missed, budget) in [(false, 200 * (round % 5)), (false, FREE), (true, 200 * (round % 5)), (true, FREE)]
+            {
+                let mut swept = Seeds::new(&model, parts, &none, (LEAST, -3.0), FREE).sweep();
+                if missed {
+                    swept.modes.drain(..swept.modes.len().saturating_sub(1));
+                }
+                let before = swept.modes.first().map(|mode| mode.ln_evidence);
+                let Some(told) = prove(&model, parts, &mut swept, budget) else { continue };
                 let best = swept.modes[0].ln_evidence;
-                proved += usize::from(found.bound == best);
-                open += usize::from(found.bound > best);
-                assert!(
-                    budget < 1000 || found.bound == best,
-                    "round {round}: {} above {best} is left open",
-                    found.bound
-                );
+                proved += u64::from(told.bound == best);
+                open += u64::from(told.bound > best);
+                found_again += u64::from(missed && before < Some(best));
+                assert!(budget < FREE || told.bound == best, "round {round}: {} above {best} is left open", told.bound);
                 let prover = Prover::of(&model, parts, &none, &swept.modes[0], 0);
                 coherent(&graph, &mut Vec::new(), &mut |set| {
                     sets += 1;
                     // Whatever its pose.
                     let gains: f64 = set.iter().map(|&v| terms.pairs[v].gain).sum();
-                    if gains + terms.ln_share[set.len()] > found.bound {
+                    if gains + terms.ln_share[set.len()] > told.bound {
                         let most = evidence(&prover, set).unwrap_or(f64::NEG_INFINITY);
-                        assert!(most <= found.bound + 0.01, "round {round}: {set:?} has {most}, bound {}", found.bound);
+                        assert!(most <= told.bound + 0.01, "round {round}: {set:?} has {most}, bound {}", told.bound);
                     }
                 });
             }
         }
-        assert!(
-            sets > 100 * rounds && proved > rounds as usize / 5 && open > rounds as usize / 10,
-            "{sets} {proved} {open}"
-        );
+        assert!(sets > 100 * rounds && 3 * proved > rounds && 5 * open > rounds, "{sets}, {proved}, {open}");
+        assert!(10 * found_again > rounds, "{found_again}");
     }
 
     /// Seen to fail where members cost twice what they do, where what another costs is not spread by what their pose leaves open, where
     /// their posterior fills less, and where bounds that prune are taken for bounds that hold.
     #[test]
     fn no_coherent_set_is_likelier_than_the_bound() {
-        compare(250);
+        compare(120);
     }
 
     /// The long form: `cargo test --release -p seafix-referencing --lib -- --ignored likelier`.

@@ -62,11 +62,7 @@ impl Rough {
             .iter()
             .map(|point| {
                 let place = motion.apply(&point.at.coords);
-                let lever = skew(&(place - at));
-                let (turn, mixed) = (covariance.fixed_view::<3, 3>(0, 0), covariance.fixed_view::<3, 3>(0, 3));
-                let shift = covariance.fixed_view::<3, 3>(3, 3);
-                let cross = lever * mixed;
-                let spread = lever * turn * lever.transpose() + shift - cross - cross.transpose();
+                let spread = spread(&covariance, &(place - at));
                 (place, spread.diagonal().map(|variance| (variance + point.sigma * point.sigma).max(0.0).sqrt()))
             })
             .collect();
@@ -121,6 +117,14 @@ impl Rough {
     pub(in crate::search) fn ln_density_of(&self, known: &Known, eta: &Vector6<f64>) -> f64 {
         self.ln_peak - 0.5 * eta.dot(&(known.information * eta))
     }
+}
+
+/// Covariance (m²) of where a point with this lever about the centroid (m) is, to first order τ − [lever]× φ, with that of η.
+pub(in crate::search) fn spread(covariance: &Matrix6<f64>, lever: &Vector3<f64>) -> Matrix3<f64> {
+    let lever = skew(lever);
+    let (turn, mixed) = (covariance.fixed_view::<3, 3>(0, 0), covariance.fixed_view::<3, 3>(0, 3));
+    let cross = lever * mixed;
+    lever * turn * lever.transpose() + covariance.fixed_view::<3, 3>(3, 3) - cross - cross.transpose()
 }
 
 /// Covariance of η.
