@@ -227,6 +227,11 @@ fn expected_of_size(problem: &Problem<'_>, frame: &Frame<'_>, size: usize, chi2:
             break;
         }
     }
+    if sum == 0.0 && halved == 0 {
+        // An object that fills the cloud's box fits it by hardly a rotation, and where it was measured all the same: of so many one,
+        // barely.
+        sum = shape.barely_fits(subsets.next(&mut sequence), &mut sequence);
+    }
     libm::exp(ln_scale + libm::log(sum / taken as f64))
 }
 

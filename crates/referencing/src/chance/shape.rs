@@ -124,22 +124,43 @@ impl<'a> Shape<'a> {
     /// An estimate from one rotation and a few directions of the errors; the mean of many is P(S) but for
     /// the [scale](Self::ln_scale).
     pub(super) fn fit_probability(&mut self, set: &[usize], sequence: &mut Sequence) -> f64 {
-        if set.len() < 3 || self.radius <= 0.0 {
+        if !self.centre(set) {
             return 0.0;
+        }
+        let motions = match self.null {
+            Null::Shells(shells) => in_shells(&self.at, set, shells, sequence),
+            Null::Box(lengths) => in_box(&self.at, lengths, sequence),
+            Null::Shuffled(cloud) => among(&self.at, cloud, sequence),
+        };
+        self.along(set, motions, sequence)
+    }
+
+    /// The estimate from a rotation by which a set fits the cloud's box as barely as its errors let it; nought where there is no box.
+    pub(super) fn barely_fits(&mut self, set: &[usize], sequence: &mut Sequence) -> f64 {
+        if !(matches!(self.null, Null::Box(_)) && self.centre(set)) {
+            return 0.0;
+        }
+        let reach = self.radius * self.noise.root.norm() / 3f64.sqrt();
+        self.along(set, ALL_TURNS * reach.powi(3), sequence)
+    }
+
+    /// Where the members are about their centroid; whether there are enough.
+    fn centre(&mut self, set: &[usize]) -> bool {
+        if set.len() < 3 || self.radius <= 0.0 {
+            return false;
         }
         self.at.clear();
         self.at.extend(set.iter().map(|&i| match self.null {
             Null::Shells(shells) => shells[i].centre,
             _ => self.problem.model[i].at.coords,
         }));
-        let size = set.len() as f64;
-        let centroid = self.at.iter().sum::<Vector3<f64>>() / size;
+        let centroid = self.at.iter().sum::<Vector3<f64>>() / set.len() as f64;
         self.at.iter_mut().for_each(|x| *x -= centroid);
-        let motions = match self.null {
-            Null::Shells(shells) => in_shells(&self.at, set, shells, sequence),
-            Null::Box(lengths) => in_box(&self.at, lengths, sequence),
-            Null::Shuffled(cloud) => among(&self.at, cloud, sequence),
-        };
+        true
+    }
+
+    /// The same of a measure of motions that a rotation gives.
+    fn along(&mut self, set: &[usize], motions: f64, sequence: &mut Sequence) -> f64 {
         if !(motions > 0.0) {
             return 0.0;
         }

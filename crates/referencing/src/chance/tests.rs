@@ -231,3 +231,20 @@ fn few_pairs_and_impossible_noise() {
     assert!(expected_sets(&frame.problem(0.05), &pairs).is_nan());
     assert!(expected_sets_as_good(&frame.problem(0.05), &pairs).is_nan());
 }
+
+/// Nothing but the object is measured, so that the cloud's box is the object's: no rotation that is drawn fits.
+///
+/// Seen to fail where what none of the rotations drawn fits is impossible.
+#[test]
+fn an_object_that_fills_its_cloud_is_no_impossible_accident() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    for _ in 0..20 {
+        let turn = nalgebra::Rotation3::from_scaled_axis(within(3.0, &mut rng));
+        let place = |at: &[f64; 3]| turn * Vector3::from(*at);
+        let cloud = PLACES.iter().map(|at| measured(place(at) + within(0.015, &mut rng), [0.01; 3])).collect();
+        let frame = Frame { model: model(), cloud, candidates: Candidates::all(7, 7), prior: None };
+        let found: Vec<Correspondence> = (0..7).map(|i| Correspondence { model: i, cloud: i }).collect();
+        let expected = expected_sets_as_good(&frame.problem(0.05), &found);
+        assert!(expected > 0.0 && expected < 1e-6, "{expected}");
+    }
+}

@@ -65,22 +65,39 @@ impl Judge<'_> {
             }
         };
         let listed = |model: usize, cloud: usize| lists[model].binary_search(&cloud).is_ok();
-        let by_shells = |cloud: usize| (cloud, (0..lists.len()).map(|model| place_of(model, cloud)).collect());
+        // Without a prior there are no shells.
+        let shells = places.len();
+        let by_shells = |cloud: usize| (cloud, (0..shells).map(|model| place_of(model, cloud)).collect());
         let placed: Vec<(usize, Vec<Place>)> = pairs.iter().map(|pair| by_shells(pair.cloud)).collect();
         // Where a shell holds what is no candidate, the candidates were proposed by more than the prior.
         let proposed = shuffled(self.problem)
             || placed.iter().any(|(cloud, places)| {
-                let mut inside = (0..lists.len()).filter(|&model| places[model] == Place::Inside);
+                let mut inside = (0..shells).filter(|&model| places[model] == Place::Inside);
                 inside.any(|model| !lists[model].is_empty() && !listed(model, *cloud))
             });
-        let few = self.problem.model.len() <= MOST_MISNAMED;
+        if proposed && self.problem.model.len() > MOST_MISNAMED {
+            return Admitted { models: listing(lists, pairs), proposed };
+        }
         let of = |(cloud, places): (usize, Vec<Place>)| {
             let allowed = |model: usize| match proposed {
-                true => few && (self.problem.prior.is_none() || places[model] != Place::Outside),
-                false => places[model] == Place::Edge,
+                true => places.get(model) != Some(&Place::Outside),
+                false => places.get(model) == Some(&Place::Edge),
             };
-            (cloud, (0..lists.len()).filter(|&model| listed(model, cloud) || allowed(model)).collect())
+            (cloud, (0..lists.len()).filter(|&model| allowed(model) || listed(model, cloud)).collect())
         };
         Admitted { models: placed.into_iter().map(of).collect(), proposed }
     }
+}
+
+/// The model points that list each measured point of a set.
+fn listing(lists: &[Vec<usize>], pairs: &[Correspondence]) -> BTreeMap<usize, Vec<usize>> {
+    let mut models: BTreeMap<usize, Vec<usize>> = pairs.iter().map(|pair| (pair.cloud, Vec::new())).collect();
+    for (model, list) in lists.iter().enumerate() {
+        for cloud in list {
+            if let Some(models) = models.get_mut(cloud) {
+                models.push(model);
+            }
+        }
+    }
+    models
 }

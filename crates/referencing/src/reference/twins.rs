@@ -80,10 +80,15 @@ impl Judge<'_> {
         }
         let at = |model: usize, place: usize| Correspondence { model, cloud: base[place] };
         let known: BTreeSet<&Correspondence> = pairs.iter().collect();
+        let meet = |a: Correspondence, b: Correspondence| self.problem.coherent(a, b);
         for &i in first {
-            for &j in second.iter().filter(|&&j| self.problem.coherent(at(i, 0), at(j, 1))) {
-                let meets = |k: usize| [at(i, 0), at(j, 1)].iter().all(|&other| self.problem.coherent(other, at(k, 2)));
-                for &k in third.iter().filter(|&&k| meets(k)) {
+            let seconds: Vec<usize> = second.iter().copied().filter(|&j| meet(at(i, 0), at(j, 1))).collect();
+            if seconds.is_empty() {
+                continue;
+            }
+            let thirds: Vec<usize> = third.iter().copied().filter(|&k| meet(at(i, 0), at(k, 2))).collect();
+            for &j in &seconds {
+                for &k in thirds.iter().filter(|&&k| meet(at(j, 1), at(k, 2))) {
                     let three = [at(i, 0), at(j, 1), at(k, 2)];
                     if three.iter().all(|pair| known.contains(pair)) {
                         continue;
@@ -146,11 +151,17 @@ impl Judge<'_> {
         admitted: &[usize],
     ) -> Option<usize> {
         let place = *pose * self.problem.cloud[cloud].position.at;
-        let distance = |model: usize| self.problem.model[model].at.distance(&place);
-        let coherent = |model: &usize| {
-            three.iter().all(|&pair| self.problem.coherent(pair, Correspondence { model: *model, cloud }))
-        };
-        admitted.iter().copied().filter(coherent).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+        let coherent =
+            |model: usize| three.iter().all(|&pair| self.problem.coherent(pair, Correspondence { model, cloud }));
+        let mut nearest = (f64::INFINITY, None);
+        for &model in admitted {
+            // Most are far: that is known sooner than their distances to the three.
+            let apart = (self.problem.model[model].at - place).norm_squared();
+            if apart < nearest.0 && coherent(model) {
+                nearest = (apart, Some(model));
+            }
+        }
+        nearest.1
     }
 
     /// Whether the camera sees the identified points from the sides from which they can be seen.

@@ -589,10 +589,18 @@ mod tests {
         let [mut sets, mut proved, mut open, mut found_again] = [0; 4];
         for round in 0..rounds {
             let (model, cloud, truth) = scene(&mut rng);
-            let candidates = Candidates::all(POINTS, cloud.len());
-            let bound = PriorBound::Gaussian(Covariance6::isotropic(0.05, 0.1));
+            // All pairs, or half of them proposed.
+            let proposed = |_: &(usize, usize)| round % 3 < 2 || rng.random_bool(0.5);
+            let pairs = (0..POINTS).flat_map(|i| (0..cloud.len()).map(move |j| (i, j))).filter(proposed);
+            let candidates = Candidates::from_pairs(POINTS, pairs.collect::<Vec<_>>());
             let at = Transform::new(UnitQuaternion::identity(), truth.translation).inverse();
-            let prior = (round % 2 == 0).then_some(Prior { object_from_camera: at, bound });
+            let bound = match round % 4 {
+                0 => Some(PriorBound::Gaussian(Covariance6::isotropic(0.05, 0.1))),
+                1 => Some(PriorBound::Box(0.5)),
+                2 => Some(PriorBound::Gaussian(Covariance6::isotropic(0.5, 0.5))),
+                _ => None,
+            };
+            let prior = bound.map(|bound| Prior { object_from_camera: at, bound });
             let (tolerance, prior) = (Tolerance::Fixed(0.3), prior.as_ref());
             let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
             let rough = Rough::of(&problem).expect("a box");
