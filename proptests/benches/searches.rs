@@ -7,29 +7,27 @@
 
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 
+mod medium;
+
 use std::{
     hint::black_box,
     time::{Duration, Instant},
 };
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use medium::MEDIUM;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_component::Choice;
 use seafix_proptests::problems::Listed;
 use seafix_referencing::SEARCHES;
-use seafix_simulation::families::{Drawn, Family, Presence};
-
-/// The problem of each family that stands for it: its number, seed 1.
-const MEDIUM: [(Family, u64); 7] =
-    [(Family::A, 10), (Family::B, 4), (Family::C, 4), (Family::D, 25), (Family::E, 1), (Family::F, 4), (Family::G, 7)];
 
 /// What takes longer is run once.
 const LONG: Duration = Duration::from_millis(500);
 
 fn searches(criterion: &mut Criterion) {
-    for (family, number) in MEDIUM {
-        let listed = Listed::new(Drawn::new(family, 1, number, Presence::Present).problem.problem());
+    for (place, (family, _)) in MEDIUM.iter().enumerate() {
+        let listed = Listed::new(medium::problem(place));
         let problem = listed.problem();
         let mut group = criterion.benchmark_group(format!("search/{}", family.name()));
         for name in SEARCHES.names() {

@@ -32,8 +32,8 @@ const CURVED: f64 = 0.2;
 /// The least set that a pose can come from.
 const LEAST: usize = 3;
 /// What a fit and each of its members cost, and each pair that is compared with a pose, in words read.
-const COST_OF_A_FIT: u64 = 256;
-const COST_OF_A_MEMBER: u64 = 32;
+const COST_OF_A_FIT: u64 = 512;
+const COST_OF_A_MEMBER: u64 = 64;
 const COST_OF_A_PAIR: u64 = 32;
 
 /// What is proved.
@@ -331,8 +331,11 @@ impl<'a> Prover<'a> {
         self.spent += COST_OF_A_FIT + COST_OF_A_MEMBER * count as u64;
         let (cost, known) = match &begun.known {
             Some(known) if count > LEAST && known.is_of_first_order() => {
-                let Some(linear) = Linear::at(terms, rough, &self.members, &known.motion) else { return *begun };
-                let cost = self.cost(&known.motion) - linear.gained();
+                // Two steps: what one foretells may be some hundredths of a nat too much, and then it is no bound.
+                let Some(first) = Linear::at(terms, rough, &self.members, &known.motion) else { return *begun };
+                let motion = first.moved();
+                let Some(linear) = Linear::at(terms, rough, &self.members, &motion) else { return *begun };
+                let cost = self.cost(&motion) - linear.gained();
                 (cost, Posterior::of(linear.moved(), linear.factor(), rough))
             }
             known => {

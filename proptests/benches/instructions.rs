@@ -1,0 +1,97 @@
+//! How many instructions each search takes on the same problems as `searches`, by the registry: a figure that no other work of the
+//! machine disturbs.
+//!
+//! Counted by `valgrind --tool=callgrind`, which must be installed: `cargo bench -p seafix-proptests --bench instructions`, some
+//! minutes; one family: `… -- a`. What takes more than 150 ms by itself is not counted, since there it would be many seconds. The last row is a whole fix
+//! by the defaults: search, solver, and all that an answer carries.
+
+#![allow(clippy::print_stdout, reason = "a bench prints")]
+
+mod medium;
+
+use std::{
+    hint::black_box,
+    process::Command,
+    time::{Duration, Instant},
+};
+
+use medium::MEDIUM;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use seafix_component::Choice;
+use seafix_proptests::problems::Listed;
+use seafix_referencing::{Acceptance, SEARCHES, SOLVERS, reference};
+
+/// What takes longer is not counted.
+const LONG: Duration = Duration::from_millis(150);
+/// Calls before those that are counted, and these: the first fills what is made once.
+const BEFORE: usize = 1;
+const COUNTED: usize = 2;
+/// The search of the whole fix, its solver, and the name of its row.
+const DEFAULT: (&str, &str, &str) = ("rigid-consensus", "mahalanobis", "a whole fix");
+
+fn main() {
+    let given: Vec<String> = std::env::args().collect();
+    // As its own child under valgrind: so many calls, and nothing else.
+    if let Some(place) = given.iter().position(|word| word == "--calls") {
+        let call = prepared(&given[place + 1], given[place + 2].parse().expect("a number"));
+        let calls: usize = given[place + 3].parse().expect("a number");
+        (0..calls).for_each(|_| call());
+        return;
+    }
+    let asked: Vec<usize> =
+        (0..MEDIUM.len()).filter(|&i| given.iter().any(|word| word == MEDIUM[i].0.name())).collect();
+    let families = if asked.is_empty() { (0..MEDIUM.len()).collect() } else { asked };
+    println!("Thousands of instructions a call.\n");
+    let names: Vec<&str> = families.iter().map(|&i| MEDIUM[i].0.name()).collect();
+    println!("| | {} |\n|---|{}", names.join(" | "), "---|".repeat(names.len()));
+    for row in SEARCHES.names().chain([DEFAULT.2]) {
+        let cells: Vec<String> = families.iter().map(|&family| cell(row, family)).collect();
+        println!("| {} | {} |", if row == DEFAULT.2 { row.to_owned() } else { format!("`{row}`") }, cells.join(" | "));
+    }
+}
+
+/// One call of a row on the problem of a family.
+fn prepared(row: &str, family: usize) -> impl Fn() + use<> {
+    let listed = Listed::new(medium::problem(family));
+    let name = if row == DEFAULT.2 { DEFAULT.0 } else { row };
+    let search = SEARCHES.build(&Choice::named(name)).expect("the defaults are in range");
+    let solver = SOLVERS.build(&Choice::named(DEFAULT.1)).expect("the defaults are in range");
+    let whole = row == DEFAULT.2;
+    move || {
+        let problem = listed.problem();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        if whole {
+            black_box(reference(black_box(&problem), &*search, &*solver, &Acceptance::default(), None, &mut rng));
+        } else {
+            let _ = black_box(search.search(black_box(&problem), &mut rng));
+        }
+    }
+}
+
+fn cell(row: &str, family: usize) -> String {
+    let call = prepared(row, family);
+    call();
+    let started = Instant::now();
+    call();
+    if started.elapsed() > LONG {
+        return "–".to_owned();
+    }
+    let counts = [BEFORE, BEFORE + COUNTED].map(|calls| instructions(row, family, calls));
+    match counts {
+        [Some(before), Some(all)] => format!("{:.0}", (all - before) / COUNTED as f64 / 1e3),
+        _ => "no valgrind".to_owned(),
+    }
+}
+
+/// Instructions of a process that makes so many calls.
+fn instructions(row: &str, family: usize, calls: usize) -> Option<f64> {
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(std::env::current_exe().ok()?)
+        .args(["--calls", row, &family.to_string(), &calls.to_string()])
+        .output()
+        .ok()?;
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    said.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
+}

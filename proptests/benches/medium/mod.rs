@@ -1,0 +1,14 @@
+//! The problem of each family that stands for it.
+
+use seafix_referencing::problem_file::CoherenceProblem;
+use seafix_simulation::families::{Drawn, Family, Presence};
+
+/// Their numbers among those of seed 1.
+pub(crate) const MEDIUM: [(Family, u64); 7] =
+    [(Family::A, 10), (Family::B, 4), (Family::C, 4), (Family::D, 25), (Family::E, 1), (Family::F, 4), (Family::G, 7)];
+
+/// The one of the family in this place.
+pub(crate) fn problem(place: usize) -> CoherenceProblem {
+    let (family, number) = MEDIUM[place];
+    Drawn::new(family, 1, number, Presence::Present).problem.problem()
+}
