@@ -112,12 +112,18 @@ impl Problem<'_> {
     /// Whether `a` and `b` are structurally coherent: two different model points, two different
     /// cloud points, and | |P_a P_b| − |C_a C_b| | ≤ Δ (closed).
     pub fn coherent(&self, a: Correspondence, b: Correspondence) -> bool {
-        if a.model == b.model || a.cloud == b.cloud {
-            return false;
-        }
+        a.model != b.model && a.cloud != b.cloud && self.agrees(a, b, self.measured(a.cloud, b.cloud))
+    }
+
+    /// The same of different model points and different cloud points that are known to be so far apart (m).
+    pub(crate) fn agrees(&self, a: Correspondence, b: Correspondence, measured: f64) -> bool {
         let model = self.model[a.model].at.distance(&self.model[b.model].at);
-        let cloud = self.cloud[a.cloud].position.at.distance(&self.cloud[b.cloud].position.at);
-        (model - cloud).abs() <= self.delta(a, b)
+        (model - measured).abs() <= self.delta(a, b)
+    }
+
+    /// How far two cloud points are apart (m).
+    pub(crate) fn measured(&self, a: usize, b: usize) -> f64 {
+        self.cloud[a].position.at.distance(&self.cloud[b].position.at)
     }
 }
 

@@ -80,15 +80,19 @@ impl Judge<'_> {
         }
         let at = |model: usize, place: usize| Correspondence { model, cloud: base[place] };
         let known: BTreeSet<&Correspondence> = pairs.iter().collect();
-        let meet = |a: Correspondence, b: Correspondence| self.problem.coherent(a, b);
+        let measured = |a: usize, b: usize| self.problem.measured(base[a], base[b]);
+        let [near, far, opposite] = [measured(0, 1), measured(0, 2), measured(1, 2)];
+        let meet = |a: Correspondence, b: Correspondence, measured: f64| {
+            a.model != b.model && self.problem.agrees(a, b, measured)
+        };
         for &i in first {
-            let seconds: Vec<usize> = second.iter().copied().filter(|&j| meet(at(i, 0), at(j, 1))).collect();
+            let seconds: Vec<usize> = second.iter().copied().filter(|&j| meet(at(i, 0), at(j, 1), near)).collect();
             if seconds.is_empty() {
                 continue;
             }
-            let thirds: Vec<usize> = third.iter().copied().filter(|&k| meet(at(i, 0), at(k, 2))).collect();
+            let thirds: Vec<usize> = third.iter().copied().filter(|&k| meet(at(i, 0), at(k, 2), far)).collect();
             for &j in &seconds {
-                for &k in thirds.iter().filter(|&&k| meet(at(j, 1), at(k, 2))) {
+                for &k in thirds.iter().filter(|&&k| meet(at(j, 1), at(k, 2), opposite)) {
                     let three = [at(i, 0), at(j, 1), at(k, 2)];
                     if three.iter().all(|pair| known.contains(pair)) {
                         continue;
@@ -151,8 +155,11 @@ impl Judge<'_> {
         admitted: &[usize],
     ) -> Option<usize> {
         let place = *pose * self.problem.cloud[cloud].position.at;
-        let coherent =
-            |model: usize| three.iter().all(|&pair| self.problem.coherent(pair, Correspondence { model, cloud }));
+        let three = three.map(|pair| (pair, self.problem.measured(pair.cloud, cloud)));
+        let coherent = |model: usize| {
+            let own = Correspondence { model, cloud };
+            three.iter().all(|&(pair, measured)| pair.model != model && self.problem.agrees(pair, own, measured))
+        };
         let mut nearest = (f64::INFINITY, None);
         for &model in admitted {
             // Most are far: that is known sooner than their distances to the three.
