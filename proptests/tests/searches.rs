@@ -12,10 +12,20 @@ use seafix_proptests::{
     problems::{LARGE, Planted, SMALL, planted},
     searches::{Tried, is_proved_largest, nowhere, searches, sets},
 };
-use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, Tolerance, Unidentified};
+use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, SEARCHES, Tolerance, Unidentified};
 
 /// Pair tests that leave time for thousands of cases.
 const BUDGET: i64 = 100_000;
+
+/// Seen to fail where a search says nothing of its time.
+#[test]
+fn every_search_says_what_it_maximises_whether_that_is_exact_and_what_time_it_takes() {
+    for listing in SEARCHES.listings() {
+        let told: Vec<&str> = listing.properties.iter().map(|(of, _)| *of).collect();
+        assert_eq!(told, ["maximises", "exact", "time"], "{}", listing.name);
+        assert!(listing.properties.iter().all(|(_, what)| !what.is_empty()), "{}", listing.name);
+    }
+}
 
 fn every_set_is_admissible(searches: &[Tried], planted: &Planted) -> TestCaseResult {
     for search in searches {

@@ -15,6 +15,9 @@ pub trait Component: Default + Serialize + DeserializeOwned + 'static {
     const SUMMARY: &'static str;
     /// Where it comes from: author, title, year.
     const SOURCE: &'static str;
+    /// What else those who choose between components of its kind ask, and the answers: of a search what it `maximises`, whether it
+    /// is `exact`, what `time` it takes.
+    const PROPERTIES: &'static [(&'static str, &'static str)] = &[];
 
     /// Whether its settings can be: a component is built only from settings that pass.
     ///
@@ -100,6 +103,7 @@ pub struct Entry<T: ?Sized> {
     name: &'static str,
     summary: &'static str,
     source: &'static str,
+    properties: &'static [(&'static str, &'static str)],
     defaults: fn() -> toml::Table,
     build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>,
 }
@@ -107,7 +111,14 @@ pub struct Entry<T: ?Sized> {
 impl<T: ?Sized> Entry<T> {
     /// The entry of component `C`.
     pub const fn of<C: Component>(build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>) -> Self {
-        Self { name: C::NAME, summary: C::SUMMARY, source: C::SOURCE, defaults: defaults::<C>, build }
+        Self {
+            name: C::NAME,
+            summary: C::SUMMARY,
+            source: C::SOURCE,
+            properties: C::PROPERTIES,
+            defaults: defaults::<C>,
+            build,
+        }
     }
 }
 
@@ -296,6 +307,8 @@ pub struct Listing {
     pub summary: &'static str,
     /// Its literature source.
     pub source: &'static str,
+    /// What else there is to say: what is told of, and what.
+    pub properties: &'static [(&'static str, &'static str)],
     /// Its settings with their default values.
     pub defaults: toml::Table,
 }
@@ -332,6 +345,7 @@ impl<T: ?Sized> Registry<T> {
                 name: entry.name,
                 summary: entry.summary,
                 source: entry.source,
+                properties: entry.properties,
                 defaults: (entry.defaults)(),
             })
             .collect()

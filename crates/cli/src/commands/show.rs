@@ -21,8 +21,9 @@ pub(crate) fn execute(name: &str) -> Ended {
             } else {
                 toml::to_string(&listing.defaults).expect("defaults are plain values")
             };
+            let properties: String = listing.properties.iter().map(|(of, what)| format!("# {of}: {what}\n")).collect();
             format!(
-                "# {} `{}`: {}\n# source: {}\nname = \"{}\"\n{settings}",
+                "# {} `{}`: {}\n# source: {}\n{properties}name = \"{}\"\n{settings}",
                 listing.kind, listing.name, listing.summary, listing.source, listing.name
             )
         })

@@ -42,6 +42,14 @@ impl Component for CompleteEnumeration {
     const SUMMARY: &'static str = "all cloud points for all model points, longest samples first: no shells";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, ref. 35";
+    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+        (
+            "maximises",
+            "the number of model points in the first coherent sample, longest samples first, every cloud point for every model point",
+        ),
+        ("exact", "within its budget"),
+        ("time", "Σ_q C(n, q) M^q choices of n model points and M cloud points; q! times as many with ordered samples"),
+    ];
 
     fn check(&self) -> Result<(), String> {
         bounded(self.budget, self.most_pairs)

@@ -47,6 +47,14 @@ impl Component for InterpretationTree {
     const SUMMARY: &'static str = "the longest interpretation that is coherent and passes a rigid fit, depth first";
     const SOURCE: &'static str = "Grimson, Lozano-Pérez, Localizing overlapping parts by searching the interpretation \
                                   tree, 1987";
+    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+        (
+            "maximises",
+            "the number of pairs, every two coherent and each within the tolerance of where their least-squares pose puts it",
+        ),
+        ("exact", "within its budget, where `enough` is 1"),
+        ("time", "exponential: Π (m + 1) over lists of m candidates"),
+    ];
 
     fn check(&self) -> Result<(), String> {
         let share = self.enough > 0.0 && self.enough <= 1.0;

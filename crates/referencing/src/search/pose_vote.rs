@@ -46,6 +46,11 @@ impl Component for PoseVote {
     const SUMMARY: &'static str = "the displacement of the prior that most model points share";
     const SOURCE: &'static str = "Ballard, Generalizing the Hough transform to detect arbitrary shapes, 1981; \
                                   the votes: offsets from the predicted places";
+    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+        ("maximises", "the number of model points whose candidates are displaced alike from where the prior has them"),
+        ("exact", "no"),
+        ("time", "N log N for N candidate pairs spread evenly"),
+    ];
 
     fn check(&self) -> Result<(), String> {
         let positive = self.radius > 0.0 && self.radius.is_finite();

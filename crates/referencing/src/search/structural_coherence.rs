@@ -51,6 +51,14 @@ impl Component for StructuralCoherence {
     const SUMMARY: &'static str = "the paper's enumeration of ordered samples, longest first";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 2.2";
+    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+        (
+            "maximises",
+            "the number of model points in the first coherent sample, longest samples first, candidates from the shells",
+        ),
+        ("exact", "within its budget, of coherence alone"),
+        ("time", "Σ_q n!/(n − q)! m^q choices of m candidates a point; with combinations q! times fewer"),
+    ];
 
     fn check(&self) -> Result<(), String> {
         in_range(self.budget > 0, "budget", self.budget, "1 or more pair tests")

@@ -43,6 +43,14 @@ impl Component for WeightedClique {
     const SUMMARY: &'static str = "the densest consistent set, by projected gradient ascent with a growing penalty";
     const SOURCE: &'static str = "Lusk, Fathian, How, CLIPPER: a graph-theoretic framework for robust data \
                                   association, 2021";
+    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+        (
+            "maximises",
+            "the density uᵀ M u / uᵀ u of a coherent set, M_ab = exp(−½ (3 d/Δ)²) of distances that differ by d",
+        ),
+        ("exact", "no: a local maximum"),
+        ("time", "K²/2 pair tests for K candidate pairs, then E operations a step for E coherent ones"),
+    ];
 
     fn check(&self) -> Result<(), String> {
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
