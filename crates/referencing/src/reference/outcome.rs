@@ -120,7 +120,8 @@ pub struct Attempt {
     /// Whether the search looked at all that may lead to a second copy of the object, whole or in part, beside the answer; `None`
     /// where it looks for none, or nothing was likely enough to be believed.
     pub copies_sought: Option<bool>,
-    /// No admissible set is likelier by more than this (nats); `None` where that was not asked.
+    /// No admissible set is likelier than the likeliest pose by more than this (nats); `None` where that was not asked. The answer is
+    /// optimal where this is zero and none of that pose's pairs had to go.
     pub evidence_gap: Option<f64>,
 }
 

@@ -5,10 +5,11 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Identification, NEEDED, Search, Unidentified,
+    Identification, Search, Unidentified,
     affinity::{Affinity, by_weight, normalized},
     association::Association,
-    grow::{conclude, feasible},
+    bounded,
+    grow::{conclude_within, feasible},
 };
 use crate::{Correspondence, Problem};
 
@@ -26,6 +27,8 @@ pub(crate) struct WeightedClique {
     pub(crate) orientation: bool,
     /// Gradient steps at most.
     pub(crate) iterations: usize,
+    /// Operations on edges, and pair tests, before the ascent ends.
+    pub(crate) budget: u64,
     /// More candidate pairs than this are not searched (40 000 take 200 MB).
     pub(crate) most_pairs: usize,
     /// Nor more edges than this (8 bytes each).
@@ -34,7 +37,7 @@ pub(crate) struct WeightedClique {
 
 impl Default for WeightedClique {
     fn default() -> Self {
-        Self { orientation: true, iterations: 500, most_pairs: 40_000, most_edges: 30_000_000 }
+        Self { orientation: true, iterations: 500, budget: 2_000_000_000, most_pairs: 40_000, most_edges: 30_000_000 }
     }
 }
 
@@ -54,7 +57,7 @@ impl Component for WeightedClique {
 
     fn check(&self) -> Result<(), String> {
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")?;
+        bounded(self.budget, self.most_pairs)?;
         in_range(self.most_edges > 0, "most-edges", self.most_edges, "1 or more")
     }
 }
@@ -66,13 +69,19 @@ impl Search for WeightedClique {
         let weight = |off: f64| libm::exp(-4.5 * off * off);
         let affinity = Affinity::of(problem, &graph, self.most_edges, weight)?;
         let mut ascent = Ascent::of(&affinity, graph.vertices.len());
+        let spent = |ascent: &Ascent<'_>| graph.tests + ascent.products * affinity.edges() as u64;
+        let mut ended = None;
         for _ in 0..self.iterations {
+            if spent(&ascent) > self.budget {
+                ended = Some((self.budget, spent(&ascent)));
+                break;
+            }
             if !ascent.climb() && !ascent.penalize() {
                 break;
             }
         }
         let ranked: Vec<Correspondence> = by_weight(&ascent.u).into_iter().map(|v| graph.vertices[v]).collect();
-        conclude(problem, &ranked, self.orientation, graph.tests + ascent.products * affinity.edges() as u64)
+        conclude_within(problem, &ranked, self.orientation, spent(&ascent), ended)
     }
 }
 

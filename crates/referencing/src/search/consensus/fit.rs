@@ -80,7 +80,13 @@ impl Linear {
 
     /// The motion after the step.
     pub(in crate::search) fn moved(&self) -> Motion {
-        self.motion.moved(&self.step.fixed_rows::<3>(0).into(), &self.step.fixed_rows::<3>(3).into(), &self.about)
+        self.moved_by(1.0)
+    }
+
+    /// The motion after so much of the step.
+    pub(in crate::search) fn moved_by(&self, share: f64) -> Motion {
+        let step = self.step * share;
+        self.motion.moved(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into(), &self.about)
     }
 
     /// By how much the step lowers what residuals and prior cost (nats), if turns were small.

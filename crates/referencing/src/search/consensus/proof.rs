@@ -21,10 +21,14 @@ use crate::{ModelPoint, lanes::ones_of};
 
 /// Evidence that differs by less (nats) is equal: fits end somewhere near their maximum.
 const EQUAL: f64 = 1e-3;
-/// Steps of a fit from the pose of all members but the last.
-const ROUNDS: usize = 6;
-/// A fit that would gain more by its next step (nats) has not come to its end.
+/// Steps of a fit at most: from the pose of all members but the last a few suffice, from that of a wide prior not always.
+const ROUNDS: usize = 30;
+/// A fit that would gain less by its next step (nats) has come to its end.
 const CONVERGED: f64 = 1e-2;
+/// Of a step that leads nowhere lower so many times the half is tried.
+const HALVES: i32 = 6;
+/// Where pairs contradict each other a fit is slow or ends where no step leads lower: its end is no lower than this (nats).
+const SLOW: f64 = 1.0;
 /// Poses known better than this (rad, the root of the sum of the variances) put their points where the first order has them.
 const FIRST_ORDER: f64 = 0.1;
 /// What second order may add to a variance, as a share of it.
@@ -323,47 +327,64 @@ impl<'a> Prover<'a> {
 
     /// With the pose of the members and what they cost under it, where they give one; the members by themselves are looked at then.
     fn fitted(&mut self, begun: &Begun) -> Begun {
-        let Climb { terms, rough, .. } = self.climb;
+        let Climb { terms, .. } = self.climb;
         let count = self.members.len();
         if count < LEAST {
             return *begun;
         }
         self.spent += COST_OF_A_FIT + COST_OF_A_MEMBER * count as u64;
-        let (cost, known) = match &begun.known {
-            Some(known) if count > LEAST && known.is_of_first_order() => {
-                // Two steps: what one foretells may be some hundredths of a nat too much, and then it is no bound.
-                let Some(first) = Linear::at(terms, rough, &self.members, &known.motion) else { return *begun };
-                let motion = first.moved();
-                let Some(linear) = Linear::at(terms, rough, &self.members, &motion) else { return *begun };
-                let cost = self.cost(&motion) - linear.gained();
-                (cost, Posterior::of(linear.moved(), linear.factor(), rough))
-            }
-            known => {
-                let Some(least) = self.least_cost(known.map(|known| known.motion)) else { return *begun };
-                least
-            }
+        let fitted = match &begun.known {
+            Some(known) if count > LEAST && known.is_of_first_order() => self.refined(&known.motion),
+            known => self.least_cost(known.map(|known| known.motion)),
         };
+        // Pairs that leave the pose open are no set of interest by themselves.
+        let Some((cost, known)) = fitted else { return *begun };
         self.meet(begun.gains - cost + terms.ln_share[count] + known.ln_filled, &known.motion);
         Begun { cost, known: Some(known), ..*begun }
     }
 
-    /// The least that the members cost under a pose, from that of the members before and from that of three of them, and that pose;
-    /// `None` where a fit does not come to an end.
-    fn least_cost(&self, before: Option<Motion>) -> Option<(f64, Posterior)> {
+    /// What the members cost at least near a pose that is known well, and that pose.
+    fn refined(&self, near: &Motion) -> Option<(f64, Posterior)> {
         let Climb { terms, rough, .. } = self.climb;
+        // Two steps: what one foretells may be some hundredths of a nat too much, and then it is no bound.
+        let motion = Linear::at(terms, rough, &self.members, near)?.moved();
+        let linear = Linear::at(terms, rough, &self.members, &motion)?;
+        let cost = self.cost(&motion) - linear.gained();
+        Some((cost, Posterior::of(linear.moved(), linear.factor(), rough)))
+    }
+
+    /// The least that the members cost under a pose, from that of the members before and from that of three of them, and that pose.
+    fn least_cost(&self, before: Option<Motion>) -> Option<(f64, Posterior)> {
         let mut least: Option<(f64, Posterior)> = None;
         for start in before.into_iter().chain(self.of_any_three()) {
-            let (motion, _) = fit(terms, rough, &self.members, &start, ROUNDS)?;
-            let linear = Linear::at(terms, rough, &self.members, &motion)?;
-            if !(linear.gained() < CONVERGED) {
-                return None;
-            }
-            let cost = self.cost(&motion) - linear.gained();
-            if least.as_ref().is_none_or(|(known, _)| cost < *known) {
-                least = Some((cost, Posterior::of(motion, linear.factor(), rough)));
+            let found = self.descended(start)?;
+            if least.as_ref().is_none_or(|(known, _)| found.0 < *known) {
+                least = Some(found);
             }
         }
         least
+    }
+
+    /// Where steps that each lower what the members cost lead to, and no more than that is.
+    fn descended(&self, start: Motion) -> Option<(f64, Posterior)> {
+        let Climb { terms, rough, .. } = self.climb;
+        let (mut motion, mut cost) = (start, self.cost(&start));
+        for round in 0.. {
+            let linear = Linear::at(terms, rough, &self.members, &motion)?;
+            let gained = linear.gained();
+            let end = |less: f64| Some((cost - less, Posterior::of(motion, linear.factor(), rough)));
+            if gained < CONVERGED {
+                return end(gained);
+            }
+            if round == ROUNDS {
+                return end(SLOW);
+            }
+            let halves = (0..=HALVES).map(|half| linear.moved_by(0.5f64.powi(half)));
+            let lower = halves.map(|to| (to, self.cost(&to))).find(|(_, of)| *of < cost);
+            let Some(lower) = lower else { return end(SLOW) };
+            (motion, cost) = lower;
+        }
+        None
     }
 
     /// What residuals and prior cost the members under a motion (nats).
