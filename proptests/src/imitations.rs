@@ -19,11 +19,18 @@ pub enum Imitation {
     Edges,
     /// The object's points come in twos nearer to each other than twice the tolerance, and all is measured twice.
     Doubles,
+    /// The object's points lie anywhere, and clutter is bunched about each, 4 cm a coordinate, in shells of 10 cm.
+    Bunched,
 }
 
 impl Imitation {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Grating, Self::Gaps, Self::Edges, Self::Doubles];
+    pub const ALL: [Self; 5] = [Self::Grating, Self::Gaps, Self::Edges, Self::Doubles, Self::Bunched];
+
+    /// Half a shell (m).
+    fn shell(self) -> f64 {
+        if self == Self::Bunched { 0.1 } else { SHELL }
+    }
 }
 
 /// A scene: the problem that a search is given.
@@ -46,6 +53,8 @@ impl Scene {
 const HALF: [f64; 3] = [1.25, 0.75, 0.75];
 /// From one point of the grating to the next (m).
 const PITCH: f64 = 0.3;
+/// Of clutter that is bunched about a point (m).
+const BUNCH: f64 = 0.04;
 /// Standard deviation of a measured coordinate (m), the tolerance of a distance, and half a shell.
 const SIGMA: f64 = 0.01;
 const DELTA: f64 = 0.045;
@@ -119,6 +128,13 @@ pub fn scene(imitation: Imitation, visible: usize, seed: u64) -> Scene {
             let twice = clutter.iter().flat_map(|at| [*at, *at]).collect();
             (first.into_iter().chain(second).collect(), twice)
         }
+        Imitation::Bunched => {
+            let count = rng.random_range(15..=20);
+            let model = apart(rng, count, 0.2, |rng| anywhere(rng, &Vector3::from(HALF)));
+            let about = |rng: &mut ChaCha8Rng| model[rng.random_range(0..model.len())] + normal(rng) * BUNCH;
+            let clutter = (0..rng.random_range(100..=200)).map(|_| about(rng)).collect();
+            (model, clutter)
+        }
     };
     let turn = Vector3::from_fn(|_, _| rng.random_range(-0.4..0.4));
     let camera_from_object = Transform::<Camera, Object>::new(so3::exp(&turn), Vector3::new(0.0, 0.0, 4.0));
@@ -135,13 +151,14 @@ pub fn scene(imitation: Imitation, visible: usize, seed: u64) -> Scene {
         .map(|at| (camera_from_object * Point::from(*at)).coords + normal(rng) * SIGMA)
         .map(|at| MeasuredPoint { position: UncertainPoint::isotropic(Point::from(at), SIGMA), pixels: None })
         .collect();
-    let turned = UnitQuaternion::from_scaled_axis(normal(rng) * 0.03) * camera_from_object.rotation();
-    let moved = camera_from_object.translation() + anywhere(rng, &Vector3::from_element(0.5 * SHELL));
+    let shell = imitation.shell();
+    let turned = UnitQuaternion::from_scaled_axis(normal(rng) * 0.03 * (shell / SHELL)) * camera_from_object.rotation();
+    let moved = camera_from_object.translation() + anywhere(rng, &Vector3::from_element(0.5 * shell));
     let rough = Transform::<Camera, Object>::new(turned, moved);
-    let prior = Prior { object_from_camera: rough.inverse(), bound: PriorBound::Box(SHELL) };
+    let prior = Prior { object_from_camera: rough.inverse(), bound: PriorBound::Box(shell) };
     let model: Vec<ModelPoint> =
         model.iter().enumerate().map(|(i, at)| ModelPoint::exact(format!("P{i}"), Point::from(*at))).collect();
-    let candidates = candidates(&model, &cloud, Some(&prior), &Gate::Box(SHELL), None);
+    let candidates = candidates(&model, &cloud, Some(&prior), &Gate::Box(shell), None);
     let planted = Planted {
         model,
         cloud,
