@@ -104,7 +104,7 @@ pub(super) fn conclude(
 /// or why there is none.
 ///
 /// # Errors
-/// As [`conclude`], and [`Unidentified::Budget`] in place of [`Unidentified::NotFound`].
+/// As [`conclude`], but [`Unidentified::Budget`] alone where the budget ended.
 pub(super) fn conclude_within(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
@@ -121,6 +121,8 @@ pub(super) fn conclude_within(
             Ok(Identification { undecided: found.undecided.or(Some(ended)), ..found })
         }
         Err(Unidentified::NotFound { bound, .. }) => Err(ended(0, bound)),
+        // What is left of a mirror image may be all that the ranking had so far.
+        Err(Unidentified::Mirrored { .. }) => so_far(problem, orientation, ended(0, most_possible(problem))),
         Err(other) => Err(other),
     }
 }

@@ -669,6 +669,9 @@ mod tests {
     }
 
     /// The long form: `cargo test --release -p seafix-referencing --lib -- --ignored likelier`.
+    ///
+    /// Seen to fail where what one step foretells is taken for the end of a fit (its 7435th problem), and where a set whose fit is slow
+    /// is passed over (the 13 623rd).
     #[test]
     #[ignore = "20 000 problems; some minutes"]
     fn no_coherent_set_of_many_problems_is_likelier_than_the_bound() {
