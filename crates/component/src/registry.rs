@@ -4,6 +4,9 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{Choice, Part, nearest, plain, suggest::unknown};
 
+/// What is told of a component, and what: `("time", "N log N for N candidate pairs")`.
+pub type Properties = &'static [(&'static str, &'static str)];
+
 /// What every component says of itself, whatever it does.
 ///
 /// The implementing struct *is* its settings: its fields are the keys a user may write,
@@ -17,7 +20,7 @@ pub trait Component: Default + Serialize + DeserializeOwned + 'static {
     const SOURCE: &'static str;
     /// What else those who choose between components of its kind ask, and the answers: of a search what it `maximises`, whether it
     /// is `exact`, what `time` it takes.
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[];
+    const PROPERTIES: Properties = &[];
 
     /// Whether its settings can be: a component is built only from settings that pass.
     ///
@@ -103,7 +106,7 @@ pub struct Entry<T: ?Sized> {
     name: &'static str,
     summary: &'static str,
     source: &'static str,
-    properties: &'static [(&'static str, &'static str)],
+    properties: Properties,
     defaults: fn() -> toml::Table,
     build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>,
 }
@@ -308,7 +311,7 @@ pub struct Listing {
     /// Its literature source.
     pub source: &'static str,
     /// What else there is to say: what is told of, and what.
-    pub properties: &'static [(&'static str, &'static str)],
+    pub properties: Properties,
     /// Its settings with their default values.
     pub defaults: toml::Table,
 }

@@ -132,7 +132,7 @@ impl<'a> Shape<'a> {
             Null::Box(lengths) => in_box(&self.at, lengths, sequence),
             Null::Shuffled(cloud) => among(&self.at, cloud, sequence),
         };
-        self.along(set, motions, sequence)
+        self.estimate(set, motions, sequence)
     }
 
     /// The estimate from a rotation by which a set fits the cloud's box as barely as its errors let it; nought where there is no box.
@@ -141,10 +141,10 @@ impl<'a> Shape<'a> {
             return 0.0;
         }
         let reach = self.radius * self.noise.root.norm() / 3f64.sqrt();
-        self.along(set, ALL_TURNS * reach.powi(3), sequence)
+        self.estimate(set, ALL_TURNS * reach.powi(3), sequence)
     }
 
-    /// Where the members are about their centroid; whether there are enough.
+    /// Puts the members about their centroid; whether there are enough of them.
     fn centre(&mut self, set: &[usize]) -> bool {
         if set.len() < 3 || self.radius <= 0.0 {
             return false;
@@ -159,8 +159,8 @@ impl<'a> Shape<'a> {
         true
     }
 
-    /// The same of a measure of motions that a rotation gives.
-    fn along(&mut self, set: &[usize], motions: f64, sequence: &mut Sequence) -> f64 {
+    /// The estimate where one rotation gives so many motions: their measure (m³ rad³, over the density that is left out).
+    fn estimate(&mut self, set: &[usize], motions: f64, sequence: &mut Sequence) -> f64 {
         if !(motions > 0.0) {
             return 0.0;
         }

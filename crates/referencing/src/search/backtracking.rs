@@ -46,7 +46,7 @@ impl Component for Backtracking {
     const SUMMARY: &'static str = "the largest admissible set by subsets of the model points, with forward checking";
     const SOURCE: &'static str = "Haralick, Elliott, Increasing tree search efficiency for constraint satisfaction \
                                   problems, 1980";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the number of pairs, every two coherent, one-to-one, no four of them mirrored; of equally many the least residual",

@@ -42,7 +42,7 @@ impl Component for CompleteEnumeration {
     const SUMMARY: &'static str = "all cloud points for all model points, longest samples first: no shells";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, ref. 35";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the number of model points in the first coherent sample, longest samples first, every cloud point for every model point",

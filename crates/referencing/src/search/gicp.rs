@@ -45,7 +45,7 @@ impl Component for Gicp {
     const NAME: &'static str = "gicp";
     const SUMMARY: &'static str = "as icp, with distances and fit weighed by the covariances";
     const SOURCE: &'static str = "Segal, Haehnel, Thrun, Generalized-ICP, 2009";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         ("maximises", "nothing over all poses: it minimises Σ rᵀ S⁻¹ r of nearest candidates, from the prior on"),
         ("exact", "no: it ends in the minimum next to the prior"),
         ("time", "N distances an iteration for N candidate pairs"),

@@ -41,7 +41,7 @@ impl Component for GncTls {
     const SUMMARY: &'static str = "one robust fit to all candidate pairs, by graduated non-convexity";
     const SOURCE: &'static str = "Yang, Antonante, Tzoumas, Carlone, Graduated non-convexity for robust spatial \
                                   perception, 2020";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the weight of what one pose explains: it minimises Σ min(r², c²) over poses by graduated non-convexity",

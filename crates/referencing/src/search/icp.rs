@@ -45,7 +45,7 @@ impl Component for Icp {
     const SUMMARY: &'static str = "nearest candidates and their least-squares pose in turn, from the prior";
     const SOURCE: &'static str = "Besl, McKay, A method for registration of 3-D shapes, 1992; the share kept: Chetverikov et al., The trimmed \
                                   iterative closest point algorithm, 2002";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         ("maximises", "nothing over all poses: it minimises Σ r² of nearest candidates, from the prior on"),
         ("exact", "no: it ends in the minimum next to the prior"),
         ("time", "N distances an iteration for N candidate pairs"),

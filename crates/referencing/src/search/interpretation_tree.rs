@@ -47,7 +47,7 @@ impl Component for InterpretationTree {
     const SUMMARY: &'static str = "the longest interpretation that is coherent and passes a rigid fit, depth first";
     const SOURCE: &'static str = "Grimson, Lozano-Pérez, Localizing overlapping parts by searching the interpretation \
                                   tree, 1987";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the number of pairs, every two coherent and each within the tolerance of where their least-squares pose puts it",

@@ -50,7 +50,7 @@ impl Component for JointCompatibility {
         "the longest hypothesis whose distances are compatible all together, by branch and bound";
     const SOURCE: &'static str = "Neira, Tardós, Data association in stochastic mapping using the joint compatibility \
                                   test, 2001; the incremental form: Li, Li, Song, Zou, Yan, IJCBB, 2014";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the number of pairs whose distances are compatible all together, D² ≤ χ²; of equally many the least D²",

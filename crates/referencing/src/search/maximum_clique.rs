@@ -44,7 +44,7 @@ impl Component for MaximumClique {
     const SUMMARY: &'static str = "the largest coherent, one-to-one, unmirrored set, by branch and bound";
     const SOURCE: &'static str = "San Segundo, Rodríguez-Losada, Jiménez, An exact bit-parallel algorithm for the \
                                   maximum clique problem, 2011; the graph: Bailey et al., 2000";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the number of pairs, every two coherent, one-to-one, no four of them mirrored; of equally many the least residual",

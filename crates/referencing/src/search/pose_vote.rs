@@ -46,7 +46,7 @@ impl Component for PoseVote {
     const SUMMARY: &'static str = "the displacement of the prior that most model points share";
     const SOURCE: &'static str = "Ballard, Generalizing the Hough transform to detect arbitrary shapes, 1981; \
                                   the votes: offsets from the predicted places";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         ("maximises", "the number of model points whose candidates are displaced alike from where the prior has them"),
         ("exact", "no"),
         ("time", "N log N for N candidate pairs spread evenly"),

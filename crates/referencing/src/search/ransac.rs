@@ -44,7 +44,7 @@ impl Component for Ransac {
     const SUMMARY: &'static str = "poses of random coherent triples, the one that explains most";
     const SOURCE: &'static str = "Fischler, Bolles, Random sample consensus, 1981; the score: Torr, Zisserman, MLESAC, \
                                   2000; the edge-length check: Zhou, Park, Koltun, Open3D, 2018";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         ("maximises", "Σ (1 − r²) over what a pose explains, over poses of random coherent triples (MSAC)"),
         ("exact", "no: triples are drawn until it is likely enough that one was true"),
         ("time", "O(w⁻³) triples for a share w of true pairs, N residuals for each coherent one"),

@@ -79,7 +79,7 @@ impl Component for RigidConsensus {
     const SUMMARY: &'static str = "the likeliest pose, weighed against all others and against no object at all";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the evidence of a pose against clutter alone: prior, residuals, how many points are seen, and how dense clutter is about each",

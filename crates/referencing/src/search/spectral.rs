@@ -42,7 +42,7 @@ impl Component for Spectral {
     const SUMMARY: &'static str = "pairs by their weight in the principal eigenvector of the agreements";
     const SOURCE: &'static str = "Leordeanu, Hebert, A spectral technique for correspondence problems using pairwise \
                                   constraints, 2005";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         ("maximises", "xᵀ M x over |x| = 1, M the agreements of pairs; pairs are taken by falling weight"),
         ("exact", "for the relaxed problem only: nothing is proved of the set"),
         ("time", "K²/2 pair tests for K candidate pairs, then E operations an iteration for E agreeing ones"),

@@ -51,7 +51,7 @@ impl Component for StructuralCoherence {
     const SUMMARY: &'static str = "the paper's enumeration of ordered samples, longest first";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 2.2";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the number of model points in the first coherent sample, longest samples first, candidates from the shells",

@@ -46,7 +46,7 @@ impl Component for WeightedClique {
     const SUMMARY: &'static str = "the densest consistent set, by projected gradient ascent with a growing penalty";
     const SOURCE: &'static str = "Lusk, Fathian, How, CLIPPER: a graph-theoretic framework for robust data \
                                   association, 2021";
-    const PROPERTIES: &'static [(&'static str, &'static str)] = &[
+    const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
             "the density uᵀ M u / uᵀ u of a coherent set, M_ab = exp(−½ (3 d/Δ)²) of distances that differ by d",

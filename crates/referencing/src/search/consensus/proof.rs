@@ -365,26 +365,23 @@ impl<'a> Prover<'a> {
         least
     }
 
-    /// Where steps that each lower what the members cost lead to, and no more than that is.
+    /// What the members cost at least (nats) where steps that each lower it lead to, and that pose.
     fn descended(&self, start: Motion) -> Option<(f64, Posterior)> {
         let Climb { terms, rough, .. } = self.climb;
-        let (mut motion, mut cost) = (start, self.cost(&start));
-        for round in 0.. {
+        let (mut motion, mut cost, mut left) = (start, self.cost(&start), ROUNDS);
+        loop {
             let linear = Linear::at(terms, rough, &self.members, &motion)?;
             let gained = linear.gained();
             let end = |less: f64| Some((cost - less, Posterior::of(motion, linear.factor(), rough)));
             if gained < CONVERGED {
                 return end(gained);
             }
-            if round == ROUNDS {
-                return end(SLOW);
-            }
             let halves = (0..=HALVES).map(|half| linear.moved_by(0.5f64.powi(half)));
-            let lower = halves.map(|to| (to, self.cost(&to))).find(|(_, of)| *of < cost);
+            let lower = halves.map(|to| (to, self.cost(&to))).find(|(_, of)| left > 0 && *of < cost);
             let Some(lower) = lower else { return end(SLOW) };
             (motion, cost) = lower;
+            left -= 1;
         }
-        None
     }
 
     /// What residuals and prior cost the members under a motion (nats).
