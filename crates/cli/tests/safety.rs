@@ -424,8 +424,34 @@ fn a_run_without_memory_is_resumed() {
             recoverable(folder, &folder.join("small"));
         }
     }
-    assert!(run(folder, "small", &["--resume"]).output().unwrap().status.success());
+    let (code, error) = ended(&run(folder, "small", &["--resume"]).output().unwrap());
+    assert_eq!(code, Some(0), "{error}");
     same(&folder.join("whole"), &folder.join("small"));
+}
+
+/// What made a run says which commit the program is of, where `git` can tell: where it cannot, that is no other program.
+#[test]
+fn a_run_that_could_not_ask_for_its_commit_is_resumed() {
+    let folder = experiment(4);
+    let folder = folder.path();
+    for (out, first, second) in [("known later", "/nonexistent", ""), ("known before", "", "/nonexistent")] {
+        for (path, more) in [(first, &[][..]), (second, &["--resume"])] {
+            let mut command = run(folder, out, more);
+            if !path.is_empty() {
+                command.env("PATH", path);
+            }
+            let (code, error) = ended(&command.output().unwrap());
+            assert_eq!(code, Some(0), "{out}: {error}");
+        }
+    }
+    // Another commit than one that is known is another program.
+    let manifest = folder.join("known before/manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    if let Some((before, after)) = text.split_once("\"commit\": \"") {
+        fs::write(&manifest, format!("{before}\"commit\": \"0{after}")).unwrap();
+        let (code, error) = ended(&run(folder, "known before", &["--resume"]).output().unwrap());
+        assert!(code != Some(0) && error.contains("the commit of the program"), "{error}");
+    }
 }
 
 /// Of a short run every nth change of a file fails, for each n that `takes` says.

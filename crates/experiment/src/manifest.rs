@@ -181,7 +181,7 @@ impl Manifest {
         };
         let differing = [
             ("the version of the program", self.seafix != other.seafix || self.format != other.format),
-            ("the commit of the program, or whether it has changes", self.git != other.git),
+            ("the commit of the program, or whether it has changes", self.git.contradicts(&other.git)),
             ("the experiment", self.experiment != other.experiment),
             ("the trials", trials(self) != trials(other)),
             ("the configuration of a trial", self.trials != other.trials),
@@ -272,6 +272,15 @@ impl Git {
             dirty: git(&["status", "--porcelain", "--", ":/crates", ":/Cargo.toml", ":/Cargo.lock"])
                 .map(|changes| !changes.is_empty()),
         }
+    }
+
+    /// Whether both say something, and not the same. What `git` could not tell, short of memory for instance or not
+    /// installed, is no difference: it must not keep a run from being resumed.
+    fn contradicts(&self, other: &Self) -> bool {
+        fn differ<T: PartialEq>(a: Option<&T>, b: Option<&T>) -> bool {
+            a.zip(b).is_some_and(|(a, b)| a != b)
+        }
+        differ(self.commit.as_ref(), other.commit.as_ref()) || differ(self.dirty.as_ref(), other.dirty.as_ref())
     }
 }
 
