@@ -8,6 +8,7 @@ mod fit;
 mod graph;
 mod imitation;
 mod labels;
+mod least;
 mod likelihood;
 mod mirror;
 mod modes;

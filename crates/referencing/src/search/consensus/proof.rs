@@ -2,16 +2,17 @@
 
 use std::{cell::Cell, collections::BTreeSet};
 
-use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::{
     Motion,
     bits::{Held, intersect},
     bound::{After, Bounds},
     filled::ln_filled,
-    fit::{Linear, fit},
+    fit::fit,
     graph::Graph,
-    likelihood::{Mode, Terms, ln_volume},
+    least::{Fits, Posterior, ROUNDS},
+    likelihood::{Mode, Terms},
     modes::Climb,
     rough::{Rough, spread},
     seeds::Swept,
@@ -21,16 +22,6 @@ use crate::{ModelPoint, lanes::ones_of};
 
 /// Evidence that differs by less (nats) is equal: fits end somewhere near their maximum.
 const EQUAL: f64 = 1e-3;
-/// Steps of a fit at most: from the pose of all members but the last a few suffice, from that of a wide prior not always.
-const ROUNDS: usize = 30;
-/// A fit that would gain less by its next step (nats) has come to its end.
-const CONVERGED: f64 = 1e-2;
-/// Of a step that leads nowhere lower so many times the half is tried.
-const HALVES: i32 = 6;
-/// Where pairs contradict each other a fit is slow or ends where no step leads lower: its end is no lower than this (nats).
-const SLOW: f64 = 1.0;
-/// Poses known better than this (rad, the root of the sum of the variances) put their points where the first order has them.
-const FIRST_ORDER: f64 = 0.1;
 /// What second order may add to a variance, as a share of it.
 const CURVED: f64 = 0.2;
 /// The least set that a pose can come from.
@@ -73,29 +64,6 @@ struct Prover<'a> {
     spent: u64,
     members: Vec<usize>,
     levels: Vec<Level>,
-}
-
-/// What some pairs say of the pose together.
-#[derive(Clone, Copy)]
-struct Posterior {
-    motion: Motion,
-    /// Of η about the motion: the inverse of the information.
-    covariance: Matrix6<f64>,
-    /// ln of the share of the prior that it fills.
-    ln_filled: f64,
-}
-
-impl Posterior {
-    fn of(motion: Motion, information: &Cholesky<f64, U6>, rough: &Rough) -> Self {
-        let ln_filled = (rough.ln_peak + ln_volume(information)).min(0.0);
-        Self { motion, covariance: information.inverse(), ln_filled }
-    }
-
-    /// Whether the pose is known so well that turns within its error are small.
-    fn is_of_first_order(&self) -> bool {
-        let turn: f64 = (0..3).map(|i| self.covariance[(i, i)]).sum();
-        turn <= FIRST_ORDER * FIRST_ORDER
-    }
 }
 
 /// The first pairs of a set.
@@ -334,8 +302,8 @@ impl<'a> Prover<'a> {
         }
         self.spent += COST_OF_A_FIT + COST_OF_A_MEMBER * count as u64;
         let fitted = match &begun.known {
-            Some(known) if count > LEAST && known.is_of_first_order() => self.refined(&known.motion),
-            known => self.least_cost(known.map(|known| known.motion)),
+            Some(known) if count > LEAST && known.is_of_first_order() => self.fits().refined(&known.motion),
+            known => self.fits().least_cost(known.map(|known| known.motion)),
         };
         // Pairs that leave the pose open are no set of interest by themselves.
         let Some((cost, known)) = fitted else { return *begun };
@@ -343,62 +311,8 @@ impl<'a> Prover<'a> {
         Begun { cost, known: Some(known), ..*begun }
     }
 
-    /// What the members cost at least near a pose that is known well, and that pose.
-    fn refined(&self, near: &Motion) -> Option<(f64, Posterior)> {
-        let Climb { terms, rough, .. } = self.climb;
-        // Two steps: what one foretells may be some hundredths of a nat too much, and then it is no bound.
-        let motion = Linear::at(terms, rough, &self.members, near)?.moved();
-        let linear = Linear::at(terms, rough, &self.members, &motion)?;
-        let cost = self.cost(&motion) - linear.gained();
-        Some((cost, Posterior::of(linear.moved(), linear.factor(), rough)))
-    }
-
-    /// The least that the members cost under a pose, from that of the members before and from that of three of them, and that pose.
-    fn least_cost(&self, before: Option<Motion>) -> Option<(f64, Posterior)> {
-        let mut least: Option<(f64, Posterior)> = None;
-        for start in before.into_iter().chain(self.of_any_three()) {
-            let found = self.descended(start)?;
-            if least.as_ref().is_none_or(|(known, _)| found.0 < *known) {
-                least = Some(found);
-            }
-        }
-        least
-    }
-
-    /// What the members cost at least (nats) where steps that each lower it lead to, and that pose.
-    fn descended(&self, start: Motion) -> Option<(f64, Posterior)> {
-        let Climb { terms, rough, .. } = self.climb;
-        let (mut motion, mut cost, mut left) = (start, self.cost(&start), ROUNDS);
-        loop {
-            let linear = Linear::at(terms, rough, &self.members, &motion)?;
-            let gained = linear.gained();
-            let end = |less: f64| Some((cost - less, Posterior::of(motion, linear.factor(), rough)));
-            if gained < CONVERGED {
-                return end(gained);
-            }
-            let halves = (0..=HALVES).map(|half| linear.moved_by(0.5f64.powi(half)));
-            let lower = halves.map(|to| (to, self.cost(&to))).find(|(_, of)| left > 0 && *of < cost);
-            let Some(lower) = lower else { return end(SLOW) };
-            (motion, cost) = lower;
-            left -= 1;
-        }
-    }
-
-    /// What residuals and prior cost the members under a motion (nats).
-    fn cost(&self, motion: &Motion) -> f64 {
-        let Climb { terms, rough, .. } = self.climb;
-        let pairs = self.members.iter().map(|&v| &terms.pairs[v]);
-        let residuals: f64 = pairs.map(|pair| 0.5 * pair.distance(&(pair.cloud - motion.apply(&pair.model)))).sum();
-        residuals + rough.ln_peak - rough.ln_density(motion)
-    }
-
-    /// A pose of the last member and of two others that fix one with it.
-    fn of_any_three(&self) -> Option<Motion> {
-        let (&last, others) = self.members.split_last()?;
-        let of = |v: usize| &self.climb.terms.pairs[v];
-        let mut pairs = (1..others.len()).flat_map(|i| (0..i).map(move |k| (others[k], others[i])));
-        pairs
-            .find_map(|(a, b)| Motion::of_three([a, b, last].map(|v| &of(v).model), [a, b, last].map(|v| &of(v).cloud)))
+    fn fits(&self) -> Fits<'_> {
+        Fits { terms: self.climb.terms, rough: self.climb.rough, members: &self.members }
     }
 
     /// Leaves out of the later ones from a rank on those with which the bound of all falls short. How many may be in reach of those that
@@ -499,7 +413,7 @@ mod tests {
     use super::*;
     use crate::{
         Candidates, Prior, PriorBound, Problem, Tolerance,
-        search::consensus::{Seeds, bits::is_set},
+        search::consensus::{Seeds, bits::is_set, likelihood::ln_volume},
     };
 
     const POINTS: usize = 6;
@@ -597,7 +511,7 @@ mod tests {
             let shares: f64 = level.costs.iter().map(|(_, share)| share).sum();
             prover.members.extend(4..10);
             let (motion, _) = fit(&terms, &rough, &prover.members, &motion, 8).expect("ten points");
-            let most = prover.cost(&motion) - begun.cost;
+            let most = prover.fits().cost(&motion) - begun.cost;
             assert!(level.costs.len() == 6 && shares <= most + 0.01, "{shares} of {most}");
             greatest = greatest.max(shares / most);
         }
