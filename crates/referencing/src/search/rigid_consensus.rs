@@ -32,7 +32,8 @@ use crate::Problem;
 /// fewer but closer points, or nearer to the prior, can outweigh one with more.
 ///
 /// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
-/// a box, in clumps), ρ_i is the density of the nearest points instead, and B(k) Π is summed over the subsets of the
+/// a box, in clumps), ρ_i is the density of the nearest points instead, or that about the predicted places of all model points where
+/// clutter is bunched there, and B(k) Π is summed over the subsets of the
 /// pairs, each model point's term over all candidates near its place: what fits in a crowd is as likely clutter. And
 /// beside the object and clutter alone stand more explanations: a pattern that the object repeats in part goes on, with
 /// the object in it or without; and where poses elsewhere explain what clutter spread evenly would not show, clutter
@@ -140,7 +141,7 @@ impl Search for RigidConsensus {
         let mut crowd = Crowd::default();
         let mut weighed = |swept: &mut Swept| {
             for mode in &mut swept.modes {
-                crowd.weigh(problem, &terms, &graph, mode);
+                crowd.weigh(problem, parts, mode);
             }
             let by =
                 |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));

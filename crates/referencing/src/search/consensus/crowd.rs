@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::{
+    bunching::Bunching,
     graph::Graph,
     likelihood::{Mode, Terms},
+    rough::Rough,
     visible::ln_visible,
 };
-use crate::Problem;
+use crate::{Correspondence, Problem};
 
 /// The density about a point is that of so many neighbours, of so many that are looked up.
 const NEIGHBOURS: usize = 3;
@@ -30,23 +32,40 @@ pub(in crate::search) struct Crowd {
     nearest: BTreeMap<usize, Vec<(f64, usize)>>,
     /// The cloud points that count.
     counted: Option<Counted>,
+    /// How near to the predicted places the cloud points are.
+    bunching: Option<Bunching>,
     /// The share of the candidates that have another within a distance (m), where two members of a pose were so near.
     twins: Option<(f64, f64)>,
 }
 
 impl Crowd {
-    /// Weighs a mode anew, with clutter as dense about each of its points as the cloud is there.
+    /// Weighs a mode anew, with clutter as dense about each of its points as the cloud is there, or as it is about the predicted places
+    /// of all model points ([`Bunching`]).
     ///
     /// A point in a crowd may say less than nothing for a pose; it is then rather clutter than the object's, and
     /// the evidence is summed over which of the members are the object's ([`ln_visible`]).
-    pub(in crate::search) fn weigh(&mut self, problem: &Problem<'_>, terms: &Terms, graph: &Graph, mode: &mut Mode) {
+    pub(in crate::search) fn weigh(
+        &mut self,
+        problem: &Problem<'_>,
+        (terms, rough, graph): (&Terms, &Rough, &Graph),
+        mode: &mut Mode,
+    ) {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
         let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
+        let known = rough.known.as_ref();
+        let bunched = known.map(|known| {
+            let bunching = self.bunching.get_or_insert_with(|| Bunching::of(problem, known));
+            (known, bunching.beside(&members))
+        });
         let crowded: Vec<f64> = (0..members.len())
             .map(|at| {
                 let v = mode.members[at];
                 let crowd = self.cost(problem, terms, graph, v, &members);
-                any_of(terms, graph, v, mode, even[at]) - crowd.max(self.twin(problem, terms, graph, v, &members[..at]))
+                let Correspondence { model, cloud } = graph.vertices[v];
+                let place = &problem.cloud[cloud].position.at.coords;
+                let bunched = bunched.as_ref().map_or(0.0, |(known, excess)| excess.about(known, model, place));
+                let twin = self.twin(problem, terms, graph, v, &members[..at]);
+                any_of(terms, graph, v, mode, even[at]) - crowd.max(twin).max(bunched)
             })
             .collect();
         let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_share[even.len()];
@@ -189,10 +208,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::{MeasuredPoint, UncertainPoint};
 
-    use super::{
-        super::{Motion, rough::Rough},
-        *,
-    };
+    use super::{super::Motion, *};
     use crate::{Candidates, ModelPoint, Tolerance};
 
     const SIGMA: f64 = 0.1;

@@ -2,6 +2,7 @@
 
 mod bits;
 mod bound;
+mod bunching;
 mod crowd;
 mod filled;
 mod fit;
