@@ -9,8 +9,10 @@ use crate::Problem;
 const BOXES: usize = 3;
 /// The share of a box that the next one fills.
 const SHARE: f64 = 0.125;
-/// So many more points within the second box than evenly spread clutter has there, in standard deviations, are no accident.
+/// So many more points within the second box than evenly spread clutter has there, in standard deviations, are no accident;
 const NO_ACCIDENT: f64 = 4.0;
+/// and where it is less than so many times as dense there, it is as even as clutter is.
+const BUNCHED: f64 = 2.0;
 
 /// How many cloud points lie how near to the predicted places, of all model points together.
 ///
@@ -56,7 +58,8 @@ impl Bunching {
         let places_a_point = all / points as f64;
         let expected = SHARE * all;
         // Written so that no clutter, a NaN, has no excess.
-        if !(near - expected > NO_ACCIDENT * (expected * places_a_point).sqrt()) {
+        let more = (NO_ACCIDENT * (expected * places_a_point).sqrt()).max((BUNCHED - 1.0) * expected);
+        if !(near - expected > more) {
             return Excess([0.0; BOXES]);
         }
         let volume = |ring: usize| {
