@@ -20,10 +20,9 @@ const BUNCHED: f64 = 2.0;
 /// tell. About all of them together it is enough: where it is bunched there, as about a structure that is where the object was
 /// expected, poses near the prediction find points that fit well much more often, and each says less.
 pub(super) struct Bunching {
-    /// The rings that each cloud point lies in, one for each model point that is expected near it: what a box holds and the next
-    /// one does not.
-    rings: Vec<Vec<usize>>,
-    /// How many lie in each ring, and how many points these are.
+    /// About how many predicted places each cloud point lies, by rings: what a box holds and the next one does not.
+    rings: Vec<[usize; BOXES]>,
+    /// The sum of all, and how many points lie about any.
     counts: [usize; BOXES],
     points: usize,
 }
@@ -34,15 +33,19 @@ pub(super) struct Excess([f64; BOXES]);
 impl Bunching {
     /// About the model points that have candidates. Time O(n M).
     pub(super) fn of(problem: &Problem<'_>, known: &Known) -> Self {
-        let mut rings = vec![Vec::new(); problem.cloud.len()];
+        let cloud: Vec<Vector3<f64>> = problem.cloud.iter().map(|point| point.position.at.coords).collect();
+        let mut rings = vec![[0; BOXES]; cloud.len()];
         for model in (0..known.places.len()).filter(|&model| !problem.candidates.lists[model].is_empty()) {
-            for (rings, point) in rings.iter_mut().zip(problem.cloud) {
-                rings.extend(ring(known, model, &point.position.at.coords));
+            let about = About::of(known, model);
+            for (rings, at) in rings.iter_mut().zip(&cloud) {
+                if let Some(ring) = about.ring(at) {
+                    rings[ring] += 1;
+                }
             }
         }
         let mut counts = [0; BOXES];
-        rings.iter().flatten().for_each(|&ring| counts[ring] += 1);
-        let points = rings.iter().filter(|rings| !rings.is_empty()).count();
+        rings.iter().for_each(|rings| (0..BOXES).for_each(|ring| counts[ring] += rings[ring]));
+        let points = rings.iter().filter(|rings| **rings != [0; BOXES]).count();
         Self { rings, counts, points }
     }
 
@@ -50,8 +53,9 @@ impl Bunching {
     pub(super) fn beside(&self, of_pose: &[usize]) -> Excess {
         let (mut counts, mut points) = (self.counts, self.points);
         for &cloud in of_pose {
-            self.rings[cloud].iter().for_each(|&ring| counts[ring] -= 1);
-            points -= usize::from(!self.rings[cloud].is_empty());
+            let rings = &self.rings[cloud];
+            (0..BOXES).for_each(|ring| counts[ring] -= rings[ring]);
+            points -= usize::from(*rings != [0; BOXES]);
         }
         let (all, near) = (counts.iter().sum::<usize>() as f64, counts[1..].iter().sum::<usize>() as f64);
         // A point that lies about several places is one accident.
@@ -73,22 +77,33 @@ impl Bunching {
 impl Excess {
     /// About a place where a model point was measured; none outside the boxes.
     pub(super) fn about(&self, known: &Known, model: usize, at: &Vector3<f64>) -> f64 {
-        ring(known, model, at).map_or(0.0, |ring| self.0[ring])
+        About::of(known, model).ring(at).map_or(0.0, |ring| self.0[ring])
     }
 }
 
-/// The ring about the predicted place of a model point that a place lies in. The first box is that of a prior's shell, or as wide as three
-/// standard deviations.
-fn ring(known: &Known, model: usize, at: &Vector3<f64>) -> Option<usize> {
-    let (place, spread) = &known.places[model];
-    let half = known.half.map_or(spread * BOUND_SIGMAS, Vector3::repeat);
-    let off = at - place;
-    // Most are far: that is known by the first axes.
-    if off.x.abs() > half.x || off.y.abs() > half.y || off.z.abs() > half.z {
-        return None;
+/// The boxes about the predicted place of a model point. The first is that of a prior's shell, or as wide as three standard deviations.
+struct About {
+    place: Vector3<f64>,
+    half: Vector3<f64>,
+}
+
+impl About {
+    fn of(known: &Known, model: usize) -> Self {
+        let (place, spread) = known.places[model];
+        Self { place, half: known.half.map_or(spread * BOUND_SIGMAS, Vector3::repeat) }
     }
-    let share = off.component_div(&half).amax();
-    (0..BOXES).rev().find(|&ring| share <= 0.5f64.powi(ring as i32))
+
+    /// The ring that a place lies in.
+    #[inline]
+    fn ring(&self, at: &Vector3<f64>) -> Option<usize> {
+        let off = at - self.place;
+        // Most are far: that is known by the first axes.
+        if off.x.abs() > self.half.x || off.y.abs() > self.half.y || off.z.abs() > self.half.z {
+            return None;
+        }
+        let share = off.component_div(&self.half).amax();
+        (0..BOXES).rev().find(|&ring| share <= 0.5f64.powi(ring as i32))
+    }
 }
 
 #[cfg(test)]
@@ -144,7 +159,7 @@ mod tests {
 
     #[test]
     fn a_cloud_without_clutter_has_no_excess() {
-        let none = Bunching { rings: vec![vec![0], vec![]], counts: [1, 0, 0], points: 1 };
+        let none = Bunching { rings: vec![[1, 0, 0], [0; BOXES]], counts: [1, 0, 0], points: 1 };
         assert_eq!(none.beside(&[0, 1]).0, [0.0; BOXES]);
     }
 }
