@@ -53,7 +53,7 @@ fn what_imitations_are_answered() {
 /// that is bunched where they are expected are not the object.
 ///
 /// Seen to fail when no imitation is weighed (a fifth of the gratings), when two points measured at one place count as two
-/// (two of the doubled scenes), and when clutter is taken to be as dense everywhere in a shell (one of the bunched).
+/// (two of the doubled scenes), and when clutter is taken to be as dense everywhere in a shell (two of the bunched).
 #[test]
 fn clutter_that_imitates_the_object_is_not_referenced() {
     for imitation in [Imitation::Gaps, Imitation::Doubles, Imitation::Bunched] {

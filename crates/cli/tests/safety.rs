@@ -444,7 +444,7 @@ fn a_run_that_could_not_ask_for_its_commit_is_resumed() {
             assert_eq!(code, Some(0), "{out}: {error}");
         }
     }
-    // Another commit than one that is known is another program.
+    // Another commit than one that is known is another program; an export without its history knows none.
     let manifest = folder.join("known before/manifest.json");
     let text = fs::read_to_string(&manifest).unwrap();
     if let Some((before, after)) = text.split_once("\"commit\": \"") {

@@ -61,9 +61,8 @@ impl Bunching {
         // A point that lies about several places is one accident.
         let places_a_point = all / points as f64;
         let expected = SHARE * all;
-        // Written so that no clutter, a NaN, has no excess.
         let more = (NO_ACCIDENT * (expected * places_a_point).sqrt()).max((BUNCHED - 1.0) * expected);
-        if !(near - expected > more) {
+        if near - expected <= more {
             return Excess([0.0; BOXES]);
         }
         let volume = |ring: usize| {

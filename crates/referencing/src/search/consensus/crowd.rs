@@ -53,7 +53,7 @@ impl Crowd {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
         let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
         let known = rough.known.as_ref();
-        let bunched = known.map(|known| {
+        let excess = known.map(|known| {
             let bunching = self.bunching.get_or_insert_with(|| Bunching::of(problem, known));
             (known, bunching.beside(&members))
         });
@@ -63,7 +63,7 @@ impl Crowd {
                 let crowd = self.cost(problem, terms, graph, v, &members);
                 let Correspondence { model, cloud } = graph.vertices[v];
                 let place = &problem.cloud[cloud].position.at.coords;
-                let bunched = bunched.as_ref().map_or(0.0, |(known, excess)| excess.about(known, model, place));
+                let bunched = excess.as_ref().map_or(0.0, |(known, excess)| excess.about(known, model, place));
                 let twin = self.twin(problem, terms, graph, v, &members[..at]);
                 any_of(terms, graph, v, mode, even[at]) - crowd.max(twin).max(bunched)
             })
