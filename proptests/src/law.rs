@@ -1,6 +1,6 @@
 //! How a law is tried.
 
-use std::fmt::Debug;
+use std::{env, fmt::Debug};
 
 use proptest::{
     strategy::Strategy,
@@ -10,25 +10,36 @@ use proptest::{
 /// The seed of every law's draws, unless `PROPTEST_RNG_SEED` gives another.
 const SEED: u64 = 1038;
 
-/// Tries `holds` on `cases` draws of `strategy`; `PROPTEST_CASES` scales the number, 256 leaves it.
-/// The number of cases tried.
+/// The number of cases of a law, or of draws of a Monte Carlo, whose full number is `full`.
+///
+/// `PROPTEST_CASES` scales it, and 256 is the full number. Without it an eighth is tried, but no fewer than 32 and no more than
+/// the full number.
+///
+/// # Panics
+/// When `PROPTEST_CASES` is no number.
+#[must_use]
+pub fn cases(full: u32) -> u32 {
+    let Ok(asked) = env::var("PROPTEST_CASES") else { return full.min(32.max(full / 8)) };
+    let asked: u64 = asked.parse().expect("PROPTEST_CASES is a number");
+    u32::try_from(u64::from(full) * asked / 256).unwrap_or(u32::MAX).max(1)
+}
+
+/// Tries `holds` on so many [`cases`] of `strategy`. The number of cases tried.
 ///
 /// # Panics
 /// With the smallest counterexample found, when the law does not hold.
-pub fn law<S: Strategy>(cases: u32, strategy: S, holds: impl Fn(S::Value) -> TestCaseResult) -> u32
+pub fn law<S: Strategy>(full: u32, strategy: S, holds: impl Fn(S::Value) -> TestCaseResult) -> u32
 where
     S::Value: Debug,
 {
-    let mut config = Config::default();
-    let scaled = u64::from(cases) * u64::from(config.cases) / 256;
-    config.cases = u32::try_from(scaled).unwrap_or(u32::MAX).max(1);
+    let cases = cases(full);
+    let mut config = Config { cases, ..Config::default() };
     if config.rng_seed == RngSeed::Random {
         config.rng_seed = RngSeed::Fixed(SEED);
     }
     config.failure_persistence = Some(Box::new(FileFailurePersistence::Direct("proptest-regressions/laws.txt")));
     config.max_local_rejects = u32::MAX;
-    config.max_global_rejects = config.cases.saturating_mul(16);
-    let cases = config.cases;
+    config.max_global_rejects = cases.saturating_mul(16);
     let mut runner = TestRunner::new(config);
     if let Err(broken) = runner.run(&strategy, holds) {
         panic!("{broken}\n{runner}");
@@ -36,14 +47,19 @@ where
     cases
 }
 
-/// Holds the draws themselves to account: `count` of `cases` met what a law is about, at least one in
-/// so many. Few cases prove nothing and are let pass.
+/// Whether so many cases must show what a law is about: many do by any seed, a few by the fixed one.
+#[must_use]
+pub fn telling(cases: u32) -> bool {
+    cases >= 100 || cases >= 8 && env::var_os("PROPTEST_RNG_SEED").is_none()
+}
+
+/// Requires that `count` of `cases` met what a law is about, at least one in so many.
 ///
 /// # Panics
 /// When the draws hardly ever meet it.
 pub fn not_idle(what: &str, count: u32, cases: u32, one_in: u32) {
     assert!(
-        cases < 100 || u64::from(count) * u64::from(one_in) >= u64::from(cases),
+        !telling(cases) || u64::from(count) * u64::from(one_in) >= u64::from(cases),
         "{what}: {count} in {cases} cases"
     );
 }

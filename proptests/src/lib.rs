@@ -7,14 +7,13 @@
 //! tomorrow.
 //!
 //! ```text
-//! cargo test -p seafix-proptests                                    # under a minute
-//! PROPTEST_CASES=20000 cargo test --release -p seafix-proptests     # the long proof, many minutes
+//! cargo test -p seafix-proptests                                    # the short suite
+//! PROPTEST_CASES=20000 cargo test --release -p seafix-proptests     # the long proof
 //! PROPTEST_RNG_SEED=7 cargo test -p seafix-proptests                # other draws
 //! ```
 //!
-//! `PROPTEST_CASES` scales every law alike: the default is 256, and a law that is dear runs a stated
-//! share of it. Seeds are fixed, so every run draws the same cases; what failed once is kept in
-//! `proptest-regressions/` and tried first ever after.
+//! [`cases`] says how many cases a law has: few by default, as many as `PROPTEST_CASES` asks for in the long proof. Seeds are
+//! fixed, so every run draws the same cases; what failed once is kept in `proptest-regressions/` and tried first ever after.
 
 pub mod admissible;
 pub mod imitations;
@@ -31,4 +30,4 @@ pub mod variants;
 pub mod views;
 pub mod voyage;
 
-pub use law::{law, not_idle, within};
+pub use law::{cases, law, not_idle, telling, within};

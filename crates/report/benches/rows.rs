@@ -4,7 +4,10 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement says what it measures")]
 
-#[path = "../tests/rows/mod.rs"]
+#[path = "../tests/it/made_up.rs"]
+#[expect(dead_code, reason = "tests want the rest")]
+mod made_up;
+#[path = "../tests/it/rows.rs"]
 mod rows;
 
 use std::{fs, time::Instant};

@@ -63,8 +63,9 @@ fn save(name: &str, image: &Image) {
     std::fs::write(std::env::temp_dir().join(format!("seafix-{name}.pgm")), bytes).unwrap();
 }
 
+/// The time that pairs take: `cargo test --release -p seafix-simulation pace -- --ignored --nocapture`
 #[test]
-#[ignore = "the time that pairs take: cargo test --release -p seafix-simulation pace -- --ignored --nocapture"]
+#[ignore = "table"]
 fn pace() {
     let field = field(&built_in("drill-centre").unwrap());
     for (scale, threads) in [(1.0, Threads::One), (1.0, Threads::Pool), (1.5625, Threads::Pool)] {

@@ -140,8 +140,9 @@ fn a_way_through_an_object_is_refused_with_place_and_time() {
     assert!(line.contains("route: lamp 0 comes within 0.3 m of something near `"), "{line}");
 }
 
+/// Frames of points a second: `cargo test --release -p seafix-simulation frames_of_points -- --ignored --nocapture`
 #[test]
-#[ignore = "frames of points a second: cargo test --release --workspace --lib frames_of_points -- --ignored --nocapture"]
+#[ignore = "table"]
 fn frames_of_points() {
     let plan = planned(&Mission { as_points: true, frames: 2000, rate: 0.0, ..Mission::default() });
     for clutter in [plan.settings().points.clutter, 0] {

@@ -11,7 +11,7 @@ pub struct PointRules {
     pub sigma_px: f64,
     /// How far such a key point lies off the corner that it means, in both images alike (standard deviation, px): directions
     /// suffer, disparities do not. Of 130 corners in 60 rendered pairs of a dive Harris' maxima were .87 px off an axis
-    /// (RMS) and their disparities .13; fitted corners .16 and .05 (`--test located -- --ignored --nocapture`).
+    /// (RMS) and their disparities .13; fitted corners .16 and .05 (`cargo test -p seafix-experiment located:: -- --ignored --nocapture`).
     pub peak_px: f64,
     /// Standard deviation of what the camera model leaves unexplained (px): calibration, lens, housing. It
     /// comes to every coordinate in both images: an alignment may be good to a hundredth of a pixel, the

@@ -1,0 +1,197 @@
+//! Two images to a cloud, as a person and as a program asks for it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use assert_cmd::Command;
+use seafix_experiment::dataset::{ImageLimits, read_image, write_png};
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample").join(name)
+}
+
+/// The first stereo pair of the sample, and more arguments.
+fn cloud(more: &[&str]) -> assert_cmd::assert::Assert {
+    let table = fs::read_to_string(sample("frames.csv")).unwrap();
+    let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
+    let mut command = Command::cargo_bin("seafix").unwrap();
+    command.arg("cloud").args(pair.iter().map(|name| sample(name)));
+    command.arg("--rig").arg(sample("dataset.toml")).args(more).assert()
+}
+
+fn json(more: &[&str]) -> Value {
+    serde_json::from_slice(&cloud(&[&["--json"], more].concat()).success().get_output().stdout).unwrap()
+}
+
+/// The error of a command that ends with this code and prints nothing.
+fn refusal(more: &[&str], code: i32) -> String {
+    let ended = cloud(more).code(code);
+    assert!(ended.get_output().stdout.is_empty());
+    let text = String::from_utf8(ended.get_output().stderr.clone()).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    text
+}
+
+#[test]
+fn a_program_gets_every_point_and_the_times() {
+    let all = json(&["--repeat", "2"]);
+    let points = all["points"].as_array().unwrap();
+    assert!(points.len() > 100);
+    for point in points {
+        let (position, covariance) = (&point["position"], &point["covariance"]);
+        assert!(position[2].as_f64().unwrap() > 0.0);
+        assert!((0..3).all(|i| covariance[i][i].as_f64().unwrap() > 0.0));
+        // The rig of the sample is rectified: the two rows agree but for noise.
+        let row = |side: &str| point[side][1].as_f64().unwrap();
+        assert!((row("left") - row("right")).abs() < 3.0, "{point}");
+    }
+    for stage in ["filter", "detect", "describe", "match", "refine", "triangulate", "total"] {
+        let times = &all["times_ms"][stage];
+        let (least, median) = (times["least"].as_f64().unwrap(), times["median"].as_f64().unwrap());
+        assert!(0.0 <= least && least <= median, "{stage}: {times}");
+    }
+}
+
+#[test]
+fn threads_and_repeats_change_no_point() {
+    let points = |more: &[&str]| json(more)["points"].clone();
+    assert_eq!(points(&["--threads", "3", "--repeat", "3"]), points(&[]));
+}
+
+#[test]
+fn the_budget_is_kept() {
+    let all = json(&["--features", "50"]);
+    assert_eq!(all["keypoints"], serde_json::json!([50, 50]));
+    assert_eq!(all["pipeline"]["detector"]["features"], 50);
+}
+
+#[test]
+fn refinement_and_triangulation_are_chosen_by_name() {
+    let chosen = json(&["--set", "refine=none", "--set", "triangulation=midpoint"]);
+    let name = |all: &Value, stage: &str| all["pipeline"][stage]["name"].as_str().unwrap().to_owned();
+    assert_eq!((name(&chosen, "refine"), name(&chosen, "triangulation")), ("none".to_owned(), "midpoint".to_owned()));
+    assert!(chosen["points"].as_array().unwrap().len() > 100);
+    let set = json(&["--set", "refine.window=15", "--set", "triangulation.max-depth=9"]);
+    assert_eq!((name(&set, "refine"), name(&set, "triangulation")), ("direct".to_owned(), "optimal".to_owned()));
+    assert_eq!(
+        (&set["pipeline"]["refine"]["window"], &set["pipeline"]["triangulation"]["max-depth"]),
+        (&15.into(), &9.into())
+    );
+    assert!(refusal(&["--set", "refine=dirct"], 2).contains("no refinement is called `dirct`, did you mean `direct`?"));
+}
+
+#[test]
+fn the_cloud_is_written_whole() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("cloud.ply");
+    let said = cloud(&["--out", file.to_str().unwrap()]).success();
+    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    let bytes = fs::read(&file).unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let header = String::from_utf8(bytes[..end].to_vec()).unwrap();
+    let count: usize = header.split("element vertex ").nth(1).unwrap().lines().next().unwrap().parse().unwrap();
+    assert_eq!(bytes.len() - end, count * (3 * 8 + 3 + 4));
+    assert!(said.contains(&format!("{count} points")), "{said}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing half-written stays");
+}
+
+#[test]
+fn images_that_changed_places_are_refused() {
+    let mut command = Command::cargo_bin("seafix").unwrap();
+    let table = fs::read_to_string(sample("frames.csv")).unwrap();
+    let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
+    command.arg("cloud").args([sample(pair[1]), sample(pair[0])]).arg("--rig").arg(sample("dataset.toml"));
+    let said = String::from_utf8(command.assert().code(3).get_output().stderr.clone()).unwrap();
+    assert!(said.contains("left and right images that have changed places") && said.lines().count() == 1, "{said}");
+}
+
+/// The cloud of two of the sample's images with a changed rig; what it says on standard error.
+fn said(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("dataset.toml");
+    fs::write(&file, rig(fs::read_to_string(sample("dataset.toml")).unwrap())).unwrap();
+    let mut command = Command::cargo_bin("seafix").unwrap();
+    command.arg("cloud").args(images.map(sample)).arg("--rig").arg(&file);
+    String::from_utf8(command.assert().code(code).get_output().stderr.clone()).unwrap()
+}
+
+/// Seen to fail when the two images are not compared: there were 17 points.
+#[test]
+fn one_image_twice_is_refused() {
+    let said = said(["left000.png", "left000.png"], |rig| rig, 3);
+    assert!(said.contains("left and right images that are the same") && said.lines().count() == 1, "{said}");
+}
+
+/// Images that were not made by their rig are told by their epipolar distances, and a rig that is called rectified and is
+/// not by its numbers.
+#[test]
+fn rows_that_do_not_correspond_are_told() {
+    let images = ["left000.png", "right000.png"];
+    assert_eq!(said(images, |rig| rig, 0), "");
+    // The right camera looks 20 rows lower than it says.
+    let lower = |rig: String| {
+        let (left, right) = rig.split_once("[rig.right]").unwrap();
+        format!("{left}[rig.right]{}", right.replace("cy = 383.5", "cy = 403.5"))
+    };
+    let told = said(images, lower, 0);
+    assert!(told.contains("warning: a rig that is called rectified and is not in "), "{told}");
+    // As above, but the numbers hold the rows for equal.
+    let upright =
+        |rig: String| rig.replace("-0.25]", "0.0]").replacen("0.0, 1.0, 0.0, 0.0]", "0.0, 1.0, 0.0, -0.25]", 1);
+    let told = said(images, upright, 0);
+    let parts = [
+        "a rig that the images contradict in ",
+        "lie within 3 px of the same columns, rms ",
+        " px; give the calibration",
+    ];
+    assert!(parts.iter().all(|part| told.contains(part)), "{told}");
+}
+
+#[test]
+fn key_points_that_come_to_nothing_are_told() {
+    let images = [sample("right000.png"), sample("left000.png")];
+    let run = |images: &[PathBuf; 2]| {
+        let mut command = Command::cargo_bin("seafix").unwrap();
+        // Too few corners to say that the images have changed places.
+        command.arg("cloud").args(images).arg("--rig").arg(sample("dataset.toml"));
+        String::from_utf8(command.output().unwrap().stderr).unwrap()
+    };
+    assert!(run(&images).contains("changed places"));
+    let folder = TempDir::new().unwrap();
+    let few = images.map(|image| {
+        // All dark but for a small part of the image.
+        let name = folder.path().join(image.file_name().unwrap());
+        let mut grey = read_image(&image, [1024, 768], 16, ImageLimits::default()).unwrap();
+        let seen = |i: usize| (440..560).contains(&(i % 1024)) && (330..400).contains(&(i / 1024));
+        grey.pixels_mut().iter_mut().enumerate().filter(|(i, _)| !seen(*i)).for_each(|(_, pixel)| *pixel = 40.0);
+        write_png(&name, &grey, 8).unwrap();
+        name
+    });
+    let told = run(&few);
+    let parts = ["warning: key points and no point in ", "with left and right exchanged ", "; exchange the images if"];
+    assert!(parts.iter().all(|part| told.contains(part)), "{told}");
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_one_line() {
+    assert!(refusal(&["--detector", "haris"], 2).contains("did you mean `harris`?"));
+    assert!(refusal(&["--features", "0"], 2).contains("features"));
+    assert!(refusal(&["--set", "detector.sigmma=2"], 2).contains("did you mean `sigma`?"));
+    assert!(refusal(&["--out", "/nowhere/cloud.ply"], 4).contains("/nowhere/cloud.ply"));
+    let folder = TempDir::new().unwrap();
+    let rig = folder.path().join("dataset.toml");
+    let text = fs::read_to_string(sample("dataset.toml")).unwrap();
+    let refused = |text: &str| {
+        fs::write(&rig, text).unwrap();
+        let mut command = Command::cargo_bin("seafix").unwrap();
+        let image = sample("frames.csv");
+        command.arg("cloud").args([&image, &image]).arg("--rig").arg(&rig);
+        String::from_utf8(command.assert().code(3).get_output().stderr.clone()).unwrap()
+    };
+    assert!(refused(&text).contains("no image that can be decoded"));
+    assert!(refused(&text.replace("fx = ", "fx = -")).contains("dataset.toml:"));
+}

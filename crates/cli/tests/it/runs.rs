@@ -1,0 +1,273 @@
+//! What can be done with runs: comparing two, and saving a log that was cut off.
+
+use std::{fs, path::Path};
+
+use assert_cmd::Command;
+
+const EXPERIMENT: &str = "question = 'Which?'\nseed = 3\n[source]\nname = 'virtual-points'\nframes = 2\n\
+                          [[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'triad']\n";
+
+fn seafix(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let out = Command::cargo_bin("seafix").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (out.status.code().unwrap(), text(out.stdout), text(out.stderr))
+}
+
+#[test]
+fn two_runs_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    for (out, settings) in [("a", &[][..]), ("b", &["--threads", "2"]), ("c", &["--set", "seed=4"])] {
+        let (code, _, error) = seafix(folder, &[&["run", "e.toml", "--out", out], settings].concat());
+        assert_eq!(code, 0, "{error}");
+    }
+    let (code, out, _) = seafix(folder, &["diff", "a", "b"]);
+    assert!(code == 0 && out.starts_with("no difference"), "{out}");
+    let (code, out, _) = seafix(folder, &["diff", "a", "c"]);
+    assert_eq!(code, 1);
+    assert!(out.starts_with("configuration\n  seed: 3 | 4\n") && out.contains("m2_rms:"), "{out}");
+    let (code, _, error) = seafix(folder, &["diff", "a", "nowhere"]);
+    assert!(code == 3 && error.contains("name the folder of a finished run"), "{error}");
+}
+
+/// Trials belong together by what they are, not by where they stand. Seen to fail with rows paired by the trial's place.
+#[test]
+fn runs_with_their_trials_in_another_order_are_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run = |name: &str, axes: &str| {
+        let start = EXPERIMENT.split("[[vary]]").next().unwrap();
+        fs::write(folder.join("e.toml"), format!("{start}{axes}")).unwrap();
+        assert_eq!(seafix(folder, &["run", "e.toml", "--out", name]).0, 0);
+    };
+    let solvers = |names: &str| format!("[[vary]]\nkey = 'pipeline.solver'\nvalues = [{names}]\n");
+    run("a", &solvers("'kabsch', 'triad'"));
+    run("b", &solvers("'triad', 'kabsch'"));
+    run("c", &solvers("'horn', 'triad', 'umeyama', 'kabsch'"));
+    run("d", &format!("{}[[vary]]\nkey = 'source.distance'\nvalues = [2.0, 3.0]\n", solvers("'triad', 'kabsch'")));
+    let (code, out, _) = seafix(folder, &["diff", "a", "b"]);
+    assert!(code == 0 && out.contains("equal rows"), "{out}");
+    for (other, alone) in
+        [("c", ["trial 001-solver-horn", "trial 003-solver-umeyama"]), ("d", ["distance-2.0", "distance-"])]
+    {
+        let (code, out, _) = seafix(folder, &["diff", "a", other]);
+        assert_eq!(code, 1, "{out}");
+        assert!(alone.iter().all(|name| out.contains(name)) && out.contains("trials: 2 | 4"), "{out}");
+        // What is in both is the same.
+        assert!(out.lines().filter(|line| line.contains(" differ")).all(|line| line.starts_with("  row:")), "{out}");
+    }
+    let (code, _, error) = seafix(folder, &["run", "e.toml", "--out", "s", "--shard", "1/2"]);
+    assert_eq!(code, 0, "{error}");
+    let (code, _, error) = seafix(folder, &["diff", "a", "s"]);
+    assert!(code == 3 && error.contains("a shard of a run") && error.contains("seafix merge"), "{error}");
+}
+
+/// A run is checked by its own manifest, its report by `report --verify`; what a damaged shard is told to do mends it.
+#[test]
+fn a_run_is_checked_by_what_it_wrote() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    assert_eq!(seafix(folder, &["run", "e.toml", "--out", "a"]).0, 0);
+    for of in ["a", "."] {
+        let (code, out, _) = seafix(folder, &["check", of]);
+        assert!(code == 0 && out.contains("a: in order") && !out.contains("fault"), "{of}: {out}");
+    }
+    let table = folder.join("a/results.csv");
+    let bytes = fs::read(&table).unwrap();
+    fs::write(&table, &bytes[..bytes.len() - 1]).unwrap();
+    let (code, out, _) = seafix(folder, &["check", "a"]);
+    assert!(code == 1 && out.contains("not the file that the run wrote in a/results.csv"), "{out}");
+    fs::write(&table, bytes).unwrap();
+    let manifest = folder.join("a/manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("\"finished\"", "\"running\"")).unwrap();
+    let (code, out, _) = seafix(folder, &["check", "a"]);
+    assert!(code == 1 && out.contains("a run that has not ended in a: running") && out.contains("--resume"), "{out}");
+
+    for k in ["1/2", "2/2"] {
+        assert_eq!(seafix(folder, &["run", "e.toml", "--untimed", "--shard", k, "--out", &k[..1]]).0, 0);
+    }
+    assert_eq!(seafix(folder, &["run", "e.toml", "--untimed", "--out", "whole"]).0, 0);
+    let rows = folder.join("1/pieces/000000/rows.csv");
+    let mut bytes = fs::read(&rows).unwrap();
+    bytes[0] ^= 1;
+    fs::write(&rows, bytes).unwrap();
+    let (code, _, error) = seafix(folder, &["merge", "1", "2", "--out", "merged"]);
+    assert!(code == 3 && error.contains("--resume"), "{error}");
+    assert_eq!(seafix(folder, &["run", "e.toml", "--untimed", "--shard", "1/2", "--out", "1", "--resume"]).0, 0);
+    let (code, _, error) = seafix(folder, &["merge", "1", "2", "--out", "merged"]);
+    assert_eq!(code, 0, "{error}");
+    assert!(
+        fs::read(folder.join("merged/results.csv")).unwrap() == fs::read(folder.join("whole/results.csv")).unwrap()
+    );
+}
+
+#[test]
+fn reports_are_verified_and_runs_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    for (out, seed) in [("a", "seed=3"), ("b", "seed=3"), ("c", "seed=4")] {
+        assert_eq!(seafix(folder, &["run", "e.toml", "--out", out, "--set", seed]).0, 0);
+    }
+    let (code, out, _) = seafix(folder, &["report", "a", "b", "--out", "reports", "--index"]);
+    assert!(code == 0 && out.contains("findings: reports/README.md"), "{out}");
+    assert!(folder.join("reports/b/report.pdf").exists() && folder.join("reports/a/tables/errors.json").exists());
+    let (code, out, _) = seafix(folder, &["report", "a", "b", "--out", "reports", "--verify"]);
+    assert!(code == 0 && out.contains("numbers equal to the last digit"), "{out}");
+    let page = folder.join("reports/a/report.html");
+    let text = fs::read_to_string(&page).unwrap().replacen("</data>", "7</data>", 1);
+    fs::write(&page, text).unwrap();
+    let (code, out, _) = seafix(folder, &["report", "a", "--out", "reports/a", "--verify"]);
+    assert!(code == 1 && out.contains("report.html: printed"), "{out}");
+    for name in ["results.csv", "results.parquet"] {
+        let table = folder.join("b").join(name);
+        let bytes = fs::read(&table).unwrap();
+        fs::write(&table, [&bytes[..], b"\n"].concat()).unwrap();
+        let (code, out, _) = seafix(folder, &["report", "b", "--out", "reports/b", "--verify"]);
+        assert!(code == 1 && out.contains(&format!("b/{name}: another SHA-256")), "{out}");
+        fs::remove_file(&table).unwrap();
+        let (code, out, _) = seafix(folder, &["report", "b", "--out", "reports/b", "--verify"]);
+        assert!(code == 1 && out.contains("a file of the run that is gone"), "{out}");
+        fs::write(&table, bytes).unwrap();
+    }
+
+    let (code, out, error) = seafix(folder, &["compare", "a", "b", "--out", "compared"]);
+    assert!(code == 0 && folder.join("compared/compare.html").exists(), "{out}{error}");
+    let (code, _, error) = seafix(folder, &["compare", "a", "c"]);
+    assert!(code == 3 && error.contains("seeds: experiment 3 against experiment 4"), "{error}");
+    assert_ne!(seafix(folder, &["compare", "a", "c", "--force"]).0, 3);
+    assert_eq!(seafix(folder, &["compare", "a", "a"]).0, 2);
+    assert_eq!(seafix(folder, &["report", "a", "a", "--out", "x"]).0, 2);
+}
+
+#[test]
+fn a_log_that_was_cut_off_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("e.toml"), EXPERIMENT).unwrap();
+    assert_eq!(seafix(folder, &["run", "e.toml", "--out", "a"]).0, 0);
+    let log = folder.join("a/001-solver-kabsch.mcap");
+    let bytes = fs::read(&log).unwrap();
+    fs::write(folder.join("cut.mcap.partial"), &bytes[..bytes.len() - 30]).unwrap();
+    let (code, out, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
+    assert!(code == 0 && out.contains("2 whole frames"), "{out}{error}");
+    assert_eq!(seafix(folder, &["check", "cut-recovered.mcap"]).0, 0);
+    let (code, _, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
+    assert!(code == 4 && error.contains("name another file with --out"), "{error}");
+    let (code, _, error) = seafix(folder, &["report", "cut.mcap.partial"]);
+    assert!(code == 3 && error.contains("not the folder of a run"), "{error}");
+    let (code, _, error) = seafix(folder, &["recover", "e.toml"]);
+    assert!(code == 3 && error.contains("not an MCAP file"), "{error}");
+}
+
+/// What the message of an interrupted run promises. A shard leaves its pieces as they are: here the first and the third of
+/// three, 16 + 8 frames, and a torn one is laid beside them.
+#[test]
+fn a_run_that_did_not_end_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let points =
+        "question = 'Where?'\n[source]\nname = 'virtual-layouts'\nframes = 40\n[pipeline]\nsolver = 'kabsch'\n";
+    fs::write(folder.join("e.toml"), points).unwrap();
+    assert_eq!(seafix(folder, &["run", "e.toml", "--shard", "1/2", "--out", "a"]).0, 0);
+    let torn = folder.join("a/pieces/000005.partial");
+    fs::create_dir(&torn).unwrap();
+    let bytes = fs::read(folder.join("a/pieces/000002/001.mcap")).unwrap();
+    fs::write(torn.join("001.mcap.partial"), &bytes[..100]).unwrap();
+    let (code, out, error) = seafix(folder, &["recover", "a"]);
+    assert!(code == 0 && out.contains("24 whole frames of 2 pieces"), "{out}{error}");
+    assert!(error.contains("lost: no message in it is readable"), "{error}");
+    assert_eq!(seafix(folder, &["check", "a/recovered/001.mcap"]).0, 0);
+    assert_eq!(seafix(folder, &["report", "a/recovered"]).0, 0);
+    let (code, _, error) = seafix(folder, &["recover", "a"]);
+    assert!(code == 4 && error.contains("name another folder with --out"), "{error}");
+    let (code, _, error) = seafix(folder, &["recover", "a/pieces"]);
+    assert!(code == 3 && error.contains("no piece of a run"), "{error}");
+}
+
+/// All files below a folder.
+fn files(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            found.extend(files(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
+        } else {
+            found.insert(name, fs::read(path).unwrap());
+        }
+    }
+    found
+}
+
+/// Reports that a repository keeps are made again to the last byte, from the logs or from nothing; what was changed in
+/// them, and in the page that sums them up, is noticed.
+#[test]
+fn a_list_of_experiments_is_published_again_to_the_last_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for name in ["a", "b", "gone"] {
+        fs::write(
+            folder.join(format!("{name}.toml")),
+            EXPERIMENT.replace("seed = 3", &format!("seed = {}", name.len())),
+        )
+        .unwrap();
+    }
+    let entry = |name: &str, set: &str| format!("[[report]]\nexperiment = '{name}.toml'\n{set}\n");
+    let list =
+        |entries: &str| fs::write(folder.join("list.toml"), format!("format = 'seafix-reports/1'\n{entries}")).unwrap();
+    let publish = |more: &[&str]| seafix(folder, &[&["publish", "list.toml"], more].concat());
+
+    list(&(entry("a", "set = ['source.frames=3']") + &entry("gone", "")));
+    let (code, out, error) = publish(&[]);
+    assert!(code == 0 && out.contains("reports/README.md"), "{out}{error}");
+    list(&(entry("a", "set = ['source.frames=3']") + &entry("b", "")));
+    let (code, _, error) = publish(&[]);
+    assert!(code == 0 && error.contains("reports/gone: a report that is not in list.toml"), "{error}");
+    assert!(folder.join("reports/gone/report.html").exists(), "nobody asked for its removal");
+    fs::remove_dir_all(folder.join("reports/gone")).unwrap();
+    let first = files(&folder.join("reports"));
+    assert!(first.contains_key("b/main.svg"), "{:?}", first.keys());
+    let text = |name: &str| String::from_utf8(first[name].clone()).unwrap();
+    assert!(text("a/report.html").contains("Not the experiment as its file says"));
+    assert!(!text("b/report.html").contains("Not the experiment as its file says"));
+    assert!(text("README.md").contains("[![The main figure of b](b/main.svg)](b/report.html)"));
+    assert!(first.values().map(Vec::len).sum::<usize>() < 1_000_000);
+
+    fs::remove_dir_all(folder.join("reports")).unwrap();
+    assert_eq!(publish(&["--logged"]).0, 0);
+    assert!(files(&folder.join("reports")) == first, "from the logs");
+    assert_eq!(publish(&["--runs", "other", "--out", "again", "--threads", "2"]).0, 0);
+    assert!(files(&folder.join("again")) == first, "from nothing");
+
+    assert_eq!(publish(&["--verify"]).0, 0);
+    for file in ["reports/README.md", "reports/b/summary.txt"] {
+        fs::write(folder.join(file), "found: all").unwrap();
+        let (code, out, _) = publish(&["--verify"]);
+        assert!(code == 1 && out.contains("is not what the logs make"), "{file}: {out}");
+        assert_eq!(publish(&["--logged"]).0, 0);
+    }
+    let stray = folder.join("reports/old");
+    fs::create_dir(&stray).unwrap();
+    for name in ["report.html", "summary.txt"] {
+        fs::copy(folder.join("reports/b").join(name), stray.join(name)).unwrap();
+    }
+    let (code, out, error) = publish(&["--verify"]);
+    assert!(
+        code == 1 && out.contains("2 of 2 reports") && error.contains("reports/old: a report that is not"),
+        "{out}{error}"
+    );
+    fs::remove_dir_all(stray).unwrap();
+    fs::rename(folder.join("reports/a"), folder.join("a-away")).unwrap();
+    let (code, out, error) = publish(&["--verify"]);
+    assert!(code == 3 && out.contains("1 of 2 reports") && error.contains("reports/a/report.html"), "{out}{error}");
+    fs::rename(folder.join("a-away"), folder.join("reports/a")).unwrap();
+
+    let (code, _, error) = publish(&["--only", "c"]);
+    assert!(code == 2 && error.contains("`c` is not in list.toml; there are a, b"), "{error}");
+    let (code, out, _) = seafix(folder, &["check", "list.toml"]);
+    assert!(code == 0 && out.contains("in order"), "{out}");
+}

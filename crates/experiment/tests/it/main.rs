@@ -1,0 +1,14 @@
+//! Experiments from file to result.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
+
+mod costs;
+mod foreign;
+mod located;
+mod logging_cost;
+mod model;
+mod network;
+mod problems;
+mod replay;
+mod run;
+mod supported;

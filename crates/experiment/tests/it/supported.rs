@@ -1,0 +1,217 @@
+//! What supports a fix stands in the log and in the table; a joint fix that fails says so.
+
+use std::{
+    collections::HashMap,
+    fs::{self, File},
+};
+
+use nalgebra::{Matrix3, Matrix4};
+use parquet::{
+    file::{reader::FileReader, serialized_reader::SerializedFileReader},
+    record::Field,
+};
+use seafix_experiment::{Options, Plan, Silent, run};
+use seafix_geometry::{MeasuredPoint, Pixel, Point, StereoPixels, UncertainPixels, UncertainPoint};
+use seafix_log::{FrameRecord, Outcome, TrialLog, read};
+use seafix_referencing::{
+    Acceptance, Candidates, Correspondence, ModelPoint, Outcome as Answer, Problem, StereoReprojection, Tolerance,
+    judge_named,
+};
+use seafix_simulation::VirtualRig;
+use tempfile::TempDir;
+
+/// The frames of the log and the rows of the table of an experiment's only trial.
+fn made(experiment: &str) -> (Vec<FrameRecord>, Vec<HashMap<String, String>>) {
+    let (log, rows) = run_of(experiment);
+    (log.frames, rows)
+}
+
+/// Its log and the rows of its table, which CSV and Parquet hold alike.
+fn run_of(experiment: &str) -> (TrialLog, Vec<HashMap<String, String>>) {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("e.toml");
+    fs::write(&file, format!("question = 'Why believe it?'\nseed = 5\n{experiment}")).unwrap();
+    let plan = Plan::read(&file, &[]).unwrap();
+    let out = folder.path().join("run");
+    run(&plan, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
+    let log = read(&out.join(format!("{}.mcap", plan.trials[0].name))).unwrap();
+    let table = fs::read_to_string(out.join("results.csv")).unwrap();
+    let mut lines = table.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    let rows: Vec<HashMap<String, String>> = lines.map(|row| head.iter().cloned().zip(row).collect()).collect();
+    let parquet = SerializedFileReader::new(File::open(out.join("results.parquet")).unwrap()).unwrap();
+    for (row, same) in rows.iter().zip(parquet.get_row_iter(None).unwrap()) {
+        for (name, field) in same.unwrap().get_column_iter() {
+            let (text, number) = (&row[name], row[name].parse::<f64>());
+            match field {
+                Field::Double(value) => assert_eq!(number, Ok(*value), "{name}"),
+                Field::Long(value) => assert_eq!(number, Ok(*value as f64), "{name}"),
+                Field::Str(value) => assert_eq!(text.trim_matches('"'), value, "{name}"),
+                Field::Null => assert_eq!(text, "", "{name}"),
+                _ => {}
+            }
+        }
+    }
+    (log, rows)
+}
+
+#[test]
+fn what_supports_a_fix_stands_in_log_and_table() {
+    for (points, grade) in [(3, "unmonitored"), (4, "detectable"), (13, "excludable")] {
+        let (frames, rows) =
+            made(&format!("[source]\nname = 'virtual-layouts'\nlayouts = 2\nframes = 8\npoints = {points}\n"));
+        let mut fixes = 0;
+        for (frame, row) in frames.iter().zip(&rows) {
+            let target = &frame.targets[0];
+            if target.outcome != Outcome::Referenced {
+                assert!(target.integrity.is_none() && row["redundancy"].is_empty() && row["chi2"].is_empty());
+                continue;
+            }
+            fixes += 1;
+            let it = target.integrity.as_ref().unwrap();
+            assert_eq!((it.redundancy.as_str(), it.freedom), (grade, 3 * points - 6));
+            assert!(it.chi2 > 0.0 || points == 3, "{it:?}");
+            assert!(it.chi2 <= it.chi2_limit);
+            let number = |name: &str| row[name].parse::<f64>().ok();
+            assert_eq!(row["redundancy"], grade);
+            assert_eq!(number("chi2_freedom"), Some(it.freedom as f64));
+            let columns = ["chi2", "chi2_limit", "separation", "protection_position", "protection_attitude"];
+            let logged =
+                [Some(it.chi2), Some(it.chi2_limit), it.separation, it.protection_position, it.protection_attitude];
+            assert_eq!(columns.map(number), logged);
+            assert_eq!(it.protection_position.is_some(), it.protection_attitude.is_some());
+            assert!(points != 3 || (it.separation, it.protection_position) == (None, None));
+            assert!(points != 13 || it.protection_position.unwrap() > it.separation.unwrap());
+        }
+        assert!(fixes > 0, "{points} points");
+    }
+}
+
+/// What the log and the table say of a fix is what the fix itself says, to the last bit: the points that were logged, judged
+/// once more.
+///
+/// Seen to fail when the position's level is logged as the attitude's.
+#[test]
+fn the_log_and_the_table_say_what_the_fix_says() {
+    let (log, rows) = run_of(
+        "[source]\nname = 'virtual-layouts'\nlayouts = 4\nframes = 24\npoints = 9\n[pipeline]\nacceptance = { two-wrong-rate = 0.01 }\n",
+    );
+    let rig = VirtualRig::default().build().unwrap();
+    let acceptance = Acceptance { two_wrong_rate: 0.01, ..Acceptance::default() };
+    assert_eq!((log.frames.len(), rows.len()), (24, 24));
+    for (frame, row) in log.frames.iter().zip(&rows) {
+        let target = &frame.targets[0];
+        let known = log.header.targets.iter().find(|known| known.id == target.object).unwrap();
+        let point = |p: &seafix_log::ModelPoint| ModelPoint {
+            sigma: p.sigma,
+            ..ModelPoint::exact(p.id.clone(), Point::from(p.at))
+        };
+        let model: Vec<ModelPoint> = known.points.iter().map(point).collect();
+        let pixel = |[u, v]: [f64; 2]| Pixel { u, v };
+        let cloud: Vec<MeasuredPoint> = frame
+            .cloud
+            .iter()
+            .zip(&frame.inputs.as_ref().unwrap().pixel_covariances)
+            .map(|(seen, covariance)| {
+                let pixels = seen.pixels.as_ref().unwrap();
+                let at = StereoPixels { left: pixel(pixels.left), right: pixel(pixels.right) };
+                let covariance = Matrix4::from_fn(|r, c| covariance[r][c]);
+                let spread = Matrix3::from_fn(|r, c| seen.covariance[r][c]);
+                let position = UncertainPoint { at: Point::from(seen.at), covariance: spread };
+                MeasuredPoint { position, pixels: Some(UncertainPixels { at, covariance }) }
+            })
+            .collect();
+        let pairs: Vec<Correspondence> = (0..9).map(|k| Correspondence { model: k, cloud: k }).collect();
+        let candidates = Candidates::from_pairs(9, (0..9).map(|k| (k, k)));
+        let (tolerance, prior) = (Tolerance::Sigmas(3.0), None);
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
+        let attempt = judge_named(&problem, pairs, &StereoReprojection::default(), &acceptance, Some(&rig));
+        let Answer::Referenced(fix) = attempt.outcome else { panic!("{:?}", attempt.outcome) };
+        let (said, it) = (&fix.integrity, target.integrity.as_ref().unwrap());
+        assert_eq!(target.object_from_camera, Some(fix.object_from_camera.rows()));
+        assert_eq!((it.redundancy.as_str(), it.freedom), (said.redundancy.name(), said.freedom as u64));
+        let fix_says = [
+            Some(fix.residual_rms),
+            Some(said.chi2),
+            Some(said.chi2_limit),
+            said.separation,
+            said.separation_two,
+            said.protection.map(|level| level.position),
+            said.protection.map(|level| level.attitude),
+            said.stretch.map(|it| it.value),
+            said.stretch.map(|it| it.sigma),
+        ];
+        let log_says = [
+            target.residual_rms,
+            Some(it.chi2),
+            Some(it.chi2_limit),
+            it.separation,
+            it.separation_two,
+            it.protection_position,
+            it.protection_attitude,
+            it.stretch,
+            it.stretch_sigma,
+        ];
+        assert_eq!(fix_says, log_says);
+        assert!(fix_says.iter().all(Option::is_some), "{fix_says:?}");
+        let columns = [
+            "chi2",
+            "chi2_limit",
+            "separation",
+            "separation_two",
+            "protection_position",
+            "protection_attitude",
+            "stretch",
+            "stretch_sigma",
+        ];
+        assert_eq!(columns.map(|name| row[name].parse::<f64>().ok())[..], fix_says[1..]);
+        // Residuals are C·H − P of each pair, and their root mean square is what is logged.
+        for (pair, residual) in fix.pairs.iter().zip(&fix.residuals) {
+            let at = fix.object_from_camera * cloud[pair.cloud].position.at;
+            assert_eq!(at - model[pair.model].at, *residual);
+        }
+        let squares: f64 = fix.residuals.iter().map(|residual| residual.norm_squared()).sum();
+        assert!((fix.residual_rms - (squares / 9.0).sqrt()).abs() < 1e-15);
+    }
+}
+
+/// Half of all true sets fail a test of so little confidence, together as well as alone.
+#[test]
+fn a_joint_fix_that_fails_says_why() {
+    let source = "[source]\nname = 'virtual-layouts'\nlayouts = 2\nobjects = 2\npoints = 12\nframes = 60\nsurvey-sigma = 0.002\n";
+    let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nconfidence = 0.4\n"));
+    let fixes = frames.iter().flat_map(|frame| &frame.targets).filter(|target| target.outcome == Outcome::Referenced);
+    let (joined, failed): (Vec<_>, Vec<_>) = fixes.partition(|target| target.detail.starts_with("joint fix over "));
+    assert!(!failed.is_empty() && !joined.is_empty(), "{} failed, {} joined", failed.len(), joined.len());
+    for target in failed {
+        assert!(target.detail.starts_with("no joint fix, the pose is that of the object alone: "), "{}", target.detail);
+        assert!(target.detail.contains("χ² = "), "{}", target.detail);
+    }
+}
+
+/// An object of which too few points are seen takes part with those, and both say so; its own fix stays refused.
+#[test]
+fn a_joint_fix_says_what_took_part() {
+    let source = "[source]\nname = 'virtual-layouts'\nlayouts = 3\nobjects = 3\npoints = 14\nframes = 30\nsurvey-sigma = 0.001\n";
+    // Objects of five, five and four points, of which five are asked for.
+    let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nleast-points = 5\n"));
+    let (mut took_part, mut left_out) = (0, 0);
+    for frame in &frames {
+        for target in &frame.targets {
+            match target.outcome {
+                Outcome::Referenced => {
+                    assert!(target.detail.starts_with("joint fix over `layout"), "{}", target.detail)
+                }
+                _ => {
+                    assert!(target.detail.starts_with("4 points were identified; 5 are needed"), "{}", target.detail);
+                    took_part += usize::from(target.detail.ends_with("; 4 points took part in the joint fix"));
+                    left_out += usize::from(target.detail.contains("; no part in the joint fix: "));
+                }
+            }
+        }
+        let said = |part: &str| frame.targets.iter().any(|target| target.detail.contains(part));
+        assert_eq!(said("took part in the joint fix"), said("(4 points, not fixed by itself)"));
+        assert_eq!(said("no part in the joint fix"), said("; left out: "));
+    }
+    assert!(took_part > 15, "{took_part} of 30 took part, {left_out} did not");
+}

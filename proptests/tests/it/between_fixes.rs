@@ -1,0 +1,511 @@
+//! Navigation from fix to fix: consistent, bounded, and not led astray by one wrong fix or a moved object.
+
+use nalgebra::Matrix6;
+use proptest::prelude::*;
+use seafix_component::Choice;
+use seafix_evaluation::clopper_pearson;
+use seafix_geometry::{Camera, Covariance6, Object, World};
+use seafix_navigation::{
+    Considered, Event, EveryFrame, FUSIONS, Fuse, Fusion, Interval, Navigated, Navigator, POLICIES, Place, Policy,
+    Situation, Standing, State,
+};
+use seafix_proptests::{law, poses::pose, voyage::Voyage, within};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Every policy asks for a fix where there is none yet and an object is in view.
+///
+/// Seen to fail when the interval compares the wrong way round.
+#[test]
+fn without_a_fix_every_policy_wants_one() {
+    let none = Situation { seconds: f64::INFINITY, metres: f64::INFINITY, sigma: f64::INFINITY, in_view: true };
+    for name in POLICIES.names() {
+        assert!(POLICIES.build(&Choice::named(name)).unwrap().due(&none), "{name}");
+    }
+}
+
+/// A policy that wants a fix wants it still when it is older, the way longer and the pose less certain.
+///
+/// Seen to fail when the interval compares the wrong way round.
+#[test]
+fn a_policy_does_not_change_its_mind() {
+    let number = || prop_oneof![Just(0.0), 0.0..100.0];
+    law(
+        512,
+        (number(), number(), 0.0..1.0, number(), number(), 0.0..1.0, any::<bool>()),
+        |(t, s, g, dt, ds, dg, v)| {
+            let now = Situation { seconds: t, metres: s, sigma: g, in_view: v };
+            let later = Situation { seconds: t + dt, metres: s + ds, sigma: g + dg, in_view: v };
+            for name in POLICIES.names() {
+                let policy = POLICIES.build(&Choice::named(name)).unwrap();
+                prop_assert!(!policy.due(&now) || policy.due(&later), "{name}");
+            }
+            Ok(())
+        },
+    );
+}
+
+/// Two fusions of the same knowledge do not depend on the frame of the object: T ↦ A T on both sides.
+///
+/// Seen to fail when the innovation is taken in the frame of the object.
+#[test]
+fn a_fusion_knows_no_origin() {
+    let near = (pose::<Object, Camera>(5.0), proptest::array::uniform6(-3e-3..3e-3), pose::<Object, Object>(50.0));
+    law(256, near, |(known, off, moved)| {
+        let at =
+            |object_from_camera, sigma| Standing::new(object_from_camera, Covariance6::isotropic(0.5 * sigma, sigma));
+        let fixed = known.perturbed(&off.into());
+        for name in FUSIONS.names() {
+            let fusion = FUSIONS.build(&Choice::named(name)).unwrap();
+            let one = fusion.take(&at(known, 0.01), &at(fixed, 0.02));
+            let two = fusion.take(&at(moved * known, 0.01), &at(moved * fixed, 0.02));
+            let (Ok(one), Ok(two)) = (one, two) else {
+                prop_assert!(false, "{name} rejects what agrees");
+                return Ok(());
+            };
+            let apart = (moved * one.object_from_camera).error_to(&two.object_from_camera);
+            within(name, apart.norm(), 1e-10)?;
+            within(name, (one.covariance.matrix - two.covariance.matrix).amax(), 1e-14)?;
+        }
+        Ok(())
+    });
+}
+
+/// P10. By the world and back a pose is what it was; exact surveys add nothing.
+///
+/// Seen to fail when the two places are exchanged.
+#[test]
+fn passing_there_and_back_changes_nothing() {
+    let place = pose::<World, Object>(50.0);
+    law(256, (pose::<Object, Camera>(5.0), place, pose::<World, Object>(50.0)), |(start, a, b)| {
+        let exact = |world_from_object| Place { world_from_object, covariance: Covariance6::new(Matrix6::zeros()) };
+        let places = [exact(a), exact(b)];
+        let known = Standing::new(start, Covariance6::isotropic(1e-3, 1e-2));
+        let there = Navigated { object: 0, standing: known.clone() }.passed_to(1, &places);
+        let world = a * start;
+        within("there", (b * there.standing.object_from_camera).error_to(&world).norm(), 1e-10)?;
+        let back = there.passed_to(0, &places).standing;
+        within("back", back.object_from_camera.error_to(&start).norm(), 1e-10)?;
+        within("covariance", (back.covariance.matrix - known.covariance.matrix).amax(), 1e-14)
+    });
+}
+
+/// Mean NEES over dives and instants, each dive's mean counted once for the interval.
+fn consistency(dives: u64, steps: usize) -> (f64, f64) {
+    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 20.0 }, Fuse::default());
+    let mut means = Vec::new();
+    for number in 0..dives {
+        let mut sailing = voyage.set_out(number);
+        let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
+        let mut sum = 0.0;
+        for step in 0..steps {
+            let local = sailing.step();
+            navigator.advance(1.0, Some(&local));
+            if navigator.due(true) {
+                navigator.fix(&sailing.fix((step / 30) % voyage.objects));
+            }
+            sum += sailing.nees(navigator.pose().expect("the first instant has a fix"));
+        }
+        means.push(sum / steps as f64);
+    }
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// The error of the navigated pose is as large as its covariance says, over 100 dives: the mean NEES of six degrees
+/// of freedom lies within 4 of its own standard errors of 6.
+///
+/// Seen to fail when the survey is left out of a passage.
+#[test]
+fn the_navigated_pose_errs_as_much_as_it_says() {
+    let (mean, error) = consistency(100, 300);
+    println!("NEES over 100 dives of 300 s: {mean:.3} ± {error:.3}");
+    assert!((mean - 6.0).abs() < 4.0 * error, "{mean} ± {error}");
+}
+
+/// NEES over dives that go past three objects and back, looking at their points: the mean of all dives and instants, and the
+/// share of instants at which the mean of the dives lies within its 95 % bounds.
+fn looked(dives: u64, policy: &dyn Policy, fusion: &dyn Fusion, considered: bool) -> (f64, f64) {
+    const STEPS: usize = 160;
+    let voyage = Voyage { objects: 3, meander: 0.0, ..Voyage::default() };
+    let mut sums = [0.0; STEPS];
+    for number in 0..dives {
+        let mut sailing = voyage.set_out(number);
+        let mut navigator = Navigator::new(sailing.surveyed.clone(), policy, fusion);
+        for (step, sum) in sums.iter_mut().enumerate() {
+            if step == STEPS / 2 {
+                sailing.turn_about();
+            }
+            let local = sailing.step();
+            navigator.advance(1.0, Some(&local));
+            let mut fixes: Vec<Navigated> = (0..voyage.objects).filter_map(|object| sailing.look(object)).collect();
+            if !considered {
+                fixes.iter_mut().for_each(|fix| fix.standing = fix.standing.clone().considering(Considered::default()));
+            }
+            if step == 0 || navigator.due(!fixes.is_empty()) {
+                fixes.iter().for_each(|fix| drop(navigator.fix(fix)));
+            }
+            *sum += sailing.nees(navigator.pose().expect("the first object is in view at first"));
+        }
+    }
+    let n = dives as f64;
+    let all = ChiSquared::new(6.0 * n).expect("a positive number of degrees of freedom");
+    let bounds = [0.025, 0.975].map(|p| all.inverse_cdf(p));
+    let within = sums.iter().filter(|sum| **sum >= bounds[0] && **sum <= bounds[1]).count();
+    (sums.iter().sum::<f64>() / STEPS as f64 / n, within as f64 / STEPS as f64)
+}
+
+/// However often fixes come, what all fixes of a model have wrong is learned from none of them, and what a passage took up
+/// of two surveys the way back gives away: over 100 dives, for every policy and for a fix every frame, every 10 s and every 40 s,
+/// the mean NEES of `fuse` and of the paper's `replace` lies within its 95 % bounds, and does so at nine instants of ten.
+/// Of all that is known to be shared, `fuse` says no more than it knows where there are the most fixes; taken for
+/// independent, they make it far too sure there.
+///
+/// Seen to fail when the fixes' share in the model's errors is left out: 28 instead of 6 with a fix every frame.
+#[test]
+fn what_a_model_has_wrong_is_not_learned_from_many_fixes() {
+    let intervals = [0.0, 10.0, 40.0].map(|seconds| Choice::named("interval").with("seconds", seconds));
+    for choice in POLICIES.names().map(Choice::named).chain(intervals) {
+        let policy = POLICIES.build(&choice).unwrap();
+        for name in ["fuse", "replace"] {
+            let fusion = FUSIONS.build(&Choice::named(name)).unwrap();
+            let (mean, within) = looked(100, &*policy, &*fusion, true);
+            println!("{choice:?} {name}: NEES {mean:.2}, within its bounds at {within:.2} of the instants");
+            assert!((mean - 6.0).abs() < 0.68 && within >= 0.9, "{choice:?} {name}: {mean} {within}");
+        }
+    }
+    let (alone, _) = looked(100, &EveryFrame::default(), &Fuse::default(), false);
+    println!("taken for independent: NEES {alone:.2}");
+    assert!(alone > 12.0, "{alone}");
+}
+
+/// Mean NEES in the end of 100 dives that stay at one object, with a fix a second for a minute.
+fn stayed(fusion: &str, shared: f64) -> f64 {
+    let voyage = Voyage { objects: 1, shared, ..Voyage::default() };
+    let (policy, fusion) = (Interval { seconds: 1.0 }, FUSIONS.build(&Choice::named(fusion)).expect("it is listed"));
+    let mut sum = 0.0;
+    for number in 0..100 {
+        let mut sailing = voyage.set_out(number);
+        let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &*fusion);
+        for _ in 0..60 {
+            navigator.advance(1.0, Some(&sailing.step()));
+            navigator.fix(&sailing.fix(0));
+        }
+        sum += sailing.nees(navigator.pose().expect("it has fixes"));
+    }
+    sum / 100.0
+}
+
+/// The intersection is never too sure of itself, whatever the fixes of an object share and nobody says; where it is not said,
+/// `fuse` takes them for independent and believes itself far too much.
+///
+/// Seen to fail when the intersection weighs both with one.
+#[test]
+fn shared_errors_do_not_add_up_to_certainty() {
+    for shared in [0.0, 0.5, 0.9] {
+        let (intersected, fused) = (stayed("intersect", shared), stayed("fuse", shared));
+        println!(
+            "NEES after a minute, share {shared} of the variance common: intersect {intersected:.1}, fuse {fused:.1}"
+        );
+        // Six on average; 100 dives put a consistent one below seven.
+        assert!(intersected < 7.0, "{shared}: {intersected}");
+        assert!(shared == 0.0 || fused > 12.0, "{shared}: {fused}");
+    }
+}
+
+/// A glimpse of another object that is far worse than the pose carried here leaves the pose where it is.
+///
+/// Seen to fail when every fix passes.
+#[test]
+fn a_poor_glimpse_moves_no_pose() {
+    let voyage = Voyage { survey: (0.02, 0.05), ..Voyage::default() };
+    let mut sailing = voyage.set_out(0);
+    let (policy, fusion) = (Interval { seconds: 1.0 }, FUSIONS.build(&Choice::named("intersect")).unwrap());
+    let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &*fusion);
+    navigator.fix(&sailing.fix(0));
+    let before = navigator.pose().unwrap().clone();
+    let good = sailing.fix(1);
+    let poor = Standing::new(good.standing.object_from_camera, Covariance6::isotropic(0.1, 0.5));
+    assert_eq!(navigator.fix(&Navigated { standing: poor, object: good.object }), Event::Left);
+    assert_eq!(navigator.pose(), Some(&before));
+    assert_eq!(navigator.fix(&good), Event::Taken);
+    assert_eq!(navigator.pose().unwrap().object, 1);
+}
+
+/// Errors along 5 km with a fix every `every` seconds: RMS of the first and of the last third over the dives, and
+/// the slope (m per km) with its standard error.
+fn far(dives: u64, every: f64, steps: usize) -> (f64, f64, f64, f64) {
+    let (voyage, policy, fusion) =
+        (Voyage { objects: 1, ..Voyage::default() }, Interval { seconds: every }, Fuse::default());
+    let (mut slopes, mut first, mut last) = (Vec::new(), 0.0, 0.0);
+    for number in 0..dives {
+        let mut sailing = voyage.set_out(number);
+        let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
+        let (mut xs, mut ys) = (Vec::new(), Vec::new());
+        for step in 0..steps {
+            let local = sailing.step();
+            navigator.advance(1.0, Some(&local));
+            if navigator.due(true) {
+                navigator.fix(&sailing.fix(0));
+            }
+            // The error of the camera's place in its own surroundings: of the pose, not of a far origin.
+            let known = navigator.pose().expect("the first instant has a fix");
+            let error = known.standing.object_from_camera.error_to(&sailing.truth(0));
+            xs.push(step as f64 * voyage.step * 1e-3);
+            ys.push(error.fixed_rows::<3>(3).norm());
+        }
+        let third = steps / 3;
+        let square = |part: &[f64]| part.iter().map(|y| y * y).sum::<f64>() / part.len() as f64;
+        first += square(&ys[..third]) / dives as f64;
+        last += square(&ys[steps - third..]) / dives as f64;
+        let (mx, my) = (xs.iter().sum::<f64>() / steps as f64, ys.iter().sum::<f64>() / steps as f64);
+        let sxy: f64 = xs.iter().zip(&ys).map(|(x, y)| (x - mx) * (y - my)).sum();
+        let sxx: f64 = xs.iter().map(|x| (x - mx).powi(2)).sum();
+        slopes.push(sxy / sxx);
+    }
+    let n = dives as f64;
+    let slope = slopes.iter().sum::<f64>() / n;
+    let error = (slopes.iter().map(|s| (s - slope).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+    (first.sqrt(), last.sqrt(), slope, error)
+}
+
+/// With a fix every 40 s the error does not grow over 5 km: the slope's interval holds zero. Without it does.
+///
+/// Seen to fail when later fixes are not taken.
+#[test]
+fn fixes_bound_the_error_over_any_distance() {
+    let steps = (5000.0 / Voyage::default().step) as usize;
+    let (first, last, slope, error) = far(20, 40.0, steps);
+    println!(
+        "fix every 40 s, 5 km: RMS {first:.4} m in the first third, {last:.4} m in the last; slope {slope:.2e} ± {error:.1e} m/km"
+    );
+    assert!(slope.abs() < 3.0 * error, "{slope} ± {error}");
+    let (first, last, slope, error) = far(20, f64::INFINITY, steps);
+    println!("one fix, 5 km: RMS {first:.4} m, {last:.4} m; slope {slope:.2e} ± {error:.1e} m/km");
+    assert!(slope > 5.0 * error && last > 3.0 * first);
+}
+
+/// Straight on without fixes the attitude errs like √n and the place like n^1.5: doubling the way multiplies them by √2 and √8.
+///
+/// Seen to fail when the covariance is not turned with the motion.
+#[test]
+fn dead_reckoning_grows_as_predicted() {
+    let voyage = Voyage { objects: 1, odometry: (1e-4, 0.0), fix: (1e-9, 1e-9), meander: 0.0, ..Voyage::default() };
+    let spread = |steps: usize| {
+        let (mut real, mut said) = ([0.0; 2], [0.0; 2]);
+        for number in 0..300 {
+            let mut sailing = voyage.set_out(number);
+            let mut known = sailing.fix(0);
+            for _ in 0..steps {
+                known = known.after(&sailing.step());
+            }
+            let error = known.standing.object_from_camera.error_to(&sailing.truth(0));
+            real[0] += error.fixed_rows::<3>(0).norm_squared();
+            real[1] += error.fixed_rows::<3>(3).norm_squared();
+            said[0] += known.standing.covariance.attitude_sigma().powi(2);
+            said[1] += known.standing.covariance.position_sigma().powi(2);
+        }
+        ([(real[0] / 300.0).sqrt(), (real[1] / 300.0).sqrt()], [(said[0] / 300.0).sqrt(), (said[1] / 300.0).sqrt()])
+    };
+    let ((short, short_said), (long, long_said)) = (spread(400), spread(800));
+    for i in 0..2 {
+        assert!((short[i] / short_said[i] - 1.0).abs() < 0.15 && (long[i] / long_said[i] - 1.0).abs() < 0.15);
+    }
+    println!("attitude × {:.3} (√2 = 1.414), place × {:.3} (√8 = 2.828)", long[0] / short[0], long[1] / short[1]);
+    assert!((long[0] / short[0] - 2f64.sqrt()).abs() < 0.15 && (long[1] / short[1] - 8f64.sqrt()).abs() < 0.3);
+}
+
+/// How many of `dives` dives reject one wrong fix and keep their pose.
+fn unmoved_by_one_wrong_fix(dives: u64) -> u64 {
+    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 10.0 }, Fuse::default());
+    let mut unmoved = 0;
+    for number in 0..dives {
+        let mut sailing = voyage.set_out(number);
+        let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
+        navigator.advance(1.0, Some(&sailing.step()));
+        for _ in 0..3 {
+            navigator.fix(&sailing.fix(0));
+            navigator.advance(1.0, Some(&sailing.step()));
+        }
+        let before = sailing.off(navigator.pose().expect("fixed"));
+        let event = navigator.fix(&sailing.wrong_fix(0, 2.0));
+        let after = sailing.off(navigator.pose().expect("fixed"));
+        unmoved += u64::from(matches!(event, Event::Doubted(_)) && before == after);
+    }
+    unmoved
+}
+
+/// `fuse` rejects one wrong fix.
+///
+/// Seen to fail when the gate lets everything pass.
+#[test]
+fn one_wrong_fix_is_rejected() {
+    let unmoved = unmoved_by_one_wrong_fix(2000);
+    println!("{unmoved} of 2000 wrong fixes rejected, interval {:?}", clopper_pearson(unmoved as usize, 2000, 0.95));
+    assert!(unmoved >= 1998);
+}
+
+/// Of `dives` dives past `objects` objects, one of which was moved, each in its turn: how many report it, how many leave open
+/// which of two was moved, and how many reports name another.
+fn displaced(dives: u64, objects: usize, metres: f64, fusion: Fuse) -> [u64; 3] {
+    let (voyage, policy) = (Voyage { objects, ..Voyage::default() }, Interval { seconds: 5.0 });
+    let (mut reported, mut open, mut false_reports) = (0, 0, 0);
+    for number in 0..dives {
+        let mut sailing = voyage.set_out(number);
+        let moved = (number as usize) % objects;
+        // One that is displaced is turned too, by however little it is shifted.
+        if metres > 0.0 {
+            sailing.displace(moved, metres);
+        }
+        let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
+        let (mut named, mut disputed) = (false, false);
+        for step in 0..30 * objects {
+            let local = sailing.step();
+            navigator.advance(1.0, Some(&local));
+            if navigator.due(true) {
+                match navigator.fix(&sailing.fix(step / 30)) {
+                    Event::Displaced(found) => {
+                        named |= found.object == moved;
+                        false_reports += u64::from(found.object != moved || metres == 0.0);
+                    }
+                    Event::Disputed { objects, .. } => disputed |= objects.contains(&moved),
+                    _ => {}
+                }
+            }
+        }
+        reported += u64::from(named);
+        open += u64::from(disputed && !named);
+    }
+    [reported, open, false_reports]
+}
+
+/// A displaced object is reported, whichever it is, the one that is fixed first included, and drags no other.
+///
+/// Seen to fail when what was doubted is forgotten between two fixes, and when of two objects that nothing else confirms the
+/// later is blamed.
+#[test]
+fn a_displaced_object_is_reported() {
+    for metres in [0.1, 0.2, 0.5] {
+        for objects in [3, 5] {
+            let [reported, open, false_reports] = displaced(200, objects, metres, Fuse::default());
+            let frames = 200 * 30 * objects;
+            println!(
+                "displaced by {metres} m, {objects} objects: {reported} of 200 reported, {open} left open, {false_reports} \
+                 false reports in {frames} frames"
+            );
+            assert!(1000 * false_reports < frames as u64);
+            assert!(reported >= 198);
+        }
+    }
+    let [.., false_reports] = displaced(200, 5, 0.0, Fuse::default());
+    println!("nothing displaced: {false_reports} false reports in 30 000 frames");
+    assert!(false_reports < 30);
+}
+
+/// The two laws above over so many dives that the intervals are narrow: 999 of 1000 wrong fixes are rejected, 99 of 100 displaced
+/// objects reported, with less than one false report in 1000 frames. 0.1 m are some five standard deviations of what survey and
+/// odometry leave open across the way: a gate that a right fix in ten thousand fails would report 98.6 of 100.
+#[test]
+#[ignore = "long: 50 000 dives"]
+fn wrong_fixes_and_displaced_objects_in_many_dives() {
+    let unmoved = unmoved_by_one_wrong_fix(20_000);
+    let rejected = clopper_pearson(unmoved as usize, 20_000, 0.95);
+    println!("{unmoved} of 20 000 wrong fixes rejected, interval {rejected:.5?}");
+    assert!(rejected.0 >= 0.999);
+    for (objects, metres) in [3, 5].into_iter().flat_map(|objects| [0.1, 0.2, 0.5].map(|metres| (objects, metres))) {
+        let [reported, open, false_reports] = displaced(5000, objects, metres, Fuse::default());
+        let share = clopper_pearson(reported as usize, 5000, 0.95);
+        let frames = 5000 * 30 * objects;
+        println!(
+            "displaced by {metres} m, {objects} objects: {reported} of 5000 reported, interval {share:.4?}, {open} left open; \
+             {false_reports} false reports in {frames} frames"
+        );
+        assert!(reported as f64 >= 0.99 * 5000.0);
+        assert!(clopper_pearson(false_reports as usize, frames, 0.95).1 < 1e-3);
+    }
+}
+
+/// Of two objects that disagree, without a third, none is named: that one of the two was moved is told, the pose at each is
+/// what it would be without the other, and either's place stays that of the survey.
+///
+/// Seen to fail when of two objects that nothing else confirms the later is blamed.
+#[test]
+fn without_a_third_none_of_two_is_blamed() {
+    let (voyage, policy, fusion) =
+        (Voyage { objects: 2, ..Voyage::default() }, Interval { seconds: 5.0 }, Fuse::default());
+    let mut told = 0;
+    for number in 0..200 {
+        let mut sailing = voyage.set_out(number);
+        sailing.displace(number as usize % 2, 0.3);
+        let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
+        let mut disputed = 0;
+        for step in 0..120 {
+            if step == 60 {
+                sailing.turn_about();
+            }
+            navigator.advance(1.0, Some(&sailing.step()));
+            if navigator.due(true) {
+                let event = navigator.fix(&sailing.fix(usize::from((30..90).contains(&step))));
+                assert!(!matches!(event, Event::Displaced(_)), "dive {number}, step {step}: {event:?}");
+                disputed += u64::from(matches!(event, Event::Disputed { .. }));
+                let off = sailing.off(navigator.pose().expect("it has fixes"));
+                assert!(off < 0.1 || matches!(event, Event::Doubted(_)), "dive {number}, step {step}: {off} m");
+            }
+        }
+        assert_eq!(navigator.places(), sailing.surveyed);
+        assert!(disputed == 0 || navigator.is_disputed(0) && navigator.is_disputed(1));
+        told += u64::from(disputed == 1);
+    }
+    println!("{told} of 200 told once");
+    assert!(told >= 198);
+}
+
+/// Where odometry is lost nothing is carried across, and the log says why.
+///
+/// Seen to fail when the last fix outlives a break.
+#[test]
+fn a_break_is_no_motion() {
+    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 5.0 }, Fuse::default());
+    let mut sailing = voyage.set_out(0);
+    let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
+    assert_eq!(navigator.state(), State::Rough);
+    assert!(navigator.due(true) && navigator.state() == State::Searching);
+    navigator.fix(&sailing.fix(0));
+    navigator.advance(1.0, Some(&sailing.step()));
+    assert_eq!(navigator.state(), State::DeadReckoning);
+    navigator.advance(1.0, None);
+    assert_eq!((navigator.state(), navigator.pose()), (State::Rough, None));
+    let states: Vec<State> = navigator.changes().iter().map(|change| change.to).collect();
+    assert_eq!(states, [State::Searching, State::Referenced, State::DeadReckoning, State::Rough]);
+    assert!(navigator.changes().iter().all(|change| !change.why.is_empty()));
+}
+
+/// It searches where a fix is due and an object should be in view but none has been taken, after dead reckoning too, and no
+/// longer than that; images that tell nothing leave the pose where it was, and a fix stays due.
+///
+/// Seen to fail when only a rough pose can search.
+#[test]
+fn the_state_is_what_it_is_said_to_be() {
+    use State::{DeadReckoning, Referenced, Searching};
+    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 1.5 }, Fuse::default());
+    let mut sailing = voyage.set_out(0);
+    let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
+    assert!(!navigator.blind(0.0, false) || navigator.state() == State::Rough);
+    navigator.fix(&sailing.fix(0));
+    assert!(!navigator.blind(1.0, true) && navigator.state() == State::DeadReckoning, "a fix of another instant");
+    assert!(navigator.blind(2.0, true) && navigator.state() == State::DeadReckoning && navigator.pose().is_some());
+    let mut states = Vec::new();
+    for (in_view, fixed) in [(true, false), (true, false), (true, false), (false, false), (true, false), (true, true)] {
+        navigator.advance(1.0, Some(&sailing.step()));
+        navigator.due(in_view);
+        if fixed {
+            navigator.fix(&sailing.fix(0));
+        }
+        states.push(navigator.state());
+    }
+    assert_eq!(states, [DeadReckoning, Searching, Searching, DeadReckoning, Searching, Referenced]);
+    // Each change is told once, and leads from the state before.
+    let changes = navigator.changes();
+    assert!(changes.windows(2).all(|two| two[0].to == two[1].from && !two[1].why.is_empty()), "{changes:?}");
+}

@@ -1,0 +1,272 @@
+//! P71. Protection levels: radii that errors exceed with no more than the stated risk, wrong matches included.
+
+use std::fmt::Write as _;
+
+use seafix_evaluation::{attitude_error, position_error};
+use seafix_geometry::MeasuredPoint;
+use seafix_referencing::{
+    Acceptance, Candidates, Correspondence, ModelPoint, Outcome, Problem, Protection, StereoReprojection, Tolerance,
+    judge_named,
+};
+use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
+
+/// Half-size (m) of the shell in which a wrong match lies.
+const SHELL: f64 = 0.25;
+/// That of one in which most wrong matches pass for noise.
+const HIDDEN: f64 = 0.02;
+/// Draws of one layout.
+const DRAWS: u64 = 500;
+
+/// One believed fix.
+struct Fix {
+    points: usize,
+    position: f64,
+    attitude: f64,
+    protection: Option<Protection>,
+}
+
+/// What came of all fixes.
+#[derive(Default)]
+struct Count {
+    /// Fixes that were simulated.
+    drawn: u64,
+    /// Draws that noise left without a point that can be triangulated, and those of layouts that fit no view: no fixes.
+    undrawn: u64,
+    /// Fixes with a wrong match.
+    wrong: u64,
+    referenced: u64,
+    available: u64,
+    within_alert: u64,
+    position: u64,
+    attitude: u64,
+    /// Fixes of three points that were given a level.
+    unmonitored: u64,
+    /// Of the position: error (mm) and level (mm), each a tenth of a decade.
+    stanford: Vec<[u32; 40]>,
+}
+
+impl Count {
+    fn add(&mut self, fix: &Fix, alert: f64) {
+        self.referenced += 1;
+        let Some(level) = fix.protection else { return };
+        self.available += 1;
+        self.within_alert += u64::from(level.position <= alert);
+        self.position += u64::from(fix.position > level.position);
+        self.attitude += u64::from(fix.attitude > level.attitude);
+        self.unmonitored += u64::from(fix.points == 3);
+        if self.stanford.is_empty() {
+            self.stanford = vec![[0; 40]; 40];
+        }
+        let bin = |metres: f64| (10.0 * (metres * 1e3).max(0.1).log10() + 10.0).clamp(0.0, 39.0) as usize;
+        self.stanford[bin(fix.position)][bin(level.position)] += 1;
+    }
+
+    fn merge(&mut self, other: &Self) {
+        let of = |count: &mut u64, more: u64| *count += more;
+        of(&mut self.drawn, other.drawn);
+        of(&mut self.undrawn, other.undrawn);
+        of(&mut self.wrong, other.wrong);
+        of(&mut self.referenced, other.referenced);
+        of(&mut self.available, other.available);
+        of(&mut self.within_alert, other.within_alert);
+        of(&mut self.position, other.position);
+        of(&mut self.attitude, other.attitude);
+        of(&mut self.unmonitored, other.unmonitored);
+        self.stanford.resize(40, [0; 40]);
+        for (row, more) in self.stanford.iter_mut().zip(&other.stanford) {
+            row.iter_mut().zip(more).for_each(|(count, more)| *count += more);
+        }
+    }
+}
+
+/// Fixes of the `number`-th layout: three to twelve points, 1.5 to 5 m, spread or compact; at the rate of the settings one
+/// point is replaced by one that is uniform in its shell of this half-size (m).
+fn fixes(number: u64, acceptance: &Acceptance, shell: f64) -> Count {
+    let mut choose = Stream::new(71, number, 0, Purpose::Survey);
+    let rigs = [VirtualRig::default(), VirtualRig { size: [1600, 1200], focal: 1348.3, baseline: 0.25 }];
+    let layout = Layout {
+        shape: [Shape::Spread, Shape::Compact][choose.below(2)],
+        points: 3 + choose.below(10),
+        number,
+        distance: choose.between(1.5, 5.0),
+        sigma_px: 0.2,
+        model_sigma: 0.0,
+        rig: rigs[choose.below(2)].clone(),
+    };
+    let mut count = Count::default();
+    let Ok(placed) = layout.place(71) else { return Count { undrawn: DRAWS, ..count } };
+    for draw in 0..DRAWS {
+        let mut stream = Stream::new(71, number, draw, Purpose::Survey);
+        let wrong = wrong(layout.points, acceptance, &mut stream);
+        let Some(mut cloud) = placed.draw(draw) else {
+            count.undrawn += 1;
+            continue;
+        };
+        count.drawn += 1;
+        count.wrong += u64::from(!wrong.is_empty());
+        for wrong in wrong {
+            cloud[wrong] = placed.elsewhere(&placed.model[wrong], shell, &mut stream);
+        }
+        if let Some(fix) = fix(&placed, &cloud, acceptance) {
+            count.add(&fix, acceptance.alert_limit);
+        }
+    }
+    count
+}
+
+/// The points that are wrong matches: one at its rate, two at theirs, mostly none.
+fn wrong(points: usize, acceptance: &Acceptance, stream: &mut Stream) -> Vec<usize> {
+    let (one, two) = (acceptance.wrong_match_rate, acceptance.two_wrong_rate);
+    match stream.unit() {
+        u if u < one => vec![stream.below(points)],
+        u if u < one + two => {
+            let first = stream.below(points);
+            vec![first, (first + 1 + stream.below(points - 1)) % points]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The fix that the tests of the method let pass, every point identified as drawn.
+fn fix(placed: &Placed, cloud: &[MeasuredPoint], acceptance: &Acceptance) -> Option<Fix> {
+    let model: Vec<ModelPoint> = placed.model.iter().map(|&at| ModelPoint::exact("", at)).collect();
+    let pairs: Vec<Correspondence> = (0..model.len()).map(|i| Correspondence { model: i, cloud: i }).collect();
+    let candidates = Candidates { lists: (0..model.len()).map(|i| vec![i]).collect() };
+    let problem =
+        Problem { model: &model, cloud, candidates: &candidates, tolerance: Tolerance::Sigmas(3.0), prior: None };
+    let attempt = judge_named(&problem, pairs, &StereoReprojection::default(), acceptance, Some(&placed.rig));
+    let Outcome::Referenced(reference) = attempt.outcome else { return None };
+    let truth = &placed.object_from_camera;
+    Some(Fix {
+        points: reference.pairs.len(),
+        position: position_error(&reference.object_from_camera, truth),
+        attitude: attitude_error(&reference.object_from_camera, truth),
+        protection: reference.integrity.protection,
+    })
+}
+
+/// `layouts` layouts on two threads; the same counts on any number.
+fn trial(layouts: u64, acceptance: &Acceptance, shell: f64) -> Count {
+    let half = |first: u64| {
+        let mut all = Count::default();
+        (first..layouts).step_by(2).for_each(|number| all.merge(&fixes(number, acceptance, shell)));
+        all
+    };
+    let mut all = Count::default();
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| half(1));
+        all.merge(&half(0));
+        all.merge(&other.join().expect("it does not panic"));
+    });
+    all
+}
+
+/// What no draw leaves more than once in a thousand trials where the risk is just met: n·p + 3.09 √(n·p).
+fn most(drawn: u64, risk: f64) -> u64 {
+    let expected = drawn as f64 * risk;
+    (expected + 3.09 * expected.sqrt()).floor() as u64
+}
+
+/// P71 over 1 000 000 draws at risk 1e-4: at most 130 violations, each of position and of attitude. Writes the counts of
+/// a Stanford diagram where `STANFORD` names a file.
+#[test]
+#[ignore = "long: a million fixes"]
+fn a_million_fixes_keep_their_levels() {
+    let acceptance = Acceptance::default();
+    million(&acceptance);
+}
+
+/// The same where two wrong matches happen besides, in two of a hundred draws, and the settings say so.
+#[test]
+#[ignore = "long: a million fixes"]
+fn a_million_fixes_keep_their_levels_under_two_wrong_matches() {
+    million(&Acceptance { two_wrong_rate: 0.02, ..Acceptance::default() });
+}
+
+fn million(acceptance: &Acceptance) {
+    let all = trial(1_000_000 / DRAWS, acceptance, SHELL);
+    let share = |n: u64| 100.0 * n as f64 / all.drawn as f64;
+    println!(
+        "{} fixes, {} with a wrong match; {} draws of no fix: referenced {:.2} %, with a level {:.2} %, level within the alert limit {:.2} %; beyond the level: \
+         position {}, attitude {}",
+        all.drawn,
+        all.wrong,
+        all.undrawn,
+        share(all.referenced),
+        share(all.available),
+        share(all.within_alert),
+        all.position,
+        all.attitude
+    );
+    if let Ok(file) = std::env::var("STANFORD") {
+        let mut text = String::from("error_mm,level_mm,fixes\n");
+        for (e, row) in all.stanford.iter().enumerate() {
+            for (l, fixes) in row.iter().enumerate().filter(|(_, fixes)| **fixes > 0) {
+                let edge = |bin: usize| 10f64.powf((bin as f64 - 10.0) / 10.0);
+                writeln!(text, "{:.3},{:.3},{fixes}", edge(e), edge(l)).expect("a string takes it");
+            }
+        }
+        std::fs::write(file, text).expect("the file can be written");
+    }
+    assert_eq!(all.unmonitored, 0, "three points are unavailable");
+    assert!(all.position <= 130 && all.attitude <= 130, "position {}, attitude {}", all.position, all.attitude);
+}
+
+/// P71, short: `layouts` times 500 draws, no level for three points, and a level for `available` of ten at least.
+fn held(layouts: u64, acceptance: &Acceptance, shell: f64, available: u64) {
+    let all = trial(layouts, acceptance, shell);
+    println!("{} drawn, {} with a level, beyond it {} and {}", all.drawn, all.available, all.position, all.attitude);
+    assert_eq!(all.unmonitored, 0, "three points are unavailable");
+    assert!(all.available * 10 > all.drawn * available, "{} of {} have a level", all.available, all.drawn);
+    let most = most(all.drawn, acceptance.risk);
+    assert!(all.position <= most && all.attitude <= most, "{} {} of {most}", all.position, all.attitude);
+}
+
+/// P71, short: 20 000 draws at risk 1e-3. Levels are far above the errors, for whichever point may be wrong
+/// widens them; the two laws below come nearer.
+///
+/// Seen to fail when three points are given a level, and with levels of a tenth (11 897 beyond of 33).
+#[test]
+fn levels_hold() {
+    held(40, &Acceptance { risk: 1e-3, ..Acceptance::default() }, SHELL, 5);
+}
+
+/// P71 where nothing is wrong and the settings say so: only the noise is left to be protected against.
+///
+/// Seen to fail with levels a third smaller, 249 and 225 beyond of 33, and without the radius of the fix itself.
+#[test]
+fn levels_hold_against_noise_alone() {
+    held(40, &Acceptance { risk: 1e-3, wrong_match_rate: 1e-12, ..Acceptance::default() }, SHELL, 5);
+}
+
+/// Settings under which no test leaves a wrong match out, so that levels alone speak of it.
+fn without_tests(risk: f64, wrong_match_rate: f64, two_wrong_rate: f64) -> Acceptance {
+    let wide = Acceptance { alert_limit: 1e3, alert_share: 1e3, attitude_limit: 1e3, ..Acceptance::default() };
+    Acceptance { confidence: 1.0 - 1e-12, risk, wrong_match_rate, two_wrong_rate, ..wide }
+}
+
+/// P71 where in every draw a match is wrong by so little that nothing leaves it out.
+///
+/// Seen to fail when the separation is left out of the level (490 and 485 beyond of 461), when the radius of the fix without the point
+/// is (598 and 599), and when levels are the radius of the fix itself (1037 and 1058).
+#[test]
+fn levels_hold_where_wrong_matches_hide() {
+    held(40, &without_tests(0.02, 1.0, 0.0), HIDDEN, 1);
+}
+
+/// P71 under two wrong matches, short: 10 000 draws at risk 1e-3, two wrong in one of ten and one in another.
+///
+/// Seen to fail with levels of a tenth (4404 beyond of 19); by less only the law below fails.
+#[test]
+fn levels_hold_under_two_wrong_matches() {
+    held(20, &Acceptance { risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() }, SHELL, 3);
+}
+
+/// The same where in every draw two are wrong by little.
+///
+/// Seen to fail when sets of two are not left out (692 and 711 beyond of 461), and when levels are the radius of the fix itself
+/// (1070 and 1097).
+#[test]
+fn levels_hold_where_two_wrong_matches_hide() {
+    held(40, &without_tests(0.02, 1e-12, 1.0), HIDDEN, 1);
+}

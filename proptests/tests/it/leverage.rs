@@ -1,0 +1,73 @@
+//! One point far from the others: what it seems to say of the pose is only as good as it is the right one.
+
+use nalgebra::Vector3;
+use seafix_geometry::{Camera, Transform};
+use seafix_proptests::views::{View, any_turn, anywhere, exact_model};
+use seafix_referencing::{Acceptance, Outcome, Refusal, rms_apart};
+use seafix_simulation::{Purpose, Stream};
+
+const SIGMA: f64 = 0.005;
+const DELTA: f64 = 4.0 * SIGMA;
+const SHELL: f64 = 0.3;
+
+/// A panel of ten points, 30 cm wide, on an object of three metres with forty more; of the panel eight points are seen, of the rest of
+/// the object `far`, and 200 points of clutter about the panel, two metres before the camera. With a rough pose, or without and among
+/// 100 points.
+fn panel(number: u64, far: usize, prior: bool) -> View {
+    let mut stream = Stream::new(number, 0, 0, Purpose::View);
+    let stream = &mut stream;
+    let middle = anywhere(stream, [0.75; 3]);
+    let mut at: Vec<Vector3<f64>> = (0..10).map(|_| middle + anywhere(stream, [0.15, 0.15, 0.045])).collect();
+    at.extend((0..40).map(|_| anywhere(stream, [1.5; 3])));
+    let turn = any_turn(stream);
+    let camera_from_object = Transform::<Camera, _>::new(turn, Vector3::z() * 2.0 - turn * middle);
+    let seen = (0..8).chain(10..10 + far);
+    let view = View::of(stream, exact_model(&at), camera_from_object, seen, SIGMA);
+    let view = view.among(stream, if prior { 200 } else { 100 }, 2.0, [1.2; 3]);
+    let error = || [stream.normal3(0.02), anywhere(stream, [0.5 * SHELL; 3])];
+    if prior { view.before(SHELL, error) } else { view }
+}
+
+/// A panel alone does not say where the far points of its object are, and clutter that is near one of them does not either: no pose
+/// off by more than the alert limit is believed; 150 frames with a rough pose and 50 without, or `LEVERAGE_FRAMES` each.
+///
+/// Seen to fail where the covariance of all points decides: 12 of 107 fixes with a rough pose are beyond.
+#[test]
+fn one_accidental_far_point_makes_no_pose() {
+    let frames = |default: u64| std::env::var("LEVERAGE_FRAMES").map_or(default, |n| n.parse().expect("a number"));
+    for (prior, frames) in [(true, frames(150)), (false, frames(50))] {
+        let (mut answered, mut beyond, mut hinges) = (0, 0, 0);
+        for number in 0..frames {
+            let view = panel(number, 0, prior);
+            match view.outcome(DELTA, &Acceptance::default()) {
+                Outcome::Referenced(fix) => {
+                    answered += 1;
+                    let off = rms_apart(&view.model, &fix.object_from_camera, &view.truth);
+                    beyond += u64::from(off > Acceptance::default().alert_limit);
+                }
+                Outcome::Unidentified(Refusal::Hinge { .. }) => hinges += 1,
+                _ => {}
+            }
+        }
+        println!("prior {prior}: {answered} of {frames} answered, {beyond} beyond the limit, {hinges} hang on a point");
+        assert!(10 * hinges > frames, "too few to tell");
+        assert_eq!(beyond, 0);
+    }
+}
+
+/// Points of all the object are evidence of where it is, and none of them is missed much.
+///
+/// Seen to fail where every pose is taken to hang on a point.
+#[test]
+fn far_points_that_bear_each_other_out_make_one() {
+    let off = |number: u64| {
+        let view = panel(number, 6, true);
+        match view.outcome(DELTA, &Acceptance::default()) {
+            Outcome::Referenced(fix) => Some(rms_apart(&view.model, &fix.object_from_camera, &view.truth)),
+            _ => None,
+        }
+    };
+    let found: Vec<f64> = (0..30).filter_map(off).collect();
+    println!("{} of 30 answered", found.len());
+    assert!(found.len() >= 27 && found.iter().all(|&off| off < 0.03), "{found:?}");
+}

@@ -1,0 +1,201 @@
+//! Fixes carried along, and what every odometry owes.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use seafix_component::Choice;
+use seafix_geometry::{Camera, Covariance6, Object, Pinhole, StereoRig, Transform, World};
+use seafix_navigation::{
+    Device, Journey, Local, Lost, ODOMETRIES, Odometry, Outcome, Reading, Standing, StereoPair, by_world,
+};
+use seafix_proptests::{law, poses::pose, within};
+use seafix_vision::{Image, Threads};
+
+fn exact<A: seafix_geometry::Frame, B: seafix_geometry::Frame>() -> Covariance6<A, B> {
+    Covariance6::isotropic(1e-6, 1e-6)
+}
+
+/// The steps between poses of one dive.
+fn steps(dive: &[Transform<World, Camera>]) -> Vec<Local> {
+    let step = |two: &[Transform<World, Camera>]| Local::new(two[0].inverse() * two[1], exact());
+    dive.windows(2).map(step).collect()
+}
+
+/// P11. A fix at i carried to j by exact odometry, Eq. (6), is the fix at j, to 1e-10 after 2000 steps; with j = i it is
+/// the fix at i bit for bit. By the world, Eq. (2), it is the same.
+#[test]
+fn a_fix_is_carried_along() {
+    let dive = prop::collection::vec(pose::<World, Camera>(10.0), 2001);
+    law(8, (pose::<World, Object>(50.0), dive), |(world_from_object, dive)| {
+        let fix = |at: &Transform<World, Camera>| by_world(&world_from_object, at);
+        let first = Standing::new(fix(&dive[0]), exact());
+        let steps = steps(&dive);
+        prop_assert_eq!(first.after_all(&[]).object_from_camera, first.object_from_camera);
+        let last = first.after_all(&steps).object_from_camera;
+        let expected = fix(&dive[2000]);
+        within("carried − direct", (last.matrix() - expected.matrix()).amax(), 1e-10)
+    });
+}
+
+/// P12. Eq. (6) composed in one step or in many agrees to 1e-12 times the number of steps.
+#[test]
+fn one_step_is_as_good_as_many() {
+    let dive = prop::collection::vec(pose::<World, Camera>(10.0), 2..200);
+    law(64, (pose::<Object, Camera>(10.0), dive), |(object_from_camera, dive)| {
+        let first = Standing::new(object_from_camera, exact());
+        let steps = steps(&dive);
+        let motion = dive[0].inverse() * dive[dive.len() - 1];
+        let at_once = first.after(&Local::new(motion, exact())).object_from_camera;
+        let many = first.after_all(&steps).object_from_camera;
+        within("many − one", (at_once.matrix() - many.matrix()).amax(), 1e-12 * steps.len() as f64)
+    });
+}
+
+/// P3. After a million compositions with re-normalisation a rotation is one to 1e-12.
+#[test]
+fn a_long_chain_stays_rigid() {
+    law(4, (pose::<Object, Camera>(1.0), pose::<Camera, Camera>(0.01)), |(object_from_camera, motion)| {
+        let mut here = object_from_camera;
+        for _ in 0..1_000_000 {
+            here = (here * motion).renormalized();
+        }
+        let r = here.rotation_matrix();
+        within("RᵀR − I", (r.transpose() * r - nalgebra::Matrix3::identity()).amax(), 1e-12)?;
+        within("det R − 1", (r.determinant() - 1.0).abs(), 1e-12)
+    });
+}
+
+/// A textured slope seen by a small rig, `step` (m) further along x with each pair.
+struct Slope {
+    rig: StereoRig,
+    pairs: Vec<[Image; 2]>,
+}
+
+const STEP: f64 = 0.03;
+
+fn texture(x: f64, y: f64) -> f64 {
+    let tile = |scale: f64| {
+        let (i, j) = ((x * scale).floor() as i64 as u32, (y * scale).floor() as i64 as u32);
+        let mut hash = i.wrapping_mul(0x9E37_79B1) ^ j.wrapping_mul(0x85EB_CA77);
+        hash ^= hash >> 15;
+        hash = hash.wrapping_mul(0x2C1B_3C6D);
+        f64::from((hash ^ (hash >> 13)) % 256)
+    };
+    0.6 * tile(21.0) + 0.4 * tile(8.0)
+}
+
+impl Slope {
+    /// The second camera `baseline` from the first.
+    fn new(count: usize, baseline: Vector3<f64>) -> Self {
+        let camera = Pinhole::new([240, 180], [200.0; 2], [119.5, 89.5], &[]).unwrap();
+        let rig = StereoRig::new(camera, camera, Transform::new(UnitQuaternion::identity(), -baseline)).unwrap();
+        // z = 1.5 + 0.3 y: a slope that tells directions apart.
+        let view = |x: f64, y: f64| {
+            let value = |i: usize| {
+                let rays = (0..9).map(|k| {
+                    let (a, b) = (f64::from(k % 3) / 3.0 - 1.0 / 3.0, f64::from(k / 3) / 3.0 - 1.0 / 3.0);
+                    let (dx, dy) = (((i % 240) as f64 + a - 119.5) / 200.0, ((i / 240) as f64 + b - 89.5) / 200.0);
+                    let z = (1.5 + 0.3 * y) / (1.0 - 0.3 * dy);
+                    texture(x + dx * z, y + dy * z)
+                });
+                (rays.sum::<f64>() / 9.0) as f32
+            };
+            Image::new(240, 180, (0..240 * 180).map(value).collect()).unwrap()
+        };
+        let pair = |k: usize| {
+            let x = STEP * k as f64;
+            [view(x, 0.0), view(x + baseline.x, baseline.y)]
+        };
+        Self { rig, pairs: (0..count).map(pair).collect() }
+    }
+
+    fn journey(&self, name: &str, threads: Threads, order: &[usize]) -> Journey {
+        let odometry = ODOMETRIES.build(&Choice::named(name)).unwrap();
+        let mut reckoning = odometry.begin(&self.rig, Transform::identity(), threads);
+        for (time, &pair) in order.iter().enumerate() {
+            let [left, right] = &self.pairs[pair];
+            let stamp_ns = 1_000_000_000 + 100_000_000 * time as u64;
+            said(stamp_ns).iter().for_each(|reading| reckoning.sense(reading));
+            reckoning.advance(&StereoPair { stamp_ns, left, right }).unwrap();
+        }
+        reckoning.journey()
+    }
+}
+
+/// What the vehicle's sensors say as it goes along x.
+fn said(stamp_ns: u64) -> [Reading; 2] {
+    let reading =
+        |device, x| Reading { device, stamp_ns, value: Vector3::new(x, 0.0, 0.0), covariance: Matrix3::zeros() };
+    [reading(Device::Doppler, STEP / 0.1), reading(Device::Gyro, 0.0)]
+}
+
+/// The odometries that go by images.
+fn by_images() -> impl Iterator<Item = (&'static str, Box<dyn Odometry>)> {
+    let built = |name| (name, ODOMETRIES.build(&Choice::named(name)).unwrap());
+    ODOMETRIES.names().map(built).filter(|(_, odometry)| !odometry.listens())
+}
+
+fn ways(journey: &Journey) -> Vec<Vector3<f64>> {
+    journey.waypoints().map(|pose| pose.world_from_camera.translation()).collect()
+}
+
+/// Every odometry finds the way over a slope to 2 %, whichever way the baseline points, and the same with any threads.
+#[test]
+fn every_odometry_finds_a_short_way() {
+    for baseline in [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.1, 0.0)] {
+        let slope = Slope::new(6, baseline);
+        for name in ODOMETRIES.names() {
+            let journey = slope.journey(name, Threads::One, &[0, 1, 2, 3, 4, 5]);
+            let found = ways(&journey);
+            assert_eq!(found.len(), 6, "{name}: {:?}", journey.outcomes);
+            for (k, at) in found.iter().enumerate() {
+                let off = (at - Vector3::new(STEP * k as f64, 0.0, 0.0)).norm();
+                assert!(off < 0.02 * 5.0 * STEP, "{name}: {k} {off} {found:?}");
+            }
+            let again = slope.journey(name, Threads::Pool, &[0, 1, 2, 3, 4, 5]);
+            assert_eq!(ways(&again), found, "{name}");
+        }
+    }
+}
+
+/// B15, B16, B59: no odometry by images invents a motion. A stamp that is not the next is refused and changes nothing; an image
+/// that is the one before, or black, is left out by name; a view of somewhere else breaks the way, and the next segment
+/// begins where the last one ended.
+#[test]
+fn no_odometry_by_images_invents_a_motion() {
+    let slope = Slope::new(3, Vector3::new(0.1, 0.0, 0.0));
+    let black = Image::new(240, 180, vec![2.0; 240 * 180]).unwrap();
+    for (name, odometry) in by_images() {
+        let mut reckoning = odometry.begin(&slope.rig, Transform::identity(), Threads::One);
+        let mut give = |stamp_ns: u64, images: [&Image; 2]| {
+            let done = reckoning.advance(&StereoPair { stamp_ns, left: images[0], right: images[1] });
+            (done, reckoning.journey())
+        };
+        let images = |k: usize| [&slope.pairs[k][0], &slope.pairs[k][1]];
+        assert!(give(1_000_000_000, images(0)).0.is_ok());
+        for stamp in [1_000_000_000, 999_999_999] {
+            let (done, journey) = give(stamp, images(1));
+            assert_eq!((done.unwrap_err().before_ns, journey.outcomes.len()), (1_000_000_000, 1), "{name}");
+        }
+        assert!(give(1_100_000_000, images(1)).0.is_ok());
+        let outcome = |journey: &Journey| journey.outcomes.last().cloned().unwrap();
+        let (_, journey) = give(1_200_000_000, images(1));
+        assert!(matches!(outcome(&journey), Outcome::Skipped(Lost::Frozen(_))), "{name}: {journey:?}");
+        let (_, journey) = give(1_300_000_000, [images(2)[0], &black]);
+        assert!(matches!(outcome(&journey), Outcome::Skipped(Lost::Blank(..))), "{name}: {journey:?}");
+        let (_, journey) = give(1_400_000_000, images(2));
+        assert!(matches!(outcome(&journey), Outcome::Followed { .. }), "{name}: {journey:?}");
+        assert_eq!(journey.segments.len(), 1, "{name}");
+        // The same slope turned upside down is somewhere else.
+        let flipped = |image: &Image| Image::new(240, 180, image.pixels().iter().rev().copied().collect()).unwrap();
+        let turned: Vec<[Image; 2]> = (0..2).map(|k| [1, 0].map(|side| flipped(&slope.pairs[k][side]))).collect();
+        for (k, pair) in turned.iter().enumerate() {
+            assert!(give(1_500_000_000 + 100_000_000 * k as u64, [&pair[0], &pair[1]]).0.is_ok());
+        }
+        let (_, journey) = give(1_700_000_000, [&turned[0][0], &turned[0][1]]);
+        assert_eq!(journey.segments.len(), 2, "{name}: {:?}", journey.outcomes);
+        let (before, after) = (&journey.segments[0], &journey.segments[1]);
+        assert!(after.broken.is_some() && after.poses[0].local.is_none(), "{name}");
+        let last = before.poses.last().unwrap().world_from_camera;
+        assert_eq!(after.poses[0].world_from_camera, last, "{name}: the motion between is left out");
+    }
+}

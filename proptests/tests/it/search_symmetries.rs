@@ -1,0 +1,304 @@
+//! Every search: what changes nothing in a problem changes nothing in the answer.
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{Camera, MeasuredPoint, Point, Transform, UncertainPoint, so3};
+use seafix_proptests::{
+    admissible::{difference, largest, tolerance},
+    law, not_idle,
+    poses::pose,
+    problems::{LARGE, Planted, SMALL, planted},
+    searches::{Answer, searches},
+};
+use seafix_referencing::{
+    Acceptance, Candidates, Correspondence, Mahalanobis, ModelPoint, Outcome, Problem, RigidConsensus, Tolerance,
+    Unidentified, reference,
+};
+use std::cell::Cell;
+
+/// Pair tests that leave time for hundreds of cases.
+const BUDGET: i64 = 20_000;
+
+/// An answer without its cost: the set, or the reason.
+fn gist(answer: &Answer) -> Result<Vec<Correspondence>, &'static str> {
+    answer.as_ref().map(|found| found.pairs.clone()).map_err(Unidentified::reason)
+}
+
+fn distinct(points: impl Iterator<Item = Vector3<f64>>) -> bool {
+    let points: Vec<_> = points.collect();
+    points.iter().enumerate().all(|(i, a)| points[..i].iter().all(|b| a != b))
+}
+
+fn all_distinct(planted: &Planted) -> bool {
+    distinct(planted.model.iter().map(|p| p.at.coords)) && distinct(planted.cloud.iter().map(|c| c.position.at.coords))
+}
+
+/// Cloud points through `change`.
+fn with_cloud(planted: &Planted, change: impl Fn(&MeasuredPoint) -> MeasuredPoint) -> Planted {
+    Planted { cloud: planted.cloud.iter().map(change).collect(), ..planted.clone() }
+}
+
+/// P20. A point outside every shell never changes the result: with 10 000 far points more the answer is the same to the
+/// last bit.
+///
+/// Seen to fail when the size of the cloud counts among the tests.
+#[test]
+fn points_outside_every_shell_change_nothing() {
+    let searches = searches(BUDGET);
+    law(8, planted(LARGE), |planted| {
+        let mut more = planted.clone();
+        more.cloud.extend((0..10_000).map(|i| {
+            let at = Point::new(1e3 + f64::from(i), -1e4, 1e5 * f64::from(i % 7));
+            MeasuredPoint { position: UncertainPoint::isotropic(at, 0.01), pixels: None }
+        }));
+        for search in &searches {
+            prop_assert_eq!(search.answer(&more), search.answer(&planted), "{}", &search.name);
+        }
+        Ok(())
+    });
+}
+
+/// P24. The order of model and cloud changes nothing but the order of the listing; where no two points coincide.
+///
+/// Seen to fail when vertices are sorted by their numbers.
+#[test]
+fn the_order_of_the_points_changes_nothing() {
+    let searches = searches(BUDGET);
+    let answered = Cell::new(0);
+    let cases = law(96, (prop_oneof![planted(SMALL), planted(LARGE)], any::<u64>()), |(planted, seed)| {
+        prop_assume!(all_distinct(&planted));
+        // Places by a multiplicative shuffle: new place k holds the old one order[k].
+        let order = |count: usize| {
+            let mut order: Vec<usize> = (0..count).collect();
+            order.sort_by_key(|&i| (i as u64 + 1).wrapping_mul(seed | 1).rotate_left(17).wrapping_mul(0x9E37_79B9));
+            order
+        };
+        let (models, clouds) = (order(planted.model.len()), order(planted.cloud.len()));
+        let new = |old: usize| clouds.iter().position(|&j| j == old).expect("a permutation");
+        let moved = Planted {
+            model: models.iter().map(|&i| planted.model[i].clone()).collect(),
+            cloud: clouds.iter().map(|&j| planted.cloud[j]).collect(),
+            candidates: Candidates::from_pairs(
+                models.len(),
+                models
+                    .iter()
+                    .enumerate()
+                    .flat_map(|(k, &i)| planted.candidates.lists[i].iter().map(|&j| (k, new(j))).collect::<Vec<_>>()),
+            ),
+            ..planted.clone()
+        };
+        for search in &searches {
+            let back = gist(&search.answer(&moved)).map(|pairs| {
+                let old =
+                    |pair: &Correspondence| Correspondence { model: models[pair.model], cloud: clouds[pair.cloud] };
+                let mut pairs: Vec<_> = pairs.iter().map(old).collect();
+                pairs.sort();
+                pairs
+            });
+            answered.set(answered.get() + u32::from(back.is_ok()));
+            prop_assert_eq!(gist(&search.answer(&planted)), back, "{}", &search.name);
+        }
+        Ok(())
+    });
+    not_idle("answers", answered.get(), cases, 1);
+}
+
+/// Whether a search came to the end of its budget.
+fn ended(answer: &Answer) -> bool {
+    let why = answer.as_ref().map_or_else(Some, |found| found.undecided.as_ref());
+    matches!(why, Some(Unidentified::Budget { .. }))
+}
+
+/// P25. A rigid motion of the cloud inside the same candidate lists changes nothing, as distances alone decide, unless
+/// rounding does: the size is the same, and the set where it is the only one of its size.
+///
+/// Seen to fail when the tolerance of a pair depends on where it lies.
+#[test]
+fn a_motion_of_the_cloud_changes_nothing() {
+    let searches = searches(BUDGET);
+    law(96, (planted(SMALL), pose(5.0)), |(planted, motion)| {
+        let motion: Transform<Camera, Camera> = motion;
+        let brute = [false, true].map(|orientation| largest(&planted.problem(), orientation));
+        let problem = planted.problem();
+        let lists = planted.candidates.lists.iter().enumerate();
+        let pairs: Vec<_> =
+            lists.flat_map(|(i, list)| list.iter().map(move |&j| Correspondence { model: i, cloud: j })).collect();
+        let edge = |a: Correspondence, b: Correspondence| {
+            (difference(&problem, a, b) - tolerance(&problem, a, b)).abs() < 1e-9
+        };
+        let doubtful = brute.iter().any(|largest| largest.doubtful);
+        prop_assume!(!doubtful && !pairs.iter().any(|&a| pairs.iter().any(|&b| edge(a, b))));
+        let turn = motion.rotation_matrix();
+        let moved = with_cloud(&planted, |point| {
+            let UncertainPoint { at, covariance } = point.position;
+            let position = UncertainPoint { at: motion * at, covariance: turn * covariance * turn.transpose() };
+            MeasuredPoint { position, pixels: None }
+        });
+        for search in searches.iter().filter(|search| search.claims.exact) {
+            let (here, there) = (search.answer(&planted), search.answer(&moved));
+            match (&here, &there) {
+                (Ok(a), Ok(b)) if a.optimal && b.optimal => {
+                    prop_assert_eq!(a.pairs.len(), b.pairs.len(), "{}", &search.name);
+                    let only = brute[usize::from(search.refuses_mirrors())].sets.len() == 1;
+                    prop_assert!(!only || a.pairs == b.pairs, "{}", search.name);
+                }
+                _ if ended(&here) || ended(&there) => {}
+                _ => prop_assert_eq!(gist(&here), gist(&there), "{}", &search.name),
+            }
+        }
+        Ok(())
+    });
+}
+
+/// P27. Monotone: of four points or more no fewer are identified when Δ grows, when a candidate is added, or when a
+/// model point is added.
+///
+/// Seen to fail when model points with more than three candidates are left out as too ambiguous; not by a lost candidate, bounds
+/// one too small, a budget mistaken for an end, or a coherence that also refuses differences below .3 Δ.
+#[test]
+fn more_never_finds_less() {
+    let searches = searches(BUDGET);
+    let held = Cell::new(0);
+    let cases = law(96, (planted(SMALL), any::<prop::sample::Index>(), any::<prop::sample::Index>()), |(all, i, j)| {
+        prop_assume!(!all.cloud.is_empty());
+        let (i, j) = (i.index(all.model.len()), j.index(all.cloud.len()));
+        let wider = Planted {
+            tolerance: match all.tolerance {
+                Tolerance::Fixed(delta) => Tolerance::Fixed(1.5 * delta),
+                Tolerance::Sigmas(k) => Tolerance::Sigmas(1.5 * k),
+            },
+            ..all.clone()
+        };
+        let mut one_more = all.clone();
+        one_more.candidates.lists[i].push(j);
+        one_more.candidates.lists[i].sort_unstable();
+        one_more.candidates.lists[i].dedup();
+        let mut without = all.clone();
+        without.candidates.lists[i].clear();
+        for search in searches.iter().filter(|search| search.claims.exact) {
+            for (less, more) in [(&all, &wider), (&all, &one_more), (&without, &all)] {
+                let Ok(before) = search.answer(less) else { continue };
+                if !before.optimal || before.pairs.len() < 4 {
+                    continue;
+                }
+                held.set(held.get() + 1);
+                match search.answer(more) {
+                    Ok(after) if after.optimal => {
+                        prop_assert!(after.pairs.len() >= before.pairs.len(), "{}", search.name);
+                    }
+                    Ok(_) | Err(Unidentified::Budget { .. }) => {}
+                    Err(refusal) => prop_assert!(false, "{}: {refusal}", search.name),
+                }
+            }
+        }
+        Ok(())
+    });
+    not_idle("sets of four and more", held.get(), cases, 2);
+}
+
+/// P28. Model, cloud, Δ and covariances scaled by a power of two: exactly the same answer, for searches that have no length
+/// of their own.
+///
+/// Seen to fail when a length of 1 mm is added to Δ.
+#[test]
+fn a_problem_of_another_size_is_the_same_problem() {
+    let searches = searches(BUDGET);
+    law(96, (prop_oneof![planted(SMALL), planted(LARGE)], -3i32..=3), |(planted, power)| {
+        let s = 2f64.powi(power);
+        let mut scaled = with_cloud(&planted, |point| {
+            let UncertainPoint { at, covariance } = point.position;
+            let position = UncertainPoint { at: Point::from(at.coords * s), covariance: covariance * (s * s) };
+            MeasuredPoint { position, pixels: None }
+        });
+        for point in &mut scaled.model {
+            (point.at, point.sigma) = (Point::from(point.at.coords * s), point.sigma * s);
+        }
+        if let Tolerance::Fixed(delta) = &mut scaled.tolerance {
+            *delta *= s;
+        }
+        for search in searches.iter().filter(|search| !search.claims.prior && !search.name.starts_with("gnc-tls")) {
+            prop_assert_eq!(gist(&search.answer(&planted)), gist(&search.answer(&scaled)), "{}", &search.name);
+        }
+        Ok(())
+    });
+}
+
+/// P30. Cloud points that come twice, with the same coordinates and candidates: the size is the same and the lower
+/// number is chosen, where model points are more than Δ apart.
+///
+/// Seen to fail when vertices of equal coordinates stand by falling number.
+#[test]
+fn a_point_that_comes_twice_is_the_first() {
+    let searches = searches(BUDGET);
+    let held = Cell::new(0);
+    let cases = law(192, planted(SMALL), |planted| {
+        let Tolerance::Fixed(delta) = planted.tolerance else { return Ok(()) };
+        let model: Vec<_> = planted.model.iter().map(|p| p.at).collect();
+        let apart = model.iter().enumerate().all(|(i, a)| model[..i].iter().all(|b| a.distance(b) > 1.01 * delta));
+        if !apart || !all_distinct(&planted) {
+            return Ok(());
+        }
+        let count = planted.cloud.len();
+        let mut twice = planted.clone();
+        twice.cloud.extend_from_within(..);
+        for list in &mut twice.candidates.lists {
+            let again: Vec<usize> = list.iter().map(|j| j + count).collect();
+            list.extend(again);
+        }
+        for search in searches.iter().filter(|search| search.claims.exact) {
+            if let (Ok(once), Ok(twice)) = (search.answer(&planted), search.answer(&twice))
+                && once.optimal
+                && twice.optimal
+            {
+                held.set(held.get() + 1);
+                prop_assert_eq!(once.pairs.len(), twice.pairs.len(), "{}", &search.name);
+                prop_assert!(twice.pairs.iter().all(|pair| pair.cloud < count), "{}: {:?}", search.name, twice.pairs);
+            }
+        }
+        Ok(())
+    });
+    not_idle("sets found twice", held.get(), cases, 2);
+}
+
+/// How many of so many clouds that show nothing but the mirror image of a model of eight to thirty points the default search
+/// takes for the object, by no more than three fifths of its points.
+fn mirror_images_referenced(clouds: usize) -> usize {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut referenced = 0;
+    for number in 0..clouds {
+        let n = [8, 12, 20, 30][number % 4];
+        let mut drawn = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+        let turn = so3::exp(&drawn(1.8));
+        let model: Vec<ModelPoint> = (0..n).map(|_| ModelPoint::exact("", drawn(0.6).into())).collect();
+        let measured = |point: &ModelPoint| {
+            let image = point.at.coords.component_mul(&Vector3::new(1.0, 1.0, -1.0));
+            let at = turn * image + Vector3::z() * 4.0 + drawn(0.01) + drawn(0.01);
+            MeasuredPoint { position: UncertainPoint::isotropic(at.into(), 0.01), pixels: None }
+        };
+        let cloud: Vec<MeasuredPoint> = model.iter().map(measured).collect();
+        let candidates = Candidates::all(n, n);
+        let tolerance = Tolerance::Fixed(0.042_426);
+        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
+        let attempt = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
+        let few = |pairs: usize| 5 * pairs <= 3 * n;
+        referenced += usize::from(matches!(&attempt.outcome, Outcome::Referenced(fix) if few(fix.pairs.len())));
+    }
+    referenced
+}
+
+/// P26. A few points of a mirror image always lie as the object's do: they are no reason to believe that it is the object.
+///
+/// Seen to fail, with two of 600, where the model is reflected in one plane only, and with one where eight threes are reflected.
+#[test]
+fn a_mirror_image_of_many_points_is_not_referenced() {
+    assert_eq!(mirror_images_referenced(100), 0);
+}
+
+#[test]
+#[ignore = "long: 6000 problems"]
+fn six_thousand_mirror_images_are_not_referenced() {
+    assert_eq!(mirror_images_referenced(6000), 0);
+}
