@@ -1,7 +1,7 @@
 //! Laws that every component of Seafix obeys.
 //!
 //! `src/` holds what the laws draw from and compare with: one idea a file, nothing that is tested.
-//! `tests/` holds the laws, one file a theme; a law's name states it, its doc comment gives the number
+//! `tests/it/` holds the laws, one file a theme; a law's name states it, its doc comment gives the number
 //! and the statement. Laws over searches and solvers run over the registries by name, with the
 //! defaults and with every value of every switch, so that a component listed tomorrow is tested
 //! tomorrow.

@@ -7,7 +7,7 @@
 //!
 //! Everything is a function of the seed, the number of the dive, the number of the frame and the
 //! purpose ([`Stream`]): the same bytes in any order and on any number of threads. A factor of magnitude 0 is, bit for bit,
-//! a factor left out (`tests/factors.rs`, `tests/settings.rs`).
+//! a factor left out (`tests/it/factors.rs`, `tests/it/settings.rs`).
 //!
 //! - World: north, east, down. The cameras look down; right in the image is starboard, its lower
 //!   edge is aft.

@@ -10,7 +10,7 @@ use seafix_navigation::{
     Device, Leg, Local, Lost, Network, ODOMETRIES, Odometry, Outcome, Place, Reading, Rough, Standing, Station,
     StereoPair, Waypoint,
 };
-use seafix_proptests::{law, poses::pose, within};
+use seafix_proptests::{cases, law, poses::pose, within};
 use seafix_simulation::{Mission, Purpose, Stream, vehicle::Current};
 use seafix_vision::{Image, Threads};
 
@@ -245,17 +245,22 @@ fn nees(error: &Vector6<f64>, covariance: &Matrix6<f64>) -> f64 {
 }
 
 /// The normalised error squared of the pose after the motions of `dives` dives, at some pairs of each: the means.
-fn consistency(odometry: &dyn Odometry, mission: &Mission, dives: u64, at: &[usize]) -> Vec<f64> {
+fn consistency(odometry: &dyn Odometry, mission: &Mission, dives: u32, at: &[usize]) -> Vec<f64> {
     let mut sums = vec![0.0; at.len()];
     for dive in 0..dives {
-        let (way, steps) = motions(odometry, mission, dive, at.last().unwrap() + 1);
+        let (way, steps) = motions(odometry, mission, dive.into(), at.last().unwrap() + 1);
         let start = Standing::new(way[0], Covariance6::isotropic(1e-9, 1e-9));
         for (sum, pair) in sums.iter_mut().zip(at) {
             let there = start.after_all(&steps[..*pair]);
             *sum += nees(&there.object_from_camera.error_to(&way[*pair]), &there.covariance.matrix);
         }
     }
-    sums.iter().map(|sum| sum / dives as f64).collect()
+    sums.iter().map(|sum| sum / f64::from(dives)).collect()
+}
+
+/// Four standard errors of the mean of so many χ² of six degrees of freedom.
+fn nees_bound(dives: u32) -> f64 {
+    4.0 * (12.0 / f64::from(dives)).sqrt()
 }
 
 /// An odometry told that the vehicle is steady.
@@ -268,8 +273,8 @@ fn steady(name: &str) -> Choice {
 
 /// The motion since the first pair errs as its covariance says, after half a second, eight seconds and more: noise, scale and
 /// bias, late readings, what is held until they come, and what velocity and rate do between them. Of a steady vehicle, and of
-/// one that turns a corner in a current, which wanders as the defaults say. The mean NEES of six degrees of freedom over 60
-/// dives lies within four of its standard errors, 1.8, of 6.
+/// one that turns a corner in a current, which wanders as the defaults say. The mean NEES of six degrees of freedom lies within
+/// four of its standard errors of 6.
 ///
 /// Seen to fail when errors that last count as errors of each step alone.
 #[test]
@@ -277,25 +282,23 @@ fn dead_reckoned_motions_are_consistent() {
     let mission = |frames| Mission { as_points: true, frames, rate: 5.0, ..Mission::default() };
     let current = Current { speed: 0.2, sigma: 0.05, tau: 10.0, ..Current::default() };
     let pushed = Mission { current, start: 20.0, ..mission(201) };
-    let bound = 4.0 * (12.0_f64 / 60.0).sqrt();
+    let dives = cases(60);
+    let bound = nees_bound(dives);
     for (name, odometry) in listening() {
         let calm = ODOMETRIES.build(&steady(name)).unwrap();
         let all = [
-            consistency(&*calm, &mission(101), 60, &[3, 40, 100]),
-            consistency(&*odometry, &pushed, 60, &[3, 40, 100, 200]),
+            consistency(&*calm, &mission(101), dives, &[3, 40, 100]),
+            consistency(&*odometry, &pushed, dives, &[3, 40, 100, 200]),
         ];
         println!("{name}: {all:.2?}");
         assert!(all.iter().flatten().all(|mean| (mean - 6.0).abs() < bound), "{name}: {all:?}");
     }
 }
 
-/// Dives whose way the network of `network_means` is laid on.
-const DIVES: u64 = 60;
-
 /// A network of dead-reckoned legs, five pairs each, over 20 s, with a pose from elsewhere at its beginning and after a
 /// quarter, which tell scale and bias for the rest: the mean NEES of every station; of the motion across half of the legs;
 /// of the pose that further steps, for 8 s, lead to from the last station.
-fn network_means(odometry: &dyn Odometry, mission: &Mission) -> (Vec<f64>, [f64; 2]) {
+fn network_means(odometry: &dyn Odometry, mission: &Mission, dives: u32) -> (Vec<f64>, [f64; 2]) {
     const LEG: usize = 5;
     const LEGS: usize = 20;
     const FURTHER: usize = 40;
@@ -303,7 +306,7 @@ fn network_means(odometry: &dyn Odometry, mission: &Mission) -> (Vec<f64>, [f64;
     let mission = Mission { frames: LEG * LEGS + FURTHER + 1, ..mission.clone() };
     let mut stations = vec![0.0; LEGS + 1];
     let (mut across, mut further) = (0.0, 0.0);
-    for dive in 0..DIVES {
+    for dive in 0..dives.into() {
         let (way, steps) = motions(odometry, &mission, dive, mission.frames);
         let mut stream = Stream::new(7, dive, 0, Purpose::Prior);
         let place = Place { world_from_object: Transform::identity(), covariance: Covariance6::isotropic(0.0, 0.0) };
@@ -328,22 +331,22 @@ fn network_means(odometry: &dyn Odometry, mission: &Mission) -> (Vec<f64>, [f64;
         let closed = network.solve().unwrap();
         for (number, sum) in stations.iter_mut().enumerate() {
             let error = closed.station(number).error_to(&way[number * LEG].relabel());
-            *sum += nees(&error, &closed.covariance(number).matrix) / DIVES as f64;
+            *sum += nees(&error, &closed.covariance(number).matrix) / f64::from(dives);
         }
         let (from, to) = (LEGS / 4, 3 * LEGS / 4);
         let motion = closed.relative(from, to).unwrap();
         let truth = way[from * LEG].inverse() * way[to * LEG];
-        across += nees(&motion.motion.error_to(&truth), &motion.covariance.matrix) / DIVES as f64;
+        across += nees(&motion.motion.error_to(&truth), &motion.covariance.matrix) / f64::from(dives);
         let there = closed.navigated(0, LEGS).unwrap().standing.after_all(&steps[LEGS * LEG..]);
         further +=
-            nees(&there.object_from_camera.error_to(way.last().unwrap()), &there.covariance.matrix) / DIVES as f64;
+            nees(&there.object_from_camera.error_to(way.last().unwrap()), &there.covariance.matrix) / f64::from(dives);
     }
     (stations, [across, further])
 }
 
-/// A network whose legs are dead reckoned says how well it knows its poses: over 60 dives of a steady vehicle the mean NEES of
+/// A network whose legs are dead reckoned says how well it knows its poses: over dives of a steady vehicle the mean NEES of
 /// every station, that of the motion across half of its legs, and that of the pose that goes on from it lie within four
-/// standard errors, 1.8, of 6; where a current pushes it through corners, which are no random walk, that of all stations
+/// standard errors of 6; where a current pushes it through corners, which are no random walk, that of all stations
 /// together.
 ///
 /// Seen to fail when legs are taken as independent of each other, and when a pose of the network shares nothing with the
@@ -353,11 +356,12 @@ fn networks_over_dead_reckoning_are_consistent() {
     let mission = Mission { as_points: true, rate: 5.0, ..Mission::default() };
     let current = Current { speed: 0.2, sigma: 0.05, tau: 10.0, ..Current::default() };
     let pushed = Mission { current, start: 20.0, ..mission.clone() };
-    let bound = 4.0 * (12.0 / DIVES as f64).sqrt();
+    let dives = cases(60);
+    let bound = nees_bound(dives);
     for (name, odometry) in listening() {
         let calm = ODOMETRIES.build(&steady(name)).unwrap();
-        let (stations, [across, further]) = network_means(&*calm, &mission);
-        let (driven, _) = network_means(&*odometry, &pushed);
+        let (stations, [across, further]) = network_means(&*calm, &mission, dives);
+        let (driven, _) = network_means(&*odometry, &pushed, dives);
         println!("{name}: {stations:.2?} {across:.2} {further:.2}; {driven:.2?}");
         let driven = driven.iter().sum::<f64>() / driven.len() as f64;
         for mean in stations.into_iter().chain([across, further, driven]) {

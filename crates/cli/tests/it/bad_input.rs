@@ -5,8 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use assert_cmd::Command;
 use tempfile::TempDir;
+
+use crate::{ended_with, program};
 
 /// A small sound data set: two images of noise, a rig, a site of three points.
 struct Sample {
@@ -112,7 +113,7 @@ fn other(width: usize, height: usize) -> String {
 
 /// The command must fail with `code` and one line for each fault; together they say every one of `parts`.
 fn refused(arguments: &[&str], code: i32, parts: &[&str]) {
-    let output = Command::cargo_bin("seafix").unwrap().args(arguments).output().unwrap();
+    let output = program().args(arguments).output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(code), "{message}");
     assert!(message.lines().all(|line| line.starts_with("error: ")), "{message}");
@@ -126,7 +127,7 @@ fn the_sound_sample_runs() {
     let sample = Sample::new();
     let out = sample.path("out");
     let run = ["run", sample.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()];
-    Command::cargo_bin("seafix").unwrap().args(run).assert().success();
+    ended_with(0, program().args(run));
     for file in ["001.mcap", "results.csv", "results.parquet", "manifest.json", "report/report.html"] {
         assert!(out.join(file).exists(), "{file}");
     }
@@ -139,7 +140,7 @@ fn a_model_with_two_points() {
     let two = SITE.split("[[object.point]]\nid = \"C\"").next().unwrap();
     sample.put("site.toml", two).change("site.toml", "base = [\"A\", \"B\", \"C\"]", "base = [\"A\", \"B\", \"B\"]");
     let folder = sample.folder.path().to_str().unwrap();
-    let output = Command::cargo_bin("seafix").unwrap().args(["run", folder]).output().unwrap();
+    let output = program().args(["run", folder]).output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(3), "{message}");
     assert!(message.lines().any(|line| line.contains("site.toml:") && line.contains("2 ")), "{message}");
@@ -172,7 +173,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
     let run = |name: &str, more: &[&str]| {
         let out = sample.path(name);
         let given = ["run", sample.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()];
-        let output = Command::cargo_bin("seafix").unwrap().args(given).args(more).output().unwrap();
+        let output = program().args(given).args(more).output().unwrap();
         (output.status.code(), String::from_utf8(output.stderr).unwrap(), out)
     };
     let (code, said, out) = run("out", &[]);
@@ -265,7 +266,7 @@ fn a_quaternion_off_unit_length() {
     }
     let sample = Sample::new();
     sample.put("prior.tum", "1.0 0 0 -3 0 0 0 1.0009\n");
-    let check = Command::cargo_bin("seafix").unwrap().arg("check").arg(sample.folder.path()).output().unwrap();
+    let check = program().arg("check").arg(sample.folder.path()).output().unwrap();
     let text = String::from_utf8(check.stdout).unwrap();
     assert_eq!(text.matches("it was normalised").count(), 1, "{text}");
 }
@@ -307,9 +308,7 @@ fn the_limits_of_images_are_settings() {
     run("source.max-pixels=3071", 3, &["a.pgm", "64×48; at most 3071 pixels are read"]);
     run("source.max-bytes=100", 3, &["a.pgm", "at most 100 bytes are read"]);
     run("source.max-pixels=0", 2, &["max-pixels = 0"]);
-    let check = |more: &[&str]| {
-        Command::cargo_bin("seafix").unwrap().args(["check", folder]).args(more).output().unwrap().status.code()
-    };
+    let check = |more: &[&str]| program().args(["check", folder]).args(more).output().unwrap().status.code();
     assert_eq!(
         (check(&[]), check(&["--max-pixels", "3072"]), check(&["--max-pixels", "3071"])),
         (Some(0), Some(0), Some(1))
@@ -318,7 +317,7 @@ fn the_limits_of_images_are_settings() {
 
 /// What `check` says of the sample, and its exit code.
 fn checked(sample: &Sample) -> (Option<i32>, String) {
-    let output = Command::cargo_bin("seafix").unwrap().arg("check").arg(sample.folder.path()).output().unwrap();
+    let output = program().arg("check").arg(sample.folder.path()).output().unwrap();
     (output.status.code(), String::from_utf8(output.stdout).unwrap())
 }
 
@@ -436,7 +435,7 @@ fn all_faults_of_an_experiment_at_once() {
         refine = 'none\n\
         [[vary]]\nkey = 'pipeline.search'\nvalues = ['icp', 'gicpp']\n[[vary]]\nkey = 'pipeline.window'\nvalues = []\n";
     let (_folder, file) = experiment(text);
-    let check = Command::cargo_bin("seafix").unwrap().args(["check", &file]).output().unwrap();
+    let check = program().args(["check", &file]).output().unwrap();
     let said = String::from_utf8(check.stdout).unwrap();
     assert_eq!(check.status.code(), Some(1), "{said}");
     let parts = [
@@ -530,7 +529,7 @@ fn a_fault_is_told_where_it_stands() {
         ),
     ] {
         let (_folder, file) = experiment(&format!("{start}{text}"));
-        let check = Command::cargo_bin("seafix").unwrap().args(["check", &file]).output().unwrap();
+        let check = program().args(["check", &file]).output().unwrap();
         let said = String::from_utf8(check.stdout).unwrap();
         assert_eq!((check.status.code(), said.lines().count()), (Some(1), places.len()), "{said}");
         for (what, place) in places {
@@ -618,7 +617,7 @@ fn dives_that_cannot_be() {
         assert!(!out.exists(), "{text}");
         if parts[0].contains("geometry") {
             let geometry = folder.path().join(parts[0].trim_end_matches(':'));
-            let check = Command::cargo_bin("seafix").unwrap().arg("check").arg(&geometry).output().unwrap();
+            let check = program().arg("check").arg(&geometry).output().unwrap();
             let said = String::from_utf8(check.stdout).unwrap();
             assert!(!check.status.success() && parts.iter().all(|part| said.contains(part)), "{said}");
         }
@@ -676,7 +675,7 @@ fn a_bad_problem_among_good_ones() {
         "cloud":[[0,0,5],[1,0,5],[0,2,5],[0,0,8]],"sigma":0.001,"delta":0.01,"prior":null,"putative":null}"#;
     let good = put("good.json", good);
     let bad = put("bad.json", "{\"format\": \"coherence-problem/1\"}");
-    let output = Command::cargo_bin("seafix").unwrap().args(["solve", "--json", &bad, &good]).output().unwrap();
+    let output = program().args(["solve", "--json", &bad, &good]).output().unwrap();
     assert_eq!(output.status.code(), Some(3));
     let lines: Vec<serde_json::Value> =
         String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -711,7 +710,7 @@ fn problems_that_cannot_be() {
         assert!(PROBLEM.contains(from), "no {from}");
         fs::write(&file, PROBLEM.replacen(from, to, 1)).unwrap();
         for (command, start, code) in [("solve", "error: ", 3), ("check", "fault: ", 1)] {
-            let output = Command::cargo_bin("seafix").unwrap().arg(command).arg(&file).output().unwrap();
+            let output = program().arg(command).arg(&file).output().unwrap();
             let said = String::from_utf8(output.stdout).unwrap().replace(folder.path().to_str().unwrap(), "");
             assert_eq!((output.status.code(), said.lines().count()), (Some(code), 1), "{said}");
             assert!(said.replace("/p.json", "p.json").starts_with(&format!("{start}{expected}")), "{expected}\n{said}");
@@ -741,7 +740,7 @@ fn problems_that_are_hardly_meant() {
     ] {
         assert!(PROBLEM.contains(from), "no {from}");
         fs::write(&file, PROBLEM.replacen(from, to, 1)).unwrap();
-        let output = Command::cargo_bin("seafix").unwrap().arg("check").arg(&file).output().unwrap();
+        let output = program().arg("check").arg(&file).output().unwrap();
         let said = String::from_utf8(output.stdout).unwrap().replace(folder.path().to_str().unwrap(), "");
         let said = said.replace("/p.json", "p.json");
         let warned = if expected.is_empty() {
@@ -769,8 +768,7 @@ fn check_lists_everything_at_once() {
         )
         .change("prior.tum", "0 0 0 1", "0 0 0 2")
         .change("frames.csv", "a.pgm,b.pgm", "c.pgm,a.pgm");
-    let output =
-        Command::cargo_bin("seafix").unwrap().args(["check", sample.folder.path().to_str().unwrap()]).output().unwrap();
+    let output = program().args(["check", sample.folder.path().to_str().unwrap()]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{text}");
     for part in ["fx = -1", "prior.tum:1", "c.pgm"] {

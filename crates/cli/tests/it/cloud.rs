@@ -5,35 +5,34 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use assert_cmd::Command;
 use seafix_experiment::dataset::{ImageLimits, read_image, write_png};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::{Ended, ended, ended_with, program};
 
 fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample").join(name)
 }
 
 /// The first stereo pair of the sample, and more arguments.
-fn cloud(more: &[&str]) -> assert_cmd::assert::Assert {
+fn cloud(more: &[&str], code: i32) -> Ended {
     let table = fs::read_to_string(sample("frames.csv")).unwrap();
     let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
-    let mut command = Command::cargo_bin("seafix").unwrap();
+    let mut command = program();
     command.arg("cloud").args(pair.iter().map(|name| sample(name)));
-    command.arg("--rig").arg(sample("dataset.toml")).args(more).assert()
+    ended_with(code, command.arg("--rig").arg(sample("dataset.toml")).args(more))
 }
 
 fn json(more: &[&str]) -> Value {
-    serde_json::from_slice(&cloud(&[&["--json"], more].concat()).success().get_output().stdout).unwrap()
+    serde_json::from_str(&cloud(&[&["--json"], more].concat(), 0).out).unwrap()
 }
 
 /// The error of a command that ends with this code and prints nothing.
 fn refusal(more: &[&str], code: i32) -> String {
-    let ended = cloud(more).code(code);
-    assert!(ended.get_output().stdout.is_empty());
-    let text = String::from_utf8(ended.get_output().stderr.clone()).unwrap();
-    assert_eq!(text.lines().count(), 1, "{text}");
-    text
+    let ended = cloud(more, code);
+    assert!(ended.out.is_empty() && ended.error.lines().count() == 1, "{}", ended.error);
+    ended.error
 }
 
 #[test]
@@ -88,8 +87,7 @@ fn refinement_and_triangulation_are_chosen_by_name() {
 fn the_cloud_is_written_whole() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("cloud.ply");
-    let said = cloud(&["--out", file.to_str().unwrap()]).success();
-    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    let said = cloud(&["--out", file.to_str().unwrap()], 0).out;
     let bytes = fs::read(&file).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     let header = String::from_utf8(bytes[..end].to_vec()).unwrap();
@@ -101,11 +99,11 @@ fn the_cloud_is_written_whole() {
 
 #[test]
 fn images_that_changed_places_are_refused() {
-    let mut command = Command::cargo_bin("seafix").unwrap();
+    let mut command = program();
     let table = fs::read_to_string(sample("frames.csv")).unwrap();
     let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
     command.arg("cloud").args([sample(pair[1]), sample(pair[0])]).arg("--rig").arg(sample("dataset.toml"));
-    let said = String::from_utf8(command.assert().code(3).get_output().stderr.clone()).unwrap();
+    let said = ended_with(3, &mut command).error;
     assert!(said.contains("left and right images that have changed places") && said.lines().count() == 1, "{said}");
 }
 
@@ -114,9 +112,8 @@ fn said(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String 
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("dataset.toml");
     fs::write(&file, rig(fs::read_to_string(sample("dataset.toml")).unwrap())).unwrap();
-    let mut command = Command::cargo_bin("seafix").unwrap();
-    command.arg("cloud").args(images.map(sample)).arg("--rig").arg(&file);
-    String::from_utf8(command.assert().code(code).get_output().stderr.clone()).unwrap()
+    let mut command = program();
+    ended_with(code, command.arg("cloud").args(images.map(sample)).arg("--rig").arg(&file)).error
 }
 
 /// Seen to fail when the two images are not compared: there were 17 points.
@@ -155,10 +152,9 @@ fn rows_that_do_not_correspond_are_told() {
 fn key_points_that_come_to_nothing_are_told() {
     let images = [sample("right000.png"), sample("left000.png")];
     let run = |images: &[PathBuf; 2]| {
-        let mut command = Command::cargo_bin("seafix").unwrap();
+        let mut command = program();
         // Too few corners to say that the images have changed places.
-        command.arg("cloud").args(images).arg("--rig").arg(sample("dataset.toml"));
-        String::from_utf8(command.output().unwrap().stderr).unwrap()
+        ended(command.arg("cloud").args(images).arg("--rig").arg(sample("dataset.toml"))).error
     };
     assert!(run(&images).contains("changed places"));
     let folder = TempDir::new().unwrap();
@@ -187,10 +183,9 @@ fn what_cannot_be_is_refused_in_one_line() {
     let text = fs::read_to_string(sample("dataset.toml")).unwrap();
     let refused = |text: &str| {
         fs::write(&rig, text).unwrap();
-        let mut command = Command::cargo_bin("seafix").unwrap();
+        let mut command = program();
         let image = sample("frames.csv");
-        command.arg("cloud").args([&image, &image]).arg("--rig").arg(&rig);
-        String::from_utf8(command.assert().code(3).get_output().stderr.clone()).unwrap()
+        ended_with(3, command.arg("cloud").args([&image, &image]).arg("--rig").arg(&rig)).error
     };
     assert!(refused(&text).contains("no image that can be decoded"));
     assert!(refused(&text.replace("fx = ", "fx = -")).contains("dataset.toml:"));

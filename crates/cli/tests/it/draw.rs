@@ -2,13 +2,13 @@
 
 use std::{fs, path::Path};
 
-use assert_cmd::Command;
 use tempfile::TempDir;
 
+use crate::{ended, program};
+
 fn seafix(arguments: &[&str]) -> (Option<i32>, String, String) {
-    let output = Command::cargo_bin("seafix").unwrap().args(arguments).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (output.status.code(), text(output.stdout), text(output.stderr))
+    let ended = ended(program().args(arguments));
+    (ended.code, ended.out, ended.error)
 }
 
 fn names(folder: &Path) -> Vec<String> {

@@ -2,13 +2,13 @@
 
 use std::{fs, path::Path};
 
-use assert_cmd::Command;
 use serde_json::Value;
 
+use crate::{ended, ended_with, program};
+
 fn eval(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let out = Command::cargo_bin("seafix").unwrap().current_dir(folder).arg("eval").args(arguments).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (out.status.code().unwrap(), text(out.stdout), text(out.stderr))
+    let ended = ended(program().current_dir(folder).arg("eval").args(arguments));
+    (ended.code.unwrap(), ended.out, ended.error)
 }
 
 fn walk(folder: &Path, name: &str, line: impl Fn(f64) -> String) {
@@ -143,8 +143,7 @@ fn breaks_of_a_log_are_not_crossed() {
         faults = [{ device = 'images', kind = 'off', from = 30.7, to = 30.9, amount = 0.0 }]\n\
         [navigation]\nfaults = [{ kind = 'off', from = 0.7, to = 0.9 }]\n";
     fs::write(folder.path().join("dive.toml"), dive).unwrap();
-    let mut run = Command::cargo_bin("seafix").unwrap();
-    run.current_dir(folder.path()).args(["run", "dive.toml", "--out", "run"]).assert().success();
+    ended_with(0, program().current_dir(folder.path()).args(["run", "dive.toml", "--out", "run"]));
     let log = fs::read_dir(folder.path().join("run")).unwrap().map(|entry| entry.unwrap().path());
     let log = log.into_iter().find(|file| file.extension().is_some_and(|ending| ending == "mcap")).unwrap();
     let log = log.to_str().unwrap();

@@ -3,10 +3,15 @@
 //! `SEAFIX_EVO` names the Python of an environment that has it: `python3 -m venv evo && evo/bin/pip install evo==1.38.1`, then
 //! `SEAFIX_EVO=$PWD/evo/bin/python cargo test --release -p seafix evo -- --ignored`.
 
-use std::{env, fs, path::Path, process::Output};
+use std::{
+    env, fs,
+    path::Path,
+    process::{Command, Output},
+};
 
-use assert_cmd::Command;
 use serde_json::Value;
+
+use crate::program;
 
 /// Computes what the two commands of evo would, of `argv`: reference, estimate, JSON of the settings.
 const PEER: &str = r#"
@@ -85,11 +90,8 @@ fn every_number_of_evo_is_met() {
     let python = env::var("SEAFIX_EVO").expect("SEAFIX_EVO names a Python with evo");
     let folder = tempfile::tempdir().unwrap();
     walks(folder.path());
-    let seafix = |arguments: &[&str]| {
-        answer(
-            &Command::cargo_bin("seafix").unwrap().current_dir(&folder).arg("eval").args(arguments).output().unwrap(),
-        )
-    };
+    let seafix =
+        |arguments: &[&str]| answer(&program().current_dir(&folder).arg("eval").args(arguments).output().unwrap());
     // The matched poses of both, in the other formats.
     seafix(&["truth.tum", "odometry.tum", "--json", "--out", "odometry.kitti"]);
     seafix(&["odometry.tum", "truth.tum", "--json", "--out", "truth.kitti"]);

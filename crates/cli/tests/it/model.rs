@@ -5,8 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use assert_cmd::{Command, assert::Assert};
 use tempfile::TempDir;
+
+use crate::{Ended, ended_with, program};
 
 fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample").join(name)
@@ -17,10 +18,10 @@ const CLICKS: &str = "id,left_u,left_v,right_u,right_v\nA,{A}\nB,{B}\nC,{C}\nD,{
 
 /// The marks, with the places of four corners that the cloud of the pair has.
 fn clicks() -> String {
-    let mut command = Command::cargo_bin("seafix").unwrap();
+    let mut command = program();
     command.args(["cloud", "--json", "--rig"]).arg(sample("dataset.toml"));
-    let said = command.args([sample("left002.png"), sample("right002.png")]).assert().success();
-    let cloud: serde_json::Value = serde_json::from_slice(&said.get_output().stdout).unwrap();
+    let cloud = ended_with(0, command.args([sample("left002.png"), sample("right002.png")])).out;
+    let cloud: serde_json::Value = serde_json::from_str(&cloud).unwrap();
     let points = cloud["points"].as_array().unwrap();
     let place = |index: usize| {
         let [u, v] = [0, 1].map(|axis| points[index]["left"][axis].as_f64().unwrap());
@@ -33,26 +34,25 @@ fn clicks() -> String {
         .fold(CLICKS.to_owned(), |text, (k, key)| text.replace(key, &place(k * apart + 7)))
 }
 
-fn model(folder: &Path, marks: &str, more: &[&str]) -> Assert {
+fn model(folder: &Path, marks: &str, more: &[&str], code: i32) -> Ended {
     fs::write(folder.join("clicks.csv"), marks).unwrap();
-    let mut command = Command::cargo_bin("seafix").unwrap();
+    let mut command = program();
     command.current_dir(folder).arg("model").args([sample("left002.png"), sample("right002.png")]);
-    command.arg("--rig").arg(sample("dataset.toml")).args(["--points", "clicks.csv"]).args(more).assert()
+    ended_with(code, command.arg("--rig").arg(sample("dataset.toml")).args(["--points", "clicks.csv"]).args(more))
 }
 
 #[test]
 fn a_model_is_a_site_that_check_takes() {
     let folder = TempDir::new().unwrap();
     let marks = clicks();
-    let said = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D", "--out", "valve.toml"]).success();
-    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    let said = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D", "--out", "valve.toml"], 0).out;
     assert!(said.ends_with("4 points; the frame is that of B, C, D\n"), "{said}");
-    Command::cargo_bin("seafix").unwrap().arg("check").arg(folder.path().join("valve.toml")).assert().success();
+    ended_with(0, program().arg("check").arg(folder.path().join("valve.toml")));
     // Without a file the site is printed, and nothing else with it.
-    let printed = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D"]).success();
-    assert_eq!(printed.get_output().stdout, fs::read(folder.path().join("valve.toml")).unwrap());
-    let json = model(folder.path(), &marks, &["--json"]).success();
-    let json: serde_json::Value = serde_json::from_slice(&json.get_output().stdout).unwrap();
+    let printed = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D"], 0).out;
+    assert_eq!(printed, fs::read_to_string(folder.path().join("valve.toml")).unwrap());
+    let json = model(folder.path(), &marks, &["--json"], 0).out;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert!(json["points"][0]["covariance"][2][2].as_f64().unwrap() > 0.0);
 }
 
@@ -70,11 +70,9 @@ fn what_is_wrong_is_one_line_and_leaves_no_file() {
         (&marks, &["--reach", "0"], 2, "--reach 0: more than 0"),
     ];
     for (marks, more, code, part) in cases {
-        let ended = model(folder.path(), marks, &[more, &["--out", "site.toml"]].concat()).code(code);
-        let text = String::from_utf8(ended.get_output().stderr.clone()).unwrap();
+        let text = model(folder.path(), marks, &[more, &["--out", "site.toml"]].concat(), code).error;
         assert!(text.lines().count() == 1 && text.contains(part), "{text}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "only the marks");
     }
-    let ended = model(folder.path(), &marks, &["--out", "nowhere/site.toml"]).code(4);
-    assert_eq!(String::from_utf8(ended.get_output().stderr.clone()).unwrap().lines().count(), 1);
+    assert_eq!(model(folder.path(), &marks, &["--out", "nowhere/site.toml"], 4).error.lines().count(), 1);
 }

@@ -2,9 +2,10 @@
 
 use std::{fs, path::PathBuf};
 
-use assert_cmd::Command;
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::{Ended, ended_with, program};
 
 const SIZE: [usize; 2] = [320, 240];
 const FOCAL: f64 = 250.0;
@@ -94,16 +95,15 @@ impl Passage {
         self.put("dataset.toml", text.replace(flat, &turned));
     }
 
-    fn odometry(&self, more: &[&str]) -> assert_cmd::assert::Assert {
-        let mut command = Command::cargo_bin("seafix").unwrap();
-        command.arg("odometry").arg(self.folder.path()).args(more).assert()
+    fn odometry(&self, more: &[&str], code: i32) -> Ended {
+        ended_with(code, program().arg("odometry").arg(self.folder.path()).args(more))
     }
 
     /// What is said on standard error by a command that ends with `code`.
     fn refusal(&self, more: &[&str], code: i32) -> String {
-        let ended = self.odometry(more).code(code);
-        assert!(ended.get_output().stdout.is_empty());
-        String::from_utf8(ended.get_output().stderr.clone()).unwrap()
+        let ended = self.odometry(more, code);
+        assert!(ended.out.is_empty());
+        ended.error
     }
 
     /// Puts stripes in place of the left image of `pair`: it shows something, and no point of the right one.
@@ -119,7 +119,7 @@ impl Passage {
     }
 
     fn json(&self, more: &[&str]) -> Value {
-        serde_json::from_slice(&self.odometry(&[&["--json"], more].concat()).success().get_output().stdout).unwrap()
+        serde_json::from_str(&self.odometry(&[&["--json"], more].concat(), 0).out).unwrap()
     }
 
     /// The x of every pose.
@@ -161,8 +161,7 @@ fn the_way_is_found_written_and_told() {
     // Threads change nothing, and the file has the same poses.
     assert_eq!(passage.json(&["--threads", "3"])["segments"], all["segments"]);
     let file = passage.path("way.tum");
-    let said = passage.odometry(&["--out", file.to_str().unwrap()]).success();
-    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    let said = passage.odometry(&["--out", file.to_str().unwrap()], 0).out;
     assert!(said.starts_with(&format!("{PAIRS} poses of {PAIRS} stereo pairs over 0.28 m")), "{said}");
     let text = fs::read_to_string(&file).unwrap();
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
@@ -233,8 +232,7 @@ fn no_break_goes_unannounced() {
     assert_eq!((segments.len(), all["left_out"].as_array().unwrap().len()), (2, 2), "{all}");
     assert!(segments[0]["broken"].is_null() && segments[1]["broken"].is_string(), "{all}");
     let file = passage.path("way.tum");
-    let ended = passage.odometry(&["--out", file.to_str().unwrap()]).success();
-    let said = String::from_utf8(ended.get_output().stdout.clone()).unwrap();
+    let said = passage.odometry(&["--out", file.to_str().unwrap()], 0).out;
     assert!(said.contains("broken before 1.500000000 s"), "{said}");
     assert!(fs::read_to_string(&file).unwrap().contains("# broken"));
 }
@@ -343,8 +341,7 @@ fn impossible_times_are_told() {
     let stamped = |stamp: &dyn Fn(u64) -> u64| {
         let lines = (0..PAIRS as u64).map(|k| format!("{},l{k}.pgm,r{k}.pgm\n", stamp(k)));
         passage.put("frames.csv", "stamp_ns,left,right\n".to_owned() + &lines.collect::<String>());
-        let checked = Command::cargo_bin("seafix").unwrap().arg("check").arg(passage.folder.path()).assert().success();
-        String::from_utf8(checked.get_output().stdout.clone()).unwrap()
+        ended_with(0, program().arg("check").arg(passage.folder.path())).out
     };
     let leap = stamped(&|k| 1_000_000_000 + k * 100_000_000 + if k < 4 { 0 } else { 1_000_000_000_000_000_000 });
     assert!(leap.contains("warning: stamps that leap by more than a year in") && leap.contains("mixed?"), "{leap}");
@@ -367,16 +364,11 @@ fn a_dive_is_reckoned_by_its_readings() {
     let file = folder.path().join("dive.toml");
     let small = "frames = 6\nrate = 5.0\nrig.size = [256, 192]\nrig.focal = 125.0\n";
     fs::write(&file, format!("question = 'Is it heard?'\n[source]\nname = 'dive'\n{small}")).unwrap();
-    let seafix = || {
-        let mut command = Command::cargo_bin("seafix").unwrap();
-        command.current_dir(folder.path());
-        command
-    };
-    seafix().args(["dive", "dive.toml", "--out", "set"]).assert().success();
+    let seafix = |arguments: &[&str]| ended_with(0, program().current_dir(folder.path()).args(arguments)).out;
+    seafix(&["dive", "dive.toml", "--out", "set"]);
     let described = fs::read_to_string(folder.path().join("set/dataset.toml")).unwrap();
     assert!(described.contains("seafix-dataset/1.2") && described.contains("doppler = \"doppler.csv\""), "{described}");
-    let ended = seafix().args(["odometry", "set", "--odometry", "dvl-gyro", "--json"]).assert().success();
-    let all: Value = serde_json::from_slice(&ended.get_output().stdout).unwrap();
+    let all: Value = serde_json::from_str(&seafix(&["odometry", "set", "--odometry", "dvl-gyro", "--json"])).unwrap();
     assert!(all["poses"].as_u64().unwrap() >= 5 && all["length"].as_f64().unwrap() > 0.1, "{all}");
 }
 
@@ -423,8 +415,7 @@ fn a_part_of_the_vehicle_is_no_ground() {
 fn much_that_disagrees_is_told() {
     let passage = Passage::new();
     passage.overlay(|pair| (0.5, STEP * pair as f64, 1.0 - STEP * pair as f64));
-    let ended = passage.odometry(&[]).code(0);
-    let said = String::from_utf8(ended.get_output().stderr.clone()).unwrap();
+    let said = passage.odometry(&[], 0).error;
     assert!(said.contains("of the landmarks agree with the motion") && said.contains("fixed to the vehicle"), "{said}");
 }
 

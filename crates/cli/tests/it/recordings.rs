@@ -6,9 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use assert_cmd::Command;
 use mcap::{WriteOptions, records::MessageHeader};
 use tempfile::TempDir;
+
+use crate::program;
 
 fn sample() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample")
@@ -162,7 +163,7 @@ impl Bag {
 }
 
 fn seafix(folder: &Path, arguments: &[&str]) -> std::process::Output {
-    Command::cargo_bin("seafix").unwrap().current_dir(folder).args(arguments).output().unwrap()
+    program().current_dir(folder).args(arguments).output().unwrap()
 }
 
 /// Frames of the run, its frames with a fix, and the warnings in its manifest.

@@ -2,15 +2,14 @@
 
 use std::{fs, path::Path};
 
-use assert_cmd::Command;
+use crate::{ended, program};
 
 const EXPERIMENT: &str = "question = 'Which?'\nseed = 3\n[source]\nname = 'virtual-points'\nframes = 2\n\
                           [[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'triad']\n";
 
 fn seafix(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let out = Command::cargo_bin("seafix").unwrap().current_dir(folder).args(arguments).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (out.status.code().unwrap(), text(out.stdout), text(out.stderr))
+    let ended = ended(program().current_dir(folder).args(arguments));
+    (ended.code.unwrap(), ended.out, ended.error)
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! `seafix solve`: what stands beside a fix, and what is refused.
 
-use assert_cmd::Command;
 use serde_json::{Value, json};
+
+use crate::program;
 
 /// A problem of seven points, exact, and where it lies.
 fn problem(folder: &tempfile::TempDir) -> String {
@@ -25,7 +26,7 @@ fn problem(folder: &tempfile::TempDir) -> String {
 }
 
 fn solve(arguments: &[&str]) -> std::process::Output {
-    Command::cargo_bin("seafix").unwrap().arg("solve").args(arguments).output().unwrap()
+    program().arg("solve").args(arguments).output().unwrap()
 }
 
 #[test]

@@ -9,10 +9,10 @@ use tempfile::TempDir;
 /// Sources of every kind, shortened, and what their frames are tried with.
 const EXPERIMENTS: [(&str, &str); 7] = [
     ("points", "[source]\nname = 'virtual-points'\nframes = 6\n"),
-    ("images", "[source]\nname = 'virtual-images'\nframes = 2\n"),
+    ("images", "[source]\nname = 'virtual-images'\nframes = 2\nrig.size = [512, 384]\nrig.focal = 250.0\n"),
     (
         "readings",
-        "[source]\nname = 'dive'\nframes = 5\nrate = 2.0\n[navigation]\nodometry = 'dvl-gyro'\npolicy = { name = 'interval', seconds = 1.0 }\n",
+        "[source]\nname = 'dive'\nframes = 5\nrate = 2.0\nrig.size = [512, 384]\nrig.focal = 250.0\n[navigation]\nodometry = 'dvl-gyro'\npolicy = { name = 'interval', seconds = 1.0 }\n",
     ),
     ("layouts", "[source]\nname = 'virtual-layouts'\nlayouts = 3\nframes = 6\nsurvey-sigma = 0.01\n"),
     (
@@ -104,7 +104,7 @@ fn another_method_on_the_logged_inputs_is_that_method_on_the_experiment() {
 #[test]
 fn another_detector_needs_the_images() {
     let folder = TempDir::new().unwrap();
-    let experiment = "[source]\nname = 'virtual-images'\nframes = 1\n";
+    let experiment = "[source]\nname = 'virtual-images'\nframes = 1\nrig.size = [512, 384]\nrig.focal = 250.0\n";
     let (_, log) = logged(folder.path(), experiment, &[]);
     let detector = "pipeline.detector=fast";
     let replay = Replay { settings: vec![detector.to_owned()], ..Replay::default() };

@@ -1,4 +1,4 @@
-//! This project's own messages, generated from `proto/seafix` (see `tests/generated.rs`).
+//! This project's own messages, generated from `proto/seafix` (see `tests/it/generated.rs`).
 
 #[expect(unreachable_pub, reason = "generated")]
 #[rustfmt::skip]

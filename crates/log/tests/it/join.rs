@@ -1,6 +1,5 @@
 //! Logs of parts become the log of the whole, byte for byte.
 
-#[allow(dead_code, reason = "each test uses some of it")]
 use std::{fs, ops::Range, path::Path};
 
 use seafix_log::{LogError, Totals, Writer, join, read};

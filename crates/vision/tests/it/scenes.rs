@@ -21,14 +21,7 @@ fn hit(origin: Vector3<f64>, d: Vector3<f64>) -> Vector3<f64> {
     origin + d * ((OFFSET - NORMAL.dot(&origin)) / NORMAL.dot(&d))
 }
 
-/// The depth (m) of the plane above the point's place, less the point's.
-#[allow(dead_code, reason = "not every test looks at clouds")]
-pub(crate) fn depth_off(p: &Point<seafix_geometry::Camera>) -> f64 {
-    OFFSET - NORMAL.dot(&p.coords)
-}
-
 /// Where the right camera sees what the left one sees at `left`.
-#[allow(dead_code, reason = "not every test looks at matches")]
 pub(crate) fn truth(rig: &StereoRig, left: Pixel) -> Option<StereoPixels> {
     let ray = rig.left().normalize(&left)?.push(1.0);
     rig.project(&Point::from(hit(Vector3::zeros(), ray)))
@@ -57,13 +50,11 @@ fn texture(x: f64, y: f64) -> f64 {
 }
 
 /// Both images in 8 bits: texture of ± `contrast` around 110 grey levels, noise of ± `grain` at most.
-#[allow(dead_code, reason = "not every test looks at both")]
 pub(crate) fn images(rig: &StereoRig, contrast: f64, grain: f64) -> [Image; 2] {
     painted(rig, contrast, grain, texture)
 }
 
 /// The same with a tile of `side` (m) of that texture, over and over.
-#[allow(dead_code, reason = "not every test looks at both")]
 pub(crate) fn tiled(rig: &StereoRig, side: f64) -> [Image; 2] {
     painted(rig, 60.0, 1.0, |x, y| texture(x.rem_euclid(side), y.rem_euclid(side)))
 }
