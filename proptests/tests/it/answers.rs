@@ -9,11 +9,6 @@ use seafix_referencing::{
 };
 use seafix_simulation::families::{Drawn, Family, Presence};
 
-/// Problems of each family at most, of the first that have no more points than this, and other orders of each.
-const PROBLEMS: usize = 8;
-const MOST_POINTS: usize = 500;
-const ORDERS: usize = 2;
-
 /// The numbers of the points of a problem in another order: the new place k has the old point order[k].
 struct Order {
     models: Vec<usize>,
@@ -61,15 +56,27 @@ fn attempt(problem: &CoherenceProblem) -> Attempt {
 /// Seen to fail where the samples of the expected chance sets follow the numbers of the points.
 #[test]
 fn the_order_of_the_points_changes_no_answer() {
+    in_other_orders(2, 200, 1);
+}
+
+#[test]
+#[ignore = "long: 112 problems, each in two other orders"]
+fn no_order_of_the_points_changes_an_answer() {
+    in_other_orders(8, 500, 2);
+}
+
+/// So many problems of each family with and without the object, of the first that have no more points than this, each in so many other
+/// orders.
+fn in_other_orders(problems: usize, most_points: usize, orders: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(24);
     let mut outcomes = BTreeMap::new();
     for family in "abcdefg".chars().map(|name| name.to_string().parse::<Family>().expect("a family")) {
         for presence in [Presence::Present, Presence::Absent] {
             let drawn = (0..40).map(|number| Drawn::new(family, 24, number, presence).problem.problem());
-            for problem in drawn.filter(|problem| problem.cloud.len() <= MOST_POINTS).take(PROBLEMS) {
+            for problem in drawn.filter(|problem| problem.cloud.len() <= most_points).take(problems) {
                 let first = attempt(&problem);
                 *outcomes.entry(first.outcome.reason().unwrap_or("referenced")).or_insert(0) += 1;
-                for _ in 0..ORDERS {
+                for _ in 0..orders {
                     let order = Order::any(&problem, &mut rng);
                     let again = attempt(&order.of(&problem));
                     let name = format!("{} ({presence:?})", problem.id);
@@ -90,5 +97,5 @@ fn the_order_of_the_points_changes_no_answer() {
             }
         }
     }
-    assert!(outcomes.len() > 2 && outcomes["referenced"] > PROBLEMS, "{outcomes:?}");
+    assert!(outcomes.len() > 2 && outcomes["referenced"] > problems, "{outcomes:?}");
 }

@@ -1,6 +1,6 @@
 //! What every odometry owes that goes by readings of a Doppler log and a gyro.
 
-use std::path::Path;
+use std::{path::Path, sync::LazyLock};
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use proptest::prelude::*;
@@ -201,13 +201,37 @@ fn no_odometry_by_readings_invents_a_motion() {
     }
 }
 
-/// A dive with the sensors' usual errors: where the camera was at each pair, and the motions to all but the first.
-fn motions(
-    odometry: &dyn Odometry,
-    mission: &Mission,
-    dive: u64,
-    pairs: usize,
-) -> (Vec<Transform<Object, Camera>>, Vec<Local>) {
+/// Where the camera was at each pair of a dive, and the motions to all but the first.
+type Dived = (Vec<Transform<Object, Camera>>, Vec<Local>);
+
+/// What an odometry by readings tells of dives with the sensors' usual errors: of a steady vehicle, and of one that turns a corner
+/// in a current, which wanders as the defaults say.
+struct Dives {
+    name: &'static str,
+    steady: Vec<Dived>,
+    pushed: Vec<Dived>,
+}
+
+/// As many of each as the bounds below are for.
+static DIVES: LazyLock<Vec<Dives>> = LazyLock::new(|| {
+    let mission = |frames| Mission { as_points: true, frames, rate: 5.0, ..Mission::default() };
+    let current = Current { speed: 0.2, sigma: 0.05, tau: 10.0, ..Current::default() };
+    let (steady, pushed) = (mission(141), Mission { current, start: 20.0, ..mission(201) });
+    let all = |odometry: &dyn Odometry, mission: &Mission| {
+        (0..cases(60).into()).map(|dive| dived(odometry, mission, dive)).collect()
+    };
+    let of = |(name, odometry): (&'static str, Box<dyn Odometry>)| {
+        let told = match name {
+            "dvl-gyro" => Choice::named(name).with("unsteady", 0.003).with("unsteady-turn-deg", 0.05),
+            _ => Choice::named(name),
+        };
+        let calm = ODOMETRIES.build(&told).unwrap();
+        Dives { name, steady: all(&*calm, &steady), pushed: all(&*odometry, &pushed) }
+    };
+    listening().into_iter().map(of).collect()
+});
+
+fn dived(odometry: &dyn Odometry, mission: &Mission, dive: u64) -> Dived {
     let planned = mission.plan(7, dive, Path::new("")).unwrap();
     let said = planned.readings();
     let sensors = &mission.sensors;
@@ -223,7 +247,7 @@ fn motions(
 
     let mut journey = Journeying::new(odometry, planned.rig(), planned.body_from_camera());
     let (mut way, mut steps, mut told) = (Vec::new(), Vec::new(), 0);
-    for pair in 0..pairs {
+    for pair in 0..mission.frames {
         let instant = planned.instant(pair);
         let stamp = instant.stamp_ns;
         let now = readings.partition_point(|(arrival, _)| *arrival <= stamp);
@@ -244,71 +268,51 @@ fn nees(error: &Vector6<f64>, covariance: &Matrix6<f64>) -> f64 {
     error.dot(&covariance.cholesky().unwrap().solve(error))
 }
 
-/// The normalised error squared of the pose after the motions of `dives` dives, at some pairs of each: the means.
-fn consistency(odometry: &dyn Odometry, mission: &Mission, dives: u32, at: &[usize]) -> Vec<f64> {
-    let mut sums = vec![0.0; at.len()];
-    for dive in 0..dives {
-        let (way, steps) = motions(odometry, mission, dive.into(), at.last().unwrap() + 1);
-        let start = Standing::new(way[0], Covariance6::isotropic(1e-9, 1e-9));
-        for (sum, pair) in sums.iter_mut().zip(at) {
-            let there = start.after_all(&steps[..*pair]);
-            *sum += nees(&there.object_from_camera.error_to(&way[*pair]), &there.covariance.matrix);
-        }
-    }
-    sums.iter().map(|sum| sum / f64::from(dives)).collect()
+/// The normalised error squared of the pose after the motions of the dives, at some pairs of each: the means.
+fn consistency(dives: &[Dived], at: &[usize]) -> Vec<f64> {
+    let mean = |pair: usize| {
+        let error = |(way, steps): &Dived| {
+            let start = Standing::new(way[0], Covariance6::isotropic(1e-9, 1e-9));
+            let there = start.after_all(&steps[..pair]);
+            nees(&there.object_from_camera.error_to(&way[pair]), &there.covariance.matrix)
+        };
+        dives.iter().map(error).sum::<f64>() / dives.len() as f64
+    };
+    at.iter().map(|&pair| mean(pair)).collect()
 }
 
 /// Four standard errors of the mean of so many χ² of six degrees of freedom.
-fn nees_bound(dives: u32) -> f64 {
-    4.0 * (12.0 / f64::from(dives)).sqrt()
-}
-
-/// An odometry told that the vehicle is steady.
-fn steady(name: &str) -> Choice {
-    match name {
-        "dvl-gyro" => Choice::named(name).with("unsteady", 0.003).with("unsteady-turn-deg", 0.05),
-        _ => Choice::named(name),
-    }
+fn nees_bound(dives: &[Dived]) -> f64 {
+    4.0 * (12.0 / dives.len() as f64).sqrt()
 }
 
 /// The motion since the first pair errs as its covariance says, after half a second, eight seconds and more: noise, scale and
-/// bias, late readings, what is held until they come, and what velocity and rate do between them. Of a steady vehicle, and of
-/// one that turns a corner in a current, which wanders as the defaults say. The mean NEES of six degrees of freedom lies within
+/// bias, late readings, what is held until they come, and what velocity and rate do between them. The mean NEES of six degrees of freedom lies within
 /// four of its standard errors of 6.
 ///
 /// Seen to fail when errors that last count as errors of each step alone.
 #[test]
 fn dead_reckoned_motions_are_consistent() {
-    let mission = |frames| Mission { as_points: true, frames, rate: 5.0, ..Mission::default() };
-    let current = Current { speed: 0.2, sigma: 0.05, tau: 10.0, ..Current::default() };
-    let pushed = Mission { current, start: 20.0, ..mission(201) };
-    let dives = cases(60);
-    let bound = nees_bound(dives);
-    for (name, odometry) in listening() {
-        let calm = ODOMETRIES.build(&steady(name)).unwrap();
-        let all = [
-            consistency(&*calm, &mission(101), dives, &[3, 40, 100]),
-            consistency(&*odometry, &pushed, dives, &[3, 40, 100, 200]),
-        ];
+    for Dives { name, steady, pushed } in &*DIVES {
+        let all = [consistency(steady, &[3, 40, 100]), consistency(pushed, &[3, 40, 100, 200])];
         println!("{name}: {all:.2?}");
-        assert!(all.iter().flatten().all(|mean| (mean - 6.0).abs() < bound), "{name}: {all:?}");
+        assert!(all.iter().flatten().all(|mean| (mean - 6.0).abs() < nees_bound(steady)), "{name}: {all:?}");
     }
 }
 
 /// A network of dead-reckoned legs, five pairs each, over 20 s, with a pose from elsewhere at its beginning and after a
 /// quarter, which tell scale and bias for the rest: the mean NEES of every station; of the motion across half of the legs;
 /// of the pose that further steps, for 8 s, lead to from the last station.
-fn network_means(odometry: &dyn Odometry, mission: &Mission, dives: u32) -> (Vec<f64>, [f64; 2]) {
+fn network_means(dives: &[Dived]) -> (Vec<f64>, [f64; 2]) {
     const LEG: usize = 5;
     const LEGS: usize = 20;
     const FURTHER: usize = 40;
     const KNOWN: (f64, f64) = (2e-4, 1e-3);
-    let mission = Mission { frames: LEG * LEGS + FURTHER + 1, ..mission.clone() };
     let mut stations = vec![0.0; LEGS + 1];
     let (mut across, mut further) = (0.0, 0.0);
-    for dive in 0..dives.into() {
-        let (way, steps) = motions(odometry, &mission, dive, mission.frames);
-        let mut stream = Stream::new(7, dive, 0, Purpose::Prior);
+    let count = dives.len() as f64;
+    for (dive, (way, steps)) in dives.iter().enumerate() {
+        let mut stream = Stream::new(7, dive as u64, 0, Purpose::Prior);
         let place = Place { world_from_object: Transform::identity(), covariance: Covariance6::isotropic(0.0, 0.0) };
         let mut network = Network::new(vec![("origin".to_owned(), place)]);
         for number in 0..=LEGS {
@@ -331,15 +335,15 @@ fn network_means(odometry: &dyn Odometry, mission: &Mission, dives: u32) -> (Vec
         let closed = network.solve().unwrap();
         for (number, sum) in stations.iter_mut().enumerate() {
             let error = closed.station(number).error_to(&way[number * LEG].relabel());
-            *sum += nees(&error, &closed.covariance(number).matrix) / f64::from(dives);
+            *sum += nees(&error, &closed.covariance(number).matrix) / count;
         }
         let (from, to) = (LEGS / 4, 3 * LEGS / 4);
         let motion = closed.relative(from, to).unwrap();
         let truth = way[from * LEG].inverse() * way[to * LEG];
-        across += nees(&motion.motion.error_to(&truth), &motion.covariance.matrix) / f64::from(dives);
-        let there = closed.navigated(0, LEGS).unwrap().standing.after_all(&steps[LEGS * LEG..]);
+        across += nees(&motion.motion.error_to(&truth), &motion.covariance.matrix) / count;
+        let there = closed.navigated(0, LEGS).unwrap().standing.after_all(&steps[LEGS * LEG..][..FURTHER]);
         further +=
-            nees(&there.object_from_camera.error_to(way.last().unwrap()), &there.covariance.matrix) / f64::from(dives);
+            nees(&there.object_from_camera.error_to(&way[LEGS * LEG + FURTHER]), &there.covariance.matrix) / count;
     }
     (stations, [across, further])
 }
@@ -353,19 +357,13 @@ fn network_means(odometry: &dyn Odometry, mission: &Mission, dives: u32) -> (Vec
 /// steps that follow.
 #[test]
 fn networks_over_dead_reckoning_are_consistent() {
-    let mission = Mission { as_points: true, rate: 5.0, ..Mission::default() };
-    let current = Current { speed: 0.2, sigma: 0.05, tau: 10.0, ..Current::default() };
-    let pushed = Mission { current, start: 20.0, ..mission.clone() };
-    let dives = cases(60);
-    let bound = nees_bound(dives);
-    for (name, odometry) in listening() {
-        let calm = ODOMETRIES.build(&steady(name)).unwrap();
-        let (stations, [across, further]) = network_means(&*calm, &mission, dives);
-        let (driven, _) = network_means(&*odometry, &pushed, dives);
+    for Dives { name, steady, pushed } in &*DIVES {
+        let (stations, [across, further]) = network_means(steady);
+        let (driven, _) = network_means(pushed);
         println!("{name}: {stations:.2?} {across:.2} {further:.2}; {driven:.2?}");
         let driven = driven.iter().sum::<f64>() / driven.len() as f64;
         for mean in stations.into_iter().chain([across, further, driven]) {
-            assert!((mean - 6.0).abs() < bound, "{name}: {mean:.2}");
+            assert!((mean - 6.0).abs() < nees_bound(steady), "{name}: {mean:.2}");
         }
     }
 }
