@@ -71,7 +71,7 @@ mod write;
 pub use error::LogError;
 pub use frames::Frames;
 pub use join::{join, join_lacking};
-pub use png::encode_png;
+pub use png::{encode_png, encode_png_16};
 pub use read::{Reader, TrialLog, looks_like, read};
 pub use record::{
     Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, ELSEWHERE, Evaluation, ExactPose,

@@ -2,10 +2,7 @@
 
 use std::io::Cursor;
 
-use image::{
-    ExtendedColorType, ImageDecoder, ImageEncoder,
-    codecs::png::{CompressionType, FilterType, PngDecoder, PngEncoder},
-};
+use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Filter, Limits};
 
 use crate::GreyImage;
 
@@ -17,26 +14,47 @@ const LIMIT: u64 = 64 << 20;
 /// # Errors
 /// An image whose pixels do not fill it.
 pub fn encode_png(image: &GreyImage) -> Result<Vec<u8>, String> {
-    let mut bytes = Vec::new();
     // To try all filters on every row takes half as long again and saves a hundredth.
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Avg)
-        .write_image(&image.pixels, image.width, image.height, ExtendedColorType::L8)
-        .map_err(|error| error.to_string())?;
+    encode_grey([image.width, image.height], BitDepth::Eight, Filter::Avg, &image.pixels)
+}
+
+/// Grey samples of 16 bits as PNG, losslessly.
+///
+/// # Errors
+/// Samples that do not fill an image of this size.
+pub fn encode_png_16(size: [u32; 2], samples: &[u16]) -> Result<Vec<u8>, String> {
+    let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_be_bytes()).collect();
+    encode_grey(size, BitDepth::Sixteen, Filter::Adaptive, &bytes)
+}
+
+fn encode_grey([width, height]: [u32; 2], depth: BitDepth, filter: Filter, data: &[u8]) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, width, height);
+    encoder.set_color(ColorType::Grayscale);
+    encoder.set_depth(depth);
+    encoder.set_compression(Compression::Fast);
+    encoder.set_filter(filter);
+    let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
+    writer.write_image_data(data).map_err(|error| error.to_string())?;
+    writer.finish().map_err(|error| error.to_string())?;
     Ok(bytes)
 }
 
 /// The 8-bit grey image in a PNG; its declared size is checked before anything is decoded.
 pub(crate) fn decode(bytes: &[u8]) -> Result<GreyImage, String> {
-    let decoder = PngDecoder::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
-    let (width, height) = decoder.dimensions();
+    let mut decoder =
+        Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: usize::try_from(LIMIT).unwrap_or(usize::MAX) });
+    let header = decoder.read_header_info().map_err(|error| error.to_string())?;
+    let (width, height) = header.size();
     if u64::from(width) * u64::from(height) > LIMIT {
         return Err(format!("an image of {width} x {height} px; the limit is {LIMIT} px"));
     }
-    if decoder.color_type() != image::ColorType::L8 {
-        return Err(format!("a PNG of kind {:?}; logs keep 8-bit grey", decoder.color_type()));
+    if (header.color_type, header.bit_depth) != (ColorType::Grayscale, BitDepth::Eight) {
+        return Err(format!("a PNG of kind {:?} {:?}; logs keep 8-bit grey", header.color_type, header.bit_depth));
     }
+    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
     let mut pixels = vec![0; width as usize * height as usize];
-    decoder.read_image(&mut pixels).map_err(|error| error.to_string())?;
+    reader.next_frame(&mut pixels).map_err(|error| error.to_string())?;
     Ok(GreyImage { width, height, pixels })
 }
 

@@ -1,10 +1,6 @@
 //! Topics, and the schema of each message on them.
 
-use std::borrow::Cow;
-
-use foxglove::{Encode, messages};
-
-use crate::proto;
+use crate::proto::{self, foxglove};
 
 /// The header of the trial.
 pub(crate) const HEADER: &str = "/run/header";
@@ -53,14 +49,14 @@ pub(crate) const POSE_PRIOR: &str = "/pose/prior";
 /// A message with a schema to publish.
 pub(crate) trait Logged: prost::Message {
     /// The schema's name and its serialised `FileDescriptorSet`.
-    fn schema() -> (String, Cow<'static, [u8]>);
+    fn schema() -> Schema;
 }
 
 macro_rules! own {
     ($($message:ident),*) => {$(
         impl Logged for proto::$message {
-            fn schema() -> (String, Cow<'static, [u8]>) {
-                (format!("{}.{}", proto::PACKAGE, stringify!($message)), proto::DESCRIPTORS.into())
+            fn schema() -> Schema {
+                (concat!("seafix.v1.", stringify!($message)), proto::DESCRIPTORS)
             }
         }
     )*};
@@ -69,10 +65,10 @@ own!(TrialHeader, Frame, Inputs, ReferencingResult, Candidates, Evaluation, Insp
 
 macro_rules! well_known {
     ($($message:ident),*) => {$(
-        impl Logged for messages::$message {
-            fn schema() -> (String, Cow<'static, [u8]>) {
-                let schema = <Self as Encode>::get_schema().expect("well-known messages have a schema");
-                (schema.name, schema.data)
+        impl Logged for foxglove::$message {
+            fn schema() -> Schema {
+                let descriptors = include_bytes!(concat!("../proto/foxglove/", stringify!($message), ".bin"));
+                (concat!("foxglove.", stringify!($message)), descriptors)
             }
         }
     )*};
@@ -88,21 +84,21 @@ well_known!(
 );
 
 /// A schema's name and its serialised `FileDescriptorSet`.
-pub(crate) type Schema = fn() -> (String, Cow<'static, [u8]>);
+pub(crate) type Schema = (&'static str, &'static [u8]);
 
 /// The topics of which every frame has its own messages, with their schemas: what is copied when logs are joined.
-pub(crate) const OF_FRAMES: [(&str, Schema); 18] = [
-    (IMAGES[0], messages::CompressedImage::schema),
-    (IMAGES[1], messages::CompressedImage::schema),
-    (ANNOTATIONS[0], messages::ImageAnnotations::schema),
-    (ANNOTATIONS[1], messages::ImageAnnotations::schema),
-    (TF, messages::FrameTransforms::schema),
-    (POSE_ESTIMATE, messages::PoseInFrame::schema),
-    (POSE_TRUTH, messages::PoseInFrame::schema),
-    (POSE_PRIOR, messages::PoseInFrame::schema),
-    (CLOUD, messages::PointCloud::schema),
-    (CLOUD_CANDIDATES, messages::PointCloud::schema),
-    (CLOUD_IDENTIFIED, messages::PointCloud::schema),
+pub(crate) const OF_FRAMES: [(&str, fn() -> Schema); 18] = [
+    (IMAGES[0], foxglove::CompressedImage::schema),
+    (IMAGES[1], foxglove::CompressedImage::schema),
+    (ANNOTATIONS[0], foxglove::ImageAnnotations::schema),
+    (ANNOTATIONS[1], foxglove::ImageAnnotations::schema),
+    (TF, foxglove::FrameTransforms::schema),
+    (POSE_ESTIMATE, foxglove::PoseInFrame::schema),
+    (POSE_TRUTH, foxglove::PoseInFrame::schema),
+    (POSE_PRIOR, foxglove::PoseInFrame::schema),
+    (CLOUD, foxglove::PointCloud::schema),
+    (CLOUD_CANDIDATES, foxglove::PointCloud::schema),
+    (CLOUD_IDENTIFIED, foxglove::PointCloud::schema),
     (CANDIDATES, proto::Candidates::schema),
     (RESULT, proto::ReferencingResult::schema),
     (EVALUATION, proto::Evaluation::schema),

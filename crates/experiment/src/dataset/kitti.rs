@@ -6,7 +6,6 @@
 
 use std::path::{Path, PathBuf};
 
-use image::ImageReader;
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_component::{Fault, read_text};
 use seafix_geometry::{Camera, Pinhole, StereoRig, Transform, World};
@@ -15,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Dataset, DatasetFrame,
     foreign::{Foreign, image},
+    picture::declared_size,
     tum::nanoseconds,
 };
 use crate::trajectory::Trajectory;
@@ -62,12 +62,7 @@ pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<
         let (Some(left), Some(right)) = (place(cameras[0]), place(cameras[1])) else { continue };
         frames.push(DatasetFrame { stamp_ns, left, right, truth: None, prior: None, visible: Vec::new() });
     }
-    let size = |frame: Option<&DatasetFrame>| {
-        let first = &frame?.left;
-        let header = ImageReader::open(first).and_then(ImageReader::with_guessed_format).ok()?;
-        header.into_dimensions().ok().map(|(width, height)| [width, height])
-    };
-    let Some(size) = size(frames.first()) else {
+    let Some(size) = frames.first().and_then(|frame| declared_size(&frame.left)) else {
         let fault = Fault::new("no image to tell the cameras' size", &folder.join(format!("image_{}", cameras[0])));
         return Err(faults.into_iter().chain([fault.remedy("images are called 000000.png, …")]).collect());
     };

@@ -2,6 +2,7 @@
 //! of EuRoC and KITTI are read as they are.
 
 mod check;
+mod decode;
 mod describe;
 mod encoded;
 mod euroc;

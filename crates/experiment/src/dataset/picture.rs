@@ -1,20 +1,15 @@
 //! Image files in and out.
 
-use std::{
-    fs::File,
-    io::{Cursor, Read},
-    path::Path,
-};
+use std::{fs::File, io::Read, path::Path};
 
-use image::{
-    DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits,
-    codecs::png::{CompressionType, FilterType, PngEncoder},
-};
 use seafix_component::Fault;
-use seafix_log::encode_png;
+use seafix_log::{encode_png, encode_png_16};
 use seafix_vision::Image;
 
-use super::{encoded::objection, pnm};
+use super::{
+    decode::{self, Samples},
+    encoded::objection,
+};
 use crate::record::grey;
 
 /// How large an image may be before it is refused: checked before anything of that size is made.
@@ -87,20 +82,14 @@ pub(crate) fn decode_image(
     bits: u8,
     limits: ImageLimits,
 ) -> Result<Image, Fault> {
-    let reader =
-        || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| unreadable(path, &error));
-    let (width, height) = reader()?.into_dimensions().map_err(|error| damaged(path, &error))?;
+    let [width, height] = decode::size(bytes).map_err(|cause| decode::damaged(path, cause))?;
     check_size(path, [width, height], expected, limits)?;
     if let Some((what, remedy)) = objection(bytes) {
         return Err(Fault::new(what, path).remedy(remedy));
     }
-    let white = pnm::white(bytes, [width, height]).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
-    let mut reader = reader()?;
-    let mut memory = Limits::default();
-    memory.max_alloc = Some(limits.bytes);
-    reader.limits(memory);
-    let decoded = reader.decode().map_err(|error| damaged(path, &error))?;
-    let pixels = grey_levels(&decoded, bits, white).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
+    let samples = decode::samples(bytes, path, limits.bytes)?;
+    let pixels =
+        grey_levels(&samples, width as usize, bits).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
 }
 
@@ -132,28 +121,30 @@ fn misfit(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
         .remedy("give the images the rig was calibrated with, or correct `size`")
 }
 
+/// The size that the header of an image file declares; `None` if there is no header to read.
+pub(super) fn declared_size(path: &Path) -> Option<[u32; 2]> {
+    /// Enough for what cameras put before a JPEG's frame: thumbnails and profiles.
+    const HEADER: u64 = 4 << 20;
+    let mut bytes = Vec::new();
+    regular(path).ok()?.take(HEADER).read_to_end(&mut bytes).ok()?;
+    decode::size(&bytes).ok()
+}
+
 /// The fault of an image whose header declares another size than `expected`; none where there is no header to read.
 pub(super) fn size_fault(path: &Path, expected: [u32; 2]) -> Option<Fault> {
-    let file = std::io::BufReader::new(regular(path).ok()?);
-    let (width, height) = ImageReader::new(file).with_guessed_format().ok()?.into_dimensions().ok()?;
-    ([width, height] != expected).then(|| misfit(path, [width, height], expected))
+    let size = declared_size(path)?;
+    (size != expected).then(|| misfit(path, size, expected))
 }
 
 /// Rec. 709's weights of red, green and blue, in ten thousandths.
 const LUMA: [u32; 3] = [2126, 7152, 722];
 
-/// The brightness of every pixel, 0 to 255; `white` is the greatest value that the file itself says it has.
-fn grey_levels(decoded: &DynamicImage, bits: u8, white: Option<u16>) -> Result<Vec<f32>, Fault> {
-    let color = decoded.color();
-    let (channels, width) = (usize::from(color.channel_count()), decoded.width() as usize);
-    let bytes = decoded.as_bytes();
-    if usize::from(color.bytes_per_pixel()) == channels {
-        let samples: Vec<u16> = bytes.iter().map(|&byte| byte.into()).collect();
-        return levels_of(&samples, channels, width, white.unwrap_or(u8::MAX.into()), u8::MAX.into());
-    }
-    let samples: Vec<u16> = bytes.chunks_exact(2).map(|pair| u16::from_ne_bytes([pair[0], pair[1]])).collect();
-    let deep = ((1_u32 << bits.min(16)) - 1) as u16;
-    levels_of(&samples, channels, width, white.map_or(deep, |white| white.min(deep)), u16::MAX)
+/// The brightness of every pixel, 0 to 255; `bits` is the depth of images of 16 bits.
+fn grey_levels(samples: &Samples, width: usize, bits: u8) -> Result<Vec<f32>, Fault> {
+    let full = if samples.deep { ((1_u32 << bits.min(16)) - 1) as u16 } else { u8::MAX.into() };
+    let opaque = samples.white.unwrap_or(if samples.deep { u16::MAX } else { u8::MAX.into() });
+    let white = samples.white.map_or(full, |white| white.min(full));
+    levels_of(&samples.values, samples.channels, width, white, opaque)
 }
 
 fn levels_of(samples: &[u16], channels: usize, width: usize, white: u16, opaque: u16) -> Result<Vec<f32>, Fault> {
@@ -184,12 +175,6 @@ fn levels_of(samples: &[u16], channels: usize, width: usize, white: u16, opaque:
     Ok(pixels.map(level).collect())
 }
 
-fn damaged(path: &Path, error: &image::ImageError) -> Fault {
-    Fault::new("no image that can be decoded", path)
-        .value(error.to_string())
-        .remedy("PNG, JPEG and PNM are read, grey or colour, 8 or 16 bits")
-}
-
 /// Writes `image` as a grey PNG: of 8 bits, or of 16 that hold `bits`.
 ///
 /// # Errors
@@ -205,17 +190,13 @@ pub fn write_png(path: &Path, image: &Image, bits: u8) -> Result<(), Fault> {
 fn encode_deep(image: &Image, bits: u8) -> Result<Vec<u8>, String> {
     let white = f64::from((1_u32 << bits) - 1);
     let level = |grey: &f32| (f64::from(*grey) * white / 255.0).round().clamp(0.0, white) as u16;
-    let samples: Vec<u8> = image.pixels().iter().flat_map(|grey| level(grey).to_ne_bytes()).collect();
-    let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(&samples, image.width() as u32, image.height() as u32, ExtendedColorType::L16)
-        .map_err(|error| error.to_string())?;
-    Ok(bytes)
+    let samples: Vec<u16> = image.pixels().iter().map(level).collect();
+    encode_png_16([image.width() as u32, image.height() as u32], &samples)
 }
 
 #[cfg(test)]
 mod tests {
-    use image::ImageFormat;
+    use png::{BitDepth, ColorType};
 
     use super::*;
 
@@ -239,30 +220,46 @@ mod tests {
         assert_eq!(said.lines().count(), 1);
     }
 
-    /// 8×6 pixels of this kind in this format.
-    fn encoded(samples: &[u8], color: ExtendedColorType, format: ImageFormat) -> Vec<u8> {
-        let mut bytes = Cursor::new(Vec::new());
-        image::write_buffer_with_format(&mut bytes, samples, 8, 6, color, format).unwrap();
-        bytes.into_inner()
+    /// 8×6 pixels of this kind as PNG.
+    fn png(samples: &[u8], (color, depth): (ColorType, BitDepth)) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 8, 6);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        encoder.write_header().unwrap().write_image_data(samples).unwrap();
+        bytes
+    }
+
+    const GREY: (ColorType, BitDepth) = (ColorType::Grayscale, BitDepth::Eight);
+    const DEEP: (ColorType, BitDepth) = (ColorType::Grayscale, BitDepth::Sixteen);
+
+    fn pgm(samples: &[u8]) -> Vec<u8> {
+        [b"P5 8 6 255\n", samples].concat()
+    }
+
+    fn jpeg(samples: &[u8]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        jpeg_encoder::Encoder::new(&mut bytes, 100).encode(samples, 8, 6, jpeg_encoder::ColorType::Luma).unwrap();
+        bytes
     }
 
     fn words(values: impl Iterator<Item = u16>) -> Vec<u8> {
-        values.flat_map(u16::to_ne_bytes).collect()
+        values.flat_map(u16::to_be_bytes).collect()
     }
 
     #[test]
     fn grey_is_read_as_finely_as_it_is_stored() {
         let eight: Vec<u8> = (0..48).map(|i| i * 5).collect();
-        for format in [ImageFormat::Png, ImageFormat::Pnm] {
-            let found = read("a", &encoded(&eight, ExtendedColorType::L8, format), [8, 6], 16).unwrap();
+        for bytes in [png(&eight, GREY), pgm(&eight)] {
+            let found = read("a", &bytes, [8, 6], 16).unwrap();
             assert!(found.pixels().iter().zip(&eight).all(|(a, b)| *a == f32::from(*b)));
         }
         let sixteen = words((0..48).map(|i| i * 1394));
-        let found = read("a", &encoded(&sixteen, ExtendedColorType::L16, ImageFormat::Png), [8, 6], 16).unwrap();
+        let found = read("a", &png(&sixteen, DEEP), [8, 6], 16).unwrap();
         for (i, value) in found.pixels().iter().enumerate() {
             assert_eq!(*value, (i as f64 * 1394.0 * 255.0 / 65535.0) as f32);
         }
-        let twelve = encoded(&words((0..48).map(|i| 4095 - i)), ExtendedColorType::L16, ImageFormat::Png);
+        let twelve = png(&words((0..48).map(|i| 4095 - i)), DEEP);
         let found = read("a", &twelve, [8, 6], 12).unwrap();
         assert_eq!(found.pixels()[0], 255.0);
         assert_eq!(found.pixels()[47], (4048.0 * 255.0 / 4095.0_f64) as f32);
@@ -283,22 +280,22 @@ mod tests {
     #[test]
     fn colour_becomes_luma_without_rounding() {
         let grey: Vec<u8> = (0..48).flat_map(|i| [i * 5; 3]).collect();
-        let found = read("a", &encoded(&grey, ExtendedColorType::Rgb8, ImageFormat::Png), [8, 6], 16).unwrap();
+        let found = read("a", &png(&grey, (ColorType::Rgb, BitDepth::Eight)), [8, 6], 16).unwrap();
         assert!(found.pixels().iter().enumerate().all(|(i, value)| *value == i as f32 * 5.0));
         let red: Vec<u8> = (0..48).flat_map(|_| [255, 0, 0, 255]).collect();
-        let found = read("a", &encoded(&red, ExtendedColorType::Rgba8, ImageFormat::Png), [8, 6], 16).unwrap();
+        let found = read("a", &png(&red, (ColorType::Rgba, BitDepth::Eight)), [8, 6], 16).unwrap();
         assert!((found.pixels()[7] - 54.213).abs() < 1e-4);
         let wide = words((0..48).flat_map(|i| [i, 65535, 0]));
-        let found = read("a", &encoded(&wide, ExtendedColorType::Rgb16, ImageFormat::Png), [8, 6], 16).unwrap();
+        let found = read("a", &png(&wide, (ColorType::Rgb, BitDepth::Sixteen)), [8, 6], 16).unwrap();
         assert!((f64::from(found.pixels()[40]) - 255.0 * (0.7152 + 0.2126 * 40.0 / 65535.0)).abs() < 1e-4);
     }
 
     #[test]
     fn what_is_no_still_image_of_light_is_refused_by_name() {
         let glass: Vec<u8> = (0..48).flat_map(|i| [100, 200 + i]).collect();
-        refused("a.png", &encoded(&glass, ExtendedColorType::La8, ImageFormat::Png), &["transparent pixels"]);
+        refused("a.png", &png(&glass, (ColorType::GrayscaleAlpha, BitDepth::Eight)), &["transparent pixels"]);
         // The chunk that announces frames stands behind the header's 33 bytes.
-        let mut moving = encoded(&[7; 48], ExtendedColorType::L8, ImageFormat::Png);
+        let mut moving = png(&[7; 48], GREY);
         let frames = [0, 0, 0, 8, b'a', b'c', b'T', b'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xF3, 0x8D, 0x93, 0x70];
         moving.splice(33..33, frames);
         refused("a.png", &moving, &["a moving image"]);
@@ -309,17 +306,16 @@ mod tests {
     #[test]
     fn a_truncated_image_is_refused_wherever_it_ends() {
         let samples: Vec<u8> = (0..48_usize).map(|i| (i * 37 % 251) as u8).collect();
-        for (name, format) in [("a.png", ImageFormat::Png), ("a.jpg", ImageFormat::Jpeg), ("a.pgm", ImageFormat::Pnm)] {
-            let whole = encoded(&samples, ExtendedColorType::L8, format);
+        for (name, whole) in [("a.png", png(&samples, GREY)), ("a.jpg", jpeg(&samples)), ("a.pgm", pgm(&samples))] {
             assert!(read(name, &whole, [8, 6], 16).is_ok());
             // The PNG's last chunk, 12 bytes, says no more than that there is none.
-            let last = if format == ImageFormat::Png { whole.len() - 13 } else { whole.len() - 1 };
+            let last = if name == "a.png" { whole.len() - 13 } else { whole.len() - 1 };
             for end in [0, 1, 5, 20, last / 2, last - 10, last] {
                 assert!(read(name, &whole[..end], [8, 6], 16).is_err(), "{name}: {end} of {}", whole.len());
             }
         }
         // The wrong extension does not matter: the content says what it is.
-        assert!(read("a.jpg", &encoded(&samples, ExtendedColorType::L8, ImageFormat::Png), [8, 6], 16).is_ok());
+        assert!(read("a.jpg", &png(&samples, GREY), [8, 6], 16).is_ok());
     }
 
     /// Pixels that are stored coarse to fine: 8×6 of them, each 5 more than the one before, by Adam7's seven passes.
@@ -339,9 +335,9 @@ mod tests {
     #[test]
     fn the_limits_are_the_caller_s() {
         let samples: Vec<u8> = (0..48).collect();
-        let png = encoded(&samples, ExtendedColorType::L8, ImageFormat::Png);
-        let limited = |pixels, bytes| within(ImageLimits { pixels, bytes }, "a.png", &png, [8, 6], 16);
-        let enough = png.len() as u64 + 48;
+        let whole = png(&samples, GREY);
+        let limited = |pixels, bytes| within(ImageLimits { pixels, bytes }, "a.png", &whole, [8, 6], 16);
+        let enough = whole.len() as u64 + 48;
         assert!(limited(48, enough).is_ok());
         let said = limited(47, enough).unwrap_err();
         assert!(
@@ -350,13 +346,13 @@ mod tests {
             ),
             "{said}"
         );
-        let said = limited(48, png.len() as u64 - 1).unwrap_err();
+        let said = limited(48, whole.len() as u64 - 1).unwrap_err();
         assert!(
             said.contains("bytes are read; `--max-bytes`, in an experiment `source.max-bytes`, allows more"),
             "{said}"
         );
         // A small file that decodes to much more than it takes.
-        let flat = encoded(&[0; 48], ExtendedColorType::L8, ImageFormat::Png);
+        let flat = png(&[0; 48], GREY);
         assert!(within(ImageLimits { pixels: 48, bytes: 40 }, "a.png", &flat, [8, 6], 16).is_err());
     }
 
@@ -369,7 +365,7 @@ mod tests {
             &["an image too large", "100000×100000; at most 67108864 pixels"],
         );
         let header = |width: u32, height: u32| {
-            let mut bytes = encoded(&[7; 48], ExtendedColorType::L8, ImageFormat::Png);
+            let mut bytes = png(&[7; 48], GREY);
             bytes[16..20].copy_from_slice(&width.to_be_bytes());
             bytes[20..24].copy_from_slice(&height.to_be_bytes());
             bytes.truncate(41);
@@ -378,7 +374,7 @@ mod tests {
         for (width, height) in [(8_000_000, 4_000_000_000), (60_000, 60_000), (0, 6)] {
             refused("a.png", &header(width, height), &[]);
         }
-        let mut jpeg = encoded(&[7; 48], ExtendedColorType::L8, ImageFormat::Jpeg);
+        let mut jpeg = self::jpeg(&[7; 48]);
         let frame = jpeg.windows(2).position(|pair| pair == [0xFF, 0xC0]).unwrap();
         jpeg[frame + 5..frame + 9].fill(0xFF);
         refused("a.jpg", &jpeg, &["an image too large", "65535×65535"]);

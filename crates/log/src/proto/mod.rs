@@ -1,15 +1,32 @@
-//! This project's own messages, generated from `proto/seafix` (see `tests/it/generated.rs`).
+//! The messages of a log, generated (see `tests/it/generated.rs`): this project's own from `proto/seafix`, the well-known ones
+//! that Foxglove and Rerun display from the descriptors in `proto/foxglove`.
 
 #[expect(unreachable_pub, reason = "generated")]
 #[rustfmt::skip]
 mod generated {
-    include!("seafix.v1.rs");
+    pub mod seafix {
+        include!("seafix.v1.rs");
+    }
+    pub mod foxglove {
+        #![allow(clippy::all, rustdoc::all, reason = "generated")]
+        include!("foxglove.rs");
+    }
+    pub mod google {
+        pub mod protobuf {
+            #![allow(clippy::all, rustdoc::all, reason = "generated")]
+            include!("google.protobuf.rs");
+        }
+    }
 }
 
-pub(crate) use generated::*;
+pub(crate) use generated::{
+    foxglove,
+    google::protobuf::{Duration, Timestamp},
+    seafix::*,
+};
 
-/// The descriptors of all of them, a serialised `FileDescriptorSet`.
+/// The descriptors of this project's messages, a serialised `FileDescriptorSet`.
 pub(crate) const DESCRIPTORS: &[u8] = include_bytes!("seafix.v1.bin");
 
 /// The package, with its version, as schema names begin.
-pub(crate) const PACKAGE: &str = "seafix.v1";
+pub(crate) const PACKAGE: &str = "seafix.v1.";

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use foxglove::messages::CompressedImage;
+use crate::proto::foxglove::CompressedImage;
 
 use super::{foreign, source::Message};
 use crate::{FrameRecord, GreyImage, LogError, convert, png, proto, topic};

@@ -34,8 +34,8 @@ pub(crate) struct Message {
 impl Message {
     /// The content, which must be this project's own message `name`.
     pub(crate) fn decode<M: prost::Message + Default>(&self, path: &Path, name: &str) -> Result<M, LogError> {
-        let own = self.schema.strip_prefix(proto::PACKAGE).and_then(|rest| rest.strip_prefix('.')) == Some(name);
-        self.decode_if(own, path, || format!("{}.{name}", proto::PACKAGE))
+        let own = self.schema.strip_prefix(proto::PACKAGE) == Some(name);
+        self.decode_if(own, path, || format!("{}{name}", proto::PACKAGE))
     }
 
     /// The content, which must have this schema.

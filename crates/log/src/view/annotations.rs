@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use foxglove::messages::{
+use crate::proto::foxglove::{
     CircleAnnotation, Color, ImageAnnotations, KeyValuePair, Point2, PointsAnnotation, TextAnnotation,
     points_annotation,
 };

@@ -1,6 +1,6 @@
 //! The cameras.
 
-use foxglove::messages::CameraCalibration;
+use crate::proto::foxglove::CameraCalibration;
 
 use super::{CAMERAS, timestamp};
 use crate::{CameraRecord, RigRecord};

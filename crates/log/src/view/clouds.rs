@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use foxglove::messages::{
+use crate::proto::foxglove::{
     PackedElementField, PointCloud, Pose, Quaternion, Vector3, packed_element_field::NumericType,
 };
 

@@ -1,6 +1,6 @@
 //! Images.
 
-use foxglove::messages::CompressedImage;
+use crate::proto::foxglove::CompressedImage;
 
 use super::{CAMERAS, timestamp};
 

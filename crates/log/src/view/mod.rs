@@ -20,7 +20,7 @@ mod rigid;
 mod scene;
 mod tf;
 
-use foxglove::messages::{Color, Timestamp};
+use crate::proto::{Timestamp, foxglove::Color};
 
 pub(crate) use annotations::annotations;
 pub(crate) use calibration::calibrations;
@@ -51,8 +51,12 @@ fn object_frame(id: &str) -> String {
 /// A stamp as the messages write it.
 pub(crate) fn timestamp(stamp_ns: u64) -> Timestamp {
     let second = 1_000_000_000;
-    Timestamp::new_checked((stamp_ns / second).try_into().unwrap_or(u32::MAX), (stamp_ns % second) as u32)
-        .unwrap_or(Timestamp::MAX)
+    let seconds = stamp_ns / second;
+    // Viewers count seconds in 32 bits.
+    if seconds > u64::from(u32::MAX) {
+        return Timestamp { seconds: u32::MAX.into(), nanos: 999_999_999 };
+    }
+    Timestamp { seconds: seconds as i64, nanos: (stamp_ns % second) as i32 }
 }
 
 /// Colours that the colour-blind tell apart (Okabe and Ito, 2008), one a target in turn.

@@ -1,6 +1,6 @@
 //! Rigid motions out of records, checked.
 
-use foxglove::messages::{Pose, Quaternion, Vector3};
+use crate::proto::foxglove::{Pose, Quaternion, Vector3};
 use seafix_geometry::{Body, Camera, Frame, Object, RightCamera, Site, Transform, World};
 
 use crate::{FrameRecord, Matrix4, TargetModel, TrialHeader};

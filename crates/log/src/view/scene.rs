@@ -1,7 +1,8 @@
 //! The model as a scene: a ball and a name a feature point.
 
-use foxglove::messages::{
-    Duration, KeyValuePair, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, TextPrimitive, Vector3,
+use crate::proto::{
+    Duration,
+    foxglove::{KeyValuePair, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, TextPrimitive, Vector3},
 };
 
 use super::{colour, colour_message, object_frame, timestamp};
@@ -26,7 +27,7 @@ fn entity(target: &TargetModel, colour: [u8; 3], stamp_ns: u64) -> SceneEntity {
         timestamp: Some(timestamp(stamp_ns)),
         frame_id: object_frame(&target.id),
         id: target.id.clone(),
-        lifetime: Some(Duration::new(0, 0)),
+        lifetime: Some(Duration::default()),
         frame_locked: true,
         metadata: vec![
             KeyValuePair { key: "points".to_owned(), value: target.points.len().to_string() },

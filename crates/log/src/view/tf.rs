@@ -1,6 +1,6 @@
 //! The tree of frames, and the vehicle in it.
 
-use foxglove::messages::{FrameTransform, FrameTransforms, PoseInFrame};
+use crate::proto::foxglove::{FrameTransform, FrameTransforms, PoseInFrame};
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Body, Frame, Transform, World};
 

@@ -88,7 +88,7 @@ impl Sink {
     pub(super) fn put_bytes(
         &mut self,
         topic: &'static str,
-        schema: Schema,
+        schema: fn() -> Schema,
         stamp: u64,
         message: &[u8],
     ) -> Result<(), LogError> {
@@ -101,9 +101,9 @@ impl Sink {
         self.mcap.write_to_known_channel(&header, message).map_err(|error| write_error(&self.partial, error))
     }
 
-    fn channel(&mut self, topic: &str, schema: Schema) -> Result<u16, McapError> {
+    fn channel(&mut self, topic: &str, schema: fn() -> Schema) -> Result<u16, McapError> {
         let (name, descriptors) = schema();
-        let schema = self.mcap.add_schema(&name, "protobuf", &descriptors)?;
+        let schema = self.mcap.add_schema(name, "protobuf", descriptors)?;
         self.mcap.add_channel(schema, topic, "protobuf", &BTreeMap::new())
     }
 

@@ -1,6 +1,7 @@
 //! Figures.
 
 mod axis;
+mod canvas;
 mod chart;
 mod drawing;
 mod layer;

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use image::{GrayImage, Rgb, RgbImage, codecs::jpeg::JpegEncoder, imageops};
 use nalgebra::{Matrix4, Point3};
 use seafix_log::{CameraRecord, FrameRecord, GreyImage, Outcome, Reader, TargetRecord, TrialHeader};
 
-use super::marks::{BLACK, BLUE, ORANGE, VERMILION, WHITE, digit, disc, frame as rectangle, plus, ring};
+use super::{
+    canvas::{self, Canvas},
+    marks::{BLACK, BLUE, ORANGE, VERMILION, WHITE, digit, disc, frame as rectangle, plus, ring},
+};
 use crate::{ReportError, place::matrix, run::Trial};
 
 /// Columns between the two images.
@@ -17,7 +19,7 @@ const SHELL: f64 = 3.368;
 /// The picture of one frame.
 #[derive(Debug)]
 pub(crate) struct Marked {
-    canvas: RgbImage,
+    canvas: Canvas,
     pub(crate) frame: u64,
     pub(crate) stamp_ns: u64,
     /// Key points of the left image, points of the cloud, candidates, identified, used.
@@ -49,7 +51,7 @@ impl Marked {
         let [left, right] = [0, 1].map(|side| full(&images[side], [&header.rig.left, &header.rig.right][side].size));
         let offset = f64::from(left.width + GAP);
         let size = [left.width + GAP + right.width, left.height.max(right.height)];
-        let mut canvas = RgbImage::from_pixel(size[0], size[1], Rgb(WHITE));
+        let mut canvas = Canvas::new(size[0], size[1], WHITE);
         copy(&mut canvas, &left, 0);
         copy(&mut canvas, &right, left.width + GAP);
 
@@ -103,23 +105,16 @@ impl Marked {
 
     /// Columns and rows at this scale.
     pub(crate) fn size(&self, scale: f64) -> [u32; 2] {
-        [self.canvas.width(), self.canvas.height()].map(|side| ((f64::from(side) * scale).round() as u32).max(1))
+        [self.canvas.width, self.canvas.height].map(|side| ((f64::from(side) * scale).round() as u32).max(1))
     }
 
     /// The file, at this scale and quality: marks stay sharp, a page with it can be sent by mail.
     pub(crate) fn jpeg(&self, scale: f64, quality: u8) -> Vec<u8> {
+        if scale >= 1.0 {
+            return self.canvas.jpeg(quality);
+        }
         let [width, height] = self.size(scale);
-        let mut jpeg = Vec::new();
-        let encoder = JpegEncoder::new_with_quality(&mut jpeg, quality);
-        let smaller;
-        let canvas = if scale < 1.0 {
-            smaller = imageops::resize(&self.canvas, width, height, imageops::FilterType::Triangle);
-            &smaller
-        } else {
-            &self.canvas
-        };
-        canvas.write_with_encoder(encoder).expect("a picture of a frame has the size that JPEG can hold");
-        jpeg
+        self.canvas.resized(width, height).jpeg(quality)
     }
 }
 
@@ -165,15 +160,14 @@ fn full(image: &GreyImage, [width, height]: [u32; 2]) -> GreyImage {
     if [image.width, image.height] == [width, height] {
         return image.clone();
     }
-    let small = GrayImage::from_raw(image.width, image.height, image.pixels.clone()).unwrap_or_default();
-    let large = imageops::resize(&small, width, height, imageops::FilterType::Triangle);
-    GreyImage { width, height, pixels: large.into_raw() }
+    let [from, to] = [[image.width, image.height], [width, height]].map(|size| size.map(|side| side as usize));
+    GreyImage { width, height, pixels: canvas::resized(&image.pixels, from, to) }
 }
 
-fn copy(canvas: &mut RgbImage, image: &GreyImage, offset: u32) {
+fn copy(canvas: &mut Canvas, image: &GreyImage, offset: u32) {
     for (row, y) in image.pixels.chunks_exact(image.width.max(1) as usize).zip(0..) {
         for (&grey, x) in row.iter().zip(offset..) {
-            canvas.put_pixel(x, y, Rgb([grey; 3]));
+            canvas.set(x, y, [grey; 3]);
         }
     }
 }

@@ -22,8 +22,10 @@ fn the_report_is_the_same_twice_and_stands_alone() {
     for foreign in ["src=\"http", "href=\"http", "url(http", "@import"] {
         assert!(!text.contains(foreign), "{foreign}");
     }
-    let picture = image::open(folder.path().join("report/fix.jpg")).unwrap();
-    assert_eq!([picture.width(), picture.height()], [2 * SIZE[0] + 8, SIZE[1]]);
+    let picture = fs::read(folder.path().join("report/fix.jpg")).unwrap();
+    let mut decoder = zune_jpeg::JpegDecoder::new(zune_core::bytestream::ZCursor::new(&picture[..]));
+    decoder.decode().unwrap();
+    assert_eq!(decoder.dimensions().unwrap(), (2 * SIZE[0] as usize + 8, SIZE[1] as usize));
     if let Some(keep) = std::env::var_os("KEEP_REPORT") {
         fs::create_dir_all(&keep).unwrap();
         fs::write(Path::new(&keep).join("report.html"), text).unwrap();
