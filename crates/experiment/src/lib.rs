@@ -18,6 +18,7 @@ mod manifest;
 mod model;
 mod navigate;
 mod odometry_fault;
+mod odometry_session;
 mod pipeline;
 mod range;
 mod read;

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// The format that this version writes.
-const FORMAT: &str = "seafix-manifest/1.1";
+const FORMAT: &str = "seafix-manifest/1.2";
 
 /// What made a run: enough to make it again and to know whether it would be the same.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -33,6 +33,10 @@ pub(crate) struct Manifest {
     /// Whether durations are logged.
     #[serde(default = "yes")]
     pub(crate) timed: bool,
+    /// Whether every trial computed all of its stages itself; else the durations of stages that trials share are those of
+    /// one computation.
+    #[serde(default = "yes")]
+    pub(crate) separate: bool,
     /// Into how many pieces the run is cut.
     #[serde(default)]
     pub(crate) pieces: usize,
@@ -119,6 +123,7 @@ impl Manifest {
             inputs,
             outputs: BTreeMap::new(),
             timed: options.timed,
+            separate: options.separate,
             pieces,
             shard: options.shard.map(|shard| shard.to_string()),
             rows: 0,
@@ -187,6 +192,7 @@ impl Manifest {
             ("the configuration of a trial", self.trials != other.trials),
             ("the inputs", self.inputs != other.inputs),
             ("whether durations are logged", self.timed != other.timed),
+            ("whether trials share stages", self.timed && self.separate != other.separate),
             ("how the run is cut into pieces", self.pieces != other.pieces),
         ];
         differing.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)

@@ -1,27 +1,25 @@
 //! Between fixes: odometry, when to take the next fix, and what becomes of the pose then.
 
-use std::time::Instant;
-
 use rand::Rng;
 use seafix_component::Choice;
 use seafix_geometry::{Covariance6, Object, StereoRig};
 use seafix_log::{ELSEWHERE, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 use seafix_navigation::{
     Considered, Event, FUSIONS, Fusion, Navigated, Navigator, Network, ODOMETRIES, Odometry, Outcome as Followed,
-    POLICIES, Place, Policy, Reckoning, Standing, StereoPair,
+    POLICIES, Place, Policy, Standing,
 };
 use seafix_referencing::{Outcome, Prior, PriorBound, Target};
-use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     Keyframes, PipelineError, Sighting, Stages,
     explore::Explorer,
     odometry_fault::{Motions, OdometryFault},
+    odometry_session::{OdometryResult, OdometrySession, stereo_pair},
     pipeline::{build, faults, misfit, resolve},
     record::rows6,
-    source::{Eyes, Passage, Sight},
-    stages::milliseconds,
+    source::{Passage, Sight},
+    stages::{Cloud, View},
 };
 
 /// How the reason ends why no motion is known to a pair that the odometry goes on from. A pair that it left out has another
@@ -121,6 +119,11 @@ impl Helm {
     pub(crate) fn listens(&self) -> bool {
         self.odometry.listens()
     }
+
+    /// Its odometry, with nothing seen yet.
+    pub(crate) fn begin_odometry<'a>(&'a self, passage: &'a dyn Passage) -> OdometrySession<'a> {
+        OdometrySession::begin(&*self.odometry, passage)
+    }
 }
 
 /// A trial's way through the frames of a passage, in their order.
@@ -128,7 +131,6 @@ pub(crate) struct Voyage<'a> {
     stages: &'a Stages,
     targets: &'a [Target],
     rig: &'a StereoRig,
-    reckoning: Box<dyn Reckoning + 'a>,
     navigator: Navigator<'a>,
     explorer: Option<Explorer<'a>>,
     /// How the odometry fails, and its motions on their way through that.
@@ -172,7 +174,6 @@ impl<'a> Voyage<'a> {
             stages,
             targets,
             rig,
-            reckoning: helm.odometry.begin(rig, passage.body_from_camera(), Threads::One),
             navigator,
             explorer: helm.network.as_ref().map(|keyframes| Explorer::begin(keyframes, targets, rig, earlier)),
             faults: &helm.faults,
@@ -185,19 +186,21 @@ impl<'a> Voyage<'a> {
         }
     }
 
-    /// The next frame: the last fix is carried along, and another is taken where one is due.
+    /// The next frame: the last fix is carried along by the `moved` odometry, and another is taken from the `cloud` where
+    /// one is due.
     ///
     /// # Errors
-    /// A sentence: the frame is no stereo pair, or not after the one before.
-    pub(crate) fn advance(&mut self, sight: &Sight, rng: &mut dyn Rng) -> Result<(Sighting, Underway), String> {
-        let Eyes::Pair(left, right) = &sight.eyes else { return Err("a frame without images".to_owned()) };
-        let start = Instant::now();
-        let pair = StereoPair { stamp_ns: sight.stamp_ns, left, right };
-        sight.readings.iter().for_each(|reading| self.reckoning.sense(reading));
-        let followed = self.reckoning.advance(&pair).map_err(|error| error.to_string())?;
-        let odometry_ms = milliseconds(start);
+    /// A sentence: the frame is no stereo pair.
+    pub(crate) fn advance<'b>(
+        &mut self,
+        sight: &'b Sight,
+        moved: &OdometryResult,
+        cloud: impl FnOnce() -> &'b Cloud,
+        rng: &mut dyn Rng,
+    ) -> Result<(Sighting, Underway), String> {
+        let pair = stereo_pair(sight)?;
         let mut events = Vec::new();
-        let odometry = self.carry(sight, &followed, &mut events);
+        let odometry = self.carry(sight, moved, &mut events);
 
         // Where the odometry is not, neither is the navigator: a fix would have no place in the order of motions.
         let here = self.last.is_some_and(|(stamp_ns, _)| stamp_ns == sight.stamp_ns);
@@ -212,7 +215,7 @@ impl<'a> Voyage<'a> {
             }
         };
         let sighting = match here && due {
-            true => self.look(sight, &priors, &rough, rng),
+            true => self.look(sight, cloud(), &priors, &rough, rng),
             false => Sighting::default(),
         };
         let taken = self.fix(&sighting, &mut events);
@@ -231,15 +234,15 @@ impl<'a> Voyage<'a> {
             events,
             errors: NavigationErrors::default(),
         };
-        Ok((sighting, Underway { record, pose, unreferenced, odometry_ms }))
+        Ok((sighting, Underway { record, pose, unreferenced, odometry_ms: moved.ms }))
     }
 
     /// Carries the pose to this frame where the odometry knows the way.
-    fn carry(&mut self, sight: &Sight, followed: &Followed, events: &mut Vec<String>) -> OdometryStep {
+    fn carry(&mut self, sight: &Sight, moved: &OdometryResult, events: &mut Vec<String>) -> OdometryStep {
         let began = *self.began.get_or_insert(sight.stamp_ns);
-        let now = self.reckoning.latest().filter(|(_, waypoint)| waypoint.stamp_ns == sight.stamp_ns);
-        let (Some((segment, waypoint)), false) = (now, matches!(followed, Followed::Skipped(_))) else {
-            let lost = match followed {
+        let now = moved.latest.filter(|(_, waypoint)| waypoint.stamp_ns == sight.stamp_ns);
+        let (Some((segment, waypoint)), false) = (now, matches!(moved.followed, Followed::Skipped(_))) else {
+            let lost = match &moved.followed {
                 Followed::Skipped(lost) => lost.to_string(),
                 Followed::Began | Followed::Followed { .. } => String::new(),
             };
@@ -273,10 +276,18 @@ impl<'a> Voyage<'a> {
 
     /// Attempts every object in view where it is believed to be. What stands elsewhere than surveyed is not found there:
     /// the rough pose then says where to look once more.
-    fn look(&self, sight: &Sight, priors: &[Option<Prior>], rough: &[Option<Prior>], rng: &mut dyn Rng) -> Sighting {
-        let mut sighting = self.stages.reference_from(sight, self.targets, priors, self.rig, rng);
+    fn look(
+        &self,
+        sight: &Sight,
+        cloud: &Cloud,
+        priors: &[Option<Prior>],
+        rough: &[Option<Prior>],
+        rng: &mut dyn Rng,
+    ) -> Sighting {
+        let view = View { sight, cloud, targets: self.targets, rig: self.rig };
+        let mut sighting = self.stages.reference_from(view, priors, None, rng);
         if self.navigator.pose().is_some() {
-            self.stages.again(&mut sighting, sight, self.targets, rough, self.rig, rng);
+            self.stages.again(&mut sighting, view, rough, rng);
         }
         sighting
     }

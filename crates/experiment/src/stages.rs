@@ -1,15 +1,15 @@
 //! From a sight to fixes: the method, one line a stage, in the paper's order.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use rand::Rng;
 use seafix_geometry::{MeasuredPoint, StereoRig};
 use seafix_log::{FrameTimes, TargetTimes};
 use seafix_navigation::Share;
 use seafix_referencing::{
-    Candidates, Correspondence, Degenerate, Gathered, ModelPoint, Observations, Outcome, Prior, PriorBound, Problem,
-    Reference, Search, Solver, Target, Tolerance, candidates, judge, judge_named, problem_file::CoherenceProblem,
-    until_found,
+    Candidates, Correspondence, Degenerate, Gathered, Identification, ModelPoint, Observations, Outcome, Prior,
+    PriorBound, Problem, Reference, Search, Solver, Target, Tolerance, Unidentified, candidates, judge, judge_named,
+    problem_file::CoherenceProblem, until_found,
 };
 use seafix_vision::{FrontEnd, Keypoint, Look};
 
@@ -31,9 +31,9 @@ pub struct Stages {
 #[derive(Debug, Default)]
 pub struct Sighting {
     /// Key points of the left image.
-    pub keypoints: Vec<Keypoint>,
+    pub keypoints: Arc<[Keypoint]>,
     /// The cloud.
-    pub cloud: Vec<MeasuredPoint>,
+    pub cloud: Arc<[MeasuredPoint]>,
     /// One attempt for each target in view.
     pub attempts: Vec<Attempt>,
     /// What a joint fix takes of objects that were not fixed by themselves.
@@ -55,21 +55,50 @@ pub struct Attempt {
     pub joint: Option<String>,
     /// Times of this target's stages.
     pub times: TargetTimes,
-    started: Instant,
 }
 
 impl Attempt {
-    /// `times` (ms) are those of candidates, search and solution.
+    /// `times` (ms) are those of candidates, search and solution, and of all that was done for this target.
     fn new(
         target: usize,
         candidates: Candidates,
         answer: seafix_referencing::Attempt,
         [candidates_ms, search_ms, solve_ms]: [Option<f64>; 3],
-        started: Instant,
+        total_ms: f64,
     ) -> Self {
-        let times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms: None };
-        Self { target, candidates, answer, joint: None, times, started }
+        let times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms: Some(total_ms) };
+        Self { target, candidates, answer, joint: None, times }
     }
+}
+
+/// The cloud of one frame. It depends on the front end alone, so that trials with the same front end can share it.
+#[derive(Debug)]
+pub(crate) struct Cloud {
+    /// Key points of the left image.
+    keypoints: Arc<[Keypoint]>,
+    points: Arc<[MeasuredPoint]>,
+    times: FrameTimes,
+    /// Duration of all stages together (ms).
+    total_ms: f64,
+}
+
+/// The candidates of one target, and the answer of the search to them. Both depend on no solver, so that trials which
+/// differ in nothing else can share them.
+#[derive(Debug, Clone)]
+pub(crate) struct Sought {
+    candidates: Candidates,
+    found: Result<Identification, Unidentified>,
+    /// Durations of the candidates and of the search (ms).
+    spent: [f64; 2],
+}
+
+/// One frame and the targets that are searched for in it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub(crate) sight: &'a Sight,
+    pub(crate) cloud: &'a Cloud,
+    pub(crate) targets: &'a [Target],
+    pub(crate) rig: &'a StereoRig,
 }
 
 impl Stages {
@@ -95,66 +124,42 @@ impl Stages {
     /// The way from one sight to fixes, in the paper's order: key points, matches, cloud; then for
     /// each target in view candidates (Stage 1), the search (Stage 2) and the solution.
     pub fn reference(&self, sight: &Sight, targets: &[Target], rig: &StereoRig, rng: &mut dyn Rng) -> Sighting {
-        self.reference_from(sight, targets, &sight.rough(targets), rig, rng)
+        let cloud = &self.cloud(&sight.eyes, rig);
+        self.reference_from(View { sight, cloud, targets, rig }, &sight.rough(targets), None, rng)
     }
 
-    /// The same from what is known before of the pose relative to each target.
+    /// The same from a cloud, and from what is known before of the pose relative to each target. The answers of the
+    /// search are those of [`Stages::seek_all`], where they are known already.
     pub(crate) fn reference_from(
         &self,
-        sight: &Sight,
-        targets: &[Target],
+        view: View<'_>,
         priors: &[Option<Prior>],
-        rig: &StereoRig,
+        sought: Option<&[Option<Sought>]>,
         rng: &mut dyn Rng,
     ) -> Sighting {
-        let start = Instant::now();
-        let (keypoints, cloud, times) = self.cloud(&sight.eyes, rig);
-        let common = milliseconds(start);
-        let attempts = targets
-            .iter()
-            .zip(priors)
-            .enumerate()
-            .filter_map(|(index, (target, prior))| {
-                let prior = prior.as_ref();
-                let mut attempt = match &sight.told {
-                    Told::Problem(problem) => self.answer(index, target, problem, rng),
-                    Told::Names(names) => self.named(index, target, &cloud, names, prior, rig)?,
-                    Told::Nothing => {
-                        self.attempt(index, target, &cloud, prior, &in_view(target, prior, rig)?, rig, rng)
-                    }
-                };
-                attempt.times.total_ms = Some(common + milliseconds(attempt.started));
+        let attempts = (0..view.targets.len())
+            .filter_map(|index| {
+                let sought = sought.map(|all| all[index].clone());
+                let mut attempt = self.attempt(view, index, priors[index].as_ref(), sought, rng)?;
+                attempt.times.total_ms = attempt.times.total_ms.map(|own| view.cloud.total_ms + own);
                 Some(attempt)
             })
             .collect();
-        Sighting { keypoints, cloud, attempts, gathered: Gathered::default(), times }
+        let Cloud { keypoints, points, times, .. } = view.cloud;
+        let (keypoints, cloud) = (Arc::clone(keypoints), Arc::clone(points));
+        Sighting { keypoints, cloud, attempts, gathered: Gathered::default(), times: *times }
     }
 
     /// Seeks once more, from other priors, what was not found.
-    pub(crate) fn again(
-        &self,
-        sighting: &mut Sighting,
-        sight: &Sight,
-        targets: &[Target],
-        priors: &[Option<Prior>],
-        rig: &StereoRig,
-        rng: &mut dyn Rng,
-    ) {
+    pub(crate) fn again(&self, sighting: &mut Sighting, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) {
         for attempt in &mut sighting.attempts {
             let (index, prior) = (attempt.target, priors[attempt.target].as_ref());
             if matches!(attempt.answer.outcome, Outcome::Referenced(_)) || prior.is_none() {
                 continue;
             }
-            let (target, cloud) = (&targets[index], &sighting.cloud);
-            let again = match &sight.told {
-                Told::Names(names) => self.named(index, target, cloud, names, prior, rig),
-                _ => in_view(target, prior, rig)
-                    .map(|in_view| self.attempt(index, target, cloud, prior, &in_view, rig, rng)),
-            };
-            let Some(mut other) = again else { continue };
+            let Some(mut other) = self.attempt(view, index, prior, None, rng) else { continue };
             if matches!(other.answer.outcome, Outcome::Referenced(_)) {
-                let spent = milliseconds(other.started);
-                other.times.total_ms = attempt.times.total_ms.map(|before| before + spent);
+                other.times.total_ms = attempt.times.total_ms.zip(other.times.total_ms).map(|(a, b)| a + b);
                 *attempt = other;
             }
         }
@@ -178,11 +183,16 @@ impl Stages {
         in_view(target, prior.as_ref(), rig).is_some()
     }
 
-    fn cloud(&self, eyes: &Eyes, rig: &StereoRig) -> (Vec<Keypoint>, Vec<MeasuredPoint>, FrameTimes) {
+    /// The front end's part.
+    pub(crate) fn cloud(&self, eyes: &Eyes, rig: &StereoRig) -> Cloud {
         let (left, right) = match eyes {
-            Eyes::Points(cloud) => return (Vec::new(), cloud.clone(), FrameTimes::default()),
+            Eyes::Points(cloud) => {
+                let times = FrameTimes::default();
+                return Cloud { keypoints: Arc::default(), points: cloud[..].into(), times, total_ms: 0.0 };
+            }
             Eyes::Pair(left, right) => (left, right),
         };
+        let start = Instant::now();
         // Frames are worked on side by side: within one, a single thread keeps the times honest.
         let mut look = Look::default();
         self.front_end.look(left, right, rig, &mut look);
@@ -193,40 +203,97 @@ impl Stages {
             match_ms: Some(look.times.match_ms),
             refine_ms: Some(look.times.refine_ms),
             triangulate_ms: Some(look.times.triangulate_ms),
-            odometry_ms: None,
+            ..FrameTimes::default()
         };
-        (look.keypoints()[0].to_vec(), look.cloud, times)
+        let (keypoints, points) = (look.keypoints()[0].into(), look.cloud[..].into());
+        Cloud { keypoints, points, times, total_ms: milliseconds(start) }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call site; each is a different thing")]
-    fn attempt(
+    /// Stages 1 and 2 of every target in view, in order.
+    pub(crate) fn seek_all(&self, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) -> Vec<Option<Sought>> {
+        (0..view.targets.len()).map(|index| self.seek(view, index, priors[index].as_ref(), rng)).collect()
+    }
+
+    /// Stages 1 and 2 of one target; `None` where it is not in view, or where every point says which one it is.
+    fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<Sought> {
+        let target = &view.targets[index];
+        match &view.sight.told {
+            Told::Names(_) => None,
+            Told::Problem(problem) => Some(self.seek_posed(target, problem, rng)),
+            Told::Nothing => {
+                Some(self.seek_near(target, &view.cloud.points, prior, &in_view(target, prior, view.rig)?, rng))
+            }
+        }
+    }
+
+    /// The candidates for the points that may be in view, and the search among them.
+    fn seek_near(
         &self,
-        index: usize,
         target: &Target,
         cloud: &[MeasuredPoint],
         prior: Option<&Prior>,
         in_view: &[bool],
-        rig: &StereoRig,
         rng: &mut dyn Rng,
-    ) -> Attempt {
+    ) -> Sought {
+        let Pipeline { gate, tolerance, .. } = &self.settings;
+        let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, gate, Some(in_view)));
+        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+        let (found, stage2) = timed(|| self.search.search(&problem, rng));
+        Sought { candidates, found, spent: [stage1, stage2] }
+    }
+
+    /// The same of a problem that states its own candidates, tolerance and rough pose.
+    fn seek_posed(&self, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> Sought {
+        let (listed, stage1) = timed(|| problem.candidates());
+        let (candidates, refused) = match listed {
+            Ok(candidates) => (candidates, None),
+            Err(refused) => (Candidates::from_pairs(target.points.len(), []), Some(refused)),
+        };
+        let posed = posed(target, problem, &candidates);
+        let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
+        Sought { candidates, found, spent: [stage1, stage2] }
+    }
+
+    /// The answer about one target; `None` where it is not in view. What the search says of it may be `sought` already.
+    fn attempt(
+        &self,
+        view: View<'_>,
+        index: usize,
+        prior: Option<&Prior>,
+        sought: Option<Option<Sought>>,
+        rng: &mut dyn Rng,
+    ) -> Option<Attempt> {
+        if let Told::Names(names) = &view.sight.told {
+            return self.named(view, index, names, prior);
+        }
+        let sought = sought.unwrap_or_else(|| self.seek(view, index, prior, rng))?;
+        match &view.sight.told {
+            Told::Problem(problem) => Some(self.answer(index, &view.targets[index], problem, sought)),
+            _ => Some(self.solve(view, index, prior, sought, rng)),
+        }
+    }
+
+    /// The answer to what was sought; where that is nothing, and shells may grow, to what is found in wider ones.
+    fn solve(&self, view: View<'_>, index: usize, prior: Option<&Prior>, sought: Sought, rng: &mut dyn Rng) -> Attempt {
         let started = Instant::now();
-        let Pipeline { gate, tolerance, acceptance, widen, .. } = &self.settings;
+        let View { cloud, targets, rig, .. } = view;
+        let (target, cloud) = (&targets[index], &cloud.points);
+        let Pipeline { tolerance, acceptance, widen, .. } = &self.settings;
         let points = &target.points;
+        let before: f64 = sought.spent.iter().sum();
         let mut times = [0.0; 3];
-        let mut seek = |prior: Option<&Prior>, in_view: &[bool]| {
-            let (candidates, stage1) = timed(|| candidates(points, cloud, prior, gate, Some(in_view)));
+        let mut judged = |Sought { candidates, found, spent: [stage1, stage2] }: Sought, prior: Option<&Prior>| {
             let problem = Problem { model: points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
-            let (found, stage2) = timed(|| self.search.search(&problem, rng));
             let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, acceptance, Some(rig)));
             times.iter_mut().zip([stage1, stage2, solution]).for_each(|(sum, spent)| *sum += spent);
             (candidates, answer)
         };
-        let (mut candidates, mut answer) = seek(prior, in_view);
+        let (mut candidates, mut answer) = judged(sought, prior);
         if *widen {
             let mut wider = Candidates::default();
             answer = until_found(answer, prior, |prior| {
-                let in_view = self::in_view(target, prior, rig).unwrap_or_else(|| vec![true; points.len()]);
-                let (listed, answer) = seek(prior, &in_view);
+                let in_view = in_view(target, prior, rig).unwrap_or_else(|| vec![true; points.len()]);
+                let (listed, answer) = judged(self.seek_near(target, cloud, prior, &in_view, rng), prior);
                 wider = listed;
                 answer
             });
@@ -234,20 +301,13 @@ impl Stages {
                 candidates = wider;
             }
         }
-        Attempt::new(index, candidates, answer, times.map(Some), started)
+        Attempt::new(index, candidates, answer, times.map(Some), before + milliseconds(started))
     }
 
     /// The answer where every point says which one it is; `None` of a target that no point belongs to.
-    fn named(
-        &self,
-        index: usize,
-        target: &Target,
-        cloud: &[MeasuredPoint],
-        names: &[(usize, usize)],
-        prior: Option<&Prior>,
-        rig: &StereoRig,
-    ) -> Option<Attempt> {
+    fn named(&self, view: View<'_>, index: usize, names: &[(usize, usize)], prior: Option<&Prior>) -> Option<Attempt> {
         let started = Instant::now();
+        let target = &view.targets[index];
         let (pairs, stage1) = timed(|| named(names, index, target));
         if pairs.is_empty() {
             return None;
@@ -255,25 +315,26 @@ impl Stages {
         let places = pairs.iter().map(|pair| (pair.model, pair.cloud));
         let candidates = Candidates::from_pairs(target.points.len(), places);
         let Pipeline { tolerance, acceptance, .. } = &self.settings;
+        let cloud = &view.cloud.points;
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
-        let (answer, solution) = timed(|| judge_named(&problem, pairs, &*self.solver, acceptance, Some(rig)));
-        Some(Attempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], started))
+        let (answer, solution) = timed(|| judge_named(&problem, pairs, &*self.solver, acceptance, Some(view.rig)));
+        Some(Attempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], milliseconds(started)))
     }
 
     /// The answer to a problem that states its own candidates, tolerance and rough pose.
-    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> Attempt {
-        let started = Instant::now();
-        let (listed, stage1) = timed(|| problem.candidates());
-        let (candidates, refused) = match listed {
-            Ok(candidates) => (candidates, None),
-            Err(refused) => (Candidates::from_pairs(target.points.len(), []), Some(refused)),
-        };
-        let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
-        let posed = Problem { model: &target.points, cloud: &problem.cloud, candidates: &candidates, tolerance, prior };
-        let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
+    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> Attempt {
+        let Sought { candidates, found, spent: [stage1, stage2] } = sought;
+        let posed = posed(target, problem, &candidates);
         let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
-        Attempt::new(index, candidates, answer, [Some(stage1), Some(stage2), Some(solution)], started)
+        let times = [stage1, stage2, solution];
+        Attempt::new(index, candidates, answer, times.map(Some), times.iter().sum())
     }
+}
+
+/// The search's view of a problem that states its own tolerance and rough pose.
+fn posed<'a>(target: &'a Target, problem: &'a CoherenceProblem, candidates: &'a Candidates) -> Problem<'a> {
+    let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
+    Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior }
 }
 
 /// The pairs of points that say which ones they are, in the order of the model: of an object its own, of the site those

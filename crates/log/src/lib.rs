@@ -77,8 +77,8 @@ pub use record::{
     Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, ELSEWHERE, Evaluation, ExactPose,
     FrameRecord, FrameTimes, GreyImage, Inputs, InspectedPoint, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint,
     NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord,
-    ProblemRecord, Region, RigRecord, SensorReading, SitePoint, TargetModel, TargetRecord, TargetTimes, Totals,
-    TrialHeader, TrueState, TruthRecord, VisiblePoint,
+    ProblemRecord, Region, RigRecord, SensorReading, SharedStages, SitePoint, TargetModel, TargetRecord, TargetTimes,
+    Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
 };
 pub use recording::{Entry, Recording, Topic};
 pub use recover::{Recovered, recover};

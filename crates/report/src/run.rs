@@ -8,7 +8,9 @@ use std::{
 
 use rayon::prelude::*;
 use seafix_evaluation::lever_arm_error;
-use seafix_log::{ELSEWHERE, FrameRecord, LogError, Outcome, Reader, Region, TargetRecord, Totals, TrialHeader};
+use seafix_log::{
+    ELSEWHERE, FrameRecord, LogError, Outcome, Reader, Region, SharedStages, TargetRecord, Totals, TrialHeader,
+};
 use sha2::{Digest, Sha256};
 
 use crate::{
@@ -48,6 +50,8 @@ pub(crate) struct Trial {
     pub(crate) disparity: (f64, usize),
     /// What searches and solvers the rows name.
     pub(crate) named: [String; 2],
+    /// The stages that it shares with other trials in some frame.
+    pub(crate) shared: SharedStages,
     /// SHA-256 of all results but the times.
     pub(crate) digest: Vec<u8>,
     rows: Vec<Attempt>,
@@ -156,6 +160,7 @@ impl Trial {
             pictures: false,
             disparity: (0.0, 0),
             named: Default::default(),
+            shared: SharedStages::default(),
             digest: Vec::new(),
             rows: Vec::new(),
             inspected: Vec::new(),
@@ -214,6 +219,9 @@ impl Trial {
             teeth::step(frame.stamp_ns, frame.truth.as_ref(), record, object)
         });
         let times = &frame.times;
+        self.shared.front_end |= times.shared.front_end;
+        self.shared.search |= times.shared.search;
+        self.shared.odometry |= times.shared.odometry;
         self.frames.push(Frame {
             number: frame.frame,
             stamp_ns: frame.stamp_ns,

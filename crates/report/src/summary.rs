@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use seafix_evaluation::quantile;
-use seafix_log::{Axis, Outcome, Region, Totals};
+use seafix_log::{Axis, Outcome, Region, SharedStages, Totals};
 
 use crate::{
     Field, paired,
@@ -82,6 +82,8 @@ pub struct Row {
     pub disparity_sigma: Option<f64>,
     /// Median times of the stages.
     pub times: StageTimes,
+    /// The stages that other trials share: their times are those of one computation for all.
+    pub shared: SharedStages,
     /// The 95 % quantile of the time from the images to the answer (ms).
     pub total_p95: Option<f64>,
 }
@@ -202,6 +204,25 @@ impl Summary {
         }
     }
 
+    /// A sentence on the durations of stages that trials share; `None` where every duration is a trial's own, or none was
+    /// logged.
+    pub(crate) fn shared_times(&self) -> Option<String> {
+        let any = |is_shared: fn(&SharedStages) -> bool| self.rows.iter().any(|row| is_shared(&row.shared));
+        let stages = [
+            ("the front end (detect to triangulate)", any(|shared| shared.front_end)),
+            ("candidates and search", any(|shared| shared.search)),
+            ("odometry", any(|shared| shared.odometry)),
+        ];
+        let shared: Vec<&str> =
+            stages.into_iter().filter(|(_, is_shared)| *is_shared).map(|(stage, _)| stage).collect();
+        (!shared.is_empty()).then(|| {
+            format!(
+                "Shared stages: {}. Each was computed once for all trials with the same settings, and its time stands in each of them; --separate measures every trial alone.",
+                shared.join("; ")
+            )
+        })
+    }
+
     /// What a figure calls a trial: what varies, or the method where nothing does.
     pub(crate) fn name(run: &Run, trial: &Trial) -> String {
         let members: Vec<usize> = (0..run.trials.len()).collect();
@@ -242,6 +263,7 @@ impl Row {
                 .filter(|(_, n)| *n > 0)
                 .map(|(squares, n)| (squares / n as f64).sqrt()),
             times: times(trial),
+            shared: trial.shared,
             total_p95: Spread::of(trial.attempts().filter_map(|(_, row)| row.get(Field::TotalTime))).map(|s| s.p95),
         };
         for frame in trial.sample() {

@@ -100,8 +100,9 @@ impl fmt::Display for Summary {
         }
         writeln!(f)?;
         times.write(f)?;
-        let note = wrapped("Median milliseconds; the first seven stages a frame, the others a target.", f.width(), 0);
-        write!(f, "{note}")
+        let shared = self.shared_times().map(|shared| format!(" {shared}")).unwrap_or_default();
+        let note = format!("Median milliseconds; the first seven stages a frame, the others a target.{shared}");
+        write!(f, "{}", wrapped(&note, f.width(), 0))
     }
 }
 

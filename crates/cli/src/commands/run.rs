@@ -31,6 +31,10 @@ pub(crate) struct Run {
     /// Log no durations: two runs of one experiment then have the same bytes.
     #[arg(long)]
     untimed: bool,
+    /// Let every trial compute all of its stages itself, so that its durations are its own; without it, trials with equal
+    /// stages share them.
+    #[arg(long)]
+    separate: bool,
 }
 
 /// Where a run goes, and who works on it.
@@ -61,7 +65,7 @@ impl Place {
             _ => Existing::Refuse,
         };
         let threads = self.threads.map_or(cores, usize::from);
-        Options { out: self.out.clone(), existing, threads, shard: None, timed: true }
+        Options { out: self.out.clone(), existing, threads, shard: None, timed: true, separate: false }
     }
 }
 
@@ -69,9 +73,10 @@ impl Run {
     pub(crate) fn execute(&self) -> Ended {
         let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
         if self.dry_run {
-            return print(&told(&plan, &estimate(&plan)?, self.place.options().threads)).map(|()| DONE);
+            return print(&told(&plan, &estimate(&plan, self.separate)?, self.place.options().threads)).map(|()| DONE);
         }
-        let options = Options { shard: self.shard, timed: !self.untimed, ..self.place.options() };
+        let own = self.place.options();
+        let options = Options { shard: self.shard, timed: !self.untimed, separate: self.separate, ..own };
         let progress = Progress::new();
         signals::listen();
         let finished = run(&plan, &options, &progress);

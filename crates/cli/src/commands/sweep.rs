@@ -39,6 +39,9 @@ pub(crate) struct Sweep {
     /// Log no durations: two runs of one experiment then have the same bytes.
     #[arg(long)]
     untimed: bool,
+    /// Let every trial compute all of its stages itself, so that its durations are its own.
+    #[arg(long)]
+    separate: bool,
 }
 
 /// The engines that are known.
@@ -105,7 +108,7 @@ impl Sweep {
             std::env::current_dir().map_err(|error| Failure::new(OUTPUT, format!("no folder to run in: {error}")))?;
         let set: String = self.set.iter().map(|setting| format!(" --set {}", quoted(setting))).collect();
         Ok(format!(
-            "#!/bin/sh\n# One shard of a sweep; {variable} says which.\ncd {} || exit 4\nexec {} run {}{set} --shard \"${variable}/{}\" --out {}/\"${variable}\" --resume --threads {}{}\n",
+            "#!/bin/sh\n# One shard of a sweep; {variable} says which.\ncd {} || exit 4\nexec {} run {}{set} --shard \"${variable}/{}\" --out {}/\"${variable}\" --resume --threads {}{}{}\n",
             quoted(&here.to_string_lossy()),
             quoted(&program.to_string_lossy()),
             quoted(&self.experiment.to_string_lossy()),
@@ -113,6 +116,7 @@ impl Sweep {
             quoted(&shards.to_string_lossy()),
             self.threads,
             if self.untimed { " --untimed" } else { "" },
+            if self.separate { " --separate" } else { "" },
         ))
     }
 

@@ -12,7 +12,6 @@ use seafix_log::Writer;
 use super::{RunError, cut, group};
 use crate::{
     Plan,
-    navigate::Voyage,
     results::{Row, Table},
 };
 
@@ -46,12 +45,12 @@ const LEAST: usize = 4;
 const LONGEST: Duration = Duration::from_secs(20);
 
 /// What `plan` would take: leads some frames of every source through its trials and writes their logs into the system's
-/// temporary folder; nothing of it stays.
+/// temporary folder; nothing of it stays. Trials share their stages, unless each is measured `separate`ly.
 ///
 /// # Errors
 /// Everything that is wrong with the inputs, and a temporary folder that cannot be written.
-pub fn estimate(plan: &Plan) -> Result<Estimate, RunError> {
-    let groups = group::open(plan)?;
+pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
+    let groups = group::open(plan, separate)?;
     let pieces = cut::cut(&groups);
     let input = |fault: Fault| RunError::Input(vec![fault]);
     let place = Scratch::new()?;
@@ -88,7 +87,7 @@ pub fn estimate(plan: &Plan) -> Result<Estimate, RunError> {
             tried += 1;
             warm.push(first.elapsed());
         }
-        drop::<Vec<Option<Voyage>>>(voyages);
+        drop(voyages);
         let closing = Instant::now();
         for writer in writers {
             writer.finish()?;

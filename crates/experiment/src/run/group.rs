@@ -9,13 +9,18 @@ use seafix_navigation::Network;
 use seafix_referencing::{Glimpse, Site, Target, TargetKind};
 use seafix_simulation::{Purpose, Stream};
 
-use super::RunError;
+use super::{
+    RunError,
+    share::{SharedFrame, Sharing},
+};
 use crate::{
     Helm, ImagesLogged, Keyframes, Plan, Sighting, Trial,
     judge::Judge,
     navigate::{Underway, Voyage},
+    odometry_session::{OdometryResult, OdometrySession},
     record,
     source::{Eyes, Passage, Sight},
+    stages::View,
 };
 
 /// The trials that see the same passage: they share its frames, so that they are compared on the
@@ -23,6 +28,8 @@ use crate::{
 pub(crate) struct Group<'a> {
     pub(crate) passage: Box<dyn Passage>,
     pub(crate) trials: Vec<&'a Trial>,
+    /// Which of their stages are the same.
+    sharing: Sharing,
     /// What each trial searches for.
     targets: Vec<Vec<Target>>,
     /// The network of an earlier run that each trial reads.
@@ -31,6 +38,33 @@ pub(crate) struct Group<'a> {
     pub(super) headers: Vec<TrialHeader>,
     /// About how much log (bytes) one frame takes.
     pub(super) frame_bytes: u64,
+}
+
+/// The trials of a group on their way from frame to frame.
+pub(super) struct Voyages<'a> {
+    /// Of each trial that is the first with its odometry.
+    odometries: Vec<Option<OdometrySession<'a>>>,
+    /// Of each trial that navigates.
+    trials: Vec<Option<Voyage<'a>>>,
+}
+
+impl Voyages<'_> {
+    /// Each odometry takes the next frame.
+    ///
+    /// # Errors
+    /// A sentence: the frame is no stereo pair, or not after the one before.
+    fn advance(&mut self, sight: &Sight) -> Result<Vec<Option<OdometryResult>>, String> {
+        let advance = |one: &mut Option<OdometrySession<'_>>| one.as_mut().map(|one| one.advance(sight)).transpose();
+        match self.odometries.iter().flatten().count() {
+            0 | 1 => self.odometries.iter_mut().map(advance).collect(),
+            _ => self.odometries.par_iter_mut().map(advance).collect(),
+        }
+    }
+
+    /// Of each trial the network that it laid, where that is kept.
+    pub(super) fn networks(self) -> impl Iterator<Item = Option<String>> {
+        self.trials.into_iter().map(|voyage| voyage.and_then(Voyage::network))
+    }
 }
 
 /// What every trial of a group made of one frame, each object by itself.
@@ -44,8 +78,8 @@ pub(super) struct Looked {
     pub(super) glimpses: Vec<Glimpse>,
 }
 
-/// Opens every source once and checks what it needs.
-pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
+/// Opens every source once and checks what it needs. Trials share their stages, unless each is measured `separate`ly.
+pub(super) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunError> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     let mut faults = Vec::new();
     for trial in &plan.trials {
@@ -60,7 +94,8 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
             Ok(passage) => match frame_bytes(&*passage, trial.resolved.log.images) {
                 Ok(frame_bytes) => {
                     let (targets, networks, headers) = (Vec::new(), Vec::new(), Vec::new());
-                    groups.push(Group { passage, trials: vec![trial], targets, networks, headers, frame_bytes });
+                    let (trials, sharing) = (vec![trial], Sharing::of(&[], separate));
+                    groups.push(Group { passage, trials, sharing, targets, networks, headers, frame_bytes });
                 }
                 Err(fault) => faults.push(fault),
             },
@@ -68,6 +103,7 @@ pub(super) fn open(plan: &Plan) -> Result<Vec<Group<'_>>, RunError> {
         }
     }
     for group in &mut groups {
+        group.sharing = Sharing::of(&group.trials, separate);
         for trial in &group.trials {
             let kind = trial.stages.settings().target;
             if group.passage.posed() && kind != TargetKind::Object {
@@ -136,47 +172,61 @@ impl Group<'_> {
     }
 
     /// Sets out with every trial that navigates.
-    pub(super) fn voyages(&self) -> Vec<Option<Voyage<'_>>> {
+    pub(super) fn voyages(&self) -> Voyages<'_> {
         let trials = self.trials.iter().zip(&self.targets).zip(&self.networks);
-        trials
-            .map(|((trial, targets), network)| {
-                let helm = trial.helm.as_ref()?;
-                Some(Voyage::begin(helm, &trial.stages, targets, &*self.passage, network.as_ref()))
-            })
-            .collect()
+        let voyages = trials.map(|((trial, targets), network)| {
+            let helm = trial.helm.as_ref()?;
+            Some(Voyage::begin(helm, &trial.stages, targets, &*self.passage, network.as_ref()))
+        });
+        let odometries = self.trials.iter().enumerate().map(|(which, trial)| {
+            let helm = trial.helm.as_ref().filter(|_| self.sharing.odometry_of(which) == which)?;
+            Some(helm.begin_odometry(&*self.passage))
+        });
+        Voyages { odometries: odometries.collect(), trials: voyages.collect() }
     }
 
-    /// One frame through every trial. The sight is made once; every trial does all of its own work on it, so that times
-    /// are its own. `voyages` are the trials' ways until here.
-    pub(super) fn look(&self, index: usize, voyages: &mut [Option<Voyage<'_>>]) -> Result<Looked, Fault> {
+    /// One frame through every trial. The sight is made once, and so is what trials share. `voyages` are the trials' ways
+    /// until here.
+    pub(super) fn look(&self, index: usize, voyages: &mut Voyages<'_>) -> Result<Looked, Fault> {
         let (passage, number) = (&*self.passage, self.passage.number(index));
         let sight = passage.sight(index)?;
         let own = sight.own_site().map(|site| {
             let targets = site.targets(TargetKind::Object).expect("an object by itself needs no world");
             (site, targets)
         });
-        let look = |((trial, targets), voyage): ((&&Trial, &Vec<Target>), &mut Option<Voyage<'_>>)| {
+        let fault = |what: String| Fault::new(what, Path::new(passage.name())).value(format!("frame {number}"));
+        let shared = SharedFrame::new(self.trials.len());
+        let moved = voyages.advance(&sight).map_err(fault)?;
+        let look = |(which, voyage): (usize, &mut Option<Voyage<'_>>)| {
+            let trial = self.trials[which];
             let mut stream = Stream::new(trial.resolved.seed, 0, number, Purpose::Search);
-            let targets = searched(&own, targets);
-            match voyage {
-                None => Ok((trial.stages.reference(&sight, targets, passage.rig(), stream.rng()), None)),
-                Some(voyage) => voyage.advance(&sight, stream.rng()).map(|(seen, known)| (seen, Some(known))),
+            let targets = searched(&own, &self.targets[which]);
+            let cloud = || shared.cloud(&self.sharing, which, || trial.stages.cloud(&sight.eyes, passage.rig()));
+            match (voyage, &moved[self.sharing.odometry_of(which)]) {
+                (Some(voyage), Some(moved)) => {
+                    voyage.advance(&sight, moved, cloud, stream.rng()).map(|(seen, known)| (seen, Some(known)))
+                }
+                _ => {
+                    let (view, priors) =
+                        (View { sight: &sight, cloud: cloud(), targets, rig: passage.rig() }, sight.rough(targets));
+                    let seek = || trial.stages.seek_all(view, &priors, stream.rng());
+                    let sought = shared.sought(&self.sharing, which, seek);
+                    Ok((trial.stages.reference_from(view, &priors, sought, stream.rng()), None))
+                }
             }
         };
-        let trials = self.trials.iter().zip(&self.targets);
         // Where frames must wait for each other, trials need not.
         let sightings: Result<Vec<_>, String> = match self.navigates() {
-            true => self.trials.par_iter().zip(&self.targets).zip(voyages).map(look).collect(),
-            false => trials.zip(voyages).map(look).collect(),
+            true => voyages.trials.par_iter_mut().enumerate().map(look).collect(),
+            false => voyages.trials.iter_mut().enumerate().map(look).collect(),
         };
-        let mut sightings =
-            sightings.map_err(|what| Fault::new(what, Path::new(passage.name())).value(format!("frame {number}")))?;
-        let trials = self.trials.iter().zip(&self.targets).zip(&mut sightings);
-        let glimpses = trials
-            .map(|((trial, targets), (sighting, _))| {
-                trial.stages.glimpse(sighting, searched(&own, targets), passage.rig())
-            })
-            .collect();
+        let mut sightings = sightings.map_err(fault)?;
+        let mut glimpses = Vec::with_capacity(sightings.len());
+        for (which, (sighting, _)) in sightings.iter_mut().enumerate() {
+            sighting.times.shared = self.sharing.shared(which, &shared, sighting);
+            let targets = searched(&own, &self.targets[which]);
+            glimpses.push(self.trials[which].stages.glimpse(sighting, targets, passage.rig()));
+        }
         Ok(Looked { sight, own, sightings, glimpses })
     }
 

@@ -17,6 +17,7 @@ mod folder;
 mod group;
 mod merge;
 mod options;
+mod share;
 mod store;
 mod work;
 
@@ -99,7 +100,7 @@ pub struct Finished {
 /// that could not be written; or that it was interrupted.
 pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
     folder::look(options).map_err(RunError::Output)?;
-    let groups = group::open(plan)?;
+    let groups = group::open(plan, options.separate)?;
     groups.iter().flat_map(|group| group.passage.warnings()).for_each(|warning| observer.warns(warning));
     let pieces = cut::cut(&groups);
     let mut manifest =

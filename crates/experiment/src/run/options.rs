@@ -24,12 +24,22 @@ pub struct Options {
     pub shard: Option<Shard>,
     /// Whether durations are logged: without them two runs of a plan have the same bytes.
     pub timed: bool,
+    /// Whether every trial computes all of its stages itself, so that its durations are its own; else trials with equal
+    /// stages share them.
+    pub separate: bool,
 }
 
 impl Options {
     /// A run into `out` by one thread, which must be a new or an empty folder.
     pub fn into(out: impl Into<PathBuf>) -> Self {
-        Self { out: Some(out.into()), existing: Existing::Refuse, threads: 1, shard: None, timed: true }
+        Self {
+            out: Some(out.into()),
+            existing: Existing::Refuse,
+            threads: 1,
+            shard: None,
+            timed: true,
+            separate: false,
+        }
     }
 
     /// The threads that work.

@@ -17,7 +17,6 @@ use super::{
     store::{Draft, Store},
 };
 use crate::{
-    navigate::Voyage,
     results::{Row, Table},
     thin::Thinned,
 };
@@ -117,8 +116,8 @@ fn make(
             observer.frame(&output.trial);
         }
     }
-    for (output, voyage) in outputs.iter_mut().zip(voyages) {
-        output.network = voyage.and_then(Voyage::network);
+    for (output, network) in outputs.iter_mut().zip(voyages.networks()) {
+        output.network = network;
     }
     draft.seal(piece.first, piece.end, outputs)?;
     Ok(true)

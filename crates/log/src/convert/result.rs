@@ -2,7 +2,8 @@
 
 use super::{Malformed, flat, matrix, matrix_if_any};
 use crate::{
-    Alternative, Evaluation, FrameRecord, FrameTimes, Integrity, Outcome, Pair, TargetRecord, TargetTimes, proto,
+    Alternative, Evaluation, FrameRecord, FrameTimes, Integrity, Outcome, Pair, SharedStages, TargetRecord,
+    TargetTimes, proto,
 };
 
 /// The message that holds target `index` of `frame`, without candidates, evaluation and times.
@@ -187,7 +188,7 @@ pub(crate) fn evaluation_record(message: &proto::Evaluation) -> Evaluation {
 
 /// The message that holds all times of `frame`.
 pub(crate) fn timing_message(frame: &FrameRecord) -> proto::Timing {
-    let FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms } =
+    let FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms, shared } =
         frame.times;
     let target = |target: &TargetRecord| {
         let TargetTimes { candidates_ms, search_ms, solve_ms, total_ms } = target.times;
@@ -203,6 +204,9 @@ pub(crate) fn timing_message(frame: &FrameRecord) -> proto::Timing {
         refine_ms,
         triangulate_ms,
         odometry_ms,
+        front_end_shared: shared.front_end,
+        search_shared: shared.search,
+        odometry_shared: shared.odometry,
         targets: frame.targets.iter().map(target).collect(),
     }
 }
@@ -217,6 +221,12 @@ pub(crate) fn target_times(message: &proto::Timing) -> (FrameTimes, Vec<TargetTi
         solve_ms: timing.solve_ms,
         total_ms: timing.total_ms,
     };
-    let times = FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms };
+    let shared = SharedStages {
+        front_end: message.front_end_shared,
+        search: message.search_shared,
+        odometry: message.odometry_shared,
+    };
+    let times =
+        FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms, shared };
     (times, message.targets.iter().map(target).collect())
 }

@@ -609,6 +609,14 @@ pub struct Timing {
     pub refine_ms: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "10")]
     pub odometry_ms: ::core::option::Option<f64>,
+    /// Stages that were computed once for several trials: the time is that of the one computation, in each of them.
+    #[prost(bool, tag = "11")]
+    pub front_end_shared: bool,
+    /// Candidates and search.
+    #[prost(bool, tag = "12")]
+    pub search_shared: bool,
+    #[prost(bool, tag = "13")]
+    pub odometry_shared: bool,
 }
 /// Times of the stages that serve one target (ms).
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -116,4 +116,18 @@ pub struct FrameTimes {
     pub triangulate_ms: Option<f64>,
     /// Odometry, its own cloud included.
     pub odometry_ms: Option<f64>,
+    /// Which of the stages several trials share.
+    pub shared: SharedStages,
+}
+
+/// The stages that were computed once for several trials. The time of each is that of the one computation, and stands in
+/// every trial that uses it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SharedStages {
+    /// Filters, detection, location, description, matching, alignment and triangulation.
+    pub front_end: bool,
+    /// Candidates and search, of every target.
+    pub search: bool,
+    /// Odometry.
+    pub odometry: bool,
 }

@@ -9,7 +9,9 @@ mod region;
 mod target;
 mod totals;
 
-pub use frame::{CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, PriorRecord, TruthRecord, VisiblePoint};
+pub use frame::{
+    CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, PriorRecord, SharedStages, TruthRecord, VisiblePoint,
+};
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
 pub use inspection::InspectedPoint;

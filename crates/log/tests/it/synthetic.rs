@@ -157,6 +157,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
             refine_ms: Some(2.5),
             triangulate_ms: Some(1.0),
             odometry_ms: Some(60.0),
+            shared: SharedStages { front_end: odd, search: number % 3 == 1, odometry: number % 4 == 2 },
         },
         inputs: (number % 4 != 3).then(|| Box::new(inputs(number))),
         navigation: (number > 0).then(|| Box::new(navigation(number))),

@@ -66,6 +66,7 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
     }
     if summary.rows.iter().any(|row| row.times.total_ms.is_some()) {
         items.push(text!["Times are wall clock of one machine that may have done other work."]);
+        items.extend(summary.shared_times().map(|shared| text![shared]));
     }
     Section::new("Threats to validity").with([Block::Items(items)])
 }

@@ -51,5 +51,9 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Section {
         line.push(Cell::minor(most));
         table.line(results::breaks(summary, index), line);
     }
-    Section::new("Run time").with([Block::Table(table)]).with(figures::search_cost(run).map(Block::Figure))
+    let mut section = Section::new("Run time");
+    if let Some(shared) = summary.shared_times() {
+        section.say(text![shared]);
+    }
+    section.with([Block::Table(table)]).with(figures::search_cost(run).map(Block::Figure))
 }
