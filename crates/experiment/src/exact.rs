@@ -50,9 +50,17 @@ fn matches(pairs: &[(usize, usize)]) -> Vec<[u32; 2]> {
     pairs.iter().map(|&(model, cloud)| [model as u32, cloud as u32]).collect()
 }
 
-/// What a log holds of a sight and the cloud that was made of it.
-pub(crate) fn inputs(sight: &Sight, cloud: &[MeasuredPoint], targets: &[Target]) -> Inputs {
+/// Whether 8 bits hold the images as they are.
+pub(crate) fn is_exact(eyes: &Eyes) -> bool {
     let whole = |image: &Image| image.pixels().iter().all(|&level| level.fract() == 0.0);
+    match eyes {
+        Eyes::Pair(left, right) => whole(left) && whole(right),
+        Eyes::Points(_) => false,
+    }
+}
+
+/// What a log holds of a sight and the cloud that was made of it; its images are still to be judged.
+pub(crate) fn inputs(sight: &Sight, cloud: &[MeasuredPoint], targets: &[Target]) -> Inputs {
     Inputs {
         prior: sight.prior.map(|prior| (pose(&prior.world_from_camera), rows6(&prior.covariance.matrix))),
         pixel_covariances: cloud
@@ -69,10 +77,7 @@ pub(crate) fn inputs(sight: &Sight, cloud: &[MeasuredPoint], targets: &[Target])
             _ => None,
         },
         truth: None,
-        exact_images: match &sight.eyes {
-            Eyes::Pair(left, right) => whole(left) && whole(right),
-            Eyes::Points(_) => false,
-        },
+        exact_images: false,
         readings: sight.readings.iter().map(reading).collect(),
     }
 }

@@ -19,6 +19,7 @@ mod model;
 mod navigate;
 mod odometry_fault;
 mod odometry_session;
+mod pictures;
 mod pipeline;
 mod range;
 mod read;

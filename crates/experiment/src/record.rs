@@ -5,18 +5,19 @@ use seafix_component::Registry;
 use seafix_evaluation::alert_limit;
 use seafix_geometry::{MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
-    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, Integrity, ModelPoint,
-    Outcome as Logged, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
+    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, Inputs, Integrity,
+    ModelPoint, Outcome as Logged, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
 };
 use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
 
 use crate::{
-    Attempt, Experiment, ImagesLogged, Place, Plan, Sighting, Trial, exact,
+    Attempt, Experiment, Place, Plan, Sighting, Trial, exact,
     manifest::Git,
     navigate::Underway,
-    source::{Eyes, Passage, Sight, Told},
+    pictures::Pictures,
+    source::{Passage, Sight, Told},
 };
 
 /// What stands for the search where every point says which one it is.
@@ -121,14 +122,11 @@ pub(crate) fn complete(
     sight: &Sight,
     sighting: &Sighting,
     targets: &[Target],
-    images: ImagesLogged,
+    images: &Pictures,
 ) {
-    let mut inputs = exact::inputs(sight, &sighting.cloud, targets);
-    inputs.exact_images &= images == ImagesLogged::All;
-    record.inputs = Some(Box::new(inputs));
-    if let Eyes::Pair(left, right) = &sight.eyes {
-        record.images = images.logged(grey(left)).zip(images.logged(grey(right))).map(<[GreyImage; 2]>::from);
-    }
+    let inputs = exact::inputs(sight, &sighting.cloud, targets);
+    record.inputs = Some(Box::new(Inputs { exact_images: images.are_exact, ..inputs }));
+    record.images.clone_from(&images.grey);
     record.key_points = sighting.keypoints.iter().map(|keypoint| uv(&keypoint.at)).collect();
     let point = |point: &MeasuredPoint| CloudPoint {
         at: point.position.at.coords.into(),

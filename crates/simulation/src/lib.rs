@@ -40,6 +40,7 @@ mod paint;
 mod points;
 mod raster;
 mod render;
+mod sand;
 mod scene;
 mod sensor;
 pub mod sensors;

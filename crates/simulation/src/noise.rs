@@ -1,7 +1,7 @@
 //! Closed-form noise: the same value at the same place, whoever asks.
 
 /// Sixteen unit vectors.
-const DIRECTIONS: [[f32; 2]; 16] = {
+pub(crate) const DIRECTIONS: [[f32; 2]; 16] = {
     const A: f32 = 0.923_879_5;
     const B: f32 = 0.382_683_43;
     const C: f32 = std::f32::consts::FRAC_1_SQRT_2;
@@ -26,6 +26,7 @@ const DIRECTIONS: [[f32; 2]; 16] = {
 };
 
 /// 32 well-mixed bits of a cell of the plane.
+#[inline(always)]
 pub(crate) fn hash(x: i32, y: i32, seed: u32) -> u32 {
     let mut h = seed ^ (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77).rotate_left(15);
     h = (h ^ (h >> 16)).wrapping_mul(0x7FEB_352D);
@@ -63,6 +64,7 @@ pub(crate) fn split(x: f64) -> (i32, f32) {
 
 /// How much of a pattern of this wavelength a pixel of this footprint shows: all of it from four
 /// pixels on, none below two.
+#[inline(always)]
 pub(crate) fn shown(wavelength: f64, footprint: f64) -> f32 {
     let t = ((wavelength / footprint - 2.0) * 0.5).clamp(0.0, 1.0) as f32;
     t * t * (3.0 - 2.0 * t)

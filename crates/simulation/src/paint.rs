@@ -23,17 +23,28 @@ pub(crate) fn light(normal: &Vector3<f64>) -> f32 {
     AMBIENT + LAMP * cosine.max(0.0) as f32
 }
 
+/// Sine and cosine of each octave's turn: their grids do not align.
+pub(crate) const OCTAVE_TURNS: [(f64, f64); 4] = [(0.0, 1.0), (0.6, 0.8), (0.8, -0.6), (-0.28, 0.96)];
+
+/// The seed of octave `k`.
+pub(crate) fn octave_seed(seed: u32, k: usize) -> u32 {
+    seed.wrapping_add(k as u32 * 0x51ED)
+}
+
+/// The octaves of the bed: feature size (m) and amplitude.
+pub(crate) const SAND: [(f64, f32); 4] = [(0.34, 0.12), (0.13, 0.13), (0.05, 0.13), (0.019, 0.12)];
+/// The two grids of stones of the bed: what their seeds differ by, and the side of a cell (m). The second is turned.
+pub(crate) const STONES: [(u32, f64); 2] = [(0xA5A5, 0.21), (0x5A5A, 0.085)];
+
 /// The sum of noise octaves: pairs of feature size (m) and amplitude.
 fn octaves(x: f64, y: f64, footprint: f64, seed: u32, layers: &[(f64, f32)]) -> f32 {
     let mut sum = 0.0;
     for (k, &(size, amplitude)) in layers.iter().enumerate() {
         let weight = shown(size * 1.5, footprint) * amplitude;
         if weight > 0.0 {
-            // Each octave is turned and shifted, so that their grids do not align.
-            let (s, c) = [(0.0, 1.0), (0.6, 0.8), (0.8, -0.6), (-0.28, 0.96)][k % 4];
-            let scale = 1.0 / size;
+            let ((s, c), scale) = (OCTAVE_TURNS[k % 4], 1.0 / size);
             let (u, v) = ((c * x - s * y) * scale, (s * x + c * y) * scale);
-            sum += weight * gradient(u + 17.3, v - 5.1, seed.wrapping_add(k as u32 * 0x51ED));
+            sum += weight * gradient(u + 17.3, v - 5.1, octave_seed(seed, k));
         }
     }
     sum
@@ -71,10 +82,11 @@ pub(crate) fn patches(north: f64, east: f64, seed: u32) -> f32 {
 /// Share of the light that the bed returns at a place (north, east), seen by pixels of this
 /// footprint (m).
 pub(crate) fn bed(north: f64, east: f64, footprint: f64, seed: u32) -> f32 {
-    let sand = octaves(north, east, footprint, seed, &[(0.34, 0.12), (0.13, 0.13), (0.05, 0.13), (0.019, 0.12)]);
+    let sand = octaves(north, east, footprint, seed, &SAND);
     let (tu, tv) = (0.8 * north - 0.6 * east, 0.6 * north + 0.8 * east);
-    let stones =
-        pebbles(north, east, footprint, seed ^ 0xA5A5, 0.21) + 0.8 * pebbles(tu, tv, footprint, seed ^ 0x5A5A, 0.085);
+    let [(salt, cell), (turned_salt, turned_cell)] = STONES;
+    let stones = pebbles(north, east, footprint, seed ^ salt, cell)
+        + 0.8 * pebbles(tu, tv, footprint, seed ^ turned_salt, turned_cell);
     0.33 * (1.0 + sand + 0.8 * stones).max(0.1)
 }
 

@@ -285,12 +285,15 @@ impl Visibility {
         (self.ids[place], self.inverse_depths[place])
     }
 
+    /// What a pixel sees that no edge crosses, the `id` and 1/Z; `None` of one that has parts.
+    pub(crate) fn whole(&self, column: usize, row: usize) -> Option<(u32, f64)> {
+        (self.slots[row * self.width + column] == NONE).then(|| self.centre(column, row))
+    }
+
     /// Calls `visit` with each part of a pixel.
     pub(crate) fn parts(&self, column: usize, row: usize, mut visit: impl FnMut(Part)) {
-        let place = row * self.width + column;
-        let slot = self.slots[place];
-        if slot == NONE {
-            let (id, inverse_depth) = self.centre(column, row);
+        let slot = self.slots[row * self.width + column];
+        if let Some((id, inverse_depth)) = self.whole(column, row) {
             return visit(Part { id, share: 1.0, offset: [0.0; 2], inverse_depth });
         }
         let samples = slot as usize * SAMPLES..(slot as usize + 1) * SAMPLES;

@@ -8,6 +8,7 @@ use crate::{
     noise::hash,
     paint,
     raster::{Facet, NONE, Part, Visibility},
+    sand::beds,
     scene::{Finish, Scene},
 };
 
@@ -27,6 +28,29 @@ struct Seen {
     finish: Finish,
     brightness: f32,
     seed: u32,
+}
+
+/// The pixels of a row that see nothing but the bed: their columns, where they see it, and how wide they are there (m).
+#[derive(Default)]
+struct Ground {
+    columns: Vec<usize>,
+    north: Vec<f64>,
+    east: Vec<f64>,
+    footprint: Vec<f64>,
+}
+
+impl Ground {
+    fn clear(&mut self) {
+        self.columns.clear();
+        [&mut self.north, &mut self.east, &mut self.footprint].into_iter().for_each(Vec::clear);
+    }
+
+    fn push(&mut self, column: usize, [north, east, footprint]: [f64; 3]) {
+        self.columns.push(column);
+        self.north.push(north);
+        self.east.push(east);
+        self.footprint.push(footprint);
+    }
 }
 
 /// A scene before one camera.
@@ -83,15 +107,45 @@ impl<'a> Rendering<'a> {
     /// The radiance of every pixel, row by row: 1 is white facing the light.
     pub(crate) fn radiance(&self) -> Vec<f32> {
         let [width, height] = self.camera.size().map(|n| n as usize);
-        let mut image = Vec::with_capacity(width * height);
-        for row in 0..height {
-            for column in 0..width {
-                let mut sum = 0.0;
-                self.visibility.parts(column, row, |part| sum += part.share * self.shade(column, row, &part));
-                image.push(sum);
+        let mut image = vec![0.0; width * height];
+        let (mut bed, mut albedo) = (Ground::default(), Vec::new());
+        for (row, out) in image.chunks_exact_mut(width).enumerate() {
+            bed.clear();
+            for (column, value) in out.iter_mut().enumerate() {
+                match self.visibility.whole(column, row) {
+                    Some((BED, inverse_depth)) => {
+                        bed.push(column, self.ground(&self.ray(column as f64, row as f64), inverse_depth));
+                    }
+                    _ => {
+                        self.visibility.parts(column, row, |part| *value += part.share * self.shade(column, row, &part))
+                    }
+                }
+            }
+            beds(&bed.north, &bed.east, &bed.footprint, self.scene.texture, &mut albedo);
+            for (k, column) in bed.columns.iter().enumerate() {
+                out[*column] = albedo[k] * self.patch.brightness(bed.north[k], bed.east[k]);
             }
         }
         image
+    }
+
+    /// The ray through (u, v).
+    fn ray(&self, u: f64, v: f64) -> Vector3<f64> {
+        let ([fx, fy], [cx, cy]) = (self.camera.focal(), self.camera.principal());
+        Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0)
+    }
+
+    /// How wide a pixel is (m) on a surface that its ray meets there, `slope` being the ray's part along the normal.
+    fn footprint(&self, ray: &Vector3<f64>, inverse_depth: f64, slope: f64) -> f64 {
+        let pixel = 1.0 / (inverse_depth * self.camera.focal()[0]);
+        pixel / (slope.abs() / ray.norm()).max(0.25)
+    }
+
+    /// Where a ray meets the bed: north, east, and how wide a pixel is there (m).
+    fn ground(&self, ray: &Vector3<f64>, inverse_depth: f64) -> [f64; 3] {
+        let along = self.turn * ray;
+        let place = self.from + along / inverse_depth;
+        [place.x, place.y, self.footprint(ray, inverse_depth, along.z)]
     }
 
     /// The depth Z (m) at the centre of a pixel, where there is anything.
@@ -106,22 +160,18 @@ impl<'a> Rendering<'a> {
         if part.id == NONE {
             return VOID;
         }
-        let ([fx, fy], [cx, cy]) = (self.camera.focal(), self.camera.principal());
-        let (u, v) = (column as f64 + part.offset[0], row as f64 + part.offset[1]);
-        let ray = Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0);
-        let at = ray / part.inverse_depth;
-        let pixel = 1.0 / (part.inverse_depth * fx);
-        let footprint = |slope: f64| pixel / (slope.abs() / ray.norm()).max(0.25);
+        let ray = self.ray(column as f64 + part.offset[0], row as f64 + part.offset[1]);
         if part.id == BED {
-            let along = self.turn * ray;
-            let place = self.from + along / part.inverse_depth;
-            let albedo = paint::bed(place.x, place.y, footprint(along.z), self.scene.texture);
-            return albedo * self.patch.brightness(place.x, place.y);
+            let [north, east, footprint] = self.ground(&ray, part.inverse_depth);
+            let albedo = paint::bed(north, east, footprint, self.scene.texture);
+            return albedo * self.patch.brightness(north, east);
         }
+        let at = ray / part.inverse_depth;
         let surface = &self.surfaces[part.id as usize - 1];
         let from = at - surface.origin;
         let (x, y) = (surface.x.dot(&from), surface.y.dot(&from));
-        surface.brightness * paint::finish(surface.finish, x, y, footprint(surface.normal.dot(&ray)), surface.seed)
+        let footprint = self.footprint(&ray, part.inverse_depth, surface.normal.dot(&ray));
+        surface.brightness * paint::finish(surface.finish, x, y, footprint, surface.seed)
     }
 }
 

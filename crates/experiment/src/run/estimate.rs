@@ -76,13 +76,14 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
             let first = Instant::now();
             let index = place_of(tried, count, group.navigates());
             let looked = group.look(index, &mut voyages).map_err(input)?;
-            let records = group.record(index, looked, &[], |_, _| true);
+            let (records, levels) = group.record(index, looked, &[], |_, _| true);
             for (which, (record, writer)) in records.iter().zip(&mut writers).enumerate() {
                 // Frames come in an order of their own; stamps in logs do not decrease.
                 let record = seafix_log::FrameRecord { stamp_ns: tried as u64, ..record.clone() };
                 failures += usize::from(crate::thin::failed(&record));
-                writer.frame(&record)?;
-                Row::of(&group.trials[which].name, &record).for_each(|row| table.add(&row));
+                let trial = group.trials[which];
+                writer.frame_with(&record, levels.pngs(trial.resolved.log.images))?;
+                Row::of(&trial.name, &record).for_each(|row| table.add(&row));
             }
             tried += 1;
             warm.push(first.elapsed());

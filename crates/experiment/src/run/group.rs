@@ -18,6 +18,7 @@ use crate::{
     judge::Judge,
     navigate::{Underway, Voyage},
     odometry_session::{OdometryResult, OdometrySession},
+    pictures::Levels,
     record,
     source::{Eyes, Passage, Sight},
     stages::View,
@@ -232,19 +233,20 @@ impl Group<'_> {
 
     /// The records of one frame, a trial each: what is solved together is joined, then truth is asked. `glimpses` are
     /// those of the frames before, the last of them the frame's own. Of a record that `logged` does not want, by the
-    /// trial's place and what tables hold of it, only that is made.
+    /// trial's place and what tables hold of it, only that is made. Beside them the frame's images, for the logs.
     pub(super) fn record(
         &self,
         index: usize,
         looked: Looked,
         glimpses: &[Vec<Glimpse>],
         mut logged: impl FnMut(usize, &FrameRecord) -> bool,
-    ) -> Vec<FrameRecord> {
+    ) -> (Vec<FrameRecord>, Levels) {
         let passage = &*self.passage;
         let truth = passage.truth(index);
         let site = looked.own.as_ref().map_or(passage.site(), |(site, _)| site);
         let sightings = looked.sightings.into_iter().enumerate();
-        sightings
+        let mut levels = Levels::default();
+        let records = sightings
             .zip(self.trials.iter().zip(&self.targets))
             .map(|((which, (mut sighting, underway)), (trial, targets))| {
                 let targets = searched(&looked.own, targets);
@@ -261,12 +263,14 @@ impl Group<'_> {
                     judge.evaluate(&mut record, &sighting, underway.as_ref());
                 }
                 if logged(which, &record) {
-                    record::complete(&mut record, &looked.sight, &sighting, targets, trial.resolved.log.images);
+                    let images = levels.at(trial.resolved.log.images, &looked.sight.eyes);
+                    record::complete(&mut record, &looked.sight, &sighting, targets, images);
                     judge.iter().for_each(|judge| judge.tell(&mut record));
                 }
                 record
             })
-            .collect()
+            .collect();
+        (records, levels)
     }
 }
 

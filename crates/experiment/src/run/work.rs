@@ -100,17 +100,18 @@ fn make(
         let mut looked = group.look(index, &mut voyages).map_err(input)?;
         glimpses.push(std::mem::take(&mut looked.glimpses));
         let mut kept = vec![false; outputs.len()];
-        let records = group.record(index, looked, &glimpses, |which, record| {
+        let (records, levels) = group.record(index, looked, &glimpses, |which, record| {
             kept[which] = outputs[which].thinned.keeps(record);
             kept[which]
         });
         glimpses.drain(..glimpses.len().saturating_sub(back));
-        for ((mut record, output), kept) in records.into_iter().zip(&mut outputs).zip(kept) {
+        for (((mut record, output), kept), trial) in records.into_iter().zip(&mut outputs).zip(kept).zip(&group.trials)
+        {
             if !timed {
                 forget_times(&mut record);
             }
             if kept {
-                output.log.frame(&record)?;
+                output.log.frame_with(&record, levels.pngs(trial.resolved.log.images))?;
             }
             Row::of(&output.trial, &record).for_each(|row| output.table.add(&row));
             observer.frame(&output.trial);

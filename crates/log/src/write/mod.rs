@@ -58,16 +58,26 @@ impl Writer {
     /// [`LogError`] when the record contradicts itself or the header (nothing of it is then written),
     /// or nothing more can be written.
     pub fn frame(&mut self, frame: &FrameRecord) -> Result<(), LogError> {
+        self.frame_with(frame, None)
+    }
+
+    /// The same with the frame's images as PNG ([`encode_png`](crate::encode_png)), where they are known: logs of several
+    /// trials hold the same images.
+    ///
+    /// # Errors
+    /// As [`Writer::frame`].
+    pub fn frame_with(&mut self, frame: &FrameRecord, pngs: Option<&[Vec<u8>; 2]>) -> Result<(), LogError> {
         let path = self.sink.path().to_owned();
         let record = |what| LogError::Record { path: path.clone(), what: format!("frame {}: {what}", frame.frame) };
         check::frame(&self.header, frame, self.last).map_err(record)?;
         let transforms = view::moving_transforms(&self.places, frame).map_err(record)?;
         let poses = view::body_pose(&self.places, frame).map_err(record)?;
-        let pngs = match &frame.images {
-            Some([left, right]) => {
+        let pngs = match (&frame.images, pngs) {
+            (None, _) => Vec::new(),
+            (Some(_), Some(known)) => known.to_vec(),
+            (Some([left, right]), None) => {
                 vec![png::encode_png(left).map_err(record)?, png::encode_png(right).map_err(record)?]
             }
-            None => Vec::new(),
         };
 
         let stamp = frame.stamp_ns;

@@ -1,0 +1,51 @@
+//! The images of one frame as logs hold them, made once for all trials.
+
+use seafix_log::{GreyImage, encode_png};
+
+use crate::{ImagesLogged, exact, record::grey, source::Eyes};
+
+/// The images of a frame at one level of logging.
+#[derive(Debug)]
+pub(crate) struct Pictures {
+    level: ImagesLogged,
+    /// Left and right, where there are images and they are logged.
+    pub(crate) grey: Option<[GreyImage; 2]>,
+    /// Whether they are to the last bit what the method saw.
+    pub(crate) are_exact: bool,
+    /// The same as PNG.
+    pub(crate) pngs: Option<[Vec<u8>; 2]>,
+}
+
+impl Pictures {
+    fn new(eyes: &Eyes, level: ImagesLogged) -> Self {
+        let grey = match eyes {
+            Eyes::Pair(left, right) => level.logged(grey(left)).zip(level.logged(grey(right))).map(<[_; 2]>::from),
+            Eyes::Points(_) => None,
+        };
+        let are_exact = level == ImagesLogged::All && exact::is_exact(eyes);
+        // Of an image that cannot be compressed the writer of the log says why.
+        let pngs = grey.as_ref().and_then(|[left, right]| Some([encode_png(left).ok()?, encode_png(right).ok()?]));
+        Self { level, grey, are_exact, pngs }
+    }
+}
+
+/// The images of a frame at every level that some trial logs.
+#[derive(Debug, Default)]
+pub(crate) struct Levels(Vec<Pictures>);
+
+impl Levels {
+    /// Those of a level; the first who asks makes them.
+    pub(crate) fn at(&mut self, level: ImagesLogged, eyes: &Eyes) -> &Pictures {
+        let known = self.0.iter().position(|pictures| pictures.level == level);
+        let place = known.unwrap_or_else(|| {
+            self.0.push(Pictures::new(eyes, level));
+            self.0.len() - 1
+        });
+        &self.0[place]
+    }
+
+    /// The images of a level as PNG, where somebody asked for it.
+    pub(crate) fn pngs(&self, level: ImagesLogged) -> Option<&[Vec<u8>; 2]> {
+        self.0.iter().find(|pictures| pictures.level == level)?.pngs.as_ref()
+    }
+}
