@@ -1,10 +1,7 @@
 //! All registries: what `list` and `show` print, and the README's tables.
 
-use seafix_component::{Listing, Registry};
-use seafix_experiment::source::SOURCES;
-use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
-use seafix_referencing::{SEARCHES, SOLVERS};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
+use seafix_component::Listing;
+use seafix_experiment::components;
 
 /// One kind of component: its plural and its components.
 pub(crate) struct Kind {
@@ -15,25 +12,30 @@ pub(crate) struct Kind {
 
 /// All kinds, in the order in which a frame meets them.
 pub(crate) fn kinds() -> Vec<Kind> {
-    vec![
-        kind("sources", &SOURCES),
-        kind("filters", &FILTERS),
-        kind("detectors", &DETECTORS),
-        kind("locators", &LOCATORS),
-        kind("descriptors", &DESCRIPTORS),
-        kind("matchers", &MATCHERS),
-        kind("refinements", &REFINEMENTS),
-        kind("triangulators", &TRIANGULATORS),
-        kind("searches", &SEARCHES),
-        kind("solvers", &SOLVERS),
-        kind("odometries", &ODOMETRIES),
-        kind("policies", &POLICIES),
-        kind("fusions", &FUSIONS),
-    ]
+    let kind = |listings: Vec<Listing>| {
+        let singular = listings.first().map_or("", |listing| listing.kind);
+        Kind { singular, plural: plural(singular), listings }
+    };
+    components().into_iter().map(kind).collect()
 }
 
-fn kind<T: ?Sized>(plural: &'static str, registry: &Registry<T>) -> Kind {
-    Kind { singular: registry.kind(), plural, listings: registry.listings() }
+fn plural(kind: &str) -> &'static str {
+    match kind {
+        "source" => "sources",
+        "filter" => "filters",
+        "detector" => "detectors",
+        "locator" => "locators",
+        "descriptor" => "descriptors",
+        "matcher" => "matchers",
+        "refinement" => "refinements",
+        "triangulator" => "triangulators",
+        "search" => "searches",
+        "solver" => "solvers",
+        "odometry" => "odometries",
+        "policy" => "policies",
+        "fusion" => "fusions",
+        _ => "components",
+    }
 }
 
 /// The kind of this name, in the singular.

@@ -84,6 +84,10 @@ impl Observer for Progress {
         self.expect(frames);
     }
 
+    fn renews(&self, reason: &str) {
+        tell(&format!("a kept run is made again: {reason}"));
+    }
+
     fn warns(&self, warning: &Fault) {
         tell(&format!("warning: {warning}"));
     }

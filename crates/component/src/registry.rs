@@ -21,6 +21,9 @@ pub trait Component: Default + Serialize + DeserializeOwned + 'static {
     /// What else those who choose between components of its kind ask, and the answers: of a search what it `maximises`, whether it
     /// is `exact`, what `time` it takes.
     const PROPERTIES: Properties = &[];
+    /// The version of its results. Raise it with every change that alters a result for some input: runs that `seafix publish`
+    /// keeps are made again by it.
+    const VERSION: u32 = 1;
 
     /// Whether its settings can be: a component is built only from settings that pass.
     ///
@@ -107,6 +110,7 @@ pub struct Entry<T: ?Sized> {
     summary: &'static str,
     source: &'static str,
     properties: Properties,
+    version: u32,
     defaults: fn() -> toml::Table,
     build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>,
 }
@@ -119,6 +123,7 @@ impl<T: ?Sized> Entry<T> {
             summary: C::SUMMARY,
             source: C::SOURCE,
             properties: C::PROPERTIES,
+            version: C::VERSION,
             defaults: defaults::<C>,
             build,
         }
@@ -312,6 +317,8 @@ pub struct Listing {
     pub source: &'static str,
     /// What else there is to say: what is told of, and what.
     pub properties: Properties,
+    /// The version of its results.
+    pub version: u32,
     /// Its settings with their default values.
     pub defaults: toml::Table,
 }
@@ -349,6 +356,7 @@ impl<T: ?Sized> Registry<T> {
                 summary: entry.summary,
                 source: entry.source,
                 properties: entry.properties,
+                version: entry.version,
                 defaults: (entry.defaults)(),
             })
             .collect()

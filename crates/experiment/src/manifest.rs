@@ -1,6 +1,12 @@
 //! `manifest.json`: what made a run.
 
-use std::{collections::BTreeMap, io::Write, path::Path, process::Command, sync::OnceLock};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::Write,
+    path::Path,
+    process::Command,
+    sync::OnceLock,
+};
 
 use seafix_component::{Fault, read_text};
 use serde::{Deserialize, Serialize};
@@ -8,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     Plan, Trial,
     dataset::sha256,
+    identity::{self, Versions},
     run::{Group, Options, RunError},
 };
 
@@ -46,6 +53,12 @@ pub(crate) struct Manifest {
     /// Rows of the tables, once they are there.
     #[serde(default)]
     pub(crate) rows: usize,
+    /// The hash of everything that the results depend on; empty in a manifest before 1.2.
+    #[serde(default)]
+    pub(crate) identity: String,
+    /// The versions of the components and of the shared code that the results depend on.
+    #[serde(default)]
+    pub(crate) versions: Versions,
 }
 
 fn yes() -> bool {
@@ -100,6 +113,7 @@ impl Manifest {
             let warnings = group.passage.warnings().iter().map(ToString::to_string).collect();
             inputs.push(Input { source: group.passage.name().to_owned(), warnings, files });
         }
+        let versions = identity::versions(groups, &inputs);
         let frames = |trial: &Trial| {
             let group = groups.iter().find(|group| group.trials.iter().any(|other| other.name == trial.name));
             group.map_or(0, |group| group.passage.frames())
@@ -120,6 +134,8 @@ impl Manifest {
             seeds: BTreeMap::from([("experiment".to_owned(), plan.experiment.seed)]),
             experiment: plan.experiment.to_toml(),
             trials: plan.trials.iter().map(entry).collect(),
+            identity: identity::identity(plan, groups, &inputs, &versions),
+            versions,
             inputs,
             outputs: BTreeMap::new(),
             timed: options.timed,
@@ -179,6 +195,30 @@ impl Manifest {
         self.outputs.iter().filter_map(fault).collect()
     }
 
+    /// Whether this run is complete, with all its files, and has the results that `other` would have.
+    pub(crate) fn stands_for(&self, other: &Self, folder: &Path) -> bool {
+        let complete = self.state == "finished" && self.outputs.keys().all(|name| folder.join(name).is_file());
+        complete && !self.identity.is_empty() && self.identity == other.identity
+    }
+
+    /// The reason why `other` is made again in place of this run, for people.
+    pub(crate) fn outdated(&self, other: &Self) -> String {
+        if self.identity == other.identity {
+            return format!("the run that was kept is not complete ({})", self.state);
+        }
+        let version = |versions: &Versions, part: &String| versions.get(part).map_or("none".to_owned(), u32::to_string);
+        let changed = self.versions.iter().chain(&other.versions).map(|(part, _)| part);
+        let changed: BTreeSet<&String> =
+            changed.filter(|part| self.versions.get(*part) != other.versions.get(*part)).collect();
+        if changed.is_empty() || self.versions.is_empty() {
+            return "another configuration, input or experiment file".to_owned();
+        }
+        let told = changed
+            .into_iter()
+            .map(|part| format!("{part} {} → {}", version(&self.versions, part), version(&other.versions, part)));
+        told.collect::<Vec<_>>().join(", ")
+    }
+
     /// What keeps this run from being the same as another: which of the things that the answer depends on differs.
     pub(crate) fn differs(&self, other: &Self) -> Option<&'static str> {
         let trials = |manifest: &Self| -> Vec<(String, usize)> {
@@ -187,6 +227,7 @@ impl Manifest {
         let differing = [
             ("the version of the program", self.seafix != other.seafix || self.format != other.format),
             ("the commit of the program, or whether it has changes", self.git.contradicts(&other.git)),
+            ("the version of a component", self.versions != other.versions),
             ("the experiment", self.experiment != other.experiment),
             ("the trials", trials(self) != trials(other)),
             ("the configuration of a trial", self.trials != other.trials),
@@ -211,6 +252,14 @@ pub fn check_run(folder: &Path) -> Vec<Fault> {
     }
     let fault = Fault::new("a run that has not ended", folder).value(&manifest.state);
     vec![fault.remedy("`seafix run --resume` goes on with it, `seafix recover` saves what is there")]
+}
+
+/// The identity of the complete run in `folder`, where there is one and its manifest states it: a hash of everything that its
+/// results depend on.
+#[must_use]
+pub fn kept_identity(folder: &Path) -> Option<String> {
+    let manifest = Manifest::read(folder).ok()?;
+    (manifest.state == "finished" && !manifest.identity.is_empty()).then_some(manifest.identity)
 }
 
 /// Whether `folder` is that of a run.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::{
     ReportError, Summary, content,
     document::{Document, Figure, Table},
-    print,
+    index, print,
     run::Run,
 };
 
@@ -55,6 +55,8 @@ pub struct Report {
     pub page: PathBuf,
     /// The results in it, as a table for the terminal.
     pub summary: Summary,
+    /// Its section of the page that [`index`](crate::index) writes.
+    pub findings: String,
 }
 
 /// The paper in its forms.
@@ -87,7 +89,8 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
     }
     let page = files.iter().map(|(name, _)| name).find(|name| name.starts_with("report."));
     let page = page.map_or_else(|| folder.to_owned(), |name| folder.join(name));
-    Ok(Report { folder: folder.to_owned(), page, summary })
+    let findings = index::section(&run, &summary, folder);
+    Ok(Report { folder: folder.to_owned(), page, summary, findings })
 }
 
 /// Everything that a report consists of.

@@ -6,7 +6,8 @@ use std::{
 };
 
 use clap::Args;
-use seafix_experiment::{Existing, Options, run};
+use seafix_component::counted;
+use seafix_experiment::{Existing, Options, Remade, RunError, kept_identity, remake, run};
 use seafix_report::{Forms, index, index_holds, report};
 
 use super::report::{failure, verified};
@@ -17,7 +18,8 @@ use crate::{
     terminal::{Progress, print, tell},
 };
 
-/// Runs the experiments of a list and reports them into a folder that can be kept beside the program.
+/// Runs the experiments of a list and reports them into a folder that can be kept beside the program. A run is kept, and made
+/// again only when something changes that its results depend on: configuration, inputs, the version of a component.
 #[derive(Debug, Args)]
 pub(crate) struct Publish {
     /// The list of experiments (seafix-reports/1).
@@ -26,19 +28,19 @@ pub(crate) struct Publish {
     /// Where the reports go, a folder each, and README.md, which says what they found.
     #[arg(long, default_value = "reports")]
     out: PathBuf,
-    /// Where the runs go, a folder each. Those that are there are gone on with.
+    /// Where the runs are kept, a folder each. A run whose results would change is made again in its place.
     #[arg(long, default_value = "runs/reports")]
     runs: PathBuf,
     /// Of the list only the experiments of these names; README.md is left as it is.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
-    /// Run nothing: report the runs that are there.
-    #[arg(long, conflicts_with_all = ["verify", "overwrite"])]
-    logged: bool,
-    /// Write nothing: compute every printed number again from the logs of the runs, and say what differs.
-    #[arg(long, conflicts_with = "overwrite")]
+    /// Write nothing: compute every printed number again from the logs of the kept runs, and say what differs.
+    #[arg(long, conflicts_with_all = ["overwrite", "check"])]
     verify: bool,
-    /// Remove the runs that are there first.
+    /// Write nothing: make a part of this many kept runs again, at most 8 frames of each, and say what differs.
+    #[arg(long, value_name = "N", conflicts_with = "overwrite")]
+    check: Option<usize>,
+    /// Use no kept run: remove those that are there, and make all again.
     #[arg(long)]
     overwrite: bool,
     /// How many threads work; the answers do not depend on it [default: all cores].
@@ -58,41 +60,61 @@ impl Publish {
         if self.verify {
             return self.verify_all(&list);
         }
+        if let Some(count) = self.check {
+            return self.check_some(&list, count);
+        }
+        let mut findings = Vec::new();
         for one in &list {
-            if !self.logged {
-                self.run(one)?;
-            }
+            let kept = self.run(one)?;
             let written =
                 report(&self.runs.join(&one.name), &self.out.join(&one.name), Forms::SMALL).map_err(failure)?;
-            tell(&format!("{}: {}", one.name, written.page.display()));
+            let how = if kept { "kept run" } else { "new run" };
+            tell(&format!("{}: {how}, {}", one.name, written.page.display()));
+            findings.push(written.findings);
         }
         if self.only.is_empty() {
             self.tell_of_others(&list);
-            print(&format!("{}\n", index(&self.folders(&list), &self.out).map_err(failure)?.display()))?;
+            let page = index(findings.iter().map(String::as_str), &self.out).map_err(failure)?;
+            print(&format!("{}\n", page.display()))?;
         }
         Ok(DONE)
     }
 
-    /// Makes a run, or what is missing of it, without durations: the same bytes wherever it is made.
-    fn run(&self, one: &Published) -> Result<(), Failure> {
+    /// A run without durations: the same bytes wherever it is made.
+    fn options(&self, folder: PathBuf) -> Options {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let options = Options {
-            existing: if self.overwrite { Existing::Overwrite } else { Existing::Resume },
-            threads: self.threads.map_or(cores, usize::from),
-            timed: false,
-            ..Options::into(self.runs.join(&one.name))
-        };
-        let progress = Progress::new();
-        signals::listen();
-        let finished = run(&one.plan, &options, &progress);
-        signals::end_at_once();
-        progress.end();
-        finished?;
-        Ok(())
+        Options { threads: self.threads.map_or(cores, usize::from), timed: false, ..Options::into(folder) }
     }
 
-    fn folders(&self, list: &[Published]) -> Vec<PathBuf> {
-        list.iter().map(|one| self.runs.join(&one.name)).collect()
+    /// Makes a run, where none that is kept has its results; whether one was kept.
+    fn run(&self, one: &Published) -> Result<bool, Failure> {
+        let existing = if self.overwrite { Existing::Overwrite } else { Existing::Keep };
+        let options = Options { existing, ..self.options(self.runs.join(&one.name)) };
+        Ok(watched(|progress| run(&one.plan, &options, progress))?.kept)
+    }
+
+    /// Makes a part of some kept runs again.
+    fn check_some(&self, list: &[Published], count: usize) -> Ended {
+        // By their identities: another sample whenever a run changes, the same until then.
+        let kept = |one: &'_ Published| kept_identity(&self.runs.join(&one.name));
+        let mut sample: Vec<(String, &Published)> = list.iter().filter_map(|one| Some((kept(one)?, one))).collect();
+        sample.sort_by(|a, b| a.0.cmp(&b.0));
+        sample.truncate(count);
+        let mut same = 0;
+        for (_, one) in &sample {
+            let folder = self.runs.join(&one.name);
+            let options = self.options(self.runs.join(format!(".check-{}", std::process::id())));
+            let Remade { frames, differing } =
+                watched(|progress| remake(&one.plan, &folder, CHECKED, &options, progress))?;
+            same += usize::from(differing.is_empty());
+            let said = if differing.is_empty() { "the same" } else { "not the same" };
+            print(&format!("{}: {} made again, {said}\n", one.name, counted(frames, "frame")))?;
+            for what in differing {
+                print(&format!("{}: {what} differ; raise the VERSION of what changed\n", one.name))?;
+            }
+        }
+        print(&format!("{same} of {} kept runs are what would be made now\n", sample.len()))?;
+        Ok(if same == sample.len() { DONE } else { FINDINGS })
     }
 
     /// Tells of reports of experiments that are not in the list, and how many. They stay: nobody asked for their removal.
@@ -109,11 +131,14 @@ impl Publish {
     }
 
     fn verify_all(&self, list: &[Published]) -> Ended {
-        let mut holding = 0;
+        let (mut holding, mut findings) = (0, Vec::new());
         let mut unreadable: Option<Failure> = None;
         for one in list {
             match verified(&self.runs.join(&one.name), &self.out.join(&one.name)) {
-                Ok(holds) => holding += usize::from(holds),
+                Ok((holds, section)) => {
+                    holding += usize::from(holds);
+                    findings.push(section);
+                }
                 // The others are verified all the same.
                 Err(failure) => {
                     let all = unreadable.get_or_insert(Failure { code: failure.code, lines: Vec::new() });
@@ -124,7 +149,7 @@ impl Publish {
         let mut holds = holding == list.len();
         if self.only.is_empty() {
             holds &= self.tell_of_others(list) == 0;
-            if unreadable.is_none() && !index_holds(&self.folders(list), &self.out).map_err(failure)? {
+            if unreadable.is_none() && !index_holds(findings.iter().map(String::as_str), &self.out) {
                 print(&format!("{} is not what the logs make\n", self.out.join("README.md").display()))?;
                 holds = false;
             }
@@ -135,6 +160,19 @@ impl Publish {
             None => Ok(if holds { DONE } else { FINDINGS }),
         }
     }
+}
+
+/// Frames of a kept run, for each trial, that a check makes again at most.
+const CHECKED: usize = 8;
+
+/// Does work that a person watches and may end.
+fn watched<T>(work: impl FnOnce(&Progress) -> Result<T, RunError>) -> Result<T, Failure> {
+    let progress = Progress::new();
+    signals::listen();
+    let done = work(&progress);
+    signals::end_at_once();
+    progress.end();
+    Ok(done?)
 }
 
 /// Whether a folder is a report that this command wrote.

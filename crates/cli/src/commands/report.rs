@@ -46,12 +46,15 @@ impl Report {
             (false, false, false) => Forms::ALL,
             (html, latex, pdf) => Forms { html, latex, pdf, small: false },
         };
+        let mut findings = Vec::new();
         for (run, folder) in self.runs.iter().zip(&folders) {
             let written = report(run, folder, forms).map_err(failure)?;
             print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
+            findings.push(written.findings);
         }
         if let (true, Some(out)) = (self.index, &self.out) {
-            print(&format!("findings: {}\n", index(&self.runs, out).map_err(failure)?.display()))?;
+            let page = index(findings.iter().map(String::as_str), out).map_err(failure)?;
+            print(&format!("findings: {}\n", page.display()))?;
         }
         Ok(DONE)
     }
@@ -80,7 +83,7 @@ impl Report {
     fn verify_all(&self, folders: &[PathBuf]) -> Ended {
         let mut code = DONE;
         for (run, folder) in self.runs.iter().zip(folders) {
-            if !verified(run, folder)? {
+            if !verified(run, folder)?.0 {
                 code = FINDINGS;
             }
         }
@@ -88,8 +91,9 @@ impl Report {
     }
 }
 
-/// Verifies a report and the files of its run, and says what was found; whether all is as it was written.
-pub(crate) fn verified(run: &Path, folder: &Path) -> Result<bool, Failure> {
+/// Verifies a report and the files of its run, and says what was found; whether all is as it was written, and what the run
+/// adds to the page of all reports.
+pub(crate) fn verified(run: &Path, folder: &Path) -> Result<(bool, String), Failure> {
     let verified = verify(run, folder).map_err(failure)?;
     let changed = changed_outputs(run).map_err(|fault| Failure::faults(INPUT, &[fault]))?;
     let whole = changed.is_empty();
@@ -98,7 +102,7 @@ pub(crate) fn verified(run: &Path, folder: &Path) -> Result<bool, Failure> {
         changed += &format!("note: {} has no manifest: its logs were read, its tables not looked at\n", run.display());
     }
     print(&format!("{changed}{}", said(&verified, &folder.display().to_string())))?;
-    Ok(verified.holds() && whole)
+    Ok((verified.holds() && whole, verified.findings))
 }
 
 /// What a verification found, for people.

@@ -23,8 +23,8 @@ pub(crate) fn execute(name: &str) -> Ended {
             };
             let properties: String = listing.properties.iter().map(|(of, what)| format!("# {of}: {what}\n")).collect();
             format!(
-                "# {} `{}`: {}\n# source: {}\n{properties}name = \"{}\"\n{settings}",
-                listing.kind, listing.name, listing.summary, listing.source, listing.name
+                "# {} `{}`: {}\n# source: {}\n# version: {}\n{properties}name = \"{}\"\n{settings}",
+                listing.kind, listing.name, listing.summary, listing.source, listing.version, listing.name
             )
         })
         .collect();

@@ -27,6 +27,11 @@ impl Piece {
         self.end - self.first
     }
 
+    /// The same with at most its first `frames` frames, one at least.
+    pub(super) fn shortened(&self, frames: usize) -> Self {
+        Self { end: self.end.min(self.first + frames.max(1)), ..*self }
+    }
+
     /// Which of its frames are logged.
     pub(super) fn thinned(&self) -> Thinned {
         Thinned::new(self.every, self.failures)

@@ -20,6 +20,8 @@ pub(super) struct Claim {
     pub(super) folder: PathBuf,
     /// The run that is finished already, where it is resumed.
     pub(super) finished: Option<Manifest>,
+    /// The reason why a run that was there was removed, where one was kept before.
+    pub(super) outdated: Option<String>,
     lock: Lock,
 }
 
@@ -57,11 +59,12 @@ impl Claim {
         let Some(out) = &options.out else {
             let folder = next_free(name).map_err(RunError::Output)?;
             let lock = lock(&folder).map_err(RunError::Output)?;
-            return Ok(Self { folder, finished: None, lock });
+            return Ok(Self { folder, finished: None, outdated: None, lock });
         };
         look(options).map_err(RunError::Output)?;
         fs::create_dir_all(out).map_err(|error| RunError::Output(unmade(out, &error)))?;
-        let mut claim = Self { folder: out.clone(), finished: None, lock: lock(out).map_err(RunError::Output)? };
+        let mut claim =
+            Self { folder: out.clone(), finished: None, outdated: None, lock: lock(out).map_err(RunError::Output)? };
         // Again under the lock: another run may just have ended.
         if free(out).map_err(RunError::Output)? {
             return Ok(claim);
@@ -69,6 +72,7 @@ impl Claim {
         match options.existing {
             Existing::Refuse => Err(RunError::Output(taken(out))),
             Existing::Overwrite => clear(out).map(|()| claim),
+            Existing::Keep => claim.keep(manifest),
             Existing::Resume => {
                 let old = Manifest::read(out).map_err(RunError::Output)?;
                 let shard = (old.shard != manifest.shard).then_some("which shard of it this is");
@@ -85,6 +89,25 @@ impl Claim {
 }
 
 impl Claim {
+    /// Keeps the run that is there where its results are those of the run that `manifest` describes; makes room otherwise.
+    fn keep(mut self, manifest: &Manifest) -> Result<Self, RunError> {
+        let old = Manifest::read(&self.folder).map_err(RunError::Output)?;
+        if old.timed != manifest.timed {
+            // Nobody can make the same durations again.
+            let fault = Fault::new("the folder holds another run", &self.folder.join(manifest::NAME));
+            let fault = fault.value("whether durations are logged differs");
+            return Err(RunError::Output(fault.remedy("choose another folder, or remove the run with --overwrite")));
+        }
+        if old.stands_for(manifest, &self.folder) {
+            self.finished = Some(old);
+        } else if old.state == "finished" || old.shard.is_some() || manifest.differs(&old).is_some() {
+            // What is there of a run that was not finished is continued by the program that began it only.
+            self.outdated = Some(old.outdated(manifest));
+            clear(&self.folder)?;
+        }
+        Ok(self)
+    }
+
     /// Whether the folder is still the one that was taken: what is made below a name does not tell that another has it since.
     pub(super) fn holds(&self) -> Result<(), RunError> {
         if is_at(&self.lock.file, &self.lock.path) {

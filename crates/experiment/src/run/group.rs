@@ -36,7 +36,7 @@ pub(crate) struct Group<'a> {
     /// The network of an earlier run that each trial reads.
     networks: Vec<Option<Network>>,
     /// What the log of each trial begins with.
-    pub(super) headers: Vec<TrialHeader>,
+    pub(crate) headers: Vec<TrialHeader>,
     /// About how much log (bytes) one frame takes.
     pub(super) frame_bytes: u64,
 }
@@ -80,7 +80,7 @@ pub(super) struct Looked {
 }
 
 /// Opens every source once and checks what it needs. Trials share their stages, unless each is measured `separate`ly.
-pub(super) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunError> {
+pub(crate) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunError> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     let mut faults = Vec::new();
     for trial in &plan.trials {

@@ -26,7 +26,7 @@ pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) ->
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let claim = Claim::new(options, &name, &manifest)?;
     if let Some(finished) = claim.finished {
-        return Ok(Finished { folder: claim.folder, rows: finished.rows });
+        return Ok(Finished { folder: claim.folder, rows: finished.rows, kept: true });
     }
     manifest.write(&claim.folder, "running")?;
     if !assemble::assemble(&claim.folder, &mut manifest, &pieces, &options.pool()?, observer)? {
@@ -34,7 +34,7 @@ pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) ->
         return Err(RunError::Interrupted(claim.folder));
     }
     manifest.write(&claim.folder, "finished")?;
-    Ok(Finished { folder: claim.folder, rows: manifest.rows })
+    Ok(Finished { folder: claim.folder, rows: manifest.rows, kept: false })
 }
 
 /// What the shards have in common, and all their pieces.

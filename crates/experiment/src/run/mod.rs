@@ -15,6 +15,7 @@ mod cut;
 mod estimate;
 mod folder;
 mod group;
+mod kept;
 mod merge;
 mod options;
 mod share;
@@ -22,6 +23,7 @@ mod store;
 mod work;
 
 pub use estimate::{Estimate, estimate};
+pub use kept::{Remade, remake};
 pub use merge::merge;
 pub use options::{Existing, Options, Shard};
 
@@ -29,6 +31,8 @@ use crate::{Plan, manifest::Manifest};
 use cut::Piece;
 use folder::Claim;
 pub(crate) use group::Group;
+#[cfg(test)]
+pub(crate) use group::open;
 use store::Store;
 
 /// Watches a run, and may end it. The runner itself prints nothing.
@@ -37,6 +41,8 @@ pub trait Observer: Sync {
     fn begins(&self, _frames: usize, _bytes: u64, _folder: &Path) {}
     /// So many of the frames are there already, from before the run was interrupted.
     fn resumes(&self, _frames: usize) {}
+    /// A run that was kept is made again, for this reason.
+    fn renews(&self, _reason: &str) {}
     /// Something is odd about an input, but not wrong.
     fn warns(&self, _warning: &Fault) {}
     /// One more frame of `trial` is logged.
@@ -87,6 +93,8 @@ pub struct Finished {
     pub folder: PathBuf,
     /// Attempts over all trials and frames; of a shard none are counted.
     pub rows: usize,
+    /// Whether it was there already, and nothing was made.
+    pub kept: bool,
 }
 
 /// Runs `plan` into a folder.
@@ -107,6 +115,7 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
         Manifest::new(plan, options, &groups, pieces.len()).map_err(|fault| RunError::Input(vec![fault]))?;
 
     let claim = Claim::new(options, &plan.name, &manifest)?;
+    claim.outdated.iter().for_each(|reason| observer.renews(reason));
     let mine: Vec<&Piece> = pieces.iter().filter(|piece| options.takes(piece.number)).collect();
     if let (true, Some(shard)) = (mine.is_empty(), options.shard) {
         let fault = Fault::new("an empty shard", &claim.folder).value(shard);
@@ -114,15 +123,15 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
             .warns(&fault.remedy(format!("the run has {} pieces; more shards than that make nothing", pieces.len())));
     }
     let frames = |pieces: &[&Piece]| pieces.iter().map(|piece| piece.frames() * groups[piece.group].trials.len()).sum();
-    observer.begins(frames(&mine), cut::bytes(&groups, &mine), &claim.folder);
     // A shard is what it is made of: one whose pieces were damaged since is made again.
     let whole = || mine.iter().all(|piece| Store::of(&claim.folder).sound(piece.number).is_some());
     if let Some(finished) = claim.finished.as_ref().filter(|_| options.shard.is_none() || whole()) {
         if options.shard.is_none() {
             Store::of(&claim.folder).remove()?;
         }
-        return Ok(Finished { rows: finished.rows, folder: claim.folder });
+        return Ok(Finished { rows: finished.rows, folder: claim.folder, kept: true });
     }
+    observer.begins(frames(&mine), cut::bytes(&groups, &mine), &claim.folder);
     // First: a folder without it holds no run.
     manifest.write(&claim.folder, "running")?;
     let store = Store::open(&claim.folder)?;
@@ -136,7 +145,7 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     claim.holds()?;
     if done && options.shard.is_some() {
         manifest.write(&claim.folder, "shard")?;
-        return Ok(Finished { folder: claim.folder, rows: 0 });
+        return Ok(Finished { folder: claim.folder, rows: 0, kept: false });
     }
     if done {
         let pieces = pool.install(|| store.all());
@@ -149,5 +158,5 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     }
     manifest.write(&claim.folder, "finished")?;
     store.remove()?;
-    Ok(Finished { folder: claim.folder, rows: manifest.rows })
+    Ok(Finished { folder: claim.folder, rows: manifest.rows, kept: false })
 }

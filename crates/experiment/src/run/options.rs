@@ -66,6 +66,8 @@ pub enum Existing {
     Resume,
     /// It is removed.
     Overwrite,
+    /// It stays if its results are those of the new run, or is continued if it is the same run; else it is removed.
+    Keep,
 }
 
 /// One of several parts that a run is dealt into, piece by piece: `2/7` is the second of seven.

@@ -3,7 +3,10 @@
 mod pending;
 mod source;
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use rayon::prelude::*;
 
@@ -50,19 +53,19 @@ pub struct Reader {
 }
 
 /// Of which frames the images are decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 enum Images {
     All,
     None,
-    At(u64),
+    At(BTreeSet<u64>),
 }
 
 impl Images {
-    fn wanted(self, stamp_ns: u64) -> bool {
+    fn wanted(&self, stamp_ns: u64) -> bool {
         match self {
             Self::All => true,
             Self::None => false,
-            Self::At(stamp) => stamp == stamp_ns,
+            Self::At(stamps) => stamps.contains(&stamp_ns),
         }
     }
 }
@@ -117,10 +120,10 @@ impl Reader {
         self
     }
 
-    /// The same, decoding only the images of frames with this stamp.
+    /// The same, decoding only the images of frames with these stamps.
     #[must_use]
-    pub fn images_at(mut self, stamp_ns: u64) -> Self {
-        self.images = Images::At(stamp_ns);
+    pub fn images_at(mut self, stamps_ns: impl IntoIterator<Item = u64>) -> Self {
+        self.images = Images::At(stamps_ns.into_iter().collect());
         self
     }
 
@@ -157,9 +160,9 @@ impl Reader {
     pub fn for_each_frame(&mut self, mut take: impl FnMut(FrameRecord) + Send) -> Result<(), LogError> {
         let mut read = self.some_messages()?;
         while !read.is_empty() {
-            let (path, images, bare) = (self.source.path().to_owned(), self.images, self.bare);
+            let (path, images, bare) = (self.source.path().to_owned(), self.images.clone(), self.bare);
             let decode = || -> Result<Vec<FrameRecord>, LogError> {
-                read.par_iter().map(|messages| decoded(&path, images, bare, messages)).collect()
+                read.par_iter().map(|messages| decoded(&path, &images, bare, messages)).collect()
             };
             let (frames, next) = rayon::join(decode, || self.some_messages());
             frames?.into_iter().for_each(&mut take);
@@ -170,7 +173,9 @@ impl Reader {
     }
 
     fn next_frame(&mut self) -> Result<Option<FrameRecord>, LogError> {
-        self.next_messages()?.map(|messages| decoded(self.source.path(), self.images, self.bare, &messages)).transpose()
+        self.next_messages()?
+            .map(|messages| decoded(self.source.path(), &self.images, self.bare, &messages))
+            .transpose()
     }
 
     /// The messages of the next frames; none at the end.
@@ -188,7 +193,7 @@ impl Reader {
 
     /// The messages of the next frame, the last of which closes it.
     fn next_messages(&mut self) -> Result<Option<Vec<Message>>, LogError> {
-        let (images, inputs) = (self.images, self.inputs);
+        let (images, inputs) = (&self.images, self.inputs);
         let take = |topic: &str, stamp: u64| match topic {
             topic::RESULT
             | topic::CANDIDATES
@@ -225,7 +230,7 @@ impl Reader {
 }
 
 /// The frame of these messages.
-fn decoded(path: &Path, images: Images, bare: bool, messages: &[Message]) -> Result<FrameRecord, LogError> {
+fn decoded(path: &Path, images: &Images, bare: bool, messages: &[Message]) -> Result<FrameRecord, LogError> {
     let mut pending = if bare { Pending::bare() } else { Pending::default() };
     for message in messages {
         if let Some(frame) = pending.take(path, message, images.wanted(message.log_time))? {

@@ -57,15 +57,12 @@ pub(super) fn section(run: &Run, summary: &Summary, small: bool) -> Section {
         })],
     );
     line("Seeds", text![of(|header| pairs(header.seeds.iter().map(|(name, seed)| (name, seed.to_string()))))]);
-    // The commit stands in the manifest: a page that is kept beside the program would differ with every one.
-    let version = |of: fn(&str) -> bool| {
-        distinct(run.trials.iter().map(|trial| {
-            let versions = trial.header.versions.iter().filter(|(name, _)| of(name));
-            pairs(versions.map(|(name, version)| (name, version.clone())))
-        }))
-        .join("; ")
-    };
-    line("Versions", text![if small { version(|name| name != "commit") } else { version(|_| true) }]);
+    // A kept page is that of every program with the same results; the page of all reports names the version.
+    if !small {
+        let versions =
+            |header: &TrialHeader| pairs(header.versions.iter().map(|(name, version)| (name, version.clone())));
+        line("Versions", text![of(versions)]);
+    }
     Section::new("Data").with([Block::Table(table), Block::Table(hashes(run))])
 }
 

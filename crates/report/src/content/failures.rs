@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::tell::{self, Unit};
 use crate::{
     Field, Number, ReportError,
@@ -29,15 +31,12 @@ pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section)
     for (trial, stamp) in best.into_iter().chain(worst.iter().map(|(trial, frame, _)| (*trial, frame.stamp_ns))) {
         wanted.entry(trial).or_default().push(stamp);
     }
-    let mut pictures: BTreeMap<(usize, u64), Marked> = BTreeMap::new();
-    for (trial, stamps) in wanted {
-        let small = run.trials[trial].frames.len() <= SEARCHED;
-        if run.trials[trial].pictures && small {
-            pictures.extend(
-                draw_picture(&run.trials[trial], &stamps)?.into_iter().map(|marked| ((trial, marked.stamp_ns), marked)),
-            );
-        }
-    }
+    wanted.retain(|trial, _| run.trials[*trial].pictures && run.trials[*trial].frames.len() <= SEARCHED);
+    let drawn = wanted.into_par_iter().map(|(trial, stamps)| Ok((trial, draw_picture(&run.trials[trial], &stamps)?)));
+    let drawn: Vec<(usize, Vec<Marked>)> = drawn.collect::<Result<_, ReportError>>()?;
+    let all = drawn.into_iter().flat_map(|(trial, drawn)| drawn.into_iter().map(move |marked| (trial, marked)));
+    let pictures: BTreeMap<(usize, u64), Marked> =
+        all.map(|(trial, marked)| ((trial, marked.stamp_ns), marked)).collect();
     let first = best.and_then(|best| pictures.get(&best).map(|marked| best_picture(run, best.0, marked, small)));
     let mut section = Section::new("Failures");
     if worst.is_empty() {

@@ -28,19 +28,19 @@ pub(crate) struct Marked {
     pub(crate) objects: Vec<String>,
 }
 
-/// The pictures of the frames of `trial` with these stamps, as far as the log has their images.
+/// The pictures of the frames of `trial` with these stamps, in the order of the log, as far as it has their images. The log
+/// is read to the last of them.
 pub(crate) fn draw(trial: &Trial, stamps: &[u64]) -> Result<Vec<Marked>, ReportError> {
+    let mut wanted: BTreeSet<u64> = stamps.iter().copied().collect();
     let mut pictures: Vec<Marked> = Vec::new();
-    for &stamp in stamps {
-        if pictures.iter().any(|known| known.stamp_ns == stamp) {
-            continue;
-        }
-        for frame in Reader::open(&trial.path)?.images_at(stamp) {
-            let frame = frame?;
-            if let (true, Some(images)) = (frame.stamp_ns == stamp, &frame.images) {
-                pictures.push(Marked::draw(&trial.header, &frame, images));
-                break;
-            }
+    let mut frames = Reader::open(&trial.path)?.without_inputs().images_at(wanted.iter().copied());
+    while !wanted.is_empty()
+        && let Some(frame) = frames.next().transpose()?
+    {
+        if let Some(images) = &frame.images
+            && wanted.remove(&frame.stamp_ns)
+        {
+            pictures.push(Marked::draw(&trial.header, &frame, images));
         }
     }
     Ok(pictures)

@@ -9,7 +9,7 @@ use std::{
 };
 
 use crate::{
-    Forms, Key, Number, ReportError, Summary,
+    Forms, Key, Number, ReportError, Summary, index,
     print::FORMS,
     run::Run,
     write::{files, strangers},
@@ -32,6 +32,8 @@ pub struct Verified {
     pub changed: Vec<String>,
     /// Files beside them that the logs do not make.
     pub strays: Vec<String>,
+    /// Its section of the page that [`index`](crate::index) writes, as the logs make it.
+    pub findings: String,
 }
 
 /// A number that is not what the logs say.
@@ -78,6 +80,7 @@ pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
     let summary = Summary::of(&run);
     let made = files(&run, &summary, forms(&page))?;
     verified.files = made.len();
+    verified.findings = index::section(&run, &summary, folder);
     let name_of = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).display().to_string();
     verified.strays = strangers(folder, &made).into_iter().map(name_of).collect();
     for (name, bytes) in made {

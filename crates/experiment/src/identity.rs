@@ -1,0 +1,278 @@
+//! The identity of a run: a hash of everything its untimed bytes depend on.
+//!
+//! It covers the resolved configuration of every trial and all else that its log begins with, the SHA-256 of every input
+//! file, the version of every component that the trials use, and the versions of the code that all of them share. It covers
+//! neither the commit nor the machine: two runs of one identity have the same results.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::LazyLock,
+};
+
+use seafix_component::{Listing, Registry};
+use seafix_log::TrialHeader;
+use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
+use seafix_referencing::{SEARCHES, SOLVERS};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
+use sha2::{Digest, Sha256};
+
+use crate::{Plan, Trial, dataset::hex, manifest::Input, run::Group, source::SOURCES};
+
+/// Versions of the code that no component owns. Raise one with every change of that code that alters a result for some
+/// input; `tests/versions.rs` fails where a result changed and no version did.
+pub const SHARED: [Shared; 8] = [
+    // Cameras, rigs, distortion, transforms, covariances.
+    Shared { name: "geometry", version: 1, used: |_| true },
+    // Candidates, gates, tolerance, acceptance tests, integrity, joint fixes.
+    Shared { name: "acceptance", version: 1, used: |_| true },
+    // Errors, rates, bounds; the comparison with truth.
+    Shared { name: "evaluation", version: 1, used: |_| true },
+    // What is logged of a frame, and which frames are.
+    Shared { name: "log", version: 1, used: |_| true },
+    // The order of the stages on a stereo pair.
+    Shared { name: "front-end", version: 1, used: |used| used.images },
+    // The navigator, the pose graph, key frames.
+    Shared { name: "navigation", version: 1, used: |used| used.navigates },
+    // Sites, dives, sensors, noisy points, problems, random streams.
+    Shared { name: "simulation", version: 1, used: |used| used.simulated },
+    // Images of dives and of the virtual site.
+    Shared { name: "renderer", version: 1, used: |used| used.simulated && used.images },
+];
+
+/// A part of the code that components share, and the version of its results.
+#[derive(Debug, Clone, Copy)]
+pub struct Shared {
+    /// The name of the part.
+    pub name: &'static str,
+    /// The version of its results.
+    pub version: u32,
+    used: fn(&Used) -> bool,
+}
+
+/// The parts of the method that a trial uses.
+struct Used {
+    images: bool,
+    labelled: bool,
+    navigates: bool,
+    simulated: bool,
+}
+
+/// All components, a list for each kind, in the order in which a frame meets them.
+pub fn components() -> Vec<Vec<Listing>> {
+    fn of<T: ?Sized>(registry: &Registry<T>) -> Vec<Listing> {
+        registry.listings()
+    }
+    vec![
+        of(&SOURCES),
+        of(&FILTERS),
+        of(&DETECTORS),
+        of(&LOCATORS),
+        of(&DESCRIPTORS),
+        of(&MATCHERS),
+        of(&REFINEMENTS),
+        of(&TRIANGULATORS),
+        of(&SEARCHES),
+        of(&SOLVERS),
+        of(&ODOMETRIES),
+        of(&POLICIES),
+        of(&FUSIONS),
+    ]
+}
+
+static ALL: LazyLock<Vec<Listing>> = LazyLock::new(|| components().concat());
+
+/// The version of every component and shared part, by `solver kabsch` or `shared geometry`.
+pub(crate) type Versions = BTreeMap<String, u32>;
+
+/// The versions of all that the trials of a plan use.
+pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
+    let mut versions = Versions::new();
+    for (group, input) in groups.iter().zip(inputs) {
+        for trial in &group.trials {
+            let used = Used {
+                images: group.passage.images(),
+                labelled: group.passage.named(),
+                navigates: trial.helm.is_some(),
+                // Recordings are files, simulations are settings.
+                simulated: input.files.is_empty(),
+            };
+            versions.extend(of_trial(trial, &used));
+        }
+    }
+    versions
+}
+
+fn of_trial(trial: &Trial, used: &Used) -> Versions {
+    /// The stages between images and a cloud.
+    const FRONT_END: [&str; 7] = ["filters", "detector", "locator", "descriptor", "matcher", "refine", "triangulation"];
+    let mut settings =
+        toml::Table::try_from(&trial.resolved).expect("a resolved experiment is a table of plain values");
+    if let Some(pipeline) = settings.get_mut("pipeline").and_then(toml::Value::as_table_mut) {
+        let idle = |stage: &str| !used.images && FRONT_END.contains(&stage) || used.labelled && stage == "search";
+        pipeline.retain(|stage, _| !idle(stage));
+    }
+    let mut found = Found::default();
+    settings.values().for_each(|value| found.look(value));
+    let shared = SHARED.iter().filter(|shared| (shared.used)(used));
+    found.versions.extend(shared.map(|shared| (format!("shared {}", shared.name), shared.version)));
+    found.versions
+}
+
+/// The components among some settings, however deep.
+///
+/// A setting chooses a component by its name, alone or in a table as `name`. A name that several kinds have counts for each
+/// of them: a run that is made again without need is the lesser evil.
+#[derive(Default)]
+struct Found {
+    versions: Versions,
+    /// Components whose defaults were looked at.
+    defaults: BTreeSet<(&'static str, &'static str)>,
+}
+
+impl Found {
+    fn look(&mut self, value: &toml::Value) {
+        match value {
+            toml::Value::String(name) => self.component(name, &toml::Table::new()),
+            toml::Value::Table(table) => {
+                let name = table.get("name").and_then(toml::Value::as_str);
+                name.into_iter().for_each(|name| self.component(name, table));
+                table.iter().filter(|(key, _)| *key != "name").for_each(|(_, value)| self.look(value));
+            }
+            toml::Value::Array(list) => list.iter().for_each(|value| self.look(value)),
+            _ => {}
+        }
+    }
+
+    /// The components of a name, and those among the defaults that `settings` leave.
+    fn component(&mut self, name: &str, settings: &toml::Table) {
+        for listing in ALL.iter().filter(|listing| listing.name == name) {
+            self.versions.insert(format!("{} {name}", listing.kind), listing.version);
+            let mut left = listing.defaults.iter().filter(|(key, _)| !settings.contains_key(*key)).peekable();
+            if left.peek().is_some() && self.defaults.insert((listing.kind, listing.name)) {
+                left.for_each(|(_, value)| self.look(value));
+            }
+        }
+    }
+}
+
+/// The identity of a run.
+pub(crate) fn identity(plan: &Plan, groups: &[Group<'_>], inputs: &[Input], versions: &Versions) -> String {
+    let mut hash = Sha256::new();
+    // A length before every part keeps two parts from passing for others of the same joined text.
+    let mut add = |text: &str| {
+        hash.update((text.len() as u64).to_le_bytes());
+        hash.update(text);
+    };
+    add("seafix-identity/1");
+    add(&plan.experiment.to_toml());
+    for (part, version) in versions {
+        add(&format!("{part} {version}"));
+    }
+    for Input { source, files, .. } in inputs {
+        add(source);
+        files.iter().for_each(|(name, hash)| add(&format!("{hash} {name}")));
+    }
+    for group in groups {
+        add(&group.passage.frames().to_string());
+        for header in &group.headers {
+            // The commit and the package are no part of a result.
+            add(&format!("{:?}", TrialHeader { versions: Vec::new(), ..header.clone() }));
+        }
+    }
+    hex(&hash.finalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::open;
+
+    fn plan(text: &str) -> Plan {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("e.toml");
+        std::fs::write(&file, text).unwrap();
+        Plan::read(&file, &[]).unwrap_or_else(|faults| panic!("{faults:?}"))
+    }
+
+    fn used(text: &str) -> Versions {
+        let plan = plan(text);
+        let groups = open(&plan).unwrap();
+        let input = || Input { source: String::new(), warnings: Vec::new(), files: BTreeMap::new() };
+        versions(&groups, &groups.iter().map(|_| input()).collect::<Vec<_>>())
+    }
+
+    const POINTS: &str = "question = 'why'\nsource = 'virtual-points'\n";
+
+    #[test]
+    fn a_run_counts_the_components_it_uses_and_no_other() {
+        let of_points = used(POINTS);
+        let parts: Vec<&str> = of_points.keys().map(String::as_str).collect();
+        let all = [
+            "search rigid-consensus",
+            "shared acceptance",
+            "shared evaluation",
+            "shared geometry",
+            "shared log",
+            "shared simulation",
+            "solver stereo-reprojection",
+            "source virtual-points",
+        ];
+        assert_eq!(parts, all);
+        let labelled = used(
+            "question = 'why'\n[source]\nname = 'virtual-layouts'\nnamed = true\n[[vary]]\nkey = 'pipeline.solver'\n\
+             values = ['kabsch', 'triad']\n",
+        );
+        assert!(labelled.contains_key("solver kabsch") && labelled.contains_key("solver triad"), "{labelled:?}");
+        assert!(!labelled.keys().any(|part| part.starts_with("search ")), "{labelled:?}");
+        let of_images = used("question = 'why'\nsource = 'virtual-images'\n[pipeline]\nfilters = ['median']\n");
+        for part in ["filter median", "detector harris", "triangulator optimal", "shared front-end", "shared renderer"]
+        {
+            assert!(of_images.contains_key(part), "no {part} in {of_images:?}");
+        }
+        assert!(!of_images.contains_key("shared navigation"));
+    }
+
+    #[test]
+    fn a_component_that_another_owns_counts() {
+        let text = "question = 'why'\nsource = 'virtual-images'\n[navigation]\nodometry = { name = 'stereo', \
+                    between = 'lucas-kanade' }\n[navigation.network.settings.recognition]\nminimal = 'horn'\n";
+        let owned = used(text);
+        let parts =
+            ["matcher lucas-kanade", "solver p3p-stereo", "solver horn", "descriptor sift", "shared navigation"];
+        for part in parts {
+            assert!(owned.contains_key(part), "no {part} in {owned:?}");
+        }
+        // Chosen by its name alone, a component brings what its defaults own.
+        let mut found = Found::default();
+        found.look(&toml::Value::from("stereo"));
+        assert!(found.versions.contains_key("solver p3p-stereo"), "{:?}", found.versions);
+    }
+
+    #[test]
+    fn all_that_a_result_depends_on_is_in_the_identity() {
+        let of = |text: &str, change: &dyn Fn(&mut Vec<Input>, &mut Versions)| {
+            let plan = plan(text);
+            let groups = open(&plan).unwrap();
+            let files = BTreeMap::from([("a.csv".to_owned(), "12".to_owned())]);
+            let mut inputs = vec![Input { source: "s".to_owned(), warnings: Vec::new(), files }];
+            let mut versions = versions(&groups, &inputs);
+            change(&mut inputs, &mut versions);
+            identity(&plan, &groups, &inputs, &versions)
+        };
+        let same = of(POINTS, &|_, _| {});
+        assert_eq!(same, of(POINTS, &|_, _| {}), "identities of two plans of one text");
+        let version = of(POINTS, &|_, versions| *versions.get_mut("solver stereo-reprojection").unwrap() += 1);
+        let input = of(POINTS, &|inputs, _| drop(inputs[0].files.insert("a.csv".to_owned(), "13".to_owned())));
+        let seed = of(&format!("seed = 1\n{POINTS}"), &|_, _| {});
+        let setting = of(&format!("{POINTS}[pipeline]\nwiden = true\n"), &|_, _| {});
+        let question = of(&POINTS.replace("why", "how"), &|_, _| {});
+        let all = BTreeSet::from([same, version, input, seed, setting, question]);
+        assert_eq!(all.len(), 6);
+    }
+
+    #[test]
+    fn every_part_has_one_name() {
+        let names: BTreeSet<&str> = SHARED.iter().map(|shared| shared.name).collect();
+        assert_eq!(names.len(), SHARED.len());
+    }
+}

@@ -1,0 +1,129 @@
+//! A part of a kept run, made again and compared.
+
+use std::{
+    fs::{self, File},
+    io::{Read as _, Seek as _, SeekFrom},
+    path::Path,
+};
+
+use seafix_component::Fault;
+use seafix_log::{FrameRecord, Reader};
+
+use super::{
+    Observer, Options, RunError, cut,
+    cut::Piece,
+    group,
+    store::{Sealed, Store},
+    work,
+};
+use crate::{Plan, manifest, manifest::Manifest, results::Stretch};
+
+/// A part of a kept run that was made again.
+#[derive(Debug)]
+pub struct Remade {
+    /// Its frames, over all trials.
+    pub frames: usize,
+    /// The trials whose rows or frames differ, and how.
+    pub differing: Vec<String>,
+}
+
+/// Makes one piece of the run in `folder` again, at most `frames` of its frames, and compares it with the run byte by byte.
+/// The identity of the run chooses the piece. The part is made in the folder that `options` say, which must not exist.
+///
+/// # Errors
+/// [`RunError`]: a folder whose run is not complete or not that of `plan`, inputs that cannot be read, an output that cannot
+/// be written, or the observer's end.
+pub fn remake(
+    plan: &Plan,
+    folder: &Path,
+    frames: usize,
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<Remade, RunError> {
+    let input = |fault: Fault| RunError::Input(vec![fault]);
+    let kept = Manifest::read(folder).map_err(input)?;
+    let groups = group::open(plan, false)?;
+    let pieces = cut::cut(&groups);
+    let manifest = Manifest::new(plan, options, &groups, pieces.len()).map_err(input)?;
+    if !kept.stands_for(&manifest, folder) {
+        let fault = Fault::new("not the run that would be made now", &folder.join(manifest::NAME));
+        return Err(input(fault.value(kept.outdated(&manifest)).remedy("`seafix publish` makes it again")));
+    }
+    let chosen = u64::from_str_radix(&kept.identity[..16], 16).unwrap_or(0) % pieces.len() as u64;
+    let piece = pieces[chosen as usize].shortened(frames);
+    let group = &groups[piece.group];
+    let scratch = Scratch::new(options.out.as_deref().unwrap_or(folder))?;
+    observer.begins(piece.frames() * group.trials.len(), cut::bytes(&groups, &[&piece]), scratch.0);
+    let store = Store::open(scratch.0)?;
+    if !work::work(&groups, &[&piece], &store, &options.pool()?, false, observer)? {
+        return Err(RunError::Interrupted(folder.to_owned()));
+    }
+    let lost = || RunError::Output(Fault::new("a piece that was not stored as it was made", scratch.0));
+    let sealed = store.sound(piece.number).ok_or_else(lost)?;
+    let results = folder.join("results.csv");
+    let table =
+        fs::read_to_string(&results).map_err(|error| input(Fault::new(format!("cannot read ({error})"), &results)))?;
+    let mut differing = Vec::new();
+    for trial in &group.trials {
+        let name = &trial.name;
+        if !table.contains(&rows(&sealed, name).map_err(|error| RunError::unwritable(scratch.0, error))?) {
+            differing.push(format!("{name}: rows of {}", said(group, &piece)));
+        }
+        let (made, log) = (Reader::open(&sealed.log(name))?, Reader::open(&folder.join(format!("{name}.mcap")))?);
+        if !in_log(made, log)? {
+            differing.push(format!("{name}: logged frames among {}", said(group, &piece)));
+        }
+    }
+    Ok(Remade { frames: piece.frames() * group.trials.len(), differing })
+}
+
+/// A folder that is removed with what was made in it.
+struct Scratch<'a>(&'a Path);
+
+impl<'a> Scratch<'a> {
+    /// A folder that is there already is somebody's: it is no scratch.
+    fn new(path: &'a Path) -> Result<Self, RunError> {
+        fs::create_dir(path).map(|()| Self(path)).map_err(|error| RunError::unwritable(path, error))
+    }
+}
+
+impl Drop for Scratch<'_> {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(self.0);
+    }
+}
+
+fn said(group: &group::Group<'_>, piece: &Piece) -> String {
+    let number = |index: usize| group.passage.number(index);
+    format!("frames {} to {}", number(piece.first), number(piece.end.max(piece.first + 1) - 1))
+}
+
+/// The rows of a trial, as text.
+fn rows(sealed: &Sealed, trial: &str) -> std::io::Result<String> {
+    let Some(Stretch { csv, text: (start, length), .. }) = sealed.stretch(trial) else { return Ok(String::new()) };
+    let (mut file, mut text) = (File::open(csv)?, String::new());
+    file.seek(SeekFrom::Start(start))?;
+    file.take(length).read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// Whether the frames of `made` are those of the same numbers in `log`.
+fn in_log(made: Reader, mut log: Reader) -> Result<bool, RunError> {
+    for frame in made {
+        let frame = frame?;
+        loop {
+            match log.next().transpose()? {
+                None => return Ok(false),
+                Some(other) if other.frame < frame.frame => {}
+                Some(other) if same(&frame, &other) => break,
+                Some(_) => return Ok(false),
+            }
+        }
+    }
+    Ok(true)
+}
+
+/// Equal, with one NaN equal to another.
+fn same(a: &FrameRecord, b: &FrameRecord) -> bool {
+    a == b || format!("{a:?}") == format!("{b:?}")
+}
