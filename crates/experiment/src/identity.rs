@@ -112,7 +112,7 @@ fn of_trial(trial: &Trial, used: &Used) -> Versions {
         pipeline.retain(|stage, _| !idle(stage));
     }
     let mut found = Found::default();
-    settings.values().for_each(|value| found.look(value));
+    settings.iter().for_each(|(key, value)| found.look(key, value));
     let shared = SHARED.iter().filter(|shared| (shared.used)(used));
     found.versions.extend(shared.map(|shared| (format!("shared {}", shared.name), shared.version)));
     found.versions
@@ -120,8 +120,8 @@ fn of_trial(trial: &Trial, used: &Used) -> Versions {
 
 /// The components among some settings, however deep.
 ///
-/// A setting chooses a component by its name, alone or in a table as `name`. A name that several kinds have counts for each
-/// of them: a run that is made again without need is the lesser evil.
+/// A setting chooses a component by its name, alone or in a table as `name`. Where the setting's key does not tell the kind, a
+/// name that several kinds have counts for each of them: a run that is made again without need is the lesser evil.
 #[derive(Default)]
 struct Found {
     versions: Versions,
@@ -130,26 +130,33 @@ struct Found {
 }
 
 impl Found {
-    fn look(&mut self, value: &toml::Value) {
+    fn look(&mut self, key: &str, value: &toml::Value) {
         match value {
-            toml::Value::String(name) => self.component(name, &toml::Table::new()),
+            toml::Value::String(name) => self.component(key, name, &toml::Table::new()),
             toml::Value::Table(table) => {
                 let name = table.get("name").and_then(toml::Value::as_str);
-                name.into_iter().for_each(|name| self.component(name, table));
-                table.iter().filter(|(key, _)| *key != "name").for_each(|(_, value)| self.look(value));
+                name.into_iter().for_each(|name| self.component(key, name, table));
+                table.iter().filter(|(key, _)| *key != "name").for_each(|(key, value)| self.look(key, value));
             }
-            toml::Value::Array(list) => list.iter().for_each(|value| self.look(value)),
+            toml::Value::Array(list) => list.iter().for_each(|value| self.look(key, value)),
             _ => {}
         }
     }
 
     /// The components of a name, and those among the defaults that `settings` leave.
-    fn component(&mut self, name: &str, settings: &toml::Table) {
-        for listing in ALL.iter().filter(|listing| listing.name == name) {
+    fn component(&mut self, key: &str, name: &str, settings: &toml::Table) {
+        let told = match key {
+            "filters" => Some("filter"),
+            "refine" => Some("refinement"),
+            "triangulation" => Some("triangulator"),
+            key => ALL.iter().map(|listing| listing.kind).find(|kind| *kind == key),
+        };
+        for listing in ALL.iter().filter(|listing| listing.name == name && told.is_none_or(|kind| kind == listing.kind))
+        {
             self.versions.insert(format!("{} {name}", listing.kind), listing.version);
             let mut left = listing.defaults.iter().filter(|(key, _)| !settings.contains_key(*key)).peekable();
             if left.peek().is_some() && self.defaults.insert((listing.kind, listing.name)) {
-                left.for_each(|(_, value)| self.look(value));
+                left.for_each(|(key, value)| self.look(key, value));
             }
         }
     }
@@ -229,6 +236,8 @@ mod tests {
         {
             assert!(of_images.contains_key(part), "no {part} in {of_images:?}");
         }
+        // The descriptor's kind is known by its key, although a detector has the same name.
+        assert!(of_images.contains_key("descriptor surf") && !of_images.contains_key("detector surf"));
         assert!(!of_images.contains_key("shared navigation"));
     }
 
@@ -244,7 +253,7 @@ mod tests {
         }
         // Chosen by its name alone, a component brings what its defaults own.
         let mut found = Found::default();
-        found.look(&toml::Value::from("stereo"));
+        found.look("odometry", &toml::Value::from("stereo"));
         assert!(found.versions.contains_key("solver p3p-stereo"), "{:?}", found.versions);
     }
 

@@ -285,8 +285,9 @@ fn each<T: ?Sized>(registry: &Registry<T>, add: &mut impl FnMut(&str, &str, Stri
 
 /// The fingerprint of the table and the logs of a small run without durations.
 fn results(source: &str, rest: &str) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    let (file, out) = (folder.path().join("e.toml"), folder.path().join("out"));
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("versions-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let (file, out) = (folder.join("e.toml"), folder.join("out"));
     fs::write(&file, format!("question = 'Why?'\nseed = 7\n[source]\n{source}\n{rest}\n")).unwrap();
     let plan = Plan::read(&file, &[]).unwrap_or_else(|faults| panic!("{faults:?}"));
     run(&plan, &Options { timed: false, ..Options::into(&out) }, &Silent).unwrap();
@@ -297,6 +298,7 @@ fn results(source: &str, rest: &str) -> String {
         log.frames.iter_mut().for_each(|frame| frame.images = None);
         text += &format!("{:?}", log.frames);
     }
+    fs::remove_dir_all(&folder).unwrap();
     print_of(&text)
 }
 
