@@ -204,7 +204,8 @@ impl Manifest {
     /// The reason why `other` is made again in place of this run, for people.
     pub(crate) fn outdated(&self, other: &Self) -> String {
         if self.identity == other.identity {
-            return format!("the run that was kept is not complete ({})", self.state);
+            let why = if self.state == "finished" { "a file of it is missing" } else { "it did not end" };
+            return why.to_owned();
         }
         let version = |versions: &Versions, part: &String| versions.get(part).map_or("none".to_owned(), u32::to_string);
         let changed = self.versions.iter().chain(&other.versions).map(|(part, _)| part);

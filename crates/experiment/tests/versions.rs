@@ -169,16 +169,22 @@ fn fingerprints() -> BTreeMap<String, Line> {
     let mut add =
         |kind: &str, name: &str, print: String| drop(prints.insert((kind.to_owned(), name.to_owned()), print));
     each(&FILTERS, &mut add, |filter| fingerprint(&filter.filtered(&world.views[0].0)));
-    each(&DETECTORS, &mut add, |detector| fingerprint(&detector.detect(&world.views[0].0)));
-    each(&LOCATORS, &mut add, |locator| fingerprint(&locator.locate(&world.views[0].0, &world.corners())));
+    let (board, at_corners) = World::board();
+    each(&DETECTORS, &mut add, |detector| {
+        fingerprint(&[&world.views[0].0, &board].map(|image| detector.detect(image)))
+    });
+    each(&LOCATORS, &mut add, |locator| fingerprint(&locator.locate(&board, &at_corners)));
     each(&DESCRIPTORS, &mut add, |descriptor| fingerprint(&descriptor.describe(&world.views[0].0, &world.corners())));
     each(&MATCHERS, &mut add, |matcher| {
         let (left, right) = &world.views[0];
         let corners = world.corners();
         let shifted = world.shifted(&corners);
-        let described = world.described(corners.len());
-        let view = |image, keypoints| View { image, keypoints, descriptors: &described };
-        fingerprint(&matcher.matches(&view(left, &corners), &view(right, &shifted), &world.rig))
+        let described = [0.0, 0.12].map(|noise| world.described(corners.len(), noise));
+        let (left, right) = (
+            View { image: left, keypoints: &corners, descriptors: &described[0] },
+            View { image: right, keypoints: &shifted, descriptors: &described[1] },
+        );
+        fingerprint(&matcher.matches(&left, &right, &world.rig))
     });
     each(&REFINEMENTS, &mut add, |refinement| {
         let (left, right) = &world.views[0];
@@ -195,10 +201,16 @@ fn fingerprints() -> BTreeMap<String, Line> {
         fingerprint(&search.search(&world.problem(), stream.rng()))
     });
     each(&SOLVERS, &mut add, |solver| {
-        let data = Observations::of(&world.true_pairs(), &world.model, &world.cloud, Some(&world.rig));
-        let pose = solver.solve(&data);
-        let rest = pose.as_ref().ok().map(|at| (solver.covariance(&data, at), solver.rivals(&data, at, 4.0)));
-        fingerprint(&(&pose, rest, solver.used(&data), solver.scale(&data)))
+        let right = world.true_pairs();
+        let wrong = [&right[..6], &[Correspondence { model: 6, cloud: 8 }]].concat();
+        let answers = [right, wrong].map(|pairs| {
+            let data = Observations::of(&pairs, &world.model, &world.cloud, Some(&world.rig));
+            let pose =
+                solver.solve(&data).map(|at| (at, solver.covariance(&data, &at), solver.rivals(&data, &at, 4.0)));
+            (pose, solver.used(&data), solver.scale(&data))
+        });
+        assert!(answers[0].0.is_ok(), "{solver:?}: {answers:?}");
+        fingerprint(&answers)
     });
     each(&ODOMETRIES, &mut add, |odometry| {
         let mut reckoning = odometry.begin(&world.rig, Transform::identity(), Threads::One);
@@ -266,6 +278,9 @@ fn fingerprints() -> BTreeMap<String, Line> {
     let all: Vec<_> =
         versions.chain(shared).filter(|(kind, name, _)| *kind != "source" || !READERS.contains(name)).collect();
     assert_eq!(all.len(), prints.len(), "a fingerprint for each component and shared part");
+    let nothing = print_of("");
+    let silent: Vec<_> = prints.iter().filter(|(_, print)| **print == nothing).map(|((_, name), _)| name).collect();
+    assert_eq!(silent, ["peak"], "an answer without a number tells no change");
     let line = |(kind, name, version): (&str, &str, u32)| {
         let print = prints.get(&(kind.to_owned(), name.to_owned()));
         (
@@ -407,18 +422,44 @@ impl World {
         let shifted = |(k, corner): (usize, &Keypoint)| {
             let across = (corner.at.u - Self::SIZE[0] as f64 / 2.0) / Self::FOCAL;
             let disparity = Self::FOCAL * Self::BASELINE * (1.0 - 0.2 * across) / 2.0;
-            let at = Pixel { u: corner.at.u - disparity + 0.4 * noise(k as i64, 20), v: corner.at.v + 0.1 };
+            // One in six is not where it should be.
+            let off = if k % 6 == 3 { 6.0 } else { 0.1 };
+            let at = Pixel { u: corner.at.u - disparity + 0.4 * noise(k as i64, 20), v: corner.at.v + off };
             Keypoint { at, ..*corner }
         };
         corners.iter().enumerate().map(shifted).collect()
     }
 
-    /// Descriptors that tell key points apart by their places in the list.
-    fn described(&self, count: usize) -> Descriptors {
+    /// Descriptors that tell key points apart by their places in the list, more or less alike.
+    fn described(&self, count: usize, spread: f64) -> Descriptors {
         let mut described = Descriptors::default();
         let numbers = described.numbers_mut(count, 16);
-        numbers.iter_mut().enumerate().for_each(|(k, number)| *number = 0.25 * noise(k as i64, 30) as f32);
+        let number = |k: i64| 0.25 * noise(k, 30) + spread * (noise(k, 31) - 0.5) * (k / 16 % 6) as f64;
+        numbers.iter_mut().enumerate().for_each(|(k, value)| *value = number(k as i64) as f32);
         described
+    }
+
+    /// Clean corners: a chequer-board, bright squares on dark ground beside it, and where about the corners are.
+    fn board() -> (Image, Vec<Keypoint>) {
+        const SIDE: f64 = 20.3;
+        let bright = |u: f64, v: f64| {
+            let (i, j) = ((u / SIDE).floor() as i64, (v / SIDE).floor() as i64);
+            let inside = if u < 120.0 { (i + j) % 2 == 0 } else { i % 2 == 0 && j % 2 == 0 };
+            if inside { 190.0 } else { 50.0 }
+        };
+        let pixel = |index: usize| {
+            let (u, v) = ((index % Self::SIZE[0]) as f64, (index / Self::SIZE[0]) as f64);
+            // The light of some two pixels, as a lens spreads it.
+            let parts =
+                (0..144).map(|k| bright(u + f64::from(k % 12) / 6.0 - 0.917, v + f64::from(k / 12) / 6.0 - 0.917));
+            (parts.sum::<f64>() / 144.0 + 2.0 * noise(index as i64, 40)) as f32
+        };
+        let image = Image::new(Self::SIZE[0], Self::SIZE[1], (0..Self::SIZE[0] * Self::SIZE[1]).map(pixel).collect());
+        let corner = |k: i64| {
+            let at = Pixel { u: SIDE * (2 + k % 9) as f64 + 0.2, v: SIDE * (2 + k / 9) as f64 - 0.9 };
+            Keypoint { at, response: 1.0, scale: 1.2 }
+        };
+        (image.unwrap(), (0..45).map(corner).collect())
     }
 
     fn pairs(&self) -> Vec<Pair> {

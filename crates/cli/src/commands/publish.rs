@@ -6,9 +6,10 @@ use std::{
 };
 
 use clap::Args;
+use rayon::prelude::*;
 use seafix_component::counted;
 use seafix_experiment::{Existing, Options, Remade, RunError, kept_identity, remake, run};
-use seafix_report::{Forms, index, index_holds, report};
+use seafix_report::{Forms, Report, index, index_holds, report};
 
 use super::report::{failure, verified};
 use crate::{
@@ -63,18 +64,17 @@ impl Publish {
         if let Some(count) = self.check {
             return self.check_some(&list, count);
         }
-        let mut findings = Vec::new();
         for one in &list {
-            let kept = self.run(one)?;
-            let written =
-                report(&self.runs.join(&one.name), &self.out.join(&one.name), Forms::SMALL).map_err(failure)?;
-            let how = if kept { "kept run" } else { "new run" };
-            tell(&format!("{}: {how}, {}", one.name, written.page.display()));
-            findings.push(written.findings);
+            let how = if self.run(one)? { "kept run" } else { "new run" };
+            tell(&format!("{}: {how}", one.name));
         }
+        let written = |one: &Published| report(&self.runs.join(&one.name), &self.out.join(&one.name), Forms::SMALL);
+        let written: Vec<_> = list.par_iter().map(written).collect();
+        let written: Vec<Report> = written.into_iter().collect::<Result<_, _>>().map_err(failure)?;
+        written.iter().for_each(|report| tell(&format!("report: {}", report.page.display())));
         if self.only.is_empty() {
             self.tell_of_others(&list);
-            let page = index(findings.iter().map(String::as_str), &self.out).map_err(failure)?;
+            let page = index(written.iter().map(|report| report.findings.as_str()), &self.out).map_err(failure)?;
             print(&format!("{}\n", page.display()))?;
         }
         Ok(DONE)

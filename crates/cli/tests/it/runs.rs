@@ -312,13 +312,14 @@ fn a_kept_run_is_made_again_when_its_results_may_differ() {
     let cases: [(&[(&str, &str)], &str); 3] = [
         (&[version, (&own, "00000000")], "solver triad 0 → 1"),
         (&[(&own, "00000000")], "another configuration, input or experiment file"),
-        (&[state, ("\"commit\": ", "\"commit\": \"0\", \"was\": ")], "not complete (running)"),
+        (&[state, ("\"commit\": ", "\"commit\": \"0\", \"was\": ")], "it did not end"),
     ];
     for (changes, reason) in cases {
         changes.iter().for_each(|(from, to)| change(from, to));
         let (code, _, error) = publish(&[]);
         assert!(code == 0 && error.contains("a: kept run") && error.contains("b: new run"), "{error}");
-        assert!(error.contains(reason) || reason.starts_with("not complete"), "no `{reason}` in {error}");
+        // Without git nobody knows the commit, and the program goes on with what is there.
+        assert!(error.contains(reason) || reason == "it did not end", "no `{reason}` in {error}");
         assert!(bytes() == first, "{reason}");
     }
     fs::remove_file(run.join("results.csv")).unwrap();
