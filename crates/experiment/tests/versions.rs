@@ -179,7 +179,7 @@ fn fingerprints() -> BTreeMap<String, Line> {
         let (left, right) = &world.views[0];
         let corners = world.corners();
         let shifted = world.shifted(&corners);
-        let described = [0.0, 0.12].map(|noise| world.described(corners.len(), noise));
+        let described = [0.0, 0.02].map(|noise| world.described(corners.len(), noise));
         let (left, right) = (
             View { image: left, keypoints: &corners, descriptors: &described[0] },
             View { image: right, keypoints: &shifted, descriptors: &described[1] },
