@@ -8,7 +8,6 @@ mod bad_input;
 mod cloud;
 mod draw;
 mod eval;
-mod evo;
 #[cfg(unix)]
 mod hyperqueue;
 mod model;

@@ -44,7 +44,7 @@ pub fn median(values: &mut [f64]) -> f64 {
 
 /// Between a number and infinity stands infinity of that sign; between the two infinities nothing is known.
 fn between(low: f64, high: f64, share: f64) -> f64 {
-    if low == high { low } else { low + share * (high - low) }
+    if low == high || low == f64::NEG_INFINITY && high.is_finite() { low } else { low + share * (high - low) }
 }
 
 #[cfg(test)]
