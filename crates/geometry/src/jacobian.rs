@@ -69,6 +69,6 @@ mod tests {
     #[test]
     fn series_and_quotients_meet() {
         let [below, above] = [0.3 - 1e-12, 0.3 + 1e-12].map(coefficients);
-        assert!((below[0] - above[0]).abs() < 1e-13 && (below[1] - above[1]).abs() < 1e-12, "{below:?} {above:?}");
+        assert!((below[0] - above[0]).abs() < 1e-13 && (below[1] - above[1]).abs() < 1e-13, "{below:?} {above:?}");
     }
 }

@@ -73,20 +73,19 @@ fn blocks_are_as_long_as_the_literature_says() {
 /// ⌈αR/2⌉-th and the ⌈(1 − α/2)R⌉-th of R. Blocks with a rest and without.
 #[test]
 fn the_median_of_many_is_that_of_the_resamples_in_order() {
-    for (n, block) in [(20_001, 1000), (20_001, 20_001), (20_004, 5001), (20_003, 7), (20_001, 60_000)] {
+    for (n, block) in [(20_001, 1000), (20_004, 5001), (20_003, 7), (20_001, 60_000)] {
         // No two alike, and scattered.
         let values: Vec<f64> = (0..n).map(|i| (i * 7919 % 20_011) as f64).collect();
-        let bootstrap = Bootstrap { resamples: 13, block, seed: 2 };
+        let bootstrap = Bootstrap { resamples: 5, block, seed: 2 };
         let mut medians = Vec::new();
         let drawn = Bootstrap { block: block.min(n), ..bootstrap };
         drawn.interval(n, 0.9, |at| {
             let mut resample: Vec<f64> = at.iter().map(|&i| values[i]).collect();
-            resample.sort_by(f64::total_cmp);
-            medians.push(resample[n.div_ceil(2) - 1]);
+            medians.push(*resample.select_nth_unstable_by(n.div_ceil(2) - 1, f64::total_cmp).1);
             0.0
         });
         medians.sort_by(f64::total_cmp);
-        for (confidence, ends) in [(0.6, [2, 10]), (0.9, [0, 12]), (0.0, [6, 6])] {
+        for (confidence, ends) in [(0.5, [1, 3]), (0.9, [0, 4]), (0.0, [2, 2])] {
             let wanted = (medians[ends[0]], medians[ends[1]]);
             assert_eq!(bootstrap.median(&values, confidence), wanted, "{n} {block} {confidence}");
         }

@@ -124,11 +124,32 @@ fn a_camera_tells_its_numbers() {
     assert_eq!(Pixel { u: 4.0, v: 2.5 }.distance(&Pixel { u: 4.0, v: 2.0 }), 0.5);
 }
 
+/// Lens models whose slope nearly vanishes on the way: full steps of Newton's iteration leap over the fold at 3.9, and shorter
+/// ones do not arrive.
+#[test]
+fn long_steps_of_the_iteration_are_shortened() {
+    let there_and_back = |lens: &[f64], x: f64, y: f64| {
+        let camera = camera(lens);
+        let found = camera.normalize(&camera.project(&ahead(x, y)).unwrap());
+        assert!(found.is_some_and(|n| (n.x - x).hypot(n.y - y) < 1e-10), "{lens:?} {x} {y}: {found:?}");
+    };
+    let wavy = [-0.3, 0.0509, 0.0, 0.0, -0.00299];
+    for radius in [2.105_286_445, 2.164_726_296, 2.510_384_623] {
+        there_and_back(&wavy, radius, 0.0);
+        there_and_back(&wavy, -0.6 * radius, 0.8 * radius);
+    }
+    there_and_back(&[-0.3, 0.0442, 0.0, 0.0, -0.00105], 3.255_231_655, 0.0);
+    there_and_back(&[0.4, 0.2, 0.0, 0.0, 0.1, 0.5, 0.1, 0.02], 7.961_303_5, 0.0);
+    there_and_back(&[0.0, 3.0, 0.0, 0.0], -3.373_036_93, 7.155_447_98);
+}
+
 #[test]
 fn a_point_in_the_plane_of_the_camera_is_not_seen() {
     assert!(camera(&[]).project(&Point::<Camera>::new(1.0, 0.0, 0.0)).is_none());
     assert!(camera(&[]).project(&Point::<Camera>::new(0.0, 0.0, f64::NAN)).is_none());
     assert!(camera(&[]).project(&Point::<Camera>::new(0.0, 0.0, 1e-9)).is_some());
+    // So near the plane that its direction is no number.
+    assert!(camera(&[]).project(&Point::<Camera>::new(1.0, 0.0, 1e-310)).is_none());
 }
 
 #[test]

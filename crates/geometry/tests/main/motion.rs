@@ -64,16 +64,16 @@ fn an_error_is_the_motion_that_is_missing() {
     assert!((log.fixed_rows::<3>(3) - Vector3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0)).norm() < 1e-14, "{log}");
 }
 
-/// Independent errors of 0.1 rad about and 2 m along each axis; a point at (0, 0, 3) is moved across by 0.1 · 3 besides.
+/// Independent errors of 0.1 rad about and 3 m along each axis; a point at (0, 0, 3) is moved across by 0.1 · 3 besides.
 #[test]
 fn a_covariance_by_hand() {
-    let covariance = Covariance6::<Object, Camera>::isotropic(0.1, 2.0);
-    let wanted = Matrix6::from_diagonal(&Vector6::new(0.01, 0.01, 0.01, 4.0, 4.0, 4.0));
+    let covariance = Covariance6::<Object, Camera>::isotropic(0.1, 3.0);
+    let wanted = Matrix6::from_diagonal(&Vector6::new(0.01, 0.01, 0.01, 9.0, 9.0, 9.0));
     assert!((covariance.matrix - wanted).amax() < 1e-16);
     assert!((covariance.attitude_sigma() - 0.1 * 3f64.sqrt()).abs() < 1e-15);
-    assert!((covariance.position_sigma() - 2.0 * 3f64.sqrt()).abs() < 1e-15);
+    assert!((covariance.position_sigma() - 3.0 * 3f64.sqrt()).abs() < 1e-15);
     let at = covariance.of_point(&Point::new(0.0, 0.0, 3.0));
-    assert!((at - Matrix3::from_diagonal(&Vector3::new(4.09, 4.09, 4.0))).amax() < 1e-14);
+    assert!((at - Matrix3::from_diagonal(&Vector3::new(9.09, 9.09, 9.0))).amax() < 1e-14);
     let point = UncertainPoint::isotropic(Point::<Camera>::origin(), 3.0);
     assert_eq!(point.covariance, Matrix3::identity() * 9.0);
     let uneven = Covariance6::<Object, Camera>::new(Matrix6::from_fn(|i, j| if (i, j) == (0, 1) { 2.0 } else { 0.0 }));

@@ -221,3 +221,22 @@ fn rays_that_part_meet_behind() {
         assert!(matches!(found, Err(Untriangulable::Behind(depth)) if depth < 0.0), "{found:?}");
     }
 }
+
+/// Rays that pass each other in front of the left camera and behind the right one, their midpoint before both: the left one
+/// looks along z from the origin, the right one stands at (0.3, 0, 0) and its ray b = (0.1, 0.9, −0.42) comes nearest at
+/// u = −0.3 bₓ / (bₓ² + b_y²) of b.
+#[test]
+fn a_ray_is_not_followed_backwards() {
+    let b = Vector3::new(0.1, 0.9, -0.42);
+    let axis = Vector3::new(-0.893, 0.792, -0.32);
+    let turn = UnitQuaternion::rotation_between(&axis, &Vector3::z()).unwrap();
+    let camera = plain([1024, 768]);
+    let rig = StereoRig::new(camera, camera, Transform::new(turn, -(turn * Vector3::new(0.3, 0.0, 0.0)))).unwrap();
+    let left = Pixel { u: 511.5, v: 383.5 };
+    let right = rig.right().project(&Point::<Camera>::from(turn * b)).unwrap();
+    let seen = UncertainPixels::independent(StereoPixels { left, right }, 0.01);
+    let u = -0.3 * b.x / (b.x * b.x + b.y * b.y) * b.norm();
+    for found in [rig.triangulate(&seen), rig.triangulate_midpoint(&seen)] {
+        assert!(matches!(found, Err(Untriangulable::Behind(depth)) if (depth - u).abs() < 1e-9), "{found:?}, not {u}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Exponential, logarithm and Jacobians against 60 digits.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform, right_jacobian_inverse, so3};
 
 use crate::{names, near, numbers};
@@ -86,4 +86,20 @@ fn the_long_way_round_is_not_taken() {
     let turn = so3::exp(&Vector3::new(0.0, 0.0, 1.5 * std::f64::consts::PI));
     assert!((so3::log(&turn).z + 0.5 * std::f64::consts::PI).abs() < 1e-15);
     assert!((so3::angle(&turn) - 0.5 * std::f64::consts::PI).abs() < 1e-15);
+}
+
+/// No turn has no axis, and half a turn has two: the quaternion's.
+#[test]
+fn the_ends_of_the_logarithm() {
+    let half = |w: f64, axis: Vector3<f64>| {
+        so3::log(&UnitQuaternion::new_unchecked(nalgebra::Quaternion::from_parts(w, axis)))
+    };
+    assert_eq!(half(1.0, Vector3::zeros()), Vector3::zeros());
+    assert_eq!(half(-1.0, Vector3::zeros()), Vector3::zeros());
+    assert_eq!(half(0.0, Vector3::x()), Vector3::x() * std::f64::consts::PI);
+    assert_eq!(half(-0.0, -Vector3::x()), -Vector3::x() * std::f64::consts::PI);
+    assert_eq!(so3::log_of_matrix(&Matrix3::identity()), Vector3::zeros());
+    assert_eq!(so3::exp(&Vector3::zeros()), UnitQuaternion::identity());
+    assert_eq!(right_jacobian_inverse(&Vector6::zeros()), nalgebra::Matrix6::identity());
+    assert_eq!(Transform::<Object, Camera>::identity().log(), Vector6::zeros());
 }
