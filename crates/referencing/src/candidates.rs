@@ -2,7 +2,7 @@
 
 use std::{cell::RefCell, collections::VecDeque};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use seafix_component::in_range;
 use seafix_geometry::{Camera, MeasuredPoint, Point};
 use serde::{Deserialize, Serialize};
@@ -117,7 +117,7 @@ pub fn candidates(
         };
         match shell(point, prior, gate) {
             PointShell::Box { centre, half } => places.within(&centre, half),
-            shell => (0..cloud.len()).filter(|&j| shell.admits(&cloud[j])).collect(),
+            PointShell::Ellipsoid(ellipsoid) => (0..cloud.len()).filter(|&j| ellipsoid.admits(&cloud[j])).collect(),
         }
     });
     Candidates { lists: lists.collect() }
@@ -160,7 +160,14 @@ fn inside([x, y, z]: [&[f64; LANES]; 3], c: [f64; 3], half: f64) -> u64 {
 /// The region about one predicted place in which cloud points are candidates.
 enum PointShell {
     Box { centre: Point<Camera>, half: f64 },
-    Ellipsoid { centre: Point<Camera>, covariance: Matrix3<f64>, limit: f64 },
+    Ellipsoid(Ellipsoid),
+}
+
+/// The places c with (c − centre)ᵀ (covariance + Σ_c)⁻¹ (c − centre) ≤ limit.
+struct Ellipsoid {
+    centre: Point<Camera>,
+    covariance: Matrix3<f64>,
+    limit: f64,
 }
 
 fn shell(point: &ModelPoint, prior: &Prior, gate: &Gate) -> PointShell {
@@ -171,30 +178,22 @@ fn shell(point: &ModelPoint, prior: &Prior, gate: &Gate) -> PointShell {
         }
         (PriorBound::Gaussian(covariance), Gate::ChiSquare(confidence)) => {
             let own = point.sigma * point.sigma;
-            PointShell::Ellipsoid {
+            PointShell::Ellipsoid(Ellipsoid {
                 centre,
                 covariance: covariance.of_point(&centre) + Matrix3::identity() * own,
                 limit: chi_square(3, *confidence),
-            }
+            })
         }
     }
 }
 
-impl PointShell {
+impl Ellipsoid {
     fn admits(&self, measured: &MeasuredPoint) -> bool {
-        match self {
-            Self::Box { centre, half } => {
-                let step: Vector3<f64> = measured.position.at - *centre;
-                step.amax() <= *half
-            }
-            Self::Ellipsoid { centre, covariance, limit } => {
-                let step = measured.position.at - *centre;
-                // A direction known exactly (S singular) still admits what lies exactly there.
-                let s = covariance + measured.position.covariance;
-                let floor = Matrix3::identity() * (1e-18 + 1e-12 * s.trace());
-                (s + floor).cholesky().is_some_and(|s| step.dot(&s.solve(&step)) <= *limit)
-            }
-        }
+        let step = measured.position.at - self.centre;
+        // A direction known exactly (S singular) still admits what lies exactly there.
+        let s = self.covariance + measured.position.covariance;
+        let floor = Matrix3::identity() * (1e-18 + 1e-12 * s.trace());
+        (s + floor).cholesky().is_some_and(|s| step.dot(&s.solve(&step)) <= self.limit)
     }
 }
 
@@ -309,5 +308,96 @@ mod tests {
         assert_eq!(toml::from_str::<Stage>(&text).unwrap().gate, Gate::Box(0.25));
         assert!(Gate::Box(-1.0).check().is_err() && Gate::ChiSquare(1.0).check().is_err() && read.gate.check().is_ok());
         assert!(Gate::Box(f64::NAN).check().is_err() && Gate::ChiSquare(f64::NAN).check().is_err());
+    }
+
+    #[test]
+    fn the_default_gate_is_the_ellipsoid_of_99_percent() {
+        assert_eq!(Gate::default(), Gate::ChiSquare(0.99));
+        assert!(Gate::default().check().is_ok());
+    }
+
+    #[test]
+    fn the_limits_of_a_gate_are_open() {
+        for (gate, fits) in [
+            (Gate::Box(0.0), false),
+            (Gate::Box(f64::INFINITY), false),
+            (Gate::Box(f64::MIN_POSITIVE), true),
+            (Gate::ChiSquare(0.0), false),
+            (Gate::ChiSquare(1.0), false),
+            (Gate::ChiSquare(1e-9), true),
+            (Gate::ChiSquare(0.999_999), true),
+        ] {
+            assert_eq!(gate.check().is_ok(), fits, "{gate:?}");
+        }
+        let message = Gate::Box(-1.0).check().unwrap_err();
+        assert_eq!(message, "gate: box = -1; give a positive half-size in metres");
+        let message = Gate::ChiSquare(1.0).check().unwrap_err();
+        assert_eq!(message, "gate: chi-square = 1; give a confidence between 0 and 1");
+    }
+
+    /// The reference values are those of `scipy.stats.chi2.ppf(confidence, freedom)`; χ²₂ is the exponential distribution with the
+    /// quantile −2 ln(1 − p). The arguments alternate, so that a cached value of other arguments shows.
+    #[test]
+    fn quantiles_of_chi_square_are_those_of_the_table() {
+        let table = [
+            (1, 0.95, 3.841_458_820_694_124),
+            (1, 0.999, 10.827_566_170_662_733),
+            (3, 0.95, 7.814_727_903_251_179),
+            (3, 0.99, 11.344_866_730_144_373),
+            (3, 0.999, 16.266_236_196_238_13),
+            (6, 0.999, 22.457_744_484_825_323),
+            (9, 0.999, 27.877_164_871_256_568),
+            (2, 0.99, 9.210_340_371_976_182),
+        ];
+        for _ in 0..3 {
+            for (freedom, confidence, quantile) in table {
+                let found = chi_square(freedom, confidence);
+                assert!((found / quantile - 1.0).abs() < 1e-9, "{freedom}, {confidence}: {found}");
+            }
+        }
+        // More arguments than the cache holds.
+        for round in 0..2 {
+            for k in 1..200 {
+                let confidence = f64::from(k) / 200.0;
+                let expected = -2.0 * (1.0 - confidence).ln();
+                let found = chi_square(2, confidence);
+                assert!((found / expected - 1.0).abs() < 1e-6, "round {round}, {confidence}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn lists_hold_each_candidate_once_in_order() {
+        let lists = Candidates::from_pairs(3, [(0, 4), (2, 1), (0, 2), (0, 4), (2, 0)]);
+        assert_eq!(lists.lists, [vec![2, 4], vec![], vec![0, 1]]);
+        assert_eq!((lists.pairs(), lists.with_candidates()), (4, 2));
+        assert_eq!(Candidates::all(2, 3).lists, [vec![0, 1, 2], vec![0, 1, 2]]);
+    }
+
+    /// Without any noise the gate's standard deviation is 1 nm; along an exact axis beside an uncertain one it is 1e-6 of the uncertainty.
+    #[test]
+    fn a_place_that_is_known_exactly_admits_what_lies_there() {
+        let bound = PriorBound::Gaussian(Covariance6::isotropic(0.0, 0.0));
+        let prior = Prior { object_from_camera: Transform::identity(), bound };
+        let places = [[0.0, 0.0, 2.0], [3e-9, 0.0, 2.0], [4e-9, 0.0, 2.0], [0.0, 0.0, 2.001]];
+        let found = candidates(&one_point([0.0, 0.0, 2.0]), &cloud(&places, 0.0), Some(&prior), &Gate::default(), None);
+        // √11.345 nm = 3.37 nm.
+        assert_eq!(found.lists, [vec![0, 1]]);
+        // The x axis has σ = 1 m, the other axes none: the semi-axes are 3.37 m and 3.37 µm.
+        let mut wide = Covariance6::<seafix_geometry::Object, Camera>::isotropic(0.0, 0.0);
+        wide.matrix[(3, 3)] = 1.0;
+        let prior = Prior { object_from_camera: Transform::identity(), bound: PriorBound::Gaussian(wide) };
+        let places = [[3.3, 0.0, 2.0], [3.4, 0.0, 2.0], [0.0, 3.3e-6, 2.0], [0.0, 3.4e-6, 2.0]];
+        let found = candidates(&one_point([0.0, 0.0, 2.0]), &cloud(&places, 0.0), Some(&prior), &Gate::default(), None);
+        assert_eq!(found.lists, [vec![0, 2]]);
+    }
+
+    /// A mask shorter than the model hides the points beyond its end.
+    #[test]
+    fn what_no_mask_names_is_not_in_view() {
+        let model = [one_point([0.0, 0.0, 2.0]), one_point([0.0, 0.0, 2.0])].concat();
+        let places = cloud(&[[0.0, 0.0, 2.0]], 0.01);
+        let found = candidates(&model, &places, Some(&boxed(0.1)), &Gate::default(), Some(&[true]));
+        assert_eq!(found.lists, [vec![0], vec![]]);
     }
 }

@@ -398,3 +398,6 @@ struct Stand {
     passed: Vec<Hypothesis>,
     refused: Vec<Hypothesis>,
 }
+
+#[cfg(test)]
+mod tests;

@@ -101,7 +101,7 @@ impl<'a> Search<'a> {
         self.sense = sense;
     }
 
-    /// The largest cliques of at least `least` members; of those that tie, no more than `cap`.
+    /// The largest cliques of at least `least` members: the first that was found and up to `cap` that tie with it.
     ///
     /// First one of the largest and the proof that none is larger, then what ties with it, with the
     /// budget that is left.
@@ -326,3 +326,6 @@ impl<'a> Search<'a> {
 pub(super) fn decisive_members(clique: &[usize]) -> &[usize] {
     if clique.len() < MOST_ORIENTED { clique } else { &clique[..FEW_ORIENTED] }
 }
+
+#[cfg(test)]
+mod tests;

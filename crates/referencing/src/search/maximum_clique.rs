@@ -189,15 +189,4 @@ pub(super) fn least_residual(problem: &Problem<'_>, vertices: &[Correspondence],
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn settings_out_of_range_are_refused() {
-        let good = MaximumClique::default();
-        assert_eq!(good.check(), Ok(()));
-        let message = MaximumClique { budget: 0, ..good.clone() }.check().unwrap_err();
-        assert_eq!(message, "budget = 0; give 1 or more pair tests");
-        assert!(MaximumClique { most_pairs: 2, ..good }.check().is_err());
-    }
-}
+mod tests;

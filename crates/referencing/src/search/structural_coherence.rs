@@ -261,7 +261,11 @@ fn next_arrangement(sample: &mut [usize], n: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng;
+    use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
+
     use super::*;
+    use crate::{Candidates, ModelPoint, Tolerance};
 
     #[test]
     fn a_search_without_a_budget_is_refused() {
@@ -288,5 +292,149 @@ mod tests {
             all.push(sample.clone());
         }
         assert_eq!(all, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]);
+    }
+
+    const PLACES: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1.5, 0.0], [3.0, 0.4, 1.1]];
+
+    /// Model points and a cloud, point i of it the only candidate of point i.
+    struct Scene {
+        model: Vec<ModelPoint>,
+        cloud: Vec<MeasuredPoint>,
+        candidates: Candidates,
+    }
+
+    impl Scene {
+        fn of(model: &[[f64; 3]], cloud: &[[f64; 3]]) -> Self {
+            let seen = |at: &[f64; 3]| UncertainPoint::isotropic(Point::from(*at), 1e-3);
+            Self {
+                model: model.iter().map(|at| ModelPoint::exact("", Point::from(*at))).collect(),
+                cloud: cloud.iter().map(|at| MeasuredPoint { position: seen(at), pixels: None }).collect(),
+                candidates: Candidates::from_pairs(model.len(), (0..cloud.len()).map(|i| (i, i))),
+            }
+        }
+
+        fn search(&self, search: &StructuralCoherence) -> Result<Identification, Unidentified> {
+            let problem = Problem {
+                model: &self.model,
+                cloud: &self.cloud,
+                candidates: &self.candidates,
+                tolerance: Tolerance::Fixed(0.01),
+                prior: None,
+            };
+            search.search(&problem, &mut rand_chacha::ChaCha8Rng::seed_from_u64(0))
+        }
+    }
+
+    fn search(samples: Samples, budget: u64) -> StructuralCoherence {
+        StructuralCoherence { samples, budget, ..StructuralCoherence::default() }
+    }
+
+    /// Budget, best and bound of an answer that the budget ended.
+    fn budget_of(ended: &Identification) -> (u64, usize, usize) {
+        assert!(!ended.optimal);
+        match ended.undecided {
+            Some(Unidentified::Budget { budget, best, bound, .. }) => (budget, best, bound),
+            ref other => panic!("{other:?}"),
+        }
+    }
+
+    /// Four points that agree are the first sample: six distances and one volume.
+    #[test]
+    fn the_tests_of_a_sample_are_its_distances_and_its_fours() {
+        for samples in [Samples::Permutations, Samples::Combinations] {
+            let found = Scene::of(&PLACES, &PLACES).search(&search(samples, 7)).unwrap();
+            assert_eq!((found.pairs.len(), found.tests, found.size_bound, found.optimal), (4, 7, 4, true));
+            assert_eq!(found.undecided, None);
+            let flat = StructuralCoherence { orientation: false, ..search(samples, 6) };
+            assert_eq!(Scene::of(&PLACES, &PLACES).search(&flat).unwrap().tests, 6);
+        }
+        let ended = Scene::of(&PLACES, &PLACES).search(&search(Samples::Permutations, 6)).unwrap();
+        assert_eq!(budget_of(&ended), (6, 4, 4));
+    }
+
+    /// The last of four points agrees with none: it is met at once in first and second place, after one test in third and after three
+    /// in fourth, so that the 24 arrangements take 6 (1 + 1 + 2 + 4) tests and the first three points 3 more. Of subsets it is 4 + 3.
+    #[test]
+    fn a_point_that_agrees_with_none_costs_what_its_samples_cost() {
+        let mut cloud = PLACES;
+        cloud[3] = [9.0, 9.0, 9.0];
+        let scene = Scene::of(&PLACES, &cloud);
+        for (samples, tests) in [(Samples::Permutations, 51), (Samples::Combinations, 7)] {
+            let found = scene.search(&search(samples, tests)).unwrap();
+            assert_eq!((found.pairs.len(), found.tests, found.size_bound, found.optimal), (3, tests, 3, true));
+            let ended = scene.search(&search(samples, tests - 1)).unwrap();
+            assert_eq!(budget_of(&ended), (tests - 1, 3, 3));
+        }
+    }
+
+    /// Sixteen points agree by 120 distances and 1820 volumes, and to draw them costs as much as one more.
+    #[test]
+    fn to_draw_sixteen_points_costs_as_much_as_a_test() {
+        let places: Vec<[f64; 3]> =
+            (0..16).map(|k| f64::from(k)).map(|k| [k, (k * 1.7).sin() * 3.0, (k * 0.9).cos() * 2.0]).collect();
+        let scene = Scene::of(&places, &places);
+        let found = scene.search(&search(Samples::Combinations, 1941)).unwrap();
+        assert_eq!((found.pairs.len(), found.tests, found.undecided), (16, 1940, None));
+        let ended = scene.search(&search(Samples::Combinations, 1940)).unwrap();
+        assert_eq!(budget_of(&ended), (1940, 16, 16));
+    }
+
+    /// No three points agree: of three whose second and third do, the two are found, by arrangements or by pairs in the end.
+    #[test]
+    fn the_size_of_the_largest_set_is_told_where_it_is_too_small() {
+        let (model, mut cloud) = (&PLACES[..3], [[9.0, 9.0, 9.0], PLACES[1], PLACES[2]]);
+        let best = |cloud: &[[f64; 3]], samples, budget| match Scene::of(model, cloud).search(&search(samples, budget))
+        {
+            Err(Unidentified::NoConsensus { best, needed: 3 }) => Ok(best),
+            Err(Unidentified::Budget { best, bound, tests, .. }) => Err((best, bound, tests)),
+            other => panic!("{other:?}"),
+        };
+        for samples in [Samples::Permutations, Samples::Combinations] {
+            assert_eq!(best(&cloud, samples, 100), Ok(2));
+        }
+        // One test of the three, then the pairs (0, 1), (0, 2) and (1, 2).
+        assert_eq!(best(&cloud, Samples::Combinations, 4), Ok(2));
+        assert_eq!(best(&cloud, Samples::Combinations, 3), Err((1, 2, 3)));
+        cloud[1] = [-9.0, 9.0, 9.0];
+        cloud[2] = [0.0, 0.0, 50.0];
+        for samples in [Samples::Permutations, Samples::Combinations] {
+            assert_eq!(best(&cloud, samples, 100), Ok(1));
+        }
+        let few = Unidentified::TooFew { with_candidates: 2, needed: 3 };
+        assert_eq!(Scene::of(model, &cloud[..2]).search(&search(Samples::Permutations, 9)), Err(few));
+    }
+
+    /// Four points and their mirror image: no fix with orientation, and one without.
+    #[test]
+    fn a_mirror_image_is_told_with_its_size() {
+        let image = PLACES.map(|[x, y, z]| [x, y, -z]);
+        for samples in [Samples::Permutations, Samples::Combinations] {
+            let refused = Scene::of(&PLACES, &image).search(&search(samples, 1000)).unwrap_err();
+            assert_eq!(refused, Unidentified::Mirrored { best: 4, proved: true });
+            let distances = StructuralCoherence { orientation: false, ..search(samples, 1000) };
+            assert_eq!(Scene::of(&PLACES, &image).search(&distances).unwrap().pairs.len(), 4);
+        }
+    }
+
+    /// The four flat points of a mirror image of six fit a motion as well: what they say is undecided.
+    #[test]
+    fn the_flat_part_of_a_mirror_image_is_undecided() {
+        let model =
+            [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [1.7, 1.5, 0.0], [0.2, 1.1, 0.0], [0.4, 0.3, 1.0], [0.9, 0.8, 1.4]];
+        let image = model.map(|[x, y, z]| [x, y, -z]);
+        let found = Scene::of(&model, &image).search(&search(Samples::Combinations, 10_000)).unwrap();
+        assert_eq!(found.pairs.len(), 4);
+        assert_eq!(found.undecided, Some(Unidentified::Mirrored { best: 6, proved: false }));
+    }
+
+    /// The first candidates of the list of each point are tried first, those of the last point in turn.
+    #[test]
+    fn every_choice_of_candidates_is_tried() {
+        let cloud = [[50.0, 0.0, 0.0], [60.0, 9.0, 0.0], [70.0, 0.0, 7.0], PLACES[0], PLACES[1], PLACES[2]];
+        let (model, cloud) = (Scene::of(&PLACES[..3], &[]).model, Scene::of(&cloud, &cloud).cloud);
+        let scene = Scene { model, cloud, candidates: Candidates::all(3, 6) };
+        let found = scene.search(&search(Samples::Combinations, 100_000)).unwrap();
+        let expected: Vec<_> = (0..3).map(|i| Correspondence { model: i, cloud: 3 + i }).collect();
+        assert_eq!(found.pairs, expected);
     }
 }

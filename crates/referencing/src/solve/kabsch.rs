@@ -124,6 +124,9 @@ const MOST_SWEEPS: usize = 30;
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+    use seafix_geometry::UncertainPoint;
+
     use super::*;
 
     #[test]
@@ -131,6 +134,58 @@ mod tests {
         assert_eq!(Kabsch::default().check(), Ok(()));
         for bad in [-0.1, 1.0, f64::NAN] {
             assert!(Kabsch { least_ratio: bad }.check().is_err(), "{bad}");
+        }
+    }
+
+    /// Two points on the x axis that turned by α and two on the y axis that turned by −β, with weights 1 and 2: the best turn is
+    /// atan((2 sin α − 4 sin β) / (2 cos α + 4 cos β)).
+    #[test]
+    fn weights_are_those_of_the_sum() {
+        let (alpha, beta) = (0.3_f64, 0.1_f64);
+        let turned = |x: f64, y: f64, angle: f64| {
+            let (s, c) = angle.sin_cos();
+            Vector3::new(c * x - s * y, s * x + c * y, 0.0)
+        };
+        let point = |model: Vector3<f64>, measured: Vector3<f64>| Observation {
+            measured: UncertainPoint::isotropic((measured + Vector3::new(0.2, -0.4, 3.0)).into(), 0.01),
+            pixels: None,
+            model: (model + Vector3::new(5.0, -7.0, 1.0)).into(),
+            model_sigma: 0.0,
+        };
+        let places = [(1.0, 0.0, -alpha), (-1.0, 0.0, -alpha), (0.0, 1.0, beta), (0.0, -1.0, beta)];
+        let points = places.map(|(x, y, angle)| point(Vector3::new(x, y, 0.0), turned(x, y, angle)));
+        let weights = [1.0, 1.0, 2.0, 2.0];
+        let angle = (2.0 * alpha.sin() - 4.0 * beta.sin()).atan2(2.0 * alpha.cos() + 4.0 * beta.cos());
+        let found = fit_weighted(&points, |k| weights[k]);
+        let expected = Transform::<Object, Camera>::new(
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle),
+            Vector3::new(5.0, -7.0, 1.0) - turned(0.2, -0.4, angle) - Vector3::z() * 3.0,
+        );
+        assert!(expected.error_to(&found).amax() < 1e-14, "{}", expected.error_to(&found));
+    }
+
+    /// tr(Rᵀ M) of the best rotation is s₁ + s₂ ± s₃: for a diagonal M that is its trace, or with a negative determinant the two
+    /// greater less the least.
+    #[test]
+    fn the_rotation_maximises_the_trace() {
+        let turn = |angles: [f64; 3]| seafix_geometry::so3::exp(&angles.into()).to_rotation_matrix().into_inner();
+        let (u, v) = (turn([0.4, -0.3, 1.1]), turn([-0.7, 2.0, 0.2]));
+        for (values, most) in [
+            ([3.0, 2.0, 1.0], 6.0),
+            ([1.0, 3.0, 2.0], 6.0),
+            ([2.0, 1.0, 3.0], 6.0),
+            ([3.0, 2.0, -1.0], 4.0),
+            ([-1.0, 3.0, 2.0], 4.0),
+            ([3.0, -1.0, 2.0], 4.0),
+            ([5.0, 4.0, 0.0], 9.0),
+            ([1.0, 1.0, 1.0], 3.0),
+            ([1e6, 1.0, 1e-6], 1_000_001.000_001),
+        ] {
+            let m = u * Matrix3::from_diagonal(&values.into()) * v.transpose();
+            let r = rotation_of(&m);
+            assert!((r.transpose() * m).trace() / most - 1.0 > -1e-14, "{values:?}: {}", (r.transpose() * m).trace());
+            assert!((r.transpose() * r - Matrix3::identity()).amax() < 1e-14, "{values:?}");
+            assert!((r.determinant() - 1.0).abs() < 1e-14, "{values:?}");
         }
     }
 }

@@ -159,3 +159,150 @@ pub(super) fn information(point: &Observation) -> Matrix3<f64> {
     let size = noise.trace() / 3.0;
     (noise / size).try_inverse().unwrap_or_else(Matrix3::identity) / size
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix4, Vector6};
+    use seafix_geometry::{Pinhole, Point, UncertainPixels, UncertainPoint};
+
+    use super::*;
+    use crate::solve::{StereoReprojection, numerical};
+
+    const PLACES: [[f64; 3]; 5] =
+        [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.4, 0.3, 0.9], [-0.7, 0.5, 0.4]];
+
+    fn rig() -> StereoRig {
+        let camera = Pinhole::new([1024, 768], [500.0, 510.0], [511.5, 383.5], &[]).unwrap();
+        StereoRig::new(camera, camera, Transform::exp(&Vector6::new(0.02, -0.05, 0.01, -0.25, 0.01, 0.02))).unwrap()
+    }
+
+    /// The points as the rig sees them from 4 m, each pixel coordinate with an error of up to `most` (px).
+    fn seen(rig: &StereoRig, most: f64) -> Observations<'_> {
+        let pose = Transform::<Object, Camera>::exp(&Vector6::new(0.4, -0.3, 0.7, 0.2, 0.3, -4.0));
+        let points = PLACES.iter().enumerate().map(|(k, at)| {
+            let mut pixels = UncertainPixels {
+                at: rig.project(&(pose.inverse() * Point::from(*at))).unwrap(),
+                covariance: Matrix4::identity() * 0.09,
+            };
+            let off = |p: f64| most * ((k as f64 + 1.0) * p).sin();
+            pixels.at.left.u += off(2.0);
+            pixels.at.left.v += off(3.0);
+            pixels.at.right.u += off(5.0);
+            pixels.at.right.v += off(7.0);
+            let found = rig.triangulate(&pixels).unwrap();
+            let measured = UncertainPoint { at: found.point, covariance: found.covariance };
+            Observation { measured, pixels: Some(pixels), model: Point::from(*at), model_sigma: 2e-3 }
+        });
+        Observations { points: points.collect(), rig: Some(rig) }
+    }
+
+    #[test]
+    fn settings_out_of_range_are_refused() {
+        assert_eq!(Mahalanobis::default().check(), Ok(()));
+        for (starts, fits) in [(0, false), (1, true), (5, true), (6, false)] {
+            assert_eq!(Mahalanobis { starts, ..Mahalanobis::default() }.check().is_ok(), fits, "{starts}");
+        }
+        let message = Mahalanobis { starts: 0, ..Mahalanobis::default() }.check().unwrap_err();
+        assert_eq!(message, "starts = 0; give 1 to 5");
+        for bad in [-0.1, 1.0, f64::NAN] {
+            assert!(Mahalanobis { least_ratio: bad, ..Mahalanobis::default() }.check().is_err(), "{bad}");
+        }
+    }
+
+    /// Noise of 1, 2 and 3 mm along the axes and 2 mm of the model: variances of 5, 8 and 13 mm².
+    #[test]
+    fn the_information_is_the_inverse_of_both_noises() {
+        let measured = UncertainPoint {
+            at: Point::new(0.1, 0.2, 3.0),
+            covariance: Matrix3::from_diagonal(&Vector3::new(1e-6, 4e-6, 9e-6)),
+        };
+        let point = Observation { measured, pixels: None, model: Point::origin(), model_sigma: 2e-3 };
+        let expected = Matrix3::from_diagonal(&Vector3::new(1.0 / 5e-6, 1.0 / 8e-6, 1.0 / 13e-6));
+        assert!((information(&point) - expected).amax() < 1e-6 * expected.amax());
+        // Too large or too small for a determinant within the range of numbers.
+        for sigma in [1e-60, 1e60] {
+            let point =
+                Observation { measured: UncertainPoint::isotropic(Point::origin(), sigma), model_sigma: 0.0, ..point };
+            let variance: f64 = 1.0 / (sigma * sigma + 1e-18);
+            assert!((information(&point)[(1, 1)] / variance - 1.0).abs() < 1e-9, "{sigma}");
+        }
+    }
+
+    /// A shift along x of the two points on the x axis, known to 1 mm there, against two points known to 2 mm.
+    #[test]
+    fn every_axis_has_its_own_weight() {
+        let point = |at: [f64; 3], x: f64, off: [f64; 3]| Observation {
+            measured: UncertainPoint {
+                at: Point::from(at) + Vector3::from(off),
+                covariance: Matrix3::from_diagonal(&Vector3::new(x * x, 1e-6, 1e-6)),
+            },
+            pixels: None,
+            model: Point::from(at),
+            model_sigma: 0.0,
+        };
+        let places = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]];
+        let points: Vec<Observation> = places
+            .iter()
+            .enumerate()
+            .map(|(k, &at)| {
+                let off = if k < 2 { [3e-4, 0.0, 0.0] } else { [0.0; 3] };
+                point(at, if k < 2 { 1e-3 } else { 2e-3 }, off)
+            })
+            .collect();
+        let data = Observations { points, rig: None };
+        let found = Mahalanobis::default().solve(&data).unwrap();
+        // Weights 4 to 1: the x of the fit is off by 4/5 of 0.3 mm.
+        assert!((found.translation() + Vector3::new(2.4e-4, 0.0, 0.0)).amax() < 1e-9, "{}", found.translation());
+    }
+
+    /// The refitted answer is that of the pixels to second order in the noise; the measured covariances lead elsewhere.
+    #[test]
+    fn with_pixels_and_a_rig_the_answer_is_that_of_the_pixels() {
+        let rig = rig();
+        let data = seen(&rig, 1.0);
+        let pixels = StereoReprojection::default().solve(&data).unwrap();
+        let refit = Mahalanobis::default().solve(&data).unwrap();
+        let fixed = Mahalanobis { refit: false, ..Mahalanobis::default() }.solve(&data).unwrap();
+        let (near, far) = (pixels.error_to(&refit).norm(), pixels.error_to(&fixed).norm());
+        assert!(far > 5e-4 && near < 0.01 * far, "{near} {far}");
+        // Without a rig, or without pixels, there is nothing to refit.
+        let bare = Mahalanobis::default().solve(&Observations { rig: None, ..data.clone() }).unwrap();
+        assert!(fixed.error_to(&bare).amax() < 1e-12);
+        let mut points = data.points.clone();
+        points.iter_mut().for_each(|point| point.pixels = None);
+        let without = Mahalanobis::default().solve(&Observations { points, rig: Some(&rig) }).unwrap();
+        assert!(fixed.error_to(&without).amax() < 1e-12);
+        // One point with pixels is enough.
+        let mut some = data.clone();
+        some.points[1..].iter_mut().for_each(|point| point.pixels = None);
+        let solver = Mahalanobis::default();
+        assert!(solver.rig(&some).is_some() && solver.rig(&data).is_some());
+        assert!(Mahalanobis { refit: false, ..solver }.rig(&data).is_none());
+    }
+
+    /// What an error of the model makes of the pose, with and without pixels, is what moving the model's points makes of it.
+    #[test]
+    fn model_errors_are_the_derivatives_of_the_answer() {
+        let rig = rig();
+        let solver = Mahalanobis::default();
+        for data in [seen(&rig, 0.0), Observations { rig: None, ..seen(&rig, 0.0) }] {
+            let at = solver.solve(&data).unwrap();
+            let analytic = solver.model_errors(&data, &at).unwrap();
+            let numeric = numerical::model_errors(|moved| solver.solve(moved), &data, &at).unwrap();
+            assert_eq!(analytic.len(), 5);
+            for (a, n) in analytic.iter().zip(&numeric) {
+                assert!(n.amax() > 1e-5 && (a - n).amax() < 1e-5 * n.amax(), "{a} {n}");
+            }
+        }
+    }
+
+    /// Points and no rig have one valley.
+    #[test]
+    fn bare_points_have_no_rivals() {
+        let rig = rig();
+        let data = Observations { rig: None, ..seen(&rig, 1.0) };
+        let solver = Mahalanobis::default();
+        let at = solver.solve(&data).unwrap();
+        assert!(solver.rivals(&data, &at, 1e9).is_empty());
+    }
+}

@@ -307,4 +307,158 @@ mod tests {
             assert!(Triad { least_sine: bad, ..Triad::default() }.check().is_err(), "{bad}");
         }
     }
+
+    /// Points of the model, seen from `pose` with noise of 1 mm.
+    fn seen(places: &[[f64; 3]], pose: &Transform<Object, Camera>) -> Vec<Observation> {
+        let point = |at: &[f64; 3]| {
+            let model = Point::from(*at);
+            let measured = seafix_geometry::UncertainPoint::isotropic(pose.inverse() * model, 1e-3);
+            Observation { measured, pixels: None, model, model_sigma: 0.0 }
+        };
+        places.iter().map(point).collect()
+    }
+
+    fn three(solver: &Triad, points: &[Observation]) -> Result<[usize; 3], Degenerate> {
+        solver.three(&Observations { points: points.to_vec(), rig: None })
+    }
+
+    /// Sides 3, 4, 5 have the area 6 and the sines 3/5, 4/5 and 1; sides 5, 12, 13 the least sine 5/13.
+    #[test]
+    fn areas_and_angles_of_right_triangles() {
+        let corners = |a: f64, b: f64| [[0.0, 0.0, 1.0], [a, 0.0, 1.0], [0.0, b, 1.0]];
+        let points = |model: [[f64; 3]; 3], measured: [[f64; 3]; 3]| {
+            let mut points = seen(&model, &Transform::identity());
+            points.iter_mut().zip(measured).for_each(|(point, at)| point.measured.at = at.into());
+            points
+        };
+        for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+            let arranged = |corners: [[f64; 3]; 3]| order.map(|k| corners[k]);
+            let of = |model, measured| {
+                let points = points(arranged(model), arranged(measured));
+                (least_sine_squared(&[0, 1, 2].map(|k| &points[k])), square_area(&[0, 1, 2].map(|k| &points[k])))
+            };
+            let (sine, area) = of(corners(3.0, 4.0), corners(3.0, 4.0));
+            assert!((sine - 0.36).abs() < 1e-12 && (area - 144.0).abs() < 1e-9, "{order:?}: {sine} {area}");
+            let (model, measured) =
+                (of(corners(3.0, 4.0), corners(5.0, 12.0)), of(corners(5.0, 12.0), corners(3.0, 4.0)));
+            let least = 25.0 / 169.0;
+            assert!((model.0 - least).abs() < 1e-12 && (measured.0 - least).abs() < 1e-12, "{order:?}");
+            assert!((measured.1 - 3600.0).abs() < 1e-9);
+        }
+    }
+
+    /// R = M_object M_cameraᵀ and P1 on C1: a quarter turn about z, and the first points on each other though the others are not.
+    #[test]
+    fn the_pose_lays_the_first_points_on_each_other() {
+        let mut points = seen(&[[1.0, 2.0, 3.0], [1.0, 4.0, 3.0], [0.0, 2.0, 3.0]], &Transform::identity());
+        let measured = [[0.0, 0.0, 5.0], [2.5, 0.0, 5.0], [0.0, 1.5, 5.0]];
+        points.iter_mut().zip(measured).for_each(|(point, at)| point.measured.at = at.into());
+        let found = pose(&[0, 1, 2].map(|k| &points[k])).unwrap();
+        // The object's +y is the camera's +x, and its −x the camera's +y.
+        let expected = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        assert!((found.rotation_matrix() - expected).amax() < 1e-15);
+        assert!((found * points[0].measured.at - points[0].model).amax() < 1e-14);
+        assert!((found.translation() - Vector3::new(1.0, 2.0, -2.0)).amax() < 1e-14);
+    }
+
+    #[test]
+    fn axes_are_refused_with_the_sine_of_the_angle_at_the_first_point() {
+        let [a, b] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]].map(Vector3::from);
+        let at = |sine: f64| axes(&a, &b, &Vector3::new(3.0, 3.0 * sine, 0.0));
+        assert!(at(2e-9).is_ok());
+        match at(5e-10) {
+            Err(Degenerate::Collinear { ratio, least }) => assert!((ratio / 5e-10 - 1.0).abs() < 1e-6 && least == 1e-9),
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(axes(&a, &a, &a), Err(Degenerate::Collinear { ratio: 0.0, least: 1e-9 }));
+    }
+
+    /// The setting is the sine of the smallest angle of the triangle; what is refused is told by the widest of the triangles.
+    #[test]
+    fn slender_triangles_are_passed_over() {
+        let solver = |choose, least_sine| Triad { choose, least_sine };
+        // The smallest angles: sin = 0.1/√(4 + 0.01) of the first three, more with the fourth.
+        let places = [[0.0, 0.0, 3.0], [1.0, 0.1, 3.0], [2.0, 0.0, 3.0], [1.0, 1.0, 3.0]];
+        let points = seen(&places, &Transform::identity());
+        // sin² of the angle at the first: (cross product 0.2)² over the two longest sides squared, 4 · 1.01.
+        let sine = (0.04_f64 / (4.0 * 1.01)).sqrt();
+        assert_eq!(three(&solver(Choose::First, sine * 0.999), &points), Ok([0, 1, 2]));
+        assert_eq!(three(&solver(Choose::First, sine * 1.001), &points), Ok([0, 1, 3]));
+        for choose in [Choose::First, Choose::LargestArea, Choose::SmallestCovariance] {
+            match three(&solver(choose, sine * 1.001), &points[..3]) {
+                Err(Degenerate::Collinear { ratio, least }) => {
+                    assert!((ratio / sine - 1.0).abs() < 1e-9 && least == sine * 1.001, "{ratio}");
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        // The largest triangle is a slender one, of 10 m by 0.6 m: the next is taken.
+        let places = [[0.0, 0.0, 3.0], [5.0, 0.6, 3.0], [10.0, 0.0, 3.0], [0.0, 1.0, 3.0], [1.0, 0.0, 3.0]];
+        let points = seen(&places, &Transform::identity());
+        let area = |three: [usize; 3]| square_area(&three.map(|k| &points[k]));
+        let sine = |three: [usize; 3]| least_sine_squared(&three.map(|k| &points[k])).sqrt();
+        let widest = triangles(5).filter(|&three| sine(three) >= 0.15).max_by(|&a, &b| area(a).total_cmp(&area(b)));
+        assert!(sine(largest(&points).unwrap()) < 0.15);
+        assert_eq!(three(&solver(Choose::LargestArea, 0.15), &points).ok(), widest);
+        // Of equal triangles, the four halves of a square, the first.
+        let square =
+            seen(&[[0.0, 0.0, 3.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0], [0.0, 1.0, 3.0]], &Transform::identity());
+        assert_eq!(three(&solver(Choose::SmallestCovariance, 0.05), &square[..3]), Ok([0, 1, 2]));
+        assert_eq!(largest(&square).map(|three| square_area(&three.map(|k| &square[k]))), Some(1.0));
+    }
+
+    /// A right angle with the legs W = 0.5 to the second point and L = 2 to the third, each point with isotropic noise δ of variance σ²:
+    /// the first and the third place have the variance 3 σ², the second (3 + 2 W²/L²) σ².
+    #[test]
+    fn the_predicted_error_is_that_of_three_points() {
+        let places = [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [2.0, 0.0, 0.0], [2.0, 0.5, 0.0]];
+        let data = Observations { points: seen(&places, &Transform::identity()), rig: None };
+        let of = |points: &[Observation]| {
+            let data = Observations { points: points.to_vec(), rig: None };
+            predicted_error(&[points[0], points[1], points[2]], &data).unwrap() / 1e-6
+        };
+        let ratio = 0.5 * 0.5 / 4.0;
+        assert!((of(&data.points[..3]) - (9.0 + 2.0 * ratio)).abs() < 1e-5, "{}", of(&data.points[..3]));
+        // The error of the place (L, W, 0) is (δ₁x − (δ₃ − δ₁)y W/L, δ₃y, δ₂z + δ₃z − δ₁z).
+        let fourth = (1.0 + 2.0 * ratio) + 1.0 + 3.0;
+        assert!((of(&data.points) - (9.0 + 2.0 * ratio + fourth)).abs() < 1e-5, "{}", of(&data.points));
+    }
+
+    /// Of four points the one that is known ten times worse is left out, wherever it stands.
+    #[test]
+    fn the_smallest_covariance_leaves_the_worst_point_out() {
+        let solver = Triad { choose: Choose::SmallestCovariance, ..Triad::default() };
+        let places = [[0.0, 0.0, 3.0], [1.0, 0.2, 3.1], [0.9, 1.1, 3.0], [-0.1, 1.0, 2.8]];
+        for worst in 0..4 {
+            let mut points = seen(&places, &Transform::identity());
+            points[worst].measured.covariance *= 100.0;
+            let others: Vec<usize> = (0..4).filter(|&k| k != worst).collect();
+            assert_eq!(three(&solver, &points).unwrap().to_vec(), others);
+            let data = Observations { points, rig: None };
+            assert_eq!(solver.used(&data), others);
+        }
+    }
+
+    /// More than forty points are thinned to forty, evenly.
+    #[test]
+    fn many_points_are_thinned_evenly() {
+        assert_eq!(triangles(4).collect::<Vec<_>>(), [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]);
+        assert_eq!((triangles(40).count(), triangles(41).count(), triangles(200).count()), (9880, 9880, 9880));
+        assert_eq!((weighed(40, 39), weighed(41, 39), weighed(80, 1), weighed(80, 39)), (39, 39, 2, 78));
+        assert_eq!(triangles(80).next(), Some([0, 2, 4]));
+        assert_eq!(triangles(80).last(), Some([74, 76, 78]));
+        let points = scattered(90, 4);
+        assert_eq!(three(&Triad { choose: Choose::First, ..Triad::default() }, &points), Ok([0, 2, 4]));
+    }
+
+    /// Every corner of the largest triangle in every place of the order.
+    #[test]
+    fn the_largest_triangle_is_found_wherever_its_corners_stand() {
+        let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [1.0, 3.0, -1.0]];
+        for (i, j, k) in (0..6).flat_map(|i| (i + 1..6).flat_map(move |j| (j + 1..6).map(move |k| (i, j, k)))) {
+            let mut places = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0].map(|n: f64| [1.5 + 0.2 * n, 1.0 - 0.1 * n * n, 0.05 * n]);
+            (places[i], places[j], places[k]) = (corners[0], corners[1], corners[2]);
+            assert_eq!(largest(&seen(&places, &Transform::identity())), Some([i, j, k]));
+        }
+    }
 }

@@ -243,7 +243,7 @@ fn exact_searches_are_brute_force() {
 }
 
 #[test]
-#[ignore = "the long form of the test above: cargo test --release -p seafix-referencing --test brute_force -- --ignored"]
+#[ignore = "the long form of the test above: cargo test --release -p seafix-referencing --test main -- --ignored"]
 fn exact_searches_are_brute_force_in_a_hundred_thousand_cases() {
     run(2_000..102_000);
 }
