@@ -162,7 +162,7 @@ pub(super) fn information(point: &Observation) -> Matrix3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix4, Vector6};
+    use nalgebra::{Matrix4, UnitQuaternion, Vector6};
     use seafix_geometry::{Pinhole, Point, UncertainPixels, UncertainPoint};
 
     use super::*;
@@ -304,5 +304,31 @@ mod tests {
         let solver = Mahalanobis::default();
         let at = solver.solve(&data).unwrap();
         assert!(solver.rivals(&data, &at, 1e9).is_empty());
+    }
+
+    /// A plate of 0.2 m at 4 m, tilted by 20°: the depths are known to some 5 cm, which does not tell the side to which it is tilted.
+    #[test]
+    fn a_small_tilted_plate_may_be_tilted_the_other_way() {
+        let rig = rig();
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.35);
+        let at = Transform::<Object, Camera>::new(turn, -(turn * Vector3::new(0.0, 0.0, 4.0)));
+        let corners = [(0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1), (0.03, 0.06)];
+        let points = corners.map(|(x, y)| {
+            let model = Point::new(x, y, 0.0);
+            let pixels = rig.project(&(at.inverse() * model)).unwrap();
+            let pixels = UncertainPixels { at: pixels, covariance: Matrix4::identity() * 0.09 };
+            let found = rig.triangulate(&pixels).unwrap();
+            let measured = UncertainPoint { at: found.point, covariance: found.covariance };
+            Observation { measured, pixels: Some(pixels), model, model_sigma: 0.0 }
+        });
+        let data = Observations { points: points.to_vec(), rig: Some(&rig) };
+        let rivals = |solver: Mahalanobis, most: f64| solver.rivals(&data, &at, most);
+        let found = rivals(Mahalanobis::default(), 40.0);
+        assert!(!found.is_empty() && found.iter().all(|rival| rival.worse > 0.0 && rival.worse <= 40.0), "{found:?}");
+        let turned = seafix_geometry::so3::angle(&(at.rotation().inverse() * found[0].pose.rotation()));
+        assert!((0.4..1.0).contains(&turned), "{turned}");
+        assert!(rivals(Mahalanobis { starts: 1, ..Mahalanobis::default() }, 40.0).is_empty());
+        assert!(rivals(Mahalanobis { refit: false, ..Mahalanobis::default() }, 40.0).is_empty());
+        assert!(rivals(Mahalanobis::default(), 0.5 * found[0].worse).is_empty());
     }
 }

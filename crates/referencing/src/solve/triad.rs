@@ -285,15 +285,19 @@ mod tests {
         (0..count).map(point).collect()
     }
 
+    /// In a box, in a slender and in a flat one: in a slender box the longest side belongs to no large triangle.
     #[test]
     fn the_bounded_search_finds_the_largest_triangle() {
-        for (count, seed) in (3..30).flat_map(|count| (0..20).map(move |seed| (count, seed))).chain([(90, 1), (200, 2)])
-        {
-            let points = scattered(count, seed);
+        let seeds = (3..30).flat_map(|count| (0..20).map(move |k: u64| (count, k.wrapping_mul(0x9E37_79B9_7F4A_7C15))));
+        for ((count, seed), shape) in seeds.chain([(90, 1), (200, 2)]).flat_map(|set| {
+            [[1.0, 1.0, 1.0], [1.0, 0.1, 0.1], [1.0, 0.3, 0.0]].map(|shape| (set, Vector3::from(shape)))
+        }) {
+            let mut points = scattered(count, seed);
+            points.iter_mut().for_each(|point| point.model.coords.component_mul_assign(&shape));
             let area = |three: [usize; 3]| square_area(&three.map(|i| &points[i]));
             let most = triangles(count).map(area).fold(0.0, f64::max);
             let found = area(largest(&points).unwrap());
-            assert!((found / most - 1.0).abs() < 1e-12, "{count} points, seed {seed}: {found} of {most}");
+            assert!((found / most - 1.0).abs() < 1e-9, "{count} points, seed {seed}: {found} of {most}");
         }
         let mut one_place = scattered(5, 1);
         one_place.iter_mut().for_each(|point| point.model = Point::origin());

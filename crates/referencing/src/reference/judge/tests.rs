@@ -404,7 +404,7 @@ fn levels_are_raised_to_poses_that_are_no_less_likely_than_a_hundredth_of_the_ri
         fix.integrity.protection
     };
     const K: f64 = 4.749_184_042_602_995;
-    for share in [1.0, 1.01e-6, f64::NAN] {
+    for share in [1.0, COVERED * 1e-4, f64::NAN] {
         let raised = level(share, Some(known)).unwrap();
         assert!(close(raised.position, 0.05 + K * 0.01) && close(raised.attitude, 0.02 + K * 0.001), "{raised:?}");
     }
