@@ -12,3 +12,4 @@ mod problems;
 mod replay;
 mod run;
 mod supported;
+mod versions;

@@ -26,7 +26,7 @@ use seafix_vision::{
 };
 use sha2::{Digest, Sha256};
 
-const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/versions.txt");
+const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/versions.txt");
 const COMMAND: &str = "SEAFIX_UPDATE=1 cargo test -p seafix-experiment versions_";
 
 /// Sources that give what stands in files: `foreign.rs`, `problems.rs` and `replay.rs` hold them to that.
