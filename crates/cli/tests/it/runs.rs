@@ -235,10 +235,8 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     assert!(!text("b/report.html").contains("Not the experiment as its file says"));
     assert!(text("README.md").contains("[![The main figure of b](b/main.svg)](b/report.html)"));
     assert!(text("README.md").contains(&format!("Made by seafix {}.", env!("CARGO_PKG_VERSION"))));
-    assert!(
-        !text("b/report.html").contains(env!("CARGO_PKG_VERSION")),
-        "a kept page is of every version with its results"
-    );
+    // The version that ran is left out: a kept run serves every version with its results.
+    assert!(!text("b/report.html").contains(&format!("seafix {}", env!("CARGO_PKG_VERSION"))));
     assert!(first.values().map(Vec::len).sum::<usize>() < 1_000_000);
 
     fs::remove_dir_all(folder.join("reports")).unwrap();

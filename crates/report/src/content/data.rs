@@ -57,7 +57,7 @@ pub(super) fn section(run: &Run, summary: &Summary, small: bool) -> Section {
         })],
     );
     line("Seeds", text![of(|header| pairs(header.seeds.iter().map(|(name, seed)| (name, seed.to_string()))))]);
-    // A kept page is that of every program with the same results; the page of all reports names the version.
+    // A kept run serves every version with the same results: which of them ran it is left out.
     if !small {
         let versions =
             |header: &TrialHeader| pairs(header.versions.iter().map(|(name, version)| (name, version.clone())));
