@@ -29,6 +29,12 @@ fn the_ends_leave_half_of_alpha_each() {
         (7.0, 7.0),
         "one resample in blocks of one at the least"
     );
+    let mut drawn = 0;
+    once.interval(3, 0.9, |_| {
+        drawn += 1;
+        0.0
+    });
+    assert_eq!(drawn, 1);
 }
 
 /// Every place as often as every other, whichever place of its block: 20 000 draws of each of 5 places have σ = 126.

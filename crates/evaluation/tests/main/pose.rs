@@ -93,6 +93,12 @@ fn errors_of_a_fix_are_numpy_s() {
     close(symmetric_distance(&estimate, &truth, &model, &symmetries).unwrap(), "symmetric distance", 1e-13);
     close(symmetric_distance(&estimate, &truth, &model, &[]).unwrap(), "symmetric distance alone", 1e-13);
     assert_eq!(residual_rms(&estimate, &[]), None);
+    let one = [Point::from(Vector3::from(truth.translation()))];
+    let moved = mean_distance(&estimate, &truth, &one).unwrap();
+    assert!(
+        (moved - position_error(&estimate, &truth)).abs() < 1e-14,
+        "the camera's own place moves as the camera does"
+    );
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn correlated_trials_have_korn_and_graubard_s_interval() {
         near(&[low, high], &numbers(SCIPY, &format!("clustered {name}")), 1e-9, name);
         rows += 1;
     }
-    assert_eq!(rows, 7);
+    assert_eq!(rows, 8);
 }
 
 #[test]
@@ -66,6 +66,7 @@ fn scipy_has_the_same_p_of_two_rates() {
         assert!((found / wanted - 1.0).abs() < 1e-9, "{name}: {found}, not {wanted}");
         assert_eq!(mcnemar(words[1], words[0]), found);
     }
+    assert_eq!(mcnemar(0, 0), 1.0);
 }
 
 /// R's manual: `p.adjust(c(0.01, 0.02, 0.03, 0.04, 0.05), "holm")` is 0.05, 0.08, 0.09, 0.09, 0.09.
@@ -90,6 +91,7 @@ fn numpy_has_the_same_quantiles() {
     assert_eq!(median(&mut [4.0, 1.0, 3.0, 8.0]), 3.5);
     // Beyond both ends stand the ends.
     assert_eq!([quantile(&mut [1.0, 2.0], -0.1), quantile(&mut [1.0, 2.0], 1.1)], [1.0, 2.0]);
+    assert_eq!([quantile(&mut [1.0, 2.0], -2.5), quantile(&mut [1.0, 2.0], 2.5)], [1.0, 2.0]);
     let infinite = f64::INFINITY;
     assert_eq!(median(&mut [1.0, infinite]), infinite);
     assert_eq!(median(&mut [-infinite, 1.0]), -infinite);
@@ -114,4 +116,8 @@ fn ranks_by_hand() {
     let found = signed_rank(&[(f64::INFINITY, 1.0), (0.0, 1.0)]);
     assert_eq!((found.differing, found.p), (2, 1.0));
     assert!((found.effect + 1.0 / 3.0).abs() < 1e-15);
+    // Three of the four choices of signs are as far from even: a probability all the same.
+    assert_eq!(signed_rank(&[(1.0, 2.0), (2.0, 1.0)]).p, 1.0);
+    let nothing = signed_rank(&[(1.0, 1.0)]);
+    assert_eq!((nothing.differing, nothing.p, nothing.effect), (0, 1.0, 0.0));
 }

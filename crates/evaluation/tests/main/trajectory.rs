@@ -243,6 +243,7 @@ fn pairs_by_path_take_the_nearest_end() {
     assert_eq!(all(&[0.0, 0.9, 1.2, 3.0], 1.0, 0.25), [(0, 1)], "0.9 is nearer than 1.2");
     assert_eq!(all(&[0.0, 1.0, 1.0, 1.0], 1.0, 0.0), [(0, 1)], "standing still, the first");
     assert_eq!(all(&[0.0, 0.0, 0.0, 1.0], 1.0, 0.0), [(0, 3), (1, 3), (2, 3)]);
+    assert_eq!(all(&[0.0, 0.9, 0.9, 1.3], 1.0, 0.25), [(0, 1)], "standing still before the end, the first");
     assert_eq!(all(&[0.0, 5.0], 1.0, 5.0), [(0, 1)], "the next is tried, however far");
     // The tolerance is a share of the length.
     assert_eq!(all(&[0.0, 3.5], 4.0, 0.15), [(0, 1)]);
