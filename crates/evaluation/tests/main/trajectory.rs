@@ -125,6 +125,7 @@ fn evo_associates_alike() {
     assert_eq!(cases, 21);
     assert_eq!(associate(&[], &[1, 2], 5, 0), []);
     assert_eq!(associate(&[1, 2], &[], 5, 0), []);
+    assert_eq!(associate(&[10, 10, 30], &[10], 5, 0), [(0, 0)], "the first of two of one stamp");
     // As near to both: the first. One as long as the other: the estimate's are gone through.
     assert_eq!(associate(&[10, 20], &[15], 5, 0), [(0, 0)]);
     assert_eq!(associate(&[10, 20], &[14, 16], 100, 0), [(0, 0), (1, 1)]);
@@ -254,6 +255,7 @@ fn pairs_by_path_take_the_nearest_end() {
     };
     let poses = turned(&[0.0, 0.169, 0.171, 0.229, 0.231]);
     assert_eq!(pairs(&poses, Delta::Radians(0.2), true, 0.15), [(0, 2), (0, 3)]);
+    assert_eq!(pairs(&poses[..2], Delta::Radians(0.2), true, 1.0), [(0, 1)], "no pose makes a pair with itself");
     assert_eq!(pairs(&poses, Delta::Radians(0.2), false, 0.1), [(0, 3)]);
     assert_eq!(pairs(&poses, Delta::Frames(0), false, 0.1), [(0, 0), (1, 1), (2, 2), (3, 3), (4, 4)]);
 }
