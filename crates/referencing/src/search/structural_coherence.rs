@@ -371,7 +371,7 @@ mod tests {
     #[test]
     fn to_draw_sixteen_points_costs_as_much_as_a_test() {
         let places: Vec<[f64; 3]> =
-            (0..16).map(|k| f64::from(k)).map(|k| [k, (k * 1.7).sin() * 3.0, (k * 0.9).cos() * 2.0]).collect();
+            (0..16).map(f64::from).map(|k| [k, (k * 1.7).sin() * 3.0, (k * 0.9).cos() * 2.0]).collect();
         let scene = Scene::of(&places, &places);
         let found = scene.search(&search(Samples::Combinations, 1941)).unwrap();
         assert_eq!((found.pairs.len(), found.tests, found.undecided), (16, 1940, None));

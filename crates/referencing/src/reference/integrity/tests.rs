@@ -278,6 +278,12 @@ fn a_level_is_the_separation_and_the_radius_beyond_it() {
     let last = separation(&data, &Acceptance::default());
     assert_eq!(last.hinge.unwrap().0, 5);
     assert!(near(last.hinge.unwrap().1, off) && near(last.protection.unwrap().position, level.position));
+    // Five times as far: the separation of the attitude alone exceeds what its covariance adds to the other levels.
+    let mut data = octahedron(SIGMA);
+    data.points[0].measured.at.coords.x += 5.0 * OFF;
+    let level = separation(&data, &Acceptance::default()).protection.unwrap();
+    assert!((level.attitude - (5.0 * OFF / 14.0 + k / 2.8_f64.sqrt())).abs() < 2e-4, "{level:?}");
+    assert!((level.position - (5.0 * OFF / 6.0 + k * (3.0_f64 / 14.0).sqrt())).abs() < 2e-4, "{level:?}");
 }
 
 /// Of equals the first point is the one that the fix hangs on, and none is worse than one that leaves no number.
