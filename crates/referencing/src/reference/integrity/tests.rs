@@ -126,7 +126,7 @@ fn two_wrong_matches_are_within_the_level_where_they_are_assumed() {
 /// about the centroid (−1/5, 0, 0) is (4, 2.8, 2.8)/σ², so that the greatest variances are σ²(1/5 + 1/70) = σ² 3/14 of the position
 /// and σ²/2.8 of the attitude.
 fn octahedron(sigma: f64) -> Observations<'static> {
-    let vertex = |k: usize| Vector3::ith(k / 2, if k % 2 == 0 { 1.0 } else { -1.0 });
+    let vertex = |k: usize| Vector3::ith(k / 2, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
     let points = (0..6).map(|k| Observation {
         measured: UncertainPoint::isotropic(vertex(k).into(), sigma),
         pixels: None,

@@ -9,7 +9,7 @@ const SIGMA: f64 = 0.002;
 
 /// The six vertices of an octahedron of one metre about this place, each seen from everywhere.
 fn octahedron(centre: [f64; 3]) -> Vec<ModelPoint> {
-    let vertex = |k: usize| Vector3::from(centre) + Vector3::ith(k / 2, if k % 2 == 0 { 1.0 } else { -1.0 });
+    let vertex = |k: usize| Vector3::from(centre) + Vector3::ith(k / 2, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
     (0..6).map(|k| ModelPoint::exact(format!("V{k}"), vertex(k).into())).collect()
 }
 
