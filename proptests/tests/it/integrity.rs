@@ -245,13 +245,13 @@ fn without_tests(risk: f64, wrong_match_rate: f64, two_wrong_rate: f64) -> Accep
     Acceptance { confidence: 1.0 - 1e-12, risk, wrong_match_rate, two_wrong_rate, ..wide }
 }
 
-/// P71 where in every draw a match is wrong by so little that nothing leaves it out.
+/// P71 where in every draw a match is wrong by so little that nothing leaves it out, 5000 draws.
 ///
-/// Seen to fail when the separation is left out of the level (490 and 485 beyond of 461), when the radius of the fix without the point
-/// is (598 and 599), and when levels are the radius of the fix itself (1037 and 1058).
+/// Seen to fail when levels are the radius of the fix itself (1037 and 1058 beyond of 461 in 20 000 draws), and when the radius of the
+/// fix without the point is left out (598 and 599); when the separation is (490 and 485), only the long form tells.
 #[test]
 fn levels_hold_where_wrong_matches_hide() {
-    held(40, &without_tests(0.02, 1.0, 0.0), HIDDEN, 1);
+    held(10, &without_tests(0.02, 1.0, 0.0), HIDDEN, 1);
 }
 
 /// P71 under two wrong matches, short: 2500 draws at risk 1e-3, two wrong in one of ten and one in another.
@@ -262,11 +262,19 @@ fn levels_hold_under_two_wrong_matches() {
     held(5, &Acceptance { risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() }, SHELL, 3);
 }
 
-/// The same where in every draw two are wrong by little.
+/// The same where in every draw two are wrong by little, 2500 draws.
 ///
-/// Seen to fail when sets of two are not left out (692 and 711 beyond of 461), and when levels are the radius of the fix itself
-/// (1070 and 1097).
+/// Seen to fail when sets of two are not left out (692 and 711 beyond of 461 in 20 000 draws), and when levels are the radius of the
+/// fix itself (1070 and 1097).
 #[test]
 fn levels_hold_where_two_wrong_matches_hide() {
+    held(5, &without_tests(0.02, 1e-12, 1.0), HIDDEN, 1);
+}
+
+/// The two laws of hidden matches, 20 000 draws each.
+#[test]
+#[ignore = "long: 40 000 draws"]
+fn levels_hold_in_many_draws_where_wrong_matches_hide() {
+    held(40, &without_tests(0.02, 1.0, 0.0), HIDDEN, 1);
     held(40, &without_tests(0.02, 1e-12, 1.0), HIDDEN, 1);
 }

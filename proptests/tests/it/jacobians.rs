@@ -112,7 +112,7 @@ fn perturbations_across_a_motion() {
 /// Seen to fail when the lever of the closed form has the other sign.
 #[test]
 fn errors_of_the_model() {
-    law(48, seen(0.0), |scene| {
+    law(16, seen(0.0), |scene| {
         for name in SOLVERS.names() {
             let solver = SOLVERS.build(&Choice::named(name)).unwrap();
             let data = scene.observations();

@@ -356,7 +356,7 @@ fn a_folder_that_goes_away_is_no_finished_run() {
 /// Seen to fail without the look at the lock: nothing else tells.
 #[test]
 fn a_folder_that_another_run_has_is_no_finished_run() {
-    let folder = experiment(2000);
+    let folder = experiment(300);
     let folder = folder.path();
     let (code, error) = while_stopped(folder, || {
         fs::write(folder.join("another"), "").unwrap();
