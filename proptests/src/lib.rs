@@ -16,10 +16,12 @@
 //! fixed, so every run draws the same cases; what failed once is kept in `proptest-regressions/` and tried first ever after.
 
 pub mod admissible;
+pub mod graphs;
 pub mod imitations;
 mod law;
 pub mod least_squares;
 pub mod monte_carlo;
+pub mod orders;
 pub mod points;
 pub mod poses;
 pub mod problems;

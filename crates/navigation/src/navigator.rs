@@ -111,7 +111,7 @@ impl Dispute {
 }
 
 /// Carries the last fix along, asks for the next, and joins it with what is known.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Navigator<'a> {
     policy: &'a dyn Policy,
     fusion: &'a dyn Fusion,

@@ -1,0 +1,376 @@
+//! Small domains tested whole: every small association graph, and every order of a few events of the navigator.
+
+use seafix_component::Choice;
+use seafix_navigation::{Event, FUSIONS, Navigated, Navigator, State};
+use seafix_proptests::{
+    graphs::{Graph, MOST, Posts, TURNS, Which, graphs},
+    orders::{BLIND, Did, Happening, Kind, Ledger, Listener, Must, OBJECTS, Site, happens, is_better},
+    searches::{Tried, searches},
+};
+use seafix_referencing::{Correspondence, Kabsch, Observations, Problem, Solver, Tolerance, Unidentified};
+
+/// The least set that is an answer.
+const NEEDED: usize = 3;
+
+/// What a search maximises.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Measure {
+    /// The size of a coherent set.
+    Size,
+    /// That of one that passes a joint test of all distances besides, as each coherent set of [`Posts`] does.
+    Jointly,
+    /// That of one that a rigid motion explains besides.
+    Rigidly,
+}
+
+/// The searches that are exact, and in which measure.
+fn exact() -> Vec<(Tried, Measure)> {
+    let measure = |search: &Tried| match search.name.split(' ').next() {
+        _ if search.claims.exact => Some(Measure::Size),
+        Some("joint-compatibility") => Some(Measure::Jointly),
+        Some("interpretation-tree") => Some(Measure::Rigidly),
+        _ => None,
+    };
+    searches(1_000_000).into_iter().filter_map(|search| measure(&search).map(|measure| (search, measure))).collect()
+}
+
+/// Whether each pair is within the tolerance of where the least-squares pose of all puts it.
+fn is_rigid(problem: &Problem<'_>, set: &[Correspondence]) -> bool {
+    let Tolerance::Sigmas(k) = problem.tolerance else { return false };
+    let fitted = Kabsch::default().solve(&Observations::of(set, problem.model, problem.cloud, None));
+    fitted.is_ok_and(|pose| {
+        set.iter().all(|pair| {
+            let (known, measured) = (&problem.model[pair.model], &problem.cloud[pair.cloud].position);
+            (pose * measured.at).distance(&known.at) <= k * (measured.covariance.trace().sqrt() + known.sigma)
+        })
+    })
+}
+
+/// Holds all searches against brute force over one graph.
+fn hold(searches: &[(Tried, Measure)], posts: &Posts, graph: &Graph, turn: usize) {
+    let planted = posts.realised(graph, turn);
+    let problem = planted.problem();
+    assert!(planted.cloud.iter().all(|point| point.position.covariance.cholesky().is_some()), "{graph:?}");
+    for (v, w) in (0..graph.models.len()).flat_map(|v| (0..v).map(move |w| (v, w))) {
+        let agree = problem.coherent(graph.correspondence(v), graph.correspondence(w));
+        assert_eq!(agree, graph.adjacent(v, w), "vertices {v} and {w} of {graph:?}, turn {turn}");
+    }
+    let mut cliques = graph.cliques();
+    let most = cliques[0].len();
+    let rigid = cliques.iter().find(|set| set.len() >= NEEDED && is_rigid(&problem, set)).map_or(0, Vec::len);
+    cliques.retain(|set| set.len() >= most.min(rigid));
+    for (search, measure) in searches {
+        let said = || format!("{} of {graph:?}, turn {turn}", search.name);
+        let size = if *measure == Measure::Rigidly { rigid } else { most };
+        match search.answer_to(&problem) {
+            Ok(found) => {
+                assert!(found.pairs.len() == size && cliques.contains(&found.pairs), "{}: {:?}", said(), found.pairs);
+                assert!(
+                    *measure != Measure::Rigidly || is_rigid(&problem, &found.pairs),
+                    "{}: {:?}",
+                    said(),
+                    found.pairs
+                );
+                assert!(found.undecided.is_none(), "{}: {:?}", said(), found.undecided);
+                let bound = if search.claims.exact { most } else { graph.model_points() };
+                assert!((most..=bound).contains(&found.size_bound), "{}: {}", said(), found.size_bound);
+                assert_eq!(found.optimal, search.claims.exact, "{}", said());
+                if search.claims.ties {
+                    let mut sets = found.rivals;
+                    sets.push(found.pairs);
+                    sets.sort_unstable();
+                    let all = cliques.iter().take_while(|set| set.len() == most);
+                    assert!(found.rivals_complete && all.eq(&sets), "{}: {sets:?}", said());
+                }
+            }
+            Err(Unidentified::TooFew { with_candidates, .. }) => {
+                assert!(with_candidates == graph.model_points() && with_candidates < NEEDED, "{}", said());
+            }
+            Err(Unidentified::NoConsensus { best, .. }) => assert!(best == size && size < NEEDED, "{}: {best}", said()),
+            Err(Unidentified::NotFound { bound, .. }) => {
+                assert!(!search.claims.exact && size < NEEDED && bound >= most, "{}: {bound}", said());
+            }
+            Err(other) => panic!("{}: {other}", said()),
+        }
+    }
+}
+
+/// P22, P23, P34 over a whole domain: of every association graph with up to six vertices, with every assignment of its vertices to
+/// model points, every exact search returns a largest clique, and with a tie rule all of them. Graphs and assignments that differ by
+/// the names of vertices alone count once. So do those with up to five vertices and four model points of which some share a
+/// cloud point, with every relation of cloud points.
+#[test]
+fn every_graph_of_six_vertices_is_searched_right() {
+    let (searches, posts) = (exact(), Posts::default());
+    let all = (0..=MOST)
+        .flat_map(|n| graphs(n, Which::Own, false))
+        .chain((0..MOST).flat_map(|n| graphs(n, Which::Shared, false)));
+    for (number, graph) in all.enumerate() {
+        hold(&searches, &posts, &graph, number % TURNS);
+    }
+}
+
+/// The long form of the law above: graphs that differ by the names of vertices are all tried, model and cloud turned in each of some
+/// ways, and vertices that share cloud points are up to six.
+#[test]
+#[ignore = "2.5 million graphs, minutes: cargo test --release -p seafix-proptests --test complete -- --ignored"]
+fn every_graph_is_searched_right_whatever_its_vertices_are_called() {
+    let (searches, posts) = (exact(), Posts::default());
+    for graph in (0..=MOST).flat_map(|n| graphs(n, Which::Own, true)) {
+        (0..TURNS).for_each(|turn| hold(&searches, &posts, &graph, turn));
+    }
+    for (number, graph) in graphs(MOST, Which::Shared, false).into_iter().enumerate() {
+        hold(&searches, &posts, &graph, number % TURNS);
+    }
+}
+
+/// Every order of some events, up to so many.
+struct Orders<'a> {
+    site: &'a Site,
+    listener: &'a Listener,
+    alphabet: &'a [Happening],
+    longest: usize,
+    /// Instants seen.
+    count: usize,
+    /// How often each event of a fix was seen: taken, left, doubted, relocated, disputed, displaced.
+    seen: [usize; 6],
+}
+
+/// What of the past the laws ask for.
+#[derive(Clone, Copy, Default)]
+struct Past {
+    /// Wrong fixes so far, and whether one came when nothing was known.
+    lies: usize,
+    believed: bool,
+    /// Whether a pose was taken since odometry was lost.
+    taken: bool,
+    /// Whether one was at this instant.
+    now: bool,
+    /// Whether the last question whether a fix is due was answered with yes, an object in view, and nothing taken since.
+    sought: bool,
+}
+
+impl Orders<'_> {
+    fn go(&mut self, navigator: &Navigator<'_>, ledger: &Ledger, past: Past, trail: &mut Vec<Happening>) {
+        if trail.len() == self.longest {
+            return;
+        }
+        for &happening in self.alphabet {
+            let (mut navigator, mut ledger, mut past) = (navigator.clone(), ledger.clone(), past);
+            trail.push(happening);
+            self.hold(&mut navigator, &mut ledger, &mut past, happening, trail);
+            self.go(&navigator, &ledger, past, trail);
+            trail.pop();
+        }
+    }
+
+    fn hold(
+        &mut self,
+        navigator: &mut Navigator<'_>,
+        ledger: &mut Ledger,
+        past: &mut Past,
+        happening: Happening,
+        trail: &[Happening],
+    ) {
+        let (before, places) = (navigator.pose().cloned(), navigator.places().to_vec());
+        let better = match happening {
+            Happening::Settle(well) => is_better(well, navigator.pose_at(0).as_ref()),
+            _ => false,
+        };
+        let did = happens(navigator, self.site, ledger.seconds, happening);
+        let must = ledger.enter(happening, better);
+        assert!(must.is(&did, self.site), "{trail:?}: {did:?}, not {must:?}");
+        self.count += 1;
+        self.knows(navigator, ledger, trail);
+        self.remembers(navigator, past, happening, &did, trail);
+
+        // What told nothing moved nothing, and without information none is gained.
+        let told = matches!(did, Did::Fix(Event::Doubted(_) | Event::Left) | Did::Said(_)) && !better;
+        if told {
+            assert!(navigator.pose() == before.as_ref() && navigator.places() == places, "{trail:?}");
+        }
+        if let (Some(before), Some(after)) = (&before, navigator.pose()) {
+            self.learns(before, after, happening, &did, trail);
+        }
+        let moved = (0..OBJECTS).filter(|&object| navigator.places()[object] != places[object]);
+        let named = match &did {
+            Did::Fix(Event::Displaced(found)) => Some(found.object),
+            _ => None,
+        };
+        assert!(moved.eq(named), "{trail:?}: {did:?}");
+
+        // Where fixes are right, so are pose and places; so it is with two wrong ones that meet a pose.
+        if !past.believed && past.lies < 3 {
+            if let Some(Must::Displaced(object, shifts)) = named.map(|_| must) {
+                assert_eq!((object, shifts), (1, seafix_proptests::orders::DISPLACED), "{trail:?}");
+            }
+            let right = |pose: &Navigated| {
+                let place = self
+                    .site
+                    .place(pose.object, if pose.object == 1 { seafix_proptests::orders::DISPLACED } else { 0 });
+                let camera = self.site.place(0, 0) * self.site.camera(0, ledger.seconds, 0);
+                (place * pose.standing.object_from_camera).error_to(&camera).norm() < 1e-9
+            };
+            assert!(navigator.pose().is_none_or(right), "{trail:?}: {:?}", navigator.pose());
+        }
+
+        // Whether a fix is due is asked with what is the case.
+        if let (Happening::Due(in_view) | Happening::Blind(in_view), Some(told)) = (happening, self.listener.told()) {
+            let ahead = if matches!(happening, Happening::Blind(_)) { BLIND } else { 0.0 };
+            let (seconds, metres) = ledger.since.map_or((f64::INFINITY, f64::INFINITY), |(seconds, steps)| {
+                (seconds + ahead, self.site.step.motion.translation().norm() * steps as f64)
+            });
+            let near = |a: f64, b: f64| a == b || (a - b).abs() < 1e-9;
+            assert!(
+                near(told.seconds, seconds) && near(told.metres, metres) && told.in_view == in_view,
+                "{trail:?}: {told:?}"
+            );
+            let sigma = navigator.pose().map_or(f64::INFINITY, |pose| {
+                let position = pose.standing.covariance.matrix.fixed_view::<3, 3>(3, 3).into_owned();
+                position.symmetric_eigenvalues().max().sqrt()
+            });
+            assert!(near(told.sigma, sigma), "{trail:?}: {told:?}, {sigma}");
+        }
+    }
+
+    /// What the navigator knows is what the ledger says.
+    fn knows(&self, navigator: &Navigator<'_>, ledger: &Ledger, trail: &[Happening]) {
+        assert_eq!(navigator.state(), ledger.state, "{trail:?}");
+        assert_eq!(navigator.pose().map(|pose| pose.object), ledger.known.map(|known| known.0), "{trail:?}");
+        for object in 0..OBJECTS {
+            assert_eq!(navigator.is_disputed(object), ledger.is_disputed(object), "{trail:?}: {object}");
+            let place = navigator.places()[object].world_from_object;
+            let off = place.error_to(&self.site.place(object, ledger.places[object])).norm();
+            assert!(off < 1e-9, "{trail:?}: object {object} is off by {off}");
+            let pose = navigator.pose_at(object);
+            assert_eq!(pose.is_some(), ledger.known.is_some(), "{trail:?}");
+            if let Some((pose, shifts)) = pose.zip(ledger.known_at(object)) {
+                let expected = self.site.camera(object, ledger.seconds, shifts);
+                let off = pose.standing.object_from_camera.error_to(&expected).norm();
+                assert!(pose.object == object && off < 1e-9, "{trail:?}: the pose at {object} is off by {off}");
+                let sound = pose.standing.covariance.matrix.cholesky().is_some();
+                assert!(sound, "{trail:?}: {}", pose.standing.covariance.matrix);
+            }
+        }
+    }
+
+    /// The state is what it is said to be, and every change of it is told.
+    fn remembers(
+        &mut self,
+        navigator: &Navigator<'_>,
+        past: &mut Past,
+        happening: Happening,
+        did: &Did,
+        trail: &[Happening],
+    ) {
+        let kinds = |event: &Event| match event {
+            Event::Taken => 0,
+            Event::Left => 1,
+            Event::Doubted(_) => 2,
+            Event::Relocated => 3,
+            Event::Disputed { .. } => 4,
+            Event::Displaced(_) => 5,
+        };
+        if let (Happening::Fix(Kind::Wrong | Kind::Otherwise), false) = (happening, past.taken) {
+            past.believed = true;
+        }
+        past.lies += usize::from(matches!(happening, Happening::Fix(Kind::Wrong | Kind::Otherwise)));
+        match did {
+            Did::Fix(event) => {
+                self.seen[kinds(event)] += 1;
+                if !matches!(event, Event::Doubted(_) | Event::Left) {
+                    *past = Past { taken: true, now: true, sought: false, ..*past };
+                }
+            }
+            Did::Said(yes) => match happening {
+                Happening::Due(in_view) => past.sought = *yes && in_view,
+                Happening::Blind(in_view) => {
+                    past.now = false;
+                    past.sought &= *yes && in_view;
+                }
+                _ if *yes => *past = Past { taken: true, now: true, sought: false, ..*past },
+                _ => {}
+            },
+            Did::Went => {
+                past.now = false;
+                if happening == Happening::Lost {
+                    (past.taken, past.sought) = (false, false);
+                }
+            }
+        }
+        let state = match (past.sought, past.now, past.taken) {
+            (true, ..) => State::Searching,
+            (_, true, _) => State::Referenced,
+            (.., true) => State::DeadReckoning,
+            _ => State::Rough,
+        };
+        assert_eq!((navigator.state(), navigator.pose().is_some()), (state, past.taken), "{trail:?}");
+        let changes = navigator.changes();
+        let first = std::iter::once(State::Rough).chain(changes.iter().map(|change| change.to));
+        let chained = first.zip(changes).all(|(from, change)| change.from == from && change.to != from);
+        let told =
+            changes.iter().all(|change| !change.why.is_empty()) && changes.is_sorted_by(|a, b| a.seconds <= b.seconds);
+        assert!(chained && told && changes.last().is_none_or(|last| last.to == state), "{trail:?}: {changes:?}");
+    }
+
+    /// Without a fix a pose is known no better than before, with one of its object no worse.
+    fn learns(&self, before: &Navigated, after: &Navigated, happening: Happening, did: &Did, trail: &[Happening]) {
+        let [old, new] = [before, after].map(|pose| pose.standing.covariance.matrix.determinant());
+        match (happening, did) {
+            (Happening::Step, _) => assert!(new > old, "{trail:?}: {old:e} {new:e}"),
+            (_, Did::Fix(Event::Taken)) if before.object == after.object => {
+                assert!(new <= old * (1.0 + 1e-9), "{trail:?}: {old:e} {new:e}");
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Every order of these events up to so many, with a fusion; how often each event of a fix was met.
+fn hold_orders(alphabet: &[Happening], longest: usize, fusion: &str) -> [usize; 6] {
+    let (site, listener) = (Site::new(longest), Listener::default());
+    let fusion = FUSIONS.build(&Choice::named(fusion)).unwrap();
+    let navigator = Navigator::new(site.surveyed.clone(), &listener, &*fusion);
+    let mut orders = Orders { site: &site, listener: &listener, alphabet, longest, count: 0, seen: [0; 6] };
+    orders.go(&navigator, &Ledger::default(), Past::default(), &mut Vec::new());
+    assert_eq!(orders.count, (1..=longest as u32).map(|length| alphabet.len().pow(length)).sum::<usize>());
+    orders.seen
+}
+
+use Happening::{Blind, Due, Fix, Lost, Settle, Step};
+
+/// Every order of up to six fixes of three objects, right and wrong ones, with and without a motion between them or with it lost:
+/// what becomes of each fix, pose, places, disputes and state are what whole numbers say, what told nothing moves nothing, a
+/// covariance grows without a fix and not with one, and two wrong fixes move nothing that is known.
+#[test]
+fn every_order_of_six_fixes_is_judged_right() {
+    let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Glimpse];
+    let alphabet: Vec<Happening> = kinds.into_iter().map(Fix).chain([Step, Lost]).collect();
+    let seen = hold_orders(&alphabet, 6, "fuse");
+    assert!(seen.iter().all(|&count| count > 100), "{seen:?}");
+}
+
+/// Every order of up to six questions, instants and poses: the state is what it is said to be, and each change is told.
+#[test]
+fn every_order_of_six_questions_is_answered_right() {
+    let alphabet = [Step, Lost, Fix(Kind::Right), Due(true), Due(false), Blind(true), Settle(true)];
+    hold_orders(&alphabet, 6, "fuse");
+}
+
+/// An object that nothing confirms is the one that was moved, though it was met first: it takes seven events.
+#[test]
+fn every_order_of_seven_fixes_of_three_objects_is_judged_right() {
+    hold_orders(&[Lost, Fix(Kind::Right), Fix(Kind::Moved), Fix(Kind::Third)], 7, "fuse");
+}
+
+/// The long form of the laws above: every order of up to six of all events.
+#[test]
+#[ignore = "16 million instants, minutes: cargo test --release -p seafix-proptests --test complete -- --ignored"]
+fn every_order_of_six_events_is_judged_right() {
+    let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Glimpse];
+    let others = [Step, Lost, Due(true), Due(false), Blind(true), Blind(false), Settle(true), Settle(false)];
+    let alphabet: Vec<Happening> = kinds.into_iter().map(Fix).chain(others).collect();
+    for fusion in ["fuse", "intersect"] {
+        hold_orders(&alphabet, 6, fusion);
+    }
+}
