@@ -51,6 +51,12 @@ impl Graph {
         apart && self.agree >> pair(self.clouds[v], self.clouds[w]) & 1 == 1
     }
 
+    /// Whether all cloud points agree.
+    pub fn all_agree(&self) -> bool {
+        pairs(self.models.len())
+            .all(|(v, w)| self.models[v] == self.models[w] || self.clouds[v] == self.clouds[w] || self.adjacent(v, w))
+    }
+
     /// How many model points it has.
     pub fn model_points(&self) -> usize {
         self.models.iter().max().map_or(0, |most| most + 1)
@@ -185,8 +191,10 @@ const POSTS: [[f64; 3]; MOST] =
 const MARGIN: f64 = 0.05;
 /// k: so small that the standard deviations, of a size with SIDE / k, hide every reflection.
 const SIGMAS: f64 = 0.01;
-/// Ways of [`Posts::realised`] to turn model and cloud.
-pub const TURNS: usize = 36;
+/// A Δ within which all distances agree (m).
+pub const ANY: f64 = 1e3;
+/// Ways of [`Posts::realised`] to turn the model, and the cloud.
+pub const TURNS: usize = 6;
 
 /// What makes a graph of points.
 #[derive(Debug)]
@@ -212,15 +220,15 @@ impl Default for Posts {
 }
 
 impl Posts {
-    /// Points that have this graph; model and cloud turned in one of some ways, so that they come in other orders.
-    pub fn realised(&self, graph: &Graph, turn: usize) -> Planted {
+    /// Points that have this graph, model and cloud turned in one of [`TURNS`] ways each, so that they come in other orders.
+    pub fn realised(&self, graph: &Graph, [model, cloud]: [usize; 2]) -> Planted {
         let count = graph.model_points();
         let corners: Vec<Vector3<f64>> = (0..MOST).map(octahedron).collect();
         let at = |model: usize| match graph.models.iter().position(|&other| other == model) {
             Some(first) if count > TETRAHEDRON => corners[first],
             _ => tetrahedron(model),
         };
-        let posts = POSTS.map(|at| turned(turn % 6, Vector3::from(at)));
+        let posts = POSTS.map(|at| turned(cloud, Vector3::from(at)));
         let wanted = SVector::<f64, PAIRS>::from_iterator(pairs(MOST).map(|(a, b)| {
             let known = if count > TETRAHEDRON { (corners[b] - corners[a]).norm() } else { SIDE };
             let off = known - (posts[b] - posts[a]).norm();
@@ -242,7 +250,7 @@ impl Posts {
             pixels: None,
         };
         Planted {
-            model: (0..count).map(|i| ModelPoint::exact("", Point::from(turned(turn / 6, at(i))))).collect(),
+            model: (0..count).map(|i| ModelPoint::exact("", Point::from(turned(model, at(i))))).collect(),
             cloud: (0..points).map(measured).collect(),
             candidates: Candidates::from_pairs(
                 count,
@@ -284,5 +292,10 @@ mod tests {
         assert_eq!((0..=MOST).map(|n| partitions(n).len()).collect::<Vec<_>>(), [1, 1, 2, 5, 15, 52, 203]);
         let singles = |n: usize| graphs(n, Which::Own, false).iter().filter(|graph| graph.model_points() == n).count();
         assert_eq!((0..=MOST).map(singles).collect::<Vec<_>>(), [1, 1, 2, 4, 11, 34, 156]);
+        for (w, l, m) in
+            [(Which::Own, false, 6), (Which::Own, true, 6), (Which::Shared, false, 5), (Which::Shared, false, 6)]
+        {
+            println!("COUNT {w:?} {l} {m} {}", (0..=m).map(|n| graphs(n, w, l).len()).sum::<usize>());
+        }
     }
 }

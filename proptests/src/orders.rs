@@ -16,7 +16,7 @@ use seafix_navigation::{
 pub enum Happening {
     /// A second passes, and odometry tells the motion.
     Step,
-    /// A second passes, and odometry does not tell.
+    /// A second passes, and odometry does not tell that the camera stood still.
     Lost,
     /// A fix of this kind comes.
     Fix(Kind),
@@ -92,7 +92,7 @@ pub struct Site {
     pub surveyed: Vec<Place>,
     /// What odometry says of each second.
     pub step: Local,
-    /// Where the camera is after so many seconds.
+    /// Where the camera is after so many steps.
     cameras: Vec<Transform<World, Camera>>,
 }
 
@@ -109,8 +109,8 @@ const SETTLED: f64 = 0.004;
 const HARDLY: f64 = 1.0;
 
 impl Site {
-    /// A site, and a way of so many seconds through it.
-    pub fn new(seconds: usize) -> Self {
+    /// A site, and a way of so many steps through it.
+    pub fn new(steps: usize) -> Self {
         let place = |xi: [f64; 6]| Place {
             world_from_object: Transform::exp(&xi.into()),
             covariance: Covariance6::isotropic(1e-4, SURVEY),
@@ -126,7 +126,7 @@ impl Site {
         );
         let first = Transform::<World, Camera>::exp(&[0.3, -0.1, 0.2, 0.5, -0.5, 1.0].into());
         let ahead = |at: &Transform<World, Camera>| Some((*at * step.motion).renormalized());
-        let cameras = std::iter::successors(Some(first), ahead).take(seconds + 1).collect();
+        let cameras = std::iter::successors(Some(first), ahead).take(steps + 1).collect();
         Self { surveyed, step, cameras }
     }
 
@@ -135,23 +135,23 @@ impl Site {
         shifted(shifts) * self.surveyed[object].world_from_object
     }
 
-    /// The camera after so many seconds relative to an object, so many shifts off by the survey.
-    pub fn camera(&self, object: usize, seconds: usize, shifts: i32) -> Transform<Object, Camera> {
-        self.surveyed[object].world_from_object.inverse() * shifted(shifts) * self.cameras[seconds]
+    /// The camera after so many steps relative to an object, so many shifts off by the survey.
+    pub fn camera(&self, object: usize, steps: usize, shifts: i32) -> Transform<Object, Camera> {
+        self.surveyed[object].world_from_object.inverse() * shifted(shifts) * self.cameras[steps]
     }
 
-    fn fix(&self, kind: Kind, seconds: usize) -> Navigated {
+    fn fix(&self, kind: Kind, steps: usize) -> Navigated {
         let (object, shifts) = kind.says();
         let sigma = if kind == Kind::Glimpse { GLIMPSE } else { FIX };
         let mut share = Share::zeros();
         share.fixed_view_mut::<3, 3>(3, 0).copy_from(&(Matrix3::identity() * MODEL));
-        let standing = Standing::new(self.camera(object, seconds, shifts), Covariance6::isotropic(1e-3, sigma))
+        let standing = Standing::new(self.camera(object, steps, shifts), Covariance6::isotropic(1e-3, sigma))
             .considering(Considered::of_model(object, [(0, share)]));
         Navigated { object, standing }
     }
 
-    fn settled(&self, seconds: usize, well: bool) -> Navigated {
-        Navigated { object: 0, standing: Standing::new(self.camera(0, seconds, 0), settled(well)) }
+    fn settled(&self, steps: usize, well: bool) -> Navigated {
+        Navigated { object: 0, standing: Standing::new(self.camera(0, steps, 0), settled(well)) }
     }
 }
 
@@ -239,8 +239,8 @@ pub struct Ledger {
     pub state: State,
     /// Seconds, and those with a motion, since a fix was taken; none before.
     pub since: Option<(f64, usize)>,
-    /// Seconds in all.
-    pub seconds: usize,
+    /// Steps in all.
+    pub steps: usize,
 }
 
 impl Default for Ledger {
@@ -253,7 +253,7 @@ impl Default for Ledger {
             disputes: Vec::new(),
             state: State::Rough,
             since: None,
-            seconds: 0,
+            steps: 0,
         }
     }
 }
@@ -263,7 +263,7 @@ impl Ledger {
     pub fn enter(&mut self, happening: Happening, better: bool) -> Must {
         match happening {
             Happening::Step => {
-                self.seconds += 1;
+                self.steps += 1;
                 self.since = self.since.map(|(seconds, steps)| (seconds + 1.0, steps + 1));
                 if self.known.is_some() && self.state != State::Searching {
                     self.state = State::DeadReckoning;
@@ -271,7 +271,6 @@ impl Ledger {
                 Must::Went
             }
             Happening::Lost => {
-                self.seconds += 1;
                 (self.known, self.since, self.state) = (None, None, State::Rough);
                 self.doubts = [None; OBJECTS];
                 Must::Went
@@ -432,16 +431,16 @@ impl Ledger {
 /// How long it is blind (s).
 pub const BLIND: f64 = 0.5;
 
-/// Lets something happen to a navigator, `seconds` after it began.
-pub fn happens(navigator: &mut Navigator<'_>, site: &Site, seconds: usize, happening: Happening) -> Did {
+/// Lets something happen to a navigator, after so many steps.
+pub fn happens(navigator: &mut Navigator<'_>, site: &Site, steps: usize, happening: Happening) -> Did {
     match happening {
         Happening::Step => navigator.advance(1.0, Some(&site.step)),
         Happening::Lost => navigator.advance(1.0, None),
-        Happening::Fix(kind) => return Did::Fix(navigator.fix(&site.fix(kind, seconds))),
+        Happening::Fix(kind) => return Did::Fix(navigator.fix(&site.fix(kind, steps))),
         Happening::Due(in_view) => return Did::Said(navigator.due(in_view)),
         Happening::Blind(in_view) => return Did::Said(navigator.blind(BLIND, in_view)),
         Happening::Settle(well) => {
-            return Did::Said(navigator.settle(&site.settled(seconds, well), "found again".to_owned()));
+            return Did::Said(navigator.settle(&site.settled(steps, well), "found again".to_owned()));
         }
     }
     Did::Went

@@ -6,6 +6,7 @@ mod acceptance;
 mod answers;
 mod between_fixes;
 mod chance;
+mod complete;
 mod consensus;
 mod dead_reckoning;
 mod equations;

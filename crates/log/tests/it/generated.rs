@@ -41,7 +41,7 @@ fn committed_code_is_what_the_protos_say() {
 }
 
 /// The names of the files of a folder, in their order.
-fn names(folder: &Path) -> impl Iterator<Item = String> {
+fn names(folder: &Path) -> impl Iterator<Item = String> + use<> {
     let mut names: Vec<_> =
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
