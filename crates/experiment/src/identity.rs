@@ -203,7 +203,7 @@ mod tests {
 
     fn used(text: &str) -> Versions {
         let plan = plan(text);
-        let groups = open(&plan).unwrap();
+        let groups = open(&plan, false).unwrap();
         let input = || Input { source: String::new(), warnings: Vec::new(), files: BTreeMap::new() };
         versions(&groups, &groups.iter().map(|_| input()).collect::<Vec<_>>())
     }
@@ -261,7 +261,7 @@ mod tests {
     fn all_that_a_result_depends_on_is_in_the_identity() {
         let of = |text: &str, change: &dyn Fn(&mut Vec<Input>, &mut Versions)| {
             let plan = plan(text);
-            let groups = open(&plan).unwrap();
+            let groups = open(&plan, false).unwrap();
             let files = BTreeMap::from([("a.csv".to_owned(), "12".to_owned())]);
             let mut inputs = vec![Input { source: "s".to_owned(), warnings: Vec::new(), files }];
             let mut versions = versions(&groups, &inputs);

@@ -186,6 +186,7 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         }),
         targets: vec![row],
         times: FrameTimes {
+            shared: seafix_log::SharedStages::default(),
             detect_ms: Some(60.0),
             locate_ms: Some(9.0),
             describe_ms: Some(31.0),
