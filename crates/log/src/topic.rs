@@ -86,8 +86,11 @@ well_known!(
 /// A schema's name and its serialised `FileDescriptorSet`.
 pub(crate) type Schema = (&'static str, &'static [u8]);
 
+/// The schema of a message, [`Logged::schema`].
+pub(crate) type SchemaOf = fn() -> Schema;
+
 /// The topics of which every frame has its own messages, with their schemas: what is copied when logs are joined.
-pub(crate) const OF_FRAMES: [(&str, fn() -> Schema); 18] = [
+pub(crate) const OF_FRAMES: [(&str, SchemaOf); 18] = [
     (IMAGES[0], foxglove::CompressedImage::schema),
     (IMAGES[1], foxglove::CompressedImage::schema),
     (ANNOTATIONS[0], foxglove::ImageAnnotations::schema),
