@@ -292,10 +292,5 @@ mod tests {
         assert_eq!((0..=MOST).map(|n| partitions(n).len()).collect::<Vec<_>>(), [1, 1, 2, 5, 15, 52, 203]);
         let singles = |n: usize| graphs(n, Which::Own, false).iter().filter(|graph| graph.model_points() == n).count();
         assert_eq!((0..=MOST).map(singles).collect::<Vec<_>>(), [1, 1, 2, 4, 11, 34, 156]);
-        for (w, l, m) in
-            [(Which::Own, false, 6), (Which::Own, true, 6), (Which::Shared, false, 5), (Which::Shared, false, 6)]
-        {
-            println!("COUNT {w:?} {l} {m} {}", (0..=m).map(|n| graphs(n, w, l).len()).sum::<usize>());
-        }
     }
 }

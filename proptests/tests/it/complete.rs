@@ -133,7 +133,7 @@ fn every_graph_of_six_vertices_is_searched_right() {
 /// The long form of the law above: graphs that differ by the names of vertices are all tried, model and cloud turned in each of some
 /// ways, and vertices that share cloud points are up to six.
 #[test]
-#[ignore = "2.5 million graphs, minutes: cargo test --release -p seafix-proptests --test complete -- --ignored"]
+#[ignore = "long: 2.5 million graphs, minutes: cargo test --release -p seafix-proptests complete:: -- --ignored"]
 fn every_graph_is_searched_right_whatever_its_vertices_are_called() {
     let (searches, posts) = (exact(), Posts::default());
     for (number, graph) in (0..=MOST).flat_map(|n| graphs(n, Which::Own, true)).enumerate() {
@@ -391,7 +391,7 @@ fn every_order_of_a_few_more_events_is_judged_right() {
 
 /// The long form of the laws above: every order of up to six of all events.
 #[test]
-#[ignore = "16 million instants, minutes: cargo test --release -p seafix-proptests --test complete -- --ignored"]
+#[ignore = "long: 16 million instants, minutes: cargo test --release -p seafix-proptests complete:: -- --ignored"]
 fn every_order_of_six_events_is_judged_right() {
     let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Glimpse];
     let others = [Step, Lost, Due(true), Due(false), Blind(true), Blind(false), Settle(true), Settle(false)];
@@ -403,7 +403,7 @@ fn every_order_of_six_events_is_judged_right() {
 
 /// Of fixes of three objects every order of up to nine: one that was moved is found, and confirms a third that is then moved.
 #[test]
-#[ignore = "350 000 instants: cargo test --release -p seafix-proptests --test complete -- --ignored"]
+#[ignore = "long: 350 000 instants: cargo test --release -p seafix-proptests complete:: -- --ignored"]
 fn every_order_of_nine_fixes_is_judged_right() {
     hold_orders(&[Kind::Right, Kind::Wrong, Kind::Moved, Kind::Third].map(Fix), 9, "fuse");
 }
