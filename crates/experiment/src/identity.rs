@@ -260,7 +260,9 @@ mod tests {
     #[test]
     fn all_that_a_result_depends_on_is_in_the_identity() {
         let of = |text: &str, change: &dyn Fn(&mut Vec<Input>, &mut Versions)| {
-            let plan = plan(text);
+            let mut plan = plan(text);
+            // The command stands in the logs, and names a folder that is another at each call.
+            plan.command.clear();
             let groups = open(&plan, false).unwrap();
             let files = BTreeMap::from([("a.csv".to_owned(), "12".to_owned())]);
             let mut inputs = vec![Input { source: "s".to_owned(), warnings: Vec::new(), files }];
