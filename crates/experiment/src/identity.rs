@@ -257,6 +257,7 @@ mod tests {
         assert!(found.versions.contains_key("solver p3p-stereo"), "{:?}", found.versions);
     }
 
+    /// Seen to fail with an identity without versions.
     #[test]
     fn all_that_a_result_depends_on_is_in_the_identity() {
         let of = |text: &str, change: &dyn Fn(&mut Vec<Input>, &mut Versions)| {

@@ -133,7 +133,7 @@ fn every_graph_of_six_vertices_is_searched_right() {
 /// The long form of the law above: graphs that differ by the names of vertices are all tried, model and cloud turned in each of some
 /// ways, and vertices that share cloud points are up to six.
 #[test]
-#[ignore = "long: 2.5 million graphs, minutes: cargo test --release -p seafix-proptests complete:: -- --ignored"]
+#[ignore = "long: 2.5 million graphs"]
 fn every_graph_is_searched_right_whatever_its_vertices_are_called() {
     let (searches, posts) = (exact(), Posts::default());
     for (number, graph) in (0..=MOST).flat_map(|n| graphs(n, Which::Own, true)).enumerate() {
@@ -340,7 +340,9 @@ impl Orders<'_> {
         match (happening, did) {
             (Happening::Step, _) => assert!(new > old, "{trail:?}: {old:e} {new:e}"),
             (_, Did::Fix(Event::Taken)) if before.object == after.object => {
-                assert!(new <= old * (1.0 + 1e-9), "{trail:?}: {old:e} {new:e}");
+                // Covariance intersection finds its weight ω to 0.618⁴⁰ = 4.4e-9. Where the pose alone (ω = 1) is best,
+                // d log det / dω = 6 − tr(A⁻¹B) lies between 0 and 6 there.
+                assert!(new <= old * (1.0 + 6.0 * 4.4e-9), "{trail:?}: {old:e} {new:e}");
             }
             _ => {}
         }
@@ -389,12 +391,13 @@ fn every_order_of_a_few_more_events_is_judged_right() {
     hold_orders(&[right, wrong, Step, Settle(true)], 6, "fuse");
 }
 
-/// The long form of the laws above: every order of up to six of all events.
+/// The long form of the laws above: every order of up to six of all events but `Settle(false)`. After a pose that is hardly known
+/// the answers depend on covariances, which the ledger of whole numbers does not have.
 #[test]
-#[ignore = "long: 16 million instants, minutes: cargo test --release -p seafix-proptests complete:: -- --ignored"]
+#[ignore = "long: 10 million instants"]
 fn every_order_of_six_events_is_judged_right() {
     let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Glimpse];
-    let others = [Step, Lost, Due(true), Due(false), Blind(true), Blind(false), Settle(true), Settle(false)];
+    let others = [Step, Lost, Due(true), Due(false), Blind(true), Blind(false), Settle(true)];
     let alphabet: Vec<Happening> = kinds.into_iter().map(Fix).chain(others).collect();
     for fusion in ["fuse", "intersect"] {
         hold_orders(&alphabet, 6, fusion);
@@ -403,7 +406,7 @@ fn every_order_of_six_events_is_judged_right() {
 
 /// Of fixes of three objects every order of up to nine: one that was moved is found, and confirms a third that is then moved.
 #[test]
-#[ignore = "long: 350 000 instants: cargo test --release -p seafix-proptests complete:: -- --ignored"]
+#[ignore = "long: 350 000 instants"]
 fn every_order_of_nine_fixes_is_judged_right() {
     hold_orders(&[Kind::Right, Kind::Wrong, Kind::Moved, Kind::Third].map(Fix), 9, "fuse");
 }

@@ -276,7 +276,7 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
 }
 
 /// A run is kept as long as its results are those of the program, and no longer; what is made again has the bytes of the kept
-/// run. Seen to fail with an identity without versions, and with runs kept that did not end.
+/// run. Seen to fail with runs kept that did not end.
 #[test]
 fn a_kept_run_is_made_again_when_its_results_may_differ() {
     let folder = tempfile::tempdir().unwrap();

@@ -247,8 +247,9 @@ fn times_of_shared_stages_are_marked() {
     }
     assert!(times(true).iter().flatten().all(|times| times.shared == SharedStages::default()));
 }
-/// A kept run of an identity has the bytes of a fresh one, whole or in part. Seen to fail with an identity that leaves the
-/// seed out.
+
+/// A kept run of an identity has the bytes of a fresh one, whole or in part. Seen to fail with an identity of the versions
+/// alone.
 #[test]
 fn a_kept_run_is_what_would_be_made_now() {
     let folder = TempDir::new().unwrap();
