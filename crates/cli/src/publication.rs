@@ -6,7 +6,8 @@ use std::{
 };
 
 use seafix_component::Fault;
-use seafix_experiment::{Plan, read_text};
+use seafix_component::read_text;
+use seafix_experiment::Plan;
 use serde::Deserialize;
 
 const FORMAT: &str = "seafix-reports/1";

@@ -5,19 +5,21 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_component::{BuildError, Choice, Fault, Part, inside, take_out};
+use seafix_component::{BuildError, Choice, Fault, Part, inside, read_text, take_out};
 use seafix_log::looks_like;
 use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::{
-    Axis, Helm, Logging, Navigation, Pipeline, Place, Stages,
+use seafix::{Helm, Pipeline, PipelineError, Stages};
+use seafix_data::{
     dataset::hex,
-    pipeline::PipelineError,
-    read::{self, Read, Texts},
-    read_text,
     source::{SOURCES, Source},
+};
+
+use crate::{
+    Axis, Logging, Navigation, Place, keyframes,
+    read::{self, Read, Texts},
     vary::{self, Cell},
 };
 
@@ -376,7 +378,7 @@ fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<
     let unfit = |message: String, path: &[&str]| Unfit::of(path, Part::Value, message);
     let mut trial = trial.resolved()?;
     let keyframes = trial.navigation.iter_mut().filter_map(|navigation| navigation.network.as_mut());
-    keyframes.for_each(|keyframes| keyframes.pin(folder));
+    keyframes.for_each(|used| keyframes::pin(used, folder));
     let source = SOURCES.build(&trial.source).map_err(|error| unfit(error.to_string(), &["source"]))?;
     let stages = trial.pipeline.build().map_err(Unfit::pipeline)?;
     if stages.needs_pixels() && !source.has_pixels() {

@@ -16,7 +16,9 @@ use seafix_referencing::{SEARCHES, SOLVERS};
 use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
 use sha2::{Digest, Sha256};
 
-use crate::{Plan, Trial, dataset::hex, manifest::Input, run::Group, source::SOURCES};
+use seafix_data::{dataset::hex, source::SOURCES};
+
+use crate::{Plan, Trial, manifest::Input, run::Group};
 
 /// Versions of the code that no component owns. Raise one with every change of that code that alters a result for some
 /// input; `tests/versions.rs` fails where a result changed and no version did.

@@ -6,7 +6,8 @@ use seafix_log::InspectedPoint;
 use seafix_navigation::{Navigated, Place, Standing};
 use seafix_referencing::{Interest, Outcome, Site, TargetKind};
 
-use crate::{Sighting, navigate::Underway, source::Truth};
+use seafix::{Sighting, Underway};
+use seafix_data::source::Truth;
 
 /// The points of interest that truly lie in both images and are turned towards the left camera.
 ///

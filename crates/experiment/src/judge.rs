@@ -9,7 +9,10 @@ use seafix_log::{Evaluation, FrameRecord, NavigationErrors, TruthRecord, Visible
 use seafix_navigation::Navigated;
 use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
 
-use crate::{Sighting, exact, inspect, navigate::Underway, source::Truth};
+use seafix::{Sighting, Underway};
+use seafix_data::{exact, source::Truth};
+
+use crate::inspect;
 
 /// A pair is correct when its cloud point shows within this distance (px) of the true projections.
 const CORRECT_PX: f64 = 2.0;

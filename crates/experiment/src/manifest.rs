@@ -11,9 +11,10 @@ use std::{
 use seafix_component::{Fault, read_text};
 use serde::{Deserialize, Serialize};
 
+use seafix_data::dataset::sha256;
+
 use crate::{
     Plan, Trial,
-    dataset::sha256,
     identity::{self, Versions},
     run::{Group, Options, RunError},
 };

@@ -2,7 +2,10 @@
 
 use seafix_log::{GreyImage, encode_png};
 
-use crate::{ImagesLogged, exact, record::grey, source::Eyes};
+use seafix::Eyes;
+use seafix_data::{dataset::grey, exact};
+
+use crate::ImagesLogged;
 
 /// The images of a frame at one level of logging.
 #[derive(Debug)]

@@ -1,24 +1,22 @@
 //! From what happened to what is logged.
 
-use nalgebra::{Matrix3, Matrix6};
+use seafix::{Attempt, Sight, Sighting, Told, Underway};
 use seafix_component::Registry;
-use seafix_evaluation::alert_limit;
+use seafix_data::{
+    exact::{self, model, rows3, rows6},
+    source::Passage,
+};
 use seafix_geometry::{MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
-    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, GreyImage, Inputs, Integrity,
-    ModelPoint, Outcome as Logged, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TrialHeader,
+    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, Inputs, Integrity,
+    NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Outcome as Logged, Pair, PixelPair, PriorRecord,
+    RigRecord, SharedStages, TargetModel, TargetRecord, TargetTimes, TrialHeader,
 };
-use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
+use seafix_navigation::{FUSIONS, Navigated, ODOMETRIES, POLICIES};
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
-use seafix_vision::{DESCRIPTORS, DETECTORS, Image, LOCATORS, MATCHERS};
+use seafix_vision::{DESCRIPTORS, DETECTORS, LOCATORS, MATCHERS};
 
-use crate::{
-    Attempt, Experiment, Place, Plan, Sighting, Trial, exact,
-    manifest::Git,
-    navigate::Underway,
-    pictures::Pictures,
-    source::{Passage, Sight, Told},
-};
+use crate::{Experiment, Place, Plan, Trial, manifest::Git, pictures::Pictures};
 
 /// What stands for the search where every point says which one it is.
 const NAMED: &str = "named";
@@ -69,27 +67,13 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
     }
 }
 
-/// What is searched for, wherever it stands.
-pub(crate) fn model(target: &Target) -> TargetModel {
-    let point = |point: &seafix_referencing::ModelPoint| ModelPoint {
-        id: point.id.clone(),
-        at: point.at.coords.into(),
-        sigma: point.sigma,
-    };
-    TargetModel {
-        id: target.name.clone(),
-        site_from_object: None,
-        points: target.points.iter().map(point).collect(),
-        alert_limit: alert_limit(target.diameter()),
-    }
-}
-
 /// What came of one frame, without truth: what the tables of results hold.
 pub(crate) fn frame(
     number: u64,
     sight: &Sight,
     sighting: &Sighting,
     underway: Option<&Underway>,
+    shared: SharedStages,
     trial: &Trial,
     targets: &[Target],
 ) -> FrameRecord {
@@ -100,7 +84,7 @@ pub(crate) fn frame(
         sighting.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
     if attempts.is_empty() {
         let reason = match underway {
-            Some(underway) if !underway.record.due => "not-due",
+            Some(underway) if !underway.due => "not-due",
             _ if sighting.cloud.is_empty() => "no-data",
             _ => "nothing-in-view",
         };
@@ -110,8 +94,8 @@ pub(crate) fn frame(
         frame: number,
         stamp_ns: sight.stamp_ns,
         targets: attempts,
-        times: FrameTimes { odometry_ms: underway.map(|underway| underway.odometry_ms), ..sighting.times },
-        navigation: underway.map(|underway| Box::new(underway.record.clone())),
+        times: times(&sighting.times, underway, shared),
+        navigation: underway.map(|underway| Box::new(navigation(underway, targets))),
         ..FrameRecord::default()
     }
 }
@@ -142,7 +126,8 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
     let answer = &attempt.answer;
     let mut record = TargetRecord::refused(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
     record.candidates = attempt.candidates.lists.iter().map(|list| list.iter().map(|&j| j as u32).collect()).collect();
-    record.times = attempt.times;
+    let seafix::TargetTimes { candidates_ms, search_ms, solve_ms, total_ms } = attempt.times;
+    record.times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms };
     record.optimal = Some(answer.optimal);
     record.size_bound = answer.size_bound.map(|n| n as u64);
     record.expected_chance_sets = answer.expected_chance_sets;
@@ -177,6 +162,35 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
     let details = answer.outcome.explanation().into_iter().chain(attempt.joint.clone());
     record.detail = details.collect::<Vec<_>>().join("; ");
     record
+}
+
+/// The durations of the stages, and which of them other trials share.
+fn times(spent: &seafix::FrameTimes, underway: Option<&Underway>, shared: SharedStages) -> FrameTimes {
+    let seafix::FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *spent;
+    let odometry_ms = underway.map(|underway| underway.odometry_ms);
+    FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms, shared }
+}
+
+/// The state of a trial that navigates, without truth.
+fn navigation(underway: &Underway, targets: &[Target]) -> NavigationRecord {
+    let pose = |pose: &Navigated| NavigatedRecord {
+        object: targets[pose.object].name.clone(),
+        object_from_camera: pose.standing.object_from_camera.rows(),
+        covariance: rows6(&pose.standing.covariance.matrix),
+    };
+    let step = underway.odometry.step;
+    NavigationRecord {
+        state: underway.state.to_string(),
+        due: underway.due,
+        pose: underway.pose.as_ref().map(pose),
+        unreferenced: underway.unreferenced.as_ref().map(pose),
+        odometry: OdometryStep {
+            lost: underway.odometry.lost.clone(),
+            motion: step.map(|step| (step.motion.rows(), rows6(&step.covariance.matrix))),
+        },
+        events: underway.events.iter().map(ToString::to_string).collect(),
+        errors: NavigationErrors::default(),
+    }
 }
 
 fn integrity(it: &seafix_referencing::Integrity) -> Integrity {
@@ -265,10 +279,6 @@ fn camera(camera: &Pinhole) -> CameraRecord {
     }
 }
 
-pub(crate) fn grey(image: &Image) -> GreyImage {
-    GreyImage { width: image.width() as u32, height: image.height() as u32, pixels: image.to_u8() }
-}
-
 fn pairs(pairs: &[Correspondence]) -> Vec<Pair> {
     pairs.iter().map(|pair| Pair { model: pair.model as u32, cloud: pair.cloud as u32 }).collect()
 }
@@ -279,12 +289,4 @@ pub(crate) fn pixel_pair(pixels: &StereoPixels) -> PixelPair {
 
 fn uv(pixel: &Pixel) -> [f64; 2] {
     [pixel.u, pixel.v]
-}
-
-pub(crate) fn rows3(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
-}
-
-pub(crate) fn rows6(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
-    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
 }

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use seafix_component::{Choice, Fault};
 use seafix_log::Reader;
 
-use crate::{Axis, Experiment, Pipeline, Plan, read::Texts, vary};
+use seafix::Pipeline;
+
+use crate::{Axis, Experiment, Plan, read::Texts, vary};
 
 /// Which of a log's frames a replay starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

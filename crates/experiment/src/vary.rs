@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use seafix::Pipeline;
 use seafix_component::{Fault, Part};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -197,6 +198,14 @@ pub fn changed<T: Serialize + DeserializeOwned>(
         set(&mut table, key.trim(), value).map_err(|message| fault(message, setting))?;
     }
     table.try_into().map_err(|error: toml::de::Error| vec![Fault::in_toml(Path::new("--set"), "", &error)])
+}
+
+/// The pipeline with each of `settings` given the last word.
+///
+/// # Errors
+/// The setting that cannot be.
+pub fn changed_pipeline(pipeline: &Pipeline, settings: &[String]) -> Result<Pipeline, Vec<Fault>> {
+    changed(&pipeline.resolved().unwrap_or_else(|_| pipeline.clone()), settings, "detector.sigma=1.5")
 }
 
 /// Puts `value` at the dotted path `key`. A component chosen by its bare name becomes a table

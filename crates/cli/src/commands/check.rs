@@ -3,12 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use seafix_component::Fault;
-use seafix_experiment::{
-    Plan, check_run,
-    dataset::{self, ImageLimits},
-    is_run, read_text,
-    source::check_recording,
-};
+use seafix_component::read_text;
+use seafix_data::{dataset, source::check_recording};
+use seafix_experiment::{Plan, check_run, is_run};
+use seafix_io::ImageLimits;
 use seafix_log::{LogError, Reader, Recording};
 use seafix_referencing::{Site, TargetKind, problem_file};
 use seafix_simulation::field::SitePlan;

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
+use seafix::{Pipeline, Rig};
 use seafix_component::{Choice, Fault};
-use seafix_experiment::{
-    Pipeline,
-    dataset::{DescribedRig, are_twins, partners_remedy, read_image, read_rig, strangers, swapped_fault, twins_fault},
-};
+use seafix_data::dataset::{are_twins, partners_remedy, strangers, swapped_fault, twins_fault};
+use seafix_experiment::changed_pipeline;
 use seafix_geometry::StereoRig;
+use seafix_io::read_image;
 use seafix_vision::{FrontEnd, Image, Keypoint, Look, OffLines, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
@@ -65,7 +65,8 @@ impl Cloud {
         let pipeline = self.pipeline()?;
         let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
         let input = |fault: Fault| Failure::new(INPUT, fault);
-        let DescribedRig { file, rig, bits, warning } = read_rig(&self.rig).map_err(input)?;
+        let Rig { stereo: rig, bits, file, warning, .. } = Rig::from_file(&self.rig).map_err(input)?;
+        let file = file.unwrap_or_default();
         let limits = self.limits.of_images();
         let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
@@ -119,7 +120,7 @@ impl Cloud {
         }
         // A wrong name is told before `--set` is blamed for it.
         pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
-        pipeline.changed(&self.set).map_err(|faults| Failure::faults(USAGE, &faults))
+        changed_pipeline(&pipeline, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))
     }
 
     fn make(&self, front_end: &FrontEnd, left: &Image, right: &Image, rig: &StereoRig) -> (Look, Vec<StageTimes>) {

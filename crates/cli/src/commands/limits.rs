@@ -1,7 +1,7 @@
 //! How large an image a command reads.
 
 use clap::Args;
-use seafix_experiment::dataset::ImageLimits;
+use seafix_io::ImageLimits;
 
 /// Nothing of the declared size is made before it is compared with these.
 #[derive(Debug, Args)]

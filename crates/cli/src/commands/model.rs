@@ -3,12 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use seafix::{Pipeline, Rig};
 use seafix_component::Fault;
-use seafix_experiment::{
-    HandModel, HandPoint, ModelByHand, Pipeline,
-    dataset::{DescribedRig, are_twins, read_image, read_rig, twins_fault},
-    read_text,
+use seafix_component::read_text;
+use seafix_data::{
+    HandModel, HandPoint, ModelByHand,
+    dataset::{are_twins, twins_fault},
 };
+use seafix_experiment::changed_pipeline;
+use seafix_io::read_image;
 use serde_json::{Value, json};
 
 use super::limits::Limits;
@@ -69,9 +72,10 @@ impl Model {
             [p1, p2, p3] => Some([p1, p2, p3].map(String::clone)),
             other => return Err(usage(format!("--base {}: three ids, separated by commas", other.join(",")))),
         };
-        let pipeline = Pipeline::default().changed(&self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
+        let pipeline =
+            changed_pipeline(&Pipeline::default(), &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
         let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
-        let DescribedRig { rig, bits, .. } = read_rig(&self.rig).map_err(input)?;
+        let Rig { stereo: rig, bits, .. } = Rig::from_file(&self.rig).map_err(input)?;
         let limits = self.limits.of_images();
         let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;

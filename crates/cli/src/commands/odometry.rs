@@ -9,10 +9,8 @@ use std::{
 use clap::Args;
 use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
-use seafix_experiment::{
-    changed,
-    dataset::{Dataset, DatasetFrame, are_twins, realigned, swapped_at_first, tum, twins_fault},
-};
+use seafix_data::dataset::{Dataset, DatasetFrame, are_twins, realigned, swapped_at_first, tum, twins_fault};
+use seafix_experiment::changed;
 use seafix_navigation::{Journey, Lost, ODOMETRIES, Odometry, Outcome, Segment, StereoPair};
 use seafix_vision::{Image, Realigned, Threads};
 use serde_json::{Value, json};

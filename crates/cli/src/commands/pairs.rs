@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix_experiment::{dataset, source::Passage};
+use seafix_data::{dataset, source::Passage};
 
 use crate::{
     exit::{DONE, Ended, Failure, OUTPUT},

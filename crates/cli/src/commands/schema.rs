@@ -1,7 +1,8 @@
 //! `seafix schema`.
 
 use clap::ValueEnum;
-use seafix_experiment::{Keyframes, Navigation, Pipeline};
+use seafix::{Keyframes, Pipeline};
+use seafix_experiment::Navigation;
 use serde_json::{Map, Value, json};
 
 use crate::{

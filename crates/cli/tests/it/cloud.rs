@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_experiment::dataset::{ImageLimits, read_image, write_png};
+use seafix_data::dataset::write_png;
+use seafix_io::{ImageLimits, read_image};
 use serde_json::Value;
 use tempfile::TempDir;
 

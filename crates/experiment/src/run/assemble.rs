@@ -12,8 +12,9 @@ use super::{
     Observer, RunError,
     store::{Sealed, network},
 };
+use seafix_data::dataset::sha256;
+
 use crate::{
-    dataset::sha256,
     manifest::Manifest,
     results::{Stretch, join_csv, join_parquet},
 };

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use rayon::prelude::*;
+use seafix::{Eyes, Helm, Keyframes, OdometryResult, OdometrySession, Sight, Sighting, Underway, View, Voyage};
 use seafix_component::Fault;
-use seafix_log::{FrameRecord, TrialHeader};
+use seafix_data::source::{Passage, own_site};
+use seafix_log::{FrameRecord, SharedStages, TrialHeader};
 use seafix_navigation::Network;
 use seafix_referencing::{Glimpse, Site, Target, TargetKind};
 use seafix_simulation::{Purpose, Stream};
@@ -13,16 +15,7 @@ use super::{
     RunError,
     share::{SharedFrame, Sharing},
 };
-use crate::{
-    Helm, ImagesLogged, Keyframes, Plan, Sighting, Trial,
-    judge::Judge,
-    navigate::{Underway, Voyage},
-    odometry_session::{OdometryResult, OdometrySession},
-    pictures::Levels,
-    record,
-    source::{Eyes, Passage, Sight},
-    stages::View,
-};
+use crate::{ImagesLogged, Plan, Trial, judge::Judge, odometry_fault::Motions, pictures::Levels, record};
 
 /// The trials that see the same passage: they share its frames, so that they are compared on the
 /// same noise.
@@ -75,6 +68,8 @@ pub(super) struct Looked {
     own: Option<(Site, Vec<Target>)>,
     /// Of each trial, what it saw, and what it knew then if it navigates.
     sightings: Vec<(Sighting, Option<Underway>)>,
+    /// Of each trial, which of its stages it shared.
+    shared: Vec<SharedStages>,
     /// Of each trial, what a joint fix takes from it.
     pub(super) glimpses: Vec<Glimpse>,
 }
@@ -117,7 +112,7 @@ pub(crate) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunErr
                     if let Some(helm) = &trial.helm {
                         faults.extend(unnavigable(&*group.passage, helm, &targets));
                     }
-                    match keyframes(trial).map_or(Ok(None), |keyframes| keyframes.open(&plan.folder)) {
+                    match keyframes(trial).map_or(Ok(None), |used| crate::keyframes::open(used, &plan.folder)) {
                         Ok(network) => group.networks.push(network),
                         Err(fault) => faults.push(fault),
                     }
@@ -177,11 +172,15 @@ impl Group<'_> {
         let trials = self.trials.iter().zip(&self.targets).zip(&self.networks);
         let voyages = trials.map(|((trial, targets), network)| {
             let helm = trial.helm.as_ref()?;
-            Some(Voyage::begin(helm, &trial.stages, targets, &*self.passage, network.as_ref()))
+            let (rig, mounting) = (self.passage.rig(), self.passage.body_from_camera());
+            let voyage = Voyage::begin(helm, &trial.stages, targets, rig, mounting, network.as_ref());
+            let faults = trial.resolved.navigation.as_ref().map_or(&[][..], |navigation| &navigation.faults);
+            let mut motions = Motions::default();
+            Some(voyage.with_motion_filter(Box::new(move |time, motion| motions.passed(faults, time, motion))))
         });
         let odometries = self.trials.iter().enumerate().map(|(which, trial)| {
             let helm = trial.helm.as_ref().filter(|_| self.sharing.odometry_of(which) == which)?;
-            Some(helm.begin_odometry(&*self.passage))
+            Some(helm.begin_odometry(self.passage.rig(), self.passage.body_from_camera()))
         });
         Voyages { odometries: odometries.collect(), trials: voyages.collect() }
     }
@@ -191,7 +190,7 @@ impl Group<'_> {
     pub(super) fn look(&self, index: usize, voyages: &mut Voyages<'_>) -> Result<Looked, Fault> {
         let (passage, number) = (&*self.passage, self.passage.number(index));
         let sight = passage.sight(index)?;
-        let own = sight.own_site().map(|site| {
+        let own = own_site(&sight).map(|site| {
             let targets = site.targets(TargetKind::Object).expect("an object by itself needs no world");
             (site, targets)
         });
@@ -222,13 +221,13 @@ impl Group<'_> {
             false => voyages.trials.iter_mut().enumerate().map(look).collect(),
         };
         let mut sightings = sightings.map_err(fault)?;
-        let mut glimpses = Vec::with_capacity(sightings.len());
+        let (mut glimpses, mut stages) = (Vec::with_capacity(sightings.len()), Vec::with_capacity(sightings.len()));
         for (which, (sighting, _)) in sightings.iter_mut().enumerate() {
-            sighting.times.shared = self.sharing.shared(which, &shared, sighting);
+            stages.push(self.sharing.shared(which, &shared, sighting));
             let targets = searched(&own, &self.targets[which]);
             glimpses.push(self.trials[which].stages.glimpse(sighting, targets, passage.rig()));
         }
-        Ok(Looked { sight, own, sightings, glimpses })
+        Ok(Looked { sight, own, sightings, shared: stages, glimpses })
     }
 
     /// The records of one frame, a trial each: what is solved together is joined, then truth is asked. `glimpses` are
@@ -256,7 +255,15 @@ impl Group<'_> {
                     trial.stages.join(&mut sighting, &before, &own[which], targets, passage.rig());
                 }
                 let number = passage.number(index);
-                let mut record = record::frame(number, &looked.sight, &sighting, underway.as_ref(), trial, targets);
+                let mut record = record::frame(
+                    number,
+                    &looked.sight,
+                    &sighting,
+                    underway.as_ref(),
+                    looked.shared[which],
+                    trial,
+                    targets,
+                );
                 let kind = trial.stages.settings().target;
                 let judge = truth.as_ref().map(|truth| Judge { truth, site, targets, kind, rig: passage.rig() });
                 if let Some(judge) = &judge {

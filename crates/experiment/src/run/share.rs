@@ -5,12 +5,10 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
+use seafix::{Cloud, Pipeline, Sighting, Sought};
 use seafix_log::SharedStages;
 
-use crate::{
-    Pipeline, Sighting, Trial,
-    stages::{Cloud, Sought},
-};
+use crate::Trial;
 
 /// The trials of a group that have a stage in common: for each trial the place of the first that has the same.
 #[derive(Debug)]

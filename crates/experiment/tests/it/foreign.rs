@@ -6,7 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_experiment::{Options, Plan, Silent, dataset::Dataset, run};
+use seafix_data::dataset::Dataset;
+use seafix_experiment::{Options, Plan, Silent, run};
 use seafix_geometry::{Body, Camera, Frame, Transform};
 use tempfile::TempDir;
 

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix_experiment::{
-    Pipeline, Plan,
-    source::{Eyes, Passage},
-};
+use seafix::{Eyes, Pipeline};
+use seafix_data::source::Passage;
+use seafix_experiment::{Plan, changed_pipeline};
 use seafix_geometry::StereoPixels;
 use seafix_vision::{Look, Threads};
 
@@ -21,7 +20,7 @@ struct Corner {
 /// have none.
 fn corners(passage: &dyn Passage, settings: &[&str]) -> (Vec<Corner>, usize) {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    let front_end = Pipeline::default().changed(&settings).unwrap().front_end().unwrap();
+    let front_end = changed_pipeline(&Pipeline::default(), &settings).unwrap().front_end().unwrap();
     let (mut look, mut found, mut missed) = (Look::new(Threads::Pool), Vec::new(), 0);
     for index in 0..passage.frames() {
         let Eyes::Pair(left, right) = passage.sight(index).unwrap().eyes else { continue };

@@ -6,7 +6,6 @@ mod costs;
 mod foreign;
 mod located;
 mod logging_cost;
-mod model;
 mod network;
 mod problems;
 mod replay;

@@ -2,10 +2,9 @@
 
 use std::{fs, path::Path};
 
-use seafix_experiment::{
-    Options, Plan, Silent, run,
-    source::{DrawnProblems, Eyes, Source},
-};
+use seafix::Eyes;
+use seafix_data::source::{DrawnProblems, Source};
+use seafix_experiment::{Options, Plan, Silent, run};
 use seafix_log::{Evaluation, FrameRecord, Outcome, TargetRecord, TargetTimes, read};
 use seafix_simulation::families::{Drawn, Family, Presence};
 use tempfile::TempDir;

@@ -9,7 +9,8 @@ use std::{collections::BTreeMap, fmt::Debug, fs, path::Path};
 
 use nalgebra::{Matrix2, Matrix3, Vector3, Vector6};
 use seafix_component::{Choice, Registry};
-use seafix_experiment::{Options, Plan, SHARED, Silent, components, run, source::SOURCES};
+use seafix_data::source::SOURCES;
+use seafix_experiment::{Options, Plan, SHARED, Silent, components, run};
 use seafix_geometry::{
     Camera, Covariance6, MeasuredPoint, Object, Pinhole, Pixel, Point, RightCamera, StereoPixels, StereoRig, Transform,
     UncertainPixels, UncertainPoint,

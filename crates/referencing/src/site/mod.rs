@@ -150,6 +150,16 @@ pub struct Site {
 }
 
 impl Site {
+    /// Reads a site file (`seafix-site/1`).
+    ///
+    /// # Errors
+    /// A file that cannot be read, or everything that is wrong with it, at once.
+    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, Vec<Fault>> {
+        let path = path.as_ref();
+        let text = seafix_component::read_text(path).map_err(|fault| vec![fault])?;
+        Self::parse(&text, path)
+    }
+
     /// The site that `text`, the content of `file`, describes in `seafix-site/1`.
     ///
     /// # Errors

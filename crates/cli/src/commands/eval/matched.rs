@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use seafix_data::trajectory::{Trajectory, Way};
 use seafix_evaluation::trajectory::{Alignment, Pose, align, associate};
-use seafix_experiment::trajectory::{Trajectory, Way};
 
 use super::Eval;
 use crate::exit::{Failure, INPUT, USAGE};

@@ -6,8 +6,8 @@ mod told;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
+use seafix_data::trajectory::{Format, Trajectory, Way};
 use seafix_evaluation::trajectory::{Alignment, Delta, Leg, Relation, Summary, ape, drift, pairs, path_lengths, rpe};
-use seafix_experiment::trajectory::{Format, Trajectory, Way};
 
 use crate::{
     exit::{DONE, Ended, Failure, USAGE},

@@ -1,0 +1,236 @@
+//! Everything that is wrong with a data set, images included.
+
+use std::{
+    io::Read,
+    ops::Add,
+    path::{Path, PathBuf},
+};
+
+use rayon::prelude::*;
+use seafix_component::Fault;
+use seafix_geometry::StereoPixels;
+use seafix_vision::{Image, Realigned, Sides, look_alikes};
+use sha2::{Digest, Sha256};
+
+use seafix_io::{ImageLimits, image::regular};
+
+use super::{Dataset, SAME_INSTANT_NS, folder::inside};
+
+/// Reads the data set in `folder` and every file it names: decodes the images, compares their sizes
+/// with the calibration and, where hashes are given, every file with its hash.
+///
+/// Returns the faults and the warnings.
+pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
+    let dataset = match Dataset::open(folder) {
+        Ok(dataset) => Dataset { limits, ..dataset },
+        Err(faults) => return (faults, Vec::new()),
+    };
+    let (mut faults, twins) = look_through(&dataset);
+    faults.extend(twins.fault(&dataset));
+    faults.extend(hash_faults(&dataset));
+    let mut warnings = dataset.warnings.clone();
+    warnings.extend(dataset.odd_times());
+    if faults.is_empty() {
+        let (sides, table) = (sides(&dataset), dataset.folder.join(&dataset.table));
+        faults.extend(swapped_fault(sides, &table));
+        warnings.extend(strangers(sides, &table));
+    }
+    (faults, warnings)
+}
+
+impl Dataset {
+    /// What is odd about the times of the pairs: a leap of more than a year, and pairs so near that a camera takes none such.
+    pub fn odd_times(&self) -> Vec<Fault> {
+        const YEAR_NS: u64 = 31_557_600_000_000_000;
+        let table = self.folder.join(&self.table);
+        let steps = || self.frames.windows(2).map(|two| [two[0].stamp_ns, two[1].stamp_ns]);
+        let told = |what: &str, odd: &dyn Fn(u64) -> bool, remedy: &str| {
+            let all: Vec<[u64; 2]> = steps().filter(|[before, after]| odd(after - before)).collect();
+            let [before, after] = all.first()?;
+            let value = format!("from {before} to {after} ns, one of {}", all.len());
+            Some(Fault::new(what, &table).value(value).remedy(remedy))
+        };
+        let leap =
+            told("stamps that leap by more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
+        let remedy = "a camera takes no two pairs within a millisecond: are they nanoseconds?";
+        leap.into_iter().chain(told("pairs too near in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
+    }
+}
+
+/// Pairs whose two images are the same, pixel by pixel.
+#[derive(Debug, Default)]
+pub struct Twins {
+    count: usize,
+    first: Option<(PathBuf, PathBuf)>,
+}
+
+/// Decodes all images of the data set: what is wrong with them, and which pairs are one image twice.
+pub fn look_through(dataset: &Dataset) -> (Vec<Fault>, Twins) {
+    let seen: Vec<(Option<Fault>, bool)> = dataset
+        .frames
+        .par_iter()
+        .map(|frame| match dataset.pair(frame) {
+            Err(fault) => (Some(fault), false),
+            Ok((left, right)) => (None, are_twins(&left, &right)),
+        })
+        .collect();
+    let mut twins = Twins { count: seen.iter().filter(|(_, twin)| *twin).count(), first: None };
+    let first = seen.iter().position(|(_, twin)| *twin).map(|first| &dataset.frames[first]);
+    twins.first = first.map(|frame| (frame.left.clone(), frame.right.clone()));
+    let mut faults: Vec<Fault> = seen.into_iter().filter_map(|(fault, _)| fault).collect();
+    faults.dedup();
+    (faults, twins)
+}
+
+/// Whether two images are one: cameras apart never see the same, unless there is nothing to see.
+pub fn are_twins(left: &Image, right: &Image) -> bool {
+    let flat = || left.pixels().iter().all(|pixel| *pixel == left.pixels()[0]);
+    left == right && !flat()
+}
+
+/// What is wrong with the pair of these two files where they hold one image.
+pub fn twins_fault(left: &Path, right: &Path) -> Fault {
+    Fault::new("left and right images that are the same", left)
+        .value(format!("the pixels of {}", right.display()))
+        .remedy("give the image of the other camera; one image twice has no depth")
+}
+
+impl Twins {
+    pub fn fault(&self, dataset: &Dataset) -> Option<Fault> {
+        let (left, right) = self.first.as_ref()?;
+        let fault = twins_fault(left, right);
+        let value = format!("{}, and so {} of {} pairs", fault.value, self.count, dataset.frames.len());
+        Some(fault.value(value))
+    }
+}
+
+/// Frames whose images are looked at for their order.
+pub const LOOKED_AT: usize = 3;
+/// Pairs that are asked where the rig stands.
+const ASKED: usize = 8;
+
+/// Left and right images that have changed places, as three frames from the whole length of the set show.
+pub fn swapped(dataset: &Dataset) -> Option<Fault> {
+    swapped_fault(sides(dataset), &dataset.folder.join(&dataset.table))
+}
+
+/// What three frames from the whole length of the set say of the order of their images.
+fn sides(dataset: &Dataset) -> Sides {
+    let step = dataset.frames.len().div_ceil(LOOKED_AT).max(1);
+    let pairs = dataset.frames.iter().step_by(step).filter_map(|frame| dataset.pair(frame).ok());
+    let sides = pairs.map(|(left, right)| Sides::of_images(&left, &right, &dataset.rig));
+    sides.fold(Sides::default(), Sides::add)
+}
+
+/// The same by the first pairs that can tell, for a set whose images need not all be good: the first that speaks for
+/// their places ends the search, three that speak against it decide.
+pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
+    let (mut sides, mut told) = (Sides::default(), 0);
+    for (left, right) in dataset.frames.iter().filter_map(|frame| dataset.pair(frame).ok()) {
+        sides = sides + Sides::of_images(&left, &right, &dataset.rig);
+        told += usize::from(sides.can_tell());
+        if told == LOOKED_AT || sides.can_tell() && !sides.are_swapped() {
+            break;
+        }
+    }
+    swapped_fault(sides, &dataset.folder.join(&dataset.table))
+}
+
+/// The rig of `dataset` turned to where pairs of its images say that it stands, of so many of them, evenly over the set; `None`
+/// where they do not contradict it. Images that cannot be read say nothing.
+pub fn realigned(dataset: &Dataset) -> Option<Realigned> {
+    let apart = dataset.frames.len().div_ceil(ASKED).max(1);
+    let some = dataset.frames.iter().step_by(apart).filter_map(|frame| dataset.pair(frame).ok());
+    let seen: Vec<StereoPixels> = some.flat_map(|(left, right)| look_alikes(&left, &right, &dataset.rig)).collect();
+    Realigned::of(&seen, &dataset.rig)
+}
+
+/// What is wrong with the images of `file` if left and right have changed places.
+pub fn swapped_fault(sides: Sides, file: &Path) -> Option<Fault> {
+    sides.are_swapped().then(|| {
+        Fault::new("left and right images that have changed places", file)
+            .value(format!("{} of {} matches lie behind the cameras", sides.exchanged, sides.exchanged + sides.given))
+            .remedy("exchange the images, or the cameras of the rig")
+    })
+}
+
+/// A word where key points have hardly any partners, and what the exchanged images would give.
+pub fn strangers(sides: Sides, file: &Path) -> Option<Fault> {
+    sides.are_strangers().then(|| {
+        let Sides { given, exchanged, keypoints } = sides;
+        Fault::new("images with key points and hardly a match", file)
+            .value(format!("{keypoints} key points, {given} matches; {exchanged} with left and right exchanged"))
+            .remedy(partners_remedy(exchanged, exchanged > 3 * given))
+    })
+}
+
+/// What to do about images whose key points have no partners: exchange them if that gives more than a handful.
+pub fn partners_remedy(exchanged: usize, clearly: bool) -> &'static str {
+    const HANDFUL: usize = 10;
+    if exchanged >= HANDFUL && clearly {
+        "exchange the images if they have changed places"
+    } else {
+        "see whether both show one scene, and whether the rig is theirs"
+    }
+}
+
+/// Files that are not those whose hashes the description has.
+pub fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
+    let file = dataset.folder.join("dataset.toml");
+    let mut faults = Vec::new();
+    for (name, expected) in &dataset.hashes {
+        match inside(&dataset.folder, name, &file).and_then(|path| sha256(&path)) {
+            Err(fault) => faults.push(fault),
+            Ok(found) if !found.eq_ignore_ascii_case(expected) => faults.push(
+                Fault::new("a file that is not the one described", &dataset.folder.join(name))
+                    .value(format!("sha256 {found}"))
+                    .remedy(format!("[hashes] has {expected}: restore the file or correct the hash")),
+            ),
+            Ok(_) => {}
+        }
+    }
+    faults
+}
+
+/// The SHA-256 of a file in hexadecimal.
+pub fn sha256(path: &Path) -> Result<String, Fault> {
+    let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), path);
+    let mut file = regular(path)?;
+    let (mut hasher, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut buffer).map_err(unreadable)? {
+            0 => return Ok(hex(&hasher.finalize())),
+            read => hasher.update(&buffer[..read]),
+        }
+    }
+}
+
+/// Bytes in hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// All files of a data set's folder and their SHA-256, in order of name, paths with `/` relative to it.
+pub fn input_hashes(folder: &Path) -> Result<Vec<(String, String)>, Fault> {
+    let mut files = Vec::new();
+    gather(folder, PathBuf::new(), &mut files)?;
+    files.sort();
+    files.into_iter().map(|name| sha256(&folder.join(&name)).map(|hash| (name, hash))).collect()
+}
+
+fn gather(folder: &Path, below: PathBuf, files: &mut Vec<String>) -> Result<(), Fault> {
+    let here = folder.join(&below);
+    let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), &here);
+    for entry in std::fs::read_dir(&here).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        let path = below.join(entry.file_name());
+        // Links are not followed: they may lead out of the folder or back into it.
+        let kind = entry.file_type().map_err(unreadable)?;
+        if kind.is_dir() {
+            gather(folder, path, files)?;
+        } else if kind.is_file() {
+            files.push(path.to_string_lossy().replace('\\', "/"));
+        }
+    }
+    Ok(())
+}

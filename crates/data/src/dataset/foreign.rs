@@ -1,0 +1,55 @@
+//! What the data sets of others have in common.
+
+use std::path::{Path, PathBuf};
+
+use seafix_component::Fault;
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
+
+use seafix_io::ImageLimits;
+
+use super::{
+    Dataset, DatasetFrame,
+    folder::{inside, is_absent},
+};
+use crate::source::Heard;
+
+/// A data set in the layout of others: no site, no prior.
+pub(super) struct Foreign {
+    pub(super) folder: PathBuf,
+    pub(super) rig: StereoRig,
+    pub(super) body_from_camera: Transform<Body, Camera>,
+    pub(super) frames: Vec<DatasetFrame>,
+    /// The file that lists the frames, relative to the folder.
+    pub(super) table: String,
+    pub(super) warnings: Vec<Fault>,
+}
+
+impl From<Foreign> for Dataset {
+    fn from(foreign: Foreign) -> Self {
+        let Foreign { folder, rig, body_from_camera, frames, table, warnings } = foreign;
+        // A name even for `.`.
+        let real = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        Self {
+            name: real.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned()),
+            folder,
+            rig,
+            ports: [None, None],
+            site: None,
+            body_from_camera,
+            frames,
+            objects: Vec::new(),
+            has_visibility: false,
+            heard: Heard::default(),
+            bits: 16,
+            limits: ImageLimits::default(),
+            table,
+            hashes: Vec::new(),
+            warnings,
+        }
+    }
+}
+
+/// The image `name` of `folder` that `table` lists; one that is missing is a fault unless `pairs_only`.
+pub(super) fn image(folder: &Path, name: &str, table: &Path, pairs_only: bool) -> Result<PathBuf, Fault> {
+    if pairs_only && is_absent(folder, name) { Ok(folder.join(name)) } else { inside(folder, name, table) }
+}

@@ -1,0 +1,26 @@
+//! Data sets: folders with stereo pairs, their rig, and what is known about them. Our own are `seafix-dataset/1`; those
+//! of EuRoC and KITTI are read as they are.
+
+mod check;
+mod euroc;
+mod folder;
+mod foreign;
+mod kitti;
+mod open;
+mod pairing;
+mod png;
+mod ports;
+pub mod tables;
+pub mod tum;
+mod write;
+
+pub use check::{LOOKED_AT, hash_faults, hex, input_hashes, look_through, sha256, swapped};
+pub use check::{
+    are_twins, check, partners_remedy, realigned, strangers, swapped_at_first, swapped_fault, twins_fault,
+};
+pub use kitti::Cameras;
+pub use open::{Dataset, DatasetFrame, is_one};
+pub use pairing::{SAME_INSTANT_NS, left_out, pairs};
+pub use png::{grey, write_png};
+pub use ports::CalibratedPort;
+pub use write::write;

@@ -1,0 +1,412 @@
+//! A data set, read and checked.
+
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
+
+use seafix_component::{Fault, line_of, nearest, read_text};
+use seafix_geometry::{Body, Camera, Covariance6, Object, StereoRig, Transform, World};
+use seafix_io::{
+    ImageLimits,
+    dataset::{Description, FORMATS},
+    image::size_fault,
+    read_image,
+};
+use seafix_navigation::{Device, Reading};
+use seafix_referencing::Site;
+use seafix_vision::Image;
+
+use super::{
+    CalibratedPort, Cameras, euroc,
+    folder::{inside, is_absent},
+    kitti, ports, tables, tum,
+};
+use crate::source::Heard;
+
+/// A data set whose description, tables and paths are in order. Its images are
+/// read frame by frame.
+#[derive(Debug)]
+pub struct Dataset {
+    /// Its name.
+    pub name: String,
+    /// The folder.
+    pub folder: PathBuf,
+    /// The rig that took it.
+    pub rig: StereoRig,
+    /// The ports that its cameras stand behind; the rig's numbers were found in the water behind them.
+    pub ports: [Option<CalibratedPort>; 2],
+    /// What there is to see, where that is known.
+    pub site: Option<Site>,
+    /// Where the left camera sits in the vehicle; the identity where the set does not say.
+    pub body_from_camera: Transform<Body, Camera>,
+    /// The stereo pairs, in order of time.
+    pub frames: Vec<DatasetFrame>,
+    /// True poses of displaced objects, by id; the others are where the survey says.
+    pub objects: Vec<(String, Transform<World, Object>)>,
+    /// Whether the set says which feature points are visible.
+    pub has_visibility: bool,
+    /// What its Doppler log and gyro told.
+    pub heard: Heard,
+    /// Depth of the pixels in images of 16 bits.
+    pub bits: u8,
+    /// How large an image may be; the reader's, not the data set's, to say.
+    pub limits: ImageLimits,
+    /// The table of the frames, relative to the folder.
+    pub(super) table: String,
+    pub(super) hashes: Vec<(String, String)>,
+    /// What is odd but not wrong.
+    pub warnings: Vec<Fault>,
+}
+
+/// One stereo pair of a data set and what is known about it.
+#[derive(Debug, Clone)]
+pub struct DatasetFrame {
+    /// When it was taken (ns).
+    pub stamp_ns: u64,
+    /// The left image's file.
+    pub left: PathBuf,
+    /// The right image's file.
+    pub right: PathBuf,
+    /// The true pose of the left camera.
+    pub truth: Option<Transform<World, Camera>>,
+    /// The rough pose a method may use, and its covariance.
+    pub prior: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
+    /// Feature points that both cameras see: (object, point).
+    pub visible: Vec<(String, String)>,
+}
+
+impl Dataset {
+    /// Reads the data set in `folder`: a `seafix-dataset/1`, a folder of EuRoC, or a sequence of KITTI.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once.
+    pub fn open(folder: &Path) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, false, false)
+    }
+
+    /// The same, of our own format also where its pairs are not in order of time: they are sorted, and of each stamp the first
+    /// is kept.
+    ///
+    /// # Errors
+    /// Everything else that is wrong with it, at once.
+    pub fn open_repaired(folder: &Path) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, false, true)
+    }
+
+    /// Reads the KITTI sequence in `folder` with two of its cameras.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once.
+    pub fn open_kitti(folder: &Path, cameras: Cameras) -> Result<Self, Vec<Fault>> {
+        kitti::read(folder, cameras, false)
+    }
+
+    /// Reads the EuRoC data set in `folder`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, at once.
+    pub fn open_euroc(folder: &Path) -> Result<Self, Vec<Fault>> {
+        let Some(home) = euroc::home(folder) else {
+            let fault = Fault::new("a folder that is no data set of EuRoC", folder);
+            return Err(vec![fault.remedy("name the folder that has mav0/cam0")]);
+        };
+        euroc::read(folder, &home, false)
+    }
+
+    /// Reads what odometry may know of the data set in `folder`: rig, stereo pairs and readings. Site, truth and prior are
+    /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair). `repair` as in
+    /// [`open_repaired`](Self::open_repaired).
+    ///
+    /// # Errors
+    /// Everything else that is wrong with it, at once.
+    pub fn open_pairs(folder: &Path, repair: bool) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, true, repair)
+    }
+
+    fn read(folder: &Path, pairs_only: bool, repair: bool) -> Result<Self, Vec<Fault>> {
+        let file = folder.join("dataset.toml");
+        if !folder.is_dir() {
+            return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
+        }
+        if !file.exists() {
+            if let Some(home) = euroc::home(folder) {
+                return euroc::read(folder, &home, pairs_only);
+            }
+            if kitti::is_one(folder) {
+                return kitti::read(folder, Cameras::Any, pairs_only);
+            }
+            let fault = Fault::new("a folder that is no data set", folder);
+            let remedy = "it has neither a dataset.toml, nor EuRoC's mav0/cam0, nor KITTI's calib.txt and image_0";
+            return Err(vec![fault.remedy(remedy)]);
+        }
+        let source = read_text(&file).map_err(|fault| vec![fault])?;
+        let mut described: Description =
+            toml::from_str(&source).map_err(|error| vec![Fault::in_toml(&file, &source, &error)])?;
+        if pairs_only {
+            described.keep_pairs_only();
+        }
+        let (faults, warnings) = (Vec::new(), Vec::new());
+        Reader { folder, file: &file, source: &source, described: &described, pairs_only, repair, faults, warnings }
+            .read()
+    }
+}
+
+/// Whether `folder` holds a data set, ours or others'.
+pub fn is_one(folder: &Path) -> bool {
+    folder.join("dataset.toml").exists() || euroc::home(folder).is_some() || kitti::is_one(folder)
+}
+
+impl Dataset {
+    /// The same, its images held to other limits.
+    #[must_use]
+    pub fn within(self, limits: ImageLimits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// Whether both its Doppler log and its gyro are heard.
+    pub fn hears(&self) -> bool {
+        self.heard.is_whole()
+    }
+
+    /// What Doppler log and gyro told up to `now` (ns), up to `before` left out.
+    pub fn readings(&self, before: Option<u64>, now: u64) -> Vec<Reading> {
+        self.heard.between(before, now)
+    }
+
+    /// The two images of `frame`.
+    ///
+    /// # Errors
+    /// As [`read_image`].
+    pub fn pair(&self, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
+        let left = read_image(&frame.left, self.rig.left().size(), self.bits, self.limits)?;
+        Ok((left, read_image(&frame.right, self.rig.right().size(), self.bits, self.limits)?))
+    }
+
+    /// Leaves out the pairs with an image of another size than its camera was calibrated for, as a set recorded in two
+    /// modes has them, and warns of them. If more than half of the pairs would go, all stay: then it is the
+    /// calibration that belongs elsewhere, and reading them says so.
+    pub fn leave_out_misfits(&mut self) {
+        let sizes = [self.rig.left().size(), self.rig.right().size()];
+        let faults: Vec<Option<Fault>> = self
+            .frames
+            .iter()
+            .map(|frame| {
+                [&frame.left, &frame.right].into_iter().zip(sizes).find_map(|(path, size)| size_fault(path, size))
+            })
+            .collect();
+        let (all, misfits) = (faults.len(), faults.iter().flatten().count());
+        let Some(first) = faults.iter().flatten().next().filter(|_| 2 * misfits <= all) else { return };
+        self.warnings.push(Fault {
+            what: format!("{misfits} of {all} pairs left out: {}", first.what),
+            remedy: "`strict = true` of the source refuses them".to_owned(),
+            ..first.clone()
+        });
+        let mut fits = faults.iter().map(Option::is_none);
+        self.frames.retain(|_| fits.next().unwrap_or(true));
+    }
+}
+
+/// Reads one description and gathers its faults.
+struct Reader<'a> {
+    folder: &'a Path,
+    file: &'a Path,
+    source: &'a str,
+    described: &'a Description,
+    pairs_only: bool,
+    repair: bool,
+    faults: Vec<Fault>,
+    warnings: Vec<Fault>,
+}
+
+impl Reader<'_> {
+    fn read(mut self) -> Result<Dataset, Vec<Fault>> {
+        let d = self.described;
+        if !FORMATS.contains(&d.format.as_str()) {
+            let remedy = format!("this program reads {}", FORMATS.join(" and "));
+            self.fault(&["format"], "an unknown format", &d.format, &remedy);
+        }
+        let bits = d.depth(self.file, self.source).map_err(|fault| self.faults.push(fault));
+        let rig = d.build_rig(self.file, self.source).and_then(|rig| {
+            let ports = ports::ports(d, self.file, self.source)?;
+            Ok((rig, ports))
+        });
+        let rig = rig.map_err(|fault| self.faults.push(fault));
+        let body_from_camera = d.mounting(self.file, self.source).unwrap_or_else(|fault| {
+            self.faults.push(fault);
+            Transform::identity()
+        });
+        let repair = self.repair;
+        let frame_lines = self.table(&d.frames, |text, file| tables::frames(text, file, repair)).unwrap_or_default();
+        let site = d.site.as_deref().and_then(|name| self.site(name));
+        let truth = d.truth.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
+        let prior = d.prior.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
+        let covariances = d.prior_covariance.as_deref().and_then(|name| self.table(name, tables::covariances));
+        let visibility = d.visibility.as_deref().and_then(|name| self.table(name, tables::visibility));
+        let objects = d.objects.as_deref().and_then(|name| self.table(name, tables::objects)).unwrap_or_default();
+        let mut readings = |name: &Option<String>, device| {
+            let table = |name: &str| self.table(name, |text, file| tables::readings(text, file, device));
+            name.as_deref().and_then(table).unwrap_or_default()
+        };
+        let (doppler, gyro) = (readings(&d.doppler, Device::Doppler), readings(&d.gyro, Device::Gyro));
+        for (key, given, other) in [("doppler", &d.doppler, &d.gyro), ("gyro", &d.gyro, &d.doppler)] {
+            if given.is_some() && other.is_none() {
+                self.fault(&[key], "one device without the other", key, "dead reckoning needs `doppler` and `gyro`");
+            }
+        }
+        let sigma = self.prior_sigma();
+        if d.prior.is_some() && sigma.is_none() && covariances.is_none() {
+            self.fault(&["prior"], "a prior without its uncertainty", "", "add prior_sigma or prior_covariance");
+        }
+        self.names(site.as_ref(), visibility.as_deref().unwrap_or_default(), &objects);
+
+        let mut frames = Vec::with_capacity(frame_lines.len());
+        for line in &frame_lines {
+            let (Some(left), Some(right)) = (self.image(line, &line.left), self.image(line, &line.right)) else {
+                continue;
+            };
+            let covariance = covariances
+                .as_ref()
+                .and_then(|all| all.iter().find(|(stamp, _)| *stamp == line.stamp_ns).map(|(_, c)| *c))
+                .or(sigma);
+            frames.push(DatasetFrame {
+                stamp_ns: line.stamp_ns,
+                left,
+                right,
+                truth: tum::at(&truth, line.stamp_ns),
+                prior: tum::at(&prior, line.stamp_ns).zip(covariance),
+                visible: visibility
+                    .iter()
+                    .flatten()
+                    .filter(|v| v.stamp_ns == line.stamp_ns)
+                    .map(|v| (v.object.clone(), v.point.clone()))
+                    .collect(),
+            });
+        }
+        let mut warnings = std::mem::take(&mut self.warnings);
+        warnings.extend(site.iter().flat_map(|site| site.warnings.clone()));
+        warnings.extend(rig.as_ref().ok().and_then(|(rig, _)| d.not_rectified(rig, self.file, self.source)));
+        for (name, given, found) in [
+            ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count()),
+            ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count()),
+        ] {
+            if given && found < frames.len() {
+                warnings.push(
+                    Fault::new(format!("stereo pairs without a {name}"), self.file)
+                        .on_line(line_of(self.source, &[name]))
+                        .value(format!("{} of {}", frames.len() - found, frames.len()))
+                        .remedy("a pose belongs to a pair when its stamp is within 1 ms"),
+                );
+            }
+        }
+        match (rig, bits) {
+            (Ok((rig, ports)), Ok(bits)) if self.faults.is_empty() => Ok(Dataset {
+                name: d.name.clone(),
+                folder: self.folder.to_owned(),
+                rig,
+                ports,
+                site,
+                body_from_camera,
+                table: d.frames.clone(),
+                frames,
+                objects,
+                has_visibility: visibility.is_some(),
+                heard: Heard::new(doppler.into_iter().chain(gyro).collect()),
+                bits,
+                limits: ImageLimits::default(),
+                hashes: d.hashes.clone().into_iter().collect(),
+                warnings,
+            }),
+            _ => Err(self.faults),
+        }
+    }
+
+    fn fault(&mut self, key: &[&str], what: &str, value: &str, remedy: &str) {
+        self.faults.push(Fault::new(what, self.file).on_line(line_of(self.source, key)).value(value).remedy(remedy));
+    }
+
+    /// The content of a file the description names, or a fault.
+    fn content(&mut self, name: &str) -> Option<(PathBuf, String)> {
+        let read =
+            inside(self.folder, name, self.file).and_then(|path| read_text(&path).map(|content| (path, content)));
+        read.map_err(|fault| {
+            let line = self.source.lines().position(|line| line.contains(name)).map(|index| index + 1);
+            self.faults.push(if fault.file == self.file { fault.on_line(line) } else { fault });
+        })
+        .ok()
+    }
+
+    fn table<T>(&mut self, name: &str, parse: impl FnOnce(&str, &Path) -> Result<T, Fault>) -> Option<T> {
+        let (path, content) = self.content(name)?;
+        parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()
+    }
+
+    /// A trajectory; a quaternion that had to be normalised is a warning, one a table.
+    fn poses(&mut self, name: &str) -> Option<Vec<tum::Stamped<World, Camera>>> {
+        let (path, content) = self.content(name)?;
+        let poses = tum::parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()?;
+        if let Some((line, length)) = tum::normalised(&content) {
+            let what = Fault::new("a quaternion that is not of unit length", &path).on_line(line);
+            self.warnings.push(what.value(format!("{length:.6}")).remedy("it was normalised; give more decimals"));
+        }
+        Some(poses)
+    }
+
+    fn site(&mut self, name: &str) -> Option<Site> {
+        let (path, content) = self.content(name)?;
+        Site::parse(&content, &path).map_err(|faults| self.faults.extend(faults)).ok()
+    }
+
+    fn image(&mut self, line: &tables::FrameLine, name: &str) -> Option<PathBuf> {
+        let table = self.folder.join(&self.described.frames);
+        if self.pairs_only && is_absent(self.folder, name) {
+            return Some(self.folder.join(name));
+        }
+        inside(self.folder, name, &table).map_err(|fault| self.faults.push(fault.on_line(line.line))).ok()
+    }
+
+    fn prior_sigma(&mut self) -> Option<Covariance6<World, Camera>> {
+        let sigma = self.described.prior_sigma?;
+        for (name, value) in [("position", sigma.position), ("attitude_deg", sigma.attitude_deg)] {
+            if !(value.is_finite() && value > 0.0) {
+                self.fault(
+                    &["prior_sigma", name],
+                    "a standard deviation that is not positive",
+                    &format!("{name} = {value}"),
+                    "give metres and degrees above zero",
+                );
+                return None;
+            }
+        }
+        Some(Covariance6::isotropic(sigma.attitude_deg.to_radians(), sigma.position))
+    }
+
+    /// Objects and points that the tables name exist in the site.
+    fn names(
+        &mut self,
+        site: Option<&Site>,
+        visibility: &[tables::VisibleLine],
+        objects: &[(String, Transform<World, Object>)],
+    ) {
+        let Some(site) = site else { return };
+        let points = |id: &str| site.objects.iter().find(|object| object.id == id).map(|object| &object.points);
+        for line in visibility {
+            if points(&line.object).is_some_and(|points| points.iter().all(|point| point.id != line.point)) {
+                let table = self.folder.join(self.described.visibility.as_deref().unwrap_or_default());
+                let fault = Fault::new("a point that its object does not have", &table).on_line(line.line);
+                self.faults
+                    .push(fault.value(format!("{}/{}", line.object, line.point)).remedy("name a point of the site"));
+            }
+        }
+        let ids: Vec<&str> = site.objects.iter().map(|object| object.id.as_str()).collect();
+        let named: HashSet<&str> =
+            visibility.iter().map(|v| v.object.as_str()).chain(objects.iter().map(|(id, _)| id.as_str())).collect();
+        let mut unknown: Vec<&str> = named.into_iter().filter(|id| !ids.contains(id)).collect();
+        unknown.sort_unstable();
+        for id in unknown {
+            let remedy = nearest(id, ids.iter().copied())
+                .map_or_else(|| format!("there are {}", ids.join(", ")), |near| format!("did you mean `{near}`?"));
+            self.fault(&["site"], "an object that the site does not have", id, &remedy);
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! Sequences of stereo pairs or clouds, simulated and recorded.
+
+pub mod dataset;
+pub mod exact;
+mod model;
+mod ros;
+pub mod source;
+pub mod trajectory;
+
+pub use model::{HandModel, HandPoint, Mark, ModelByHand};

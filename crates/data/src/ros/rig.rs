@@ -1,0 +1,125 @@
+//! Two `CameraInfo`s as a rig.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use seafix_geometry::{Camera, Pinhole, RightCamera, Transform};
+use serde::{Deserialize, Serialize};
+
+use super::CameraInfo;
+
+/// Which images the recording has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Views {
+    /// Rectified where the topic's name says so (`image_rect`), else as the camera gave them.
+    #[default]
+    ByName,
+    /// As the camera gave them: K and D hold.
+    Raw,
+    /// Rectified: P holds.
+    Rectified,
+}
+
+impl Views {
+    /// Whether the images on this topic are rectified.
+    pub fn rectified(self, topic: &str) -> bool {
+        match self {
+            Self::ByName => topic.contains("rect") && !topic.contains("unrect"),
+            Self::Raw => false,
+            Self::Rectified => true,
+        }
+    }
+}
+
+/// The camera that took the images.
+pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> Result<Pinhole, String> {
+    if info.binning.iter().any(|&binning| binning > 1)
+        || info.region != [0; 4] && info.region[2..] != [info.size[1], info.size[0]]
+    {
+        return Err("images of a part of the sensor, or binned, are not read".to_owned());
+    }
+    let [fx, _, cx, _, fy, cy, ..] = info.k;
+    let [px, _, pcx, _, _, py, pcy, ..] = info.p;
+    let distortion: &[f64] = if info.d.iter().all(|&number| number == 0.0) { &[] } else { &info.d };
+    let built = match (rectified, info.model.as_str()) {
+        (true, _) => Pinhole::new(info.size, [px, py], [pcx, pcy], &[]),
+        (false, "plumb_bob" | "rational_polynomial" | "") => Pinhole::new(info.size, [fx, fy], [cx, cy], distortion),
+        // Whatever its D: a fisheye lens without coefficients (r = f·θ) is no pinhole (r = f·tan θ).
+        (false, other) => {
+            let read = "plumb_bob and rational_polynomial are";
+            let remedy = "rectify the images and set images = \"rectified\"";
+            return Err(format!("the distortion model `{other}` is not read, {read}: {remedy}"));
+        }
+    };
+    built.map_err(|error| error.to_string())
+}
+
+/// Where the cameras stand, as their calibration has it: `P = K [I | t]` in the frames that R turns them into;
+/// `None` where it says nothing.
+pub(crate) fn right_from_left(
+    left: &CameraInfo,
+    right: &CameraInfo,
+    rectified: bool,
+) -> Result<Option<Transform<RightCamera, Camera>>, String> {
+    let Some(between) = baseline(left, right) else { return Ok(None) };
+    if rectified {
+        return Ok(Some(Transform::new(UnitQuaternion::identity(), between)));
+    }
+    let (left, right) = (turn(left)?, turn(right)?);
+    Ok(Some(raw(&left, &right, &between)))
+}
+
+/// Where the left camera's centre is in the rectified right view (m), by P = K [I | t]; `None` where both are one.
+fn baseline(left: &CameraInfo, right: &CameraInfo) -> Option<Vector3<f64>> {
+    let shift = |info: &CameraInfo| {
+        let [fx, _, cx, tx, _, fy, cy, ty, _, _, _, tz] = info.p;
+        Vector3::new((tx - cx * tz) / fx, (ty - cy * tz) / fy, tz)
+    };
+    let between = shift(right) - shift(left);
+    (between.norm() > 0.0 && between.iter().all(|t| t.is_finite())).then_some(between)
+}
+
+/// The rotation R, x_rect = R x.
+fn turn(info: &CameraInfo) -> Result<Matrix3<f64>, String> {
+    let r = Matrix3::from_row_slice(&info.r);
+    let off = (r.transpose() * r - Matrix3::identity()).amax();
+    if off > 1e-6 { Err(format!("R is off orthonormal by {off:.1e}")) } else { Ok(r) }
+}
+
+/// The cameras as they are mounted: the right one sees the left one's x_rect at x_rect + t.
+fn raw(left: &Matrix3<f64>, right: &Matrix3<f64>, between: &Vector3<f64>) -> Transform<RightCamera, Camera> {
+    Transform::from_axes(&(right.transpose() * left), right.transpose() * between)
+}
+
+/// A calibration and a drawing of one rig agree about its baseline to this share,
+const SAME_LENGTH: f64 = 0.01;
+/// and about directions to this angle (rad).
+const SAME_DIRECTION: f64 = 0.1;
+
+/// Where the transforms have the right camera elsewhere than P: what each of them says. The frames of the transforms may
+/// be those of the cameras as they are mounted, or of the rectified views.
+pub(crate) fn contradiction(
+    left: &CameraInfo,
+    right: &CameraInfo,
+    stands: &Transform<RightCamera, Camera>,
+) -> Result<Option<String>, String> {
+    let Some(between) = baseline(left, right) else { return Ok(None) };
+    let rectified = Transform::new(UnitQuaternion::identity(), between);
+    // An R of zeros is that of a camera nobody has rectified.
+    let mounted = turn(left).and_then(|l| Ok(raw(&l, &turn(right)?, &between))).ok();
+    let agrees = |p: &Transform<RightCamera, Camera>| {
+        let (a, b) = (p.translation(), stands.translation());
+        (a.norm() - b.norm()).abs() <= SAME_LENGTH * a.norm()
+            && a.angle(&b) <= SAME_DIRECTION
+            && p.rotation().angle_to(&stands.rotation()) <= SAME_DIRECTION
+    };
+    if agrees(&rectified) || mounted.as_ref().is_some_and(agrees) {
+        return Ok(None);
+    }
+    let said = |t: &Vector3<f64>, turned: f64| {
+        let turned = if turned > 1e-3 { format!(", turned by {:.1}°", turned.to_degrees()) } else { String::new() };
+        format!("{:.4} m at [{:.3}, {:.3}, {:.3}]{turned}", t.norm(), t.x, t.y, t.z)
+    };
+    let p = mounted.unwrap_or(rectified);
+    let of = |which: &Transform<RightCamera, Camera>| said(&which.translation(), which.rotation().angle());
+    Ok(Some(format!("P says {}, /tf {}", of(&p), of(stands))))
+}

@@ -1,0 +1,353 @@
+//! The stereo rig and the stereo pairs of a recording of ROS 2, looked through.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use seafix_component::Fault;
+use seafix_geometry::{Camera, Covariance6, Frame, Pinhole, StereoRig, Transform, World};
+use seafix_io::{
+    ImageLimits,
+    image::{decode_image, image_of_samples},
+};
+use seafix_log::{Entry, Recording, Topic};
+use seafix_vision::{Image, Sides};
+
+use super::{Mcap, logged::fault, topics::Topics};
+use crate::{
+    dataset::{LOOKED_AT, are_twins, left_out, pairs, strangers, swapped_fault, tum::Stamped},
+    ros::{self, CameraInfo, CompressedImage, Odometry, Tree},
+};
+
+/// What a recording holds of a stereo rig: every pair in it has been decoded once.
+pub(super) struct Bag {
+    path: PathBuf,
+    recording: Recording,
+    settings: Mcap,
+    topics: Topics,
+    tree: Tree,
+    /// The coordinate frames of the cameras.
+    frames: [String; 2],
+    pub(super) rig: StereoRig,
+    /// Stamp and messages of each pair.
+    pub(super) pairs: Vec<(u64, [Entry; 2])>,
+    pub(super) warnings: Vec<Fault>,
+}
+
+/// Some frame that ROS names.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Child;
+impl Frame for Child {}
+
+/// Poses of the left camera, and their covariances where they have any.
+pub(super) type Poses = (Vec<Stamped<World, Camera>>, Option<Vec<Covariance6<World, Camera>>>);
+
+impl Bag {
+    /// Reads `path` through, decodes every image, and checks rig and images against each other. Pairs with an image that
+    /// cannot be read are left out, each with a warning, as long as at least half of the pairs stay.
+    pub(super) fn open(path: &Path, settings: &Mcap) -> Result<Self, Fault> {
+        let recording =
+            Recording::open(path, |topic: &Topic| topic.encoding == "cdr").map_err(|error| fault(path, &error))?;
+        let topics = Topics::of(path, &recording, settings)?;
+        let mut warnings = Vec::new();
+        if !recording.is_protected() {
+            warnings.push(Fault::new("no check sums", path).remedy("damage would not be noticed"));
+        }
+        let mut reader = Messages { path, recording: &recording, settings, warnings };
+        let infos = [reader.info(&topics.infos[0])?, reader.info(&topics.infos[1])?];
+        let tree = reader.tree()?;
+        let images = [reader.stamps(&topics.images[0])?, reader.stamps(&topics.images[1])?];
+        let frames = [0, 1].map(|side| images[side].first().map_or_else(String::new, |(_, _, frame)| frame.clone()));
+        let rig = reader.rig(&topics, &infos, &tree, &frames)?;
+        let stamps = [0, 1].map(|side| images[side].iter().map(|image| image.0).collect::<Vec<u64>>());
+        let found = pairs(&stamps[0], &stamps[1], (settings.tolerance * 1e9) as u64);
+        let left = left_out(found.len(), [stamps[0].len(), stamps[1].len()], path);
+        reader.warnings.extend(left?);
+        if found.is_empty() {
+            return Err(Fault::new("no stereo pair", path).remedy("no two images are of one instant; see `tolerance`"));
+        }
+        let pairs: Vec<(u64, [Entry; 2])> =
+            found.iter().map(|&(i, j)| (images[0][i].0, [images[0][i].1, images[1][j].1])).collect();
+        let warnings = reader.warnings;
+        let (path, settings) = (path.to_owned(), settings.clone());
+        let mut bag = Self { path, recording, settings, topics, tree, frames, rig, pairs, warnings };
+        bag.look_through()?;
+        bag.look_at_the_sides()?;
+        Ok(bag)
+    }
+
+    /// The two images of a pair.
+    pub(super) fn pair(&self, index: usize) -> Result<(Image, Image), Fault> {
+        let [left, right] = &self.pairs[index].1;
+        let bytes = |entry: &Entry| self.recording.message(entry).map_err(|error| fault(&self.path, &error));
+        self.decoded([left, right], [&bytes(left)?, &bytes(right)?])
+    }
+
+    /// The poses of the left camera that `said` names at the stamps of the pairs, and their covariances where they have any:
+    /// a topic of odometry, or `tf:FRAME`, the camera in that frame.
+    pub(super) fn poses(&self, said: &str) -> Result<Poses, Fault> {
+        let (recording, settings) = (&self.recording, &self.settings);
+        let reader = Messages { path: &self.path, recording, settings, warnings: Vec::new() };
+        let at: Vec<u64> = self.pairs.iter().map(|(stamp, _)| *stamp).collect();
+        reader.poses(said, &self.tree, &self.frames[0], &at)
+    }
+
+    /// What it holds, in a line.
+    pub(super) fn told(&self) -> String {
+        let ([left, right], [w, h]) = (&self.topics.images, self.rig.left().size());
+        let (first, last) = (self.pairs[0].0, self.pairs[self.pairs.len() - 1].0);
+        let poses = self.recording.topics().iter().filter(|topic| ros::plain(&topic.schema) == "nav_msgs/Odometry");
+        let poses: Vec<String> = poses.map(|topic| format!("`{}`", topic.name)).collect();
+        format!(
+            "{} pairs of {w}×{h} from `{left}` and `{right}` over {:.1} s, baseline {:.4} m; odometry: {}",
+            self.pairs.len(),
+            (last - first) as f64 * 1e-9,
+            self.rig.baseline(),
+            if poses.is_empty() { "none".to_owned() } else { poses.join(", ") }
+        )
+    }
+
+    /// Decodes all pairs once: those that cannot be read are left out, so that none ends a run midway.
+    fn look_through(&mut self) -> Result<(), Fault> {
+        /// Pairs are read in the order of the file, and so many of them decoded at a time.
+        const AT_ONCE: usize = 16;
+        /// Pairs left out that are told one by one.
+        const TOLD: usize = 10;
+        let bytes = |entry: &Entry| self.recording.message(entry).map_err(|error| fault(&self.path, &error));
+        let mut seen: Vec<Result<bool, Fault>> = Vec::with_capacity(self.pairs.len());
+        for some in self.pairs.chunks(AT_ONCE) {
+            let read = some.iter().map(|(_, [left, right])| Ok([bytes(left)?, bytes(right)?]));
+            let read = read.collect::<Result<Vec<_>, Fault>>()?;
+            let look = |((_, [left, right]), [l, r]): (&(u64, [Entry; 2]), &[Vec<u8>; 2])| {
+                self.decoded([left, right], [l, r]).map(|(left, right)| are_twins(&left, &right))
+            };
+            seen.extend(some.par_iter().zip(&read).map(look).collect::<Vec<_>>());
+        }
+        let all = self.pairs.len();
+        let twins = seen.iter().filter(|one| **one == Ok(true)).count();
+        if twins > 0 {
+            let fault = Fault::new("left and right images that are the same", &self.path);
+            let [left, right] = &self.topics.images;
+            let fault = fault.value(format!("{left} and {right}, {twins} of {all} pairs"));
+            return Err(fault.remedy("name the topic of the other camera; one image twice has no depth"));
+        }
+        let lost: Vec<Fault> = seen.iter().filter_map(|one| one.clone().err()).collect();
+        if 2 * lost.len() > all {
+            let remedy = format!("so are {} of {all} pairs; at least half must be readable", lost.len());
+            return Err(Fault { remedy, ..lost[0].clone() });
+        }
+        let more = lost.len().saturating_sub(TOLD);
+        if more > 0 {
+            let fault = Fault::new("pairs that cannot be read", &self.path).value(format!("{} of {all}", lost.len()));
+            self.warnings.push(fault.remedy("they are left out"));
+        }
+        let told =
+            lost.into_iter().take(TOLD).map(|fault| Fault { remedy: "its pair is left out".to_owned(), ..fault });
+        self.warnings.extend(told);
+        let mut readable = seen.iter().map(Result::is_ok);
+        self.pairs.retain(|_| readable.next().unwrap_or(false));
+        Ok(())
+    }
+
+    /// Whether the images are the cameras' they are said to be, as some pairs from the whole length show.
+    fn look_at_the_sides(&mut self) -> Result<(), Fault> {
+        let step = self.pairs.len().div_ceil(LOOKED_AT).max(1);
+        let mut sides = Sides::default();
+        for index in (0..self.pairs.len()).step_by(step) {
+            let (left, right) = self.pair(index)?;
+            sides = sides + Sides::of_images(&left, &right, &self.rig);
+        }
+        if let Some(fault) = swapped_fault(sides, &self.path) {
+            return Err(fault.remedy("exchange the topics `left` and `right`, or `left-info` and `right-info`"));
+        }
+        self.warnings.extend(strangers(sides, &self.path));
+        // A right camera on the left: the right one sees the left one's centre at t.
+        let t = self.rig.right_from_left().translation();
+        if t.x > 0.5 * t.norm() {
+            let fault = Fault::new("a left camera that stands to the right of the other", &self.path);
+            let fault = fault.value(format!("{} by {:.4} m", self.topics.images[0], t.x));
+            self.warnings.push(fault.remedy("exchange `left` and `right` unless that is meant"));
+        }
+        Ok(())
+    }
+
+    fn decoded(&self, entries: [&Entry; 2], bytes: [&[u8]; 2]) -> Result<(Image, Image), Fault> {
+        let [left, right] = [self.rig.left(), self.rig.right()];
+        Ok((self.image(entries[0], bytes[0], left)?, self.image(entries[1], bytes[1], right)?))
+    }
+
+    /// The image in a message.
+    fn image(&self, entry: &Entry, bytes: &[u8], camera: &Pinhole) -> Result<Image, Fault> {
+        let topic = &self.recording.topics()[entry.topic];
+        let broken = |what: String| message_fault(&self.path, topic, entry, &what);
+        let limits = ImageLimits { pixels: self.settings.max_pixels, bytes: self.settings.max_bytes };
+        if ros::plain(&topic.schema) == "sensor_msgs/CompressedImage" {
+            let message = CompressedImage::decode(bytes).map_err(broken)?;
+            let place = PathBuf::from(format!("{} ({} at {} ns)", self.path.display(), topic.name, entry.log_time));
+            return decode_image(message.data, &place, camera.size(), self.settings.bits, limits);
+        }
+        let message = ros::Image::decode(bytes).map_err(broken)?;
+        if message.size != camera.size() {
+            let ([w, h], [cw, ch]) = (message.size, camera.size());
+            return Err(broken(format!("an image of {w}×{h} from a camera calibrated for {cw}×{ch}")));
+        }
+        let (samples, white) = message.samples(self.settings.bits).map_err(broken)?;
+        image_of_samples(&samples, message.size, white).map_err(|fault| broken(fault.what))
+    }
+}
+
+/// What is wrong with a message.
+fn message_fault(path: &Path, topic: &Topic, entry: &Entry, what: &str) -> Fault {
+    Fault::new(what, path).value(format!("{} message {} at {} ns", topic.name, entry.sequence, entry.log_time))
+}
+
+/// Reads messages of a recording.
+struct Messages<'a> {
+    path: &'a Path,
+    recording: &'a Recording,
+    settings: &'a Mcap,
+    warnings: Vec<Fault>,
+}
+
+impl Messages<'_> {
+    fn of<'s>(&'s self, topic: &'s str) -> impl Iterator<Item = &'s Entry> {
+        self.recording.entries().iter().filter(move |entry| self.recording.topics()[entry.topic].name == topic)
+    }
+
+    fn read<T>(&self, entry: &Entry, decode: impl Fn(&[u8]) -> Result<T, String>) -> Result<T, Fault> {
+        let bytes = self.recording.message(entry).map_err(|error| fault(self.path, &error))?;
+        decode(&bytes).map_err(|what| message_fault(self.path, &self.recording.topics()[entry.topic], entry, &what))
+    }
+
+    /// The first calibration on a topic.
+    fn info(&self, topic: &str) -> Result<CameraInfo, Fault> {
+        let first = self.of(topic).next();
+        let entry = first.ok_or_else(|| Fault::new("a topic without messages", self.path).value(topic))?;
+        let info = self.read(entry, CameraInfo::decode)?;
+        for later in self.of(topic).skip(1) {
+            let other = self.read(later, CameraInfo::decode)?;
+            if !info.is_of_one_camera_with(&other) {
+                let value = format!("{topic}: the message of {} ns", other.header.stamp_ns);
+                let fault = Fault::new("a calibration that changes within the recording", self.path).value(value);
+                return Err(fault.remedy("cut the recording there and run its parts by themselves"));
+            }
+        }
+        Ok(info)
+    }
+
+    /// Stamp, message and coordinate frame of each image, in order of time.
+    fn stamps(&mut self, topic: &str) -> Result<Vec<(u64, Entry, String)>, Fault> {
+        let mut images: Vec<(u64, Entry, String)> = Vec::new();
+        for entry in self.of(topic) {
+            let header = self.read(entry, ros::stamp)?;
+            images.push((header.stamp_ns, *entry, header.frame));
+        }
+        let fault = |what: &str, at: &(u64, Entry, String)| {
+            let fault = Fault::new(what, self.path).value(format!("{topic}: {} ns", at.0));
+            fault.remedy("`repair = true` sorts them and keeps the first of each stamp")
+        };
+        let wrong = images.windows(2).find(|pair| pair[0].0 >= pair[1].0);
+        if let (Some([before, after]), false) = (wrong, self.settings.repair) {
+            let what = if before.0 == after.0 { "two images with one stamp" } else { "stamps that go back" };
+            return Err(fault(what, after));
+        }
+        images.sort_by_key(|image| image.0);
+        images.dedup_by_key(|image| image.0);
+        const YEAR_NS: u64 = 31_557_600_000_000_000;
+        if let Some((stamp, entry, _)) =
+            images.iter().find(|(stamp, entry, _)| stamp.abs_diff(entry.log_time) > YEAR_NS)
+        {
+            let value = format!("{topic}: taken at {stamp} ns, recorded at {} ns", entry.log_time);
+            let fault = Fault::new("clocks that are more than a year apart", self.path).value(value);
+            self.warnings.push(fault.remedy("do seconds and nanoseconds mix? the time of capture is used"));
+        }
+        Ok(images)
+    }
+
+    fn tree(&self) -> Result<Tree, Fault> {
+        let mut tree = Tree::default();
+        for (topic, is_static) in [("/tf", false), ("/tf_static", true)] {
+            for entry in self.of(topic) {
+                for transform in self.read(entry, ros::transforms)? {
+                    tree.add(transform, is_static);
+                }
+            }
+        }
+        tree.sort();
+        Ok(tree)
+    }
+
+    fn rig(
+        &self,
+        topics: &Topics,
+        infos: &[CameraInfo; 2],
+        tree: &Tree,
+        frames: &[String; 2],
+    ) -> Result<StereoRig, Fault> {
+        let rectified = self.settings.images.rectified(&topics.images[0]);
+        let fault = |side: usize, what: String| Fault::new(what, self.path).value(&topics.infos[side]);
+        let camera = |side: usize| ros::camera(&infos[side], rectified).map_err(|what| fault(side, what));
+        let calibrated = ros::right_from_left(&infos[0], &infos[1], rectified).map_err(|what| fault(1, what))?;
+        let [left, right] = frames;
+        let stamp = infos[0].header.stamp_ns;
+        // One frame for both images, as some drivers have it, says nothing of the cameras.
+        let of_tree = (left != right).then(|| tree.look_up(right, left, stamp, self.settings.gap_ns())).flatten();
+        if let (Some(_), Some(stands)) = (&calibrated, &of_tree) {
+            let said = ros::contradiction(&infos[0], &infos[1], stands).map_err(|what| fault(1, what))?;
+            if let Some(said) = said {
+                let what = "P and the transforms contradict each other about where the cameras stand".to_owned();
+                let remedy = format!(
+                    "correct {} or the transform `{right}` from `{left}`; without the transform P alone holds",
+                    topics.infos[1]
+                );
+                return Err(fault(1, what).value(said).remedy(remedy));
+            }
+        }
+        let stands = calibrated.or(of_tree).ok_or_else(|| {
+            let remedy =
+                format!("give the right camera's P a baseline (P[3] = −fx·b), or a transform `{left}` → `{right}`");
+            fault(1, "no baseline".to_owned()).remedy(remedy)
+        })?;
+        StereoRig::new(camera(0)?, camera(1)?, stands).map_err(|error| fault(1, error.to_string()))
+    }
+
+    /// The poses of the left camera that `said` names, and their covariances where they have any: a topic of odometry,
+    /// or `tf:FRAME`, the camera in that frame.
+    fn poses(&self, said: &str, tree: &Tree, camera: &str, stamps: &[u64]) -> Result<Poses, Fault> {
+        let gap = self.settings.gap_ns();
+        if said.is_empty() {
+            return Ok((Vec::new(), None));
+        }
+        if let Some(frame) = said.strip_prefix("tf:") {
+            let poses: Vec<_> =
+                stamps.iter().filter_map(|&stamp| Some((stamp, tree.look_up(frame, camera, stamp, gap)?))).collect();
+            if poses.is_empty() {
+                let fault =
+                    Fault::new("no transform that leads there", self.path).value(format!("`{frame}` from `{camera}`"));
+                return Err(fault.remedy("is the name of the frame right?"));
+            }
+            return Ok((poses, None));
+        }
+        let (mut poses, mut covariances) = (Vec::new(), Vec::new());
+        for entry in self.of(said) {
+            let message = self.read(entry, Odometry::decode)?;
+            let child_from_camera: Transform<Child, Camera> = match message.child.trim_start_matches('/') {
+                "" => Transform::identity(),
+                child if child == camera.trim_start_matches('/') => Transform::identity(),
+                child => tree.look_up(child, camera, message.header.stamp_ns, gap).ok_or_else(|| {
+                    let fault = Fault::new("no transform from the camera to the vehicle", self.path);
+                    fault.value(format!("`{child}` from `{camera}`")).remedy("record /tf_static")
+                })?,
+            };
+            let world_from_child: Transform<World, Child> = message.pose.transform();
+            poses.push((message.header.stamp_ns, world_from_child * child_from_camera));
+            covariances.push(ros::covariance(&message, &child_from_camera));
+        }
+        if poses.windows(2).any(|pair| pair[0].0 >= pair[1].0) {
+            return Err(Fault::new("stamps that do not increase", self.path).value(said));
+        }
+        if poses.is_empty() {
+            return Err(Fault::new("a topic without messages", self.path).value(said));
+        }
+        Ok((poses, covariances.into_iter().collect()))
+    }
+}

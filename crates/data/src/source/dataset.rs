@@ -1,0 +1,195 @@
+//! A recorded data set.
+
+use std::path::Path;
+
+use seafix_component::{Component, Fault, in_range, read_text};
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
+use seafix_io::ImageLimits;
+use seafix_referencing::Site;
+use serde::{Deserialize, Serialize};
+
+use super::{CalibratedPort, Eyes, Passage, Sight, Source, Told, Truth, WorldPrior};
+use crate::dataset::{Dataset, hash_faults, input_hashes, look_through, swapped};
+
+/// Reads a `seafix-dataset/1` folder, one of EuRoC, or a sequence of KITTI.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct DatasetSource {
+    /// The folder; relative to the experiment file.
+    pub path: String,
+    /// The file of a site to look for, instead of the data set's own; relative to the experiment file.
+    pub site: String,
+    /// The most pixels that an image's header may declare.
+    pub max_pixels: u64,
+    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    pub max_bytes: u64,
+    /// Whether one image of another size than the calibration refuses the whole set; otherwise its pair is left out
+    /// and counted, as long as at least half of the pairs stay.
+    pub strict: bool,
+    /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
+    pub repair: bool,
+}
+
+impl Default for DatasetSource {
+    fn default() -> Self {
+        let ImageLimits { pixels, bytes } = ImageLimits::default();
+        Self {
+            path: String::new(),
+            site: String::new(),
+            max_pixels: pixels,
+            max_bytes: bytes,
+            strict: false,
+            repair: false,
+        }
+    }
+}
+
+impl Component for DatasetSource {
+    const NAME: &'static str = "dataset";
+    const SUMMARY: &'static str = "stereo pairs from the folder of a data set, ours or others'";
+    const SOURCE: &'static str = "docs/formats.md";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(!self.path.is_empty(), "path", "''", "the folder of a data set, relative to the experiment file")?;
+        // What TOML can say.
+        let most = i64::MAX as u64;
+        in_range((1..=most).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
+        in_range((1..=most).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
+    }
+}
+
+impl Source for DatasetSource {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
+        let path = folder.join(&self.path);
+        let read = if self.repair { Dataset::open_repaired(&path) } else { Dataset::open(&path) };
+        let mut dataset = read?.within(limits);
+        if !self.strict {
+            dataset.leave_out_misfits();
+        }
+        Recorded::open(dataset, &self.site, folder)
+    }
+
+    fn may_hear(&self) -> bool {
+        true
+    }
+}
+
+/// A data set with a site.
+pub(super) struct Recorded {
+    dataset: Dataset,
+    site: Site,
+}
+
+impl Recorded {
+    /// The data set with the site in the file `site`, relative to `folder`, or its own.
+    pub(super) fn open(mut dataset: Dataset, site: &str, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        if !site.is_empty() {
+            let file = folder.join(site);
+            dataset.site = Some(Site::parse(&read_text(&file).map_err(|fault| vec![fault])?, &file)?);
+        }
+        let Some(site) = dataset.site.clone() else {
+            let fault = Fault::new("no site", &dataset.folder);
+            return Err(vec![fault.remedy("a fix needs a known object: add `site = \"site.toml\"`")]);
+        };
+        // Every image is decoded once before anything is written: a damaged one shall not end a run midway.
+        let (mut faults, twins) = look_through(&dataset);
+        faults.extend(twins.fault(&dataset));
+        faults.extend(hash_faults(&dataset));
+        if faults.is_empty() {
+            faults.extend(swapped(&dataset));
+        }
+        if faults.is_empty() { Ok(Box::new(Recorded { dataset, site })) } else { Err(faults) }
+    }
+}
+
+impl Passage for Recorded {
+    fn name(&self) -> &str {
+        &self.dataset.name
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+
+    fn rig(&self) -> &StereoRig {
+        &self.dataset.rig
+    }
+
+    fn body_from_camera(&self) -> Transform<Body, Camera> {
+        self.dataset.body_from_camera
+    }
+
+    fn images(&self) -> bool {
+        true
+    }
+
+    fn bits(&self) -> u8 {
+        // Sixteen is what a set of eight bits says that says nothing.
+        if self.dataset.bits < 16 { self.dataset.bits } else { 8 }
+    }
+
+    fn hears(&self) -> bool {
+        self.dataset.hears()
+    }
+
+    fn ports(&self) -> [Option<CalibratedPort>; 2] {
+        self.dataset.ports.clone()
+    }
+
+    fn frames(&self) -> usize {
+        self.dataset.frames.len()
+    }
+
+    fn prior_sigma(&self) -> Option<(f64, f64)> {
+        let (_, covariance) = self.dataset.frames.iter().find_map(|frame| frame.prior)?;
+        Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
+    }
+
+    fn warnings(&self) -> &[Fault] {
+        &self.dataset.warnings
+    }
+
+    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+        let frame = &self.dataset.frames[index];
+        let (left, right) = self.dataset.pair(frame)?;
+        let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
+        let before = index.checked_sub(1).map(|before| self.dataset.frames[before].stamp_ns);
+        Ok(Sight {
+            stamp_ns: frame.stamp_ns,
+            eyes: Eyes::Pair(left, right),
+            prior,
+            told: Told::Nothing,
+            readings: self.dataset.readings(before, frame.stamp_ns),
+        })
+    }
+
+    fn truth(&self, index: usize) -> Option<Truth> {
+        let frame = &self.dataset.frames[index];
+        let world_from_object = self
+            .site
+            .objects
+            .iter()
+            .map(|object| {
+                let moved = self.dataset.objects.iter().find(|(id, _)| *id == object.id).map(|(_, pose)| *pose);
+                moved.or(object.world_from_object)
+            })
+            .collect();
+        let index_of = |(object, point): &(String, String)| {
+            let o = self.site.objects.iter().position(|candidate| candidate.id == *object)?;
+            let p = self.site.objects[o].points.iter().position(|candidate| candidate.id == *point)?;
+            Some((o, p))
+        };
+        Some(Truth {
+            world_from_camera: frame.truth?,
+            world_from_object,
+            visible: self.dataset.has_visibility.then(|| frame.visible.iter().filter_map(index_of).collect()),
+            bound: None,
+            answer: None,
+        })
+    }
+
+    fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
+        input_hashes(&self.dataset.folder)
+    }
+}

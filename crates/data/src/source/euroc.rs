@@ -1,0 +1,59 @@
+//! A data set of EuRoC.
+
+use std::path::Path;
+
+use seafix_component::{Component, Fault, in_range};
+use seafix_io::ImageLimits;
+use serde::{Deserialize, Serialize};
+
+use super::{DatasetSource, Passage, Source, dataset::Recorded};
+use crate::dataset::Dataset;
+
+/// Reads a folder in the layout of the EuRoC data sets: `mav0/cam0`, `mav0/cam1`, `mav0/state_groundtruth_estimate0`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Euroc {
+    /// The folder; relative to the experiment file.
+    pub path: String,
+    /// The file of the site to look for; relative to the experiment file.
+    pub site: String,
+    /// The most pixels that an image's header may declare.
+    pub max_pixels: u64,
+    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    pub max_bytes: u64,
+}
+
+impl Default for Euroc {
+    fn default() -> Self {
+        let DatasetSource { path, site, max_pixels, max_bytes, .. } = DatasetSource::default();
+        Self { path, site, max_pixels, max_bytes }
+    }
+}
+
+impl Component for Euroc {
+    const NAME: &'static str = "euroc";
+    const SUMMARY: &'static str = "stereo pairs from a folder in the layout of EuRoC (ASL), with a site of your own";
+    const SOURCE: &'static str = "Burri et al., The EuRoC micro aerial vehicle datasets, 2016";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(!self.site.is_empty(), "site", "''", "the file of a site, relative to the experiment file")?;
+        let (path, site) = (self.path.clone(), self.site.clone());
+        DatasetSource {
+            path,
+            site,
+            max_pixels: self.max_pixels,
+            max_bytes: self.max_bytes,
+            strict: true,
+            repair: false,
+        }
+        .check()
+    }
+}
+
+impl Source for Euroc {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
+        let dataset = Dataset::open_euroc(&folder.join(&self.path))?;
+        Recorded::open(dataset.within(limits), &self.site, folder)
+    }
+}

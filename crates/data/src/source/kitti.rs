@@ -1,0 +1,62 @@
+//! A sequence of KITTI.
+
+use std::path::Path;
+
+use seafix_component::{Component, Fault, in_range};
+use seafix_io::ImageLimits;
+use serde::{Deserialize, Serialize};
+
+use super::{DatasetSource, Passage, Source, dataset::Recorded};
+use crate::dataset::{Cameras, Dataset};
+
+/// Reads an odometry sequence of KITTI: `calib.txt`, `times.txt`, `image_0`, `image_1`, the truth in `poses.txt` or
+/// `../../poses/NAME.txt`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Kitti {
+    /// The folder; relative to the experiment file.
+    pub path: String,
+    /// The file of the site to look for; relative to the experiment file.
+    pub site: String,
+    /// Which two of the four cameras: `grey`, `colour`, or `any`, the grey ones where they are there.
+    pub cameras: Cameras,
+    /// The most pixels that an image's header may declare.
+    pub max_pixels: u64,
+    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    pub max_bytes: u64,
+}
+
+impl Default for Kitti {
+    fn default() -> Self {
+        let DatasetSource { path, site, max_pixels, max_bytes, .. } = DatasetSource::default();
+        Self { path, site, cameras: Cameras::Any, max_pixels, max_bytes }
+    }
+}
+
+impl Component for Kitti {
+    const NAME: &'static str = "kitti";
+    const SUMMARY: &'static str = "stereo pairs from an odometry sequence of KITTI, with a site of your own";
+    const SOURCE: &'static str = "Geiger, Lenz and Urtasun, Are we ready for autonomous driving?, 2012";
+
+    fn check(&self) -> Result<(), String> {
+        in_range(!self.site.is_empty(), "site", "''", "the file of a site, relative to the experiment file")?;
+        let (path, site) = (self.path.clone(), self.site.clone());
+        DatasetSource {
+            path,
+            site,
+            max_pixels: self.max_pixels,
+            max_bytes: self.max_bytes,
+            strict: true,
+            repair: false,
+        }
+        .check()
+    }
+}
+
+impl Source for Kitti {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+        let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
+        let dataset = Dataset::open_kitti(&folder.join(&self.path), self.cameras)?;
+        Recorded::open(dataset.within(limits), &self.site, folder)
+    }
+}

@@ -1,0 +1,134 @@
+//! A recording of ROS 2 with a site: what a method sees of it, and what is true.
+
+use std::path::{Path, PathBuf};
+
+use seafix_component::{Fault, read_text};
+use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform, World};
+use seafix_io::ImageLimits;
+use seafix_referencing::Site;
+
+use super::{Eyes, Mcap, Passage, Sight, Told, Truth, WorldPrior, bag::Bag};
+use crate::dataset::{
+    sha256,
+    tum::{Stamped, between},
+};
+
+/// Stereo pairs, calibration and poses out of a recording of ROS 2.
+pub(super) struct Recorded {
+    path: PathBuf,
+    bag: Bag,
+    gap_ns: u64,
+    site: Site,
+    prior: Vec<Stamped<World, Camera>>,
+    /// The prior's covariances, one a pose, or one for all.
+    covariances: Vec<Covariance6<World, Camera>>,
+    truth: Vec<Stamped<World, Camera>>,
+    warnings: Vec<Fault>,
+}
+
+/// What is wrong with the recording at `path` by itself, its warnings, and what it holds in a line: rig and images by the names
+/// of its topics, every image decoded.
+pub fn check_recording(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>, String) {
+    let settings = Mcap { max_pixels: limits.pixels, max_bytes: limits.bytes, ..Mcap::default() };
+    match Bag::open(path, &settings) {
+        Ok(bag) => (Vec::new(), bag.warnings.clone(), bag.told()),
+        Err(fault) => (vec![fault], Vec::new(), String::new()),
+    }
+}
+
+impl Recorded {
+    /// Reads `path` and the file of its site through.
+    pub(super) fn open(path: &Path, settings: &Mcap, folder: &Path) -> Result<Self, Vec<Fault>> {
+        let one = |fault| vec![fault];
+        let file = folder.join(&settings.site);
+        let site = Site::parse(&read_text(&file).map_err(one)?, &file)?;
+        let bag = Bag::open(path, settings).map_err(one)?;
+        let (prior, covariances) = bag.poses(&settings.prior).map_err(one)?;
+        let covariances = match (covariances, prior.is_empty(), settings.prior_sigma()) {
+            (_, true, _) => Vec::new(),
+            (_, false, Some((position, attitude))) => vec![Covariance6::isotropic(attitude, position)],
+            (Some(covariances), false, None) => covariances,
+            (None, false, None) => {
+                return Err(one(Fault::new("a prior without its uncertainty", path)
+                    .value(&settings.prior)
+                    .remedy("set `prior-position` (m) and `prior-attitude-deg`")));
+            }
+        };
+        let (truth, _) = bag.poses(&settings.truth).map_err(one)?;
+        let mut warnings = bag.warnings.clone();
+        for (name, given, poses) in [("prior", &settings.prior, &prior), ("truth", &settings.truth, &truth)] {
+            let lacks = |stamp: u64| between(poses, stamp, settings.gap_ns()).is_none();
+            let without = bag.pairs.iter().filter(|(stamp, _)| lacks(*stamp)).count();
+            if !given.is_empty() && without > 0 {
+                let fault = Fault::new(format!("stereo pairs without a {name}"), path);
+                let value = format!("{without} of {}, {given}", bag.pairs.len());
+                warnings
+                    .push(fault.value(value).remedy("poses farther apart than `most-gap` say nothing between them"));
+            }
+        }
+        warnings.extend(site.warnings.clone());
+        let (path, gap_ns) = (path.to_owned(), settings.gap_ns());
+        Ok(Self { path, bag, gap_ns, site, prior, covariances, truth, warnings })
+    }
+}
+
+impl Passage for Recorded {
+    fn name(&self) -> &str {
+        self.path.file_name().and_then(|name| name.to_str()).unwrap_or("recording")
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+
+    fn rig(&self) -> &StereoRig {
+        &self.bag.rig
+    }
+
+    fn body_from_camera(&self) -> Transform<Body, Camera> {
+        Transform::identity()
+    }
+
+    fn images(&self) -> bool {
+        true
+    }
+
+    fn frames(&self) -> usize {
+        self.bag.pairs.len()
+    }
+
+    fn prior_sigma(&self) -> Option<(f64, f64)> {
+        let covariance = self.covariances.first()?;
+        Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
+    }
+
+    fn warnings(&self) -> &[Fault] {
+        &self.warnings
+    }
+
+    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+        let stamp_ns = &self.bag.pairs[index].0;
+        let (left, right) = self.bag.pair(index)?;
+        let eyes = Eyes::Pair(left, right);
+        let prior = between(&self.prior, *stamp_ns, self.gap_ns).map(|world_from_camera| {
+            let nearest = self.prior.partition_point(|(time, _)| time < stamp_ns).min(self.covariances.len() - 1);
+            WorldPrior { world_from_camera, covariance: self.covariances[nearest] }
+        });
+        Ok(Sight { stamp_ns: *stamp_ns, eyes, prior, told: Told::Nothing, readings: Vec::new() })
+    }
+
+    fn truth(&self, index: usize) -> Option<Truth> {
+        let world_from_camera = between(&self.truth, self.bag.pairs[index].0, self.gap_ns)?;
+        Some(Truth {
+            world_from_camera,
+            world_from_object: self.site.objects.iter().map(|object| object.world_from_object).collect(),
+            visible: None,
+            bound: None,
+            answer: None,
+        })
+    }
+
+    fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
+        Ok(vec![(self.name().to_owned(), sha256(&self.path)?)])
+    }
+}

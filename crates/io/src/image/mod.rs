@@ -1,0 +1,352 @@
+//! Image files in and out.
+
+use std::{fs::File, io::Read, path::Path};
+
+use seafix_component::Fault;
+use seafix_vision::Image;
+
+use self::{decode::Samples, encoded::objection};
+
+mod decode;
+mod encoded;
+mod pnm;
+
+/// How large an image may be before it is refused: checked before anything of that size is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageLimits {
+    /// The most pixels that a header may declare.
+    pub pixels: u64,
+    /// The most memory that the decoder may take, and the largest file that is read (bytes).
+    pub bytes: u64,
+}
+
+impl Default for ImageLimits {
+    /// 64 Mi pixels, 512 MiB.
+    fn default() -> Self {
+        Self { pixels: 64 << 20, bytes: 512 << 20 }
+    }
+}
+
+/// Reads a PNG, JPEG or PNM image as grey, 0 to 255 for black to white, as finely as its file has it;
+/// colour becomes luma (Rec. 709 weights). `expected` is the size that the calibration has, `bits` the
+/// depth of the pixels in images of 16 bits.
+///
+/// # Errors
+/// An unreadable, truncated or foreign file, a moving image, four inks, transparent pixels, pixels
+/// beyond the depth, a size other than expected or beyond `limits` (checked from the header, before
+/// anything is decoded).
+pub fn read_image(path: &Path, expected: [u32; 2], bits: u8, limits: ImageLimits) -> Result<Image, Fault> {
+    let mut bytes = Vec::new();
+    // A file may grow while it is read, and some have no size before.
+    let read = regular(path)?.take(limits.bytes.saturating_add(1)).read_to_end(&mut bytes);
+    read.map_err(|error| unreadable(path, &error))?;
+    if bytes.len() as u64 > limits.bytes {
+        let remedy = format!("at most {} bytes are read; {} allows more", limits.bytes, allows("max-bytes"));
+        let size = std::fs::metadata(path).map_or(0, |metadata| metadata.len()).max(bytes.len() as u64);
+        return Err(Fault::new("an image file too large", path).value(format!("{size} bytes")).remedy(remedy));
+    }
+    decode_image(&bytes, path, expected, bits, limits)
+}
+
+/// The file at `path`, open; devices, pipes and folders are not opened.
+///
+/// # Errors
+/// What is there instead, or why it cannot be read.
+pub fn regular(path: &Path) -> Result<File, Fault> {
+    let kind = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.file_type();
+    if !kind.is_file() {
+        let kind = if kind.is_dir() { "a folder" } else { "a device, pipe or socket" };
+        return Err(Fault::new("a path that is no file", path).value(kind).remedy("name a file"));
+    }
+    File::open(path).map_err(|error| unreadable(path, &error))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Fault {
+    Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
+}
+
+/// How a limit is changed: by an option of a command or, in an experiment, by a setting of the source.
+fn allows(limit: &str) -> String {
+    format!("`--{limit}`, in an experiment `source.{limit}`,")
+}
+
+/// The same of the bytes of such a file; faults name `path`.
+///
+/// # Errors
+/// As [`read_image`].
+pub fn decode_image(
+    bytes: &[u8],
+    path: &Path,
+    expected: [u32; 2],
+    bits: u8,
+    limits: ImageLimits,
+) -> Result<Image, Fault> {
+    let [width, height] = decode::size(bytes).map_err(|cause| decode::damaged(path, cause))?;
+    check_size(path, [width, height], expected, limits)?;
+    if let Some((what, remedy)) = objection(bytes) {
+        return Err(Fault::new(what, path).remedy(remedy));
+    }
+    let samples = decode::samples(bytes, path, limits.bytes)?;
+    let pixels =
+        grey_levels(&samples, width as usize, bits).map_err(|fault| Fault { file: path.to_owned(), ..fault })?;
+    Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
+}
+
+/// The image of samples as a camera gave them, row by row: grey, or red, green and blue; `white` is the greatest.
+pub fn image_of_samples(samples: &[u16], [width, height]: [u32; 2], white: u16) -> Result<Image, Fault> {
+    let channels = samples.len() / (width as usize * height as usize).max(1);
+    let pixels = levels_of(samples, channels.max(1), width as usize, white, 0)?;
+    Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), Path::new("")))
+}
+
+/// `expected` is the size that the calibration has.
+fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits: ImageLimits) -> Result<(), Fault> {
+    if u64::from(width) * u64::from(height) > limits.pixels {
+        return Err(Fault::new("an image too large", path).value(format!("{width}×{height}")).remedy(format!(
+            "at most {} pixels are read; {} allows more",
+            limits.pixels,
+            allows("max-pixels")
+        )));
+    }
+    if [width, height] != expected {
+        return Err(misfit(path, [width, height], expected));
+    }
+    Ok(())
+}
+
+fn misfit(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
+    Fault::new("an image of another size than the calibration", path)
+        .value(format!("{width}×{height}, calibrated {w}×{h}"))
+        .remedy("give the images the rig was calibrated with, or correct `size`")
+}
+
+/// The size that the header of an image file declares; `None` if there is no header to read.
+pub fn declared_size(path: &Path) -> Option<[u32; 2]> {
+    /// Enough for what cameras put before a JPEG's frame: thumbnails and profiles.
+    const HEADER: u64 = 4 << 20;
+    let mut bytes = Vec::new();
+    regular(path).ok()?.take(HEADER).read_to_end(&mut bytes).ok()?;
+    decode::size(&bytes).ok()
+}
+
+/// The fault of an image whose header declares another size than `expected`; none where there is no header to read.
+pub fn size_fault(path: &Path, expected: [u32; 2]) -> Option<Fault> {
+    let size = declared_size(path)?;
+    (size != expected).then(|| misfit(path, size, expected))
+}
+
+/// Rec. 709's weights of red, green and blue, in ten thousandths.
+const LUMA: [u32; 3] = [2126, 7152, 722];
+
+/// The brightness of every pixel, 0 to 255; `bits` is the depth of images of 16 bits.
+fn grey_levels(samples: &Samples, width: usize, bits: u8) -> Result<Vec<f32>, Fault> {
+    let full = if samples.deep { ((1_u32 << bits.min(16)) - 1) as u16 } else { u8::MAX.into() };
+    let opaque = samples.white.unwrap_or(if samples.deep { u16::MAX } else { u8::MAX.into() });
+    let white = samples.white.map_or(full, |white| white.min(full));
+    levels_of(&samples.values, samples.channels, width, white, opaque)
+}
+
+fn levels_of(samples: &[u16], channels: usize, width: usize, white: u16, opaque: u16) -> Result<Vec<f32>, Fault> {
+    let here = Path::new("");
+    let colours = if channels > 2 { 3 } else { 1 };
+    let pixels = samples.chunks_exact(channels);
+    if pixels.clone().any(|pixel| pixel[colours..].iter().any(|&alpha| alpha < opaque)) {
+        return Err(Fault::new("an image with transparent pixels", here).remedy("give it without an alpha channel"));
+    }
+    if pixels.clone().any(|pixel| pixel[..colours].iter().any(|&value| value > white)) {
+        let greatest = |pixel: &[u16]| pixel[..colours].iter().copied().max().unwrap_or(0);
+        let all = pixels.clone().map(greatest).enumerate();
+        let (at, most) = all.max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).unwrap_or_default();
+        let (x, y, least) = (at % width.max(1), at / width.max(1), if most < 4096 { 12 } else { 16 });
+        return Err(Fault::new("a pixel beyond the depth", here)
+            .value(format!("{most} at ({x}, {y}), white is {white}"))
+            .remedy(format!("its images have more bits than `bits` of dataset.toml says; give bits = {least}")));
+    }
+    // Integers up to here: a grey pixel comes out the same whether it is stored as grey or as colour.
+    let whole = f64::from(LUMA.iter().sum::<u32>()) * f64::from(white);
+    let level = |pixel: &[u16]| {
+        let luma: u32 = match pixel {
+            [grey] | [grey, _] => u32::from(*grey) * LUMA.iter().sum::<u32>(),
+            _ => pixel.iter().zip(LUMA).map(|(&value, weight)| u32::from(value) * weight).sum(),
+        };
+        (f64::from(luma) * 255.0 / whole) as f32
+    };
+    Ok(pixels.map(level).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use png::{BitDepth, ColorType};
+
+    use super::*;
+
+    /// An image file of these bytes, read back.
+    fn read(name: &str, bytes: &[u8], size: [u32; 2], bits: u8) -> Result<Image, String> {
+        within(ImageLimits::default(), name, bytes, size, bits)
+    }
+
+    fn within(limits: ImageLimits, name: &str, bytes: &[u8], size: [u32; 2], bits: u8) -> Result<Image, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        read_image(&path, size, bits, limits).map_err(|fault| fault.to_string())
+    }
+
+    fn refused(name: &str, bytes: &[u8], parts: &[&str]) {
+        let said = read(name, bytes, [8, 6], 16).unwrap_err();
+        for part in [&[name], parts].concat() {
+            assert!(said.contains(part), "no `{part}` in {said}");
+        }
+        assert_eq!(said.lines().count(), 1);
+    }
+
+    /// 8×6 pixels of this kind as PNG.
+    fn png(samples: &[u8], (color, depth): (ColorType, BitDepth)) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 8, 6);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        encoder.write_header().unwrap().write_image_data(samples).unwrap();
+        bytes
+    }
+
+    const GREY: (ColorType, BitDepth) = (ColorType::Grayscale, BitDepth::Eight);
+    const DEEP: (ColorType, BitDepth) = (ColorType::Grayscale, BitDepth::Sixteen);
+
+    fn pgm(samples: &[u8]) -> Vec<u8> {
+        [b"P5 8 6 255\n", samples].concat()
+    }
+
+    fn jpeg(samples: &[u8]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        jpeg_encoder::Encoder::new(&mut bytes, 100).encode(samples, 8, 6, jpeg_encoder::ColorType::Luma).unwrap();
+        bytes
+    }
+
+    fn words(values: impl Iterator<Item = u16>) -> Vec<u8> {
+        values.flat_map(u16::to_be_bytes).collect()
+    }
+
+    #[test]
+    fn grey_is_read_as_finely_as_it_is_stored() {
+        let eight: Vec<u8> = (0..48).map(|i| i * 5).collect();
+        for bytes in [png(&eight, GREY), pgm(&eight)] {
+            let found = read("a", &bytes, [8, 6], 16).unwrap();
+            assert!(found.pixels().iter().zip(&eight).all(|(a, b)| *a == f32::from(*b)));
+        }
+        let sixteen = words((0..48).map(|i| i * 1394));
+        let found = read("a", &png(&sixteen, DEEP), [8, 6], 16).unwrap();
+        for (i, value) in found.pixels().iter().enumerate() {
+            assert_eq!(*value, (i as f64 * 1394.0 * 255.0 / 65535.0) as f32);
+        }
+        let twelve = png(&words((0..48).map(|i| 4095 - i)), DEEP);
+        let found = read("a", &twelve, [8, 6], 12).unwrap();
+        assert_eq!(found.pixels()[0], 255.0);
+        assert_eq!(found.pixels()[47], (4048.0 * 255.0 / 4095.0_f64) as f32);
+        let said = read("a", &twelve, [8, 6], 8).unwrap_err();
+        assert!(said.contains("4095 at (0, 0), white is 255; ") && said.contains("give bits = 12"), "{said}");
+    }
+
+    #[test]
+    fn colour_becomes_luma_without_rounding() {
+        let grey: Vec<u8> = (0..48).flat_map(|i| [i * 5; 3]).collect();
+        let found = read("a", &png(&grey, (ColorType::Rgb, BitDepth::Eight)), [8, 6], 16).unwrap();
+        assert!(found.pixels().iter().enumerate().all(|(i, value)| *value == i as f32 * 5.0));
+        let red: Vec<u8> = (0..48).flat_map(|_| [255, 0, 0, 255]).collect();
+        let found = read("a", &png(&red, (ColorType::Rgba, BitDepth::Eight)), [8, 6], 16).unwrap();
+        assert!((found.pixels()[7] - 54.213).abs() < 1e-4);
+        let wide = words((0..48).flat_map(|i| [i, 65535, 0]));
+        let found = read("a", &png(&wide, (ColorType::Rgb, BitDepth::Sixteen)), [8, 6], 16).unwrap();
+        assert!((f64::from(found.pixels()[40]) - 255.0 * (0.7152 + 0.2126 * 40.0 / 65535.0)).abs() < 1e-4);
+    }
+
+    #[test]
+    fn what_is_no_still_image_of_light_is_refused_by_name() {
+        let glass: Vec<u8> = (0..48).flat_map(|i| [100, 200 + i]).collect();
+        refused("a.png", &png(&glass, (ColorType::GrayscaleAlpha, BitDepth::Eight)), &["transparent pixels"]);
+        // The chunk that announces frames stands behind the header's 33 bytes.
+        let mut moving = png(&[7; 48], GREY);
+        let frames = [0, 0, 0, 8, b'a', b'c', b'T', b'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xF3, 0x8D, 0x93, 0x70];
+        moving.splice(33..33, frames);
+        refused("a.png", &moving, &["a moving image"]);
+        refused("a.png", b"GIF89a", &["PNG, JPEG and PNM"]);
+        refused("a.png", b"", &["PNG, JPEG and PNM"]);
+    }
+
+    #[test]
+    fn a_truncated_image_is_refused_wherever_it_ends() {
+        let samples: Vec<u8> = (0..48_usize).map(|i| (i * 37 % 251) as u8).collect();
+        for (name, whole) in [("a.png", png(&samples, GREY)), ("a.jpg", jpeg(&samples)), ("a.pgm", pgm(&samples))] {
+            assert!(read(name, &whole, [8, 6], 16).is_ok());
+            // The PNG's last chunk, 12 bytes, says no more than that there is none.
+            let last = if name == "a.png" { whole.len() - 13 } else { whole.len() - 1 };
+            for end in [0, 1, 5, 20, last / 2, last - 10, last] {
+                assert!(read(name, &whole[..end], [8, 6], 16).is_err(), "{name}: {end} of {}", whole.len());
+            }
+        }
+        // The wrong extension does not matter: the content says what it is.
+        assert!(read("a.jpg", &png(&samples, GREY), [8, 6], 16).is_ok());
+    }
+
+    /// Pixels that are stored coarse to fine: 8×6 of them, each 5 more than the one before, by Adam7's seven passes.
+    #[test]
+    fn an_interlaced_image_is_put_in_order() {
+        let bytes = [
+            137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 8, 0, 0, 0, 6, 8, 0, 0, 0, 1, 172,
+            105, 176, 177, 0, 0, 0, 71, 73, 68, 65, 84, 120, 1, 1, 60, 0, 195, 255, 0, 0, 0, 20, 0, 160, 180, 0, 10,
+            30, 0, 170, 190, 0, 80, 90, 100, 110, 0, 5, 15, 25, 35, 0, 85, 95, 105, 115, 0, 165, 175, 185, 195, 0, 40,
+            45, 50, 55, 60, 65, 70, 75, 0, 120, 125, 130, 135, 140, 145, 150, 155, 0, 200, 205, 210, 215, 220, 225,
+            230, 235, 238, 81, 22, 9, 215, 91, 7, 20, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130,
+        ];
+        let found = read("a.png", &bytes, [8, 6], 8).unwrap();
+        assert!(found.pixels().iter().enumerate().all(|(i, value)| *value == i as f32 * 5.0));
+    }
+
+    #[test]
+    fn the_limits_are_the_caller_s() {
+        let samples: Vec<u8> = (0..48).collect();
+        let whole = png(&samples, GREY);
+        let limited = |pixels, bytes| within(ImageLimits { pixels, bytes }, "a.png", &whole, [8, 6], 16);
+        let enough = whole.len() as u64 + 48;
+        assert!(limited(48, enough).is_ok());
+        let said = limited(47, enough).unwrap_err();
+        assert!(
+            said.contains(
+                "8×6; at most 47 pixels are read; `--max-pixels`, in an experiment `source.max-pixels`, allows more"
+            ),
+            "{said}"
+        );
+        let said = limited(48, whole.len() as u64 - 1).unwrap_err();
+        assert!(
+            said.contains("bytes are read; `--max-bytes`, in an experiment `source.max-bytes`, allows more"),
+            "{said}"
+        );
+        // A small file that decodes to much more than it takes.
+        let flat = png(&[0; 48], GREY);
+        assert!(within(ImageLimits { pixels: 48, bytes: 40 }, "a.png", &flat, [8, 6], 16).is_err());
+    }
+
+    #[test]
+    fn huge_and_empty_sizes_are_refused_from_the_header() {
+        refused("a.pgm", b"P5 0 0 255\n", &["a.pgm"]);
+        refused(
+            "a.pgm",
+            b"P5 100000 100000 255\n1234",
+            &["an image too large", "100000×100000; at most 67108864 pixels"],
+        );
+        let header = |width: u32, height: u32| {
+            let mut bytes = png(&[7; 48], GREY);
+            bytes[16..20].copy_from_slice(&width.to_be_bytes());
+            bytes[20..24].copy_from_slice(&height.to_be_bytes());
+            bytes.truncate(41);
+            bytes
+        };
+        for (width, height) in [(8_000_000, 4_000_000_000), (60_000, 60_000), (0, 6)] {
+            refused("a.png", &header(width, height), &[]);
+        }
+        let mut jpeg = self::jpeg(&[7; 48]);
+        let frame = jpeg.windows(2).position(|pair| pair == [0xFF, 0xC0]).unwrap();
+        jpeg[frame + 5..frame + 9].fill(0xFF);
+        refused("a.jpg", &jpeg, &["an image too large", "65535×65535"]);
+    }
+}

@@ -1,0 +1,52 @@
+//! A stereo rig from a file.
+
+use std::path::{Path, PathBuf};
+
+use seafix_component::{Fault, read_text};
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
+
+use crate::dataset::Description;
+
+/// A stereo rig, its place in the vehicle and the depth of its images.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    /// The two cameras.
+    pub stereo: StereoRig,
+    /// The pose of the left camera in the vehicle; the identity where the file does not state it.
+    pub body_from_camera: Transform<Body, Camera>,
+    /// Significant bits of a pixel in an image file of 16 bits.
+    pub bits: u8,
+    /// The file that it was read from.
+    pub file: Option<PathBuf>,
+    /// A rig that is called rectified and is not.
+    pub warning: Option<Fault>,
+}
+
+impl Rig {
+    /// Reads the `[rig]` table of a data set description (`seafix-dataset/1`), a file or the folder that holds it.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or its first invalid value.
+    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, Fault> {
+        let path = path.as_ref();
+        let file = if path.is_dir() { path.join("dataset.toml") } else { path.to_owned() };
+        let source = read_text(&file)?;
+        let description: Description =
+            toml::from_str(&source).map_err(|error| Fault::in_toml(&file, &source, &error))?;
+        let stereo = description.build_rig(&file, &source)?;
+        Ok(Self {
+            body_from_camera: description.mounting(&file, &source)?,
+            bits: description.depth(&file, &source)?,
+            warning: description.not_rectified(&stereo, &file, &source),
+            stereo,
+            file: Some(file),
+        })
+    }
+}
+
+impl From<StereoRig> for Rig {
+    /// A rig whose left camera is the vehicle's frame, with images of up to 16 bits.
+    fn from(stereo: StereoRig) -> Self {
+        Self { stereo, body_from_camera: Transform::identity(), bits: 16, file: None, warning: None }
+    }
+}

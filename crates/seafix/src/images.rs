@@ -1,0 +1,47 @@
+//! A stereo pair.
+
+use std::path::Path;
+
+use seafix_geometry::StereoRig;
+use seafix_io::{ImageLimits, Rig, read_image};
+use seafix_vision::Image;
+
+use crate::{Error, Eyes};
+
+/// The left and the right image of one instant.
+#[derive(Debug, Clone)]
+pub struct StereoImages {
+    /// The left image.
+    pub left: Image,
+    /// The right image.
+    pub right: Image,
+}
+
+impl StereoImages {
+    /// Reads two image files (PNG, JPEG or PNM, grey or colour) of a rig.
+    ///
+    /// # Errors
+    /// [`Error::File`]: a file that cannot be read or decoded, or an image of another size than its camera's calibration.
+    pub fn open(left: impl AsRef<Path>, right: impl AsRef<Path>, rig: &Rig) -> Result<Self, Error> {
+        let read = |path: &Path, size| read_image(path, size, rig.bits, ImageLimits::default());
+        let left = read(left.as_ref(), rig.stereo.left().size())?;
+        Ok(Self { left, right: read(right.as_ref(), rig.stereo.right().size())? })
+    }
+
+    /// The same pair, to be given to a [`NavigationSession`](crate::Voyage).
+    pub fn into_frame_data(self) -> Eyes {
+        Eyes::Pair(self.left, self.right)
+    }
+}
+
+/// Images have the sizes that their cameras are calibrated for.
+pub(crate) fn check_sizes(left: &Image, right: &Image, rig: &StereoRig) -> Result<(), Error> {
+    for (side, image, camera) in [("left", left, rig.left()), ("right", right, rig.right())] {
+        let [expected_width, expected_height] = camera.size();
+        let (width, height) = (image.width(), image.height());
+        if [width, height] != [expected_width as usize, expected_height as usize] {
+            return Err(Error::ImageSize { side, width, height, expected_width, expected_height });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! All objects in view solved together, with those of the frames before.
+
+use std::{collections::BTreeMap, time::Instant};
+
+use seafix_geometry::StereoRig;
+use seafix_referencing::{
+    Candidates, Correspondence, Gathered, Glimpse, JointFixes, Member, Observations, Outcome, Target, TargetKind,
+    gather, joint_fixes,
+};
+
+use crate::{Attempt, Sighting, Stages, times::milliseconds};
+
+impl Stages {
+    /// How many frames before its own a frame's answer looks back on.
+    pub fn looks_back(&self) -> usize {
+        match self.settings().target {
+            TargetKind::Joint => self.settings().window - 1,
+            _ => 0,
+        }
+    }
+
+    /// What a joint fix takes from a sighting: the identified points of every object that was fixed by itself, and those
+    /// of the other objects that stand where these put them.
+    pub fn glimpse(&self, sighting: &mut Sighting, targets: &[Target], rig: &StereoRig) -> Glimpse {
+        let mut glimpse = Glimpse::default();
+        if self.settings().target != TargetKind::Joint {
+            return glimpse;
+        }
+        let fixed: Vec<(usize, Vec<Correspondence>)> =
+            sighting.attempts.iter().filter_map(|attempt| Some((attempt.target, pairs(attempt)?.to_vec()))).collect();
+        if fixed.is_empty() {
+            return glimpse;
+        }
+        let mut listed: Vec<Option<&Candidates>> = vec![None; targets.len()];
+        sighting.attempts.iter().for_each(|attempt| listed[attempt.target] = Some(&attempt.candidates));
+        let others = gather(rig, targets, &sighting.cloud, &listed, &fixed, &self.settings().acceptance);
+        for (object, pairs) in fixed.iter().chain(&others.added) {
+            glimpse.see(*object, &Observations::of(pairs, &targets[*object].points, &sighting.cloud, Some(rig)));
+        }
+        sighting.gathered = others;
+        glimpse
+    }
+
+    /// Replaces the pose of every object fixed by itself by that of one fix over all of them, over what was gathered of
+    /// others and over the `before` glimpses, and says of what. Where the images contradict each other, or
+    /// determine no joint fix, each keeps its own and is told why.
+    pub fn join(
+        &self,
+        sighting: &mut Sighting,
+        before: &[&Glimpse],
+        own: &Glimpse,
+        targets: &[Target],
+        rig: &StereoRig,
+    ) {
+        if own.points.is_empty() {
+            return;
+        }
+        let start = Instant::now();
+        // What shares no object with this frame says nothing about it.
+        let related = |glimpse: &&&Glimpse| {
+            glimpse.points.iter().any(|(object, _)| own.points.iter().any(|(same, _)| same == object))
+        };
+        let all: Vec<Glimpse> = before.iter().filter(related).copied().chain([own]).cloned().collect();
+        let members: Vec<Member> = targets.iter().map(Target::member).collect();
+        let confidence = self.settings().acceptance.confidence;
+        let parts = match joint_fixes(rig, &members, &all, confidence) {
+            Ok(fixes) => {
+                replace(sighting, &fixes, targets, rig);
+                tell(&sighting.gathered, own, all.len(), &fixes, targets)
+            }
+            Err(why) => {
+                Told { all: format!("no joint fix, the pose is that of the object alone: {why}"), ..Told::default() }
+            }
+        };
+        for attempt in &mut sighting.attempts {
+            attempt.joint = match attempt.answer.outcome {
+                Outcome::Referenced(_) => Some(parts.all.clone()),
+                _ => parts.own.get(&attempt.target).cloned(),
+            };
+        }
+        let spent = milliseconds(start);
+        for attempt in &mut sighting.attempts {
+            for time in [&mut attempt.times.solve_ms, &mut attempt.times.total_ms].into_iter().flatten() {
+                *time += spent;
+            }
+        }
+    }
+}
+
+/// The pairs of an attempt that was believed.
+fn pairs(attempt: &Attempt) -> Option<&[Correspondence]> {
+    match &attempt.answer.outcome {
+        Outcome::Referenced(fix) => Some(&fix.pairs),
+        _ => None,
+    }
+}
+
+/// What is said of a joint fix.
+#[derive(Default)]
+struct Told {
+    /// Of all that took part or might have.
+    all: String,
+    /// Of each object that was not fixed by itself.
+    own: BTreeMap<usize, String>,
+}
+
+fn tell(others: &Gathered, own: &Glimpse, instants: usize, fixes: &JointFixes, targets: &[Target]) -> Told {
+    let points = |n: usize| if n == 1 { "1 point".to_owned() } else { format!("{n} points") };
+    let (mut part, mut out, mut told) = (Vec::new(), Vec::new(), BTreeMap::new());
+    for (object, target) in targets.iter().enumerate().filter(|(object, _)| own.count(*object) > 0) {
+        let (name, seen) = (&target.name, points(own.count(object)));
+        let gathered = others.added.iter().any(|(added, _)| *added == object);
+        if fixes.left_out.contains(&object) {
+            let why = format!("{seen} contradict the rest");
+            out.push(format!("`{name}` ({why})"));
+            told.insert(object, format!("no part in the joint fix: {why}"));
+            continue;
+        }
+        let moved = if fixes.displaced.contains(&object) { ", not where it was surveyed" } else { "" };
+        let how = if gathered { ", not fixed by itself" } else { "" };
+        part.push(format!("`{name}` ({seen}{how}{moved})"));
+        if gathered {
+            told.insert(object, format!("{seen} took part in the joint fix"));
+        }
+    }
+    for (object, why) in &others.left_out {
+        out.push(format!("`{}` ({why})", targets[*object].name));
+        told.insert(*object, format!("no part in the joint fix: {why}"));
+    }
+    let mut all = format!("joint fix over {}", part.join(", "));
+    if instants > 1 {
+        all += &format!(
+            " and {} before",
+            if instants == 2 { "1 frame".to_owned() } else { format!("{} frames", instants - 1) }
+        );
+    }
+    if !out.is_empty() {
+        all += &format!("; left out: {}", out.join(", "));
+    }
+    Told { all, own: told }
+}
+
+fn replace(sighting: &mut Sighting, fixes: &JointFixes, targets: &[Target], rig: &StereoRig) {
+    for attempt in &mut sighting.attempts {
+        let Outcome::Referenced(fix) = &mut attempt.answer.outcome else { continue };
+        let Some((pose, covariance)) = fixes.object_from_camera[attempt.target] else { continue };
+        // What protects the object's own fix protects this one, and the way between them.
+        let moved = (pose.translation() - fix.object_from_camera.translation()).norm();
+        let turned = seafix_geometry::so3::angle(&(pose.rotation().inverse() * fix.object_from_camera.rotation()));
+        if let Some(level) = &mut fix.integrity.protection {
+            level.position += moved;
+            level.attitude += turned;
+        }
+        (fix.object_from_camera, fix.covariance) = (pose, covariance);
+        fix.used = (0..fix.pairs.len()).collect();
+        let points = &targets[attempt.target].points;
+        let data = Observations::of(&fix.pairs, points, &sighting.cloud, Some(rig));
+        (fix.residuals, fix.residual_rms) = (data.residuals(&pose), data.residual_rms(&pose));
+    }
+}

@@ -1,0 +1,65 @@
+//! What a method is given at one instant.
+
+use std::sync::Arc;
+
+use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Transform, World};
+use seafix_navigation::Reading as SensorReading;
+use seafix_referencing::{Prior, Target, problem_file::CoherenceProblem};
+use seafix_vision::Image;
+
+/// The measurements of one instant and the prior knowledge of its pose.
+#[derive(Debug, Clone)]
+pub struct Sight {
+    /// Time (ns).
+    pub stamp_ns: u64,
+    /// The stereo pair or the cloud.
+    pub eyes: Eyes,
+    /// The prior pose of the left camera in the world, if one is known.
+    pub prior: Option<WorldPrior>,
+    /// Correspondences or a problem that come with the data.
+    pub told: Told,
+    /// The readings of the navigation sensors since the previous instant, in the order of arrival.
+    pub readings: Vec<SensorReading>,
+}
+
+impl Sight {
+    /// The prior pose relative to each target; `None` without a prior or without a place of the target in the world.
+    pub fn rough(&self, targets: &[Target]) -> Vec<Option<Prior>> {
+        let prior = |target: &Target| {
+            let world = self.prior.as_ref()?;
+            target.prior(&world.world_from_camera, &world.covariance)
+        };
+        targets.iter().map(prior).collect()
+    }
+}
+
+/// Knowledge of the correspondences that comes with the data.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum Told {
+    /// No knowledge.
+    #[default]
+    Nothing,
+    /// The feature point of each cloud point as (object, point) indices, no two the same. No search runs.
+    Names(Vec<(usize, usize)>),
+    /// An identification problem with its own model, tolerance, candidates and prior. The settings `gate` and `tolerance` of
+    /// the pipeline do not apply.
+    Problem(Arc<CoherenceProblem>),
+}
+
+/// The measurements of the cameras.
+#[derive(Debug, Clone)]
+pub enum Eyes {
+    /// A stereo pair.
+    Pair(Image, Image),
+    /// A cloud without images.
+    Points(Vec<MeasuredPoint>),
+}
+
+/// A prior pose of the left camera in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorldPrior {
+    /// The pose.
+    pub world_from_camera: Transform<World, Camera>,
+    /// Its covariance.
+    pub covariance: Covariance6<World, Camera>,
+}

@@ -1,0 +1,331 @@
+//! A navigation session: fixes, and odometry between them.
+
+use std::cell::OnceCell;
+
+use rand::Rng;
+use seafix_geometry::{Body, Camera, Covariance6, Object, StereoRig, Transform};
+use seafix_navigation::{
+    Considered, Event, Local, Navigated, Navigator, Network, Outcome as Followed, Place, Standing, State,
+};
+use seafix_referencing::{Outcome, Prior, PriorBound, Target};
+
+use crate::{
+    Error, Eyes, Helm, Sight, Sighting, Stages,
+    event::NavigationEvent,
+    explore::Explorer,
+    images::check_sizes,
+    odometry_session::{OdometryResult, OdometrySession, stereo_pair},
+    random,
+    stages::{Cloud, View},
+};
+
+/// How the reason ends why no motion is known to a pair that the odometry goes on from. A pair that it left out has another
+/// reason; of that, the way goes on over it.
+pub const THE_WAY_IS_UNKNOWN: &str = "the way here is unknown";
+
+/// Changes the motion that the odometry found, given the time since the first frame (s).
+pub type MotionFilter<'a> = Box<dyn FnMut(f64, Option<Local>) -> Option<Local> + Send + 'a>;
+
+/// Navigation from fix to fix through successive frames.
+///
+/// It holds the navigated pose relative to the object of the last fix. For each frame the odometry moves that pose, the
+/// policy decides whether a fix is due, and the fusion joins the fix to the pose.
+pub struct Voyage<'a> {
+    helm: &'a Helm,
+    stages: &'a Stages,
+    targets: &'a [Target],
+    rig: &'a StereoRig,
+    navigator: Navigator<'a>,
+    explorer: Option<Explorer<'a>>,
+    /// Changes the motions of the odometry, for a study of its failures.
+    filter: Option<MotionFilter<'a>>,
+    body_from_camera: Transform<Body, Camera>,
+    /// The odometry of [`push`](Self::push), from its first frame on.
+    odometry: Option<OdometrySession<'a>>,
+    frames: u64,
+    /// When the first frame was taken (ns).
+    began: Option<u64>,
+    /// Changes of the navigator's state that have been told.
+    told: usize,
+    /// The pair that the odometry knew last: when, and in which segment.
+    last: Option<(u64, usize)>,
+    /// Whether there has been a fix.
+    fixed: bool,
+    /// The first fix, carried along by odometry alone, until the way is lost.
+    unreferenced: Option<Navigated>,
+}
+
+/// The state of a navigation session after a frame.
+#[derive(Debug, Clone)]
+pub struct Underway {
+    /// What the pose rests on: the prior, a fix, or dead reckoning since a fix.
+    pub state: State,
+    /// Whether a fix was attempted.
+    pub due: bool,
+    /// The navigated pose, relative to the object of the last fix; `None` while there is none.
+    pub pose: Option<Navigated>,
+    /// The first fix, moved here by odometry alone; `None` before it and after a gap in the odometry.
+    pub unreferenced: Option<Navigated>,
+    /// The motion of the odometry to this frame.
+    pub odometry: Motion,
+    /// What happened, in order.
+    pub events: Vec<NavigationEvent>,
+    /// Duration of the odometry (ms).
+    pub odometry_ms: f64,
+}
+
+/// The motion of the odometry to a frame.
+#[derive(Debug, Clone, Default)]
+pub struct Motion {
+    /// Why no motion to the frame is known; empty where one is, and at the first frame. It ends in
+    /// [`THE_WAY_IS_UNKNOWN`] where the trajectory is broken and begins again at this frame. Otherwise the frame was
+    /// skipped, and the next motion spans it.
+    pub lost: String,
+    /// The motion from the last known frame, `earlier_from_later`.
+    pub step: Option<Local>,
+}
+
+impl std::fmt::Debug for Voyage<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("NavigationSession")
+            .field("frames", &self.frames)
+            .field("last", &self.last)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Voyage<'a> {
+    /// Sets out, in the network of an earlier run where there is one; every target stands somewhere in the world.
+    pub fn begin(
+        helm: &'a Helm,
+        stages: &'a Stages,
+        targets: &'a [Target],
+        rig: &'a StereoRig,
+        body_from_camera: Transform<Body, Camera>,
+        earlier: Option<&Network>,
+    ) -> Self {
+        let names = targets.iter().map(|target| target.name.clone()).collect();
+        let navigator = Navigator::new(places(targets), &*helm.policy, &*helm.fusion).with_names(names);
+        Self {
+            helm,
+            stages,
+            targets,
+            rig,
+            navigator,
+            explorer: helm.network.as_ref().map(|keyframes| Explorer::begin(keyframes, targets, rig, earlier)),
+            filter: None,
+            body_from_camera,
+            odometry: None,
+            frames: 0,
+            began: None,
+            told: 0,
+            last: None,
+            fixed: false,
+            unreferenced: None,
+        }
+    }
+
+    /// The same with `filter` between the odometry and the navigator.
+    #[must_use]
+    pub fn with_motion_filter(self, filter: MotionFilter<'a>) -> Self {
+        Self { filter: Some(filter), ..self }
+    }
+
+    /// The targets; a [`Navigated`] pose names its object by the index here.
+    pub fn targets(&self) -> &'a [Target] {
+        self.targets
+    }
+
+    /// Takes the next frame: moves the pose by odometry and takes a fix where one is due.
+    ///
+    /// Frames come in order of time and must be stereo pairs of the session's rig.
+    ///
+    /// # Errors
+    /// [`Error::Frame`]: a frame without images, or one that is not later than the frame before.
+    pub fn push(&mut self, frame: &Sight) -> Result<Underway, Error> {
+        let invalid = |cause: String| Error::Frame { stamp_ns: frame.stamp_ns, cause };
+        if let Eyes::Pair(left, right) = &frame.eyes {
+            check_sizes(left, right, self.rig)?;
+        }
+        let (helm, rig, mounting) = (self.helm, self.rig, self.body_from_camera);
+        let odometry = self.odometry.get_or_insert_with(|| helm.begin_odometry(rig, mounting));
+        let moved = odometry.advance(frame).map_err(invalid)?;
+        let mut rng = random::of_frame(0, self.frames);
+        self.frames += 1;
+        let cloud = OnceCell::new();
+        let make = || cloud.get_or_init(|| self.stages.cloud(&frame.eyes, rig));
+        self.advance(frame, &moved, make, &mut rng).map(|(_, state)| state).map_err(invalid)
+    }
+
+    /// The same for a caller that computes odometry and cloud itself. The last fix is carried along by the `moved` odometry, and another is taken from the `cloud` where
+    /// one is due.
+    ///
+    /// # Errors
+    /// A sentence: the frame is no stereo pair.
+    pub fn advance<'b>(
+        &mut self,
+        sight: &'b Sight,
+        moved: &OdometryResult,
+        cloud: impl FnOnce() -> &'b Cloud,
+        rng: &mut dyn Rng,
+    ) -> Result<(Sighting, Underway), String> {
+        let pair = stereo_pair(sight)?;
+        let mut events = Vec::new();
+        let odometry = self.carry(sight, moved, &mut events);
+
+        // Where the odometry is not, neither is the navigator: a fix would have no place in the order of motions.
+        let here = self.last.is_some_and(|(stamp_ns, _)| stamp_ns == sight.stamp_ns);
+        let rough = sight.rough(self.targets);
+        let priors = self.priors(&rough);
+        let in_view = || self.targets.iter().zip(&priors).any(|(target, prior)| Stages::shows(target, prior, self.rig));
+        let due = match here {
+            true => self.navigator.due(in_view()),
+            false => {
+                let ago = self.last.map_or(0.0, |(stamp_ns, _)| (sight.stamp_ns - stamp_ns) as f64 * 1e-9);
+                self.navigator.blind(ago, in_view())
+            }
+        };
+        let sighting = match here && due {
+            true => self.look(sight, cloud(), &priors, &rough, rng),
+            false => Sighting::default(),
+        };
+        let taken = self.fix(&sighting, &mut events);
+        if here && let Some(explorer) = &mut self.explorer {
+            explorer.visit(sight, &pair, &mut self.navigator, &taken, &mut events);
+        }
+        self.tell(&mut events);
+        let pose = self.navigator.pose().filter(|_| here).cloned();
+        let unreferenced = self.unreferenced.clone().filter(|_| here);
+        let state = self.navigator.state();
+        Ok((sighting, Underway { state, due, pose, unreferenced, odometry, events, odometry_ms: moved.ms }))
+    }
+
+    /// Carries the pose to this frame where the odometry knows the way.
+    fn carry(&mut self, sight: &Sight, moved: &OdometryResult, events: &mut Vec<NavigationEvent>) -> Motion {
+        let began = *self.began.get_or_insert(sight.stamp_ns);
+        let now = moved.latest.filter(|(_, waypoint)| waypoint.stamp_ns == sight.stamp_ns);
+        let (Some((segment, waypoint)), false) = (now, matches!(moved.followed, Followed::Skipped(_))) else {
+            let lost = match &moved.followed {
+                Followed::Skipped(lost) => lost.to_string(),
+                Followed::Began | Followed::Followed { .. } => String::new(),
+            };
+            events.push(NavigationEvent::NoMotion { why: lost.clone() });
+            return Motion { lost, step: None };
+        };
+        let before = self.last.replace((sight.stamp_ns, segment));
+        let Some((stamp_ns, left)) = before else { return Motion::default() };
+        let seconds = (sight.stamp_ns - stamp_ns) as f64 * 1e-9;
+        let found = waypoint.local.filter(|_| left == segment);
+        let time = (sight.stamp_ns - began) as f64 * 1e-9;
+        let motion = match &mut self.filter {
+            Some(filter) => filter(time, found),
+            None => found,
+        };
+        self.navigator.advance(seconds, motion.as_ref());
+        self.explorer.iter_mut().for_each(|explorer| explorer.advance(seconds, motion.as_ref()));
+        self.unreferenced = self.unreferenced.take().zip(motion).map(|(pose, motion)| pose.after(&motion));
+        let Some(motion) = motion else {
+            let why = if found.is_some() { "it failed" } else { "a new segment begins" };
+            return Motion { lost: format!("{why}: {THE_WAY_IS_UNKNOWN}"), step: None };
+        };
+        Motion { lost: String::new(), step: Some(motion) }
+    }
+
+    /// What is known before a fix: the navigated pose, passed to each object; else the rough one.
+    fn priors(&self, rough: &[Option<Prior>]) -> Vec<Option<Prior>> {
+        let known = |index| {
+            let Standing { object_from_camera, covariance, .. } = self.navigator.pose_at(index)?.standing;
+            Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) })
+        };
+        rough.iter().enumerate().map(|(index, rough)| known(index).or_else(|| rough.clone())).collect()
+    }
+
+    /// Attempts every object in view where it is believed to be. What stands elsewhere than surveyed is not found there:
+    /// the rough pose then says where to look once more.
+    fn look(
+        &self,
+        sight: &Sight,
+        cloud: &Cloud,
+        priors: &[Option<Prior>],
+        rough: &[Option<Prior>],
+        rng: &mut dyn Rng,
+    ) -> Sighting {
+        let view = View { sight, cloud, targets: self.targets, rig: self.rig };
+        let mut sighting = self.stages.reference_from(view, priors, None, rng);
+        if self.navigator.pose().is_some() {
+            self.stages.again(&mut sighting, view, rough, rng);
+        }
+        sighting
+    }
+
+    /// Gives the fixes to the navigator; those that it took.
+    fn fix(&mut self, sighting: &Sighting, events: &mut Vec<NavigationEvent>) -> Vec<Navigated> {
+        let mut taken = Vec::new();
+        for attempt in &sighting.attempts {
+            let Outcome::Referenced(fix) = &attempt.answer.outcome else { continue };
+            let target = &self.targets[attempt.target];
+            let object = target.name.clone();
+            let shares = match self.stages.model_errors(fix, target, &sighting.cloud, self.rig) {
+                Ok(shares) => shares,
+                Err(why) => {
+                    events.push(NavigationEvent::FixUnused { object, why: why.to_string() });
+                    continue;
+                }
+            };
+            let standing = Standing::new(fix.object_from_camera, fix.covariance)
+                .considering(Considered::of_model(attempt.target, shares));
+            let fix = Navigated { object: attempt.target, standing };
+            let event = self.navigator.fix(&fix);
+            // What is laid by an object that may have been moved would stand where it does not.
+            let sure = !self.navigator.is_disputed(attempt.target);
+            if sure && matches!(event, Event::Taken | Event::Left | Event::Relocated) {
+                taken.push(fix.clone());
+            }
+            match event {
+                Event::Taken => events.push(NavigationEvent::FixTaken { object }),
+                Event::Left => events.push(NavigationEvent::FixLeft { object }),
+                Event::Doubted(why) => events.push(NavigationEvent::FixDoubted { object, why: why.to_string() }),
+                Event::Relocated => events.push(NavigationEvent::FixesOverrule { object }),
+                Event::Disputed { objects, metres } => {
+                    let objects = objects.map(|object| self.targets[object].name.clone());
+                    events.push(NavigationEvent::Disputed { objects, metres });
+                }
+                Event::Displaced(found) => {
+                    let object = self.targets[found.object].name.clone();
+                    let metres = found.old_from_new.translation().norm();
+                    events.push(NavigationEvent::Displaced { object, metres });
+                    self.explorer.iter_mut().for_each(|explorer| explorer.displaced(&found));
+                }
+            }
+            if !std::mem::replace(&mut self.fixed, true) {
+                self.unreferenced = Some(fix);
+            }
+        }
+        taken
+    }
+
+    /// What its network has become, as a file, where it is to be kept.
+    pub fn network(self) -> Option<String> {
+        self.explorer?.finish()
+    }
+
+    fn tell(&mut self, events: &mut Vec<NavigationEvent>) {
+        let changes = self.navigator.changes();
+        let new = &changes[self.told..];
+        events.extend(new.iter().map(|change| NavigationEvent::State {
+            from: change.from.to_string(),
+            to: change.to.to_string(),
+            why: change.why.to_string(),
+        }));
+        self.told = changes.len();
+    }
+}
+
+/// Where the objects stand by the survey.
+pub fn places(targets: &[Target]) -> Vec<Place> {
+    let place = |target: &Target| Place {
+        world_from_object: target.world_from_object.expect("checked when the source was opened"),
+        covariance: target.survey.unwrap_or_else(|| Covariance6::<_, Object>::new(nalgebra::Matrix6::zeros())),
+    };
+    targets.iter().map(place).collect()
+}

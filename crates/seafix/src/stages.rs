@@ -1,0 +1,378 @@
+//! From a sight to fixes: the method, one line a stage, in the paper's order.
+
+use std::{sync::Arc, time::Instant};
+
+use rand::Rng;
+use seafix_geometry::{MeasuredPoint, StereoRig};
+use seafix_navigation::Share;
+use seafix_referencing::{
+    Candidates, Correspondence, Degenerate, Gathered, Identification, ModelPoint, Observations, Outcome, Prior,
+    PriorBound, Problem, Reference, Search, Solver, Target, Tolerance, Unidentified, candidates, judge, judge_named,
+    problem_file::CoherenceProblem, until_found,
+};
+use seafix_vision::{FrontEnd, Keypoint, Look};
+
+use crate::{
+    Eyes, FrameTimes, Pipeline, Sight, TargetTimes, Told,
+    times::{milliseconds, timed},
+};
+
+/// A pipeline, built.
+#[derive(Debug)]
+pub struct Stages {
+    pub(crate) front_end: FrontEnd,
+    pub(crate) search: Box<dyn Search>,
+    pub(crate) solver: Box<dyn Solver>,
+    settings: Pipeline,
+}
+
+/// Everything the pipeline made of one sight; nothing, where none was to be made.
+#[derive(Debug, Default)]
+pub struct Sighting {
+    /// Key points of the left image.
+    pub keypoints: Arc<[Keypoint]>,
+    /// The cloud.
+    pub cloud: Arc<[MeasuredPoint]>,
+    /// One attempt for each target in view.
+    pub attempts: Vec<Attempt>,
+    /// What a joint fix takes of objects that were not fixed by themselves.
+    pub gathered: Gathered,
+    /// Times of the common stages.
+    pub times: FrameTimes,
+}
+
+/// What came of one target.
+#[derive(Debug)]
+pub struct Attempt {
+    /// Index among the site's targets.
+    pub target: usize,
+    /// The shells' content.
+    pub candidates: Candidates,
+    /// The answer.
+    pub answer: seafix_referencing::Attempt,
+    /// What became of the joint fix that was asked for.
+    pub joint: Option<String>,
+    /// Times of this target's stages.
+    pub times: TargetTimes,
+}
+
+impl Attempt {
+    /// `times` (ms) are those of candidates, search and solution, and of all that was done for this target.
+    fn new(
+        target: usize,
+        candidates: Candidates,
+        answer: seafix_referencing::Attempt,
+        [candidates_ms, search_ms, solve_ms]: [Option<f64>; 3],
+        total_ms: f64,
+    ) -> Self {
+        let times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms: Some(total_ms) };
+        Self { target, candidates, answer, joint: None, times }
+    }
+}
+
+/// The cloud of one frame. It depends on the front end alone, so that trials with the same front end can share it.
+#[derive(Debug)]
+pub struct Cloud {
+    /// Key points of the left image.
+    keypoints: Arc<[Keypoint]>,
+    points: Arc<[MeasuredPoint]>,
+    times: FrameTimes,
+    /// Duration of all stages together (ms).
+    total_ms: f64,
+}
+
+/// The candidates of one target, and the answer of the search to them. Both depend on no solver, so that trials which
+/// differ in nothing else can share them.
+#[derive(Debug, Clone)]
+pub struct Sought {
+    candidates: Candidates,
+    found: Result<Identification, Unidentified>,
+    /// Durations of the candidates and of the search (ms).
+    spent: [f64; 2],
+}
+
+/// One frame and the targets that are searched for in it.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// The measurements and their prior.
+    pub sight: &'a Sight,
+    /// The cloud of these measurements.
+    pub cloud: &'a Cloud,
+    /// The targets.
+    pub targets: &'a [Target],
+    /// The rig.
+    pub rig: &'a StereoRig,
+}
+
+impl Stages {
+    /// A pipeline of these components.
+    pub fn new(front_end: FrontEnd, search: Box<dyn Search>, solver: Box<dyn Solver>, settings: Pipeline) -> Self {
+        Self { front_end, search, solver, settings }
+    }
+
+    /// Whether its solver works on pixels, and on nothing else.
+    pub fn needs_pixels(&self) -> bool {
+        self.solver.needs_pixels()
+    }
+
+    /// The settings it was built from.
+    pub fn settings(&self) -> &Pipeline {
+        &self.settings
+    }
+
+    /// The way from one sight to fixes, in the paper's order: key points, matches, cloud; then for
+    /// each target in view candidates (Stage 1), the search (Stage 2) and the solution.
+    pub fn reference(&self, sight: &Sight, targets: &[Target], rig: &StereoRig, rng: &mut dyn Rng) -> Sighting {
+        let cloud = &self.cloud(&sight.eyes, rig);
+        self.reference_from(View { sight, cloud, targets, rig }, &sight.rough(targets), None, rng)
+    }
+
+    /// The same from a cloud, and from what is known before of the pose relative to each target. The answers of the
+    /// search are those of [`Stages::seek_all`], where they are known already.
+    pub fn reference_from(
+        &self,
+        view: View<'_>,
+        priors: &[Option<Prior>],
+        sought: Option<&[Option<Sought>]>,
+        rng: &mut dyn Rng,
+    ) -> Sighting {
+        let attempts = (0..view.targets.len())
+            .filter_map(|index| {
+                let sought = sought.map(|all| all[index].clone());
+                let mut attempt = self.attempt(view, index, priors[index].as_ref(), sought, rng)?;
+                attempt.times.total_ms = attempt.times.total_ms.map(|own| view.cloud.total_ms + own);
+                Some(attempt)
+            })
+            .collect();
+        let Cloud { keypoints, points, times, .. } = view.cloud;
+        let (keypoints, cloud) = (Arc::clone(keypoints), Arc::clone(points));
+        Sighting { keypoints, cloud, attempts, gathered: Gathered::default(), times: *times }
+    }
+
+    /// Seeks once more, from other priors, what was not found.
+    pub fn again(&self, sighting: &mut Sighting, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) {
+        for attempt in &mut sighting.attempts {
+            let (index, prior) = (attempt.target, priors[attempt.target].as_ref());
+            if matches!(attempt.answer.outcome, Outcome::Referenced(_)) || prior.is_none() {
+                continue;
+            }
+            let Some(mut other) = self.attempt(view, index, prior, None, rng) else { continue };
+            if matches!(other.answer.outcome, Outcome::Referenced(_)) {
+                other.times.total_ms = attempt.times.total_ms.zip(other.times.total_ms).map(|(a, b)| a + b);
+                *attempt = other;
+            }
+        }
+    }
+
+    /// What a fix owes to the errors of its model: for each point that it rests on, by its place in the model.
+    pub fn model_errors(
+        &self,
+        fix: &Reference,
+        target: &Target,
+        cloud: &[MeasuredPoint],
+        rig: &StereoRig,
+    ) -> Result<Vec<(usize, Share)>, Degenerate> {
+        let data = Observations::of(&fix.pairs, &target.points, cloud, Some(rig));
+        let shares = self.solver.model_errors(&data, &fix.object_from_camera)?;
+        Ok(fix.pairs.iter().map(|pair| pair.model).zip(shares).collect())
+    }
+
+    /// Whether enough of `target` should be in view for a fix, by what is known of the pose; without that it may be.
+    pub fn shows(target: &Target, prior: &Option<Prior>, rig: &StereoRig) -> bool {
+        in_view(target, prior.as_ref(), rig).is_some()
+    }
+
+    /// The front end's part.
+    pub fn cloud(&self, eyes: &Eyes, rig: &StereoRig) -> Cloud {
+        let (left, right) = match eyes {
+            Eyes::Points(cloud) => {
+                let times = FrameTimes::default();
+                return Cloud { keypoints: Arc::default(), points: cloud[..].into(), times, total_ms: 0.0 };
+            }
+            Eyes::Pair(left, right) => (left, right),
+        };
+        let start = Instant::now();
+        // Frames are worked on side by side: within one, a single thread keeps the times honest.
+        let mut look = Look::default();
+        self.front_end.look(left, right, rig, &mut look);
+        let times = FrameTimes {
+            detect_ms: Some(look.times.filter_ms + look.times.detect_ms),
+            locate_ms: Some(look.times.locate_ms),
+            describe_ms: Some(look.times.describe_ms),
+            match_ms: Some(look.times.match_ms),
+            refine_ms: Some(look.times.refine_ms),
+            triangulate_ms: Some(look.times.triangulate_ms),
+        };
+        let (keypoints, points) = (look.keypoints()[0].into(), look.cloud[..].into());
+        Cloud { keypoints, points, times, total_ms: milliseconds(start) }
+    }
+
+    /// Stages 1 and 2 of every target in view, in order.
+    pub fn seek_all(&self, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) -> Vec<Option<Sought>> {
+        (0..view.targets.len()).map(|index| self.seek(view, index, priors[index].as_ref(), rng)).collect()
+    }
+
+    /// Stages 1 and 2 of one target; `None` where it is not in view, or where every point says which one it is.
+    fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<Sought> {
+        let target = &view.targets[index];
+        match &view.sight.told {
+            Told::Names(_) => None,
+            Told::Problem(problem) => Some(self.seek_posed(target, problem, rng)),
+            Told::Nothing => {
+                Some(self.seek_near(target, &view.cloud.points, prior, &in_view(target, prior, view.rig)?, rng))
+            }
+        }
+    }
+
+    /// The candidates for the points that may be in view, and the search among them.
+    fn seek_near(
+        &self,
+        target: &Target,
+        cloud: &[MeasuredPoint],
+        prior: Option<&Prior>,
+        in_view: &[bool],
+        rng: &mut dyn Rng,
+    ) -> Sought {
+        let Pipeline { gate, tolerance, .. } = &self.settings;
+        let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, gate, Some(in_view)));
+        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+        let (found, stage2) = timed(|| self.search.search(&problem, rng));
+        Sought { candidates, found, spent: [stage1, stage2] }
+    }
+
+    /// The same of a problem that states its own candidates, tolerance and rough pose.
+    fn seek_posed(&self, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> Sought {
+        let (listed, stage1) = timed(|| problem.candidates());
+        let (candidates, refused) = match listed {
+            Ok(candidates) => (candidates, None),
+            Err(refused) => (Candidates::from_pairs(target.points.len(), []), Some(refused)),
+        };
+        let posed = posed(target, problem, &candidates);
+        let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
+        Sought { candidates, found, spent: [stage1, stage2] }
+    }
+
+    /// The answer about one target; `None` where it is not in view. What the search says of it may be `sought` already.
+    fn attempt(
+        &self,
+        view: View<'_>,
+        index: usize,
+        prior: Option<&Prior>,
+        sought: Option<Option<Sought>>,
+        rng: &mut dyn Rng,
+    ) -> Option<Attempt> {
+        if let Told::Names(names) = &view.sight.told {
+            return self.named(view, index, names, prior);
+        }
+        let sought = sought.unwrap_or_else(|| self.seek(view, index, prior, rng))?;
+        match &view.sight.told {
+            Told::Problem(problem) => Some(self.answer(index, &view.targets[index], problem, sought)),
+            _ => Some(self.solve(view, index, prior, sought, rng)),
+        }
+    }
+
+    /// The answer to what was sought; where that is nothing, and shells may grow, to what is found in wider ones.
+    fn solve(&self, view: View<'_>, index: usize, prior: Option<&Prior>, sought: Sought, rng: &mut dyn Rng) -> Attempt {
+        let started = Instant::now();
+        let View { cloud, targets, rig, .. } = view;
+        let (target, cloud) = (&targets[index], &cloud.points);
+        let Pipeline { tolerance, acceptance, widen, .. } = &self.settings;
+        let points = &target.points;
+        let before: f64 = sought.spent.iter().sum();
+        let mut times = [0.0; 3];
+        let mut judged = |Sought { candidates, found, spent: [stage1, stage2] }: Sought, prior: Option<&Prior>| {
+            let problem = Problem { model: points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+            let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, acceptance, Some(rig)));
+            times.iter_mut().zip([stage1, stage2, solution]).for_each(|(sum, spent)| *sum += spent);
+            (candidates, answer)
+        };
+        let (mut candidates, mut answer) = judged(sought, prior);
+        if *widen {
+            let mut wider = Candidates::default();
+            answer = until_found(answer, prior, |prior| {
+                let in_view = in_view(target, prior, rig).unwrap_or_else(|| vec![true; points.len()]);
+                let (listed, answer) = judged(self.seek_near(target, cloud, prior, &in_view, rng), prior);
+                wider = listed;
+                answer
+            });
+            if !matches!(answer.outcome, Outcome::Unidentified(_)) && !wider.lists.is_empty() {
+                candidates = wider;
+            }
+        }
+        Attempt::new(index, candidates, answer, times.map(Some), before + milliseconds(started))
+    }
+
+    /// The answer where every point says which one it is; `None` of a target that no point belongs to.
+    fn named(&self, view: View<'_>, index: usize, names: &[(usize, usize)], prior: Option<&Prior>) -> Option<Attempt> {
+        let started = Instant::now();
+        let target = &view.targets[index];
+        let (pairs, stage1) = timed(|| named(names, index, target));
+        if pairs.is_empty() {
+            return None;
+        }
+        let places = pairs.iter().map(|pair| (pair.model, pair.cloud));
+        let candidates = Candidates::from_pairs(target.points.len(), places);
+        let Pipeline { tolerance, acceptance, .. } = &self.settings;
+        let cloud = &view.cloud.points;
+        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+        let (answer, solution) = timed(|| judge_named(&problem, pairs, &*self.solver, acceptance, Some(view.rig)));
+        Some(Attempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], milliseconds(started)))
+    }
+
+    /// The answer to a problem that states its own candidates, tolerance and rough pose.
+    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> Attempt {
+        let Sought { candidates, found, spent: [stage1, stage2] } = sought;
+        let posed = posed(target, problem, &candidates);
+        let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
+        let times = [stage1, stage2, solution];
+        Attempt::new(index, candidates, answer, times.map(Some), times.iter().sum())
+    }
+}
+
+/// The search's view of a problem that states its own tolerance and rough pose.
+fn posed<'a>(target: &'a Target, problem: &'a CoherenceProblem, candidates: &'a Candidates) -> Problem<'a> {
+    let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
+    Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior }
+}
+
+/// The pairs of points that say which ones they are, in the order of the model: of an object its own, of the site those
+/// of all its objects.
+fn named(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Correspondence> {
+    let pair = |(cloud, &name)| Some(Correspondence { model: target.place_of(index, name)?, cloud });
+    let mut pairs: Vec<Correspondence> = names.iter().enumerate().filter_map(pair).collect();
+    pairs.sort_unstable();
+    // Of two that say the same the first is believed.
+    pairs.dedup_by_key(|pair| pair.model);
+    pairs
+}
+
+/// Which points of `target` may be in view: predicted in both images, or out of them by no more than
+/// three standard deviations of the prediction, and not from behind. `None` when fewer than three are
+/// predicted inside, so that no fix is attempted. Without a prior everything may be in view.
+fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Vec<bool>> {
+    /// Cosine of the angle between a point's normal and the line of sight below which it shows its back.
+    const BACK: f64 = -0.2;
+    let Some(prior) = prior else { return Some(vec![true; target.points.len()]) };
+    let camera_from_object = prior.object_from_camera.inverse();
+    let faces = |point: &ModelPoint| {
+        point.normal.is_none_or(|normal| {
+            let sight = prior.object_from_camera.translation() - point.at.coords;
+            normal.normalize().dot(&sight.normalize()) > BACK
+        })
+    };
+    let inside = |point: &ModelPoint| faces(point) && rig.sees(&(camera_from_object * point.at), 0.0).is_some();
+    // Most targets of a large site are nowhere near: that is known before any covariance is.
+    if target.points.iter().filter(|point| inside(point)).take(3).count() < 3 {
+        return None;
+    }
+    let focal = rig.left().focal()[0];
+    let near = |point: &ModelPoint| {
+        let at = camera_from_object * point.at;
+        let spread = match &prior.bound {
+            PriorBound::Gaussian(covariance) => covariance.of_point(&at).trace().sqrt(),
+            PriorBound::Box(half) => *half,
+        };
+        rig.sees(&at, -3.0 * focal * spread / at.coords.z).is_some()
+    };
+    Some(target.points.iter().map(|point| inside(point) || faces(point) && near(point)).collect())
+}
