@@ -1,4 +1,39 @@
 //! Position and attitude of an underwater vehicle relative to a known structure, from stereo images.
+//!
+//! A [`Localizer`] takes *fixes*: it makes a cloud of 3D points from a stereo pair, finds among them the feature points of
+//! an object of a [`Site`] by structural coherence, and solves the rigid transform `object_from_camera`
+//! (Bobkov, Kudryashov and Inzartsev, *J. Mar. Sci. Eng.* 2021, 9, 1038). A [navigation session](Voyage) carries the last
+//! fix along by odometry and takes the next one when it is due.
+//!
+//! ```
+//! use seafix::{Localizer, Outcome, PosePrior, Rig, Site, StereoImages, geometry::Transform};
+//!
+//! # fn main() -> Result<(), seafix::Error> {
+//! # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../datasets/virtual-sample");
+//! # let path = |name: &str| format!("{folder}/{name}");
+//! # let attitude = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(-0.31943, -0.10266, -0.03577, 0.94135));
+//! # let world_from_camera = Transform::new(attitude, nalgebra::Vector3::new(-23.459, -5.727, 36.558));
+//! let rig = Rig::from_file(path("dataset.toml"))?;
+//! let site = Site::from_file(path("site.toml"))?;
+//! let images = StereoImages::open(path("left000.png"), path("right000.png"), &rig)?;
+//! let prior = PosePrior::isotropic(world_from_camera, 0.5_f64.to_radians(), 0.1); // rad, m
+//!
+//! let localizer = Localizer::new(&site, &rig)?;
+//! for target in localizer.localize(&images, &prior)? {
+//!     match target.outcome {
+//!         Outcome::Referenced(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
+//!         rejected => println!("{}: {rejected}", target.name),
+//!     }
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Every stage is a component chosen by name ([`Localizer::from_toml`]) or given as a trait object
+//! ([`Localizer::with_solver`]). This crate reads images, rigs and sites; it knows no log, no simulator and no truth.
+//!
+//! Lengths are metres, angles radians, times nanoseconds and image positions pixels. `a_from_b` maps column vectors:
+//! `p_a = a_from_b · p_b`.
 
 mod error;
 mod event;
@@ -14,6 +49,12 @@ mod sensor_frame;
 mod session;
 mod stages;
 mod times;
+
+pub use seafix_component as component;
+pub use seafix_geometry as geometry;
+pub use seafix_navigation as odometry;
+pub use seafix_referencing as referencing;
+pub use seafix_vision as vision;
 
 pub use error::Error;
 pub use event::NavigationEvent;

@@ -10,6 +10,7 @@ mod draw;
 mod eval;
 #[cfg(unix)]
 mod hyperqueue;
+mod layers;
 mod model;
 mod odometry;
 mod recordings;

@@ -1,5 +1,7 @@
 //! What comes of an attempt: a fix, rivals, or a refusal.
 
+use std::fmt;
+
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform};
 
@@ -30,6 +32,11 @@ pub struct Reference {
 }
 
 impl Reference {
+    /// Standard deviation of the camera's position in the object frame (m): the root of the trace of its covariance.
+    pub fn position_sigma(&self) -> f64 {
+        self.covariance.position_sigma()
+    }
+
     /// The covariance (m², camera axes) of the place where the fix puts a point of the object.
     pub fn point_covariance(&self, point: &Point<Object>) -> Matrix3<f64> {
         self.covariance.of_point(&(self.object_from_camera.inverse() * *point))
@@ -95,6 +102,25 @@ impl Outcome {
             Self::Ambiguous(rivals) => Some(format!("{} different poses explain the data", rivals.len())),
             Self::Unidentified(refusal) => Some(refusal.to_string()),
             Self::Degenerate(degenerate) => Some(degenerate.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    /// The outcome in one line: a fix with its precision, or why there is none.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self, self.explanation()) {
+            (Self::Referenced(fix), _) => {
+                write!(
+                    f,
+                    "{}: {} points, position ± {:.1} mm",
+                    self.name(),
+                    fix.pairs.len(),
+                    1e3 * fix.position_sigma()
+                )
+            }
+            (_, Some(explanation)) => write!(f, "{}: {explanation}", self.name()),
+            (_, None) => f.write_str(self.name()),
         }
     }
 }

@@ -83,7 +83,7 @@ pub struct Identification {
 
 impl Identification {
     /// A set of which nothing is proved but that no admissible set has more than `bound` pairs.
-    pub(crate) fn unproved(pairs: Vec<Correspondence>, bound: usize, tests: u64) -> Self {
+    pub fn unproved(pairs: Vec<Correspondence>, bound: usize, tests: u64) -> Self {
         Self {
             pairs,
             rivals: Vec::new(),
