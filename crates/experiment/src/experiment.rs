@@ -5,11 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use hmac_sha256::Hash as Sha256;
 use seafix_component::{BuildError, Choice, Fault, Part, inside, read_text, take_out};
 use seafix_log::looks_like;
 use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use seafix::{Helm, Pipeline, PipelineError, Stages};
 use seafix_data::{
@@ -192,7 +192,7 @@ impl Plan {
     /// What the run is called: the experiment's name, and a number that changes with any of its settings.
     pub(crate) fn id(&self) -> String {
         let settings: String = self.trials.iter().map(|trial| trial.resolved.to_toml()).collect();
-        format!("{}-{}", self.name, &hex(&Sha256::digest(settings))[..8])
+        format!("{}-{}", self.name, &hex(&Sha256::hash(settings.as_bytes()))[..8])
     }
 
     /// Reads an experiment file, or takes a data set's folder for an experiment of its own; then

@@ -9,12 +9,12 @@ use std::{
     sync::LazyLock,
 };
 
+use hmac_sha256::Hash as Sha256;
 use seafix_component::{Listing, Registry};
 use seafix_log::TrialHeader;
 use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
 use seafix_referencing::{SEARCHES, SOLVERS};
 use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
-use sha2::{Digest, Sha256};
 
 use seafix_data::{dataset::hex, source::SOURCES};
 

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use hmac_sha256::Hash as Sha256;
 use seafix::Keyframes;
 use seafix_component::{Fault, read_long_text};
 use seafix_data::dataset::hex;
 use seafix_navigation::Network;
-use sha2::{Digest, Sha256};
 
 /// A network is read up to this length (bytes): some five thousand key frames.
 const MOST: u64 = 1 << 30;
@@ -42,5 +42,5 @@ pub(crate) fn open(keyframes: &Keyframes, folder: &Path) -> Result<Option<Networ
 
 /// Of the text, which is what is read: byte order mark and line ends do not count.
 fn digest(text: &str) -> String {
-    hex(&Sha256::digest(text))
+    hex(&Sha256::hash(text.as_bytes()))
 }

@@ -6,12 +6,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
 use seafix_evaluation::lever_arm_error;
 use seafix_log::{
     ELSEWHERE, FrameRecord, LogError, Outcome, Reader, Region, SharedStages, TargetRecord, Totals, TrialHeader,
 };
-use sha2::{Digest, Sha256};
 
 use crate::{
     Field, ReportError, disparity, lever,

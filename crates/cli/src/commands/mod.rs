@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::Subcommand;
+use clap::{CommandFactory, Subcommand};
 
-use crate::exit::Ended;
+use crate::{Arguments, exit::Ended};
 
 mod check;
 mod cloud;
 mod compare;
+mod completions;
 mod diff;
 mod dive;
 mod draw;
@@ -88,6 +89,10 @@ pub(crate) enum Command {
     Dive(dive::Dive),
     /// Write the frames of an experiment's source as a data set.
     Export(export::Export),
+    /// Print the completions of a shell, for its start-up file.
+    Completions(completions::Completions),
+    /// Write the manual pages of all commands.
+    Man(completions::Man),
 }
 
 impl Command {
@@ -114,6 +119,8 @@ impl Command {
             Self::Publish(command) => command.execute(),
             Self::Dive(command) => command.execute(),
             Self::Export(command) => command.execute(),
+            Self::Completions(command) => command.execute(Arguments::command()),
+            Self::Man(command) => command.execute(Arguments::command()),
         }
     }
 }

@@ -6,11 +6,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
 use seafix_component::Fault;
 use seafix_geometry::StereoPixels;
 use seafix_vision::{Image, Realigned, Sides, look_alikes};
-use sha2::{Digest, Sha256};
 
 use seafix_io::{ImageLimits, image::regular};
 

@@ -6,12 +6,12 @@ use std::{
     sync::Arc,
 };
 
+use hmac_sha256::Hash as Sha256;
 use seafix_component::{Component, Fault, in_range, read_text};
 use seafix_evaluation::Solved;
 use seafix_geometry::{Camera, Object, Transform};
 use seafix_referencing::problem_file::{self, CoherenceProblem};
 use serde::{Deserialize, Serialize, de::IgnoredAny};
-use sha2::{Digest, Sha256};
 
 use super::{
     Passage, Source, TrueAnswer,

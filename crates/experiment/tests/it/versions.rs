@@ -7,6 +7,7 @@
 
 use std::{collections::BTreeMap, fmt::Debug, fs, path::Path};
 
+use hmac_sha256::Hash as Sha256;
 use nalgebra::{Matrix2, Matrix3, Vector3, Vector6};
 use seafix_component::{Choice, Registry};
 use seafix_data::source::SOURCES;
@@ -25,7 +26,6 @@ use seafix_vision::{
     DESCRIPTORS, DETECTORS, Descriptors, FILTERS, Image, Keypoint, LOCATORS, MATCHERS, Pair, Place, REFINEMENTS,
     TRIANGULATORS, Threads, View,
 };
-use sha2::{Digest, Sha256};
 
 const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/versions.txt");
 const COMMAND: &str = "SEAFIX_UPDATE=1 cargo test -p seafix-experiment versions_";

@@ -1,7 +1,7 @@
 //! What the methods were given.
 
+use hmac_sha256::Hash as Sha256;
 use seafix_log::{CameraRecord, TrialHeader};
-use sha2::{Digest, Sha256};
 
 use super::distinct;
 use crate::{
@@ -82,7 +82,7 @@ fn hashes(run: &Run) -> Table {
     let heads = ["Log", "configuration", "site", "results"].map(Head::words).to_vec();
     let mut table = Table::new("hashes", caption, heads);
     for trial in &run.trials {
-        let hash = |text: &str| code(hex(&Sha256::digest(text.as_bytes())));
+        let hash = |text: &str| code(hex(&Sha256::hash(text.as_bytes())));
         // Where every frame has an object of its own there is no site.
         let site = match trial.header.site.as_str() {
             "" => "–".into(),

@@ -1,0 +1,75 @@
+//! `seafix completions` and `seafix man`: derived from the command line's own definition.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Command, ValueEnum};
+use clap_complete::Shell;
+use seafix_component::Fault;
+
+use crate::{
+    exit::{DONE, Ended, Failure, OUTPUT},
+    terminal::print,
+};
+
+/// The program's name in completions and manual pages.
+const PROGRAM: &str = "seafix";
+
+/// Prints the completions of a shell.
+#[derive(Debug, Args)]
+pub(crate) struct Completions {
+    /// The shell.
+    #[arg(value_enum)]
+    shell: ShellName,
+}
+
+/// The shells that completions exist for.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ShellName {
+    /// GNU Bourne-again shell.
+    Bash,
+    /// Elvish.
+    Elvish,
+    /// Fish.
+    Fish,
+    /// `PowerShell`.
+    Powershell,
+    /// Z shell.
+    Zsh,
+}
+
+impl Completions {
+    pub(crate) fn execute(&self, mut program: Command) -> Ended {
+        let shell = match self.shell {
+            ShellName::Bash => Shell::Bash,
+            ShellName::Elvish => Shell::Elvish,
+            ShellName::Fish => Shell::Fish,
+            ShellName::Powershell => Shell::PowerShell,
+            ShellName::Zsh => Shell::Zsh,
+        };
+        let mut script = Vec::new();
+        clap_complete::generate(shell, &mut program, PROGRAM, &mut script);
+        print(&String::from_utf8_lossy(&script))?;
+        Ok(DONE)
+    }
+}
+
+/// Writes the manual pages.
+#[derive(Debug, Args)]
+pub(crate) struct Man {
+    /// The folder for the pages, one a command; it is made if it does not exist.
+    folder: PathBuf,
+}
+
+impl Man {
+    pub(crate) fn execute(&self, program: Command) -> Ended {
+        let write = |folder: &Path| {
+            std::fs::create_dir_all(folder)?;
+            clap_mangen::generate_to(program.name(PROGRAM), folder)
+        };
+        write(&self.folder).map_err(|error| {
+            let what = format!("cannot write ({error})");
+            Failure::new(OUTPUT, Fault::new(what, &self.folder).remedy("name a folder that can be written"))
+        })?;
+        Ok(DONE)
+    }
+}
