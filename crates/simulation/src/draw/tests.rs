@@ -1,3 +1,5 @@
+use std::sync::{Arc, LazyLock};
+
 use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Pinhole, RightCamera, Transform, World};
 use seafix_vision::{Image, Threads, Workspace};
@@ -19,6 +21,9 @@ pub(super) fn field(plan: &SitePlan) -> Field {
     Field::new(plan, &Changes::default(), SurveyErrors { model: 0.0, survey: 0.0 }, 3)
 }
 
+/// Kept for all tests: to make looks takes longer than to draw with them.
+static LOOKS: LazyLock<Arc<Looks>> = LazyLock::new(|| Looks::shared(5));
+
 pub(super) fn studio(scale: f64, water: Water, imager: Imager, port: Port, distortion: &[f64]) -> Studio {
     let size = [1024.0, 768.0].map(|n| (n * scale) as u32);
     let principal = size.map(|n| 0.5 * (f64::from(n) - 1.0));
@@ -34,7 +39,7 @@ pub(super) fn studio(scale: f64, water: Water, imager: Imager, port: Port, disto
         .collect();
     let left = Eye::new(Lens::new(camera, port.clone()), lamps, &water);
     let right = Eye::new(Lens::new(camera, port), there, &water);
-    let looks = Looks::shared(5);
+    let looks = Arc::clone(&LOOKS);
     Studio::new(left, right, water, imager, looks, true, 1, 2)
 }
 

@@ -1,7 +1,5 @@
 //! Cameras that fail, each in its way.
 
-use std::path::Path;
-
 use seafix_vision::{Image, Threads};
 
 use super::{Mission, PlannedMission, RigPlan};
@@ -10,7 +8,7 @@ use crate::sensors::{Device, DeviceFault, FaultKind};
 /// Twelve frames a fifth of a second apart; the fault acts from the fifth to the tenth.
 fn planned(faults: Vec<DeviceFault>) -> PlannedMission {
     let rig = RigPlan { size: [64, 48], focal: 31.0, ..RigPlan::default() };
-    Mission { frames: 12, rate: 5.0, start: 3.0, rig, faults, ..Mission::default() }.plan(5, 0, Path::new("")).unwrap()
+    super::tests::planned(&Mission { frames: 12, rate: 5.0, start: 3.0, rig, faults, ..Mission::default() })
 }
 
 fn images(plan: &PlannedMission) -> Vec<(Image, Image)> {

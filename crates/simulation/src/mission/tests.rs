@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::{path::Path, sync::LazyLock};
 
 use nalgebra::Vector3;
 use seafix_geometry::Point;
@@ -18,7 +18,11 @@ fn small() -> Mission {
     Mission { frames: 6, rate: 0.5, rig, ..Mission::default() }
 }
 
-fn planned(mission: &Mission) -> PlannedMission {
+/// Keeps the looks of surfaces of seed 5 for all tests: to make them takes longer than to draw with them.
+static KEPT: LazyLock<PlannedMission> = LazyLock::new(|| small().plan(5, 0, Path::new("")).unwrap());
+
+pub(super) fn planned(mission: &Mission) -> PlannedMission {
+    LazyLock::force(&KEPT);
     mission.plan(5, 0, Path::new("")).unwrap()
 }
 
