@@ -5,7 +5,7 @@ use std::fs;
 use seafix_log::Writer;
 use seafix_report::{Forms, report, verify};
 
-use crate::made_up::{frame, header};
+use crate::made_up::{blind, header};
 
 /// Found at 2 and 3 m, refused at 4 m, found again at 5 m: it breaks down beyond 3 m. Eight of eight are not surely 95 %.
 ///
@@ -18,8 +18,8 @@ fn what_comes_after_a_break_does_not_count() {
         let mut writer = Writer::create(&folder.path().join(format!("{}.mcap", header.trial)), &header).unwrap();
         for place in 0..8 {
             let refused = distance == 4.0 && place == 0;
-            let mut frame = frame(&header, if refused { 5 } else { 0 }, distance);
-            (frame.images, frame.frame, frame.stamp_ns) = (None, place, 100 * place);
+            let mut frame = blind(&header, if refused { 5 } else { 0 }, distance);
+            (frame.frame, frame.stamp_ns) = (place, 100 * place);
             writer.frame(&frame).unwrap();
         }
         writer.finish().unwrap();

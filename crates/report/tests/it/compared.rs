@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use seafix_log::Writer;
 use seafix_report::{ReportError, compare};
 
-use crate::made_up::{frame, header};
+use crate::made_up::{blind, header};
 
 /// A run of one trial: its errors are those of `solver`.
 fn run(folder: &Path, name: &str, solver: &str, seed: u64) -> PathBuf {
@@ -22,8 +22,7 @@ fn long(folder: &Path, name: &str, solver: &str, seed: u64, frames: u64) -> Path
     header.configuration += &format!("[source]\nframes = {frames}\n");
     let mut writer = Writer::create(&path.join("001.mcap"), &header).unwrap();
     for number in 0..frames {
-        let mut frame = frame(&header, number, 3.0);
-        frame.images = None;
+        let frame = blind(&header, number, 3.0);
         writer.frame(&frame).unwrap();
     }
     writer.finish().unwrap();

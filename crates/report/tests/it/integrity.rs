@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use seafix_log::{FrameRecord, Integrity, Outcome, Region, Totals, Writer};
 use seafix_report::{Forms, report, summary, verify};
 
-use crate::made_up::{frame, header};
+use crate::made_up::{blind, header};
 
 /// Errors and levels (m) beside a limit of 50 mm, one fix in each region.
 const CASES: [(f64, Option<f64>, Region); 6] = [
@@ -23,8 +23,7 @@ fn write(folder: &Path, totals: bool, change: impl Fn(&mut FrameRecord)) {
     let mut sums = Totals { every: 1, ..Totals::default() };
     let mut writer = Writer::create(&folder.join("001.mcap"), &header).unwrap();
     for number in 0..12 {
-        let mut frame = frame(&header, number, 3.0);
-        frame.images = None;
+        let mut frame = blind(&header, number, 3.0);
         let (error, level, _) = CASES[number as usize % 6];
         let row = &mut frame.targets[0];
         row.outcome = Outcome::Referenced;

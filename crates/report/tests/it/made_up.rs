@@ -1,6 +1,11 @@
 //! A made-up run whose results are known.
 
-use std::path::Path;
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use seafix_log::{
     Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, InspectedPoint,
@@ -80,8 +85,42 @@ pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
     }
 }
 
+/// What tells one frame from the others.
+fn seed(number: u64, distance: f64) -> u64 {
+    10_000 * number + (distance * 10.0) as u64
+}
+
 /// Frame `number` at `distance`; every sixth is refused, one in all the run is wrong.
 pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
+    let blind = blind(header, number, distance);
+    let images = Some([0, 1].map(|side| image(&blind.cloud, side, seed(number, distance))));
+    FrameRecord { images, ..blind }
+}
+
+/// An image of the cloud.
+fn image(cloud: &[CloudPoint], side: usize, seed: u64) -> GreyImage {
+    let wave = |n: u32, of: fn(f64) -> f64| (0..n).map(|k| of(f64::from(k))).collect::<Vec<f64>>();
+    let (across, down) = (wave(SIZE[0], |x| (x / 23.0).sin()), wave(SIZE[1], |y| (y / 17.0).cos()));
+    let mut pixels: Vec<u8> = (0..SIZE[0] * SIZE[1])
+        .map(|i| {
+            let (x, y) = ((i % SIZE[0]) as usize, (i / SIZE[0]) as usize);
+            (90.0 + 25.0 * across[x] * down[y] + 14.0 * noise(u64::from(i) + seed)) as u8
+        })
+        .collect();
+    for point in cloud {
+        let seen = point.pixels.map(|pixels| if side == 0 { pixels.left } else { pixels.right }).unwrap();
+        for (dx, dy) in (-9..9).flat_map(|dx| (-9..9).map(move |dy| (dx, dy))) {
+            let (x, y) = (seen[0] as i64 + dx, seen[1] as i64 + dy);
+            if (0..i64::from(SIZE[0])).contains(&x) && (0..i64::from(SIZE[1])).contains(&y) && (dx < 0) == (dy < 0) {
+                pixels[(y * i64::from(SIZE[0]) + x) as usize] = 190;
+            }
+        }
+    }
+    GreyImage { width: SIZE[0], height: SIZE[1], pixels }
+}
+
+/// The frame without its images, which take the most time.
+pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
     let target = &header.targets[0];
     let mut world_from_camera = EYE;
     world_from_camera[2][3] = -distance;
@@ -92,7 +131,7 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         };
         PixelPair { left: at(0.0, seed), right: at(0.25, seed + 1) }
     };
-    let seed = 10_000 * number + (distance * 10.0) as u64;
+    let seed = seed(number, distance);
     let covariance = [[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-4]];
     let cloud: Vec<CloudPoint> = (0..40)
         .map(|i| {
@@ -104,25 +143,6 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
             CloudPoint { at: [at[0], at[1], at[2] + distance], covariance, pixels }
         })
         .collect();
-    let image = |side: usize| {
-        let mut pixels: Vec<u8> = (0..SIZE[0] * SIZE[1])
-            .map(|i| {
-                let (x, y) = (f64::from(i % SIZE[0]), f64::from(i / SIZE[0]));
-                (90.0 + 25.0 * (x / 23.0).sin() * (y / 17.0).cos() + 14.0 * noise(u64::from(i) + seed)) as u8
-            })
-            .collect();
-        for point in &cloud {
-            let seen = point.pixels.map(|pixels| if side == 0 { pixels.left } else { pixels.right }).unwrap();
-            for (dx, dy) in (-9..9).flat_map(|dx| (-9..9).map(move |dy| (dx, dy))) {
-                let (x, y) = (seen[0] as i64 + dx, seen[1] as i64 + dy);
-                if (0..i64::from(SIZE[0])).contains(&x) && (0..i64::from(SIZE[1])).contains(&y) && (dx < 0) == (dy < 0)
-                {
-                    pixels[(y * i64::from(SIZE[0]) + x) as usize] = 190;
-                }
-            }
-        }
-        GreyImage { width: SIZE[0], height: SIZE[1], pixels }
-    };
     let solver = &header.components[2].name;
     let worse = if solver == "triad" { 2.0 } else { 1.0 };
     let refused = number % 6 == 5;
@@ -175,7 +195,7 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
     FrameRecord {
         frame: number,
         stamp_ns: number * 100_000_000,
-        images: Some([image(0), image(1)]),
+        images: None,
         key_points: cloud.iter().filter_map(|point| point.pixels).map(|pixels| pixels.left).collect(),
         cloud,
         prior: Some(PriorRecord { world_from_camera }),
@@ -209,15 +229,33 @@ pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
     }
 }
 
+/// The names and the bytes of the logs of a run.
+type Logs = Vec<(String, Vec<u8>)>;
+
+/// Writes a run; one of the same distances is made once.
 pub(crate) fn write_run(folder: &Path, distances: &[f64]) {
-    let mut index = 0;
+    static MADE: Mutex<BTreeMap<String, Arc<Logs>>> = Mutex::new(BTreeMap::new());
+    let made = {
+        let mut all = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(all.entry(format!("{distances:?}")).or_insert_with(|| Arc::new(made(distances))))
+    };
+    for (name, bytes) in made.iter() {
+        fs::write(folder.join(name), bytes).unwrap();
+    }
+}
+
+fn made(distances: &[f64]) -> Logs {
+    let folder = tempfile::tempdir().unwrap();
+    let mut logs = Logs::new();
     for &distance in distances {
         for solver in ["triad", "kabsch"] {
-            index += 1;
-            let header = header(index, distance, solver);
-            let mut writer = Writer::create(&folder.join(format!("{}.mcap", header.trial)), &header).unwrap();
+            let header = header(logs.len() + 1, distance, solver);
+            let (name, path) = (format!("{}.mcap", header.trial), folder.path().join("log.mcap"));
+            let mut writer = Writer::create(&path, &header).unwrap();
             (0..12).for_each(|number| writer.frame(&frame(&header, number, distance)).unwrap());
             writer.finish().unwrap();
+            logs.push((name, fs::read(path).unwrap()));
         }
     }
+    logs
 }

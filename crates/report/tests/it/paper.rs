@@ -1,6 +1,6 @@
 //! What reports say.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, sync::LazyLock};
 
 use seafix_log::{FrameRecord, FrameTimes, Outcome, TrialHeader, Writer, read};
 use seafix_report::{Forms, ReportError, report, summary};
@@ -41,7 +41,7 @@ fn one_trial_is_drawn_over_its_frames() {
     header.axes.clear();
     header.trial = "001".to_owned();
     let mut writer = Writer::create(&folder.path().join("001.mcap"), &header).unwrap();
-    (0..12).for_each(|number| writer.frame(&frame(&header, number, 3.0)).unwrap());
+    FRAMES.iter().for_each(|frame| writer.frame(frame).unwrap());
     writer.finish().unwrap();
     let text =
         fs::read_to_string(report(folder.path(), &folder.path().join("report"), Forms::ALL).unwrap().page).unwrap();
@@ -84,11 +84,16 @@ fn a_folder_without_logs_is_no_run() {
     assert!(matches!(report(folder.path(), &folder.path().join("report"), Forms::ALL), Err(ReportError::NoLogs(_))));
 }
 
+static FRAMES: LazyLock<Vec<FrameRecord>> = LazyLock::new(|| {
+    let header = header(1, 3.0, "kabsch");
+    (0..12).map(|number| frame(&header, number, 3.0)).collect()
+});
+
 /// Writes the run of one trial that `change` makes of frames at 3 m, and gives its report and summary.
 fn changed(change: impl Fn(&mut TrialHeader, &mut FrameRecord)) -> (String, seafix_report::Summary) {
     let folder = tempfile::tempdir().unwrap();
     let mut header = header(1, 3.0, "kabsch");
-    let mut frames: Vec<FrameRecord> = (0..12).map(|number| frame(&header, number, 3.0)).collect();
+    let mut frames = FRAMES.clone();
     frames.iter_mut().for_each(|frame| change(&mut header, frame));
     let mut writer = Writer::create(&folder.path().join("001.mcap"), &header).unwrap();
     frames.iter().for_each(|frame| writer.frame(frame).unwrap());

@@ -5,7 +5,7 @@ use std::fs;
 use seafix_log::Writer;
 use seafix_report::{Forms, report, verify};
 
-use crate::made_up::{frame, header};
+use crate::made_up::{blind, header};
 
 /// Three fixes of four attempts, turned by 0.02 rad about the points they used and shifted by 3 mm.
 ///
@@ -18,8 +18,8 @@ fn areas_and_lever_arms_are_as_by_hand() {
     let mut writer = Writer::create(&folder.path().join("001.mcap"), &header).unwrap();
     let (sine, cosine) = 0.02_f64.sin_cos();
     for (place, number) in [0, 1, 2, 5].into_iter().enumerate() {
-        let mut frame = frame(&header, number, 3.0);
-        (frame.images, frame.frame) = (None, place as u64);
+        let mut frame = blind(&header, number, 3.0);
+        frame.frame = place as u64;
         let row = &mut frame.targets[0];
         if let Some(pose) = &mut row.object_from_camera {
             let points = &header.targets[0].points[..7];
