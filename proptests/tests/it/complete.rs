@@ -362,15 +362,15 @@ fn hold_orders(alphabet: &[Happening], longest: usize, fusion: &str) -> [usize; 
 
 use Happening::{Blind, Due, Fix, Lost, Settle, Step};
 
-/// Every order of up to six fixes of three objects, right and wrong ones, with and without a motion between them or with it lost:
+/// Every order of up to five fixes of three objects, right and wrong ones, with and without a motion between them or with it lost:
 /// what becomes of each fix, pose, places, disputes and state are what whole numbers say, what told nothing moves nothing, a
 /// covariance grows without a fix and not with one, and two wrong fixes move nothing that is known.
 #[test]
-fn every_order_of_six_fixes_is_judged_right() {
+fn every_order_of_five_fixes_is_judged_right() {
     let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Glimpse];
     let alphabet: Vec<Happening> = kinds.into_iter().map(Fix).chain([Step, Lost]).collect();
-    let seen = hold_orders(&alphabet, 6, "fuse");
-    assert!(seen.iter().all(|&count| count > 100), "{seen:?}");
+    let seen = hold_orders(&alphabet, 5, "fuse");
+    assert!(seen.iter().all(|&count| count > 12), "{seen:?}");
 }
 
 /// Every order of up to six questions, instants and poses: the state is what it is said to be, and each change is told.
@@ -400,7 +400,8 @@ fn every_order_of_six_events_is_judged_right() {
     let others = [Step, Lost, Due(true), Due(false), Blind(true), Blind(false), Settle(true)];
     let alphabet: Vec<Happening> = kinds.into_iter().map(Fix).chain(others).collect();
     for fusion in ["fuse", "intersect"] {
-        hold_orders(&alphabet, 6, fusion);
+        let seen = hold_orders(&alphabet, 6, fusion);
+        assert!(seen.iter().all(|&count| count > 100), "{fusion}: {seen:?}");
     }
 }
 

@@ -1,5 +1,7 @@
 //! P46. Every derivative that the geometry computes by formulas, against central differences at random places.
 
+use std::cell::Cell;
+
 use nalgebra::{Matrix3, Matrix3x6, Matrix4x3, Vector3, Vector6};
 use proptest::prelude::*;
 use seafix_component::Choice;
@@ -112,9 +114,15 @@ fn perturbations_across_a_motion() {
 /// Seen to fail when the lever of the closed form has the other sign.
 #[test]
 fn errors_of_the_model() {
+    let scenes = Cell::new(0);
     law(16, seen(0.0), |scene| {
+        scenes.set(scenes.get() + 1);
         for name in SOLVERS.names() {
             let solver = SOLVERS.build(&Choice::named(name)).unwrap();
+            // Of a general-purpose optimiser, which takes the most time, no more than how many there are is asked.
+            if !solver.to_rounding() && scenes.get() > 2 {
+                continue;
+            }
             let data = scene.observations();
             let Ok(pose) = solver.solve(&data) else { continue };
             let Ok(errors) = solver.model_errors(&data, &pose) else { continue };
