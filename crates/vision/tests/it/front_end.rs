@@ -235,15 +235,16 @@ fn threads_and_memory_change_no_bit() {
     let matchers = ["epipolar-band", "lucas-kanade", "zncc-band"].map(|matcher| (matcher, front_end(matcher)));
     let refined = REFINEMENTS.names().map(|name| (name, refined(name)));
     let triangulated = TRIANGULATORS.names().map(|name| (name, triangulated(name)));
+    let rigs = rigs();
+    let scenes: Vec<_> = rigs[1..4].iter().map(|(name, rig)| (name, rig, scenes::images(rig, 60.0, 2.0))).collect();
     for (listed, front_end) in matchers.into_iter().chain(refined).chain(triangulated) {
         let mut kept = [Threads::One, Threads::Pool].map(Look::new);
-        for (name, rig) in &rigs()[1..4] {
-            let [left, right] = scenes::images(rig, 60.0, 2.0);
+        for (name, rig, [left, right]) in &scenes {
             let shown = |look: &Look| format!("{:?}", (&look.matches, &look.pixels, &look.cloud));
             let mut fresh = Look::new(Threads::One);
-            front_end.look(&left, &right, rig, &mut fresh);
+            front_end.look(left, right, rig, &mut fresh);
             for look in &mut kept {
-                front_end.look(&left, &right, rig, look);
+                front_end.look(left, right, rig, look);
                 assert!(shown(look) == shown(&fresh), "{name}, {listed}");
                 assert!(look.cloud.len() > 50, "{name}, {listed}");
             }
