@@ -96,9 +96,9 @@ const NOTHING: fn(usize, usize) -> Option<Local> = |_, _| None;
 
 #[test]
 fn a_key_frame_is_found_again_from_another_side_and_errs_as_it_says() {
+    let draws = 150;
     let (rig, settings) = (rig(), Recognition::default());
     let mut recogniser = Recogniser::new(&settings, &rig, Threads::One);
-    let draws = 150;
     let (mut found, mut nees) = (0, 0.0);
     for seed in 0..draws {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -120,11 +120,11 @@ fn a_key_frame_is_found_again_from_another_side_and_errs_as_it_says() {
     assert!((mean - 6.0).abs() < 4.0 * (12.0 / found as f64).sqrt(), "{mean}");
 }
 
-#[test]
-fn other_ground_is_refused() {
+/// So many pieces of other ground are refused.
+fn refused(draws: u64) {
     let (rig, settings) = (rig(), Recognition::default());
     let mut recogniser = Recogniser::new(&settings, &rig, Threads::One);
-    for seed in 0..300 {
+    for seed in 0..draws {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
         let ground = Ground::new(&mut rng, 150, [4.0, 3.0]);
         let mut other = Ground::new(&mut rng, 150, [4.0, 3.0]);
@@ -138,6 +138,11 @@ fn other_ground_is_refused() {
         let told = recogniser.recognise(&glance, &[Candidate { keyframe: &keyframe, prior }], NOTHING);
         assert!(told.is_err(), "{seed}: {told:?}");
     }
+}
+
+#[test]
+fn other_ground_is_refused() {
+    refused(30);
 }
 
 #[test]
@@ -176,10 +181,12 @@ struct Dived {
 
 const STEP: (f64, f64) = (1e-3, 5e-3);
 const FIX: (f64, f64) = (1e-3, 5e-3);
+/// Points of the ground: few are quick.
+const FEW: usize = 1000;
 
-fn dive(seed: u64, rig: &StereoRig, settings: &NetworkSettings, earlier: Option<&Network>) -> Dived {
+fn dive(seed: u64, points: usize, rig: &StereoRig, settings: &NetworkSettings, earlier: Option<&Network>) -> Dived {
     let mut ground_rng = ChaCha8Rng::seed_from_u64(55);
-    let ground = Ground::new(&mut ground_rng, 2500, [18.0, 6.0]);
+    let ground = Ground::new(&mut ground_rng, points, [18.0, 6.0]);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let world_from_object = Transform::<World, Object>::exp(&[0.0, 0.0, 0.5, -12.0, 1.0, 0.0].into());
     let place = Place { world_from_object, covariance: Covariance6::isotropic(1e-3, 1e-3) };
@@ -229,13 +236,14 @@ fn nees((error, covariance): &(Vector6<f64>, Matrix6<f64>)) -> f64 {
     error.dot(&(covariance.try_inverse().unwrap() * error))
 }
 
-#[test]
-fn a_way_back_over_key_frames_ends_where_it_began() {
+/// So many ways back over key frames end where they began, and err as they say.
+///
+/// Seen to fail when the motion from a key frame is 5 cm off.
+fn ways_back(draws: u64, points: usize) {
     let (rig, settings) = (rig(), NetworkSettings { apart: 5.0, ..NetworkSettings::default() });
-    let draws = 24;
     let (mut sum, mut squares, mut alone) = (0.0, 0.0, 0.0);
     for seed in 0..draws {
-        let dived = dive(seed, &rig, &settings, None);
+        let dived = dive(seed, points, &rig, &settings, None);
         assert!((4..=12).contains(&dived.laid), "{seed}: {} laid", dived.laid);
         assert!(dived.refound >= 5, "{seed}: {} found again", dived.refound);
         sum += nees(&dived.network);
@@ -250,13 +258,25 @@ fn a_way_back_over_key_frames_ends_where_it_began() {
 }
 
 #[test]
+fn a_way_back_over_key_frames_ends_where_it_began() {
+    ways_back(4, FEW);
+}
+
+#[test]
+#[ignore = "long: 300 pieces of other ground, 24 dives"]
+fn key_frames_and_ways_back_in_many_draws() {
+    refused(300);
+    ways_back(24, 2500);
+}
+
+#[test]
 fn a_later_run_goes_on_in_the_network_of_an_earlier_one() {
     let (rig, settings) = (rig(), NetworkSettings { apart: 1000.0, ..NetworkSettings::default() });
-    let first = dive(100, &rig, &settings, None);
+    let first = dive(100, FEW, &rig, &settings, None);
     assert_eq!(first.refound, 0, "all of its own key frames are too young");
     let text = first.kept.text(&settings.recognition);
     let read = Network::read(std::path::Path::new("n"), &text, &settings.recognition).unwrap();
-    let second = dive(101, &rig, &settings, Some(&read));
+    let second = dive(101, FEW, &rig, &settings, Some(&read));
     assert!(second.refound >= 10, "{} found again", second.refound);
     let sigma = |one: &(Vector6<f64>, Matrix6<f64>)| one.1.fixed_view::<3, 3>(3, 3).trace();
     assert!(sigma(&second.network) < 0.25 * sigma(&second.odometry));
@@ -266,6 +286,6 @@ fn a_later_run_goes_on_in_the_network_of_an_earlier_one() {
 #[test]
 fn the_same_dive_gives_the_same_bytes() {
     let (rig, settings) = (rig(), NetworkSettings { apart: 5.0, ..NetworkSettings::default() });
-    let text = || dive(3, &rig, &settings, None).kept.text(&settings.recognition);
+    let text = || dive(3, FEW, &rig, &settings, None).kept.text(&settings.recognition);
     assert!(text() == text());
 }
