@@ -219,6 +219,13 @@ impl Patch {
         })
     }
 
+    /// The brightness at many places (north, east), bit by bit that of each.
+    pub(crate) fn brightnesses(&self, north: &[f64], east: &[f64], out: &mut Vec<f32>) {
+        out.clear();
+        out.resize(north.len(), 0.0);
+        brightnesses(self, north, east, out);
+    }
+
     /// The brightness at a place: smooth over the triangles.
     pub(crate) fn brightness(&self, north: f64, east: f64) -> f32 {
         let at = |x: f64, first: i64, count: usize| {
@@ -236,9 +243,56 @@ impl Patch {
     }
 }
 
+/// Places that are looked up at once.
+const CHUNK: usize = 32;
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn brightnesses(patch: &Patch, north: &[f64], east: &[f64], out: &mut [f32]) {
+    let ([first_north, first_east], [rows, columns]) = (patch.first.map(|n| n as f64), patch.count.map(|n| n as i32));
+    let (most_north, most_east) = (f64::from(rows - 1), f64::from(columns - 1));
+    let (mut x, mut y) = ([0.0; CHUNK], [0.0; CHUNK]);
+    for ((north, east), out) in north.chunks(CHUNK).zip(east.chunks(CHUNK)).zip(out.chunks_mut(CHUNK)) {
+        let n = out.len();
+        x[..n].copy_from_slice(north);
+        y[..n].copy_from_slice(east);
+        let (mut fx, mut fy, mut place) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK], [0_i32; CHUNK]);
+        for i in 0..CHUNK {
+            let u = (x[i] / CELL - first_north).clamp(0.0, most_north);
+            let v = (y[i] / CELL - first_east).clamp(0.0, most_east);
+            let (row, column) = ((u as i32).min(rows - 2), (v as i32).min(columns - 2));
+            (fx[i], fy[i]) = ((u - f64::from(row)) as f32, (v - f64::from(column)) as f32);
+            place[i] = row * columns + column;
+        }
+        // The look-ups by themselves, so that what is around them works on whole vectors.
+        let mut four = [[0.0_f32; CHUNK]; 4];
+        for i in 0..n {
+            let above = &patch.brightness[place[i] as usize..][..columns as usize + 2];
+            let wide = columns as usize;
+            (four[0][i], four[1][i], four[2][i], four[3][i]) = (above[0], above[1], above[wide], above[wide + 1]);
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            let above = four[0][i] + fy[i] * (four[1][i] - four[0][i]);
+            let below = four[2][i] + fy[i] * (four[3][i] - four[2][i]);
+            *out = above + fx[i] * (below - above);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Seen to fail with north and east exchanged.
+    #[test]
+    fn many_places_are_as_bright_as_each() {
+        let patch = Bed::new(40.0, 3).patch([-1.0, -2.0], [1.0, 3.0], |[x, y], normal| (x * y + normal.x) as f32);
+        let of = |step: f64| (0..500).map(|k| f64::from(k) * step - 3.0).collect::<Vec<_>>();
+        let (north, east, mut all) = (of(0.013), of(0.0171), Vec::new());
+        patch.brightnesses(&north, &east, &mut all);
+        for k in 0..500 {
+            assert_eq!(all[k].to_bits(), patch.brightness(north[k], east[k]).to_bits(), "{k}");
+        }
+    }
 
     #[test]
     fn a_ray_ends_on_the_surface() {

@@ -35,6 +35,7 @@ pub mod field;
 mod layout;
 mod mission;
 mod noise;
+mod normals;
 pub mod optics;
 mod paint;
 mod points;

@@ -90,18 +90,22 @@ pub(crate) fn bed(north: f64, east: f64, footprint: f64, seed: u32) -> f32 {
     0.33 * (1.0 + sand + 0.8 * stones).max(0.1)
 }
 
-/// By what a surface's albedo is multiplied at (x, y) of its plane (m).
-pub(crate) fn finish(finish: Finish, x: f64, y: f64, footprint: f64, seed: u32) -> f32 {
+/// Octaves of noise, with what their seed differs by from that of the surface.
+pub(crate) type Coat = (u32, &'static [(f64, f32)]);
+
+/// What a finish is the sum of, besides 1.
+pub(crate) fn coats(finish: Finish) -> &'static [Coat] {
     match finish {
         // Stains and growth: large blotches, and small ones where they are thick.
-        Finish::Plate => {
-            let large = octaves(x, y, footprint, seed, &[(0.42, 0.16), (0.17, 0.12)]);
-            let small = octaves(x, y, footprint, seed ^ 0x77, &[(0.071, 0.10), (0.03, 0.07), (0.013, 0.05)]);
-            1.0 + large + small
-        }
-        Finish::Paint => 1.0 + octaves(x, y, footprint, seed, &[(0.11, 0.16), (0.04, 0.12), (0.015, 0.08)]),
-        Finish::Rock => 1.0 + octaves(x, y, footprint, seed, &[(0.09, 0.25), (0.035, 0.2), (0.014, 0.15)]),
+        Finish::Plate => &[(0, &[(0.42, 0.16), (0.17, 0.12)]), (0x77, &[(0.071, 0.10), (0.03, 0.07), (0.013, 0.05)])],
+        Finish::Paint => &[(0, &[(0.11, 0.16), (0.04, 0.12), (0.015, 0.08)])],
+        Finish::Rock => &[(0, &[(0.09, 0.25), (0.035, 0.2), (0.014, 0.15)])],
     }
+}
+
+/// By what a surface's albedo is multiplied at (x, y) of its plane (m).
+pub(crate) fn finish(finish: Finish, x: f64, y: f64, footprint: f64, seed: u32) -> f32 {
+    coats(finish).iter().fold(1.0, |sum, (salt, layers)| sum + octaves(x, y, footprint, seed ^ salt, layers))
 }
 
 #[cfg(test)]

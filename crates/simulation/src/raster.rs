@@ -9,6 +9,8 @@
 use nalgebra::Vector3;
 use seafix_geometry::Pinhole;
 
+use crate::draw::changes;
+
 /// Samples of a pixel that an edge crosses: a Fibonacci lattice.
 pub(crate) const SAMPLES: usize = 34;
 /// The generator of the lattice.
@@ -53,9 +55,17 @@ pub(crate) struct Visibility {
     inverse_depths: Vec<f64>,
     /// Place among the crossed pixels, or [`NONE`].
     slots: Vec<u32>,
-    sample_ids: Vec<u32>,
-    sample_depths: Vec<f64>,
-    places: [[f64; 2]; SAMPLES],
+    sample_ids: Vec<[u32; SAMPLES]>,
+    sample_depths: Vec<[f64; SAMPLES]>,
+    /// Places of the samples from the centre of their pixel: all u, all v.
+    places: [[f64; SAMPLES]; 2],
+}
+
+/// The pixels that edges cross, row by row.
+struct Crossed {
+    /// Where the columns of each row begin among all; the last is their end.
+    starts: Vec<usize>,
+    columns: Vec<u32>,
 }
 
 /// A facet in the image.
@@ -134,10 +144,6 @@ impl Outline {
         if low > high { (0, 0) } else { (low as usize, high as usize + 1) }
     }
 
-    fn inverse_depth(&self, u: f64, v: f64) -> f64 {
-        self.plane[0] * u + self.plane[1] * v + self.plane[2]
-    }
-
     /// The rows of the image that the facet touches, pixels being squares.
     fn touched_rows(&self, height: usize) -> std::ops::Range<usize> {
         let first = (self.rows[0] - 0.5).ceil().max(0.0) as usize;
@@ -173,11 +179,8 @@ impl Visibility {
     pub(crate) fn new(facets: &[Facet], camera: &Pinhole) -> Self {
         let [width, height] = camera.size().map(|n| n as usize);
         let outlines: Vec<Outline> = facets.iter().filter_map(|facet| Outline::new(facet, camera)).collect();
-        let mut places = [[0.0; 2]; SAMPLES];
-        for (k, place) in places.iter_mut().enumerate() {
-            let coordinate = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 - 0.5;
-            *place = [coordinate(k), coordinate(k * LATTICE % SAMPLES)];
-        }
+        let coordinate = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 - 0.5;
+        let places = [1, LATTICE].map(|step| std::array::from_fn(|k| coordinate(k * step % SAMPLES)));
         let mut seen = Self {
             width,
             ids: vec![NONE; width * height],
@@ -192,19 +195,13 @@ impl Visibility {
         for outline in &outlines {
             seen.draw_centres(outline, &mut layered, &mut crossed, height);
         }
-        seen.cross_borders(&mut crossed, height);
-        let mut count = 0;
-        for (slot, crossed) in seen.slots.iter_mut().zip(&crossed) {
-            if *crossed {
-                *slot = count;
-                count += 1;
-            }
-        }
-        seen.sample_ids = vec![NONE; count as usize * SAMPLES];
-        seen.sample_depths = vec![0.0; count as usize * SAMPLES];
-        let mut layered = vec![0.0; count as usize * SAMPLES];
+        seen.cross_borders(&mut crossed);
+        let crossed = seen.number(&crossed);
+        seen.sample_ids = vec![[NONE; SAMPLES]; crossed.columns.len()];
+        seen.sample_depths = vec![[0.0; SAMPLES]; crossed.columns.len()];
+        let mut layered = vec![[0.0; SAMPLES]; crossed.columns.len()];
         for outline in &outlines {
-            seen.draw_samples(outline, &mut layered, height);
+            seen.draw_samples(outline, &mut layered, &crossed, height);
         }
         seen
     }
@@ -214,20 +211,20 @@ impl Visibility {
         for row in outline.touched_rows(height) {
             let (v, start) = (row as f64, row * self.width);
             let (first, end) = outline.span(v, 0.0, self.width);
-            for column in first..end {
-                let inverse = outline.inverse_depth(column as f64, v);
-                let place = start + column;
-                if inverse * outline.layer > layered[place] {
-                    layered[place] = inverse * outline.layer;
-                    self.inverse_depths[place] = inverse;
-                    self.ids[place] = outline.id;
-                }
+            if first < end {
+                let here = start + first..start + end;
+                let (depths, ids) = (&mut self.inverse_depths[here.clone()], &mut self.ids[here.clone()]);
+                centres(outline, [first as f64, v], &mut layered[here], depths, ids);
             }
             if !outline.seamless {
                 let (outer, outer_end) = outline.span(v, 1.0, self.width);
                 let (inner, inner_end) = outline.span(v, -1.0, self.width);
-                for column in (outer..outer_end).filter(|c| !(inner..inner_end).contains(c)) {
-                    crossed[start + column] = true;
+                let crossed = &mut crossed[start..start + self.width];
+                if inner >= inner_end {
+                    crossed[outer..outer_end].fill(true);
+                } else {
+                    crossed[outer..inner.clamp(outer, outer_end)].fill(true);
+                    crossed[inner_end.clamp(outer, outer_end)..outer_end].fill(true);
                 }
             }
         }
@@ -235,46 +232,53 @@ impl Visibility {
 
     /// Marks the pixels beside a change of surface: where two facets pass through each other, no
     /// edge says so.
-    fn cross_borders(&self, crossed: &mut [bool], height: usize) {
-        for row in 0..height {
-            for column in 0..self.width {
-                let here = row * self.width + column;
-                let right = (column + 1 < self.width).then_some(here + 1);
-                let below = (row + 1 < height).then_some(here + self.width);
-                for there in [right, below].into_iter().flatten() {
-                    if self.ids[here] != self.ids[there] {
-                        (crossed[here], crossed[there]) = (true, true);
-                    }
-                }
+    fn cross_borders(&self, crossed: &mut [bool]) {
+        let rows: Vec<&[u32]> = self.ids.chunks_exact(self.width).collect();
+        for (row, ids) in rows.iter().enumerate() {
+            let here = row * self.width;
+            for column in changes(&ids[..self.width - 1], &ids[1..]) {
+                crossed[here + column..here + column + 2].fill(true);
+            }
+            for column in rows.get(row + 1).into_iter().flat_map(|below| changes(ids, below)) {
+                (crossed[here + column], crossed[here + self.width + column]) = (true, true);
             }
         }
     }
 
+    /// Gives every crossed pixel its slot.
+    fn number(&mut self, crossed: &[bool]) -> Crossed {
+        let (mut starts, mut columns) = (vec![0], Vec::new());
+        for (crossed, slots) in crossed.chunks_exact(self.width).zip(self.slots.chunks_exact_mut(self.width)) {
+            for (column, _) in crossed.iter().enumerate().filter(|(_, crossed)| **crossed) {
+                slots[column] = columns.len() as u32;
+                columns.push(column as u32);
+            }
+            starts.push(columns.len());
+        }
+        Crossed { starts, columns }
+    }
+
     /// Draws a facet at the samples of the crossed pixels.
-    fn draw_samples(&mut self, outline: &Outline, layered: &mut [f64], height: usize) {
+    fn draw_samples(&mut self, outline: &Outline, layered: &mut [[f64; SAMPLES]], crossed: &Crossed, height: usize) {
         for row in outline.touched_rows(height) {
-            let (v, start) = (row as f64, row * self.width);
+            let slots = crossed.starts[row]..crossed.starts[row + 1];
+            let columns = &crossed.columns[slots.clone()];
+            if columns.is_empty() {
+                continue;
+            }
+            let v = row as f64;
             let (outer, outer_end) = outline.span(v, 1.0, self.width);
+            let from = columns.partition_point(|&column| (column as usize) < outer);
+            let to = columns.partition_point(|&column| (column as usize) < outer_end);
+            if from >= to {
+                continue;
+            }
             let (inner, inner_end) = outline.span(v, -1.0, self.width);
-            for column in outer..outer_end {
-                let slot = self.slots[start + column];
-                if slot == NONE {
-                    continue;
-                }
-                let whole = (inner..inner_end).contains(&column);
-                for (k, [du, dv]) in self.places.iter().enumerate() {
-                    let (u, v) = (column as f64 + du, v + dv);
-                    if !whole && outline.edges.iter().any(|([a, b, c], _)| a * u + b * v + c < 0.0) {
-                        continue;
-                    }
-                    let inverse = outline.inverse_depth(u, v);
-                    let place = slot as usize * SAMPLES + k;
-                    if inverse * outline.layer > layered[place] {
-                        layered[place] = inverse * outline.layer;
-                        self.sample_depths[place] = inverse;
-                        self.sample_ids[place] = outline.id;
-                    }
-                }
+            for (&column, slot) in columns[from..to].iter().zip(slots.start + from..) {
+                let whole = (inner..inner_end).contains(&(column as usize));
+                let edges = if whole { &[][..] } else { &outline.edges };
+                let (depths, ids) = (&mut self.sample_depths[slot], &mut self.sample_ids[slot]);
+                samples(outline, edges, [f64::from(column), v], &self.places, &mut layered[slot], depths, ids);
             }
         }
     }
@@ -296,8 +300,7 @@ impl Visibility {
         if let Some((id, inverse_depth)) = self.whole(column, row) {
             return visit(Part { id, share: 1.0, offset: [0.0; 2], inverse_depth });
         }
-        let samples = slot as usize * SAMPLES..(slot as usize + 1) * SAMPLES;
-        let (ids, depths) = (&self.sample_ids[samples.clone()], &self.sample_depths[samples]);
+        let (ids, depths) = (&self.sample_ids[slot as usize], &self.sample_depths[slot as usize]);
         let mut done = [false; SAMPLES];
         for first in 0..SAMPLES {
             if done[first] {
@@ -307,8 +310,8 @@ impl Visibility {
             for k in (first..SAMPLES).filter(|&k| ids[k] == ids[first]) {
                 done[k] = true;
                 count += 1.0;
-                offset[0] += self.places[k][0];
-                offset[1] += self.places[k][1];
+                offset[0] += self.places[0][k];
+                offset[1] += self.places[1][k];
                 inverse += depths[k];
             }
             visit(Part {
@@ -318,6 +321,50 @@ impl Visibility {
                 inverse_depth: inverse / count,
             });
         }
+    }
+}
+
+/// Gives pixels from (u, v) on to an outline where it is nearer (1/Z) than what they see; `layered` are the depths by which that
+/// is decided.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn centres(outline: &Outline, [u, v]: [f64; 2], layered: &mut [f64], depths: &mut [f64], ids: &mut [u32]) {
+    let n = layered.len();
+    let (depths, ids) = (&mut depths[..n], &mut ids[..n]);
+    let ([a, b, c], layer, id) = (outline.plane, outline.layer, outline.id);
+    for k in 0..n {
+        let inverse = a * (u + f64::from(k as i32)) + b * v + c;
+        let nearer = inverse * layer > layered[k];
+        layered[k] = if nearer { inverse * layer } else { layered[k] };
+        depths[k] = if nearer { inverse } else { depths[k] };
+        ids[k] = if nearer { id } else { ids[k] };
+    }
+}
+
+/// The same of the samples of one pixel, as far as they lie within these edges.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn samples(
+    outline: &Outline,
+    edges: &[([f64; 3], f64)],
+    [u, v]: [f64; 2],
+    places: &[[f64; SAMPLES]; 2],
+    layered: &mut [f64; SAMPLES],
+    depths: &mut [f64; SAMPLES],
+    ids: &mut [u32; SAMPLES],
+) {
+    let mut least = [0.0; SAMPLES];
+    for ([a, b, c], _) in edges {
+        for k in 0..SAMPLES {
+            let inside = a * (u + places[0][k]) + b * (v + places[1][k]) + c;
+            least[k] = if inside < least[k] { inside } else { least[k] };
+        }
+    }
+    let ([a, b, c], layer, id) = (outline.plane, outline.layer, outline.id);
+    for k in 0..SAMPLES {
+        let inverse = a * (u + places[0][k]) + b * (v + places[1][k]) + c;
+        let nearer = (inverse * layer > layered[k]) & (least[k] >= 0.0);
+        layered[k] = if nearer { inverse * layer } else { layered[k] };
+        depths[k] = if nearer { inverse } else { depths[k] };
+        ids[k] = if nearer { id } else { ids[k] };
     }
 }
 

@@ -8,7 +8,7 @@ use crate::{
     noise::hash,
     paint,
     raster::{Facet, NONE, Part, Visibility},
-    sand::beds,
+    sand::{beds, finishes},
     scene::{Finish, Scene},
 };
 
@@ -30,26 +30,107 @@ struct Seen {
     seed: u32,
 }
 
-/// The pixels of a row that see nothing but the bed: their columns, where they see it, and how wide they are there (m).
-#[derive(Default)]
-struct Ground {
-    columns: Vec<usize>,
-    north: Vec<f64>,
-    east: Vec<f64>,
+/// Pixels of a row that see nothing but the bed, or nothing but one surface: their columns and 1/Z, where they see it (north and
+/// east, or x and y of the surface's plane), and how wide they are there (m).
+#[derive(Debug, Default)]
+struct Whole {
+    columns: Vec<u32>,
+    inverse_depths: Vec<f64>,
+    x: Vec<f64>,
+    y: Vec<f64>,
     footprint: Vec<f64>,
 }
 
-impl Ground {
+impl Whole {
     fn clear(&mut self) {
         self.columns.clear();
-        [&mut self.north, &mut self.east, &mut self.footprint].into_iter().for_each(Vec::clear);
+        self.inverse_depths.clear();
     }
 
-    fn push(&mut self, column: usize, [north, east, footprint]: [f64; 3]) {
-        self.columns.push(column);
-        self.north.push(north);
-        self.east.push(east);
-        self.footprint.push(footprint);
+    fn push(&mut self, column: usize, inverse_depth: f64) {
+        self.columns.push(column as u32);
+        self.inverse_depths.push(inverse_depth);
+    }
+
+    /// Finds the places by the values of [`Rendering::ground`] or [`Rendering::upon`].
+    fn place(&mut self, row: usize, sight: &Sight<'_>) {
+        let n = self.columns.len();
+        for list in [&mut self.x, &mut self.y, &mut self.footprint] {
+            list.resize(n, 0.0);
+        }
+        let Self { columns, inverse_depths, x, y, footprint } = self;
+        match sight.surface {
+            None => on_bed(sight, row as f64, columns, inverse_depths, x, y, footprint),
+            Some(surface) => on_surface(sight, surface, row as f64, columns, inverse_depths, x, y, footprint),
+        }
+    }
+}
+
+/// A camera, and a surface that it looks at, or the bed.
+struct Sight<'a> {
+    focal: [f64; 2],
+    principal: [f64; 2],
+    turn: &'a Matrix3<f64>,
+    from: &'a Vector3<f64>,
+    surface: Option<&'a Seen>,
+}
+
+/// [`Rendering::ground`] for many pixels of row `v`, bit by bit.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn on_bed(
+    sight: &Sight<'_>,
+    v: f64,
+    columns: &[u32],
+    inverse_depths: &[f64],
+    north: &mut [f64],
+    east: &mut [f64],
+    footprint: &mut [f64],
+) {
+    let n = columns.len();
+    let (inverse_depths, north, east) = (&inverse_depths[..n], &mut north[..n], &mut east[..n]);
+    let footprint = &mut footprint[..n];
+    let ([fx, fy], [cx, cy], t, from) = (sight.focal, sight.principal, sight.turn, sight.from);
+    let y = (v - cy) / fy;
+    for i in 0..n {
+        let x = (f64::from(columns[i] as i32) - cx) / fx;
+        let along_x = t.m11 * x + t.m12 * y + t.m13;
+        let along_y = t.m21 * x + t.m22 * y + t.m23;
+        let slope = t.m31 * x + t.m32 * y + t.m33;
+        north[i] = from.x + along_x / inverse_depths[i];
+        east[i] = from.y + along_y / inverse_depths[i];
+        let pixel = 1.0 / (inverse_depths[i] * fx);
+        footprint[i] = pixel / (slope.abs() / (x * x + y * y + 1.0).sqrt()).max(0.25);
+    }
+}
+
+/// [`Rendering::upon`] for many pixels of row `v`, bit by bit.
+#[expect(clippy::too_many_arguments, reason = "a slice of its own each: the compiler knows that none overlap")]
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn on_surface(
+    sight: &Sight<'_>,
+    surface: &Seen,
+    v: f64,
+    columns: &[u32],
+    inverse_depths: &[f64],
+    along: &mut [f64],
+    across: &mut [f64],
+    footprint: &mut [f64],
+) {
+    let n = columns.len();
+    let (inverse_depths, along, across) = (&inverse_depths[..n], &mut along[..n], &mut across[..n]);
+    let footprint = &mut footprint[..n];
+    let ([fx, fy], [cx, cy]) = (sight.focal, sight.principal);
+    let Seen { origin, x: p, y: q, normal, .. } = surface;
+    let y = (v - cy) / fy;
+    for i in 0..n {
+        let x = (f64::from(columns[i] as i32) - cx) / fx;
+        let inverse = inverse_depths[i];
+        let (a, b, c) = (x / inverse - origin.x, y / inverse - origin.y, 1.0 / inverse - origin.z);
+        along[i] = p.x * a + p.y * b + p.z * c;
+        across[i] = q.x * a + q.y * b + q.z * c;
+        let slope = normal.x * x + normal.y * y + normal.z;
+        let pixel = 1.0 / (inverse * fx);
+        footprint[i] = pixel / (slope.abs() / (x * x + y * y + 1.0).sqrt()).max(0.25);
     }
 }
 
@@ -108,25 +189,58 @@ impl<'a> Rendering<'a> {
     pub(crate) fn radiance(&self) -> Vec<f32> {
         let [width, height] = self.camera.size().map(|n| n as usize);
         let mut image = vec![0.0; width * height];
-        let (mut bed, mut albedo) = (Ground::default(), Vec::new());
+        let (mut bed, mut run) = (Whole::default(), Whole::default());
+        let (mut albedo, mut brightness) = (Vec::new(), Vec::new());
         for (row, out) in image.chunks_exact_mut(width).enumerate() {
             bed.clear();
-            for (column, value) in out.iter_mut().enumerate() {
-                match self.visibility.whole(column, row) {
-                    Some((BED, inverse_depth)) => {
-                        bed.push(column, self.ground(&self.ray(column as f64, row as f64), inverse_depth));
-                    }
-                    _ => {
-                        self.visibility.parts(column, row, |part| *value += part.share * self.shade(column, row, &part))
+            let mut column = 0;
+            while column < width {
+                let first = column;
+                column += 1;
+                match self.visibility.whole(first, row) {
+                    None => self
+                        .visibility
+                        .parts(first, row, |part| out[first] += part.share * self.shade(first, row, &part)),
+                    Some((NONE, _)) => out[first] = VOID,
+                    Some((BED, inverse_depth)) => bed.push(first, inverse_depth),
+                    Some((id, inverse_depth)) => {
+                        run.clear();
+                        run.push(first, inverse_depth);
+                        while let Some((_, next)) =
+                            (column < width).then(|| self.visibility.whole(column, row)).flatten().filter(|w| w.0 == id)
+                        {
+                            run.push(column, next);
+                            column += 1;
+                        }
+                        let surface = &self.surfaces[id as usize - 1];
+                        run.place(row, &self.sight(Some(surface)));
+                        finishes(surface.finish, &run.x, &run.y, &run.footprint, surface.seed, &mut albedo);
+                        let albedos = out[first..column].iter_mut().zip(&albedo);
+                        albedos.for_each(|(out, albedo)| *out = surface.brightness * albedo);
                     }
                 }
             }
-            beds(&bed.north, &bed.east, &bed.footprint, self.scene.texture, &mut albedo);
-            for (k, column) in bed.columns.iter().enumerate() {
-                out[*column] = albedo[k] * self.patch.brightness(bed.north[k], bed.east[k]);
+            bed.place(row, &self.sight(None));
+            beds(&bed.x, &bed.y, &bed.footprint, self.scene.texture, &mut albedo);
+            self.patch.brightnesses(&bed.x, &bed.y, &mut brightness);
+            for ((&column, albedo), brightness) in bed.columns.iter().zip(&albedo).zip(&brightness) {
+                out[column as usize] = albedo * brightness;
             }
         }
         image
+    }
+
+    /// The radiance of one pixel by itself.
+    #[cfg(test)]
+    pub(crate) fn pixel(&self, column: usize, row: usize) -> f32 {
+        let mut value = 0.0;
+        self.visibility.parts(column, row, |part| value += part.share * self.shade(column, row, &part));
+        value
+    }
+
+    fn sight<'b>(&'b self, surface: Option<&'b Seen>) -> Sight<'b> {
+        let (focal, principal) = (self.camera.focal(), self.camera.principal());
+        Sight { focal, principal, turn: &self.turn, from: &self.from, surface }
     }
 
     /// The ray through (u, v).
@@ -166,12 +280,16 @@ impl<'a> Rendering<'a> {
             let albedo = paint::bed(north, east, footprint, self.scene.texture);
             return albedo * self.patch.brightness(north, east);
         }
-        let at = ray / part.inverse_depth;
         let surface = &self.surfaces[part.id as usize - 1];
-        let from = at - surface.origin;
-        let (x, y) = (surface.x.dot(&from), surface.y.dot(&from));
-        let footprint = self.footprint(&ray, part.inverse_depth, surface.normal.dot(&ray));
+        let [x, y, footprint] = self.upon(surface, &ray, part.inverse_depth);
         surface.brightness * paint::finish(surface.finish, x, y, footprint, surface.seed)
+    }
+
+    /// Where a ray meets a surface: x and y of its plane, and how wide a pixel is there (m).
+    fn upon(&self, surface: &Seen, ray: &Vector3<f64>, inverse_depth: f64) -> [f64; 3] {
+        let from = ray / inverse_depth - surface.origin;
+        let footprint = self.footprint(ray, inverse_depth, surface.normal.dot(ray));
+        [surface.x.dot(&from), surface.y.dot(&from), footprint]
     }
 }
 

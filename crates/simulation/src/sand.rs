@@ -1,9 +1,10 @@
-//! The albedo of the bed at many places at once: the values of [`paint::bed`](crate::paint::bed), bit by bit, by loops that
-//! vectorise.
+//! Albedos at many places at once: the values of [`paint::bed`](crate::paint::bed) and [`paint::finish`](crate::paint::finish),
+//! bit by bit, by loops that vectorise.
 
 use crate::{
     noise::{DIRECTIONS, hash, shown},
-    paint::{OCTAVE_TURNS, SAND, STONES, octave_seed},
+    paint::{OCTAVE_TURNS, SAND, STONES, coats, octave_seed},
+    scene::Finish,
 };
 
 /// Places that are worked on at once.
@@ -24,12 +25,7 @@ pub(crate) fn beds(north: &[f64], east: &[f64], footprint: &[f64], seed: u32, ou
         y[..out.len()].copy_from_slice(east);
         width[..out.len()].copy_from_slice(footprint);
         let (mut sand, mut stones) = ([0.0; CHUNK], [0.0; CHUNK]);
-        for (k, &(size, amplitude)) in SAND.iter().enumerate() {
-            let weight = width.map(|width| shown(size * 1.5, width) * amplitude);
-            if weight.iter().any(|weight| *weight > 0.0) {
-                octave(k, size, &x, &y, seed, &weight, &mut sand);
-            }
-        }
+        octaves(&SAND, &x, &y, &width, seed, &mut sand);
         let [(salt, cell), (turned_salt, turned_cell)] = STONES;
         for i in 0..CHUNK {
             stones[i] = pebbles(x[i], y[i], width[i], seed ^ salt, cell);
@@ -42,6 +38,36 @@ pub(crate) fn beds(north: &[f64], east: &[f64], footprint: &[f64], seed: u32, ou
         }
         for (i, out) in out.iter_mut().enumerate() {
             *out = 0.33 * (1.0 + sand[i] + 0.8 * stones[i]).max(0.1);
+        }
+    }
+}
+
+/// [`paint::finish`](crate::paint::finish) at each place (x, y) of a surface, seen by pixels of these footprints (m).
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+pub(crate) fn finishes(finish: Finish, x: &[f64], y: &[f64], footprint: &[f64], seed: u32, out: &mut Vec<f32>) {
+    out.clear();
+    out.resize(x.len(), 1.0);
+    let places = x.chunks(CHUNK).zip(y.chunks(CHUNK)).zip(footprint.chunks(CHUNK));
+    let (mut u, mut v, mut width) = ([0.0; CHUNK], [0.0; CHUNK], [1.0; CHUNK]);
+    for (((x, y), footprint), out) in places.zip(out.chunks_mut(CHUNK)) {
+        u[..out.len()].copy_from_slice(x);
+        v[..out.len()].copy_from_slice(y);
+        width[..out.len()].copy_from_slice(footprint);
+        for (salt, layers) in coats(finish) {
+            let mut sum = [0.0; CHUNK];
+            octaves(layers, &u, &v, &width, seed ^ salt, &mut sum);
+            out.iter_mut().zip(sum).for_each(|(out, sum)| *out += sum);
+        }
+    }
+}
+
+/// Adds those octaves of gradient noise that some place shows.
+#[inline(always)]
+fn octaves(layers: &[(f64, f32)], x: &Lane<f64>, y: &Lane<f64>, width: &Lane<f64>, seed: u32, sum: &mut Lane<f32>) {
+    for (k, &(size, amplitude)) in layers.iter().enumerate() {
+        let weight = width.map(|width| shown(size * 1.5, width) * amplitude);
+        if weight.iter().any(|weight| *weight > 0.0) {
+            octave(k, size, x, y, seed, &weight, sum);
         }
     }
 }
@@ -140,6 +166,13 @@ mod tests {
             assert_eq!(all.len(), north.len());
             for (k, value) in all.iter().enumerate() {
                 assert_eq!(value.to_bits(), paint::bed(north[k], east[k], widths[k], 77).to_bits(), "{footprint}, {k}");
+            }
+            for finish in [Finish::Plate, Finish::Paint, Finish::Rock] {
+                finishes(finish, &north, &east, &widths, 5, &mut all);
+                for (k, value) in all.iter().enumerate() {
+                    let one = paint::finish(finish, north[k], east[k], widths[k], 5);
+                    assert_eq!(value.to_bits(), one.to_bits(), "{finish:?}, {footprint}, {k}");
+                }
             }
         }
     }

@@ -26,16 +26,32 @@ impl Sensor {
     /// The image of this radiance (1: white facing the light), rounded to 8 bits.
     pub(crate) fn expose(&self, radiance: Vec<f32>, width: usize, mut noise: Stream) -> Vec<f32> {
         let mut image = blurred(radiance, width, self.blur);
-        for value in &mut image {
-            let grey = f64::from(*value) * self.white;
-            let noisy = if self.noise > 0.0 { grey + self.noise * noise.normal() } else { grey };
-            *value = noisy.round().clamp(0.0, 255.0) as f32;
+        let mut normal = [0.0; CHUNK];
+        for values in image.chunks_mut(CHUNK) {
+            if self.noise > 0.0 {
+                noise.normals(&mut normal[..values.len()]);
+            }
+            graded(values, self.white, self.noise, &normal);
         }
         image
     }
 }
 
+/// Pixels that are graded at once.
+const CHUNK: usize = 1024;
+
+/// Turns radiances into whole grey levels, with noise of deviation `sigma` from normal numbers.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
+fn graded(values: &mut [f32], white: f64, sigma: f64, normal: &[f64; CHUNK]) {
+    for (value, normal) in values.iter_mut().zip(normal) {
+        let grey = f64::from(*value) * white;
+        let noisy = if sigma > 0.0 { grey + sigma * normal } else { grey };
+        *value = noisy.round().clamp(0.0, 255.0) as f32;
+    }
+}
+
 /// The image convolved with a Gaussian; at the border the nearest pixel continues.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn blurred(image: Vec<f32>, width: usize, sigma: f64) -> Vec<f32> {
     if !(sigma > 0.0) {
         return image;

@@ -3,6 +3,8 @@
 use rand::Rng;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
+use crate::normals::{PAIRS, normals};
+
 /// What a stream of random numbers is drawn for; each purpose has its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
@@ -113,6 +115,25 @@ impl Stream {
         radius * cosine
     }
 
+    /// Fills a list with what as many calls of [`normal`](Self::normal) would give.
+    pub(crate) fn normals(&mut self, out: &mut [f64]) {
+        let spare = usize::from(self.spare.is_some()).min(out.len());
+        let (first, rest) = out.split_at_mut(spare);
+        first.iter_mut().for_each(|x| *x = self.normal());
+        let mut chunks = rest.chunks_exact_mut(2 * PAIRS);
+        for chunk in &mut chunks {
+            let (mut radii, mut angles) = ([0.0; PAIRS], [0.0; PAIRS]);
+            for (radius, angle) in radii.iter_mut().zip(&mut angles) {
+                (*radius, *angle) = (self.unit(), self.unit());
+            }
+            let [cosine, sine] = normals(&radii, &angles);
+            for ((pair, cosine), sine) in chunk.chunks_exact_mut(2).zip(cosine).zip(sine) {
+                pair.copy_from_slice(&[cosine, sine]);
+            }
+        }
+        chunks.into_remainder().iter_mut().for_each(|x| *x = self.normal());
+    }
+
     /// Three independent normal numbers of standard deviation `sigma`.
     pub fn normal3(&mut self, sigma: f64) -> nalgebra::Vector3<f64> {
         let [x, y, z] = [self.normal(), self.normal(), self.normal()];
@@ -123,6 +144,18 @@ impl Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Seen to fail when the spare number is not used first.
+    #[test]
+    fn many_normal_numbers_are_those_drawn_one_by_one() {
+        let stream = || Stream::new(4, 0, 7, Purpose::LeftImage);
+        let (mut one, mut many) = (stream(), stream());
+        for count in [1, 0, 64, 300, 5, 20_000, 1] {
+            let mut all = vec![0.0; count];
+            many.normals(&mut all);
+            assert!(all.iter().all(|x| x.to_bits() == one.normal().to_bits()), "{count}");
+        }
+    }
 
     #[test]
     fn streams_are_functions_of_their_four_numbers() {

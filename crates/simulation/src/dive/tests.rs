@@ -119,6 +119,20 @@ fn depth_is_what_a_ray_meets() {
     assert!(same as f64 >= 0.999 * all as f64, "{same} of {all}");
 }
 
+/// Seen to fail when the slope of a surface is taken from its own axes.
+#[test]
+fn rows_have_the_radiance_of_each_pixel() {
+    let dive = small().plan(9, 0).unwrap();
+    for frame in dive.frames().take(3) {
+        let eyes = frame.eyes();
+        let rendering = Rendering::new(&dive.scene, eyes.rig.left(), &eyes.world_from_camera);
+        for (place, value) in rendering.radiance().iter().enumerate() {
+            let (column, row) = (place % 256, place / 256);
+            assert_eq!(value.to_bits(), rendering.pixel(column, row).to_bits(), "{column}, {row}");
+        }
+    }
+}
+
 #[test]
 fn left_and_right_image_show_one_scene() {
     // No noise: where both cameras see a place of the flat surfaces, its grey is the same.

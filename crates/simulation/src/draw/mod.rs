@@ -28,6 +28,7 @@ pub(crate) use scene::{Shot, Studio};
 pub(crate) use sensor::Pattern;
 pub use sensor::{Exposure, Imager};
 pub(crate) use texture::Looks;
+pub(crate) use visibility::changes;
 
 #[cfg(test)]
 mod tests;

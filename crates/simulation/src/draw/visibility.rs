@@ -194,7 +194,7 @@ fn sample(
 }
 
 /// Where two rows differ.
-fn changes<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = usize> + 'a {
+pub(crate) fn changes<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = usize> + 'a {
     const PIECE: usize = 16;
     // Most of the way nothing changes: whole pieces are compared first.
     let pieces = a.chunks(PIECE).zip(b.chunks(PIECE)).enumerate().filter(|(_, (a, b))| a != b);
