@@ -7,7 +7,7 @@ use rand::Rng;
 use seafix::{
     Localizer, Outcome, PosePrior, Rig, Site, StereoImages,
     geometry::Transform,
-    referencing::{Correspondence, Identification, Problem, Search, Unidentified},
+    referencing::{Correspondence, Identification, Problem, Rejected, Search},
 };
 
 /// Takes for each model point its nearest candidate that agrees with the pairs taken before.
@@ -15,7 +15,7 @@ use seafix::{
 struct Greedy;
 
 impl Search for Greedy {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         let mut pairs: Vec<Correspondence> = Vec::new();
         for (model, list) in problem.candidates.lists.iter().enumerate() {
             let candidate = |&cloud: &usize| Correspondence { model, cloud };
@@ -24,7 +24,7 @@ impl Search for Greedy {
         }
         let bound = problem.model.len();
         match pairs.len() {
-            0..3 => Err(Unidentified::NotFound { bound, needed: 3 }),
+            0..3 => Err(Rejected::NotFound { bound, needed: 3 }),
             _ => Ok(Identification::unproved(pairs, bound, 0)),
         }
     }
@@ -40,7 +40,7 @@ fn main() -> Result<(), seafix::Error> {
     let localizer = Localizer::new(&site, &rig)?.with_search(Box::new(Greedy));
     for target in localizer.localize(&images, &prior)? {
         match target.outcome {
-            Outcome::Referenced(fix) => println!("{}: {} points", target.name, fix.pairs.len()),
+            Outcome::Fix(fix) => println!("{}: {} points", target.name, fix.pairs.len()),
             rejected => println!("{}: {rejected}", target.name),
         }
     }

@@ -37,7 +37,7 @@ fn main() -> Result<(), seafix::Error> {
     for target in localizer.localize(&images, None)? {
         match target.outcome {
             // The covariance is that of this solver, by numerical derivatives.
-            Outcome::Referenced(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
+            Outcome::Fix(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
             rejected => println!("{}: {rejected}", target.name),
         }
     }

@@ -19,7 +19,7 @@ fn main() -> Result<(), seafix::Error> {
     let localizer = Localizer::new(&site, &rig)?;
     for target in localizer.localize(&images, &prior)? {
         match target.outcome {
-            Outcome::Referenced(fix) => {
+            Outcome::Fix(fix) => {
                 let position = fix.object_from_camera.translation();
                 println!("{}: camera at {position:.3?} m, ± {:.1} mm", target.name, 1e3 * fix.position_sigma());
             }

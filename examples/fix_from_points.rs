@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let localizer = Localizer::from_toml(&site, &rig, "solver = 'mahalanobis'")?;
     for target in localizer.localize_points(&cloud, &prior) {
         match target.outcome {
-            Outcome::Referenced(fix) => {
+            Outcome::Fix(fix) => {
                 println!("{}: {} points, residual {:.1} mm", target.name, fix.pairs.len(), 1e3 * fix.residual_rms);
             }
             rejected => println!("{}: {rejected}", target.name),

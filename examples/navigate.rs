@@ -9,15 +9,15 @@ use seafix_data::source::SOURCES;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let choice = Choice::named("dive").with("frames", 4_i64);
     let source = SOURCES.build(&choice)?;
-    let passage = source.open(7, ".".as_ref()).map_err(seafix::Error::from)?;
+    let sequence = source.open(7, ".".as_ref()).map_err(seafix::Error::from)?;
 
-    let rig = Rig::from(*passage.rig());
-    let localizer = Localizer::new(passage.site(), &rig)?;
-    let helm = Navigation::default().build()?;
-    let mut session = localizer.navigate(&helm, None)?;
-    for index in 0..passage.frames() {
-        let state = session.push(&passage.sight(index).map_err(seafix::Error::from)?)?;
-        let sigma = state.pose.as_ref().map(|pose| 1e3 * pose.standing.covariance.position_sigma());
+    let rig = Rig::from(*sequence.rig());
+    let localizer = Localizer::new(sequence.site(), &rig)?;
+    let navigation_stack = Navigation::default().build()?;
+    let mut session = localizer.navigate(&navigation_stack, None)?;
+    for index in 0..sequence.frames() {
+        let state = session.push(&sequence.sensor_frame(index).map_err(seafix::Error::from)?)?;
+        let sigma = state.pose.as_ref().map(|pose| 1e3 * pose.object_pose.covariance.position_sigma());
         println!("frame {index}: {}, position ± {sigma:.1?} mm", state.state);
         state.events.iter().for_each(|event| println!("    {event}"));
     }

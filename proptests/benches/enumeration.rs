@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use seafix_component::Choice;
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
 use seafix_referencing::{
-    Candidates, Identification, ModelPoint, Prior, PriorBound, Problem, SEARCHES, Search, Tolerance, Unidentified,
+    Candidates, Identification, ModelPoint, Prior, PriorBound, Problem, Rejected, SEARCHES, Search, Tolerance,
 };
 
 /// Pair tests before a strategy is stopped.
@@ -31,7 +31,7 @@ const LIST: usize = 3;
 /// Standard deviation of a measured coordinate (m).
 const SIGMA: f64 = 0.005;
 /// Half-size of the shell that the candidates lie in (m).
-const SHELL: f64 = 0.25;
+const GATE: f64 = 0.25;
 
 fn main() {
     let strategies: [(&str, Choice); 6] = [
@@ -56,7 +56,7 @@ fn main() {
                 let search = SEARCHES.build(&choice.clone().with("budget", BUDGET)).expect("in range");
                 match median(&*search, &problems) {
                     Ok(cell) => cell,
-                    Err(Unidentified::Budget { .. }) => {
+                    Err(Rejected::Budget { .. }) => {
                         *stopped = Some(n);
                         "stopped at its budget".to_owned()
                     }
@@ -69,7 +69,7 @@ fn main() {
 }
 
 /// Medians over the problems as a cell of the table, or what most of them ended with.
-fn median(search: &dyn Search, problems: &[Planted]) -> Result<String, Unidentified> {
+fn median(search: &dyn Search, problems: &[Planted]) -> Result<String, Rejected> {
     let (mut tests, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
     let mut without = 0;
     for planted in problems {
@@ -119,19 +119,19 @@ impl Planted {
             for place in 0..LIST {
                 let measured = place == 0 && i >= hidden;
                 // Uniform noise of the stated standard deviation.
-                let reach = if measured { SIGMA * 3f64.sqrt() } else { SHELL };
+                let reach = if measured { SIGMA * 3f64.sqrt() } else { GATE };
                 list.push(cloud.len());
                 let position = UncertainPoint::isotropic(image + within(Vector3::from_element(reach)), SIGMA);
                 cloud.push(MeasuredPoint { position, pixels: None });
             }
         }
         let pairs = lists.iter().enumerate().flat_map(|(i, list)| list.iter().map(move |&j| (i, j)));
-        let prior = Prior { object_from_camera: camera_from_object.inverse(), bound: PriorBound::Box(SHELL) };
+        let prior = Prior { object_from_camera: camera_from_object.inverse(), bound: PriorBound::Box(GATE) };
         Self { candidates: Candidates::from_pairs(n, pairs), model, cloud, prior }
     }
 
     /// Pair tests, points found and seconds (the median of some runs).
-    fn run(&self, search: &dyn Search) -> Result<(u64, usize, f64), Unidentified> {
+    fn run(&self, search: &dyn Search) -> Result<(u64, usize, f64), Rejected> {
         let problem = Problem {
             model: &self.model,
             cloud: &self.cloud,
@@ -145,7 +145,7 @@ impl Planted {
             let answer = black_box(search.search(black_box(&problem), &mut ChaCha8Rng::seed_from_u64(0)));
             times.push(start.elapsed().as_secs_f64());
             let Identification { tests, pairs, undecided, .. } = answer?;
-            if let Some(why @ Unidentified::Budget { .. }) = undecided {
+            if let Some(why @ Rejected::Budget { .. }) = undecided {
                 return Err(why);
             }
             if times.len() == 15 || times.iter().sum::<f64>() > 0.02 {

@@ -20,7 +20,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_component::Choice;
 use seafix_proptests::problems::Listed;
-use seafix_referencing::{Acceptance, SEARCHES, SOLVERS, reference};
+use seafix_referencing::{Acceptance, SEARCHES, SOLVERS, compute_fix};
 
 /// What takes longer is not counted.
 const LONG: Duration = Duration::from_millis(150);
@@ -57,12 +57,12 @@ fn prepared(row: &str, family: usize) -> impl Fn() + use<> {
     let name = if row == DEFAULT.2 { DEFAULT.0 } else { row };
     let search = SEARCHES.build(&Choice::named(name)).expect("the defaults are in range");
     let solver = SOLVERS.build(&Choice::named(DEFAULT.1)).expect("the defaults are in range");
-    let whole = row == DEFAULT.2;
+    let full = row == DEFAULT.2;
     move || {
         let problem = listed.problem();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        if whole {
-            black_box(reference(black_box(&problem), &*search, &*solver, &Acceptance::default(), None, &mut rng));
+        if full {
+            black_box(compute_fix(black_box(&problem), &*search, &*solver, &Acceptance::default(), None, &mut rng));
         } else {
             let _ = black_box(search.search(black_box(&problem), &mut rng));
         }

@@ -84,8 +84,8 @@ pub fn objection(problem: &Problem<'_>, orientation: bool, set: &[Correspondence
             }
         }
     }
-    let fours = set.iter().enumerate().flat_map(|(k, &d)| threes(&set[..k]).map(move |[a, b, c]| [a, b, c, d]));
-    let four = fours.filter(|_| orientation).find(|&four| is_mirrored(problem, four) && !doubtful(problem, four));
+    let quadruples = set.iter().enumerate().flat_map(|(k, &d)| threes(&set[..k]).map(move |[a, b, c]| [a, b, c, d]));
+    let four = quadruples.filter(|_| orientation).find(|&four| is_mirrored(problem, four) && !doubtful(problem, four));
     four.map(|four| format!("{four:?} are a mirror image"))
 }
 

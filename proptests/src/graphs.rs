@@ -16,9 +16,9 @@ use seafix_referencing::{Candidates, Correspondence, ModelPoint, Tolerance};
 use crate::problems::Planted;
 
 /// Vertices at most.
-pub const MOST: usize = 6;
+pub const MAX: usize = 6;
 /// Pairs of them.
-const PAIRS: usize = MOST * (MOST - 1) / 2;
+const PAIRS: usize = MAX * (MAX - 1) / 2;
 /// Model points at most for which all distances of the model are the same.
 const TETRAHEDRON: usize = 4;
 
@@ -59,7 +59,7 @@ impl Graph {
 
     /// How many model points it has.
     pub fn model_points(&self) -> usize {
-        self.models.iter().max().map_or(0, |most| most + 1)
+        self.models.iter().max().map_or(0, |max| max + 1)
     }
 
     /// Its pair of a vertex.
@@ -129,15 +129,15 @@ pub fn graphs(n: usize, which: Which, labelled: bool) -> Vec<Graph> {
             Which::Shared => continue,
         };
         for clouds in clouds {
-            let points = clouds.iter().max().map_or(0, |most| most + 1);
+            let points = clouds.iter().max().map_or(0, |max| max + 1);
             for agree in 0..1u16 << pairs(points).count() {
                 let graph = Graph { models: models.clone(), clouds: clouds.clone(), agree };
                 if !graph.is_sparing() || (!labelled && seen.contains(&graph.key())) {
                     continue;
                 }
                 if !labelled {
-                    let (edges, twins) = graph.key();
-                    seen.extend(renamings.iter().map(|to| (renamed(edges, to), renamed(twins, to))));
+                    let (edges, same_cloud) = graph.key();
+                    seen.extend(renamings.iter().map(|to| (renamed(edges, to), renamed(same_cloud, to))));
                 }
                 all.push(graph);
             }
@@ -150,7 +150,7 @@ pub fn graphs(n: usize, which: Which, labelled: bool) -> Vec<Graph> {
 fn partitions(n: usize) -> Vec<Vec<usize>> {
     (0..n).fold(vec![Vec::new()], |shorter, _| {
         let with_one_more = |parts: Vec<usize>| {
-            let next = parts.iter().max().map_or(0, |most| most + 1);
+            let next = parts.iter().max().map_or(0, |max| max + 1);
             (0..=next).map(move |part| [parts.as_slice(), &[part]].concat())
         };
         shorter.into_iter().flat_map(with_one_more).collect()
@@ -185,7 +185,7 @@ fn renamed(bits: u16, to: &[usize]) -> u16 {
 /// The distance of adjacent corners of the model (m).
 const SIDE: f64 = 40.0;
 /// The cloud points (m).
-const POSTS: [[f64; 3]; MOST] =
+const POSTS: [[f64; 3]; MAX] =
     [[6.0, 0.0, 3.0], [6.0, 0.0, -3.0], [-3.0, 5.0, 3.0], [-3.0, 5.0, -3.0], [-3.0, -5.0, 3.0], [-3.0, -5.0, -3.0]];
 /// By what share Δ² is above or below the squared difference of the distances.
 const MARGIN: f64 = 0.05;
@@ -208,7 +208,7 @@ impl Default for Posts {
     /// Never: the six points are such that the system is regular.
     fn default() -> Self {
         let posts = POSTS.map(Vector3::from);
-        let all: Vec<(usize, usize)> = pairs(MOST).collect();
+        let all: Vec<(usize, usize)> = pairs(MAX).collect();
         let direction = |(a, b): (usize, usize)| (posts[b] - posts[a]).normalize();
         let effect = SMatrix::<f64, PAIRS, PAIRS>::from_fn(|i, j| {
             let (p, q) = (all[i], all[j]);
@@ -223,13 +223,13 @@ impl Posts {
     /// Points that have this graph, model and cloud turned in one of [`TURNS`] ways each, so that they come in other orders.
     pub fn realised(&self, graph: &Graph, [model, cloud]: [usize; 2]) -> Planted {
         let count = graph.model_points();
-        let corners: Vec<Vector3<f64>> = (0..MOST).map(octahedron).collect();
+        let corners: Vec<Vector3<f64>> = (0..MAX).map(octahedron).collect();
         let at = |model: usize| match graph.models.iter().position(|&other| other == model) {
             Some(first) if count > TETRAHEDRON => corners[first],
             _ => tetrahedron(model),
         };
         let posts = POSTS.map(|at| turned(cloud, Vector3::from(at)));
-        let wanted = SVector::<f64, PAIRS>::from_iterator(pairs(MOST).map(|(a, b)| {
+        let wanted = SVector::<f64, PAIRS>::from_iterator(pairs(MAX).map(|(a, b)| {
             let known = if count > TETRAHEDRON { (corners[b] - corners[a]).norm() } else { SIDE };
             let off = known - (posts[b] - posts[a]).norm();
             let margin = if graph.agree >> pair(a, b) & 1 == 1 { MARGIN } else { -MARGIN };
@@ -238,13 +238,13 @@ impl Posts {
         let sphere = 0.42 * wanted.mean();
         let lambdas = self.lambdas * wanted.add_scalar(-2.0 * sphere);
         let covariance = |v: usize| {
-            let own = pairs(MOST).filter(|&(a, b)| a == v || b == v).map(|(a, b)| {
+            let own = pairs(MAX).filter(|&(a, b)| a == v || b == v).map(|(a, b)| {
                 let n = (posts[b] - posts[a]).normalize();
                 n * n.transpose() * lambdas[pair(a, b)]
             });
             own.fold(Matrix3::identity() * sphere, |sum, one| sum + one) / (SIGMAS * SIGMAS)
         };
-        let points = graph.clouds.iter().max().map_or(0, |most| most + 1);
+        let points = graph.clouds.iter().max().map_or(0, |max| max + 1);
         let measured = |v: usize| MeasuredPoint {
             position: UncertainPoint { at: Point::from(posts[v]), covariance: covariance(v) },
             pixels: None,
@@ -277,9 +277,9 @@ fn tetrahedron(corner: usize) -> Vector3<f64> {
 }
 
 /// One of six ways to turn or reflect about the origin.
-fn turned(way: usize, at: Vector3<f64>) -> Vector3<f64> {
-    let sign = if way < 3 { 1.0 } else { -1.0 };
-    Vector3::from_fn(|axis, _| sign * at[(axis + way) % 3])
+fn turned(turn: usize, at: Vector3<f64>) -> Vector3<f64> {
+    let sign = if turn < 3 { 1.0 } else { -1.0 };
+    Vector3::from_fn(|axis, _| sign * at[(axis + turn) % 3])
 }
 
 #[cfg(test)]
@@ -289,8 +289,8 @@ mod tests {
     #[test]
     fn graphs_are_counted() {
         // OEIS A000110: partitions; A000088: graphs.
-        assert_eq!((0..=MOST).map(|n| partitions(n).len()).collect::<Vec<_>>(), [1, 1, 2, 5, 15, 52, 203]);
+        assert_eq!((0..=MAX).map(|n| partitions(n).len()).collect::<Vec<_>>(), [1, 1, 2, 5, 15, 52, 203]);
         let singles = |n: usize| graphs(n, Which::Own, false).iter().filter(|graph| graph.model_points() == n).count();
-        assert_eq!((0..=MOST).map(singles).collect::<Vec<_>>(), [1, 1, 2, 4, 11, 34, 156]);
+        assert_eq!((0..=MAX).map(singles).collect::<Vec<_>>(), [1, 1, 2, 4, 11, 34, 156]);
     }
 }

@@ -49,7 +49,7 @@ where
 
 /// Whether so many cases must show what a law is about: many do by any seed, a few by the fixed one.
 #[must_use]
-pub fn telling(cases: u32) -> bool {
+pub fn distinctive(cases: u32) -> bool {
     cases >= 100 || cases >= 8 && env::var_os("PROPTEST_RNG_SEED").is_none()
 }
 
@@ -59,7 +59,7 @@ pub fn telling(cases: u32) -> bool {
 /// When the draws hardly ever meet it.
 pub fn not_idle(what: &str, count: u32, cases: u32, one_in: u32) {
     assert!(
-        !telling(cases) || u64::from(count) * u64::from(one_in) >= u64::from(cases),
+        !distinctive(cases) || u64::from(count) * u64::from(one_in) >= u64::from(cases),
         "{what}: {count} in {cases} cases"
     );
 }

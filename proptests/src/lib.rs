@@ -16,11 +16,12 @@
 //! fixed, so every run draws the same cases; what failed once is kept in `proptest-regressions/` and tried first ever after.
 
 pub mod admissible;
+pub mod clutter_patterns;
 pub mod graphs;
-pub mod imitations;
 mod law;
 pub mod least_squares;
 pub mod monte_carlo;
+pub mod navigation_scenario;
 pub mod orders;
 pub mod points;
 pub mod poses;
@@ -30,6 +31,5 @@ pub mod scenes;
 pub mod searches;
 pub mod variants;
 pub mod views;
-pub mod voyage;
 
-pub use law::{cases, law, not_idle, telling, within};
+pub use law::{cases, distinctive, law, not_idle, within};

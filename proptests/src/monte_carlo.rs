@@ -71,7 +71,7 @@ pub fn cell_where(
 ) -> Cell {
     let mut placed = placed(settings, 1, layouts);
     placed.retain(|placed| keep(placed, &bound(placed, settings)));
-    let asked = Asked { draws: draws / layouts, covariance, rivals: None };
+    let asked = Asked { draws: draws / layouts, covariance, alternatives: None };
     cell_of(solver, settings, &placed, &asked)
 }
 
@@ -103,7 +103,7 @@ pub struct Asked {
     /// Whether covariances are held against the errors.
     pub covariance: bool,
     /// With how much more of χ² another pose makes a draw ambiguous; `None` to answer whatever else is as likely.
-    pub rivals: Option<f64>,
+    pub alternatives: Option<f64>,
 }
 
 /// What a solver makes of the draws of these layouts.
@@ -130,7 +130,7 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
                 cell.refused += 1;
                 continue;
             };
-            if asked.rivals.is_some_and(|most| !solver.rivals(&data, &pose, most).is_empty()) {
+            if asked.alternatives.is_some_and(|max| !solver.alternatives(&data, &pose, max).is_empty()) {
                 cell.ambiguous += 1;
                 continue;
             }
@@ -141,7 +141,7 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
                 let sum: Vector3<f64> = used.iter().map(|&i| data.points[i].measured.at.coords).sum();
                 nees(&pose, truth, &covariance, &Point::from(sum / used.len() as f64))
             });
-            if asked.rivals.is_some() && error.is_some_and(|error| error > 100.0) {
+            if asked.alternatives.is_some() && error.is_some_and(|error| error > 100.0) {
                 cell.elsewhere += 1;
                 continue;
             }
@@ -190,7 +190,7 @@ fn observations_of(placed: &Placed, cloud: &[MeasuredPoint], model_sigma: f64) -
 /// (χ² below 64) that noise would prefer it more often than Q(√64 / 2) = 3e-5. Where one does, the likeliest pose
 /// itself is now and then a wrong one, fifty bounds away.
 pub fn is_meaningful(placed: &Placed, sigma_px: f64, bound: &Covariance6<Object, Camera>) -> bool {
-    bent(placed, sigma_px, bound) <= 0.1 && rival(placed, sigma_px) >= 64.0
+    bent(placed, sigma_px, bound) <= 0.1 && alternative(placed, sigma_px) >= 64.0
 }
 
 /// [`nonlinearity`] of a layout's exact pixels within its bound: the relative curvature of Bates and Watts, nought where the
@@ -211,14 +211,14 @@ pub fn foreseen(placed: &Placed, settings: &Layout) -> Option<Covariance6<Object
 
 /// The least χ² of the exact pixels in any valley but the truth's, from 64 starts turned about the centroid; infinite
 /// where all lead to the truth.
-pub fn rival(placed: &Placed, sigma_px: f64) -> f64 {
+pub fn alternative(placed: &Placed, sigma_px: f64) -> f64 {
     let solver = SOLVERS.build(&Choice::named("stereo-reprojection").with("starts", 1)).expect("a solver");
     let Some(mut exact) = observations_of(placed, &placed.exact(sigma_px), 0.0) else { return f64::INFINITY };
     let truth = placed.object_from_camera;
     let places: Vec<Vector3<f64>> = placed.model.iter().map(|&p| (truth.inverse() * p).coords).collect();
     let centre = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
     let mut rng = ChaCha8Rng::seed_from_u64(64);
-    let mut least = f64::INFINITY;
+    let mut min = f64::INFINITY;
     for _ in 0..64 {
         let q = nalgebra::Vector4::from_fn(|_, _| rng.random_range(-1.0..1.0));
         let turn = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::from(q));
@@ -228,10 +228,10 @@ pub fn rival(placed: &Placed, sigma_px: f64) -> f64 {
         let data = Observations { points: exact.clone(), rig: Some(&placed.rig) };
         let Ok(pose) = solver.solve(&data) else { continue };
         if let Some(chi2) = pixel_chi2(placed, &exact, &pose, sigma_px).filter(|chi2| *chi2 > 1e-6) {
-            least = least.min(chi2);
+            min = min.min(chi2);
         }
     }
-    least
+    min
 }
 
 /// χ² of the pixels at a pose; `None` where a point is behind a camera.

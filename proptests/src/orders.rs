@@ -8,7 +8,8 @@ use std::sync::Mutex;
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 use seafix_navigation::{
-    Considered, Event, Local, Navigated, Navigator, Place, Policy, Share, Situation, Standing, State,
+    ConsiderStates, Event, Navigated, Navigator, ObjectPlacement, ObjectPose, Policy, RelativeMotion, Sensitivity,
+    Situation, State,
 };
 
 /// What can happen to a navigator.
@@ -42,18 +43,18 @@ pub enum Kind {
     /// A right one of the third object.
     Third,
     /// A right one of the third object, of which little is seen.
-    Glimpse,
+    Imprecise,
 }
 
 impl Kind {
     /// Its object, and how many shifts the camera is off that one has who believes the fix and the survey.
-    fn says(self) -> (usize, i32) {
+    fn states(self) -> (usize, i32) {
         match self {
             Self::Right => (0, 0),
             Self::Wrong => (0, 1),
             Self::Otherwise => (0, 3),
             Self::Moved => (1, -DISPLACED),
-            Self::Third | Self::Glimpse => (2, 0),
+            Self::Third | Self::Imprecise => (2, 0),
         }
     }
 }
@@ -80,7 +81,7 @@ impl Policy for Listener {
 
 impl Listener {
     /// What it was told since this was asked last.
-    pub fn told(&self) -> Option<Situation> {
+    pub fn reported(&self) -> Option<Situation> {
         self.0.lock().expect("no thread died").take()
     }
 }
@@ -89,9 +90,9 @@ impl Listener {
 #[derive(Debug)]
 pub struct Site {
     /// Where the survey has the objects.
-    pub surveyed: Vec<Place>,
+    pub surveyed: Vec<ObjectPlacement>,
     /// What odometry says of each second.
-    pub step: Local,
+    pub step: RelativeMotion,
     /// Where the camera is after so many steps.
     cameras: Vec<Transform<World, Camera>>,
 }
@@ -100,7 +101,7 @@ pub struct Site {
 const SHIFT: [f64; 3] = [2.0, -1.0, 1.5];
 /// Standard deviation of the position of a fix (m), that of a glimpse, and of a surveyed place.
 const FIX: f64 = 0.005;
-const GLIMPSE: f64 = 0.05;
+const IMPRECISE: f64 = 0.05;
 const SURVEY: f64 = 0.02;
 /// The part of a fix's that all of its object have in common.
 const MODEL: f64 = 0.0045;
@@ -111,7 +112,7 @@ const HARDLY: f64 = 1.0;
 impl Site {
     /// A site, and a way of so many steps through it.
     pub fn new(steps: usize) -> Self {
-        let place = |xi: [f64; 6]| Place {
+        let place = |xi: [f64; 6]| ObjectPlacement {
             world_from_object: Transform::exp(&xi.into()),
             covariance: Covariance6::isotropic(1e-4, SURVEY),
         };
@@ -120,7 +121,7 @@ impl Site {
             place([-0.3, 0.1, 0.9, -2.0, 3.0, 4.0]),
             place([0.5, -0.2, 2.0, 1.0, -4.0, 6.0]),
         ];
-        let step = Local::new(
+        let step = RelativeMotion::new(
             Transform::exp(&[0.02, -0.03, 0.05, 0.3, 0.1, -0.05].into()),
             Covariance6::isotropic(1e-4, 1e-3),
         );
@@ -141,17 +142,17 @@ impl Site {
     }
 
     fn fix(&self, kind: Kind, steps: usize) -> Navigated {
-        let (object, shifts) = kind.says();
-        let sigma = if kind == Kind::Glimpse { GLIMPSE } else { FIX };
-        let mut share = Share::zeros();
-        share.fixed_view_mut::<3, 3>(3, 0).copy_from(&(Matrix3::identity() * MODEL));
-        let standing = Standing::new(self.camera(object, steps, shifts), Covariance6::isotropic(1e-3, sigma))
-            .considering(Considered::of_model(object, [(0, share)]));
-        Navigated { object, standing }
+        let (object, shifts) = kind.states();
+        let sigma = if kind == Kind::Imprecise { IMPRECISE } else { FIX };
+        let mut fraction = Sensitivity::zeros();
+        fraction.fixed_view_mut::<3, 3>(3, 0).copy_from(&(Matrix3::identity() * MODEL));
+        let object_pose = ObjectPose::new(self.camera(object, steps, shifts), Covariance6::isotropic(1e-3, sigma))
+            .with_consider_states(ConsiderStates::of_model(object, [(0, fraction)]));
+        Navigated { object, object_pose }
     }
 
     fn settled(&self, steps: usize, well: bool) -> Navigated {
-        Navigated { object: 0, standing: Standing::new(self.camera(0, steps, 0), settled(well)) }
+        Navigated { object: 0, object_pose: ObjectPose::new(self.camera(0, steps, 0), settled(well)) }
     }
 }
 
@@ -251,7 +252,7 @@ impl Default for Ledger {
             doubts: [None; OBJECTS],
             agreed: Vec::new(),
             disputes: Vec::new(),
-            state: State::Rough,
+            state: State::Prior,
             since: None,
             steps: 0,
         }
@@ -271,7 +272,7 @@ impl Ledger {
                 Must::Went
             }
             Happening::Lost => {
-                (self.known, self.since, self.state) = (None, None, State::Rough);
+                (self.known, self.since, self.state) = (None, None, State::Prior);
                 self.doubts = [None; OBJECTS];
                 Must::Went
             }
@@ -288,7 +289,7 @@ impl Ledger {
             Happening::Blind(in_view) => {
                 let due = self.is_due(BLIND);
                 let searches = self.state == State::Searching && due && in_view;
-                if !searches && matches!(self.state, State::Searching | State::Referenced) {
+                if !searches && matches!(self.state, State::Searching | State::Fixed) {
                     self.state = self.carried();
                 }
                 Must::Said(due)
@@ -327,15 +328,15 @@ impl Ledger {
     }
 
     fn carried(&self) -> State {
-        if self.known.is_some() { State::DeadReckoning } else { State::Rough }
+        if self.known.is_some() { State::DeadReckoning } else { State::Prior }
     }
 
     fn take(&mut self, object: usize, off: i32) {
-        (self.known, self.since, self.state) = (Some((object, off)), Some((0.0, 0)), State::Referenced);
+        (self.known, self.since, self.state) = (Some((object, off)), Some((0.0, 0)), State::Fixed);
     }
 
     fn fix(&mut self, kind: Kind) -> Must {
-        let (object, off) = kind.says();
+        let (object, off) = kind.states();
         let Some((known, _)) = self.known else {
             self.take(object, off);
             return Must::Taken;
@@ -352,7 +353,7 @@ impl Ledger {
             return self.doubt(object, off);
         } else if object != known {
             self.agreed.push([known, object]);
-            if kind == Kind::Glimpse {
+            if kind == Kind::Imprecise {
                 self.doubts[object] = None;
                 return Must::Left;
             }
@@ -449,7 +450,7 @@ pub fn happens(navigator: &mut Navigator<'_>, site: &Site, steps: usize, happeni
 /// Whether a settled pose is better known than this one of the same object.
 pub fn is_better(well: bool, known: Option<&Navigated>) -> bool {
     let sigma = settled(well).position_sigma();
-    known.is_none_or(|known| sigma < known.standing.covariance.position_sigma())
+    known.is_none_or(|known| sigma < known.object_pose.covariance.position_sigma())
 }
 
 fn settled(well: bool) -> Covariance6<Object, Camera> {

@@ -80,7 +80,7 @@ pub enum Layout {
     Flat,
     /// Within a few tolerances of each other, the images being each other's candidates: two model points
     /// may both suit one cloud point.
-    Crowded,
+    Dense,
 }
 
 /// The most points a problem may have, and the most candidates a point.
@@ -103,7 +103,7 @@ pub const LARGE: Size = Size { points: 24, list: 6, clutter: 60 };
 
 /// One model point's draws.
 #[derive(Debug, Clone)]
-struct Drawn {
+struct Generated {
     place: Vector3<f64>,
     cell: [u8; 3],
     /// Of its image, and of its decoy (shares of the problem's noise).
@@ -115,7 +115,7 @@ struct Drawn {
     sigma: f64,
 }
 
-fn drawn(list: usize) -> impl Strategy<Value = Drawn> {
+fn generated(list: usize) -> impl Strategy<Value = Generated> {
     let noise = || vector(1.0);
     (
         vector(1.0),
@@ -126,7 +126,7 @@ fn drawn(list: usize) -> impl Strategy<Value = Drawn> {
         prop::collection::vec(any::<Index>(), 0..=list),
         0.0..=1.0,
     )
-        .prop_map(|(place, cell, (a, b), visible, decoy, others, sigma)| Drawn {
+        .prop_map(|(place, cell, (a, b), visible, decoy, others, sigma)| Generated {
             place,
             cell,
             noise: [a, b],
@@ -153,7 +153,7 @@ struct Shared {
 
 fn shared() -> impl Strategy<Value = Shared> {
     let layout =
-        prop::sample::select(vec![Layout::Scattered, Layout::Lattice, Layout::Lattice, Layout::Flat, Layout::Crowded]);
+        prop::sample::select(vec![Layout::Scattered, Layout::Lattice, Layout::Lattice, Layout::Flat, Layout::Dense]);
     let motion = (rotation(), vector(1.0))
         .prop_map(|(r, t): (UnitQuaternion<f64>, Vector3<f64>)| Transform::new(r, t + Vector3::new(0.0, 0.0, 4.0)));
     let sigmas = (0.0..=0.01, 1.0..10.0, prop_oneof![Just(0.0), 1e-3..5e-3]);
@@ -180,18 +180,18 @@ fn shared() -> impl Strategy<Value = Shared> {
 
 /// Problems up to this size.
 pub fn planted(size: Size) -> impl Strategy<Value = Planted> {
-    let points = prop::collection::vec(drawn(size.list), 1..=size.points);
+    let points = prop::collection::vec(generated(size.list), 1..=size.points);
     let clutter = prop::collection::vec(vector(1.0), 0..=size.clutter);
     (shared(), points, clutter).prop_map(|(shared, points, clutter)| plant(&shared, &points, &clutter))
 }
 
-fn plant(shared: &Shared, points: &[Drawn], clutter: &[Vector3<f64>]) -> Planted {
+fn plant(shared: &Shared, points: &[Generated], clutter: &[Vector3<f64>]) -> Planted {
     let extent = Vector3::new(1.0, 0.75, 0.5);
-    let place = |drawn: &Drawn| match shared.layout {
-        Layout::Scattered => drawn.place.component_mul(&extent),
-        Layout::Flat => drawn.place.component_mul(&Vector3::new(1.0, 0.75, 0.0)),
-        Layout::Lattice => (Vector3::from(drawn.cell.map(f64::from)) - Vector3::from_element(1.0)) * 0.25,
-        Layout::Crowded => drawn.place * 0.05,
+    let place = |generated: &Generated| match shared.layout {
+        Layout::Scattered => generated.place.component_mul(&extent),
+        Layout::Flat => generated.place.component_mul(&Vector3::new(1.0, 0.75, 0.0)),
+        Layout::Lattice => (Vector3::from(generated.cell.map(f64::from)) - Vector3::from_element(1.0)) * 0.25,
+        Layout::Dense => generated.place * 0.05,
     };
     let reflected = |p: Vector3<f64>| Vector3::new(p.x, p.y, -p.z);
     let image = |p: Vector3<f64>, noise: Vector3<f64>| {
@@ -201,29 +201,29 @@ fn plant(shared: &Shared, points: &[Drawn], clutter: &[Vector3<f64>]) -> Planted
     let model: Vec<ModelPoint> = points
         .iter()
         .enumerate()
-        .map(|(i, drawn)| ModelPoint {
-            sigma: shared.sigma[3] * drawn.sigma,
-            ..ModelPoint::exact(format!("P{i}"), Point::from(place(drawn)))
+        .map(|(i, generated)| ModelPoint {
+            sigma: shared.sigma[3] * generated.sigma,
+            ..ModelPoint::exact(format!("P{i}"), Point::from(place(generated)))
         })
         .collect();
     let mut places: Vec<Point<Camera>> = Vec::new();
     let mut lists = vec![Vec::new(); points.len()];
     let mut truth = Vec::new();
-    for (i, drawn) in points.iter().enumerate().filter(|(_, drawn)| drawn.visible) {
+    for (i, generated) in points.iter().enumerate().filter(|(_, generated)| generated.visible) {
         truth.push(Correspondence { model: i, cloud: places.len() });
         lists[i].push(places.len());
-        places.push(image(place(drawn), drawn.noise[0]));
+        places.push(image(place(generated), generated.noise[0]));
     }
-    for (i, drawn) in points.iter().enumerate().filter(|(_, drawn)| drawn.decoy) {
+    for (i, generated) in points.iter().enumerate().filter(|(_, generated)| generated.decoy) {
         lists[i].push(places.len());
-        places.push(image(reflected(place(drawn)), drawn.noise[1]));
+        places.push(image(reflected(place(generated)), generated.noise[1]));
     }
     places.extend(clutter.iter().map(|p| shared.camera_from_object * Point::from(p.component_mul(&extent))));
-    for (list, drawn) in lists.iter_mut().zip(points) {
+    for (list, generated) in lists.iter_mut().zip(points) {
         // Images and decoys come first; the list grows to as many as were drawn.
-        let reach = if shared.layout == Layout::Crowded { truth.len() } else { places.len() };
-        let more = drawn.others.len().saturating_sub(list.len());
-        list.extend(drawn.others.iter().filter(|_| reach > 0).take(more).map(|other| other.index(reach)));
+        let reach = if shared.layout == Layout::Dense { truth.len() } else { places.len() };
+        let more = generated.others.len().saturating_sub(list.len());
+        list.extend(generated.others.iter().filter(|_| reach > 0).take(more).map(|other| other.index(reach)));
     }
     let pairs = lists.iter().enumerate().flat_map(|(i, list)| list.iter().map(move |&j| (i, j)));
     let [x, y, z, _] = shared.sigma;

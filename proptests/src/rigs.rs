@@ -9,7 +9,7 @@ use crate::poses::turn;
 /// The greatest depth (m) of a drawn point.
 pub const FARTHEST: f64 = 20.0;
 /// The least focal length times baseline (px m) of a drawn rig.
-pub const LEAST_FB: f64 = 50.0;
+pub const MIN_FB: f64 = 50.0;
 
 /// A camera of 1024 to 4096 × 768 to 3072 px, 53 to 102 degrees wide, its principal point near the
 /// middle.
@@ -25,7 +25,7 @@ fn pinhole(distortion: Vec<f64>) -> impl Strategy<Value = Pinhole> {
 /// Two equal cameras without distortion, one beside the other along x.
 pub fn rectified() -> impl Strategy<Value = StereoRig> {
     (pinhole(Vec::new()), 1.0..4.0).prop_map(|(camera, fold): (Pinhole, f64)| {
-        let baseline = Vector3::new(-fold * LEAST_FB / camera.focal()[0], 0.0, 0.0);
+        let baseline = Vector3::new(-fold * MIN_FB / camera.focal()[0], 0.0, 0.0);
         let right_from_left = Transform::new(UnitQuaternion::identity(), baseline);
         StereoRig::new(camera, camera, right_from_left).expect("the baseline is long")
     })
@@ -56,7 +56,7 @@ pub fn general() -> impl Strategy<Value = StereoRig> {
         |(left, right, fold, around, along, rotation): (Pinhole, Pinhole, f64, f64, f64, _)| {
             let [fl, fr] = [left.focal(), right.focal()];
             let f = fl[0].min(fl[1]).min(fr[0]).min(fr[1]);
-            let away = Vector3::new(around.cos(), around.sin(), along) * (fold * LEAST_FB / f);
+            let away = Vector3::new(around.cos(), around.sin(), along) * (fold * MIN_FB / f);
             StereoRig::new(left, right, Transform::new(rotation, -(rotation * away))).expect("the baseline is long")
         },
     )

@@ -82,8 +82,8 @@ pub fn model() -> impl Strategy<Value = Vec<Vector3<f64>>> {
             points.into_iter().map(|p: Vector3<f64>| tilt * p.component_mul(&flatten) * scale).collect::<Vec<_>>()
         })
         .prop_filter("nearly a line", |points| {
-            let [least, first] = [1, 2].map(|k| extents(points)[k].sqrt());
-            least > 0.2 * first
+            let [min, first] = [1, 2].map(|k| extents(points)[k].sqrt());
+            min > 0.2 * first
         })
 }
 

@@ -2,7 +2,7 @@
 
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use seafix_geometry::Transform;
-use seafix_referencing::{Correspondence, Identification, Prior, PriorBound, Problem, SEARCHES, Search, Unidentified};
+use seafix_referencing::{Correspondence, Identification, Prior, PriorBound, Problem, Rejected, SEARCHES, Search};
 
 use crate::{
     problems::Planted,
@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// What a search says.
-pub type Answer = Result<Identification, Unidentified>;
+pub type Answer = Result<Identification, Rejected>;
 
 /// What a search claims beyond what all do: coherent, one-to-one sets without mirror images, honest bounds, and no
 /// dependence on the order of the points.
@@ -57,8 +57,8 @@ pub struct Tried {
 
 /// Every search with every combination of its switches; its budget, if it has one, as given.
 pub fn searches(budget: i64) -> Vec<Tried> {
-    let most = Claims { exact: true, ties: true, prior: false };
-    let claims = |name: &str| CLAIMS.iter().find(|(listed, _)| *listed == name).map_or(most, |(_, claims)| *claims);
+    let max = Claims { exact: true, ties: true, prior: false };
+    let claims = |name: &str| CLAIMS.iter().find(|(listed, _)| *listed == name).map_or(max, |(_, claims)| *claims);
     let tried = |variant: Variant<dyn Search>| {
         let component = variant.name.split(' ').next().unwrap_or_default();
         Tried { claims: claims(component), name: variant.name.clone(), variant }
@@ -97,7 +97,7 @@ impl Tried {
 
 /// All sets that an answer names.
 pub fn sets(answer: &Answer) -> impl Iterator<Item = &Vec<Correspondence>> {
-    answer.iter().flat_map(|found| std::iter::once(&found.pairs).chain(&found.rivals))
+    answer.iter().flat_map(|found| std::iter::once(&found.pairs).chain(&found.alternatives))
 }
 
 /// The pose of a problem that has none.
@@ -107,5 +107,5 @@ pub fn nowhere() -> Transform<seafix_geometry::Object, seafix_geometry::Camera> 
 
 /// Whether a set is called the largest; a search by likelihood calls it the likeliest.
 pub fn is_proved_largest(found: &Identification) -> bool {
-    found.optimal && found.belief.is_none()
+    found.optimal && found.posterior.is_none()
 }

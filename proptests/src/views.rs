@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
 use seafix_referencing::{
     Acceptance, Candidates, Gate, Mahalanobis, ModelPoint, Outcome, Prior, PriorBound, Problem, RigidConsensus,
-    Tolerance, candidates, reference,
+    Tolerance, candidates, compute_fix,
 };
 use seafix_simulation::{Purpose, Stream};
 
@@ -73,10 +73,10 @@ impl View {
         self.prior = Some(loop {
             let [turn, step] = error();
             let turned = so3::exp(&turn) * camera_from_object.rotation();
-            let rough = Transform::<Camera, Object>::new(turned, camera_from_object.translation() + step);
-            let off = |point: &ModelPoint| (rough * point.at - camera_from_object * point.at).amax();
+            let moved = Transform::<Camera, Object>::new(turned, camera_from_object.translation() + step);
+            let off = |point: &ModelPoint| (moved * point.at - camera_from_object * point.at).amax();
             if self.model.iter().all(|point| off(point) <= half) {
-                break Prior { object_from_camera: rough.inverse(), bound: PriorBound::Box(half) };
+                break Prior { object_from_camera: moved.inverse(), bound: PriorBound::Box(half) };
             }
         });
         self
@@ -102,6 +102,6 @@ impl View {
         let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Fixed(delta), prior: prior.as_ref() };
         let mut stream = Stream::new(0, 0, 0, Purpose::Search);
         let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
-        reference(&problem, &search, &solver, acceptance, None, stream.rng()).outcome
+        compute_fix(&problem, &search, &solver, acceptance, None, stream.rng()).outcome
     }
 }

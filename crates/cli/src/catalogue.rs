@@ -102,7 +102,8 @@ mod tests {
             let (sentence, link) = finding.rsplit_once("([").unwrap();
             let name = link.split_once(']').unwrap().0;
             let answer = published.split("\n## ").find(|section| section.starts_with(&format!("{name}\n"))).unwrap();
-            let numbers = sentence.split(|c: char| !(c.is_ascii_digit() || c == '.')).map(|word| word.trim_matches('.'));
+            let numbers =
+                sentence.split(|c: char| !(c.is_ascii_digit() || c == '.')).map(|word| word.trim_matches('.'));
             let known = |number: &&str| number.contains('.') && !CONDITIONS.contains(number);
             for number in numbers.filter(known) {
                 assert!(answer.contains(number), "{name} does not report {number}");

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
+mod atomic_file;
 mod catalogue;
 mod commands;
 mod executor;
@@ -12,7 +13,6 @@ mod ply;
 mod publication;
 mod signals;
 mod terminal;
-mod whole;
 
 /// Positions of an underwater vehicle relative to a known structure, from stereo images.
 #[derive(Debug, Parser)]
@@ -28,7 +28,7 @@ fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
             for line in &failure.lines {
-                terminal::tell(&format!("error: {line}"));
+                terminal::notify(&format!("error: {line}"));
             }
             ExitCode::from(failure.code)
         }

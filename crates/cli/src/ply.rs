@@ -5,7 +5,7 @@ use std::path::Path;
 use seafix_geometry::MeasuredPoint;
 use seafix_vision::Image;
 
-use crate::{exit::Failure, whole};
+use crate::{atomic_file, exit::Failure};
 
 /// Writes `cloud` as binary PLY: position (m, left camera's axes), the grey of the left image there,
 /// and the standard deviation of the position (m, √ of the covariance's trace).
@@ -27,7 +27,7 @@ pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Resul
         bytes.extend([grey; 3]);
         bytes.extend((point.position.covariance.trace().sqrt() as f32).to_le_bytes());
     }
-    whole::write(path, bytes)
+    atomic_file::write(path, bytes)
 }
 
 /// The grey value of the pixel nearest to (u, v).

@@ -75,23 +75,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_faults_of_a_list_are_told_at_once() {
+    fn all_faults_of_a_list_are_reported_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
         write("a.toml", "question = 'Why?'\nsource = 'virtual-points'\n");
-        let told = |text: &str| {
+        let reported = |text: &str| {
             write("list.toml", text);
             let faults = read(&folder.path().join("list.toml")).map(|all| all.len());
             faults.map_err(|faults| faults.iter().map(|fault| fault.to_string() + "\n").collect::<String>())
         };
         let one = "[[report]]\nexperiment = 'a.toml'\n";
-        assert_eq!(told(&format!("format = 'seafix-reports/1'\n{one}")), Ok(1));
-        let told_of = |text: &str| told(text).unwrap_err();
-        assert!(told_of(&format!("format = 'seafix-reports/1'\n{one}{one}")).contains("two reports of one name"));
-        assert!(told_of(&format!("format = 'seafix-reports/2'\n{one}")).contains("another format"));
-        assert!(told_of("format = 'seafix-reports/1'\n").contains("no report"));
-        assert!(told_of("format = 'seafix-reports/1'\n[[report]]\nexperimnt = 'a.toml'\n").contains("list.toml:3"));
-        let both = told_of("format = 'seafix-reports/0'\n[[report]]\nexperiment = 'b.toml'\n");
+        assert_eq!(reported(&format!("format = 'seafix-reports/1'\n{one}")), Ok(1));
+        let reported_of = |text: &str| reported(text).unwrap_err();
+        assert!(reported_of(&format!("format = 'seafix-reports/1'\n{one}{one}")).contains("two reports of one name"));
+        assert!(reported_of(&format!("format = 'seafix-reports/2'\n{one}")).contains("another format"));
+        assert!(reported_of("format = 'seafix-reports/1'\n").contains("no report"));
+        assert!(reported_of("format = 'seafix-reports/1'\n[[report]]\nexperimnt = 'a.toml'\n").contains("list.toml:3"));
+        let both = reported_of("format = 'seafix-reports/0'\n[[report]]\nexperiment = 'b.toml'\n");
         assert!(both.contains("another format") && both.contains("b.toml"), "{both}");
     }
 

@@ -52,7 +52,7 @@ pub(crate) fn end_at_once() {
 }
 
 /// Whether a signal came.
-pub(crate) fn came() -> bool {
+pub(crate) fn turned_out() -> bool {
     ASKED.get().is_some_and(|asked| asked.signal.load(Ordering::Relaxed) != 0)
 }
 

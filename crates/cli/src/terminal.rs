@@ -30,7 +30,7 @@ pub(crate) fn width() -> usize {
 }
 
 /// Tells the person on standard error; a run does not stop because nobody listens.
-pub(crate) fn tell(line: &str) {
+pub(crate) fn notify(line: &str) {
     let _ = writeln!(stderr(), "{line}");
 }
 
@@ -64,7 +64,7 @@ impl Progress {
             // A log file gets a line at every tenth of the way.
             let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(1).max(1));
             if done * 10 / all != done.saturating_sub(1) * 10 / all {
-                tell(&format!("{done}/{all} frames"));
+                notify(&format!("{done}/{all} frames"));
             }
         }
     }
@@ -76,7 +76,7 @@ impl Progress {
 
 impl Observer for Progress {
     fn begins(&self, frames: usize, bytes: u64, folder: &Path) {
-        tell(&format!(
+        notify(&format!(
             "{frames} frames, at most about {} MB of log, into {}",
             bytes.div_ceil(1_000_000),
             folder.display()
@@ -85,15 +85,15 @@ impl Observer for Progress {
     }
 
     fn renews(&self, reason: &str) {
-        tell(&format!("a kept run is made again: {reason}"));
+        notify(&format!("a kept run is made again: {reason}"));
     }
 
     fn warns(&self, warning: &Fault) {
-        tell(&format!("warning: {warning}"));
+        notify(&format!("warning: {warning}"));
     }
 
     fn resumes(&self, frames: usize) {
-        tell(&format!("{frames} of them are there already"));
+        notify(&format!("{frames} of them are there already"));
         self.bar.set_position(frames as u64);
     }
 
@@ -102,6 +102,6 @@ impl Observer for Progress {
     }
 
     fn stops(&self) -> bool {
-        signals::came()
+        signals::turned_out()
     }
 }

@@ -73,11 +73,11 @@ mod tests {
 
     #[test]
     fn a_name_and_a_table_are_both_choices() {
-        let table: toml::Table = toml::from_str("a = 'triad'\nb = { name = 'triad', least-sine = 0.2 }").unwrap();
+        let table: toml::Table = toml::from_str("a = 'triad'\nb = { name = 'triad', min-sine = 0.2 }").unwrap();
         let a: Choice = table["a"].clone().try_into().unwrap();
         let b: Choice = table["b"].clone().try_into().unwrap();
         assert_eq!(a, Choice::named("triad"));
-        assert_eq!(b, Choice::named("triad").with("least-sine", 0.2));
+        assert_eq!(b, Choice::named("triad").with("min-sine", 0.2));
         let printed = toml::to_string(&b).unwrap();
         assert_eq!(toml::from_str::<Choice>(&printed).unwrap(), b);
     }
@@ -96,6 +96,6 @@ mod tests {
 
     #[test]
     fn a_table_without_a_name_is_refused() {
-        assert!(toml::from_str::<Choice>("least-sine = 0.2").unwrap_err().to_string().contains("needs a `name`"));
+        assert!(toml::from_str::<Choice>("min-sine = 0.2").unwrap_err().to_string().contains("needs a `name`"));
     }
 }

@@ -50,7 +50,7 @@ mod words;
 pub use choice::Choice;
 pub use fault::{Fault, Part, line_at, line_of, place_at, place_of};
 pub use registry::{
-    BuildError, Component, Entry, Listing, Properties, Registry, SettingsError, each_unfit, in_range, inside,
+    BuildError, Component, Entry, Listing, Properties, Registry, SettingsError, each_invalid, in_range, inside,
     out_of_range, settings, take_out,
 };
 pub use suggest::{nearest, unknown};

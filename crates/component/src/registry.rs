@@ -204,14 +204,14 @@ fn culprit(
         if is_it(&rest) {
             path.push(step.clone());
             let replaced = |inner: &toml::Value| {
-                let mut whole = value.clone();
-                if let Some(place) = inside(&mut whole, &step) {
+                let mut full = value.clone();
+                if let Some(place) = inside(&mut full, &step) {
                     *place = inner.clone();
                 }
-                refused(&whole)
+                refused(&full)
             };
-            let mut whole = value.clone();
-            if let Some(inner) = inside(&mut whole, &step) {
+            let mut full = value.clone();
+            if let Some(inner) = inside(&mut full, &step) {
                 culprit(inner, message, &replaced, path);
             }
             return;
@@ -272,11 +272,11 @@ pub fn out_of_range(message: &str) -> Option<String> {
 
 /// All that `check` finds in settings that are no component's: what it finds first is put back to its default, and the rest
 /// looked at.
-pub fn each_unfit<T: Clone + Serialize + DeserializeOwned>(
-    whole: &T,
+pub fn each_invalid<T: Clone + Serialize + DeserializeOwned>(
+    full: &T,
     check: fn(&T) -> Result<(), String>,
 ) -> Vec<String> {
-    let (mut found, mut rest) = (Vec::new(), whole.clone());
+    let (mut found, mut rest) = (Vec::new(), full.clone());
     while let Err(message) = check(&rest) {
         // A default that is unfit by itself ends it.
         let next = if found.contains(&message) { None } else { without(&rest, &message) };
@@ -291,10 +291,10 @@ pub fn each_unfit<T: Clone + Serialize + DeserializeOwned>(
 }
 
 /// The settings without the one that a message is about, where they can do without.
-fn without<T: Serialize + DeserializeOwned>(whole: &T, message: &str) -> Option<T> {
+fn without<T: Serialize + DeserializeOwned>(full: &T, message: &str) -> Option<T> {
     let own = message.split_once(": ").map_or(message, |(_, own)| own);
     let key = out_of_range(message).or_else(|| out_of_range(own))?;
-    let mut table = toml::Table::try_from(whole).ok()?;
+    let mut table = toml::Table::try_from(full).ok()?;
     let path: Vec<&str> = key.split(['.', '[', ']']).filter(|step| !step.is_empty()).collect();
     take_out(&mut table, &path);
     table.try_into().ok()
@@ -511,7 +511,7 @@ mod tests {
 
     /// Seen to fail when the first fault ends the search.
     #[test]
-    fn all_faults_are_told_each_with_its_place() {
+    fn all_faults_are_reported_each_with_its_place() {
         let settings: toml::Table = toml::from_str(
             "side-length = -2.0\nside = 1\nframe = { widht = 1.0, width = 'wide', holes = [{ width = 1.0 }, { width = 'x' }] }",
         )
@@ -544,15 +544,15 @@ mod tests {
     }
 
     #[test]
-    fn settings_of_no_component_are_told_one_by_one_too() {
+    fn settings_of_no_component_are_reported_one_by_one_too() {
         let check = |square: &Square| {
             in_range(square.side_length > 0.0, "side-length", square.side_length, "a length")?;
             in_range(square.frame.width >= 0.0, "frame.width", square.frame.width, "a width")
         };
         let wrong = Square { side_length: -1.0, frame: Frame { width: -2.0, holes: Vec::new() } };
-        assert_eq!(each_unfit(&wrong, check), ["side-length = -1; give a length", "frame.width = -2; give a width"]);
-        assert!(each_unfit(&Square::default(), check).is_empty());
-        assert_eq!(each_unfit(&wrong, |_| Err("side-length = 0; give more".to_owned())).len(), 1);
+        assert_eq!(each_invalid(&wrong, check), ["side-length = -1; give a length", "frame.width = -2; give a width"]);
+        assert!(each_invalid(&Square::default(), check).is_empty());
+        assert_eq!(each_invalid(&wrong, |_| Err("side-length = 0; give more".to_owned())).len(), 1);
     }
 
     #[test]

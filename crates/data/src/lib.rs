@@ -1,7 +1,7 @@
 //! Sequences of stereo pairs or clouds, simulated and recorded.
 
 pub mod dataset;
-pub mod exact;
+pub mod log_conversion;
 mod model;
 mod ros;
 pub mod source;

@@ -107,7 +107,7 @@ mod tests {
     /// Many points on a far ring about the axis: the lateral position is known as f·σ_x/z = σ_px/√(2n) says, when
     /// the attitude is known; with the attitude open it is known less.
     #[test]
-    fn depth_is_known_as_disparity_and_scale_say() {
+    fn depth_is_known_as_disparity_and_scale_state() {
         let camera = Pinhole::new([1000, 1000], [500.0, 500.0], [499.5, 499.5], &[]).unwrap();
         let right_from_left = Transform::exp(&Vector6::new(0.0, 0.0, 0.0, -0.25, 0.0, 0.0));
         let rig = StereoRig::new(camera, camera, right_from_left).unwrap();

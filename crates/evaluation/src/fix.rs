@@ -124,10 +124,10 @@ mod tests {
             moved(end).powi(2)
         });
         let rms = (ends.sum::<f64>() / 6.0).sqrt();
-        let told = lever_arm_error(moved(c), so3::angle(&e.rotation()), 2.0);
+        let reported = lever_arm_error(moved(c), so3::angle(&e.rotation()), 2.0);
         assert!(
-            (rms - told).abs() < 1e-12,
-            "the six ends along the axes have the mean square of the sphere: {rms} {told}"
+            (rms - reported).abs() < 1e-12,
+            "the six ends along the axes have the mean square of the sphere: {rms} {reported}"
         );
     }
 

@@ -62,9 +62,9 @@ mod tests {
 
     #[test]
     fn each_rule_by_hand() {
-        let shells = Solved { ideal_rms: Some(0.001), putative: false };
-        assert!(solved(shells, 0.049, 0.0) && !solved(shells, 0.051, 0.0));
-        assert!(solved(shells, 0.0, 1.9) && !solved(shells, 0.0, 2.1));
+        let gates = Solved { ideal_rms: Some(0.001), putative: false };
+        assert!(solved(gates, 0.049, 0.0) && !solved(gates, 0.051, 0.0));
+        assert!(solved(gates, 0.0, 1.9) && !solved(gates, 0.0, 2.1));
         // Poorly determined: what no method could do better is right.
         let poor = Solved { ideal_rms: Some(0.1), putative: false };
         assert!(solved(poor, 0.29, 0.0) && !solved(poor, 0.31, 0.0));

@@ -40,7 +40,7 @@ pub struct Difference {
 }
 
 /// So many differing values are kept one by one.
-const MOST: usize = 100;
+const MAX: usize = 100;
 
 impl Difference {
     /// Whether nothing differs.
@@ -56,7 +56,7 @@ impl Difference {
 /// # Errors
 /// A folder that is no finished run, or files that cannot be read.
 pub fn diff(first: &Path, second: &Path) -> Result<Difference, Fault> {
-    let (a, b) = (Told::read(first)?, Told::read(second)?);
+    let (a, b) = (RunInputs::read(first)?, RunInputs::read(second)?);
     let pairs = pairs(&a.trials, &b.trials);
     let mut difference = Difference {
         configuration: configuration(&a, &b, &pairs),
@@ -145,7 +145,7 @@ fn pairs(a: &[OfTrial], b: &[OfTrial]) -> Vec<(Option<usize>, Option<usize>)> {
 }
 
 /// What differs in what the trials were told: what does so in all pairs alike is said once.
-fn configuration(a: &Told, b: &Told, pairs: &[(Option<usize>, Option<usize>)]) -> Vec<Change> {
+fn configuration(a: &RunInputs, b: &RunInputs, pairs: &[(Option<usize>, Option<usize>)]) -> Vec<Change> {
     let (mut found, mut alone) = (BTreeMap::<Change, Vec<&str>>::new(), Vec::new());
     let mut both = 0;
     for pair in pairs {
@@ -174,7 +174,7 @@ fn configuration(a: &Told, b: &Told, pairs: &[(Option<usize>, Option<usize>)]) -
         }
     }
     if a.trials.len() != b.trials.len() {
-        let count = |told: &Told| Some(told.trials.len().to_string());
+        let count = |run_inputs: &RunInputs| Some(run_inputs.trials.len().to_string());
         all.push(Change { what: "trials".to_owned(), first: count(a), second: count(b) });
     }
     all.sort_by(|one, other| one.what.cmp(&other.what));
@@ -185,7 +185,7 @@ fn configuration(a: &Told, b: &Told, pairs: &[(Option<usize>, Option<usize>)]) -
 impl Difference {
     fn note(&mut self, column: &str, row: String, first: Option<String>, second: Option<String>) {
         *self.columns.entry(column.to_owned()).or_default() += 1;
-        if self.results.len() < MOST {
+        if self.results.len() < MAX {
             self.results.push(Change { what: format!("{row} {column}"), first, second });
         }
     }
@@ -198,7 +198,7 @@ fn changes(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Ch
 }
 
 /// What a run was told, from its manifest.
-struct Told {
+struct RunInputs {
     inputs: BTreeMap<String, String>,
     trials: Vec<OfTrial>,
 }
@@ -232,7 +232,7 @@ struct Input {
     files: BTreeMap<String, String>,
 }
 
-impl Told {
+impl RunInputs {
     fn read(folder: &Path) -> Result<Self, Fault> {
         let file = folder.join("manifest.json");
         let remedy = "name the folder of a finished run";
@@ -422,12 +422,15 @@ mod tests {
         // The seed varies in neither: it is a difference, and parts nothing.
         assert_eq!(pairs(&a, &b), [(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))]);
         assert_eq!(pairs(&b, &a), [(Some(0), Some(1)), (Some(1), Some(0)), (Some(2), None)]);
-        let told = |trials| Told { inputs: BTreeMap::new(), trials };
-        let said: Vec<String> =
-            configuration(&told(a.into()), &told(b.into()), &[(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))])
-                .into_iter()
-                .map(|change| format!("{} {:?} {:?}", change.what, change.first, change.second))
-                .collect();
+        let run_inputs = |trials| RunInputs { inputs: BTreeMap::new(), trials };
+        let said: Vec<String> = configuration(
+            &run_inputs(a.into()),
+            &run_inputs(b.into()),
+            &[(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))],
+        )
+        .into_iter()
+        .map(|change| format!("{} {:?} {:?}", change.what, change.first, change.second))
+        .collect();
         assert_eq!(said, ["seed None Some(\"3\")", "trials Some(\"2\") Some(\"3\")", "trial 3 None Some(\"there\")"]);
         // Of trials that are alike the first belongs to the first.
         let same = [trial("1", &[]), trial("2", &[])];
@@ -435,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_is_told_by_its_leaves() {
+    fn a_tree_is_reported_by_its_leaves() {
         let table: toml::Table = toml::from_str("a = 1\n[b]\nc = ['x']\n").unwrap();
         let mut leaves = BTreeMap::new();
         flatten("", &table.into(), &mut leaves);

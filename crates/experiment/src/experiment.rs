@@ -11,16 +11,16 @@ use seafix_log::looks_like;
 use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
 
-use seafix::{Helm, Pipeline, PipelineError, Stages};
+use seafix::{NavigationStack, Pipeline, PipelineError, PipelineStages};
 use seafix_data::{
     dataset::hex,
     source::{SOURCES, Source},
 };
 
 use crate::{
-    Axis, Logging, Navigation, Place, keyframes,
-    read::{self, Read, Texts},
-    vary::{self, Cell},
+    Axis, AxisValue, Logging, Navigation, keyframes,
+    parse::{self, Read, Texts},
+    sweep::{self, Cell},
 };
 
 /// An experiment as its file says it: one question, a source, a pipeline, what varies.
@@ -68,10 +68,10 @@ impl Experiment {
     }
 
     /// Every setting that nothing can be built from.
-    fn unfit(&self) -> Vec<Unfit> {
-        let source = SOURCES.faults(&self.source).into_iter().map(|error| Unfit::new(&["source"], error));
-        let pipeline = self.pipeline.unfit().into_iter().map(Unfit::pipeline);
-        let navigation = self.navigation.iter().flat_map(Navigation::unfit).map(Unfit::navigation);
+    fn invalid(&self) -> Vec<InvalidSetting> {
+        let source = SOURCES.faults(&self.source).into_iter().map(|error| InvalidSetting::new(&["source"], error));
+        let pipeline = self.pipeline.invalid().into_iter().map(InvalidSetting::pipeline);
+        let navigation = self.navigation.iter().flat_map(Navigation::invalid).map(InvalidSetting::navigation);
         source.chain(pipeline).chain(navigation).collect()
     }
 
@@ -95,10 +95,11 @@ impl Experiment {
     }
 
     /// The same experiment with every default written out.
-    fn resolved(&self) -> Result<Self, Unfit> {
-        let source = SOURCES.resolve(&self.source).map_err(|error| Unfit::new(&["source"], error))?;
-        let pipeline = self.pipeline.resolved().map_err(Unfit::pipeline)?;
-        let navigation = self.navigation.as_ref().map(Navigation::resolved).transpose().map_err(Unfit::navigation)?;
+    fn resolved(&self) -> Result<Self, InvalidSetting> {
+        let source = SOURCES.resolve(&self.source).map_err(|error| InvalidSetting::new(&["source"], error))?;
+        let pipeline = self.pipeline.resolved().map_err(InvalidSetting::pipeline)?;
+        let navigation =
+            self.navigation.as_ref().map(Navigation::resolved).transpose().map_err(InvalidSetting::navigation)?;
         Ok(Self { source, pipeline, navigation, ..self.clone() })
     }
 }
@@ -124,19 +125,19 @@ pub struct Trial {
     /// Its name: a number and what distinguishes it.
     pub name: String,
     /// Its value on each axis.
-    pub cell: Vec<Place>,
+    pub cell: Vec<AxisValue>,
     /// The resolved experiment of this trial alone, nothing varying: running it gives this trial again.
     pub resolved: Experiment,
     /// Where its frames come from.
     pub source: Box<dyn Source>,
     /// Its pipeline.
-    pub stages: Stages,
+    pub stages: PipelineStages,
     /// What navigates between its fixes, where anything does.
-    pub helm: Option<Helm>,
+    pub navigation_stack: Option<NavigationStack>,
 }
 
 /// A setting that no component can be built from, and its path in the file.
-struct Unfit {
+struct InvalidSetting {
     path: Vec<String>,
     part: Part,
     /// The component that was meant by a name that none has.
@@ -144,7 +145,7 @@ struct Unfit {
     message: String,
 }
 
-impl Unfit {
+impl InvalidSetting {
     fn new(path: &[&str], error: BuildError) -> Self {
         let mut path: Vec<String> = path.iter().map(|&step| step.to_owned()).collect();
         path.extend(error.key().into_iter().flat_map(steps));
@@ -176,7 +177,7 @@ impl Unfit {
 
     /// It where the file has it: on the axis that sets it, at the point `cell` of the grid, or where the experiment itself does.
     fn fault(&self, experiment: &Experiment, cell: &Cell, texts: &Texts) -> Fault {
-        let (path, part) = vary::written(&experiment.vary, cell, &self.path, self.part)
+        let (path, part) = sweep::written(&experiment.vary, cell, &self.path, self.part)
             .unwrap_or_else(|| (self.path.clone(), self.part));
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         texts.fault(&path, part, &self.message)
@@ -213,7 +214,7 @@ impl Plan {
             return Err(vec![fault]);
         }
         let text = read_text(path).map_err(|fault| vec![fault])?;
-        let Read { experiment, mut faults, texts } = read::experiment(path, &text);
+        let Read { experiment, mut faults, texts } = parse::experiment(path, &text);
         let folder = path.parent().unwrap_or(Path::new(""));
         let experiment = experiment.map(|experiment| changed(experiment, settings)).transpose();
         let planned = experiment.and_then(|experiment| {
@@ -240,9 +241,9 @@ impl Plan {
         settings: &[String],
     ) -> Result<Self, Vec<Fault>> {
         let fault = |path: &[&str], what: &str| texts.fault(path, Part::Value, what);
-        let mut faults = vary::check(&experiment.vary, |path, part, what| texts.fault(path, part, what));
-        let unfit = experiment.unfit();
-        faults.extend(unfit.iter().map(|unfit| unfit.fault(&experiment, &Vec::new(), texts)));
+        let mut faults = sweep::check(&experiment.vary, |path, part, what| texts.fault(path, part, what));
+        let invalid = experiment.invalid();
+        faults.extend(invalid.iter().map(|invalid| invalid.fault(&experiment, &Vec::new(), texts)));
         if experiment.question.trim().is_empty() {
             faults.push(fault(&["question"], "no question").remedy("say in one sentence what the experiment asks"));
         }
@@ -257,10 +258,10 @@ impl Plan {
             faults.push(fault(&["repetitions"], "the seed varies already").remedy(remedy));
         }
         if !faults.is_empty() {
-            faults.extend(experiment.faults_of_axes(&unfit, folder, texts));
+            faults.extend(experiment.faults_of_axes(&invalid, folder, texts));
             return Err(faults);
         }
-        let grid = vary::grid(&experiment.axes());
+        let grid = sweep::grid(&experiment.axes());
         let trials = trials(&experiment, grid, folder, texts)?;
         let settings: String = settings.iter().map(|setting| format!(" --set '{setting}'")).collect();
         let command = format!("cargo run --release -- run {}{settings}", file.display());
@@ -270,11 +271,11 @@ impl Plan {
 
 impl Experiment {
     /// What is wrong with values of axes, looked at one by one, where something else is wrong too: that is left out.
-    fn faults_of_axes(&self, unfit: &[Unfit], folder: &Path, texts: &Texts) -> Vec<Fault> {
+    fn faults_of_axes(&self, invalid: &[InvalidSetting], folder: &Path, texts: &Texts) -> Vec<Fault> {
         let mut table = toml::Table::try_from(self).expect("an experiment is a table of plain values");
         let mut source_is_known = true;
         // Of lists the last first, so that the others keep their places.
-        for Unfit { path, near, .. } in unfit.iter().rev() {
+        for InvalidSetting { path, near, .. } in invalid.iter().rev() {
             let is_name = path.last().is_some_and(|last| last == "name");
             match (&path[..], near) {
                 (_, Some(near)) => rename(&mut table, path, near),
@@ -288,11 +289,11 @@ impl Experiment {
         }
         let Ok(rest) = table.try_into::<Self>() else { return Vec::new() };
         let rest = Self { seed: 0, repetitions: 1, ..rest };
-        if !rest.unfit().is_empty() {
+        if !rest.invalid().is_empty() {
             return Vec::new();
         }
         let sound = |axis: &&Axis| axis.is_bounded() && (source_is_known || !axis.touches("source"));
-        let cells = self.vary.iter().filter(sound).flat_map(|axis| vary::grid(std::slice::from_ref(axis))).collect();
+        let cells = self.vary.iter().filter(sound).flat_map(|axis| sweep::grid(std::slice::from_ref(axis))).collect();
         trials(&rest, cells, folder, texts).err().unwrap_or_default()
     }
 }
@@ -309,7 +310,7 @@ fn rename(table: &mut toml::Table, path: &[String], near: &str) {
 
 /// The trials of these points of the grid, or what is wrong with all of them.
 fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts) -> Result<Vec<Trial>, Vec<Fault>> {
-    let base = experiment.resolved().map_err(|unfit| vec![unfit.fault(experiment, &Vec::new(), texts)])?;
+    let base = experiment.resolved().map_err(|invalid| vec![invalid.fault(experiment, &Vec::new(), texts)])?;
     let base = Experiment { vary: Vec::new(), repetitions: 1, ..base };
     let base = toml::Table::try_from(&base).expect("an experiment is a table of plain values");
     let (mut trials, mut faults) = (Vec::new(), Vec::new());
@@ -317,8 +318,8 @@ fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts
         match trial(&base, index, &cell, folder) {
             Ok(trial) => trials.push(trial),
             // A fault of an axis is that of many points.
-            Err(unfit) => {
-                for fault in unfit.iter().map(|unfit| unfit.fault(experiment, &cell, texts)) {
+            Err(invalid) => {
+                for fault in invalid.iter().map(|invalid| invalid.fault(experiment, &cell, texts)) {
                     if !faults.contains(&fault) {
                         faults.push(fault);
                     }
@@ -330,20 +331,20 @@ fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts
 }
 
 /// The experiment `base` with what one point of the grid sets; without the settings that no experiment has, which are told.
-fn at(base: &toml::Table, cell: &Cell) -> (Option<Experiment>, Vec<Unfit>) {
+fn at(base: &toml::Table, cell: &Cell) -> (Option<Experiment>, Vec<InvalidSetting>) {
     let settings = || cell.iter().flat_map(|place| &place.set);
-    let with = |table: &toml::Table, key: &str, value: &toml::Value| -> Result<toml::Table, Unfit> {
+    let with = |table: &toml::Table, key: &str, value: &toml::Value| -> Result<toml::Table, InvalidSetting> {
         let (mut table, path) = (table.clone(), steps(key).collect::<Vec<_>>());
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
-        let set = vary::set(&mut table, key, value.clone());
-        set.map_err(|message| Unfit::of(&path, Part::Key, message)).map(|()| table)
+        let set = sweep::set(&mut table, key, value.clone());
+        set.map_err(|message| InvalidSetting::of(&path, Part::Key, message)).map(|()| table)
     };
     let all = settings().try_fold(base.clone(), |table, (key, value)| with(&table, key, value));
     if let Some(experiment) = all.ok().and_then(|table| table.try_into().ok()) {
         return (Some(experiment), Vec::new());
     }
     // One after the other, to know which it is.
-    let (mut table, mut unfit) = (base.clone(), Vec::new());
+    let (mut table, mut invalid) = (base.clone(), Vec::new());
     for (key, value) in settings() {
         let read = with(&table, key, value).and_then(|more| match more.clone().try_into::<Experiment>() {
             Ok(_) => Ok(more),
@@ -352,54 +353,61 @@ fn at(base: &toml::Table, cell: &Cell) -> (Option<Experiment>, Vec<Unfit>) {
                 let part = if what.starts_with("unknown key") { Part::Key } else { Part::Value };
                 let said: Vec<String> = [what, value, remedy].into_iter().filter(|part| !part.is_empty()).collect();
                 let path: Vec<String> = steps(key).collect();
-                Err(Unfit { path, part, near: None, message: said.join(", ") })
+                Err(InvalidSetting { path, part, near: None, message: said.join(", ") })
             }
         });
         match read {
             Ok(more) => table = more,
-            Err(error) => unfit.push(error),
+            Err(error) => invalid.push(error),
         }
     }
-    (table.try_into().ok(), unfit)
+    (table.try_into().ok(), invalid)
 }
 
 /// The trial at one point of the grid, or everything that is wrong with it.
-fn trial(base: &toml::Table, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, Vec<Unfit>> {
-    let (trial, mut unfit) = at(base, cell);
-    unfit.extend(trial.iter().flat_map(Experiment::unfit));
+fn trial(base: &toml::Table, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, Vec<InvalidSetting>> {
+    let (trial, mut invalid) = at(base, cell);
+    invalid.extend(trial.iter().flat_map(Experiment::invalid));
     match trial {
-        Some(trial) if unfit.is_empty() => built(trial, index, cell, folder).map_err(|unfit| vec![unfit]),
-        _ => Err(unfit),
+        Some(trial) if invalid.is_empty() => built(trial, index, cell, folder).map_err(|invalid| vec![invalid]),
+        _ => Err(invalid),
     }
 }
 
 /// The trial that a sound experiment is.
-fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, Unfit> {
-    let unfit = |message: String, path: &[&str]| Unfit::of(path, Part::Value, message);
+fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, InvalidSetting> {
+    let invalid = |message: String, path: &[&str]| InvalidSetting::of(path, Part::Value, message);
     let mut trial = trial.resolved()?;
-    let keyframes = trial.navigation.iter_mut().filter_map(|navigation| navigation.network.as_mut());
+    let keyframes = trial.navigation.iter_mut().filter_map(|navigation| navigation.pose_graph.as_mut());
     keyframes.for_each(|used| keyframes::pin(used, folder));
-    let source = SOURCES.build(&trial.source).map_err(|error| unfit(error.to_string(), &["source"]))?;
-    let stages = trial.pipeline.build().map_err(Unfit::pipeline)?;
+    let source = SOURCES.build(&trial.source).map_err(|error| invalid(error.to_string(), &["source"]))?;
+    let stages = trial.pipeline.build().map_err(InvalidSetting::pipeline)?;
     if stages.needs_pixels() && !source.has_pixels() {
         let (solver, source) = (&trial.pipeline.solver.name, &trial.source.name);
         let what = format!("solver `{solver}` needs pixels, which source `{source}` has not; use `mahalanobis`");
-        return Err(unfit(what, &["pipeline", "solver"]));
+        return Err(invalid(what, &["pipeline", "solver"]));
     }
-    let helm = trial.navigation.as_ref().map(Navigation::build).transpose();
-    let helm = helm.map_err(Unfit::navigation)?;
-    if helm.as_ref().is_some_and(Helm::listens) && !source.may_hear() {
+    let navigation_stack = trial.navigation.as_ref().map(Navigation::build).transpose();
+    let navigation_stack = navigation_stack.map_err(InvalidSetting::navigation)?;
+    if navigation_stack.as_ref().is_some_and(NavigationStack::listens) && !source.may_have_readings() {
         let source = &trial.source.name;
         let what = format!(
             "goes by a Doppler log and a gyro, which source `{source}` has not; use `stereo`, or the source `dive`"
         );
-        return Err(unfit(what, &["navigation", "odometry"]));
+        return Err(invalid(what, &["navigation", "odometry"]));
     }
-    if helm.is_some() && trial.pipeline.target != TargetKind::Object {
+    if navigation_stack.is_some() && trial.pipeline.target != TargetKind::Object {
         let what = "navigation goes from object to object; use target = \"object\"".to_owned();
-        return Err(unfit(what, &["pipeline", "target"]));
+        return Err(invalid(what, &["pipeline", "target"]));
     }
-    Ok(Trial { name: vary::name(index + 1, cell), cell: cell.clone(), resolved: trial, source, stages, helm })
+    Ok(Trial {
+        name: sweep::name(index + 1, cell),
+        cell: cell.clone(),
+        resolved: trial,
+        source,
+        stages,
+        navigation_stack,
+    })
 }
 
 /// What a file is that is no experiment, by how it begins.
@@ -427,7 +435,7 @@ fn changed(experiment: Experiment, settings: &[String]) -> Result<Experiment, Ve
         return Ok(experiment);
     }
     // Components are written out first, so that a setting of a default component can be changed.
-    vary::changed(&experiment.resolved().unwrap_or(experiment), settings, "pipeline.solver=triad")
+    sweep::changed(&experiment.resolved().unwrap_or(experiment), settings, "pipeline.solver=triad")
 }
 
 #[cfg(test)]

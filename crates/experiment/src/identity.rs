@@ -22,28 +22,28 @@ use crate::{Plan, Trial, manifest::Input, run::Group};
 
 /// Versions of the code that no component owns. Raise one with every change of that code that alters a result for some
 /// input; `tests/versions.rs` fails where a result changed and no version did.
-pub const SHARED: [Shared; 8] = [
+pub const SHARED: [SharedPart; 8] = [
     // Cameras, rigs, distortion, transforms, covariances.
-    Shared { name: "geometry", version: 1, used: |_| true },
+    SharedPart { name: "geometry", version: 1, used: |_| true },
     // Candidates, gates, tolerance, acceptance tests, integrity, joint fixes.
-    Shared { name: "acceptance", version: 1, used: |_| true },
+    SharedPart { name: "acceptance", version: 1, used: |_| true },
     // Errors, rates, bounds; the comparison with truth.
-    Shared { name: "evaluation", version: 1, used: |_| true },
+    SharedPart { name: "evaluation", version: 1, used: |_| true },
     // What is logged of a frame, and which frames are.
-    Shared { name: "log", version: 1, used: |_| true },
+    SharedPart { name: "log", version: 1, used: |_| true },
     // The order of the stages on a stereo pair.
-    Shared { name: "front-end", version: 1, used: |used| used.images },
+    SharedPart { name: "front-end", version: 1, used: |used| used.images },
     // The navigator, the pose graph, key frames.
-    Shared { name: "navigation", version: 1, used: |used| used.navigates },
+    SharedPart { name: "navigation", version: 1, used: |used| used.navigates },
     // Sites, dives, sensors, noisy points, problems, random streams.
-    Shared { name: "simulation", version: 1, used: |used| used.simulated },
+    SharedPart { name: "simulation", version: 1, used: |used| used.simulated },
     // Images of dives and of the virtual site.
-    Shared { name: "renderer", version: 1, used: |used| used.simulated && used.images },
+    SharedPart { name: "renderer", version: 1, used: |used| used.simulated && used.images },
 ];
 
 /// A part of the code that components share, and the version of its results.
 #[derive(Debug, Clone, Copy)]
-pub struct Shared {
+pub struct SharedPart {
     /// The name of the part.
     pub name: &'static str,
     /// The version of its results.
@@ -92,9 +92,9 @@ pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
     for (group, input) in groups.iter().zip(inputs) {
         for trial in &group.trials {
             let used = Used {
-                images: group.passage.images(),
-                labelled: group.passage.named(),
-                navigates: trial.helm.is_some(),
+                images: group.sequence.images(),
+                labelled: group.sequence.labelled(),
+                navigates: trial.navigation_stack.is_some(),
                 // Recordings are files, simulations are settings.
                 simulated: input.files.is_empty(),
             };
@@ -106,7 +106,8 @@ pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
 
 fn of_trial(trial: &Trial, used: &Used) -> Versions {
     /// The stages between images and a cloud.
-    const FRONT_END: [&str; 7] = ["filters", "detector", "locator", "descriptor", "matcher", "refine", "triangulation"];
+    const FRONT_END: [&str; 7] =
+        ["filters", "detector", "locator", "descriptor", "matcher", "refinement", "triangulator"];
     let mut settings =
         toml::Table::try_from(&trial.resolved).expect("a resolved experiment is a table of plain values");
     if let Some(pipeline) = settings.get_mut("pipeline").and_then(toml::Value::as_table_mut) {
@@ -114,7 +115,7 @@ fn of_trial(trial: &Trial, used: &Used) -> Versions {
         pipeline.retain(|stage, _| !idle(stage));
     }
     let mut found = Found::default();
-    settings.iter().for_each(|(key, value)| found.look(key, value));
+    settings.iter().for_each(|(key, value)| found.visit(key, value));
     let shared = SHARED.iter().filter(|shared| (shared.used)(used));
     found.versions.extend(shared.map(|shared| (format!("shared {}", shared.name), shared.version)));
     found.versions
@@ -132,33 +133,32 @@ struct Found {
 }
 
 impl Found {
-    fn look(&mut self, key: &str, value: &toml::Value) {
+    fn visit(&mut self, key: &str, value: &toml::Value) {
         match value {
             toml::Value::String(name) => self.component(key, name, &toml::Table::new()),
             toml::Value::Table(table) => {
                 let name = table.get("name").and_then(toml::Value::as_str);
                 name.into_iter().for_each(|name| self.component(key, name, table));
-                table.iter().filter(|(key, _)| *key != "name").for_each(|(key, value)| self.look(key, value));
+                table.iter().filter(|(key, _)| *key != "name").for_each(|(key, value)| self.visit(key, value));
             }
-            toml::Value::Array(list) => list.iter().for_each(|value| self.look(key, value)),
+            toml::Value::Array(list) => list.iter().for_each(|value| self.visit(key, value)),
             _ => {}
         }
     }
 
     /// The components of a name, and those among the defaults that `settings` leave.
     fn component(&mut self, key: &str, name: &str, settings: &toml::Table) {
-        let told = match key {
+        let reported = match key {
             "filters" => Some("filter"),
-            "refine" => Some("refinement"),
-            "triangulation" => Some("triangulator"),
             key => ALL.iter().map(|listing| listing.kind).find(|kind| *kind == key),
         };
-        for listing in ALL.iter().filter(|listing| listing.name == name && told.is_none_or(|kind| kind == listing.kind))
+        for listing in
+            ALL.iter().filter(|listing| listing.name == name && reported.is_none_or(|kind| kind == listing.kind))
         {
             self.versions.insert(format!("{} {name}", listing.kind), listing.version);
             let mut left = listing.defaults.iter().filter(|(key, _)| !settings.contains_key(*key)).peekable();
             if left.peek().is_some() && self.defaults.insert((listing.kind, listing.name)) {
-                left.for_each(|(key, value)| self.look(key, value));
+                left.for_each(|(key, value)| self.visit(key, value));
             }
         }
     }
@@ -182,7 +182,7 @@ pub(crate) fn identity(plan: &Plan, groups: &[Group<'_>], inputs: &[Input], vers
         files.iter().for_each(|(name, hash)| add(&format!("{hash} {name}")));
     }
     for group in groups {
-        add(&group.passage.frames().to_string());
+        add(&group.sequence.frames().to_string());
         for header in &group.headers {
             // The commit and the package are no part of a result.
             add(&format!("{:?}", TrialHeader { versions: Vec::new(), ..header.clone() }));
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn a_component_that_another_owns_counts() {
         let text = "question = 'why'\nsource = 'virtual-images'\n[navigation]\nodometry = { name = 'stereo', \
-                    between = 'lucas-kanade' }\n[navigation.network.settings.recognition]\nminimal = 'horn'\n";
+                    between = 'lucas-kanade' }\n[navigation.pose-graph.settings.recognition]\nminimal = 'horn'\n";
         let owned = used(text);
         let parts =
             ["matcher lucas-kanade", "solver p3p-stereo", "solver horn", "descriptor sift", "shared navigation"];
@@ -255,7 +255,7 @@ mod tests {
         }
         // Chosen by its name alone, a component brings what its defaults own.
         let mut found = Found::default();
-        found.look("odometry", &toml::Value::from("stereo"));
+        found.visit("odometry", &toml::Value::from("stereo"));
         assert!(found.versions.contains_key("solver p3p-stereo"), "{:?}", found.versions);
     }
 

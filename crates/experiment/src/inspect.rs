@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 use seafix_geometry::{Object, Point, StereoRig, Transform, World};
 use seafix_log::InspectedPoint;
-use seafix_navigation::{Navigated, Place, Standing};
+use seafix_navigation::{Navigated, ObjectPlacement, ObjectPose};
 use seafix_referencing::{Interest, Outcome, Site, TargetKind};
 
-use seafix::{Sighting, Underway};
+use seafix::{FrameResult, NavigationState};
 use seafix_data::source::Truth;
 
 /// The points of interest that truly lie in both images and are turned towards the left camera.
@@ -19,26 +19,27 @@ pub(crate) fn inspected(
     site: &Site,
     rig: &StereoRig,
     kind: TargetKind,
-    sighting: &Sighting,
-    underway: Option<&Underway>,
+    frame_result: &FrameResult,
+    navigation_state: Option<&NavigationState>,
 ) -> Vec<InspectedPoint> {
     let camera_from_world = truth.world_from_camera.inverse();
     let mut points = Vec::new();
     for (o, (object, place)) in site.objects.iter().zip(&truth.world_from_object).enumerate() {
         let Some(world_from_object) = place else { continue };
         let camera_from_object = camera_from_world * *world_from_object;
-        let eye = camera_from_object.inverse() * Point::from(Vector3::zeros());
-        let mut known: Option<Option<Standing>> = None;
-        for interest in object.interest.iter().filter(|interest| turned(interest, &eye)) {
+        let camera = camera_from_object.inverse() * Point::from(Vector3::zeros());
+        let mut known: Option<Option<ObjectPose>> = None;
+        for interest in object.interest.iter().filter(|interest| turned(interest, &camera)) {
             let at = camera_from_object * interest.at;
             if rig.sees(&at, 0.0).is_none() {
                 continue;
             }
-            let standing = known.get_or_insert_with(|| standing(o, site, kind, sighting, underway)).as_ref();
-            let believed = standing.map(|standing| standing.object_from_camera.inverse() * interest.at);
-            let nees = believed.zip(standing).and_then(|(believed, standing)| {
+            let object_pose =
+                known.get_or_insert_with(|| object_pose(o, site, kind, frame_result, navigation_state)).as_ref();
+            let believed = object_pose.map(|object_pose| object_pose.object_from_camera.inverse() * interest.at);
+            let nees = believed.zip(object_pose).and_then(|(believed, object_pose)| {
                 let error = believed - at;
-                let information = standing.covariance.of_point(&believed).cholesky()?;
+                let information = object_pose.covariance.of_point(&believed).cholesky()?;
                 Some(error.dot(&information.solve(&error)))
             });
             points.push(InspectedPoint {
@@ -54,27 +55,29 @@ pub(crate) fn inspected(
 }
 
 /// Whether the side that is to be looked at is turned towards a place, object frame.
-fn turned(interest: &Interest, eye: &Point<Object>) -> bool {
-    interest.normal.is_none_or(|normal| normal.dot(&(*eye - interest.at)) > 0.0)
+fn turned(interest: &Interest, camera: &Point<Object>) -> bool {
+    interest.normal.is_none_or(|normal| normal.dot(&(*camera - interest.at)) > 0.0)
 }
 
 /// The pose relative to `object` that is known after a frame.
-fn standing(
+fn object_pose(
     object: usize,
     site: &Site,
     kind: TargetKind,
-    sighting: &Sighting,
-    underway: Option<&Underway>,
-) -> Option<Standing> {
+    frame_result: &FrameResult,
+    navigation_state: Option<&NavigationState>,
+) -> Option<ObjectPose> {
     // The object whose frame a target's pose is in.
     let own = |target: usize| if kind == TargetKind::Site { site.frame } else { target };
-    let known = match underway {
-        Some(underway) => underway.pose.clone().map(|pose| Navigated { object: own(pose.object), ..pose })?,
+    let known = match navigation_state {
+        Some(navigation_state) => {
+            navigation_state.pose.clone().map(|pose| Navigated { object: own(pose.object), ..pose })?
+        }
         None => {
-            let fixes = sighting.attempts.iter().filter_map(|attempt| match &attempt.answer.outcome {
-                Outcome::Referenced(fix) => Some(Navigated {
+            let fixes = frame_result.attempts.iter().filter_map(|attempt| match &attempt.answer.outcome {
+                Outcome::Fix(fix) => Some(Navigated {
                     object: own(attempt.target),
-                    standing: Standing::new(fix.object_from_camera, fix.covariance),
+                    object_pose: ObjectPose::new(fix.object_from_camera, fix.covariance),
                 }),
                 _ => None,
             });
@@ -83,13 +86,13 @@ fn standing(
         }
     };
     if known.object == object {
-        return Some(known.standing);
+        return Some(known.object_pose);
     }
-    let surveyed = |o: usize| -> Option<Place> {
+    let surveyed = |o: usize| -> Option<ObjectPlacement> {
         let object = &site.objects[o];
         let world_from_object: Transform<World, Object> = object.world_from_object?;
-        Some(Place { world_from_object, covariance: object.survey_covariance()? })
+        Some(ObjectPlacement { world_from_object, covariance: object.survey_covariance()? })
     };
     let both = [surveyed(known.object)?, surveyed(object)?];
-    Some(Navigated { object: 0, ..known }.passed_to(1, &both).standing)
+    Some(Navigated { object: 0, ..known }.passed_to(1, &both).object_pose)
 }

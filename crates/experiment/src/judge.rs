@@ -7,10 +7,10 @@ use seafix_evaluation::{
 use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform, World};
 use seafix_log::{Evaluation, FrameRecord, NavigationErrors, TruthRecord, VisiblePoint};
 use seafix_navigation::Navigated;
-use seafix_referencing::{Correspondence, Outcome, Reference, Site, Target, TargetKind};
+use seafix_referencing::{Correspondence, Fix, Outcome, Site, Target, TargetKind};
 
-use seafix::{Sighting, Underway};
-use seafix_data::{exact, source::Truth};
+use seafix::{FrameResult, NavigationState};
+use seafix_data::{log_conversion, source::Truth};
 
 use crate::inspect;
 
@@ -30,7 +30,7 @@ struct TrueTarget<'a> {
 
 /// What a trial is judged by: the truth of an instant, and what it searches for.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Judge<'a> {
+pub(crate) struct Evaluator<'a> {
     pub(crate) truth: &'a Truth,
     pub(crate) site: &'a Site,
     pub(crate) targets: &'a [Target],
@@ -38,15 +38,20 @@ pub(crate) struct Judge<'a> {
     pub(crate) rig: &'a StereoRig,
 }
 
-impl<'a> Judge<'a> {
+impl<'a> Evaluator<'a> {
     /// Fills in the evaluation of every attempt.
-    pub(crate) fn evaluate(&self, record: &mut FrameRecord, sighting: &Sighting, underway: Option<&Underway>) {
-        let Judge { truth, kind, rig, .. } = *self;
-        if let (Some(underway), Some(row)) = (underway, &mut record.navigation) {
-            row.errors = errors(underway, self);
+    pub(crate) fn evaluate(
+        &self,
+        record: &mut FrameRecord,
+        frame_result: &FrameResult,
+        navigation_state: Option<&NavigationState>,
+    ) {
+        let Evaluator { truth, kind, rig, .. } = *self;
+        if let (Some(navigation_state), Some(row)) = (navigation_state, &mut record.navigation) {
+            row.errors = errors(navigation_state, self);
         }
-        record.inspected = inspect::inspected(truth, self.site, rig, kind, sighting, underway);
-        for (attempt, row) in sighting.attempts.iter().zip(record.targets.iter_mut()) {
+        record.inspected = inspect::inspected(truth, self.site, rig, kind, frame_result, navigation_state);
+        for (attempt, row) in frame_result.attempts.iter().zip(record.targets.iter_mut()) {
             let Some(known) = &self.known(attempt.target) else { continue };
             let identified = row.evaluation.identified;
             let visible = count_visible(known, rig);
@@ -61,14 +66,14 @@ impl<'a> Judge<'a> {
                 row.evaluation.m2_bound = Some(transfer_bound(&bound, &true_pose, &model));
                 row.evaluation.m3_bound = Some(bound.position_sigma());
             }
-            if let Outcome::Referenced(fix) = &attempt.answer.outcome {
-                evaluate(&mut row.evaluation, fix, known, sighting, truth, rig);
+            if let Outcome::Fix(fix) = &attempt.answer.outcome {
+                evaluate(&mut row.evaluation, fix, known, frame_result, truth, rig);
             }
         }
     }
 
     /// Fills in the truth itself, which only a log holds.
-    pub(crate) fn tell(&self, record: &mut FrameRecord) {
+    pub(crate) fn annotate(&self, record: &mut FrameRecord) {
         let known: Vec<TrueTarget<'_>> = (0..self.targets.len()).filter_map(|index| self.known(index)).collect();
         record.truth = Some(TruthRecord {
             world_from_camera: self.truth.world_from_camera.rows(),
@@ -79,7 +84,7 @@ impl<'a> Judge<'a> {
             visible: known.iter().flat_map(visible_points).collect(),
         });
         if let Some(inputs) = &mut record.inputs {
-            inputs.truth = Some(exact::truth(self.truth, self.site));
+            inputs.truth = Some(log_conversion::truth(self.truth, self.site));
         }
     }
 
@@ -94,14 +99,14 @@ impl<'a> Judge<'a> {
 }
 
 /// How the navigated poses compare with truth, each relative to its own object.
-fn errors(underway: &Underway, judge: &Judge<'_>) -> NavigationErrors {
+fn errors(navigation_state: &NavigationState, judge: &Evaluator<'_>) -> NavigationErrors {
     let mut errors = NavigationErrors::default();
     let of = |navigated: &Navigated| {
         let known = judge.known(navigated.object)?;
         let true_pose = known.world_from_object.inverse() * judge.truth.world_from_camera;
-        Some((known, navigated.standing.object_from_camera, true_pose))
+        Some((known, navigated.object_pose.object_from_camera, true_pose))
     };
-    if let Some(navigated) = &underway.pose
+    if let Some(navigated) = &navigation_state.pose
         && let Some((known, estimate, true_pose)) = of(navigated)
     {
         let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
@@ -110,9 +115,9 @@ fn errors(underway: &Underway, judge: &Judge<'_>) -> NavigationErrors {
         errors.m2_rms = transfer_rms(&estimate, &true_pose, &model);
         errors.m3_position = Some(position_error(&estimate, &true_pose));
         errors.m3_attitude = Some(attitude_error(&estimate, &true_pose));
-        errors.nees = nees(&estimate, &true_pose, &navigated.standing.covariance, &centroid);
+        errors.nees = nees(&estimate, &true_pose, &navigated.object_pose.covariance, &centroid);
     }
-    if let Some((_, estimate, true_pose)) = underway.unreferenced.as_ref().and_then(of) {
+    if let Some((_, estimate, true_pose)) = navigation_state.unreferenced.as_ref().and_then(of) {
         errors.unreferenced_m3_position = Some(position_error(&estimate, &true_pose));
         errors.unreferenced_m3_attitude = Some(attitude_error(&estimate, &true_pose));
     }
@@ -162,9 +167,9 @@ fn count_visible(known: &TrueTarget<'_>, rig: &StereoRig) -> Option<u32> {
 
 fn evaluate(
     row: &mut Evaluation,
-    fix: &Reference,
+    fix: &Fix,
     known: &TrueTarget<'_>,
-    sighting: &Sighting,
+    frame_result: &FrameResult,
     truth: &Truth,
     rig: &StereoRig,
 ) {
@@ -173,15 +178,15 @@ fn evaluate(
     let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
     let correct = |pair: &Correspondence| match &truth.answer {
         Some(answer) => answer.pairs.contains(&(pair.model, pair.cloud)),
-        None => shows_the_point(pair, known, sighting, rig),
+        None => shows_the_point(pair, known, frame_result, rig),
     };
     let is_correct: Vec<bool> = fix.pairs.iter().map(correct).collect();
     let of = |keep: &dyn Fn(usize) -> bool| -> Vec<(Point<Camera>, Point<Object>)> {
         let kept = fix.pairs.iter().enumerate().filter(|(index, _)| is_correct[*index] && keep(*index));
-        kept.map(|(_, pair)| (sighting.cloud[pair.cloud].position.at, model[pair.model])).collect()
+        kept.map(|(_, pair)| (frame_result.cloud[pair.cloud].position.at, model[pair.model])).collect()
     };
     let used: Vec<Vector3<f64>> =
-        fix.used.iter().map(|&index| sighting.cloud[fix.pairs[index].cloud].position.at.coords).collect();
+        fix.used.iter().map(|&index| frame_result.cloud[fix.pairs[index].cloud].position.at.coords).collect();
     let centroid = Point::from(used.iter().sum::<Vector3<f64>>() / used.len().max(1) as f64);
 
     row.correct_pairs = Some(is_correct.iter().filter(|correct| **correct).count() as u32);
@@ -199,8 +204,8 @@ fn evaluate(
 }
 
 /// Whether the cloud point of `pair` shows where its model point truly is, in both images.
-fn shows_the_point(pair: &Correspondence, known: &TrueTarget<'_>, sighting: &Sighting, rig: &StereoRig) -> bool {
-    let measured = &sighting.cloud[pair.cloud];
+fn shows_the_point(pair: &Correspondence, known: &TrueTarget<'_>, frame_result: &FrameResult, rig: &StereoRig) -> bool {
+    let measured = &frame_result.cloud[pair.cloud];
     let shown: Option<StereoPixels> =
         measured.pixels.map(|pixels| pixels.at).or_else(|| rig.project(&measured.position.at));
     let (Some(shown), Some(expected)) = (shown, rig.project(&known.points[pair.model])) else { return false };

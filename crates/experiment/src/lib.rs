@@ -11,23 +11,23 @@ mod identity;
 mod inspect;
 mod judge;
 mod keyframes;
+mod log_decimation;
 mod logging;
 mod manifest;
 mod navigation;
 mod odometry_fault;
+mod parse;
 mod pictures;
 mod range;
-mod read;
 mod record;
 mod replay;
 mod results;
 mod run;
-mod thin;
-mod vary;
+mod sweep;
 
 pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
-pub use identity::{SHARED, Shared, components};
+pub use identity::{SHARED, SharedPart, components};
 pub use logging::{ImagesLogged, Logging};
 pub use manifest::{changed_outputs, check_run, is_run, kept_identity};
 pub use navigation::Navigation;
@@ -36,6 +36,6 @@ pub use range::{Number, Range};
 pub use replay::{Replay, ReplayFrom};
 pub use results::COLUMNS;
 pub use run::{
-    Estimate, Existing, Finished, Observer, Options, Remade, RunError, Shard, Silent, estimate, merge, remake, run,
+    Existing, Finished, Observer, Options, Remade, RunError, RunEstimate, Shard, Silent, estimate, merge, remake, run,
 };
-pub use vary::{Axis, Case, Place, changed, changed_pipeline};
+pub use sweep::{Axis, AxisValue, Case, changed, changed_pipeline};

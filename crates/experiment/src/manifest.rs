@@ -109,15 +109,15 @@ impl Manifest {
     pub(crate) fn new(plan: &Plan, options: &Options, groups: &[Group<'_>], pieces: usize) -> Result<Self, Fault> {
         let mut inputs = Vec::new();
         for group in groups {
-            let mut files: BTreeMap<String, String> = group.passage.inputs()?.into_iter().collect();
-            files.extend(group.networks_read());
-            let warnings = group.passage.warnings().iter().map(ToString::to_string).collect();
-            inputs.push(Input { source: group.passage.name().to_owned(), warnings, files });
+            let mut files: BTreeMap<String, String> = group.sequence.inputs()?.into_iter().collect();
+            files.extend(group.pose_graphs_read());
+            let warnings = group.sequence.warnings().iter().map(ToString::to_string).collect();
+            inputs.push(Input { source: group.sequence.name().to_owned(), warnings, files });
         }
         let versions = identity::versions(groups, &inputs);
         let frames = |trial: &Trial| {
             let group = groups.iter().find(|group| group.trials.iter().any(|other| other.name == trial.name));
-            group.map_or(0, |group| group.passage.frames())
+            group.map_or(0, |group| group.sequence.frames())
         };
         let entry = |trial: &Trial| TrialEntry {
             name: trial.name.clone(),
@@ -215,10 +215,10 @@ impl Manifest {
         if changed.is_empty() || self.versions.is_empty() {
             return "another configuration, input or experiment file".to_owned();
         }
-        let told = changed
+        let reported = changed
             .into_iter()
             .map(|part| format!("{part} {} → {}", version(&self.versions, part), version(&other.versions, part)));
-        told.collect::<Vec<_>>().join(", ")
+        reported.collect::<Vec<_>>().join(", ")
     }
 
     /// What keeps this run from being the same as another: which of the things that the answer depends on differs.

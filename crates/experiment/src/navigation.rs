@@ -1,6 +1,6 @@
 //! The `[navigation]` table of an experiment: the navigation of the library, and how its odometry fails.
 
-use seafix::{Helm, Keyframes, PipelineError, misfit};
+use seafix::{Keyframes, NavigationStack, PipelineError, invalid_setting};
 use seafix_component::Choice;
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::odometry_fault::OdometryFault;
 
 /// The settings of the navigation between fixes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Navigation {
     /// Moves the last fix along.
     pub odometry: Choice,
@@ -21,7 +21,7 @@ pub struct Navigation {
     pub faults: Vec<OdometryFault>,
     /// Key frames where no object is in view; none without it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub network: Option<Keyframes>,
+    pub pose_graph: Option<Keyframes>,
 }
 
 impl Default for Navigation {
@@ -32,13 +32,13 @@ impl Default for Navigation {
 
 impl Navigation {
     fn with_faults(navigation: seafix::Navigation, faults: Vec<OdometryFault>) -> Self {
-        let seafix::Navigation { odometry, policy, fusion, network } = navigation;
-        Self { odometry, policy, fusion, faults, network }
+        let seafix::Navigation { odometry, policy, fusion, pose_graph } = navigation;
+        Self { odometry, policy, fusion, faults, pose_graph }
     }
 
     fn without_faults(&self) -> seafix::Navigation {
-        let Self { odometry, policy, fusion, network, .. } = self.clone();
-        seafix::Navigation { odometry, policy, fusion, network }
+        let Self { odometry, policy, fusion, pose_graph, .. } = self.clone();
+        seafix::Navigation { odometry, policy, fusion, pose_graph }
     }
 
     /// The same with every setting of its components written out.
@@ -50,8 +50,8 @@ impl Navigation {
     }
 
     /// Every setting that it cannot be built with.
-    pub(crate) fn unfit(&self) -> Vec<PipelineError> {
-        let mut all = self.without_faults().unfit();
+    pub(crate) fn invalid(&self) -> Vec<PipelineError> {
+        let mut all = self.without_faults().invalid();
         all.extend(self.unsound());
         all
     }
@@ -59,14 +59,14 @@ impl Navigation {
     /// The faults that are none.
     fn unsound(&self) -> impl Iterator<Item = PipelineError> {
         let all = self.faults.iter().enumerate().filter_map(|(k, fault)| fault.check(k).err());
-        all.map(|message| misfit("faults", message))
+        all.map(|message| invalid_setting("faults", message))
     }
 
     /// Ready to work.
     ///
     /// # Errors
     /// [`PipelineError`] names the setting.
-    pub fn build(&self) -> Result<Helm, PipelineError> {
+    pub fn build(&self) -> Result<NavigationStack, PipelineError> {
         self.unsound().next().map_or(Ok(()), Err)?;
         self.without_faults().build()
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use seafix_geometry::{Transform, so3};
-use seafix_navigation::Local;
+use seafix_navigation::RelativeMotion;
 use seafix_simulation::{Purpose, Stream, sensors::FaultKind};
 use serde::{Deserialize, Serialize};
 
@@ -47,12 +47,17 @@ impl OdometryFault {
 #[derive(Debug, Default)]
 pub(crate) struct Motions {
     /// When each pair was taken (s after the first) and the motion that the odometry found to it, the last one last.
-    found: Vec<(f64, Option<Local>)>,
+    found: Vec<(f64, Option<RelativeMotion>)>,
 }
 
 impl Motions {
     /// What the navigator is given for the motion to the pair at `time` (s after the first frame).
-    pub(crate) fn passed(&mut self, faults: &[OdometryFault], time: f64, motion: Option<Local>) -> Option<Local> {
+    pub(crate) fn passed(
+        &mut self,
+        faults: &[OdometryFault],
+        time: f64,
+        motion: Option<RelativeMotion>,
+    ) -> Option<RelativeMotion> {
         if faults.is_empty() {
             return motion;
         }
@@ -69,12 +74,12 @@ impl Motions {
                 FaultKind::Delayed => as_at(time - fault.amount),
                 FaultKind::Garbage => {
                     let turn = so3::exp(&stream.normal3(0.5));
-                    motion.map(|local| Local { motion: Transform::new(turn, stream.normal3(1.0)), ..local })
+                    motion.map(|local| RelativeMotion { motion: Transform::new(turn, stream.normal3(1.0)), ..local })
                 }
                 FaultKind::Wrong => motion.map(|local| {
                     // A scale a fifth too large, and a slow turn: what a bumped rig would give.
                     let turn = so3::exp(&Vector3::new(0.0, 0.002, 0.002)) * local.motion.rotation();
-                    Local { motion: Transform::new(turn, local.motion.translation() * 1.2), ..local }
+                    RelativeMotion { motion: Transform::new(turn, local.motion.translation() * 1.2), ..local }
                 }),
             }
         })
@@ -89,9 +94,9 @@ mod tests {
     use super::*;
 
     /// The k-th motion goes k metres.
-    fn motion(k: u32) -> Option<Local> {
+    fn motion(k: u32) -> Option<RelativeMotion> {
         let motion = Transform::new(UnitQuaternion::identity(), Vector3::new(f64::from(k), 0.0, 0.0));
-        Some(Local::new(motion, Covariance6::isotropic(1e-3, 1e-3)))
+        Some(RelativeMotion::new(motion, Covariance6::isotropic(1e-3, 1e-3)))
     }
 
     /// The lengths that come of a minute of motions a second while the odometry fails from 20 to 40 s.
@@ -103,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn odometry_fails_as_told_and_only_then() {
+    fn odometry_fails_as_reported_and_only_then() {
         let sound: Vec<Option<f64>> = (0..60).map(|k| Some(f64::from(k))).collect();
         for kind in [
             FaultKind::Off,

@@ -2,8 +2,8 @@
 
 use seafix_log::{GreyImage, encode_png};
 
-use seafix::Eyes;
-use seafix_data::{dataset::grey, exact};
+use seafix::FrameData;
+use seafix_data::{dataset::grey, log_conversion};
 
 use crate::ImagesLogged;
 
@@ -20,12 +20,14 @@ pub(crate) struct Pictures {
 }
 
 impl Pictures {
-    fn new(eyes: &Eyes, level: ImagesLogged) -> Self {
-        let grey = match eyes {
-            Eyes::Pair(left, right) => level.logged(grey(left)).zip(level.logged(grey(right))).map(<[_; 2]>::from),
-            Eyes::Points(_) => None,
+    fn new(frame_data: &FrameData, level: ImagesLogged) -> Self {
+        let grey = match frame_data {
+            FrameData::Stereo(left, right) => {
+                level.logged(grey(left)).zip(level.logged(grey(right))).map(<[_; 2]>::from)
+            }
+            FrameData::Points(_) => None,
         };
-        let are_exact = level == ImagesLogged::All && exact::is_exact(eyes);
+        let are_exact = level == ImagesLogged::All && log_conversion::is_exact(frame_data);
         // Of an image that cannot be compressed the writer of the log says why.
         let pngs = grey.as_ref().and_then(|[left, right]| Some([encode_png(left).ok()?, encode_png(right).ok()?]));
         Self { level, grey, are_exact, pngs }
@@ -38,10 +40,10 @@ pub(crate) struct Levels(Vec<Pictures>);
 
 impl Levels {
     /// Those of a level; the first who asks makes them.
-    pub(crate) fn at(&mut self, level: ImagesLogged, eyes: &Eyes) -> &Pictures {
+    pub(crate) fn at(&mut self, level: ImagesLogged, frame_data: &FrameData) -> &Pictures {
         let known = self.0.iter().position(|pictures| pictures.level == level);
         let place = known.unwrap_or_else(|| {
-            self.0.push(Pictures::new(eyes, level));
+            self.0.push(Pictures::new(frame_data, level));
             self.0.len() - 1
         });
         &self.0[place]

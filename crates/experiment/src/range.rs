@@ -28,7 +28,7 @@ pub struct Range {
 #[serde(untagged)]
 pub enum Number {
     /// A whole one; from whole numbers at whole steps come whole numbers.
-    Whole(i64),
+    Integer(i64),
     /// Any other.
     Real(f64),
 }
@@ -36,18 +36,18 @@ pub enum Number {
 impl Number {
     fn real(self) -> f64 {
         match self {
-            Self::Whole(whole) => whole as f64,
+            Self::Integer(full) => full as f64,
             Self::Real(real) => real,
         }
     }
 
-    fn is_whole(self) -> bool {
-        matches!(self, Self::Whole(_))
+    fn is_integer(self) -> bool {
+        matches!(self, Self::Integer(_))
     }
 }
 
 /// More are a mistake.
-const MOST: usize = 10_000;
+const MAX: usize = 10_000;
 
 /// So much of a step is taken for rounding.
 const ROUNDING: f64 = 1e-9;
@@ -62,10 +62,10 @@ impl Range {
             None => self.count.unwrap_or(2).saturating_sub(1),
         };
         let step = self.step.map_or((to - from) / steps.max(1) as f64, Number::real);
-        let whole = self.from.is_whole() && self.step.map_or(step.fract() == 0.0, Number::is_whole);
+        let full = self.from.is_integer() && self.step.map_or(step.fract() == 0.0, Number::is_integer);
         (0..=steps).map(move |k| {
             let value = from + step * k as f64;
-            if whole { toml::Value::Integer(value as i64) } else { toml::Value::Float(rounded(value, 12)) }
+            if full { toml::Value::Integer(value as i64) } else { toml::Value::Float(rounded(value, 12)) }
         })
     }
 
@@ -93,12 +93,12 @@ impl Range {
             return refuse(key, "a log-range that touches zero; give two ends above zero");
         }
         match (self.count, self.step) {
-            (Some(count), None) if (2..=MOST).contains(&count) => Ok(()),
+            (Some(count), None) if (2..=MAX).contains(&count) => Ok(()),
             (Some(_), None) => refuse("count", "a range of too few or too many numbers; give a count from 2 to 10000"),
             (None, Some(_)) if ratios => refuse("step", "a log-range with a step; give a count"),
             (None, Some(step)) => {
                 let steps = (to - from) / step.real();
-                if !(steps >= 1.0 - ROUNDING && steps < MOST as f64) {
+                if !(steps >= 1.0 - ROUNDING && steps < MAX as f64) {
                     return refuse("step", "a step that does not lead from one end to the other in 1 to 10000 steps");
                 }
                 if (steps - steps.round()).abs() <= ROUNDING {

@@ -1,10 +1,10 @@
 //! From what happened to what is logged.
 
-use seafix::{Attempt, Sight, Sighting, Told, Underway};
+use seafix::{FrameResult, Hints, NavigationState, SensorFrame, TargetAttempt};
 use seafix_component::Registry;
 use seafix_data::{
-    exact::{self, model, rows3, rows6},
-    source::Passage,
+    log_conversion::{self, model, rows3, rows6},
+    source::Sequence,
 };
 use seafix_geometry::{MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
@@ -16,17 +16,17 @@ use seafix_navigation::{FUSIONS, Navigated, ODOMETRIES, POLICIES};
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
 use seafix_vision::{DESCRIPTORS, DETECTORS, LOCATORS, MATCHERS};
 
-use crate::{Experiment, Place, Plan, Trial, manifest::Git, pictures::Pictures};
+use crate::{AxisValue, Experiment, Plan, Trial, manifest::Git, pictures::Pictures};
 
 /// What stands for the search where every point says which one it is.
-const NAMED: &str = "named";
+const LABELLED: &str = "labelled";
 
 /// What is the same for every frame of `trial`.
-pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets: &[Target]) -> TrialHeader {
-    let site = passage.site();
+pub(crate) fn header(plan: &Plan, trial: &Trial, sequence: &dyn Sequence, targets: &[Target]) -> TrialHeader {
+    let site = sequence.site();
     let world_from_site = site.objects.get(site.frame).and_then(|object| object.world_from_object);
     let pipeline = trial.stages.settings();
-    let prior = passage.prior_sigma();
+    let prior = sequence.prior_sigma();
     TrialHeader {
         run: plan.id(),
         trial: trial.name.clone(),
@@ -36,17 +36,17 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
         axes: trial
             .cell
             .iter()
-            .map(|Place { key, value, .. }| Axis {
+            .map(|AxisValue { key, value, .. }| Axis {
                 key: key.clone(),
                 value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
             })
             .collect(),
-        components: components(&trial.resolved, passage),
+        components: components(&trial.resolved, sequence),
         configuration: toml::to_string(&trial.resolved).expect("a resolved experiment is plain values"),
         site: if site.objects.is_empty() { String::new() } else { site.to_toml() },
-        source: passage.name().to_owned(),
-        rig: rig(passage.rig()),
-        body_from_camera: passage.body_from_camera().rows(),
+        source: sequence.name().to_owned(),
+        rig: rig(sequence.rig()),
+        body_from_camera: sequence.body_from_camera().rows(),
         world_from_site: world_from_site.map(|pose| pose.rows()),
         targets: targets
             .iter()
@@ -61,7 +61,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
             .collect(),
         prior_position_sigma: prior.map(|(position, _)| position),
         prior_attitude_sigma: prior.map(|(_, attitude)| attitude),
-        pixel_sigma: passage.pixel_sigma().or_else(|| pipeline.pixel_sigma()),
+        pixel_sigma: sequence.pixel_sigma().or_else(|| pipeline.pixel_sigma()),
         seeds: vec![("experiment".to_owned(), trial.resolved.seed)],
         versions: versions(),
     }
@@ -70,32 +70,32 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, passage: &dyn Passage, targets:
 /// What came of one frame, without truth: what the tables of results hold.
 pub(crate) fn frame(
     number: u64,
-    sight: &Sight,
-    sighting: &Sighting,
-    underway: Option<&Underway>,
+    sensor_frame: &SensorFrame,
+    frame_result: &FrameResult,
+    navigation_state: Option<&NavigationState>,
     shared: SharedStages,
     trial: &Trial,
     targets: &[Target],
 ) -> FrameRecord {
     let pipeline = trial.stages.settings();
-    let search = if matches!(sight.told, Told::Names(_)) { NAMED } else { &pipeline.search.name };
+    let search = if matches!(sensor_frame.hints, Hints::Names(_)) { LABELLED } else { &pipeline.search.name };
     let solver = &pipeline.solver.name;
     let mut attempts: Vec<TargetRecord> =
-        sighting.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
+        frame_result.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
     if attempts.is_empty() {
-        let reason = match underway {
-            Some(underway) if !underway.due => "not-due",
-            _ if sighting.cloud.is_empty() => "no-data",
+        let reason = match navigation_state {
+            Some(navigation_state) if !navigation_state.due => "not-due",
+            _ if frame_result.cloud.is_empty() => "no-data",
             _ => "nothing-in-view",
         };
         attempts.push(TargetRecord::not_attempted(search, solver, reason));
     }
     FrameRecord {
         frame: number,
-        stamp_ns: sight.stamp_ns,
+        stamp_ns: sensor_frame.stamp_ns,
         targets: attempts,
-        times: times(&sighting.times, underway, shared),
-        navigation: underway.map(|underway| Box::new(navigation(underway, targets))),
+        times: times(&frame_result.times, navigation_state, shared),
+        navigation: navigation_state.map(|navigation_state| Box::new(navigation(navigation_state, targets))),
         ..FrameRecord::default()
     }
 }
@@ -103,26 +103,26 @@ pub(crate) fn frame(
 /// Adds what only a log holds: what was seen, and what the method was given.
 pub(crate) fn complete(
     record: &mut FrameRecord,
-    sight: &Sight,
-    sighting: &Sighting,
+    sensor_frame: &SensorFrame,
+    frame_result: &FrameResult,
     targets: &[Target],
     images: &Pictures,
 ) {
-    let inputs = exact::inputs(sight, &sighting.cloud, targets);
+    let inputs = log_conversion::inputs(sensor_frame, &frame_result.cloud, targets);
     record.inputs = Some(Box::new(Inputs { exact_images: images.are_exact, ..inputs }));
     record.images.clone_from(&images.grey);
-    record.key_points = sighting.keypoints.iter().map(|keypoint| uv(&keypoint.at)).collect();
+    record.key_points = frame_result.keypoints.iter().map(|keypoint| uv(&keypoint.at)).collect();
     let point = |point: &MeasuredPoint| CloudPoint {
         at: point.position.at.coords.into(),
         covariance: rows3(&point.position.covariance),
         pixels: point.pixels.map(|pixels| pixel_pair(&pixels.at)),
     };
-    record.cloud = sighting.cloud.iter().map(point).collect();
-    record.prior = sight.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() });
+    record.cloud = frame_result.cloud.iter().map(point).collect();
+    record.prior = sensor_frame.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() });
 }
 
 /// What came of one target.
-fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> TargetRecord {
+fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) -> TargetRecord {
     let answer = &attempt.answer;
     let mut record = TargetRecord::refused(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
     record.candidates = attempt.candidates.lists.iter().map(|list| list.iter().map(|&j| j as u32).collect()).collect();
@@ -130,13 +130,13 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
     record.times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms };
     record.optimal = Some(answer.optimal);
     record.size_bound = answer.size_bound.map(|n| n as u64);
-    record.expected_chance_sets = answer.expected_chance_sets;
+    record.nfa = answer.nfa;
     record.tests = answer.tests;
     record.pairs = pairs(&answer.identified);
     record.evaluation.identified = Some(answer.identified.len() as u32);
     match &answer.outcome {
-        Outcome::Referenced(fix) => {
-            record.outcome = Logged::Referenced;
+        Outcome::Fix(fix) => {
+            record.outcome = Logged::Fix;
             record.object_from_camera = Some(fix.object_from_camera.rows());
             record.covariance = Some(rows6(&fix.covariance.matrix));
             record.pairs = pairs(&fix.pairs);
@@ -156,7 +156,7 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
                 })
                 .collect();
         }
-        Outcome::Unidentified(_) => record.outcome = Logged::Unidentified,
+        Outcome::Rejected(_) => record.outcome = Logged::Rejected,
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
     let details = answer.outcome.explanation().into_iter().chain(attempt.joint.clone());
@@ -165,30 +165,30 @@ fn target(attempt: &Attempt, target: &Target, search: &str, solver: &str) -> Tar
 }
 
 /// The durations of the stages, and which of them other trials share.
-fn times(spent: &seafix::FrameTimes, underway: Option<&Underway>, shared: SharedStages) -> FrameTimes {
+fn times(spent: &seafix::FrameTimes, navigation_state: Option<&NavigationState>, shared: SharedStages) -> FrameTimes {
     let seafix::FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *spent;
-    let odometry_ms = underway.map(|underway| underway.odometry_ms);
+    let odometry_ms = navigation_state.map(|navigation_state| navigation_state.odometry_ms);
     FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms, shared }
 }
 
 /// The state of a trial that navigates, without truth.
-fn navigation(underway: &Underway, targets: &[Target]) -> NavigationRecord {
+fn navigation(navigation_state: &NavigationState, targets: &[Target]) -> NavigationRecord {
     let pose = |pose: &Navigated| NavigatedRecord {
         object: targets[pose.object].name.clone(),
-        object_from_camera: pose.standing.object_from_camera.rows(),
-        covariance: rows6(&pose.standing.covariance.matrix),
+        object_from_camera: pose.object_pose.object_from_camera.rows(),
+        covariance: rows6(&pose.object_pose.covariance.matrix),
     };
-    let step = underway.odometry.step;
+    let step = navigation_state.odometry.step;
     NavigationRecord {
-        state: underway.state.to_string(),
-        due: underway.due,
-        pose: underway.pose.as_ref().map(pose),
-        unreferenced: underway.unreferenced.as_ref().map(pose),
+        state: navigation_state.state.to_string(),
+        due: navigation_state.due,
+        pose: navigation_state.pose.as_ref().map(pose),
+        unreferenced: navigation_state.unreferenced.as_ref().map(pose),
         odometry: OdometryStep {
-            lost: underway.odometry.lost.clone(),
+            lost: navigation_state.odometry.lost.clone(),
             motion: step.map(|step| (step.motion.rows(), rows6(&step.covariance.matrix))),
         },
-        events: underway.events.iter().map(ToString::to_string).collect(),
+        events: navigation_state.events.iter().map(ToString::to_string).collect(),
         errors: NavigationErrors::default(),
     }
 }
@@ -210,7 +210,7 @@ fn integrity(it: &seafix_referencing::Integrity) -> Integrity {
 
 /// The components that did some work: a cloud that came without images was not looked at, points that say which ones they
 /// are were not searched.
-fn components(experiment: &Experiment, passage: &dyn Passage) -> Vec<Component> {
+fn components(experiment: &Experiment, sequence: &dyn Sequence) -> Vec<Component> {
     let pipeline = &experiment.pipeline;
     let front = [
         component(&DETECTORS, &pipeline.detector),
@@ -218,11 +218,11 @@ fn components(experiment: &Experiment, passage: &dyn Passage) -> Vec<Component> 
         component(&DESCRIPTORS, &pipeline.descriptor),
         component(&MATCHERS, &pipeline.matcher),
     ];
-    let search = match passage.named() {
+    let search = match sequence.labelled() {
         false => component(&SEARCHES, &pipeline.search),
         true => Component {
             stage: SEARCHES.kind().to_owned(),
-            name: NAMED.to_owned(),
+            name: LABELLED.to_owned(),
             summary: "none: every point says which one it is".to_owned(),
             source: String::new(),
             settings: Vec::new(),
@@ -236,7 +236,7 @@ fn components(experiment: &Experiment, passage: &dyn Passage) -> Vec<Component> 
             component(&FUSIONS, &navigation.fusion),
         ]
     });
-    front.into_iter().filter(|_| passage.images()).chain(back).chain(between).collect()
+    front.into_iter().filter(|_| sequence.images()).chain(back).chain(between).collect()
 }
 
 fn versions() -> Vec<(String, String)> {
@@ -266,7 +266,7 @@ fn rig(rig: &StereoRig) -> RigRecord {
         right: camera(rig.right()),
         right_from_left: rig.right_from_left().rows(),
         rectified: rig.is_rectified(),
-        right_from_left_rotation: Some(exact::pose(rig.right_from_left()).rotation),
+        right_from_left_rotation: Some(log_conversion::pose(rig.right_from_left()).rotation),
     }
 }
 

@@ -7,7 +7,7 @@ use seafix_log::Reader;
 
 use seafix::Pipeline;
 
-use crate::{Axis, Experiment, Plan, read::Texts, vary};
+use crate::{Axis, Experiment, Plan, parse::Texts, sweep};
 
 /// Which of a log's frames a replay starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -62,7 +62,7 @@ impl Replay {
         let header = reader.header().clone();
         let logged: Experiment = toml::from_str(&header.configuration)
             .map_err(|error| fault(&format!("its configuration is not this version's ({})", error.message())))?;
-        let mut changed: Experiment = vary::changed(&logged, &self.settings, "pipeline.acceptance.confidence=0.999")?;
+        let mut changed: Experiment = sweep::changed(&logged, &self.settings, "pipeline.acceptance.confidence=0.999")?;
         if changed.source != logged.source || changed.seed != logged.seed {
             let fault = Fault::new("a change of what was logged", Path::new("--set"));
             return Err(vec![fault.remedy("change the pipeline; to change source or seed, run the experiment again")]);
@@ -85,7 +85,7 @@ impl Replay {
             ReplayFrom::Clouds => true,
             ReplayFrom::Images => false,
             // Odometry needs the images.
-            ReplayFrom::Suited => changed.navigation.is_none() && same_eyes(&logged.pipeline, &changed.pipeline),
+            ReplayFrom::Suited => changed.navigation.is_none() && same_front_end(&logged.pipeline, &changed.pipeline),
         };
         let read = if clouds { "clouds" } else { "images" };
         let file = log.canonicalize().unwrap_or_else(|_| log.to_owned());
@@ -93,7 +93,7 @@ impl Replay {
         let vary = [own(&self.searches, "pipeline.search"), own(&self.solvers, "pipeline.solver")];
         let replayed = Experiment { source, vary: vary.into_iter().flatten().collect(), ..changed };
         let name = format!("replay-{}", header.trial);
-        let folder = folder_of_network(&replayed, &file);
+        let folder = folder_of_pose_graph(&replayed, &file);
         let mut plan = Plan::resolve(replayed, &name, &folder, log, &Texts::of(log, ""), &[])?;
         plan.command = self.command(log);
         if let [trial] = &mut plan.trials[..] {
@@ -113,17 +113,17 @@ impl Replay {
 
 /// Where the network that is read lies, if one is: here, or in the folder of the log or one above it, for the experiment file
 /// that named it is not known any more. Which network it must be its SHA-256 says.
-fn folder_of_network(experiment: &Experiment, log: &Path) -> PathBuf {
-    let network = experiment.navigation.as_ref().and_then(|navigation| navigation.network.as_ref());
-    let read = network.map_or("", |network| network.read.as_str());
+fn folder_of_pose_graph(experiment: &Experiment, log: &Path) -> PathBuf {
+    let pose_graph = experiment.navigation.as_ref().and_then(|navigation| navigation.pose_graph.as_ref());
+    let read = pose_graph.map_or("", |pose_graph| pose_graph.read.as_str());
     let lies_in = |folder: &&Path| folder.join(read).is_file();
     let folders = std::iter::once(Path::new("")).chain(log.ancestors().skip(1));
     folders.filter(|_| !read.is_empty()).find(lies_in).unwrap_or(Path::new("")).to_owned()
 }
 
 /// Whether all stages before the candidates are the same.
-fn same_eyes(a: &Pipeline, b: &Pipeline) -> bool {
-    let eyes = |p: &Pipeline| Pipeline {
+fn same_front_end(a: &Pipeline, b: &Pipeline) -> bool {
+    let frame_data = |p: &Pipeline| Pipeline {
         target: Default::default(),
         window: 1,
         gate: Default::default(),
@@ -133,5 +133,5 @@ fn same_eyes(a: &Pipeline, b: &Pipeline) -> bool {
         acceptance: Default::default(),
         ..p.clone()
     };
-    eyes(a) == eyes(b)
+    frame_data(a) == frame_data(b)
 }

@@ -105,8 +105,8 @@ mod tests {
                 assert!(found.point.distance(&point) < 1e-9, "{:?}", found.point);
                 assert!(found.disagreement < 1e-12);
                 // Nobody is better than the likeliest, and here nobody is much worse.
-                let [own, least] = [found.covariance, best.covariance].map(|c| c.trace().sqrt());
-                assert!(own > 0.9999 * least && own < 1.1 * least, "{own} beside {least}");
+                let [own, min] = [found.covariance, best.covariance].map(|c| c.trace().sqrt());
+                assert!(own > 0.9999 * min && own < 1.1 * min, "{own} beside {min}");
             }
         }
     }

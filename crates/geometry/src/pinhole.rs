@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn undistorting_undoes_distortion_over_the_whole_image() {
+    fn undistorting_undoes_distortion_over_the_full_image() {
         for coefficients in [
             &[-0.28, 0.04, 0.001, -0.0001, 0.12][..],
             &[-0.3, 0.1, 1e-3, 2e-3],

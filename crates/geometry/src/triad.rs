@@ -7,17 +7,17 @@ use crate::{Frame, Point, Transform};
 /// Three points that define no frame: they lie on a line, or two of them coincide.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "the three points are collinear: the sine of the angle at the first is {sine:.2e}, at least {least:.0e} is needed"
+    "the three points are collinear: the sine of the angle at the first is {sine:.2e}, at least {min:.0e} is needed"
 )]
 pub struct Collinear {
     /// The sine of the angle between P1→P2 and P1→P3.
     pub sine: f64,
     /// The least sine accepted.
-    pub least: f64,
+    pub min: f64,
 }
 
 /// The least sine of the angle at P1 that still defines a frame.
-const LEAST_SINE: f64 = 1e-9;
+const MIN_SINE: f64 = 1e-9;
 
 /// The auxiliary frame `G` on three points (the paper's Fig. 2 rule): origin P1, x along P1→P3,
 /// z along (P2−P1)×(P3−P1), y = z × x; right-handed, and P2 has y < 0.
@@ -44,8 +44,8 @@ pub fn triad<F: Frame, G: Frame>(p1: &Point<F>, p2: &Point<F>, p3: &Point<F>) ->
     let normal = a.cross(&b);
     let sine = normal.norm() / (a.norm() * b.norm());
     // Written so that a NaN (coincident points) is refused too.
-    if !(sine >= LEAST_SINE) {
-        return Err(Collinear { sine: if sine.is_nan() { 0.0 } else { sine }, least: LEAST_SINE });
+    if !(sine >= MIN_SINE) {
+        return Err(Collinear { sine: if sine.is_nan() { 0.0 } else { sine }, min: MIN_SINE });
     }
     let x = b.normalize();
     let z = normal.normalize();

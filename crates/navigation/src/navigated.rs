@@ -2,7 +2,7 @@
 
 use seafix_geometry::{Covariance6, Object, Transform, World};
 
-use crate::{Considered, Local, Standing, by_world};
+use crate::{ConsiderStates, ObjectPose, RelativeMotion, by_world};
 
 /// The camera's pose relative to one object of the site.
 ///
@@ -13,12 +13,12 @@ pub struct Navigated {
     /// The object, as its place in the site.
     pub object: usize,
     /// Where the camera is relative to it.
-    pub standing: Standing,
+    pub object_pose: ObjectPose,
 }
 
 /// Where an object stands, by the survey or by what was found of it since.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct ObjectPlacement {
     /// The pose.
     pub world_from_object: Transform<World, Object>,
     /// Its covariance.
@@ -28,37 +28,34 @@ pub struct Place {
 impl Navigated {
     /// The pose after the motion `step`, Eq. (6).
     #[must_use]
-    pub fn after(&self, step: &Local) -> Self {
-        Self { standing: self.standing.after(step), object: self.object }
+    pub fn after(&self, step: &RelativeMotion) -> Self {
+        Self { object_pose: self.object_pose.after(step), object: self.object }
     }
 
     /// The same camera relative to `other`, by the world: Eq. (2).
     ///
     /// object_m_from_camera = W_m⁻¹ W_r T. With W_true = W Exp(ω) it errs by
     /// ξ + Ad(T⁻¹) ω_r − Ad(T_m⁻¹) ω_m; the survey of the object it stays with does not matter. Both ω are
-    /// [considered](Considered): what one passage took up the way back gives away again.
+    /// [consider_states](ConsiderStates): what one passage took up the way back gives away again.
     #[must_use]
-    pub fn passed_to(&self, other: usize, places: &[Place]) -> Self {
+    pub fn passed_to(&self, other: usize, places: &[ObjectPlacement]) -> Self {
         if other == self.object {
             return self.clone();
         }
         let (from, to) = (&places[self.object], &places[other]);
-        let here = self.standing.object_from_camera;
+        let here = self.object_pose.object_from_camera;
         let pose = by_world(&to.world_from_object, &(from.world_from_object * here));
         let (near, far) = (here.inverse().adjoint(), pose.inverse().adjoint());
-        let surveys = Considered::of_survey(self.object, &near, &from.covariance.matrix).plus(&Considered::of_survey(
-            other,
-            &-far,
-            &to.covariance.matrix,
-        ));
-        let common = self.standing.considered.common(&surveys);
-        let covariance = self.standing.covariance.matrix + surveys.common(&surveys) + common + common.transpose();
-        let standing = Standing {
+        let surveys = ConsiderStates::of_survey(self.object, &near, &from.covariance.matrix)
+            .plus(&ConsiderStates::of_survey(other, &-far, &to.covariance.matrix));
+        let common = self.object_pose.consider_states.common(&surveys);
+        let covariance = self.object_pose.covariance.matrix + surveys.common(&surveys) + common + common.transpose();
+        let object_pose = ObjectPose {
             object_from_camera: pose.renormalized(),
             covariance: Covariance6::new(covariance),
-            considered: self.standing.considered.clone().plus(&surveys),
-            ..self.standing.clone()
+            consider_states: self.object_pose.consider_states.clone().plus(&surveys),
+            ..self.object_pose.clone()
         };
-        Self { object: other, standing }
+        Self { object: other, object_pose }
     }
 }

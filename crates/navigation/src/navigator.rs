@@ -5,7 +5,7 @@ use std::fmt;
 use seafix_geometry::{Covariance6, Object, Transform, so3};
 
 use crate::{
-    Local, Navigated, Place,
+    Navigated, ObjectPlacement, RelativeMotion,
     fusion::{Contradiction, Fusion},
     policy::{Policy, Situation},
 };
@@ -14,11 +14,11 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// On acoustics alone: no fix yet, or none that could be carried here.
-    Rough,
+    Prior,
     /// A fix is due and an object should be in view, but none has been taken.
     Searching,
     /// On a fix of this instant.
-    Referenced,
+    Fixed,
     /// On a fix carried along by odometry.
     DeadReckoning,
 }
@@ -26,9 +26,9 @@ pub enum State {
 impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Rough => "rough",
+            Self::Prior => "prior",
             Self::Searching => "searching",
-            Self::Referenced => "referenced",
+            Self::Fixed => "fix",
             Self::DeadReckoning => "dead reckoning",
         })
     }
@@ -65,12 +65,12 @@ pub struct Displacement {
     /// From where it was believed to stand to where it stands, in its own frame.
     pub old_from_new: Transform<Object, Object>,
     /// Where it stands.
-    pub place: Place,
+    pub place: ObjectPlacement,
 }
 
 /// A change of state, for the log.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct StateChange {
     /// When (s since the navigator began).
     pub seconds: f64,
     /// The state before.
@@ -96,7 +96,7 @@ struct Doubt {
 struct Dispute {
     objects: [usize; 2],
     /// Where each stands if it is the one that was moved.
-    moved: [Place; 2],
+    moved: [ObjectPlacement; 2],
 }
 
 impl Dispute {
@@ -115,7 +115,7 @@ impl Dispute {
 pub struct Navigator<'a> {
     policy: &'a dyn Policy,
     fusion: &'a dyn Fusion,
-    places: Vec<Place>,
+    places: Vec<ObjectPlacement>,
     names: Vec<String>,
     known: Option<Navigated>,
     doubts: Vec<Option<Doubt>>,
@@ -126,12 +126,12 @@ pub struct Navigator<'a> {
     seconds: f64,
     fixed_at: f64,
     metres: f64,
-    changes: Vec<Change>,
+    changes: Vec<StateChange>,
 }
 
 impl<'a> Navigator<'a> {
     /// Begins without a fix, at a site with these objects.
-    pub fn new(places: Vec<Place>, policy: &'a dyn Policy, fusion: &'a dyn Fusion) -> Self {
+    pub fn new(places: Vec<ObjectPlacement>, policy: &'a dyn Policy, fusion: &'a dyn Fusion) -> Self {
         let n = places.len();
         Self {
             policy,
@@ -142,7 +142,7 @@ impl<'a> Navigator<'a> {
             doubts: vec![None; n],
             agreed: vec![Vec::new(); n],
             disputes: Vec::new(),
-            state: State::Rough,
+            state: State::Prior,
             seconds: 0.0,
             fixed_at: f64::NEG_INFINITY,
             metres: f64::INFINITY,
@@ -163,7 +163,7 @@ impl<'a> Navigator<'a> {
     }
 
     /// Every change of state so far, with its reason.
-    pub fn changes(&self) -> &[Change] {
+    pub fn changes(&self) -> &[StateChange] {
         &self.changes
     }
 
@@ -184,18 +184,18 @@ impl<'a> Navigator<'a> {
     }
 
     /// Where the objects stand, as far as is known by now.
-    pub fn places(&self) -> &[Place] {
+    pub fn places(&self) -> &[ObjectPlacement] {
         &self.places
     }
 
     /// Some time and the motion in it; without a motion the last fix is not carried across.
-    pub fn advance(&mut self, seconds: f64, motion: Option<&Local>) {
+    pub fn advance(&mut self, seconds: f64, motion: Option<&RelativeMotion>) {
         self.seconds += seconds;
         let Some(motion) = motion else {
             self.known = None;
             self.doubts.fill(None);
             (self.fixed_at, self.metres) = (f64::NEG_INFINITY, f64::INFINITY);
-            self.turn(State::Rough, "the motion is unknown: the last fix is not carried across".to_owned());
+            self.turn(State::Prior, "the motion is unknown: the last fix is not carried across".to_owned());
             return;
         };
         self.metres += motion.motion.translation().norm();
@@ -228,7 +228,7 @@ impl<'a> Navigator<'a> {
     /// Whether a fix would have been due.
     pub fn blind(&mut self, seconds: f64, in_view: bool) -> bool {
         let due = self.is_due(seconds, in_view);
-        if self.state == State::Referenced || self.state == State::Searching && !(due && in_view) {
+        if self.state == State::Fixed || self.state == State::Searching && !(due && in_view) {
             self.turn(self.carried(), "no motion to this instant: the last pose waits for one".to_owned());
         }
         due
@@ -236,13 +236,13 @@ impl<'a> Navigator<'a> {
 
     /// Without a fix of this instant, and without looking for one.
     fn carried(&self) -> State {
-        if self.known.is_some() { State::DeadReckoning } else { State::Rough }
+        if self.known.is_some() { State::DeadReckoning } else { State::Prior }
     }
 
     /// Whether a fix is due `ahead` seconds from now.
     fn is_due(&self, ahead: f64, in_view: bool) -> bool {
         let sigma = self.known.as_ref().map_or(f64::INFINITY, |known| {
-            let position = known.standing.covariance.matrix.fixed_view::<3, 3>(3, 3).into_owned();
+            let position = known.object_pose.covariance.matrix.fixed_view::<3, 3>(3, 3).into_owned();
             position.symmetric_eigenvalues().max().max(0.0).sqrt()
         });
         let seconds = self.seconds - self.fixed_at + ahead;
@@ -271,17 +271,17 @@ impl<'a> Navigator<'a> {
             self.doubts[object] = None;
             return self.displace(moved, place, fix);
         }
-        match self.fusion.take(&known.passed_to(object, &self.places).standing, &fix.standing) {
+        match self.fusion.take(&known.passed_to(object, &self.places).object_pose, &fix.object_pose) {
             Ok(pose) => {
                 if object != known.object {
                     self.agree(object, known.object);
-                    if !self.fusion.passes(&known.standing, &pose) {
+                    if !self.fusion.passes(&known.object_pose, &pose) {
                         self.doubts[object] = None;
                         return Event::Left;
                     }
                 }
                 self.doubts[object] = None;
-                self.take(Navigated { object, standing: pose }, format!("fix at {}", self.names[object]));
+                self.take(Navigated { object, object_pose: pose }, format!("fix at {}", self.names[object]));
                 Event::Taken
             }
             Err(contradiction) => self.doubt(&known, fix, contradiction),
@@ -292,8 +292,8 @@ impl<'a> Navigator<'a> {
     /// over the graph. It is taken where it is better known than what there was, and `why` said.
     pub fn settle(&mut self, pose: &Navigated, why: String) -> bool {
         let better = self.known.as_ref().is_none_or(|known| {
-            let known = known.passed_to(pose.object, &self.places).standing;
-            pose.standing.covariance.position_sigma() < known.covariance.position_sigma()
+            let known = known.passed_to(pose.object, &self.places).object_pose;
+            pose.object_pose.covariance.position_sigma() < known.covariance.position_sigma()
         });
         if better {
             self.doubts.fill(None);
@@ -305,7 +305,7 @@ impl<'a> Navigator<'a> {
     fn doubt(&mut self, known: &Navigated, fix: &Navigated, contradiction: Contradiction) -> Event {
         let object = fix.object;
         let votes = match self.doubts[object].take() {
-            Some(doubt) if self.fusion.take(&doubt.latest.standing, &fix.standing).is_ok() => doubt.votes + 1,
+            Some(doubt) if self.fusion.take(&doubt.latest.object_pose, &fix.object_pose).is_ok() => doubt.votes + 1,
             _ => 1,
         };
         if votes < VOTES {
@@ -342,7 +342,7 @@ impl<'a> Navigator<'a> {
 
     /// Which object of an open dispute was moved, and where it stands: a fix passes between one of the two and a third, and it
     /// agrees with the survey of that one or with its having been moved, not with both.
-    fn verdict(&self, known: &Navigated, fix: &Navigated) -> Option<(usize, Place)> {
+    fn verdict(&self, known: &Navigated, fix: &Navigated) -> Option<(usize, ObjectPlacement)> {
         self.disputes.iter().find_map(|dispute| {
             let side = match (dispute.side(known.object), dispute.side(fix.object)) {
                 (Some(side), None) | (None, Some(side)) => side,
@@ -360,7 +360,12 @@ impl<'a> Navigator<'a> {
     }
 
     /// Whether a fix agrees with what is known, where an object stands elsewhere than was believed.
-    fn agrees(&self, known: &Navigated, fix: &Navigated, moved: Option<(usize, Place)>) -> Result<(), Contradiction> {
+    fn agrees(
+        &self,
+        known: &Navigated,
+        fix: &Navigated,
+        moved: Option<(usize, ObjectPlacement)>,
+    ) -> Result<(), Contradiction> {
         let passed = match moved {
             None => self.passed(known, fix.object),
             Some((object, place)) => {
@@ -369,7 +374,7 @@ impl<'a> Navigator<'a> {
                 known.passed_to(fix.object, &places)
             }
         };
-        self.fusion.take(&passed.standing, &fix.standing).map(drop)
+        self.fusion.take(&passed.object_pose, &fix.object_pose).map(drop)
     }
 
     /// What is known, relative to another object.
@@ -385,12 +390,12 @@ impl<'a> Navigator<'a> {
     }
 
     /// From where an object was believed to stand to `place`, in its own frame.
-    fn shift(&self, object: usize, place: &Place) -> Transform<Object, Object> {
+    fn shift(&self, object: usize, place: &ObjectPlacement) -> Transform<Object, Object> {
         self.places[object].world_from_object.inverse() * place.world_from_object
     }
 
     /// An object stands elsewhere; the fix that told is taken.
-    fn displace(&mut self, moved: usize, place: Place, fix: &Navigated) -> Event {
+    fn displace(&mut self, moved: usize, place: ObjectPlacement, fix: &Navigated) -> Event {
         let old_from_new = self.shift(moved, &place);
         self.places[moved] = place;
         self.agreed[moved].clear();
@@ -413,12 +418,12 @@ impl<'a> Navigator<'a> {
     fn take(&mut self, pose: Navigated, why: String) {
         self.known = Some(pose);
         (self.fixed_at, self.metres) = (self.seconds, 0.0);
-        self.turn(State::Referenced, why);
+        self.turn(State::Fixed, why);
     }
 
     fn turn(&mut self, to: State, why: String) {
         if self.state != to {
-            self.changes.push(Change { seconds: self.seconds, from: self.state, to, why });
+            self.changes.push(StateChange { seconds: self.seconds, from: self.state, to, why });
             self.state = to;
         }
     }
@@ -426,13 +431,13 @@ impl<'a> Navigator<'a> {
 
 /// Where an object stands that is seen from the same camera as one whose place is known:
 /// W_m = W_r T_r T_m⁻¹, erring by Ad(T_m T_r⁻¹) ω_r + Ad(T_m)(ξ_r − ξ_m) in its own frame.
-fn found(place: &Place, by: &Navigated, seen: &Navigated) -> Place {
-    let (t_r, t_m) = (by.standing.object_from_camera, seen.standing.object_from_camera);
+fn found(place: &ObjectPlacement, by: &Navigated, seen: &Navigated) -> ObjectPlacement {
+    let (t_r, t_m) = (by.object_pose.object_from_camera, seen.object_pose.object_from_camera);
     let across = (t_m * t_r.inverse()).adjoint();
     let own = t_m.adjoint();
     let covariance = across * place.covariance.matrix * across.transpose()
-        + own * (by.standing.covariance.matrix + seen.standing.covariance.matrix) * own.transpose();
-    Place {
+        + own * (by.object_pose.covariance.matrix + seen.object_pose.covariance.matrix) * own.transpose();
+    ObjectPlacement {
         world_from_object: (place.world_from_object * t_r * t_m.inverse()).renormalized(),
         covariance: Covariance6::new(covariance),
     }

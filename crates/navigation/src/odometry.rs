@@ -4,7 +4,7 @@ use seafix_component::{Registry, entry};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_vision::{Image, Threads};
 
-use crate::{DvlGyro, Icp, Journey, Outcome, Reading, Stereo, Waypoint};
+use crate::{DvlGyro, Icp, OdometryOutcome, OdometryTrajectory, Reading, Stereo, Waypoint};
 
 /// The two images of one instant.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +51,7 @@ impl Stamps {
 
 /// Computes the motion of a stereo rig from the images it took, or from what other sensors of the vehicle say.
 pub trait Odometry: Send + Sync + std::fmt::Debug {
-    /// Whether it goes by readings ([`Reckoning::sense`]) and cannot do without.
+    /// Whether it goes by readings ([`OdometrySession::sense`]) and cannot do without.
     fn listens(&self) -> bool {
         false
     }
@@ -62,11 +62,11 @@ pub trait Odometry: Send + Sync + std::fmt::Debug {
         rig: &'a StereoRig,
         body_from_camera: Transform<Body, Camera>,
         threads: Threads,
-    ) -> Box<dyn Reckoning + 'a>;
+    ) -> Box<dyn OdometrySession + 'a>;
 }
 
 /// An odometry at work: pairs go in, in order of time, and between them readings as they come; poses come out.
-pub trait Reckoning: Send {
+pub trait OdometrySession: Send {
     /// Takes a reading, whenever it was made; one that goes by images alone has no use for it.
     fn sense(&mut self, _reading: &Reading) {}
 
@@ -74,13 +74,13 @@ pub trait Reckoning: Send {
     ///
     /// # Errors
     /// [`NotAfter`] when it is not the next; nothing changes then.
-    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<Outcome, NotAfter>;
+    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<OdometryOutcome, NotAfter>;
 
     /// The last waypoint and the number of its segment: what one that navigates needs of the journey.
     fn latest(&self) -> Option<(usize, Waypoint)>;
 
     /// All that is known by now: later pairs may still improve poses and explain outcomes.
-    fn journey(&self) -> Journey;
+    fn trajectory(&self) -> OdometryTrajectory;
 }
 
 /// All odometries.

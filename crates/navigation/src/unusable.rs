@@ -5,11 +5,11 @@ use seafix_vision::Image;
 use crate::{Lost, Side};
 
 /// Brightness that varies by less (grey levels) shows nothing: it is noise and rounding.
-const LEAST_VARIATION: f64 = 1.0;
+const MIN_VARIATION: f64 = 1.0;
 /// A pixel this bright is at the end of its range.
 const WHITE: f32 = 254.5;
 /// The largest share of such pixels.
-const MOST_WHITE: f64 = 0.5;
+const MAX_WHITE: f64 = 0.5;
 
 /// The last images that showed anything, as they came: what a frozen camera repeats.
 #[derive(Debug, Default)]
@@ -47,12 +47,12 @@ fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
             sum += f64::from(s);
             squares += f64::from(q);
         }
-        let share = white as f64 / count;
-        if share > MOST_WHITE {
-            return Some(Lost::Saturated(side, 100.0 * share));
+        let fraction = white as f64 / count;
+        if fraction > MAX_WHITE {
+            return Some(Lost::Saturated(side, 100.0 * fraction));
         }
         let deviation = (squares / count - (sum / count).powi(2)).max(0.0).sqrt();
-        if deviation < LEAST_VARIATION {
+        if deviation < MIN_VARIATION {
             return Some(Lost::Blank(side, deviation));
         }
     }

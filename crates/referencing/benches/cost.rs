@@ -46,16 +46,16 @@ fn main() {
             (250e-6 / start.elapsed().as_secs_f64()).clamp(1.0, 50.0) as u32
         })
         .collect();
-    let mut least = vec![f64::INFINITY; solvers.len()];
+    let mut min = vec![f64::INFINITY; solvers.len()];
     let mut eigen = f64::INFINITY;
     let umeyama = umeyama();
     for round in 0..200 {
-        for ((solver, least), &calls) in solvers.iter().zip(&mut least).zip(&calls) {
+        for ((solver, min), &calls) in solvers.iter().zip(&mut min).zip(&calls) {
             let start = Instant::now();
             for _ in 0..calls {
                 let _ = black_box(solver.solve(black_box(&data)));
             }
-            *least = least.min(start.elapsed().as_secs_f64() * 1e9 / f64::from(calls));
+            *min = min.min(start.elapsed().as_secs_f64() * 1e9 / f64::from(calls));
         }
         if let Some(program) = umeyama.as_ref().filter(|_| round % 40 == 0) {
             eigen = eigen.min(nanoseconds(program));
@@ -70,18 +70,18 @@ fn main() {
         "solver", "ns", "kabsch", "instructions", "kabsch", "allocations"
     );
     for (which, (name, _)) in choices.iter().enumerate() {
-        let (count, share) = match (instructions[which], instructions[kabsch]) {
+        let (count, fraction) = match (instructions[which], instructions[kabsch]) {
             (Some(count), Some(unit)) => (format!("{count:.0}"), format!("{:.2}", count / unit)),
             _ => ("-".to_owned(), "-".to_owned()),
         };
         let region = Region::new(ALLOCATOR);
         let _ = black_box(solvers[which].solve(black_box(&data)));
         let allocations = region.change().allocations;
-        let (ns, ratio) = (least[which], least[which] / least[kabsch]);
-        println!("{name:32} {ns:9.0} {ratio:7.2} {count:>12} {share:>7} {allocations:>11}");
+        let (ns, ratio) = (min[which], min[which] / min[kabsch]);
+        println!("{name:32} {ns:9.0} {ratio:7.2} {count:>12} {fraction:>7} {allocations:>11}");
     }
     match umeyama {
-        Some(_) => println!("Eigen's umeyama: {eigen:.0} ns; kabsch is {:.2} of it", least[kabsch] / eigen),
+        Some(_) => println!("Eigen's umeyama: {eigen:.0} ns; kabsch is {:.2} of it", min[kabsch] / eigen),
         None => println!("Eigen's umeyama: no headers in EIGEN_INCLUDE or /usr/include/eigen3, or no compiler"),
     }
 }

@@ -115,9 +115,9 @@ pub fn candidates(
         let Some(prior) = prior else {
             return (0..cloud.len()).collect();
         };
-        match shell(point, prior, gate) {
-            PointShell::Box { centre, half } => places.within(&centre, half),
-            PointShell::Ellipsoid(ellipsoid) => (0..cloud.len()).filter(|&j| ellipsoid.admits(&cloud[j])).collect(),
+        match point_gate(point, prior, gate) {
+            PointGate::Box { centre, half } => places.within(&centre, half),
+            PointGate::Ellipsoid(ellipsoid) => (0..cloud.len()).filter(|&j| ellipsoid.admits(&cloud[j])).collect(),
         }
     });
     Candidates { lists: lists.collect() }
@@ -158,7 +158,7 @@ fn inside([x, y, z]: [&[f64; LANES]; 3], c: [f64; 3], half: f64) -> u64 {
 }
 
 /// The region about one predicted place in which cloud points are candidates.
-enum PointShell {
+enum PointGate {
     Box { centre: Point<Camera>, half: f64 },
     Ellipsoid(Ellipsoid),
 }
@@ -170,15 +170,15 @@ struct Ellipsoid {
     limit: f64,
 }
 
-fn shell(point: &ModelPoint, prior: &Prior, gate: &Gate) -> PointShell {
+fn point_gate(point: &ModelPoint, prior: &Prior, gate: &Gate) -> PointGate {
     let centre = prior.object_from_camera.inverse() * point.at;
     match (&prior.bound, gate) {
         (PriorBound::Box(half), _) | (PriorBound::Gaussian(_), Gate::Box(half)) => {
-            PointShell::Box { centre, half: *half }
+            PointGate::Box { centre, half: *half }
         }
         (PriorBound::Gaussian(covariance), Gate::ChiSquare(confidence)) => {
             let own = point.sigma * point.sigma;
-            PointShell::Ellipsoid(Ellipsoid {
+            PointGate::Ellipsoid(Ellipsoid {
                 centre,
                 covariance: covariance.of_point(&centre) + Matrix3::identity() * own,
                 limit: chi_square(3, *confidence),
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_of_more_points_than_a_word_has_bits_is_looked_at_whole() {
+    fn a_cloud_of_more_points_than_a_word_has_bits_is_examined_full() {
         let model = one_point([0.0, 0.0, 2.0]);
         let places: Vec<[f64; 3]> = (0..150).map(|j| [0.01 * f64::from(j % 65) - 0.6, 0.0, 2.0]).collect();
         let found = candidates(&model, &cloud(&places, 0.0), Some(&boxed(0.0301)), &Gate::default(), None);

@@ -20,11 +20,11 @@ pub(crate) struct Parts {
     /// Of each cloud point; `None` of what is no candidate.
     part_of: Vec<Option<usize>>,
     parts: Vec<Part>,
-    whole: Part,
+    full: Part,
     /// How long the object is (m).
     object: f64,
     /// The greatest tolerance of a candidate (m): no side is shorter.
-    least: f64,
+    min: f64,
 }
 
 /// Points, and the box about them.
@@ -65,22 +65,22 @@ impl Parts {
         let lists = problem.candidates.lists.iter().enumerate();
         let pairs = lists.flat_map(|(model, list)| list.iter().map(move |&cloud| Correspondence { model, cloud }));
         let mut reaches: Vec<Option<f64>> = vec![None; problem.cloud.len()];
-        let mut least = f64::MIN_POSITIVE;
+        let mut min = f64::MIN_POSITIVE;
         for pair in pairs {
-            let reach = problem.share_of_delta(pair);
-            least = least.max(reach);
+            let reach = problem.fraction_of_delta(pair);
+            min = min.max(reach);
             reaches[pair.cloud] = Some(reaches[pair.cloud].map_or(reach, |known| known.max(reach)));
         }
         let at = |number: usize| problem.cloud[number].position.at.coords;
         let candidates = reaches.iter().enumerate().filter_map(|(number, reach)| Some((number, at(number), (*reach)?)));
         let finite = candidates.filter(|(_, at, _)| at.iter().all(|x| x.is_finite()));
-        Self::joined(finite.collect(), problem.cloud.len(), diameter(problem.model), least)
+        Self::joined(finite.collect(), problem.cloud.len(), diameter(problem.model), min)
     }
 
     /// What is joined by steps of no more than the object's length.
-    fn joined(mut left: Vec<Candidate>, count: usize, object: f64, least: f64) -> Self {
-        let mut whole = Part::empty();
-        left.iter().for_each(|(_, at, _)| whole.add(at));
+    fn joined(mut left: Vec<Candidate>, count: usize, object: f64, min: f64) -> Self {
+        let mut full = Part::empty();
+        left.iter().for_each(|(_, at, _)| full.add(at));
         let (mut part_of, mut parts) = (vec![None; count], Vec::new());
         let mut joined: Vec<Candidate> = Vec::new();
         while let Some(first) = left.pop() {
@@ -106,7 +106,7 @@ impl Parts {
             }
             parts.push(part);
         }
-        Self { part_of, parts, whole, object, least }
+        Self { part_of, parts, full, object, min }
     }
 
     fn part(&self, point: usize) -> Option<&Part> {
@@ -115,42 +115,42 @@ impl Parts {
 
     /// The sides (m) of the box that a part fills.
     fn lengths(&self, part: &Part) -> Vector3<f64> {
-        part.lengths().add_scalar(self.object).inf(&self.whole.lengths())
+        part.lengths().add_scalar(self.object).inf(&self.full.lengths())
     }
 
     /// ln of the volume (m³) of a box.
     fn ln_of(&self, lengths: &Vector3<f64>) -> f64 {
-        lengths.iter().map(|side| libm::log(side.max(self.least))).sum()
+        lengths.iter().map(|side| libm::log(side.max(self.min))).sum()
     }
 
     /// By how much the part of a point is denser than the cloud as a whole (nats), no less than nought.
     pub(crate) fn ln_excess(&self, point: usize) -> f64 {
         let density = |count: usize, lengths: &Vector3<f64>| libm::log(count as f64) - self.ln_of(lengths);
-        let even = density(self.whole.count, &self.whole.lengths());
+        let even = density(self.full.count, &self.full.lengths());
         self.part(point).map_or(0.0, |part| (density(part.count, &self.lengths(part)) - even).max(0.0))
     }
 
     /// The sides (m) of a box that would be as dense as the part of a point, were all points in it, and has its proportions; that of
     /// the cloud where this is denser.
     pub(crate) fn as_dense(&self, point: usize) -> Vector3<f64> {
-        let whole = self.whole.lengths();
-        let Some(part) = self.part(point).filter(|_| self.ln_excess(point) > 0.0) else { return whole };
-        self.lengths(part) * libm::cbrt(self.whole.count as f64 / part.count as f64)
+        let full = self.full.lengths();
+        let Some(part) = self.part(point).filter(|_| self.ln_excess(point) > 0.0) else { return full };
+        self.lengths(part) * libm::cbrt(self.full.count as f64 / part.count as f64)
     }
 
     /// ln of the volume (m³) of the box about all.
-    pub(crate) fn ln_whole(&self) -> f64 {
-        self.ln_of(&self.whole.lengths())
+    pub(crate) fn ln_full(&self) -> f64 {
+        self.ln_of(&self.full.lengths())
     }
 
     /// ln of the volume (m³) of the boxes of all parts that hold a pose, no more than that of the one about all.
     pub(crate) fn ln_volume(&self) -> f64 {
-        let whole = self.ln_whole();
+        let full = self.ln_full();
         let hold = self.parts.iter().filter(|part| part.count >= NEEDED);
-        let mut shares: Vec<f64> = hold.map(|part| libm::exp(self.ln_of(&self.lengths(part)) - whole)).collect();
+        let mut fractions: Vec<f64> = hold.map(|part| libm::exp(self.ln_of(&self.lengths(part)) - full)).collect();
         // In an order of their own, so that the sum does not depend on that of the points.
-        shares.sort_unstable_by(f64::total_cmp);
-        whole + libm::log(shares.iter().sum::<f64>().clamp(f64::MIN_POSITIVE, 1.0))
+        fractions.sort_unstable_by(f64::total_cmp);
+        full + libm::log(fractions.iter().sum::<f64>().clamp(f64::MIN_POSITIVE, 1.0))
     }
 
     /// A point of the part that has the most.
@@ -178,7 +178,7 @@ mod tests {
         Parts::joined(finite.map(|(number, at)| (number, *at, 0.01)).collect(), points.len(), 1.0, 0.02)
     }
 
-    fn drawn(count: usize, seed: u64) -> Vec<Vector3<f64>> {
+    fn sampled(count: usize, seed: u64) -> Vec<Vector3<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..count).map(|_| Vector3::from_fn(|axis, _| rng.random_range(-1.0..1.0) * [1.5, 1.0, 0.5][axis])).collect()
     }
@@ -186,12 +186,12 @@ mod tests {
     #[test]
     fn a_cloud_without_gaps_is_its_box() {
         for seed in 0..100 {
-            let points = drawn(60, seed);
+            let points = sampled(60, seed);
             let parts = parts(&points);
             let (low, high) = points.iter().fold((points[0], points[0]), |(low, high), at| (low.inf(at), high.sup(at)));
             assert_eq!(parts.as_dense(7), high - low);
-            assert_eq!((parts.ln_excess(7), parts.ln_volume()), (0.0, parts.ln_whole()));
-            assert!((parts.ln_whole() - (high - low).iter().product::<f64>().ln()).abs() < 1e-12);
+            assert_eq!((parts.ln_excess(7), parts.ln_volume()), (0.0, parts.ln_full()));
+            assert!((parts.ln_full() - (high - low).iter().product::<f64>().ln()).abs() < 1e-12);
             assert!(parts.in_largest().is_some_and(|middle| (0..60).all(|point| parts.together(point, middle))));
         }
     }
@@ -206,7 +206,7 @@ mod tests {
         assert_eq!(together, [true, true, false, true, false, false]);
         assert_eq!(chain.in_largest(), Some(0));
         for seed in 0..100 {
-            let mut points = drawn(40, seed);
+            let mut points = sampled(40, seed);
             let alone = parts(&points);
             points.extend((1..=4).map(|k| Vector3::new(-2.0, 3.0, 1.0) * 10f64.powi(20 * k)));
             let found = parts(&points);
@@ -222,13 +222,13 @@ mod tests {
 
     #[test]
     fn the_order_of_the_points_is_none_of_the_parts() {
-        let mut points = drawn(30, 3);
-        points.extend(drawn(9, 4).into_iter().map(|at| at + Vector3::new(7.0, 0.0, 0.0)));
+        let mut points = sampled(30, 3);
+        points.extend(sampled(9, 4).into_iter().map(|at| at + Vector3::new(7.0, 0.0, 0.0)));
         points.push(Vector3::repeat(1e4));
         let forth = parts(&points);
         points.reverse();
         let back = parts(&points);
-        assert_eq!((forth.ln_volume(), forth.ln_whole()), (back.ln_volume(), back.ln_whole()));
+        assert_eq!((forth.ln_volume(), forth.ln_full()), (back.ln_volume(), back.ln_full()));
         for point in 0..40 {
             assert_eq!(forth.ln_excess(point), back.ln_excess(39 - point));
             assert_eq!(forth.as_dense(point), back.as_dense(39 - point));

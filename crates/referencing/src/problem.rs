@@ -98,7 +98,7 @@ impl Problem<'_> {
     }
 
     /// The share of Δ that is due to one pair (m): that of two is no more than the sum of both, by √(x² + y²) ≤ x + y.
-    pub(crate) fn share_of_delta(&self, pair: Correspondence) -> f64 {
+    pub(crate) fn fraction_of_delta(&self, pair: Correspondence) -> f64 {
         match self.tolerance {
             Tolerance::Fixed(delta) => 0.5 * delta,
             Tolerance::Sigmas(k) => {

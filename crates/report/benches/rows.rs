@@ -32,6 +32,6 @@ fn main() {
 /// The most memory the process had, as Linux says.
 fn memory() -> String {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let most = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    most.map_or_else(|| "memory unknown".to_owned(), |most| most.trim().to_owned())
+    let max = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    max.map_or_else(|| "memory unknown".to_owned(), |max| max.trim().to_owned())
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use seafix_log::Axis;
 
 use crate::{
-    Forms, ReportError, Summary, content, format,
+    Forms, ReportError, RunSummary, content, format,
     paired::{self, Comparison},
     print,
     run::{Run, Trial},
@@ -64,7 +64,7 @@ pub fn compare(
         trial.header.run.clone_from(&title);
         trial.header.command = format!("seafix compare {}", names.join(" "));
     }
-    let summary = Summary::of(&run);
+    let summary = RunSummary::of(&run);
     let comparisons = paired::comparisons(&run, &summary);
     let page = out.map(|folder| {
         let document = content::document(&run, &summary, false)?;
@@ -151,8 +151,8 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
 
 /// As much of a line as tells what it is about.
 fn clipped(line: &str) -> String {
-    const MOST: usize = 60;
-    if line.chars().count() <= MOST { line.to_owned() } else { line.chars().take(MOST - 1).chain(['…']).collect() }
+    const MAX: usize = 60;
+    if line.chars().count() <= MAX { line.to_owned() } else { line.chars().take(MAX - 1).chain(['…']).collect() }
 }
 
 /// That runs gave the same results bit for bit, where they did: such a comparison says nothing of methods.
@@ -182,8 +182,8 @@ fn lengths(run: &Run, names: &[String], comparisons: &[Comparison]) -> String {
     let of = |index: usize| &run.trials[index].header.axes[0].value;
     let n = || comparisons.iter().filter(|c| of(c.first) != of(c.second)).map(|comparison| comparison.n);
     let what = match (n().min(), n().max()) {
-        (Some(least), Some(most)) if least < most => {
-            format!("compared are the attempts at the same frame and target that both made, {least} to {most} of them")
+        (Some(min), Some(max)) if min < max => {
+            format!("compared are the attempts at the same frame and target that both made, {min} to {max} of them")
         }
         (Some(n), _) => format!("compared are the {n} attempts at the same frame and target that both made"),
         _ => "no two of their trials saw the same, so nothing of the one is compared with the other".to_owned(),

@@ -76,12 +76,12 @@ pub(crate) fn probability(value: f64) -> String {
 
 /// As many decimals as the smallest of `values` needs for two digits, the same for a whole column.
 pub(crate) fn decimals(values: impl IntoIterator<Item = f64>) -> usize {
-    let least = values.into_iter().filter(|x| x.is_finite() && *x > 0.0).fold(f64::INFINITY, f64::min);
-    match least {
+    let min = values.into_iter().filter(|x| x.is_finite() && *x > 0.0).fold(f64::INFINITY, f64::min);
+    match min {
         x if x < 0.1 => 3,
         x if x < 1.0 => 2,
         x if x < 100.0 => 1,
-        _ => usize::from(least == f64::INFINITY),
+        _ => usize::from(min == f64::INFINITY),
     }
 }
 
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_keep_two_digits_of_their_least() {
+    fn columns_keep_two_digits_of_their_smallest() {
         assert_eq!(decimals([0.4, 12.0]), 2);
         assert_eq!(decimals([4.0, 12.0]), 1);
         assert_eq!(decimals([f64::INFINITY]), 1);

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{ReportError, Summary, content, print, run::Run, write::write};
+use crate::{ReportError, RunSummary, content, print, run::Run, write::write};
 
 /// The name of the page.
 const NAME: &str = "README.md";
@@ -34,7 +34,7 @@ fn text<'a>(findings: impl IntoIterator<Item = &'a str>) -> String {
 }
 
 /// The section of one run: its question, the main figure of the report in `folder`, and the sentences with its numbers.
-pub(crate) fn section(run: &Run, summary: &Summary, folder: &Path) -> String {
+pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String {
     let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let escaped = print::escape_markdown(&name);
     let there = |file: &str| folder.join(file).exists();

@@ -14,20 +14,20 @@ mod document;
 mod error;
 mod field;
 mod figure;
+mod fix_intervals;
 mod format;
 mod index;
 mod lever;
-mod looked;
+mod navigation_quantity;
 mod number;
 mod paired;
 mod paper;
 mod place;
+mod points_of_interest;
 mod print;
+mod proportion;
 mod run;
-mod sailed;
-mod share;
 mod summary;
-mod teeth;
 mod terminal;
 mod verify;
 mod write;
@@ -36,7 +36,7 @@ pub use compare::{Compared, compare};
 pub use error::ReportError;
 pub use index::{index, index_holds};
 pub use paper::PAPER_M1;
-pub use summary::{Limits, Row, Spread, StageTimes, Summary};
+pub use summary::{Distribution, Limits, Row, RunSummary, StageTimeSummary};
 pub use verify::{Mismatch, Verified, verify};
 pub use write::{Forms, Report, report};
 
@@ -50,6 +50,6 @@ use run::Run;
 ///
 /// # Errors
 /// [`ReportError`] when there is no log, or one cannot be read.
-pub fn summary(run_dir: &Path) -> Result<Summary, ReportError> {
-    Ok(Summary::of(&Run::read(run_dir)?))
+pub fn summary(run_dir: &Path) -> Result<RunSummary, ReportError> {
+    Ok(RunSummary::of(&Run::read(run_dir)?))
 }

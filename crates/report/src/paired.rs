@@ -6,7 +6,7 @@ use seafix_evaluation::{Bootstrap, holm, mcnemar, median, signed_rank};
 use seafix_log::Axis;
 
 use crate::{
-    Field, Summary,
+    Field, RunSummary,
     content::distinct,
     format,
     run::{Run, Trial},
@@ -22,7 +22,7 @@ pub(crate) const MARGIN: f64 = 1e-3;
 /// The same of a ratio of medians over conditions.
 pub(crate) const MARGIN_RATIO: f64 = 1.1;
 /// Of fewer independent differences the median is outside all of them with a probability of more than a tenth: 2 · 2⁻⁴.
-const LEAST_BLOCKS: usize = 5;
+const MIN_BLOCKS: usize = 5;
 /// So many in a group are all compared with each other; of more each with the first alone.
 pub(crate) const ALL_PAIRS: usize = 8;
 /// More comparisons than these nobody reads; then only groups of four or less are compared in all pairs.
@@ -66,8 +66,8 @@ impl Comparison {
     /// Whether the two are shown to be equivalent within the margin; `None` where they differ. Medians do not see that one finds
     /// more than the other: where McNemar's test does, they are not.
     pub(crate) fn equivalent(&self) -> Option<bool> {
-        let most = if self.over_conditions { MARGIN_RATIO.ln() } else { MARGIN };
-        self.margin.map(|margin| margin <= most && self.mcnemar >= ALPHA)
+        let max = if self.over_conditions { MARGIN_RATIO.ln() } else { MARGIN };
+        self.margin.map(|margin| margin <= max && self.mcnemar >= ALPHA)
     }
 
     /// The trial that errs less, if that is sure: by the test and by the interval.
@@ -134,7 +134,7 @@ pub(crate) fn names(run: &Run, members: &[usize]) -> (String, Vec<String>) {
 }
 
 /// Every comparison the run allows, as one family.
-pub(crate) fn comparisons(run: &Run, summary: &Summary) -> Vec<Comparison> {
+pub(crate) fn comparisons(run: &Run, summary: &RunSummary) -> Vec<Comparison> {
     let groups: Vec<Vec<usize>> = groups(run).into_iter().filter(|group| group.len() > 1).collect();
     let mut family = match groups.len() {
         0 => between(run),
@@ -153,20 +153,20 @@ pub(crate) fn comparisons(run: &Run, summary: &Summary) -> Vec<Comparison> {
 }
 
 /// How many members groups of these sizes may have for all pairs of them to be compared.
-fn most_in_all_pairs(sizes: impl Iterator<Item = usize>) -> usize {
+fn max_in_all_pairs(sizes: impl Iterator<Item = usize>) -> usize {
     let pairs: usize = sizes.map(|n| if n <= ALL_PAIRS { n * n.saturating_sub(1) / 2 } else { n - 1 }).sum();
     if pairs <= READABLE { ALL_PAIRS } else { 4 }
 }
 
-/// Pairs of places: all of up to `most`, each with the first of more.
-fn pairs(n: usize, most: usize) -> Vec<(usize, usize)> {
-    let all = n <= most;
+/// Pairs of places: all of up to `max`, each with the first of more.
+fn pairs(n: usize, max: usize) -> Vec<(usize, usize)> {
+    let all = n <= max;
     (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).filter(|(a, _)| all || *a == 0).collect()
 }
 
 fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
     let mut found = Vec::new();
-    let most = most_in_all_pairs(groups.iter().map(Vec::len));
+    let max = max_in_all_pairs(groups.iter().map(Vec::len));
     for members in groups {
         let (condition, names) = names(run, members);
         let axes = |place: usize| &run.trials[members[place]].header.axes[1..];
@@ -175,7 +175,7 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
             run.trials[members[a]].header.axes[0] != run.trials[members[b]].header.axes[0]
                 && axes(a).iter().zip(axes(b)).all(equal)
         };
-        let mut chosen = pairs(members.len(), most);
+        let mut chosen = pairs(members.len(), max);
         if run.joined {
             // Of several runs, what differs in nothing but the run; where nothing does, all.
             let n = members.len();
@@ -205,14 +205,14 @@ fn between(run: &Run) -> Vec<Comparison> {
     };
     let first = alike(&run.trials[0]);
     // Recorded frames have no random numbers in common.
-    let drawn = !run.header().configuration.contains("name = \"dataset\"");
-    if run.joined || !drawn || first.0.is_empty() || run.trials.iter().any(|trial| alike(trial) != first) {
+    let plotted = !run.header().configuration.contains("name = \"dataset\"");
+    if run.joined || !plotted || first.0.is_empty() || run.trials.iter().any(|trial| alike(trial) != first) {
         return Vec::new();
     }
     let members: Vec<usize> = (0..run.trials.len()).collect();
     let (_, names) = names(run, &members);
     let mut found = Vec::new();
-    for (a, b) in pairs(members.len(), most_in_all_pairs([members.len()].into_iter())) {
+    for (a, b) in pairs(members.len(), max_in_all_pairs([members.len()].into_iter())) {
         let errors = errors(&run.trials[a], &run.trials[b]);
         if !errors.is_empty() {
             let names = [names[a].clone(), names[b].clone()];
@@ -261,12 +261,12 @@ fn matched<K: Ord>(first: Vec<(u64, K, f64)>, second: Vec<(u64, K, f64)>) -> Vec
 }
 
 /// One value a condition: the median of m2 over all attempts.
-fn over_conditions(run: &Run, summary: &Summary, groups: &[Vec<usize>]) -> Vec<Comparison> {
+fn over_conditions(run: &Run, summary: &RunSummary, groups: &[Vec<usize>]) -> Vec<Comparison> {
     let named: Vec<(Vec<usize>, Vec<String>)> =
         groups.iter().map(|group| (group.clone(), names(run, group).1)).collect();
     let methods = distinct(named.iter().flat_map(|(_, names)| names.clone()));
     let mut found = Vec::new();
-    for (a, b) in pairs(methods.len(), most_in_all_pairs([methods.len()].into_iter())) {
+    for (a, b) in pairs(methods.len(), max_in_all_pairs([methods.len()].into_iter())) {
         let mut logs = Vec::new();
         for (group, names) in &named {
             let of = |method: &str| names.iter().position(|name| name == method).map(|place| group[place]);
@@ -341,7 +341,7 @@ impl Statistics {
     pub(crate) fn margin(errors: &[(f64, f64)], conditions: bool) -> f64 {
         let differences = differences(errors);
         let bootstrap = bootstrap(differences.len(), conditions);
-        if differences.len() < LEAST_BLOCKS * bootstrap.block {
+        if differences.len() < MIN_BLOCKS * bootstrap.block {
             return f64::INFINITY;
         }
         let (low, high) = bootstrap.median(&differences, 0.90);
@@ -352,8 +352,8 @@ impl Statistics {
 
 /// First less second, in their order. Where both fail neither errs less.
 fn differences(errors: &[(f64, f64)]) -> Vec<f64> {
-    let told = errors.iter().filter(|(a, b)| a.is_finite() || b.is_finite());
-    let differences: Vec<f64> = told.map(|(a, b)| a - b).collect();
+    let finite = errors.iter().filter(|(a, b)| a.is_finite() || b.is_finite());
+    let differences: Vec<f64> = finite.map(|(a, b)| a - b).collect();
     if differences.is_empty() { vec![0.0] } else { differences }
 }
 
@@ -397,9 +397,9 @@ mod tests {
 
     #[test]
     fn all_pairs_of_few_and_the_first_with_each_of_many() {
-        assert_eq!(pairs(6, most_in_all_pairs([6].into_iter())).len(), 15);
-        assert_eq!(pairs(9, most_in_all_pairs([9].into_iter())).len(), 8);
-        let many = most_in_all_pairs([6; 7].into_iter());
+        assert_eq!(pairs(6, max_in_all_pairs([6].into_iter())).len(), 15);
+        assert_eq!(pairs(9, max_in_all_pairs([9].into_iter())).len(), 8);
+        let many = max_in_all_pairs([6; 7].into_iter());
         assert_eq!((many, pairs(6, many).len(), pairs(4, many).len()), (4, 5, 6));
     }
 
@@ -407,7 +407,7 @@ mod tests {
     ///
     /// Seen to fail where two failures differ by zero.
     #[test]
-    fn two_failures_say_nothing() {
+    fn two_failures_state_nothing() {
         let none = f64::INFINITY;
         let errors: Vec<(f64, f64)> = (0..30).map(|i| (none, if i < 12 { 0.01 } else { none })).collect();
         let found = Statistics::of(&errors, false);

@@ -14,11 +14,12 @@ use seafix_log::{
 };
 
 use crate::{
-    Field, ReportError, disparity, lever,
-    looked::{self, Looked},
+    Field, ReportError, disparity,
+    fix_intervals::{self, Step},
+    lever,
+    navigation_quantity::{Counted, NavigationQuantity},
     place,
-    sailed::{Counted, Sailed},
-    teeth::{self, Step},
+    points_of_interest::{self, PoiQuantity},
 };
 
 /// All trials of a run, in the order of their names.
@@ -54,7 +55,7 @@ pub(crate) struct Trial {
     pub(crate) shared: SharedStages,
     /// SHA-256 of all results but the times.
     pub(crate) digest: Vec<u8>,
-    rows: Vec<Attempt>,
+    rows: Vec<AttemptRow>,
     inspected: Vec<Inspected>,
     words: Vec<String>,
 }
@@ -66,11 +67,11 @@ pub(crate) struct Frame {
     pub(crate) stamp_ns: u64,
     /// Where the left camera really was in the world (m).
     pub(crate) truth: Option<[f64; 3]>,
-    /// Times of the stages that serve all targets, in the order of [`crate::StageTimes`] (ms); NaN where none.
+    /// Times of the stages that serve all targets, in the order of [`crate::StageTimeSummary`] (ms); NaN where none.
     pub(crate) times: [f64; 7],
     rows: (u32, u32),
     /// What the navigator knew, where the trial navigates.
-    pub(crate) sailed: Option<Box<Underway>>,
+    pub(crate) navigated: Option<Box<NavigatedFrame>>,
     inspected: (u32, u32),
 }
 
@@ -78,12 +79,12 @@ pub(crate) struct Frame {
 #[derive(Debug)]
 pub(crate) struct Inspected {
     name: u32,
-    values: [f64; Looked::ALL.len()],
+    values: [f64; PoiQuantity::ALL.len()],
 }
 
 /// What a navigator knew after a frame.
 #[derive(Debug)]
-pub(crate) struct Underway {
+pub(crate) struct NavigatedFrame {
     /// Where the navigated pose and the survey put the left camera in the world, and where the first fix carried by odometry
     /// alone does (m); NaN where unknown.
     pub(crate) places: [[f64; 3]; 2],
@@ -92,12 +93,12 @@ pub(crate) struct Underway {
     /// What it says of the growth of the error; `None` without a pose or truth.
     pub(crate) step: Option<Step>,
     counted: [bool; Counted::ALL.len()],
-    values: [f64; Sailed::ALL.len()],
+    values: [f64; NavigationQuantity::ALL.len()],
 }
 
 /// One attempt at one target.
 #[derive(Debug)]
-pub(crate) struct Attempt {
+pub(crate) struct AttemptRow {
     pub(crate) outcome: Outcome,
     pub(crate) wrong: Option<bool>,
     pub(crate) points: u32,
@@ -197,7 +198,7 @@ impl Trial {
                 self.named = [target.search.clone(), target.solver.clone()];
             }
             let [object, reason] = [&target.object, &target.reason].map(|word| self.word(word, places));
-            self.rows.push(Attempt {
+            self.rows.push(AttemptRow {
                 outcome: target.outcome,
                 wrong: target.evaluation.wrong,
                 points: target.pairs.len() as u32,
@@ -208,15 +209,15 @@ impl Trial {
                 values: values(target),
             });
         }
-        let looked = self.inspected.len() as u32;
+        let poi_quantity = self.inspected.len() as u32;
         for point in &frame.inspected {
-            let name = self.word(&looked::name(point), places);
-            let values = Looked::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN));
+            let name = self.word(&points_of_interest::name(point), places);
+            let values = PoiQuantity::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN));
             self.inspected.push(Inspected { name, values });
         }
         let step = frame.navigation.as_deref().and_then(|record| {
             let object = self.word(&record.pose.as_ref()?.object, places);
-            teeth::step(frame.stamp_ns, frame.truth.as_ref(), record, object)
+            fix_intervals::step(frame.stamp_ns, frame.truth.as_ref(), record, object)
         });
         let times = &frame.times;
         self.shared.front_end |= times.shared.front_end;
@@ -237,17 +238,17 @@ impl Trial {
             ]
             .map(|time| time.unwrap_or(f64::NAN)),
             rows: (first, self.rows.len() as u32),
-            sailed: frame.navigation.as_deref().map(|record| {
-                Box::new(Underway {
+            navigated: frame.navigation.as_deref().map(|record| {
+                Box::new(NavigatedFrame {
                     places: [&record.pose, &record.unreferenced]
                         .map(|pose| place::carried(&self.header, pose.as_ref())),
                     displaced: record.events.iter().filter(|event| event.contains(ELSEWHERE)).cloned().collect(),
                     step,
                     counted: Counted::ALL.map(|counted| counted.holds(record)),
-                    values: std::array::from_fn(|index| Sailed::ALL[index].of(record).unwrap_or(f64::NAN)),
+                    values: std::array::from_fn(|index| NavigationQuantity::ALL[index].of(record).unwrap_or(f64::NAN)),
                 })
             }),
-            inspected: (looked, self.inspected.len() as u32),
+            inspected: (poi_quantity, self.inspected.len() as u32),
         });
     }
 
@@ -295,17 +296,17 @@ impl Trial {
     }
 
     /// The attempts of `frame`.
-    pub(crate) fn attempts_of(&self, frame: &Frame) -> impl Iterator<Item = &Attempt> {
+    pub(crate) fn attempts_of(&self, frame: &Frame) -> impl Iterator<Item = &AttemptRow> {
         self.rows[frame.rows.0 as usize..frame.rows.1 as usize].iter().filter(|row| row.object != 0)
     }
 
     /// Every attempt of every frame of the sample.
-    pub(crate) fn attempts(&self) -> impl Iterator<Item = (&Frame, &Attempt)> {
+    pub(crate) fn attempts(&self) -> impl Iterator<Item = (&Frame, &AttemptRow)> {
         self.sample().flat_map(|frame| self.attempts_of(frame).map(move |row| (frame, row)))
     }
 
     /// What an attempt's target is called.
-    pub(crate) fn object(&self, row: &Attempt) -> &str {
+    pub(crate) fn object(&self, row: &AttemptRow) -> &str {
         self.words.get(row.object as usize).map_or("", String::as_str)
     }
 
@@ -320,7 +321,7 @@ impl Trial {
     }
 
     /// Why an attempt was refused: the word for it, or its outcome.
-    pub(crate) fn reason(&self, row: &Attempt) -> &str {
+    pub(crate) fn reason(&self, row: &AttemptRow) -> &str {
         match self.words.get(row.reason as usize).map_or("", String::as_str) {
             "" => row.outcome.name(),
             word => word,
@@ -337,9 +338,9 @@ impl Trial {
     }
 }
 
-impl Underway {
+impl NavigatedFrame {
     /// The value of a quantity; `None` where nothing is known.
-    pub(crate) fn get(&self, quantity: Sailed) -> Option<f64> {
+    pub(crate) fn get(&self, quantity: NavigationQuantity) -> Option<f64> {
         Some(self.values[quantity as usize]).filter(|value| !value.is_nan())
     }
 
@@ -351,12 +352,12 @@ impl Underway {
 
 impl Inspected {
     /// The value of a quantity; `None` where nothing is known.
-    pub(crate) fn get(&self, quantity: Looked) -> Option<f64> {
+    pub(crate) fn get(&self, quantity: PoiQuantity) -> Option<f64> {
         Some(self.values[quantity as usize]).filter(|value| !value.is_nan())
     }
 }
 
-impl Attempt {
+impl AttemptRow {
     /// The value of one of its quantities; `None` where nothing is known.
     pub(crate) fn get(&self, field: Field) -> Option<f64> {
         Some(self.values[field as usize]).filter(|value| !value.is_nan())
@@ -364,18 +365,18 @@ impl Attempt {
 
     /// A fix that is not known to be wrong.
     pub(crate) fn found(&self) -> bool {
-        self.outcome == Outcome::Referenced && self.wrong != Some(true)
+        self.outcome == Outcome::Fix && self.wrong != Some(true)
     }
 
     /// A fix beyond the alert limit.
     pub(crate) fn wrong(&self) -> bool {
-        self.outcome == Outcome::Referenced && self.wrong == Some(true)
+        self.outcome == Outcome::Fix && self.wrong == Some(true)
     }
 
     /// The region of the Stanford diagram that a fix is in, where its error and its limit are known.
     pub(crate) fn region(&self) -> Option<Region> {
         let (error, limit) = (self.get(Field::Position)?, self.get(Field::Limit)?);
-        (self.outcome == Outcome::Referenced).then(|| Region::of(error, self.get(Field::Level), limit))
+        (self.outcome == Outcome::Fix).then(|| Region::of(error, self.get(Field::Level), limit))
     }
 
     /// Its error at a lever arm of this length (m); `None` where it is not known.

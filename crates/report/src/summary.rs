@@ -8,14 +8,14 @@ use seafix_log::{Axis, Outcome, Region, SharedStages, Totals};
 
 use crate::{
     Field, paired,
-    run::{Attempt, Run, Trial},
+    run::{AttemptRow, Run, Trial},
 };
 
 /// The results of a run.
 ///
 /// `{}` prints them as a table for a terminal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Summary {
+pub struct RunSummary {
     /// The run's name.
     pub run: String,
     /// The question it asks.
@@ -56,23 +56,23 @@ pub struct Row {
     /// Why attempts were refused, and how often.
     pub reasons: BTreeMap<String, usize>,
     /// m1 of the fixes found: RMS of C·H − P over the identified points (m).
-    pub m1: Option<Spread>,
+    pub m1: Option<Distribution>,
     /// m1 over the identified points that the solver did not use (m).
-    pub m1_unused: Option<Spread>,
+    pub m1_unused: Option<Distribution>,
     /// m2 of the fixes found: RMS error of the transferred model points (m).
-    pub m2: Option<Spread>,
+    pub m2: Option<Distribution>,
     /// Median of m2 over all attempts, refused and wrong ones as infinitely far off (m).
     pub m2_of_all: Option<f64>,
     /// m3 of the fixes found, position of the left camera (m).
-    pub m3_position: Option<Spread>,
+    pub m3_position: Option<Distribution>,
     /// m3 of the fixes found, attitude (rad).
-    pub m3_attitude: Option<Spread>,
+    pub m3_attitude: Option<Distribution>,
     /// Mean of the normalised error squared of the fixes found; 6 for an honest covariance.
     pub nees_mean: Option<f64>,
     /// How many fixes that mean is over.
     pub nees_count: usize,
     /// Identified points of the fixes found.
-    pub identified: Option<Spread>,
+    pub identified: Option<Distribution>,
     /// How many fixes are in each region of the Stanford diagram, in the order of [`Region::ALL`]; `None` where the log does
     /// not say of all frames, or truth is unknown.
     pub regions: Option<[usize; Region::ALL.len()]>,
@@ -81,7 +81,7 @@ pub struct Row {
     /// Measured standard deviation of the disparity of correctly identified points (px).
     pub disparity_sigma: Option<f64>,
     /// Median times of the stages.
-    pub times: StageTimes,
+    pub times: StageTimeSummary,
     /// The stages that other trials share: their times are those of one computation for all.
     pub shared: SharedStages,
     /// The 95 % quantile of the time from the images to the answer (ms).
@@ -122,7 +122,7 @@ impl Limits {
 
 /// How a quantity spreads.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spread {
+pub struct Distribution {
     /// How many values there are.
     pub count: usize,
     /// The 5 % quantile.
@@ -133,7 +133,7 @@ pub struct Spread {
     pub p95: f64,
 }
 
-impl Spread {
+impl Distribution {
     /// The spread of `values`; `None` without any.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.into_iter().collect();
@@ -148,7 +148,7 @@ impl Spread {
 
 /// Median times (ms): of the first seven a frame, of the others an attempt; `None` where a stage did not run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct StageTimes {
+pub struct StageTimeSummary {
     /// Detection, both images.
     pub detect_ms: Option<f64>,
     /// Location of the exact corners, both images.
@@ -173,7 +173,7 @@ pub struct StageTimes {
     pub total_ms: Option<f64>,
 }
 
-impl StageTimes {
+impl StageTimeSummary {
     /// The stages and their times, in the order of the method.
     pub fn stages(&self) -> [(&'static str, Option<f64>); 11] {
         [
@@ -192,7 +192,7 @@ impl StageTimes {
     }
 }
 
-impl Summary {
+impl RunSummary {
     /// The results of `run`.
     pub(crate) fn of(run: &Run) -> Self {
         let header = run.header();
@@ -264,13 +264,14 @@ impl Row {
                 .map(|(squares, n)| (squares / n as f64).sqrt()),
             times: times(trial),
             shared: trial.shared,
-            total_p95: Spread::of(trial.attempts().filter_map(|(_, row)| row.get(Field::TotalTime))).map(|s| s.p95),
+            total_p95: Distribution::of(trial.attempts().filter_map(|(_, row)| row.get(Field::TotalTime)))
+                .map(|s| s.p95),
         };
         for frame in trial.sample() {
             row.referenced_frames += usize::from(trial.attempts_of(frame).any(|row| row.found() || row.wrong()));
-            row.wrong_frames += usize::from(trial.attempts_of(frame).any(Attempt::wrong));
+            row.wrong_frames += usize::from(trial.attempts_of(frame).any(AttemptRow::wrong));
         }
-        let mut found: Vec<&Attempt> = Vec::new();
+        let mut found: Vec<&AttemptRow> = Vec::new();
         for (_, attempt) in trial.attempts() {
             row.attempted += 1;
             if attempt.found() {
@@ -285,7 +286,7 @@ impl Row {
             }
         }
         let values = |field: Field| found.iter().filter_map(move |fix| fix.get(field));
-        let spread = |field: Field| Spread::of(values(field));
+        let spread = |field: Field| Distribution::of(values(field));
         row.m1 = spread(Field::M1);
         row.m1_unused = spread(Field::M1Unused);
         row.m2 = spread(Field::M2);
@@ -309,12 +310,12 @@ impl Row {
 
     /// Takes the counts of all frames in place of those of the sample.
     fn count(&mut self, totals: &Totals) {
-        let whole = |count: u64| count as usize;
-        (self.frames, self.attempted) = (whole(totals.frames), whole(totals.attempted));
-        (self.referenced_frames, self.wrong_frames) = (whole(totals.referenced_frames), whole(totals.wrong_frames));
-        (self.found, self.wrong, self.unjudged) = (whole(totals.found), whole(totals.wrong), whole(totals.unjudged));
-        self.refused = whole(totals.refused());
-        self.reasons = totals.reasons.iter().map(|(reason, &count)| (reason.clone(), whole(count))).collect();
+        let full = |count: u64| count as usize;
+        (self.frames, self.attempted) = (full(totals.frames), full(totals.attempted));
+        (self.referenced_frames, self.wrong_frames) = (full(totals.referenced_frames), full(totals.wrong_frames));
+        (self.found, self.wrong, self.unjudged) = (full(totals.found), full(totals.wrong), full(totals.unjudged));
+        self.refused = full(totals.refused());
+        self.reasons = totals.reasons.iter().map(|(reason, &count)| (reason.clone(), full(count))).collect();
     }
 
     /// Search and solver, as tables name the method.
@@ -334,7 +335,7 @@ fn regions(trial: &Trial) -> Option<[usize; Region::ALL.len()]> {
         return Some(counts.map(|count| count as usize));
     }
     let mut counts = [0; Region::ALL.len()];
-    for (_, row) in trial.attempts().filter(|(_, row)| row.outcome == Outcome::Referenced) {
+    for (_, row) in trial.attempts().filter(|(_, row)| row.outcome == Outcome::Fix) {
         if let (Some(error), Some(limit)) = (row.get(Field::Position), row.get(Field::Limit)) {
             counts[Region::of(error, row.get(Field::Level), limit) as usize] += 1;
         }
@@ -342,12 +343,12 @@ fn regions(trial: &Trial) -> Option<[usize; Region::ALL.len()]> {
     (trial.every() == 1 && counts.iter().any(|count| *count > 0)).then_some(counts)
 }
 
-fn times(trial: &Trial) -> StageTimes {
-    let median = |values: Vec<f64>| Spread::of(values).map(|spread| spread.median);
+fn times(trial: &Trial) -> StageTimeSummary {
+    let median = |values: Vec<f64>| Distribution::of(values).map(|spread| spread.median);
     let frames =
         |stage: usize| median(trial.sample().map(|frame| frame.times[stage]).filter(|time| !time.is_nan()).collect());
     let attempts = |field: Field| median(trial.attempts().filter_map(|(_, row)| row.get(field)).collect());
-    StageTimes {
+    StageTimeSummary {
         detect_ms: frames(0),
         locate_ms: frames(1),
         describe_ms: frames(2),

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use crate::{PAPER_M1, Row, Spread, Summary, format};
+use crate::{Distribution, PAPER_M1, Row, RunSummary, format};
 
-impl fmt::Display for Summary {
+impl fmt::Display for RunSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let conditions: Vec<String> = self
             .rows
@@ -18,7 +18,7 @@ impl fmt::Display for Summary {
         let heads: Vec<String> = heads.collect();
         let wide = Table { rows: [vec![heads.clone()], names.clone()].concat(), leading: heads.len() }.width();
         let (heads, names) = match f.width() {
-            Some(most) if 2 * wide > most => {
+            Some(max) if 2 * wide > max => {
                 for (index, row) in self.rows.iter().enumerate() {
                     let parts = row.conditions().filter(|axis| axis.value != "–").map(format::condition);
                     let line = [format!("{:>2}  {}", index + 1, row.method())].into_iter().chain(parts);
@@ -39,7 +39,7 @@ impl fmt::Display for Summary {
                 .into_iter()
                 .chain(timed.then_some("ms")),
         );
-        let column = |value: fn(&Row) -> Option<Spread>, scale: f64| {
+        let column = |value: fn(&Row) -> Option<Distribution>, scale: f64| {
             let medians: Vec<Option<f64>> =
                 self.rows.iter().map(|row| value(row).map(|spread| spread.median * scale)).collect();
             let decimals = format::decimals(medians.iter().flatten().copied());
@@ -71,8 +71,8 @@ impl fmt::Display for Summary {
                 .chain(blank(3 + usize::from(timed))),
         );
         results.write(f)?;
-        let most = f.width();
-        let said = |text: &str| wrapped(text, most, 0);
+        let max = f.width();
+        let said = |text: &str| wrapped(text, max, 0);
         let note = said(
             "frames fixed of all, targets attempted (n); m1 residual C·H − P, m2 transferred model points, m3 camera position and attitude; medians of the fixes found.",
         );
@@ -106,7 +106,7 @@ impl fmt::Display for Summary {
     }
 }
 
-impl Summary {
+impl RunSummary {
     /// Errors beside their bound.
     fn limits(&self, heads: &[&str], names: &[Vec<String>]) -> Table {
         let leading = heads;
@@ -136,23 +136,23 @@ fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-/// Breaks a line at blanks so that it takes no more than `most` columns, the later lines moved in by `indent`; a longer word is
+/// Breaks a line at blanks so that it takes no more than `max` columns, the later lines moved in by `indent`; a longer word is
 /// cut.
-pub(crate) fn wrapped(text: &str, most: Option<usize>, indent: usize) -> String {
-    let Some(most) = most.map(|most| most.max(indent + 8)) else { return text.to_owned() };
+pub(crate) fn wrapped(text: &str, max: Option<usize>, indent: usize) -> String {
+    let Some(max) = max.map(|max| max.max(indent + 8)) else { return text.to_owned() };
     let mut lines = vec![String::new()];
     let mut taken = 0;
     for (place, word) in text.split(' ').enumerate() {
         let mut rest: Vec<char> = word.chars().collect();
-        if place > 0 && taken + 1 + rest.len() > most {
+        if place > 0 && taken + 1 + rest.len() > max {
             lines.push(" ".repeat(indent));
             taken = indent;
         } else if place > 0 {
             lines.last_mut().expect("there is a line").push(' ');
             taken += 1;
         }
-        while taken + rest.len() > most {
-            let cut = rest.drain(..most - taken).collect::<String>();
+        while taken + rest.len() > max {
+            let cut = rest.drain(..max - taken).collect::<String>();
             lines.last_mut().expect("there is a line").push_str(&cut);
             lines.push(" ".repeat(indent));
             taken = indent;
@@ -201,7 +201,7 @@ impl Table {
         for (column, width) in widths.iter().enumerate().skip(self.leading) {
             let wide = width + 2;
             match parts.last_mut() {
-                Some((part, taken)) if f.width().is_none_or(|most| *taken + wide - 2 <= most) => {
+                Some((part, taken)) if f.width().is_none_or(|max| *taken + wide - 2 <= max) => {
                     part.push(column);
                     *taken += wide;
                 }
@@ -246,9 +246,9 @@ mod tests {
         table.row(["some name", "1", "22222222", "3", "4"].map(str::to_owned));
         let table = Shown(table);
         assert_eq!(format!("{table}").lines().count(), 3);
-        for most in 20..60 {
-            let text = format!("{table:most$}");
-            assert!(text.lines().all(|line| line.chars().count() <= most), "{most}: {text}");
+        for max in 20..60 {
+            let text = format!("{table:max$}");
+            assert!(text.lines().all(|line| line.chars().count() <= max), "{max}: {text}");
             assert!(["22222222", "four"].iter().all(|cell| text.matches(cell).count() == 1), "{text}");
         }
     }

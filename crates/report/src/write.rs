@@ -8,7 +8,7 @@ use std::{
 use rayon::prelude::*;
 
 use crate::{
-    ReportError, Summary, content,
+    ReportError, RunSummary, content,
     document::{Document, Figure, Table},
     index, print,
     run::Run,
@@ -54,7 +54,7 @@ pub struct Report {
     /// Its page, or the first other form.
     pub page: PathBuf,
     /// The results in it, as a table for the terminal.
-    pub summary: Summary,
+    pub summary: RunSummary,
     /// Its section of the page that [`index`](crate::index) writes.
     pub findings: String,
 }
@@ -79,7 +79,7 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
     if let Some(other) = foreign(folder) {
         return Err(ReportError::Foreign { folder: folder.to_owned(), other });
     }
-    let summary = Summary::of(&run);
+    let summary = RunSummary::of(&run);
     let files = files(&run, &summary, forms)?;
     for path in strays(folder, &files) {
         fs::remove_file(&path).map_err(|source| ReportError::Io { doing: "write", path, source })?;
@@ -94,16 +94,16 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
 }
 
 /// Everything that a report consists of.
-pub(crate) fn files(run: &Run, summary: &Summary, forms: Forms) -> Result<Vec<File>, ReportError> {
+pub(crate) fn files(run: &Run, summary: &RunSummary, forms: Forms) -> Result<Vec<File>, ReportError> {
     let document = content::document(run, summary, forms.small)?;
     let html = || forms.html.then(|| print::html(&document, forms).into_bytes());
     let latex = || forms.latex.then(|| print::latex(&document).into_bytes());
     let pdf = || forms.pdf.then(|| print::pdf(&document));
-    let drawn = || if forms.small { Vec::new() } else { figures(&document) };
-    let ((html, latex), (pdf, drawn)) = rayon::join(|| rayon::join(html, latex), || rayon::join(pdf, drawn));
+    let plotted = || if forms.small { Vec::new() } else { figures(&document) };
+    let ((html, latex), (pdf, plotted)) = rayon::join(|| rayon::join(html, latex), || rayon::join(pdf, plotted));
     let papers = PAPERS.into_iter().zip([html, latex, pdf]);
     let mut files: Vec<File> =
-        papers.filter_map(|(name, bytes)| Some((name.to_owned(), bytes?))).chain(drawn).collect();
+        papers.filter_map(|(name, bytes)| Some((name.to_owned(), bytes?))).chain(plotted).collect();
     let mut add = |name: String, bytes: Vec<u8>| files.push((name, bytes));
     if forms.small {
         kept(&document, &mut add);

@@ -6,7 +6,7 @@ use seafix_geometry::StereoRig;
 use seafix_io::{ImageLimits, Rig, read_image};
 use seafix_vision::Image;
 
-use crate::{Error, Eyes};
+use crate::{Error, FrameData};
 
 /// The left and the right image of one instant.
 #[derive(Debug, Clone)]
@@ -28,9 +28,9 @@ impl StereoImages {
         Ok(Self { left, right: read(right.as_ref(), rig.stereo.right().size())? })
     }
 
-    /// The same pair, to be given to a [`NavigationSession`](crate::Voyage).
-    pub fn into_frame_data(self) -> Eyes {
-        Eyes::Pair(self.left, self.right)
+    /// The same pair, to be given to a [`NavigationSession`](crate::NavigationSession).
+    pub fn into_frame_data(self) -> FrameData {
+        FrameData::Stereo(self.left, self.right)
     }
 }
 

@@ -4,15 +4,15 @@ use std::{collections::BTreeMap, time::Instant};
 
 use seafix_geometry::StereoRig;
 use seafix_referencing::{
-    Candidates, Correspondence, Gathered, Glimpse, JointFixes, Member, Observations, Outcome, Target, TargetKind,
-    gather, joint_fixes,
+    Candidates, Correspondence, Gathered, JointFixes, Member, ObjectObservations, Observations, Outcome, Target,
+    TargetKind, gather, joint_fixes,
 };
 
-use crate::{Attempt, Sighting, Stages, times::milliseconds};
+use crate::{FrameResult, PipelineStages, TargetAttempt, times::milliseconds};
 
-impl Stages {
+impl PipelineStages {
     /// How many frames before its own a frame's answer looks back on.
-    pub fn looks_back(&self) -> usize {
+    pub fn window_length(&self) -> usize {
         match self.settings().target {
             TargetKind::Joint => self.settings().window - 1,
             _ => 0,
@@ -21,24 +21,33 @@ impl Stages {
 
     /// What a joint fix takes from a sighting: the identified points of every object that was fixed by itself, and those
     /// of the other objects that stand where these put them.
-    pub fn glimpse(&self, sighting: &mut Sighting, targets: &[Target], rig: &StereoRig) -> Glimpse {
-        let mut glimpse = Glimpse::default();
+    pub fn object_observations(
+        &self,
+        frame_result: &mut FrameResult,
+        targets: &[Target],
+        rig: &StereoRig,
+    ) -> ObjectObservations {
+        let mut object_observations = ObjectObservations::default();
         if self.settings().target != TargetKind::Joint {
-            return glimpse;
+            return object_observations;
         }
-        let fixed: Vec<(usize, Vec<Correspondence>)> =
-            sighting.attempts.iter().filter_map(|attempt| Some((attempt.target, pairs(attempt)?.to_vec()))).collect();
+        let fixed: Vec<(usize, Vec<Correspondence>)> = frame_result
+            .attempts
+            .iter()
+            .filter_map(|attempt| Some((attempt.target, pairs(attempt)?.to_vec())))
+            .collect();
         if fixed.is_empty() {
-            return glimpse;
+            return object_observations;
         }
         let mut listed: Vec<Option<&Candidates>> = vec![None; targets.len()];
-        sighting.attempts.iter().for_each(|attempt| listed[attempt.target] = Some(&attempt.candidates));
-        let others = gather(rig, targets, &sighting.cloud, &listed, &fixed, &self.settings().acceptance);
+        frame_result.attempts.iter().for_each(|attempt| listed[attempt.target] = Some(&attempt.candidates));
+        let others = gather(rig, targets, &frame_result.cloud, &listed, &fixed, &self.settings().acceptance);
         for (object, pairs) in fixed.iter().chain(&others.added) {
-            glimpse.see(*object, &Observations::of(pairs, &targets[*object].points, &sighting.cloud, Some(rig)));
+            object_observations
+                .see(*object, &Observations::of(pairs, &targets[*object].points, &frame_result.cloud, Some(rig)));
         }
-        sighting.gathered = others;
-        glimpse
+        frame_result.gathered = others;
+        object_observations
     }
 
     /// Replaces the pose of every object fixed by itself by that of one fix over all of them, over what was gathered of
@@ -46,9 +55,9 @@ impl Stages {
     /// determine no joint fix, each keeps its own and is told why.
     pub fn join(
         &self,
-        sighting: &mut Sighting,
-        before: &[&Glimpse],
-        own: &Glimpse,
+        frame_result: &mut FrameResult,
+        before: &[&ObjectObservations],
+        own: &ObjectObservations,
         targets: &[Target],
         rig: &StereoRig,
     ) {
@@ -57,29 +66,30 @@ impl Stages {
         }
         let start = Instant::now();
         // What shares no object with this frame says nothing about it.
-        let related = |glimpse: &&&Glimpse| {
-            glimpse.points.iter().any(|(object, _)| own.points.iter().any(|(same, _)| same == object))
+        let related = |object_observations: &&&ObjectObservations| {
+            object_observations.points.iter().any(|(object, _)| own.points.iter().any(|(same, _)| same == object))
         };
-        let all: Vec<Glimpse> = before.iter().filter(related).copied().chain([own]).cloned().collect();
+        let all: Vec<ObjectObservations> = before.iter().filter(related).copied().chain([own]).cloned().collect();
         let members: Vec<Member> = targets.iter().map(Target::member).collect();
         let confidence = self.settings().acceptance.confidence;
         let parts = match joint_fixes(rig, &members, &all, confidence) {
             Ok(fixes) => {
-                replace(sighting, &fixes, targets, rig);
-                tell(&sighting.gathered, own, all.len(), &fixes, targets)
+                replace(frame_result, &fixes, targets, rig);
+                describe(&frame_result.gathered, own, all.len(), &fixes, targets)
             }
-            Err(why) => {
-                Told { all: format!("no joint fix, the pose is that of the object alone: {why}"), ..Told::default() }
-            }
+            Err(why) => JointReport {
+                all: format!("no joint fix, the pose is that of the object alone: {why}"),
+                ..JointReport::default()
+            },
         };
-        for attempt in &mut sighting.attempts {
+        for attempt in &mut frame_result.attempts {
             attempt.joint = match attempt.answer.outcome {
-                Outcome::Referenced(_) => Some(parts.all.clone()),
+                Outcome::Fix(_) => Some(parts.all.clone()),
                 _ => parts.own.get(&attempt.target).cloned(),
             };
         }
         let spent = milliseconds(start);
-        for attempt in &mut sighting.attempts {
+        for attempt in &mut frame_result.attempts {
             for time in [&mut attempt.times.solve_ms, &mut attempt.times.total_ms].into_iter().flatten() {
                 *time += spent;
             }
@@ -88,44 +98,50 @@ impl Stages {
 }
 
 /// The pairs of an attempt that was believed.
-fn pairs(attempt: &Attempt) -> Option<&[Correspondence]> {
+fn pairs(attempt: &TargetAttempt) -> Option<&[Correspondence]> {
     match &attempt.answer.outcome {
-        Outcome::Referenced(fix) => Some(&fix.pairs),
+        Outcome::Fix(fix) => Some(&fix.pairs),
         _ => None,
     }
 }
 
 /// What is said of a joint fix.
 #[derive(Default)]
-struct Told {
+struct JointReport {
     /// Of all that took part or might have.
     all: String,
     /// Of each object that was not fixed by itself.
     own: BTreeMap<usize, String>,
 }
 
-fn tell(others: &Gathered, own: &Glimpse, instants: usize, fixes: &JointFixes, targets: &[Target]) -> Told {
+fn describe(
+    others: &Gathered,
+    own: &ObjectObservations,
+    instants: usize,
+    fixes: &JointFixes,
+    targets: &[Target],
+) -> JointReport {
     let points = |n: usize| if n == 1 { "1 point".to_owned() } else { format!("{n} points") };
-    let (mut part, mut out, mut told) = (Vec::new(), Vec::new(), BTreeMap::new());
+    let (mut part, mut out, mut reported) = (Vec::new(), Vec::new(), BTreeMap::new());
     for (object, target) in targets.iter().enumerate().filter(|(object, _)| own.count(*object) > 0) {
         let (name, seen) = (&target.name, points(own.count(object)));
         let gathered = others.added.iter().any(|(added, _)| *added == object);
         if fixes.left_out.contains(&object) {
             let why = format!("{seen} contradict the rest");
             out.push(format!("`{name}` ({why})"));
-            told.insert(object, format!("no part in the joint fix: {why}"));
+            reported.insert(object, format!("no part in the joint fix: {why}"));
             continue;
         }
         let moved = if fixes.displaced.contains(&object) { ", not where it was surveyed" } else { "" };
         let how = if gathered { ", not fixed by itself" } else { "" };
         part.push(format!("`{name}` ({seen}{how}{moved})"));
         if gathered {
-            told.insert(object, format!("{seen} took part in the joint fix"));
+            reported.insert(object, format!("{seen} took part in the joint fix"));
         }
     }
     for (object, why) in &others.left_out {
         out.push(format!("`{}` ({why})", targets[*object].name));
-        told.insert(*object, format!("no part in the joint fix: {why}"));
+        reported.insert(*object, format!("no part in the joint fix: {why}"));
     }
     let mut all = format!("joint fix over {}", part.join(", "));
     if instants > 1 {
@@ -137,12 +153,12 @@ fn tell(others: &Gathered, own: &Glimpse, instants: usize, fixes: &JointFixes, t
     if !out.is_empty() {
         all += &format!("; left out: {}", out.join(", "));
     }
-    Told { all, own: told }
+    JointReport { all, own: reported }
 }
 
-fn replace(sighting: &mut Sighting, fixes: &JointFixes, targets: &[Target], rig: &StereoRig) {
-    for attempt in &mut sighting.attempts {
-        let Outcome::Referenced(fix) = &mut attempt.answer.outcome else { continue };
+fn replace(frame_result: &mut FrameResult, fixes: &JointFixes, targets: &[Target], rig: &StereoRig) {
+    for attempt in &mut frame_result.attempts {
+        let Outcome::Fix(fix) = &mut attempt.answer.outcome else { continue };
         let Some((pose, covariance)) = fixes.object_from_camera[attempt.target] else { continue };
         // What protects the object's own fix protects this one, and the way between them.
         let moved = (pose.translation() - fix.object_from_camera.translation()).norm();
@@ -154,7 +170,7 @@ fn replace(sighting: &mut Sighting, fixes: &JointFixes, targets: &[Target], rig:
         (fix.object_from_camera, fix.covariance) = (pose, covariance);
         fix.used = (0..fix.pairs.len()).collect();
         let points = &targets[attempt.target].points;
-        let data = Observations::of(&fix.pairs, points, &sighting.cloud, Some(rig));
+        let data = Observations::of(&fix.pairs, points, &frame_result.cloud, Some(rig));
         (fix.residuals, fix.residual_rms) = (data.residuals(&pose), data.residual_rms(&pose));
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A [`Localizer`] takes *fixes*: it makes a cloud of 3D points from a stereo pair, finds among them the feature points of
 //! an object of a [`Site`] by structural coherence, and solves the rigid transform `object_from_camera`
-//! (Bobkov, Kudryashov and Inzartsev, *J. Mar. Sci. Eng.* 2021, 9, 1038). A [navigation session](Voyage) carries the last
+//! (Bobkov, Kudryashov and Inzartsev, *J. Mar. Sci. Eng.* 2021, 9, 1038). A [navigation session](NavigationSession) carries the last
 //! fix along by odometry and takes the next one when it is due.
 //!
 //! ```
@@ -37,9 +37,9 @@
 
 mod error;
 mod event;
-mod explore;
 mod images;
 mod joint;
+mod keyframe_mapper;
 mod localizer;
 mod navigation;
 mod odometry_session;
@@ -58,15 +58,15 @@ pub use seafix_vision as vision;
 
 pub use error::Error;
 pub use event::NavigationEvent;
-pub use explore::{Explorer, Keyframes};
 pub use images::StereoImages;
+pub use keyframe_mapper::{KeyframeMapper, Keyframes};
 pub use localizer::{Localizer, PosePrior, TargetOutcome};
-pub use navigation::{Helm, Navigation};
-pub use odometry_session::{OdometryResult, OdometrySession, stereo_pair};
-pub use pipeline::{Pipeline, PipelineError, build, faults, misfit, resolve};
+pub use navigation::{Navigation, NavigationStack};
+pub use odometry_session::{OdometryResult, TrialOdometry, stereo_pair};
+pub use pipeline::{Pipeline, PipelineError, build, faults, invalid_setting, resolve};
 pub use seafix_io::Rig;
 pub use seafix_referencing::{Outcome, Site};
-pub use sensor_frame::{Eyes, Sight, Told, WorldPrior};
-pub use session::{Motion, MotionFilter, THE_WAY_IS_UNKNOWN, Underway, Voyage, places};
-pub use stages::{Attempt, Cloud, Sighting, Sought, Stages, View};
+pub use sensor_frame::{FrameData, Hints, SensorFrame, WorldPrior};
+pub use session::{Motion, MotionFilter, NavigationSession, NavigationState, UNKNOWN_MOTION, places};
+pub use stages::{Cloud, FrameResult, PipelineStages, Sought, TargetAttempt, View};
 pub use times::{FrameTimes, TargetTimes};

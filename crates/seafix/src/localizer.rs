@@ -2,13 +2,13 @@
 
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Transform, World};
 use seafix_io::Rig;
-use seafix_navigation::Network;
+use seafix_navigation::PoseGraph;
 use seafix_referencing::{Outcome, Search, Site, Solver, Target, TargetKind};
 use seafix_vision::{Descriptor, Detector, Matcher};
 
 use crate::{
-    Error, Eyes, Helm, Pipeline, Sight, Sighting, Stages, StereoImages, Told, Voyage, WorldPrior, images::check_sizes,
-    random, stages::View,
+    Error, FrameData, FrameResult, Hints, NavigationSession, NavigationStack, Pipeline, PipelineStages, SensorFrame,
+    StereoImages, WorldPrior, images::check_sizes, random, stages::View,
 };
 
 /// A prior pose of the left camera in the world, with its covariance.
@@ -37,7 +37,7 @@ pub struct TargetOutcome {
 /// ([`Localizer::from_toml`]); a component of one's own is given as a trait object ([`Localizer::with_solver`]).
 #[derive(Debug)]
 pub struct Localizer {
-    stages: Stages,
+    stages: PipelineStages,
     targets: Vec<Target>,
     rig: Rig,
     seed: u64,
@@ -136,8 +136,8 @@ impl Localizer {
         prior: impl Into<Option<&'a PosePrior>>,
     ) -> Result<Vec<TargetOutcome>, Error> {
         check_sizes(&images.left, &images.right, &self.rig.stereo)?;
-        let eyes = Eyes::Pair(images.left.clone(), images.right.clone());
-        Ok(self.outcomes(self.process(&frame(eyes, prior.into()))))
+        let frame_data = FrameData::Stereo(images.left.clone(), images.right.clone());
+        Ok(self.outcomes(self.process(&frame(frame_data, prior.into()))))
     }
 
     /// Fixes from a cloud of measured points (camera frame, m): an outcome for each target that the prior puts in view.
@@ -148,19 +148,19 @@ impl Localizer {
         points: &[MeasuredPoint],
         prior: impl Into<Option<&'a PosePrior>>,
     ) -> Vec<TargetOutcome> {
-        self.outcomes(self.process(&frame(Eyes::Points(points.to_vec()), prior.into())))
+        self.outcomes(self.process(&frame(FrameData::Points(points.to_vec()), prior.into())))
     }
 
     /// Everything that the pipeline computed from one frame: key points, cloud, candidates and answers.
-    pub fn process(&self, frame: &Sight) -> Sighting {
+    pub fn process(&self, frame: &SensorFrame) -> FrameResult {
         let rig = &self.rig.stereo;
-        let cloud = self.stages.cloud(&frame.eyes, rig);
-        let view = View { sight: frame, cloud: &cloud, targets: &self.targets, rig };
-        let priors = frame.rough(&self.targets);
+        let cloud = self.stages.cloud(&frame.frame_data, rig);
+        let view = View { sensor_frame: frame, cloud: &cloud, targets: &self.targets, rig };
+        let priors = frame.prior_pose(&self.targets);
         let mut rng = random::of_frame(self.seed, frame.stamp_ns);
-        let mut result = self.stages.reference_from(view, &priors, None, &mut rng);
+        let mut result = self.stages.fix_from(view, &priors, None, &mut rng);
         if self.stages.settings().target == TargetKind::Joint {
-            let own = self.stages.glimpse(&mut result, &self.targets, rig);
+            let own = self.stages.object_observations(&mut result, &self.targets, rig);
             self.stages.join(&mut result, &[], &own, &self.targets, rig);
         }
         result
@@ -170,16 +170,27 @@ impl Localizer {
     ///
     /// # Errors
     /// [`Error::NoWorld`]: navigation needs the place of every object in the world.
-    pub fn navigate<'a>(&'a self, helm: &'a Helm, map: Option<&Network>) -> Result<Voyage<'a>, Error> {
+    pub fn navigate<'a>(
+        &'a self,
+        navigation_stack: &'a NavigationStack,
+        map: Option<&PoseGraph>,
+    ) -> Result<NavigationSession<'a>, Error> {
         let missing = self.targets.iter().find(|target| target.world_from_object.is_none());
         if let Some(target) = missing {
             return Err(Error::NoWorld { purpose: "navigate", object: target.name.clone() });
         }
-        Ok(Voyage::begin(helm, &self.stages, &self.targets, &self.rig.stereo, self.rig.body_from_camera, map))
+        Ok(NavigationSession::begin(
+            navigation_stack,
+            &self.stages,
+            &self.targets,
+            &self.rig.stereo,
+            self.rig.body_from_camera,
+            map,
+        ))
     }
 
-    fn outcomes(&self, result: Sighting) -> Vec<TargetOutcome> {
-        let outcome = |attempt: crate::Attempt| TargetOutcome {
+    fn outcomes(&self, result: FrameResult) -> Vec<TargetOutcome> {
+        let outcome = |attempt: crate::TargetAttempt| TargetOutcome {
             name: self.targets[attempt.target].name.clone(),
             outcome: attempt.answer.outcome,
         };
@@ -188,6 +199,6 @@ impl Localizer {
 }
 
 /// A single frame, at time zero.
-fn frame(eyes: Eyes, prior: Option<&PosePrior>) -> Sight {
-    Sight { stamp_ns: 0, eyes, prior: prior.copied(), told: Told::Nothing, readings: Vec::new() }
+fn frame(frame_data: FrameData, prior: Option<&PosePrior>) -> SensorFrame {
+    SensorFrame { stamp_ns: 0, frame_data, prior: prior.copied(), hints: Hints::Nothing, readings: Vec::new() }
 }

@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Keyframes, PipelineError,
-    odometry_session::OdometrySession,
+    odometry_session::TrialOdometry,
     pipeline::{build, faults, resolve},
 };
 
 /// The settings of the way from fix to fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Navigation {
     /// Carries the last fix along.
     pub odometry: Choice,
@@ -23,7 +23,7 @@ pub struct Navigation {
     pub fusion: Choice,
     /// Key frames where no object is in view; without it none are laid.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub network: Option<Keyframes>,
+    pub pose_graph: Option<Keyframes>,
 }
 
 impl Default for Navigation {
@@ -32,7 +32,7 @@ impl Default for Navigation {
             odometry: Choice::named("stereo"),
             policy: Choice::named("every-frame"),
             fusion: Choice::named("fuse"),
-            network: None,
+            pose_graph: None,
         }
     }
 }
@@ -47,16 +47,16 @@ impl Navigation {
             odometry: resolve(&ODOMETRIES, &self.odometry)?,
             policy: resolve(&POLICIES, &self.policy)?,
             fusion: resolve(&FUSIONS, &self.fusion)?,
-            network: self.network.as_ref().map(Keyframes::resolved).transpose()?,
+            pose_graph: self.pose_graph.as_ref().map(Keyframes::resolved).transpose()?,
         })
     }
 
     /// Every setting that it cannot be built with.
-    pub fn unfit(&self) -> Vec<PipelineError> {
+    pub fn invalid(&self) -> Vec<PipelineError> {
         let mut all = faults(&ODOMETRIES, &self.odometry);
         all.extend(faults(&POLICIES, &self.policy));
         all.extend(faults(&FUSIONS, &self.fusion));
-        all.extend(self.network.iter().flat_map(Keyframes::unfit));
+        all.extend(self.pose_graph.iter().flat_map(Keyframes::invalid));
         all
     }
 
@@ -64,29 +64,29 @@ impl Navigation {
     ///
     /// # Errors
     /// [`PipelineError`] names the setting.
-    pub fn build(&self) -> Result<Helm, PipelineError> {
-        let unfit = self.network.iter().flat_map(Keyframes::unfit).next();
-        unfit.map_or(Ok(()), Err)?;
-        Ok(Helm {
+    pub fn build(&self) -> Result<NavigationStack, PipelineError> {
+        let invalid = self.pose_graph.iter().flat_map(Keyframes::invalid).next();
+        invalid.map_or(Ok(()), Err)?;
+        Ok(NavigationStack {
             odometry: build(&ODOMETRIES, &self.odometry)?,
             policy: build(&POLICIES, &self.policy)?,
             fusion: build(&FUSIONS, &self.fusion)?,
-            network: self.network.clone(),
+            pose_graph: self.pose_graph.clone(),
         })
     }
 }
 
 /// The components between fixes, built.
 #[derive(Debug)]
-pub struct Helm {
+pub struct NavigationStack {
     pub(crate) odometry: Box<dyn Odometry>,
     pub(crate) policy: Box<dyn Policy>,
     pub(crate) fusion: Box<dyn Fusion>,
     /// The settings of the key frames, where any are kept.
-    pub network: Option<Keyframes>,
+    pub pose_graph: Option<Keyframes>,
 }
 
-impl Helm {
+impl NavigationStack {
     /// Whether it cannot do without what the vehicle's Doppler log and gyro say.
     pub fn listens(&self) -> bool {
         self.odometry.listens()
@@ -97,7 +97,7 @@ impl Helm {
         &'a self,
         rig: &'a StereoRig,
         body_from_camera: Transform<Body, Camera>,
-    ) -> OdometrySession<'a> {
-        OdometrySession::begin(&*self.odometry, rig, body_from_camera)
+    ) -> TrialOdometry<'a> {
+        TrialOdometry::begin(&*self.odometry, rig, body_from_camera)
     }
 }

@@ -1,14 +1,14 @@
 //! The settings of the way from a sight to fixes, and what is built from them.
 
-use seafix_component::{BuildError, Choice, Part, Registry, each_unfit, in_range, out_of_range};
+use seafix_component::{BuildError, Choice, Part, Registry, each_invalid, in_range, out_of_range};
 use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, StageChoices, TRIANGULATORS,
-    UnfitStage, read_refinement, read_triangulator,
+    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, InvalidStage, LOCATORS, MATCHERS, REFINEMENTS, StageChoices,
+    TRIANGULATORS, read_refinement, read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::Stages;
+use crate::PipelineStages;
 
 /// The settings of the way from a frame to a fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,14 +30,14 @@ pub struct Pipeline {
     pub matcher: Choice,
     /// Says more exactly where the right image shows each left place. Settings without a name are those of `direct`.
     #[serde(deserialize_with = "read_refinement")]
-    pub refine: Choice,
+    pub refinement: Choice,
     /// Turns pairs into points. Settings without a name are those of `optimal`.
     #[serde(deserialize_with = "read_triangulator")]
-    pub triangulation: Choice,
+    pub triangulator: Choice,
     /// Stage 1: the shells.
     pub gate: Gate,
     /// Whether shells grow where nothing is found in them, and then vanish: an object may have been displaced.
-    pub widen: bool,
+    pub expand_gates: bool,
     /// When two distances agree.
     pub tolerance: Tolerance,
     /// Stage 2: the search. Of points that say which ones they are none is asked for.
@@ -58,10 +58,10 @@ impl Default for Pipeline {
             locator: Choice::named("corner"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band"),
-            refine: Choice::named("direct"),
-            triangulation: Choice::named("optimal"),
+            refinement: Choice::named("direct"),
+            triangulator: Choice::named("optimal"),
             gate: Gate::default(),
-            widen: false,
+            expand_gates: false,
             tolerance: Tolerance::Sigmas(3.0),
             search: Choice::named("rigid-consensus"),
             solver: Choice::named("stereo-reprojection"),
@@ -98,8 +98,8 @@ impl Pipeline {
             descriptor: resolve(&DESCRIPTORS, &self.descriptor)?,
             matcher: resolve(&MATCHERS, &self.matcher)?,
             locator: resolve(&LOCATORS, &self.locator)?,
-            refine: resolve(&REFINEMENTS, &self.refine)?,
-            triangulation: resolve(&TRIANGULATORS, &self.triangulation)?,
+            refinement: resolve(&REFINEMENTS, &self.refinement)?,
+            triangulator: resolve(&TRIANGULATORS, &self.triangulator)?,
             search: resolve(&SEARCHES, &self.search)?,
             solver: resolve(&SOLVERS, &self.solver)?,
             ..self.clone()
@@ -107,7 +107,7 @@ impl Pipeline {
     }
 
     /// Every setting that it cannot be built with.
-    pub fn unfit(&self) -> Vec<PipelineError> {
+    pub fn invalid(&self) -> Vec<PipelineError> {
         let filters = self.filters.iter().enumerate().flat_map(|(place, choice)| {
             let of = move |error: PipelineError| in_list(place, error);
             faults(&FILTERS, choice).into_iter().map(of)
@@ -117,29 +117,31 @@ impl Pipeline {
         all.extend(faults(&LOCATORS, &self.locator));
         all.extend(faults(&DESCRIPTORS, &self.descriptor));
         all.extend(faults(&MATCHERS, &self.matcher));
-        all.extend(faults(&REFINEMENTS, &self.refine));
-        all.extend(faults(&TRIANGULATORS, &self.triangulation));
+        all.extend(faults(&REFINEMENTS, &self.refinement));
+        all.extend(faults(&TRIANGULATORS, &self.triangulator));
         all.extend(faults(&SEARCHES, &self.search));
         all.extend(faults(&SOLVERS, &self.solver));
-        all.extend(each_unfit(&self.gate, Gate::check).into_iter().map(|message| misfit("gate", message)));
+        all.extend(each_invalid(&self.gate, Gate::check).into_iter().map(|message| invalid_setting("gate", message)));
         all.extend(
-            each_unfit(&self.tolerance, Tolerance::check).into_iter().map(|message| misfit("tolerance", message)),
+            each_invalid(&self.tolerance, Tolerance::check)
+                .into_iter()
+                .map(|message| invalid_setting("tolerance", message)),
         );
-        let acceptance = each_unfit(&self.acceptance, Acceptance::check);
-        all.extend(acceptance.into_iter().map(|message| misfit("acceptance", message)));
+        let acceptance = each_invalid(&self.acceptance, Acceptance::check);
+        all.extend(acceptance.into_iter().map(|message| invalid_setting("acceptance", message)));
         all.extend(self.window_fits().err());
         all
     }
 
     fn window_fits(&self) -> Result<(), PipelineError> {
         let fits = in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000");
-        fits.map_err(|message| misfit("window", message))
+        fits.map_err(|message| invalid_setting("window", message))
     }
 
     /// Standard deviation of the coordinates of a key point that no corner was fitted to (px); none of a pipeline that
     /// cannot be built.
     pub fn pixel_sigma(&self) -> Option<f64> {
-        build(&TRIANGULATORS, &self.triangulation).ok().map(|triangulator| triangulator.rules().sigma_px)
+        build(&TRIANGULATORS, &self.triangulator).ok().map(|triangulator| triangulator.rules().sigma_px)
     }
 
     /// The part of it between two images and a cloud, ready to work.
@@ -153,11 +155,11 @@ impl Pipeline {
             locator: &self.locator,
             descriptor: &self.descriptor,
             matcher: &self.matcher,
-            refine: &self.refine,
-            triangulation: &self.triangulation,
+            refinement: &self.refinement,
+            triangulator: &self.triangulator,
         };
-        FrontEnd::build(&choices).map_err(|UnfitStage { stage, place, error }| {
-            let error = unfit(stage, &error);
+        FrontEnd::build(&choices).map_err(|InvalidStage { stage, place, error }| {
+            let error = invalid(stage, &error);
             match place {
                 Some(place) => in_list(place, error),
                 None => error,
@@ -169,18 +171,18 @@ impl Pipeline {
     ///
     /// # Errors
     /// [`PipelineError`] names the setting.
-    pub fn build(&self) -> Result<Stages, PipelineError> {
-        self.gate.check().map_err(|message| misfit("gate", message))?;
-        self.tolerance.check().map_err(|message| misfit("tolerance", message))?;
-        self.acceptance.check().map_err(|message| misfit("acceptance", message))?;
+    pub fn build(&self) -> Result<PipelineStages, PipelineError> {
+        self.gate.check().map_err(|message| invalid_setting("gate", message))?;
+        self.tolerance.check().map_err(|message| invalid_setting("tolerance", message))?;
+        self.acceptance.check().map_err(|message| invalid_setting("acceptance", message))?;
         self.window_fits()?;
         let (search, solver) = (build(&SEARCHES, &self.search)?, build(&SOLVERS, &self.solver)?);
-        Ok(Stages::new(self.front_end()?, search, solver, self.clone()))
+        Ok(PipelineStages::new(self.front_end()?, search, solver, self.clone()))
     }
 }
 
 /// What a check of settings that are no component's says.
-pub fn misfit(setting: &'static str, message: String) -> PipelineError {
+pub fn invalid_setting(setting: &'static str, message: String) -> PipelineError {
     // Some checks say by themselves whose they are.
     let own = message.strip_prefix(&format!("{setting}: ")).unwrap_or(&message);
     // Settings of a list say their places: `faults[0].to`.
@@ -231,17 +233,11 @@ fn each_filter<T>(
 }
 
 fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {
-    // Two stages had their names before they were components.
-    let setting = match registry.kind() {
-        "refinement" => "refine",
-        "triangulator" => "triangulation",
-        kind => kind,
-    };
-    unfit(setting, error)
+    invalid(registry.kind(), error)
 }
 
 /// What is wrong with a component, as the fault of its setting.
-fn unfit(setting: &'static str, error: &BuildError) -> PipelineError {
+fn invalid(setting: &'static str, error: &BuildError) -> PipelineError {
     let key = error.key().map(str::to_owned);
     PipelineError { setting, key, part: error.part(), near: error.near(), message: error.to_string() }
 }

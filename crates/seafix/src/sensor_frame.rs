@@ -9,22 +9,22 @@ use seafix_vision::Image;
 
 /// The measurements of one instant and the prior knowledge of its pose.
 #[derive(Debug, Clone)]
-pub struct Sight {
+pub struct SensorFrame {
     /// Time (ns).
     pub stamp_ns: u64,
     /// The stereo pair or the cloud.
-    pub eyes: Eyes,
+    pub frame_data: FrameData,
     /// The prior pose of the left camera in the world, if one is known.
     pub prior: Option<WorldPrior>,
     /// Correspondences or a problem that come with the data.
-    pub told: Told,
+    pub hints: Hints,
     /// The readings of the navigation sensors since the previous instant, in the order of arrival.
     pub readings: Vec<SensorReading>,
 }
 
-impl Sight {
+impl SensorFrame {
     /// The prior pose relative to each target; `None` without a prior or without a place of the target in the world.
-    pub fn rough(&self, targets: &[Target]) -> Vec<Option<Prior>> {
+    pub fn prior_pose(&self, targets: &[Target]) -> Vec<Option<Prior>> {
         let prior = |target: &Target| {
             let world = self.prior.as_ref()?;
             target.prior(&world.world_from_camera, &world.covariance)
@@ -35,7 +35,7 @@ impl Sight {
 
 /// Knowledge of the correspondences that comes with the data.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub enum Told {
+pub enum Hints {
     /// No knowledge.
     #[default]
     Nothing,
@@ -48,9 +48,9 @@ pub enum Told {
 
 /// The measurements of the cameras.
 #[derive(Debug, Clone)]
-pub enum Eyes {
+pub enum FrameData {
     /// A stereo pair.
-    Pair(Image, Image),
+    Stereo(Image, Image),
     /// A cloud without images.
     Points(Vec<MeasuredPoint>),
 }

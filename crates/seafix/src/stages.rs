@@ -4,22 +4,22 @@ use std::{sync::Arc, time::Instant};
 
 use rand::Rng;
 use seafix_geometry::{MeasuredPoint, StereoRig};
-use seafix_navigation::Share;
+use seafix_navigation::Sensitivity;
 use seafix_referencing::{
-    Candidates, Correspondence, Degenerate, Gathered, Identification, ModelPoint, Observations, Outcome, Prior,
-    PriorBound, Problem, Reference, Search, Solver, Target, Tolerance, Unidentified, candidates, judge, judge_named,
-    problem_file::CoherenceProblem, until_found,
+    Candidates, Correspondence, Degenerate, Fix, Gathered, Identification, ModelPoint, Observations, Outcome, Prior,
+    PriorBound, Problem, Rejected, Search, Solver, Target, Tolerance, candidates, judge, judge_labelled,
+    problem_file::CoherenceProblem, search_with_expanding_gates,
 };
-use seafix_vision::{FrontEnd, Keypoint, Look};
+use seafix_vision::{FrontEnd, FrontEndOutput, Keypoint};
 
 use crate::{
-    Eyes, FrameTimes, Pipeline, Sight, TargetTimes, Told,
+    FrameData, FrameTimes, Hints, Pipeline, SensorFrame, TargetTimes,
     times::{milliseconds, timed},
 };
 
 /// A pipeline, built.
 #[derive(Debug)]
-pub struct Stages {
+pub struct PipelineStages {
     pub(crate) front_end: FrontEnd,
     pub(crate) search: Box<dyn Search>,
     pub(crate) solver: Box<dyn Solver>,
@@ -28,13 +28,13 @@ pub struct Stages {
 
 /// Everything the pipeline made of one sight; nothing, where none was to be made.
 #[derive(Debug, Default)]
-pub struct Sighting {
+pub struct FrameResult {
     /// Key points of the left image.
     pub keypoints: Arc<[Keypoint]>,
     /// The cloud.
     pub cloud: Arc<[MeasuredPoint]>,
     /// One attempt for each target in view.
-    pub attempts: Vec<Attempt>,
+    pub attempts: Vec<TargetAttempt>,
     /// What a joint fix takes of objects that were not fixed by themselves.
     pub gathered: Gathered,
     /// Times of the common stages.
@@ -43,7 +43,7 @@ pub struct Sighting {
 
 /// What came of one target.
 #[derive(Debug)]
-pub struct Attempt {
+pub struct TargetAttempt {
     /// Index among the site's targets.
     pub target: usize,
     /// The shells' content.
@@ -56,7 +56,7 @@ pub struct Attempt {
     pub times: TargetTimes,
 }
 
-impl Attempt {
+impl TargetAttempt {
     /// `times` (ms) are those of candidates, search and solution, and of all that was done for this target.
     fn new(
         target: usize,
@@ -86,7 +86,7 @@ pub struct Cloud {
 #[derive(Debug, Clone)]
 pub struct Sought {
     candidates: Candidates,
-    found: Result<Identification, Unidentified>,
+    found: Result<Identification, Rejected>,
     /// Durations of the candidates and of the search (ms).
     spent: [f64; 2],
 }
@@ -95,7 +95,7 @@ pub struct Sought {
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// The measurements and their prior.
-    pub sight: &'a Sight,
+    pub sensor_frame: &'a SensorFrame,
     /// The cloud of these measurements.
     pub cloud: &'a Cloud,
     /// The targets.
@@ -104,7 +104,7 @@ pub struct View<'a> {
     pub rig: &'a StereoRig,
 }
 
-impl Stages {
+impl PipelineStages {
     /// A pipeline of these components.
     pub fn new(front_end: FrontEnd, search: Box<dyn Search>, solver: Box<dyn Solver>, settings: Pipeline) -> Self {
         Self { front_end, search, solver, settings }
@@ -122,20 +122,26 @@ impl Stages {
 
     /// The way from one sight to fixes, in the paper's order: key points, matches, cloud; then for
     /// each target in view candidates (Stage 1), the search (Stage 2) and the solution.
-    pub fn reference(&self, sight: &Sight, targets: &[Target], rig: &StereoRig, rng: &mut dyn Rng) -> Sighting {
-        let cloud = &self.cloud(&sight.eyes, rig);
-        self.reference_from(View { sight, cloud, targets, rig }, &sight.rough(targets), None, rng)
+    pub fn compute_fix(
+        &self,
+        sensor_frame: &SensorFrame,
+        targets: &[Target],
+        rig: &StereoRig,
+        rng: &mut dyn Rng,
+    ) -> FrameResult {
+        let cloud = &self.cloud(&sensor_frame.frame_data, rig);
+        self.fix_from(View { sensor_frame, cloud, targets, rig }, &sensor_frame.prior_pose(targets), None, rng)
     }
 
     /// The same from a cloud, and from what is known before of the pose relative to each target. The answers of the
-    /// search are those of [`Stages::seek_all`], where they are known already.
-    pub fn reference_from(
+    /// search are those of [`PipelineStages::seek_all`], where they are known already.
+    pub fn fix_from(
         &self,
         view: View<'_>,
         priors: &[Option<Prior>],
         sought: Option<&[Option<Sought>]>,
         rng: &mut dyn Rng,
-    ) -> Sighting {
+    ) -> FrameResult {
         let attempts = (0..view.targets.len())
             .filter_map(|index| {
                 let sought = sought.map(|all| all[index].clone());
@@ -146,18 +152,18 @@ impl Stages {
             .collect();
         let Cloud { keypoints, points, times, .. } = view.cloud;
         let (keypoints, cloud) = (Arc::clone(keypoints), Arc::clone(points));
-        Sighting { keypoints, cloud, attempts, gathered: Gathered::default(), times: *times }
+        FrameResult { keypoints, cloud, attempts, gathered: Gathered::default(), times: *times }
     }
 
     /// Seeks once more, from other priors, what was not found.
-    pub fn again(&self, sighting: &mut Sighting, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) {
-        for attempt in &mut sighting.attempts {
+    pub fn again(&self, frame_result: &mut FrameResult, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) {
+        for attempt in &mut frame_result.attempts {
             let (index, prior) = (attempt.target, priors[attempt.target].as_ref());
-            if matches!(attempt.answer.outcome, Outcome::Referenced(_)) || prior.is_none() {
+            if matches!(attempt.answer.outcome, Outcome::Fix(_)) || prior.is_none() {
                 continue;
             }
             let Some(mut other) = self.attempt(view, index, prior, None, rng) else { continue };
-            if matches!(other.answer.outcome, Outcome::Referenced(_)) {
+            if matches!(other.answer.outcome, Outcome::Fix(_)) {
                 other.times.total_ms = attempt.times.total_ms.zip(other.times.total_ms).map(|(a, b)| a + b);
                 *attempt = other;
             }
@@ -167,14 +173,14 @@ impl Stages {
     /// What a fix owes to the errors of its model: for each point that it rests on, by its place in the model.
     pub fn model_errors(
         &self,
-        fix: &Reference,
+        fix: &Fix,
         target: &Target,
         cloud: &[MeasuredPoint],
         rig: &StereoRig,
-    ) -> Result<Vec<(usize, Share)>, Degenerate> {
+    ) -> Result<Vec<(usize, Sensitivity)>, Degenerate> {
         let data = Observations::of(&fix.pairs, &target.points, cloud, Some(rig));
-        let shares = self.solver.model_errors(&data, &fix.object_from_camera)?;
-        Ok(fix.pairs.iter().map(|pair| pair.model).zip(shares).collect())
+        let sensitivities = self.solver.model_errors(&data, &fix.object_from_camera)?;
+        Ok(fix.pairs.iter().map(|pair| pair.model).zip(sensitivities).collect())
     }
 
     /// Whether enough of `target` should be in view for a fix, by what is known of the pose; without that it may be.
@@ -183,27 +189,27 @@ impl Stages {
     }
 
     /// The front end's part.
-    pub fn cloud(&self, eyes: &Eyes, rig: &StereoRig) -> Cloud {
-        let (left, right) = match eyes {
-            Eyes::Points(cloud) => {
+    pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig) -> Cloud {
+        let (left, right) = match frame_data {
+            FrameData::Points(cloud) => {
                 let times = FrameTimes::default();
                 return Cloud { keypoints: Arc::default(), points: cloud[..].into(), times, total_ms: 0.0 };
             }
-            Eyes::Pair(left, right) => (left, right),
+            FrameData::Stereo(left, right) => (left, right),
         };
         let start = Instant::now();
         // Frames are worked on side by side: within one, a single thread keeps the times honest.
-        let mut look = Look::default();
-        self.front_end.look(left, right, rig, &mut look);
+        let mut output = FrontEndOutput::default();
+        self.front_end.run(left, right, rig, &mut output);
         let times = FrameTimes {
-            detect_ms: Some(look.times.filter_ms + look.times.detect_ms),
-            locate_ms: Some(look.times.locate_ms),
-            describe_ms: Some(look.times.describe_ms),
-            match_ms: Some(look.times.match_ms),
-            refine_ms: Some(look.times.refine_ms),
-            triangulate_ms: Some(look.times.triangulate_ms),
+            detect_ms: Some(output.times.filter_ms + output.times.detect_ms),
+            locate_ms: Some(output.times.locate_ms),
+            describe_ms: Some(output.times.describe_ms),
+            match_ms: Some(output.times.match_ms),
+            refine_ms: Some(output.times.refine_ms),
+            triangulate_ms: Some(output.times.triangulate_ms),
         };
-        let (keypoints, points) = (look.keypoints()[0].into(), look.cloud[..].into());
+        let (keypoints, points) = (output.keypoints()[0].into(), output.cloud[..].into());
         Cloud { keypoints, points, times, total_ms: milliseconds(start) }
     }
 
@@ -215,10 +221,10 @@ impl Stages {
     /// Stages 1 and 2 of one target; `None` where it is not in view, or where every point says which one it is.
     fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<Sought> {
         let target = &view.targets[index];
-        match &view.sight.told {
-            Told::Names(_) => None,
-            Told::Problem(problem) => Some(self.seek_posed(target, problem, rng)),
-            Told::Nothing => {
+        match &view.sensor_frame.hints {
+            Hints::Names(_) => None,
+            Hints::Problem(problem) => Some(self.seek_posed(target, problem, rng)),
+            Hints::Nothing => {
                 Some(self.seek_near(target, &view.cloud.points, prior, &in_view(target, prior, view.rig)?, rng))
             }
         }
@@ -260,23 +266,30 @@ impl Stages {
         prior: Option<&Prior>,
         sought: Option<Option<Sought>>,
         rng: &mut dyn Rng,
-    ) -> Option<Attempt> {
-        if let Told::Names(names) = &view.sight.told {
-            return self.named(view, index, names, prior);
+    ) -> Option<TargetAttempt> {
+        if let Hints::Names(names) = &view.sensor_frame.hints {
+            return self.labelled(view, index, names, prior);
         }
         let sought = sought.unwrap_or_else(|| self.seek(view, index, prior, rng))?;
-        match &view.sight.told {
-            Told::Problem(problem) => Some(self.answer(index, &view.targets[index], problem, sought)),
+        match &view.sensor_frame.hints {
+            Hints::Problem(problem) => Some(self.answer(index, &view.targets[index], problem, sought)),
             _ => Some(self.solve(view, index, prior, sought, rng)),
         }
     }
 
     /// The answer to what was sought; where that is nothing, and shells may grow, to what is found in wider ones.
-    fn solve(&self, view: View<'_>, index: usize, prior: Option<&Prior>, sought: Sought, rng: &mut dyn Rng) -> Attempt {
+    fn solve(
+        &self,
+        view: View<'_>,
+        index: usize,
+        prior: Option<&Prior>,
+        sought: Sought,
+        rng: &mut dyn Rng,
+    ) -> TargetAttempt {
         let started = Instant::now();
         let View { cloud, targets, rig, .. } = view;
         let (target, cloud) = (&targets[index], &cloud.points);
-        let Pipeline { tolerance, acceptance, widen, .. } = &self.settings;
+        let Pipeline { tolerance, acceptance, expand_gates, .. } = &self.settings;
         let points = &target.points;
         let before: f64 = sought.spent.iter().sum();
         let mut times = [0.0; 3];
@@ -287,26 +300,32 @@ impl Stages {
             (candidates, answer)
         };
         let (mut candidates, mut answer) = judged(sought, prior);
-        if *widen {
+        if *expand_gates {
             let mut wider = Candidates::default();
-            answer = until_found(answer, prior, |prior| {
+            answer = search_with_expanding_gates(answer, prior, |prior| {
                 let in_view = in_view(target, prior, rig).unwrap_or_else(|| vec![true; points.len()]);
                 let (listed, answer) = judged(self.seek_near(target, cloud, prior, &in_view, rng), prior);
                 wider = listed;
                 answer
             });
-            if !matches!(answer.outcome, Outcome::Unidentified(_)) && !wider.lists.is_empty() {
+            if !matches!(answer.outcome, Outcome::Rejected(_)) && !wider.lists.is_empty() {
                 candidates = wider;
             }
         }
-        Attempt::new(index, candidates, answer, times.map(Some), before + milliseconds(started))
+        TargetAttempt::new(index, candidates, answer, times.map(Some), before + milliseconds(started))
     }
 
     /// The answer where every point says which one it is; `None` of a target that no point belongs to.
-    fn named(&self, view: View<'_>, index: usize, names: &[(usize, usize)], prior: Option<&Prior>) -> Option<Attempt> {
+    fn labelled(
+        &self,
+        view: View<'_>,
+        index: usize,
+        names: &[(usize, usize)],
+        prior: Option<&Prior>,
+    ) -> Option<TargetAttempt> {
         let started = Instant::now();
         let target = &view.targets[index];
-        let (pairs, stage1) = timed(|| named(names, index, target));
+        let (pairs, stage1) = timed(|| labelled(names, index, target));
         if pairs.is_empty() {
             return None;
         }
@@ -315,17 +334,17 @@ impl Stages {
         let Pipeline { tolerance, acceptance, .. } = &self.settings;
         let cloud = &view.cloud.points;
         let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
-        let (answer, solution) = timed(|| judge_named(&problem, pairs, &*self.solver, acceptance, Some(view.rig)));
-        Some(Attempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], milliseconds(started)))
+        let (answer, solution) = timed(|| judge_labelled(&problem, pairs, &*self.solver, acceptance, Some(view.rig)));
+        Some(TargetAttempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], milliseconds(started)))
     }
 
     /// The answer to a problem that states its own candidates, tolerance and rough pose.
-    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> Attempt {
+    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> TargetAttempt {
         let Sought { candidates, found, spent: [stage1, stage2] } = sought;
         let posed = posed(target, problem, &candidates);
         let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
         let times = [stage1, stage2, solution];
-        Attempt::new(index, candidates, answer, times.map(Some), times.iter().sum())
+        TargetAttempt::new(index, candidates, answer, times.map(Some), times.iter().sum())
     }
 }
 
@@ -337,7 +356,7 @@ fn posed<'a>(target: &'a Target, problem: &'a CoherenceProblem, candidates: &'a 
 
 /// The pairs of points that say which ones they are, in the order of the model: of an object its own, of the site those
 /// of all its objects.
-fn named(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Correspondence> {
+fn labelled(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Correspondence> {
     let pair = |(cloud, &name)| Some(Correspondence { model: target.place_of(index, name)?, cloud });
     let mut pairs: Vec<Correspondence> = names.iter().enumerate().filter_map(pair).collect();
     pairs.sort_unstable();
@@ -356,8 +375,8 @@ fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Ve
     let camera_from_object = prior.object_from_camera.inverse();
     let faces = |point: &ModelPoint| {
         point.normal.is_none_or(|normal| {
-            let sight = prior.object_from_camera.translation() - point.at.coords;
-            normal.normalize().dot(&sight.normalize()) > BACK
+            let ray = prior.object_from_camera.translation() - point.at.coords;
+            normal.normalize().dot(&ray.normalize()) > BACK
         })
     };
     let inside = |point: &ModelPoint| faces(point) && rig.sees(&(camera_from_object * point.at), 0.0).is_some();

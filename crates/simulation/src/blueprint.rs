@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn the_route_has_short_legs_over_a_site_of_fifty_metres() {
+    fn the_route_has_short_segments_over_a_site_of_fifty_metres() {
         let at: Vec<_> = Blueprint::drill_centre().objects.iter().map(|o| nalgebra::Vector2::from(o.at)).collect();
         assert!(at.windows(2).all(|w| (w[1] - w[0]).norm() <= 15.0));
         let span = at.iter().flat_map(|a| at.iter().map(move |b| (a - b).norm())).fold(0.0, f64::max);
@@ -220,11 +220,11 @@ mod tests {
     }
 
     #[test]
-    fn distances_within_an_object_tell_its_points_apart() {
+    fn distances_within_an_object_report_its_points_apart() {
         for object in &Blueprint::drill_centre().objects {
             let all = distances(object);
-            let least = all.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
-            assert!(least > 0.045, "{}: {least}", object.id);
+            let min = all.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+            assert!(min > 0.045, "{}: {min}", object.id);
             assert!(all[0] > 0.25);
             assert!(object.boxes.iter().all(|b| b.top < 1.5));
         }

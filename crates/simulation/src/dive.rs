@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     blueprint::Blueprint,
-    points::{Eyes, PointNoise},
-    render::Rendering,
-    scene::Scene,
+    points::{PlacedRig, PointNoise},
     sensor::Sensor,
     stream::{Purpose, Stream},
     survey::{SurveyErrors, survey},
+    virtual_render::Rendering,
+    virtual_scene::VirtualScene,
 };
 
 /// The first stamp: some time in 2023, so that stamps look like those of a real log.
@@ -40,7 +40,7 @@ pub struct Dive {
     /// How far the object's centre may lie off the middle of the view (tangent of the angle).
     pub off_centre: f64,
     /// Feature points of the object that a view should show in both images, if it can.
-    pub least_visible: usize,
+    pub min_visible: usize,
     /// Frames a second.
     pub rate: f64,
     /// Standard deviation of the rough pose's position, each world axis (m).
@@ -66,7 +66,7 @@ impl Default for Dive {
             distance: 3.0,
             tilt_deg: [0.0, 15.0],
             off_centre: 0.1,
-            least_visible: 6,
+            min_visible: 6,
             rate: 10.0,
             prior_position: 0.1,
             prior_attitude_deg: 0.5,
@@ -142,7 +142,7 @@ pub enum BadDive {
 
 /// The rough pose that a method may use.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RoughPose {
+pub struct SimulatedPrior {
     /// The left camera in the world, with its error.
     pub world_from_camera: Transform<World, Camera>,
     /// Standard deviation of the position, each world axis (m).
@@ -185,7 +185,7 @@ impl Dive {
         self.check()?;
         let rig = self.rig.build()?;
         let blueprint = Blueprint::drill_centre();
-        let scene = Scene::new(&blueprint, seed);
+        let scene = VirtualScene::new(&blueprint, seed);
         let errors = SurveyErrors { model: self.model_sigma, survey: self.survey_sigma };
         let (site, world_from_object) = survey(&blueprint, &scene, errors, seed);
         Ok(PlannedDive { settings: self.clone(), seed, dive, rig, scene, site, world_from_object })
@@ -230,7 +230,7 @@ pub struct PlannedDive {
     seed: u64,
     dive: u64,
     rig: StereoRig,
-    scene: Scene,
+    scene: VirtualScene,
     site: Site,
     world_from_object: Vec<Transform<World, Object>>,
 }
@@ -269,15 +269,15 @@ impl PlannedDive {
     /// Frame number `index`, a function of seed, dive and index alone.
     pub fn frame(&self, index: usize) -> DiveFrame<'_> {
         let object = index % self.scene.bodies.len();
-        let eyes = self.view(object, &mut self.stream(index, Purpose::View));
-        let world_from_camera = eyes.world_from_camera;
-        let truth = FrameTruth { object, world_from_camera, visible: self.visible(&eyes) };
+        let placed_rig = self.view(object, &mut self.stream(index, Purpose::View));
+        let world_from_camera = placed_rig.world_from_camera;
+        let truth = FrameTruth { object, world_from_camera, visible: self.visible(&placed_rig) };
         let interval = 1e9 / self.settings.rate;
         DiveFrame {
             dive: self,
             index,
             stamp_ns: EPOCH_NS + (index as f64 * interval).round() as u64,
-            prior: self.rough(&world_from_camera, &mut self.stream(index, Purpose::Prior)),
+            prior: self.prior_pose(&world_from_camera, &mut self.stream(index, Purpose::Prior)),
             truth,
         }
     }
@@ -292,18 +292,18 @@ impl PlannedDive {
     }
 
     /// A view of an object: the first of many random ones that shows enough of it, or the best.
-    fn view(&self, object: usize, stream: &mut Stream) -> Eyes<'_> {
+    fn view(&self, object: usize, stream: &mut Stream) -> PlacedRig<'_> {
         let body = &self.scene.bodies[object];
-        let wanted = self.settings.least_visible.min(body.points.len());
-        let mut best: Option<(usize, Eyes<'_>)> = None;
+        let wanted = self.settings.min_visible.min(body.points.len());
+        let mut best: Option<(usize, PlacedRig<'_>)> = None;
         for _ in 0..VIEW_TRIALS {
-            let eyes = Eyes { rig: &self.rig, world_from_camera: self.look_at(&body.centroid(), stream) };
-            if !eyes.places().iter().all(|at| at.z < self.scene.summit(at, 1.0) - CLEARANCE) {
+            let placed_rig = PlacedRig { rig: &self.rig, world_from_camera: self.look_at(&body.centroid(), stream) };
+            if !placed_rig.places().iter().all(|at| at.z < self.scene.summit(at, 1.0) - CLEARANCE) {
                 continue;
             }
-            let shown = body.points.iter().filter(|p| eyes.see(&self.scene, p, VIEW_MARGIN).is_some()).count();
-            if best.is_none_or(|(most, _)| shown > most) {
-                best = Some((shown, eyes));
+            let shown = body.points.iter().filter(|p| placed_rig.see(&self.scene, p, VIEW_MARGIN).is_some()).count();
+            if best.is_none_or(|(max, _)| shown > max) {
+                best = Some((shown, placed_rig));
             }
             if shown >= wanted {
                 break;
@@ -311,8 +311,8 @@ impl PlannedDive {
         }
         best.map_or_else(
             // Only distances below a metre or so leave no room above an object: look from straight above.
-            || Eyes { rig: &self.rig, world_from_camera: self.aim(&body.centroid(), [0.0; 2], 0.0, 0.0, 0.0) },
-            |(_, eyes)| eyes,
+            || PlacedRig { rig: &self.rig, world_from_camera: self.aim(&body.centroid(), [0.0; 2], 0.0, 0.0, 0.0) },
+            |(_, placed_rig)| placed_rig,
         )
     }
 
@@ -345,11 +345,15 @@ impl PlannedDive {
         Transform::new(rotation, place - rotation * seen)
     }
 
-    fn visible(&self, eyes: &Eyes<'_>) -> Vec<VisiblePoint> {
+    fn visible(&self, placed_rig: &PlacedRig<'_>) -> Vec<VisiblePoint> {
         let mut all = Vec::new();
         for (object, body) in self.scene.bodies.iter().enumerate() {
             for (point, corner) in body.points.iter().enumerate() {
-                all.extend(eyes.see(&self.scene, corner, 0.0).map(|pixels| VisiblePoint { object, point, pixels }));
+                all.extend(placed_rig.see(&self.scene, corner, 0.0).map(|pixels| VisiblePoint {
+                    object,
+                    point,
+                    pixels,
+                }));
             }
         }
         all
@@ -357,13 +361,13 @@ impl PlannedDive {
 
     /// The rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the
     /// position's along the world's.
-    fn rough(&self, truth: &Transform<World, Camera>, stream: &mut Stream) -> RoughPose {
+    fn prior_pose(&self, truth: &Transform<World, Camera>, stream: &mut Stream) -> SimulatedPrior {
         let (position_sigma, attitude_sigma) =
             (self.settings.prior_position, self.settings.prior_attitude_deg.to_radians());
         let turn = so3::exp(&-stream.normal3(attitude_sigma));
         let step = stream.normal3(position_sigma);
         let world_from_camera = Transform::new(truth.rotation() * turn, truth.translation() - step);
-        RoughPose { world_from_camera, position_sigma, attitude_sigma }
+        SimulatedPrior { world_from_camera, position_sigma, attitude_sigma }
     }
 }
 
@@ -376,30 +380,33 @@ pub struct DiveFrame<'a> {
     /// When it was taken (ns since 1970).
     pub stamp_ns: u64,
     /// The rough pose.
-    pub prior: RoughPose,
+    pub prior: SimulatedPrior,
     truth: FrameTruth,
 }
 
 impl DiveFrame<'_> {
     /// The left and the right image: a plain function of the frame.
     pub fn render(&self) -> (Image, Image) {
-        let eyes = self.eyes();
-        let world_from_right = eyes.world_from_camera * eyes.rig.right_from_left().inverse();
+        let placed_rig = self.placed_rig();
+        let world_from_right = placed_rig.world_from_camera * placed_rig.rig.right_from_left().inverse();
         let scene = &self.dive.scene;
-        let left = Rendering::new(scene, eyes.rig.left(), &eyes.world_from_camera).radiance();
-        let right = Rendering::new(scene, eyes.rig.right(), &world_from_right).radiance();
+        let left = Rendering::new(scene, placed_rig.rig.left(), &placed_rig.world_from_camera).radiance();
+        let right = Rendering::new(scene, placed_rig.rig.right(), &world_from_right).radiance();
         let expose = |radiance, camera: &Pinhole, purpose| {
             let [width, height] = camera.size().map(|n| n as usize);
             let pixels = self.dive.settings.sensor.expose(radiance, width, self.dive.stream(self.index, purpose));
             Image::new(width, height, pixels).expect("the rasteriser fills every pixel")
         };
-        (expose(left, eyes.rig.left(), Purpose::LeftImage), expose(right, eyes.rig.right(), Purpose::RightImage))
+        (
+            expose(left, placed_rig.rig.left(), Purpose::LeftImage),
+            expose(right, placed_rig.rig.right(), Purpose::RightImage),
+        )
     }
 
     /// The same view as measured points: visible corners, feature points among them, and clutter.
     pub fn points(&self) -> Vec<MeasuredPoint> {
         let mut stream = self.dive.stream(self.index, Purpose::Points);
-        self.eyes().measure(&self.dive.scene, &self.dive.settings.points, &mut stream)
+        self.placed_rig().measure(&self.dive.scene, &self.dive.settings.points, &mut stream)
     }
 
     /// What no method may see.
@@ -407,8 +414,8 @@ impl DiveFrame<'_> {
         &self.truth
     }
 
-    fn eyes(&self) -> Eyes<'_> {
-        Eyes { rig: &self.dive.rig, world_from_camera: self.truth.world_from_camera }
+    fn placed_rig(&self) -> PlacedRig<'_> {
+        PlacedRig { rig: &self.dive.rig, world_from_camera: self.truth.world_from_camera }
     }
 }
 

@@ -70,9 +70,9 @@ pub struct Placed {
 }
 
 /// Second extent of a layout over the first: below it points are nearly a line.
-const LEAST_RATIO: f64 = 0.15;
+const MIN_RATIO: f64 = 0.15;
 /// Layouts that are drawn before none is said to fit.
-const MOST_TRIES: usize = 10_000;
+const MAX_TRIES: usize = 10_000;
 
 impl Layout {
     /// The layout of this `seed`.
@@ -82,7 +82,7 @@ impl Layout {
     pub fn place(&self, seed: u64) -> Result<Placed, BadDive> {
         let rig = self.rig.build()?;
         let mut stream = Stream::new(seed, self.number, 0, Purpose::View);
-        for _ in 0..MOST_TRIES {
+        for _ in 0..MAX_TRIES {
             let places = match self.shape {
                 Shape::Spread => self.spread(&rig, &mut stream),
                 Shape::Compact => self.compact(&rig, &mut stream),
@@ -98,14 +98,14 @@ impl Layout {
     }
 
     fn spread(&self, rig: &StereoRig, stream: &mut Stream) -> Option<Vec<Vector3<f64>>> {
-        const SHARE: f64 = 0.7;
+        const FRACTION: f64 = 0.7;
         let [width, height] = rig.left().size().map(|n| f64::from(n - 1));
         let one = |_| {
             let depth = self.distance * stream.between(0.9, 1.1);
             // What both cameras see at this depth begins where the right image begins.
             let hidden = self.rig.focal * self.rig.baseline / depth;
-            let across = hidden + (width - hidden) * (0.5 + SHARE * (stream.unit() - 0.5));
-            let pixel = Pixel { u: across, v: height * (0.5 + SHARE * (stream.unit() - 0.5)) };
+            let across = hidden + (width - hidden) * (0.5 + FRACTION * (stream.unit() - 0.5));
+            let pixel = Pixel { u: across, v: height * (0.5 + FRACTION * (stream.unit() - 0.5)) };
             let at = rig.left().normalize(&pixel)?.push(1.0) * depth;
             rig.sees(&Point::from(at), 0.0).map(|_| at)
         };
@@ -144,14 +144,14 @@ impl Placed {
     ///
     /// # Panics
     /// Never: the true place is in view, and with it some of any shell.
-    pub fn elsewhere(&self, model: &Point<Object>, shell: f64, stream: &mut Stream) -> MeasuredPoint {
+    pub fn elsewhere(&self, model: &Point<Object>, gate: f64, stream: &mut Stream) -> MeasuredPoint {
         let (place, sigma) = (self.object_from_camera.inverse() * *model, self.settings.sigma_px);
         let mut draw = || {
-            let other = place + Vector3::from_fn(|_, _| stream.between(-shell, shell));
+            let other = place + Vector3::from_fn(|_, _| stream.between(-gate, gate));
             self.rig.sees(&other, 0.0)?;
             self.measure(&(self.object_from_camera * other), sigma.max(1e-3), || sigma * stream.normal())
         };
-        (0..MOST_TRIES).find_map(|_| draw()).expect("some of the shell is in view")
+        (0..MAX_TRIES).find_map(|_| draw()).expect("some of the shell is in view")
     }
 
     /// The points without any noise, with the covariance of pixels that err by `sigma_px`.
@@ -186,7 +186,7 @@ fn is_wide(places: &[Vector3<f64>]) -> bool {
     let scatter: Matrix3<f64> = places.iter().map(|p| (p - centre) * (p - centre).transpose()).sum();
     let mut values: [f64; 3] = scatter.symmetric_eigenvalues().into();
     values.sort_by(f64::total_cmp);
-    values[1] > LEAST_RATIO * LEAST_RATIO * values[2]
+    values[1] > MIN_RATIO * MIN_RATIO * values[2]
 }
 
 #[cfg(test)]
@@ -194,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_are_seen_where_the_layout_says() {
+    fn points_are_seen_where_the_layout_states() {
         for shape in [Shape::Spread, Shape::Compact] {
             for number in 0..20 {
                 let layout = Layout { shape, number, points: 8, distance: 2.0, ..Layout::default() };
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_match_lies_in_the_shell_and_in_view() {
+    fn a_wrong_match_lies_in_the_gate_and_in_view() {
         let placed = Layout { sigma_px: 0.0, ..Layout::default() }.place(3).unwrap();
         let mut stream = Stream::new(3, 0, 0, Purpose::Mismatches);
         let mut farthest: f64 = 0.0;

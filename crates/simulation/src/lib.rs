@@ -1,6 +1,6 @@
 //! Seeded dives over subsea structures: rendered images or noisy points, with exact truth.
 //!
-//! A [`Mission`] is the settings of a dive: [site](field), [water and lamps](optics), cameras, [vehicle],
+//! A [`Mission`] is the settings of a dive: [site](scene), [water and lamps](optics), cameras, [vehicle],
 //! [navigation sensors](sensors), what has changed since the survey, and what fails. [`Mission::plan`] builds the site and
 //! lets the vehicle go its way; each [`Instant`] of the [`PlannedMission`] has a stamp and a rough pose, [renders](Instant::render)
 //! a stereo pair or gives [points](Instant::points) of the same view; its [truth](Instant::truth) is kept apart.
@@ -26,12 +26,9 @@
 //! boxes are worse than painted ones, since the bed behind them moves. [`PointNoise`] is set to the paper's range instead
 //! (σ_d = √2·0.2 px).
 
-mod bed;
 mod blueprint;
 mod dive;
-mod draw;
 pub mod families;
-pub mod field;
 mod layout;
 mod mission;
 mod noise;
@@ -42,20 +39,23 @@ mod points;
 mod raster;
 mod render;
 mod sand;
-mod scene;
+pub mod scene;
+mod seabed;
 mod sensor;
 pub mod sensors;
 mod stream;
 mod survey;
 pub mod vehicle;
+mod virtual_render;
+mod virtual_scene;
 
 pub use blueprint::{Blueprint, BoxPlan, ChequerPlan, ObjectPlan, PanelPlan, PipePlan, PointPlan};
-pub use dive::{BadDive, Dive, DiveFrame, FrameTruth, PlannedDive, RoughPose, VirtualRig, VisiblePoint};
-pub use draw::{Exposure, Imager};
+pub use dive::{BadDive, Dive, DiveFrame, FrameTruth, PlannedDive, SimulatedPrior, VirtualRig, VisiblePoint};
 pub use layout::{Layout, Placed, Shape};
 pub use mission::{
     CALIBRATION_RANGE, CalibrationError, FocalIn, Instant, InstantTruth, Mission, PlannedMission, PriorKind, RigPlan,
 };
 pub use points::PointNoise;
+pub use render::{Exposure, Imager};
 pub use sensor::Sensor;
 pub use stream::{Purpose, Stream};

@@ -99,9 +99,9 @@ fn sincos(x: &Lane<f64>, sine: &mut Lane<f64>, cosine: &mut Lane<f64>) {
         let z = y0 * y0;
         let (w, v) = (z * z, z * y0);
         let r = S[1] + z * (S[2] + z * S[3]) + z * w * (S[4] + z * S[5]);
-        let whole = y0 + v * (S[0] + z * r);
+        let full = y0 + v * (S[0] + z * r);
         let reduced = y0 - ((z * (0.5 * y1 - v * r) - y1) - v * S[0]);
-        let s = if quarters[i] == 0 { whole } else { reduced };
+        let s = if quarters[i] == 0 { full } else { reduced };
         let r = z * (C[0] + z * (C[1] + z * C[2])) + w * w * (C[3] + z * (C[4] + z * C[5]));
         let half = 0.5 * z;
         let w = 1.0 - half;

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::{
     noise::{gradient, hash, shown, split},
-    scene::Finish,
+    virtual_scene::Finish,
 };
 
 /// Share of the light that comes from everywhere.
@@ -61,16 +61,16 @@ fn pebbles(x: f64, y: f64, footprint: f64, seed: u32, cell: f64) -> f32 {
     if h & 7 > 3 {
         return 0.0;
     }
-    let share = |shift: u32| ((h >> shift) & 0xFF) as f32 / 255.0;
-    let radius = 0.16 + 0.26 * share(3) * share(3);
+    let fraction = |shift: u32| ((h >> shift) & 0xFF) as f32 / 255.0;
+    let radius = 0.16 + 0.26 * fraction(3) * fraction(3);
     let room = 1.0 - 2.0 * radius;
-    let (du, dv) = (fu - radius - room * share(8), fv - radius - room * share(16));
-    let stretch = 1.0 + 0.5 * share(20);
+    let (du, dv) = (fu - radius - room * fraction(8), fv - radius - room * fraction(16));
+    let stretch = 1.0 + 0.5 * fraction(20);
     let (along, across) = if h & 0x800_0000 == 0 { (du, dv * stretch) } else { (du * stretch, dv) };
     let distance = (along * along + across * across).sqrt();
     let soft = (footprint / cell) as f32 + 0.3 * radius;
     let inside = ((radius - distance) / soft + 0.5).clamp(0.0, 1.0);
-    let tone = 0.9 * share(24) - 0.5 + 0.12 * (du * 0.76 + dv * 0.65) / radius;
+    let tone = 0.9 * fraction(24) - 0.5 + 0.12 * (du * 0.76 + dv * 0.65) / radius;
     weight * inside * tone
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn patches(north: f64, east: f64, seed: u32) -> f32 {
 
 /// Share of the light that the bed returns at a place (north, east), seen by pixels of this
 /// footprint (m).
-pub(crate) fn bed(north: f64, east: f64, footprint: f64, seed: u32) -> f32 {
+pub(crate) fn seabed(north: f64, east: f64, footprint: f64, seed: u32) -> f32 {
     let sand = octaves(north, east, footprint, seed, &SAND);
     let (tu, tv) = (0.8 * north - 0.6 * east, 0.6 * north + 0.8 * east);
     let [(salt, cell), (turned_salt, turned_cell)] = STONES;
@@ -122,17 +122,17 @@ mod tests {
     }
 
     #[test]
-    fn the_bed_is_never_white_nor_black() {
+    fn the_seabed_is_never_white_nor_black() {
         for k in 0..20_000 {
             let (n, e) = (f64::from(k) * 0.0371, f64::from(k % 317) * 0.0113);
-            let a = bed(n, e, 0.004, 9);
+            let a = seabed(n, e, 0.004, 9);
             assert!((0.02..0.75).contains(&a), "{a}");
         }
     }
 
     #[test]
     fn far_away_a_texture_is_its_mean() {
-        assert!((bed(0.3, 0.4, 100.0, 9) - 0.33).abs() < 1e-6);
+        assert!((seabed(0.3, 0.4, 100.0, 9) - 0.33).abs() < 1e-6);
         assert_eq!(finish(Finish::Plate, 0.1, 0.2, 100.0, 9), 1.0);
     }
 }

@@ -6,8 +6,8 @@ use seafix_geometry::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    scene::{Corner, Scene},
     stream::Stream,
+    virtual_scene::{Corner, VirtualScene},
 };
 
 /// How points are measured. The default noise is what the paper's figures imply, not what the
@@ -31,12 +31,12 @@ impl Default for PointNoise {
 
 /// The rig in the world.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Eyes<'a> {
+pub(crate) struct PlacedRig<'a> {
     pub(crate) rig: &'a StereoRig,
     pub(crate) world_from_camera: Transform<World, Camera>,
 }
 
-impl Eyes<'_> {
+impl PlacedRig<'_> {
     /// Where the left and the right camera are.
     pub(crate) fn places(&self) -> [nalgebra::Vector3<f64>; 2] {
         let right = self.world_from_camera * self.rig.right_from_left().inverse();
@@ -44,7 +44,7 @@ impl Eyes<'_> {
     }
 
     /// The pixels of a corner that both cameras see, at least `margin` (px) from the border.
-    pub(crate) fn see(&self, scene: &Scene, corner: &Corner, margin: f64) -> Option<StereoPixels> {
+    pub(crate) fn see(&self, scene: &VirtualScene, corner: &Corner, margin: f64) -> Option<StereoPixels> {
         let at = self.world_from_camera.inverse() * Point::from(corner.at);
         let pixels = self.rig.sees(&at, margin)?;
         self.places().iter().all(|from| scene.sees(from, corner)).then_some(pixels)
@@ -52,7 +52,7 @@ impl Eyes<'_> {
 
     /// The pixels of a place that lies where the left camera looks along `pixel`, if the right one
     /// sees it too.
-    fn look(&self, scene: &Scene, pixel: &Pixel) -> Option<StereoPixels> {
+    fn project_visible(&self, scene: &VirtualScene, pixel: &Pixel) -> Option<StereoPixels> {
         let [left, right] = self.places();
         let direction = self.rig.left().normalize(pixel)?.push(1.0);
         let place = scene.seen(&left, &(self.world_from_camera.rotation() * direction))?;
@@ -61,7 +61,7 @@ impl Eyes<'_> {
     }
 
     /// The view as points, in an order that tells nothing.
-    pub(crate) fn measure(&self, scene: &Scene, noise: &PointNoise, stream: &mut Stream) -> Vec<MeasuredPoint> {
+    pub(crate) fn measure(&self, scene: &VirtualScene, noise: &PointNoise, stream: &mut Stream) -> Vec<MeasuredPoint> {
         let mut pixels = Vec::new();
         for corner in scene.bodies.iter().flat_map(|b| b.points.iter().chain(&b.distractors)) {
             if let Some(seen) = self.see(scene, corner, 0.0)
@@ -73,7 +73,7 @@ impl Eyes<'_> {
         let [width, height] = self.rig.left().size().map(|n| f64::from(n - 1));
         for _ in 0..noise.clutter {
             let pixel = Pixel { u: stream.between(0.0, width), v: stream.between(0.0, height) };
-            pixels.extend(self.look(scene, &pixel));
+            pixels.extend(self.project_visible(scene, &pixel));
         }
         for k in (1..pixels.len()).rev() {
             pixels.swap(k, stream.below(k + 1));

@@ -9,7 +9,7 @@
 use nalgebra::Vector3;
 use seafix_geometry::Pinhole;
 
-use crate::draw::changes;
+use crate::render::changes;
 
 /// Samples of a pixel that an edge crosses: a Fibonacci lattice.
 pub(crate) const SAMPLES: usize = 34;
@@ -40,7 +40,7 @@ pub(crate) struct Part {
     /// The facet's `id`, [`NONE`] where there is nothing.
     pub(crate) id: u32,
     /// Share of the pixel.
-    pub(crate) share: f32,
+    pub(crate) fraction: f32,
     /// Mean place of the part, from the pixel's centre.
     pub(crate) offset: [f64; 2],
     /// 1/Z at that place.
@@ -275,8 +275,8 @@ impl Visibility {
             }
             let (inner, inner_end) = outline.span(v, -1.0, self.width);
             for (&column, slot) in columns[from..to].iter().zip(slots.start + from..) {
-                let whole = (inner..inner_end).contains(&(column as usize));
-                let edges = if whole { &[][..] } else { &outline.edges };
+                let full = (inner..inner_end).contains(&(column as usize));
+                let edges = if full { &[][..] } else { &outline.edges };
                 let (depths, ids) = (&mut self.sample_depths[slot], &mut self.sample_ids[slot]);
                 samples(outline, edges, [f64::from(column), v], &self.places, &mut layered[slot], depths, ids);
             }
@@ -290,15 +290,15 @@ impl Visibility {
     }
 
     /// What a pixel sees that no edge crosses, the `id` and 1/Z; `None` of one that has parts.
-    pub(crate) fn whole(&self, column: usize, row: usize) -> Option<(u32, f64)> {
+    pub(crate) fn full(&self, column: usize, row: usize) -> Option<(u32, f64)> {
         (self.slots[row * self.width + column] == NONE).then(|| self.centre(column, row))
     }
 
     /// Calls `visit` with each part of a pixel.
     pub(crate) fn parts(&self, column: usize, row: usize, mut visit: impl FnMut(Part)) {
         let slot = self.slots[row * self.width + column];
-        if let Some((id, inverse_depth)) = self.whole(column, row) {
-            return visit(Part { id, share: 1.0, offset: [0.0; 2], inverse_depth });
+        if let Some((id, inverse_depth)) = self.full(column, row) {
+            return visit(Part { id, fraction: 1.0, offset: [0.0; 2], inverse_depth });
         }
         let (ids, depths) = (&self.sample_ids[slot as usize], &self.sample_depths[slot as usize]);
         let mut done = [false; SAMPLES];
@@ -316,7 +316,7 @@ impl Visibility {
             }
             visit(Part {
                 id: ids[first],
-                share: (count / SAMPLES as f64) as f32,
+                fraction: (count / SAMPLES as f64) as f32,
                 offset: offset.map(|x| x / count),
                 inverse_depth: inverse / count,
             });
@@ -351,17 +351,17 @@ fn samples(
     depths: &mut [f64; SAMPLES],
     ids: &mut [u32; SAMPLES],
 ) {
-    let mut least = [0.0; SAMPLES];
+    let mut min = [0.0; SAMPLES];
     for ([a, b, c], _) in edges {
         for k in 0..SAMPLES {
             let inside = a * (u + places[0][k]) + b * (v + places[1][k]) + c;
-            least[k] = if inside < least[k] { inside } else { least[k] };
+            min[k] = if inside < min[k] { inside } else { min[k] };
         }
     }
     let ([a, b, c], layer, id) = (outline.plane, outline.layer, outline.id);
     for k in 0..SAMPLES {
         let inverse = a * (u + places[0][k]) + b * (v + places[1][k]) + c;
-        let nearer = (inverse * layer > layered[k]) & (least[k] >= 0.0);
+        let nearer = (inverse * layer > layered[k]) & (min[k] >= 0.0);
         layered[k] = if nearer { inverse * layer } else { layered[k] };
         depths[k] = if nearer { inverse } else { depths[k] };
         ids[k] = if nearer { id } else { ids[k] };
@@ -387,9 +387,9 @@ mod tests {
         facet(&[[x[0], y[0], 2.0], [x[1], y[0], 2.0], [x[1], y[1], 2.0], [x[0], y[1], 2.0]], 3, 0)
     }
 
-    fn share(seen: &Visibility, column: usize, row: usize, id: u32) -> f64 {
+    fn fraction(seen: &Visibility, column: usize, row: usize, id: u32) -> f64 {
         let mut sum = 0.0;
-        seen.parts(column, row, |part| sum += if part.id == id { f64::from(part.share) } else { 0.0 });
+        seen.parts(column, row, |part| sum += if part.id == id { f64::from(part.fraction) } else { 0.0 });
         sum
     }
 
@@ -397,16 +397,16 @@ mod tests {
     fn the_centre_of_the_first_pixel_is_zero() {
         // From −0.5 to 0.5 a facet fills the first pixel and no other.
         let seen = Visibility::new(&[upright([-0.5, 0.5], [-0.5, 0.5])], &camera());
-        assert_eq!(share(&seen, 0, 0, 3), 1.0);
-        assert_eq!(share(&seen, 1, 0, 3) + share(&seen, 0, 1, 3), 0.0);
+        assert_eq!(fraction(&seen, 0, 0, 3), 1.0);
+        assert_eq!(fraction(&seen, 1, 0, 3) + fraction(&seen, 0, 1, 3), 0.0);
     }
 
     #[test]
-    fn an_edge_covers_its_share_of_a_pixel() {
+    fn an_edge_covers_its_fraction_of_a_pixel() {
         for cut in [10.07, 10.25, 10.5, 10.61, 10.93] {
             let seen = Visibility::new(&[upright([2.0, cut - 0.5], [4.0, 20.0])], &camera());
-            assert!((share(&seen, 10, 9, 3) - (cut - 10.0)).abs() < 0.016, "{cut}");
-            assert_eq!(share(&seen, 9, 9, 3), 1.0);
+            assert!((fraction(&seen, 10, 9, 3) - (cut - 10.0)).abs() < 0.016, "{cut}");
+            assert_eq!(fraction(&seen, 9, 9, 3), 1.0);
         }
     }
 
@@ -420,8 +420,10 @@ mod tests {
             .map(|c| Vector3::new(cosine * c.x - sine * c.y, sine * c.x + cosine * c.y, c.z))
             .collect();
         let seen = Visibility::new(&[Facet { corners: turned, ..square }], &camera());
-        let area: f64 =
-            (0..48).flat_map(|row| (0..64).map(move |column| (column, row))).map(|(c, r)| share(&seen, c, r, 3)).sum();
+        let area: f64 = (0..48)
+            .flat_map(|row| (0..64).map(move |column| (column, row)))
+            .map(|(c, r)| fraction(&seen, c, r, 3))
+            .sum();
         assert!((area - 13.5 * 20.5).abs() < 0.05, "{area}");
     }
 
@@ -446,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn facets_that_pass_through_each_other_share_the_pixels_between() {
+    fn facets_that_pass_through_each_other_fraction_the_pixels_between() {
         // Two planes that cross at u = 20.3.
         let x = |u: f64| (u - 31.5) / 50.0;
         let flat = facet(&[[-3.0, -3.0, 2.0], [3.0, -3.0, 2.0], [3.0, 3.0, 2.0], [-3.0, 3.0, 2.0]], 1, 0);
@@ -455,7 +457,7 @@ mod tests {
         let [[x0, z0], [x1, z1]] = [slope(-1.0), slope(1.0)];
         let steep = facet(&[[x0, -3.0, z0], [x1, -3.0, z1], [x1, 3.0, z1], [x0, 3.0, z0]], 2, 0);
         let seen = Visibility::new(&[flat, steep], &camera());
-        assert!((share(&seen, 20, 20, 2) - 0.8).abs() < 0.02);
+        assert!((fraction(&seen, 20, 20, 2) - 0.8).abs() < 0.02);
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! Albedos at many places at once: the values of [`paint::bed`](crate::paint::bed) and [`paint::finish`](crate::paint::finish),
+//! Albedos at many places at once: the values of [`paint::seabed`](crate::paint::seabed) and [`paint::finish`](crate::paint::finish),
 //! bit by bit, by loops that vectorise.
 
 use crate::{
     noise::{DIRECTIONS, hash, shown},
     paint::{OCTAVE_TURNS, SAND, STONES, coats, octave_seed},
-    scene::Finish,
+    virtual_scene::Finish,
 };
 
 /// Places that are worked on at once.
@@ -13,9 +13,9 @@ const CHUNK: usize = 32;
 /// A number for each place.
 type Lane<T> = [T; CHUNK];
 
-/// [`paint::bed`](crate::paint::bed) at each place (north, east), seen by pixels of these footprints (m).
+/// [`paint::seabed`](crate::paint::seabed) at each place (north, east), seen by pixels of these footprints (m).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-pub(crate) fn beds(north: &[f64], east: &[f64], footprint: &[f64], seed: u32, out: &mut Vec<f32>) {
+pub(crate) fn seabeds(north: &[f64], east: &[f64], footprint: &[f64], seed: u32, out: &mut Vec<f32>) {
     out.clear();
     out.resize(north.len(), 0.0);
     let places = north.chunks(CHUNK).zip(east.chunks(CHUNK)).zip(footprint.chunks(CHUNK));
@@ -124,16 +124,16 @@ fn pebbles(x: f64, y: f64, footprint: f64, seed: u32, cell: f64) -> f32 {
     let weight = shown(cell * 0.5, footprint);
     let ((cu, fu), (cv, fv)) = (split(x / cell), split(y / cell));
     let h = hash(cu, cv, seed);
-    let share = |shift: u32| ((h >> shift) & 0xFF) as i32 as f32 / 255.0;
-    let radius = 0.16 + 0.26 * share(3) * share(3);
+    let fraction = |shift: u32| ((h >> shift) & 0xFF) as i32 as f32 / 255.0;
+    let radius = 0.16 + 0.26 * fraction(3) * fraction(3);
     let room = 1.0 - 2.0 * radius;
-    let (du, dv) = (fu - radius - room * share(8), fv - radius - room * share(16));
-    let stretch = 1.0 + 0.5 * share(20);
+    let (du, dv) = (fu - radius - room * fraction(8), fv - radius - room * fraction(16));
+    let stretch = 1.0 + 0.5 * fraction(20);
     let (along, across) = if h & 0x800_0000 == 0 { (du, dv * stretch) } else { (du * stretch, dv) };
     let distance = (along * along + across * across).sqrt();
     let soft = (footprint / cell) as f32 + 0.3 * radius;
     let inside = ((radius - distance) / soft + 0.5).clamp(0.0, 1.0);
-    let tone = 0.9 * share(24) - 0.5 + 0.12 * (du * 0.76 + dv * 0.65) / radius;
+    let tone = 0.9 * fraction(24) - 0.5 + 0.12 * (du * 0.76 + dv * 0.65) / radius;
     if h & 7 > 3 { 0.0 } else { weight * inside * tone }
 }
 
@@ -162,10 +162,14 @@ mod tests {
             let (north, east) = (of(0.0137), of(-0.0051));
             let widths: Vec<f64> = (0..count).map(|k| footprint * (1.0 + f64::from(k % 7) * 0.03)).collect();
             let mut all = vec![9.0; 3];
-            beds(&north, &east, &widths, 77, &mut all);
+            seabeds(&north, &east, &widths, 77, &mut all);
             assert_eq!(all.len(), north.len());
             for (k, value) in all.iter().enumerate() {
-                assert_eq!(value.to_bits(), paint::bed(north[k], east[k], widths[k], 77).to_bits(), "{footprint}, {k}");
+                assert_eq!(
+                    value.to_bits(),
+                    paint::seabed(north[k], east[k], widths[k], 77).to_bits(),
+                    "{footprint}, {k}"
+                );
             }
             for finish in [Finish::Plate, Finish::Paint, Finish::Rock] {
                 finishes(finish, &north, &east, &widths, 5, &mut all);

@@ -49,7 +49,7 @@ pub enum Purpose {
     /// A reading of the depth.
     Depth,
     /// Imperfections that a device keeps for the whole dive.
-    Device,
+    FaultyDevice,
     /// The particles in the water.
     Snow,
     /// A question to the transponders on the bed.
@@ -147,7 +147,7 @@ mod tests {
 
     /// Seen to fail when the spare number is not used first.
     #[test]
-    fn many_normal_numbers_are_those_drawn_one_by_one() {
+    fn many_normal_numbers_are_those_generated_one_by_one() {
         let stream = || Stream::new(4, 0, 7, Purpose::LeftImage);
         let (mut one, mut many) = (stream(), stream());
         for count in [1, 0, 64, 300, 5, 20_000, 1] {
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_stay_below_their_bound() {
+    fn integers_stay_below_their_bound() {
         let mut stream = Stream::new(7, 0, 1, Purpose::Points);
         assert!((0..1000).all(|_| stream.below(7) < 7));
         assert_eq!(stream.below(0), 0);

@@ -6,8 +6,8 @@ use seafix_referencing::{ModelPoint, Site, SiteObject};
 
 use crate::{
     blueprint::{Blueprint, ObjectPlan},
-    scene::{Body, Scene},
     stream::{Purpose, Stream},
+    virtual_scene::{Body, VirtualScene},
 };
 
 /// Errors of distances between surveyed points are kept below this many standard deviations, so
@@ -26,14 +26,14 @@ pub(crate) struct SurveyErrors {
 /// The site as described, and where its objects truly are.
 pub(crate) fn survey(
     blueprint: &Blueprint,
-    scene: &Scene,
+    scene: &VirtualScene,
     errors: SurveyErrors,
     seed: u64,
 ) -> (Site, Vec<Transform<World, Object>>) {
-    let drawn = blueprint.objects.iter().zip(&scene.bodies).enumerate().map(|(index, (plan, body))| {
+    let sampled = blueprint.objects.iter().zip(&scene.bodies).enumerate().map(|(index, (plan, body))| {
         survey_object(plan, body, errors, &mut Stream::new(seed, 0, index as u64, Purpose::Survey))
     });
-    let (objects, truth): (Vec<_>, Vec<_>) = drawn.unzip();
+    let (objects, truth): (Vec<_>, Vec<_>) = sampled.unzip();
     let frame = blueprint.objects.iter().position(|o| o.id == blueprint.site_frame).unwrap_or(0);
     (Site { name: blueprint.name.clone(), frame, objects, warnings: Vec::new() }, truth)
 }
@@ -112,16 +112,17 @@ fn surveyed_base(
     stream: &mut Stream,
 ) -> [Point<World>; 3] {
     let limit = SURVEY_LIMIT * (2.0 * (errors.survey.powi(2) + errors.model.powi(2))).sqrt() + 5e-6;
-    let mut drawn = truth;
+    let mut sampled = truth;
     // Almost every draw passes; where a thousand do not, the last stands and the site file's check tells.
     for _ in 0..1000 {
-        drawn = truth.map(|p| (p + stream.normal3(errors.survey)).map(micrometres));
-        let fits = |i: usize, k: usize| ((drawn[i] - drawn[k]).norm() - model[i].distance(&model[k])).abs() <= limit;
+        sampled = truth.map(|p| (p + stream.normal3(errors.survey)).map(micrometres));
+        let fits =
+            |i: usize, k: usize| ((sampled[i] - sampled[k]).norm() - model[i].distance(&model[k])).abs() <= limit;
         if fits(0, 1) && fits(0, 2) && fits(1, 2) {
             break;
         }
     }
-    drawn.map(Point::from)
+    sampled.map(Point::from)
 }
 
 /// Rounded to a micrometre: the site file stays readable.
@@ -162,16 +163,16 @@ fn best_fit(
 mod tests {
     use super::*;
 
-    fn drawn(errors: SurveyErrors, seed: u64) -> (Site, Vec<Transform<World, Object>>, Scene) {
+    fn sampled(errors: SurveyErrors, seed: u64) -> (Site, Vec<Transform<World, Object>>, VirtualScene) {
         let blueprint = Blueprint::drill_centre();
-        let scene = Scene::new(&blueprint, seed);
+        let scene = VirtualScene::new(&blueprint, seed);
         let (site, truth) = survey(&blueprint, &scene, errors, seed);
         (site, truth, scene)
     }
 
     #[test]
     fn an_exact_survey_is_exact() {
-        let (site, truth, scene) = drawn(SurveyErrors { model: 0.0, survey: 0.0 }, 3);
+        let (site, truth, scene) = sampled(SurveyErrors { model: 0.0, survey: 0.0 }, 3);
         for ((object, world_from_object), body) in site.objects.iter().zip(&truth).zip(&scene.bodies) {
             for (point, corner) in object.points.iter().zip(&body.points) {
                 assert!((*world_from_object * point.at).distance(&Point::from(corner.at)) < 3e-6);
@@ -184,7 +185,7 @@ mod tests {
     fn the_model_is_good_to_a_millimetre_and_the_survey_to_a_centimetre() {
         let (mut model, mut survey, mut n, mut m) = (0.0, 0.0, 0.0, 0.0);
         for seed in 0..20 {
-            let (site, truth, scene) = drawn(SurveyErrors { model: 0.001, survey: 0.01 }, seed);
+            let (site, truth, scene) = sampled(SurveyErrors { model: 0.001, survey: 0.01 }, seed);
             for ((object, world_from_object), body) in site.objects.iter().zip(&truth).zip(&scene.bodies) {
                 for (point, corner) in object.points.iter().zip(&body.points) {
                     model += ((*world_from_object * point.at).coords - corner.at).norm_squared();
@@ -203,9 +204,9 @@ mod tests {
     }
 
     #[test]
-    fn the_site_file_says_the_same_and_passes_its_own_check() {
+    fn the_site_file_states_the_same_and_passes_its_own_check() {
         for seed in 0..10 {
-            let (site, _, _) = drawn(SurveyErrors { model: 0.001, survey: 0.01 }, seed);
+            let (site, _, _) = sampled(SurveyErrors { model: 0.001, survey: 0.01 }, seed);
             let text = site.to_toml();
             let read = Site::parse(&text, std::path::Path::new("site.toml")).unwrap();
             assert_eq!(read.warnings, []);

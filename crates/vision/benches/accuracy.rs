@@ -106,13 +106,13 @@ fn main() {
         let mut work = Workspace::default();
         let mut places = Vec::new();
         for (name, locator) in &all {
-            let mut least = f64::INFINITY;
+            let mut min = f64::INFINITY;
             for _ in 0..9 {
                 let begin = ThreadTime::now();
                 locator.locate_into(&image, &points, &mut work, &mut places);
-                least = least.min(begin.elapsed().as_secs_f64() * 1e3);
+                min = min.min(begin.elapsed().as_secs_f64() * 1e3);
             }
-            println!("1000 × {name}: {least:.2} ms of one thread");
+            println!("1000 × {name}: {min:.2} ms of one thread");
         }
     }
 }
@@ -204,8 +204,8 @@ fn pixels(scene: &Parameters, chequer: bool, left: usize, top: usize, side: usiz
             let ((a0, a1), (b0, b1)) = (side(0), side(1));
             let mass = |from: f64, to: f64| if to > from { below(to) - below(from) } else { 0.0 };
             let both = mass(a0.max(b0), a1.min(b1));
-            let share = if chequer { 1.0 - mass(a0, a1) - mass(b0, b1) + 2.0 * both } else { both };
-            lit += weight * share;
+            let fraction = if chequer { 1.0 - mass(a0, a1) - mass(b0, b1) + 2.0 * both } else { both };
+            lit += weight * fraction;
             all += weight;
         }
         dark + difference * lit / all

@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 use seafix_geometry::{Pinhole, Pixel, StereoRig, Transform};
-use seafix_vision::{Direct, Image, Pair, Place, Refinement, Warp, Weight, ZnccParabola};
+use seafix_vision::{Direct, Image, Pair, Refinement, UncertainPixel, Warp, Weight, ZnccParabola};
 
 use random::Random;
 
@@ -42,16 +42,17 @@ struct Scene {
 }
 
 /// Half of the side of the gravel bed (px).
-const BED: f64 = 34.0;
+const SEABED: f64 = 34.0;
 /// Spacing of the stones (px).
 const SPACING: f64 = 4.5;
 
 impl Scene {
     fn new(kind: Kind, random: &mut Random) -> Self {
         let turn = 2.0 * PI * random.uniform();
-        let across = (2.0 * BED / SPACING) as usize;
+        let across = (2.0 * SEABED / SPACING) as usize;
         let stone = |i: usize, random: &mut Random| {
-            let [x, y] = [i % across, i / across].map(|k| -BED + SPACING * (k as f64 + 0.2 + 0.6 * random.uniform()));
+            let [x, y] =
+                [i % across, i / across].map(|k| -SEABED + SPACING * (k as f64 + 0.2 + 0.6 * random.uniform()));
             let sign = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
             [x, y, 1.2 + 1.2 * random.uniform(), sign * (0.5 + 0.5 * random.uniform())]
         };
@@ -66,8 +67,8 @@ impl Scene {
             Kind::X => step(u) * step(v),
             Kind::L => 0.5 * (1.0 + step(u)) * (1.0 + step(v)) - 1.0,
             Kind::Gravel => {
-                let across = (2.0 * BED / SPACING) as isize;
-                let [i, j] = [x, y].map(|x| ((x + BED) / SPACING).floor() as isize);
+                let across = (2.0 * SEABED / SPACING) as isize;
+                let [i, j] = [x, y].map(|x| ((x + SEABED) / SPACING).floor() as isize);
                 let mut sum = 0.0;
                 for j in (j - 1).max(0)..(j + 2).min(across) {
                     for i in (i - 1).max(0)..(i + 2).min(across) {
@@ -130,7 +131,7 @@ fn measure(kind: Kind, slope: f64, noise: f64, refinement: &dyn Refinement, wind
         let right = picture(&scene, |p| back * (p - right_at), noise, &mut random);
         let start = right_at + Vector2::new(random.uniform() - 0.5, random.uniform() - 0.5);
         let pixel = |v: &Vector2<f64>| Pixel { u: v.x, v: v.y };
-        let [l, r] = [&left_at, &start].map(|at| Place::independent(pixel(at), 0.15));
+        let [l, r] = [&left_at, &start].map(|at| UncertainPixel::independent(pixel(at), 0.15));
         sums.count += 1;
         let [pair] = refinement.refine(&[Pair { left: l, right: r }], &left, &right, &rig)[..] else {
             sums.failed += 1;
@@ -193,8 +194,8 @@ fn main() {
     let uniform = Direct { window: 21, weight: Weight::Uniform, ..moving.clone() };
     for kind in [Kind::X, Kind::L, Kind::Gravel] {
         for noise in [0.0, 2.0, 5.0] {
-            for refine in [&uniform, &moving, &Direct::default()] {
-                row(kind, 0.0, noise, refine);
+            for refinement in [&uniform, &moving, &Direct::default()] {
+                row(kind, 0.0, noise, refinement);
             }
         }
     }

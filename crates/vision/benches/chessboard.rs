@@ -17,7 +17,7 @@ use common::peer::{OPENCV, Peer, floats};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use seafix_component::Choice;
 use seafix_geometry::{Pinhole, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels};
-use seafix_vision::{DESCRIPTORS, DETECTORS, Direct, FrontEnd, LOCATORS, Look, MATCHERS, Optimal, Warp};
+use seafix_vision::{DESCRIPTORS, DETECTORS, Direct, FrontEnd, FrontEndOutput, LOCATORS, MATCHERS, Optimal, Warp};
 use serde_json::{Value, json};
 
 /// How near to OpenCV's corner ours has to be (px).
@@ -63,9 +63,9 @@ fn main() {
                     return Board { ours: theirs.iter().copied().map(Some).collect(), theirs, wrong: 0 };
                 };
                 let images = ["left", "right"].map(|side| opencv.picture(&format!("{folder}/{side}{pair}.jpg")));
-                let mut look = Look::default();
-                front_end(warp).look(&images[0], &images[1], &rig, &mut look);
-                found(theirs, &look.pixels)
+                let mut output = FrontEndOutput::default();
+                front_end(warp).run(&images[0], &images[1], &rig, &mut output);
+                found(theirs, &output.pixels)
             })
             .collect();
         let all = || boards.iter().flat_map(|board| board.theirs.iter().zip(&board.ours));

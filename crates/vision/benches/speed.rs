@@ -112,15 +112,15 @@ fn measure(stage: &mut Stage<'_>, mut peer: Option<&mut Peer>, pool: &rayon::Thr
 fn print(stage: &Stage<'_>, times: Times, allocations: [usize; 2]) {
     let [peer, one] = [times.peer, times.ours].map(Summary::of);
     let [alone, two] = times.clock.map(Summary::of);
-    let ratio = one.least / peer.least;
+    let ratio = one.min / peer.min;
     let verdict = |met: bool| if met { "met" } else { "MISSED" };
     let mut remarks = Vec::new();
-    if let Some(limit) = stage.at_most {
+    if let Some(limit) = stage.max_ratio {
         remarks.push(format!("at most {limit:.3}: {}", verdict(ratio <= limit)));
     }
-    if let Some(limit) = stage.at_most_ms {
-        remarks.push(format!("at most {limit} ms: {}", verdict(one.least <= limit)));
-        remarks.push(format!("{:.1} Hz, on two threads {:.1} Hz", 1e3 / one.least, 1e3 / two.least));
+    if let Some(limit) = stage.max_ms {
+        remarks.push(format!("at most {limit} ms: {}", verdict(one.min <= limit)));
+        remarks.push(format!("{:.1} Hz, on two threads {:.1} Hz", 1e3 / one.min, 1e3 / two.min));
     }
     println!(
         "{:<40} {:>17} {:>17} {:>7.3} {:>17} {:>5.2} {:>7}  {}",
@@ -129,14 +129,14 @@ fn print(stage: &Stage<'_>, times: Times, allocations: [usize; 2]) {
         one.to_string(),
         ratio,
         two.to_string(),
-        alone.least / two.least,
+        alone.min / two.min,
         format!("{}/{}", allocations[0], allocations[1]),
         remarks.join("; "),
     );
 }
 
 struct Summary {
-    least: f64,
+    min: f64,
     median: f64,
 }
 
@@ -144,13 +144,13 @@ impl Summary {
     fn of(mut times: Vec<f64>) -> Self {
         times.sort_by(f64::total_cmp);
         let at = |i: usize| times.get(i).copied().unwrap_or(f64::NAN);
-        Self { least: at(0), median: at(times.len() / 2) }
+        Self { min: at(0), median: at(times.len() / 2) }
     }
 }
 
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.least.is_nan() { write!(f, "–") } else { write!(f, "{:.2} ({:.2})", self.least, self.median) }
+        if self.min.is_nan() { write!(f, "–") } else { write!(f, "{:.2} ({:.2})", self.min, self.median) }
     }
 }
 

@@ -5,8 +5,8 @@ use std::time::Instant;
 use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels};
 
 use crate::{
-    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Locator, Match, Matcher, Pair, Place, Refinement,
-    Threads, Triangulator, View, Workspace,
+    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Locator, Match, Matcher, Pair, Refinement, Threads,
+    Triangulator, UncertainPixel, View, Workspace,
 };
 
 /// The stages between two images and a cloud.
@@ -32,9 +32,9 @@ pub struct FrontEnd {
 ///
 /// Used again for the next pair it allocates nothing that an earlier pair did not need.
 #[derive(Debug, Default)]
-pub struct Look {
+pub struct FrontEndOutput {
     /// Left and right.
-    eyes: [Eye; 2],
+    sides: [SideOutput; 2],
     /// The images as the filters leave them; where there is no filter the images are looked at themselves.
     filtered: [Option<Image>; 2],
     work: Workspace,
@@ -52,10 +52,10 @@ pub struct Look {
 
 /// One image's part.
 #[derive(Debug, Default)]
-struct Eye {
+struct SideOutput {
     work: Workspace,
     keypoints: Vec<Keypoint>,
-    located: Vec<Option<Place>>,
+    located: Vec<Option<UncertainPixel>>,
     descriptors: Descriptors,
 }
 
@@ -94,21 +94,21 @@ impl StageTimes {
     }
 }
 
-impl Look {
+impl FrontEndOutput {
     /// An empty one; `threads` says who works.
     pub fn new(threads: Threads) -> Self {
-        let eye = || Eye { work: Workspace::new(threads), ..Eye::default() };
-        Self { eyes: [eye(), eye()], work: Workspace::new(threads), ..Self::default() }
+        let side = || SideOutput { work: Workspace::new(threads), ..SideOutput::default() };
+        Self { sides: [side(), side()], work: Workspace::new(threads), ..Self::default() }
     }
 
     /// The key points of the left and of the right image.
     pub fn keypoints(&self) -> [&[Keypoint]; 2] {
-        [&self.eyes[0].keypoints, &self.eyes[1].keypoints]
+        [&self.sides[0].keypoints, &self.sides[1].keypoints]
     }
 
     /// Their descriptors, in the same order; of no meaning where the matcher compares none.
     pub fn descriptors(&self) -> [&Descriptors; 2] {
-        [&self.eyes[0].descriptors, &self.eyes[1].descriptors]
+        [&self.sides[0].descriptors, &self.sides[1].descriptors]
     }
 
     /// The images as the filters leave them; `None` where there is no filter.
@@ -118,9 +118,9 @@ impl Look {
 }
 
 impl FrontEnd {
-    /// Replaces what is in `look` by what these two images show.
-    pub fn look(&self, left: &Image, right: &Image, rig: &StereoRig, look: &mut Look) {
-        let Look { eyes: [l, r], filtered, work, matches, pairs, pixels, cloud, times } = look;
+    /// Replaces what is in `output` by what these two images show.
+    pub fn run(&self, left: &Image, right: &Image, rig: &StereoRig, output: &mut FrontEndOutput) {
+        let FrontEndOutput { sides: [l, r], filtered, work, matches, pairs, pixels, cloud, times } = output;
         let [clear_left, clear_right] = filtered;
         let threads = work.threads();
         let (mut left, mut right) = (left, right);
@@ -133,16 +133,17 @@ impl FrontEnd {
             }
         });
         times.detect_ms = timed(|| {
-            let detect = |image, eye: &mut Eye| self.detector.detect_into(image, &mut eye.work, &mut eye.keypoints);
+            let detect =
+                |image, side: &mut SideOutput| self.detector.detect_into(image, &mut side.work, &mut side.keypoints);
             threads.join(|| detect(left, l), || detect(right, r));
         });
         times.locate_ms = timed(|| {
             threads.join(|| self.locate(left, l), || self.locate(right, r));
         });
         times.describe_ms = timed(|| {
-            let describe = |image, eye: &mut Eye| {
+            let describe = |image, side: &mut SideOutput| {
                 if self.matcher.compares_descriptors() {
-                    self.descriptor.describe_into(image, &eye.keypoints, &mut eye.work, &mut eye.descriptors);
+                    self.descriptor.describe_into(image, &side.keypoints, &mut side.work, &mut side.descriptors);
                 }
             };
             threads.join(|| describe(left, l), || describe(right, r));
@@ -154,9 +155,9 @@ impl FrontEnd {
         times.refine_ms = timed(|| {
             pairs.clear();
             let pair = |found: &Match| {
-                let rough = || Place::independent(left.keypoints[found.left].at, sigma);
-                let place = l.located[found.left].unwrap_or_else(rough);
-                Pair { left: place, right: Place::independent(found.right, sigma) }
+                let detected = || UncertainPixel::independent(left.keypoints[found.left].at, sigma);
+                let place = l.located[found.left].unwrap_or_else(detected);
+                Pair { left: place, right: UncertainPixel::independent(found.right, sigma) }
             };
             pairs.extend(matches.iter().map(pair));
             self.refinement.refine_into(pairs, left.image, right.image, rig, work, pixels);
@@ -174,8 +175,8 @@ impl FrontEnd {
 
     /// Moves the key points of `image` to the corners they are near. Key points of one corner are one: the
     /// strongest, which comes first.
-    fn locate(&self, image: &Image, eye: &mut Eye) {
-        let Eye { work, keypoints, located, .. } = eye;
+    fn locate(&self, image: &Image, side: &mut SideOutput) {
+        let SideOutput { work, keypoints, located, .. } = side;
         self.locator.locate_into(image, keypoints, work, located);
         let mut kept = 0;
         for i in 0..keypoints.len() {

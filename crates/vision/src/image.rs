@@ -89,8 +89,8 @@ impl Image {
         const STEP: f64 = 255.0 / 65_535.0;
         // Some pixels tell: finer levels are whole once in hundreds.
         let stride = (self.pixels.len() / 257).max(1);
-        let whole = self.pixels.iter().step_by(stride).all(|level| level.fract() == 0.0);
-        if whole { 1.0 / 12.0 } else { STEP * STEP / 12.0 }
+        let full = self.pixels.iter().step_by(stride).all(|level| level.fract() == 0.0);
+        if full { 1.0 / 12.0 } else { STEP * STEP / 12.0 }
     }
 
     /// The pixels rounded to 8 bits, clipped at black and white.
@@ -101,7 +101,7 @@ impl Image {
 
 /// Noise of whole grey levels, the same every time.
 #[cfg(test)]
-pub(crate) fn rough(width: usize, height: usize) -> Image {
+pub(crate) fn random_image(width: usize, height: usize) -> Image {
     let value = |i: usize| {
         let h = (i as u32).wrapping_mul(0x9E37_79B1);
         ((h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 24) as f32

@@ -12,17 +12,17 @@
 mod align;
 mod describe;
 mod detect;
+mod epipolar_check;
 mod filter;
 mod front_end;
 mod gaussian;
 mod image;
 mod locate;
 mod matching;
-mod off_lines;
-mod realigned;
+mod right_camera_rotation;
 mod scale_space;
 mod stages;
-mod swapped;
+mod swap_check;
 mod track;
 mod triangulate;
 mod workspace;
@@ -35,15 +35,15 @@ pub use detect::{
     DETECTORS, Detector, Dog, Fast, FastHessian, FittedCorners, Harris, Keypoint, LCorners, Selection, ShiTomasi,
     Window, XCorners,
 };
+pub use epipolar_check::{EpipolarCheck, repeated_patterns};
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
-pub use front_end::{FrontEnd, Look, StageTimes};
+pub use front_end::{FrontEnd, FrontEndOutput, StageTimes};
 pub use image::{BadImage, Image};
-pub use locate::{Corner, CornerFit, Junction, LCorner, LOCATORS, Locator, Pair, Peak, Place, XCorner};
+pub use locate::{Corner, CornerFit, Junction, LCorner, LOCATORS, Locator, Pair, Peak, UncertainPixel, XCorner};
 pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View, ZnccBand};
-pub use off_lines::{OffLines, look_alikes};
-pub use realigned::Realigned;
-pub use stages::{StageChoices, UnfitStage};
-pub use swapped::Sides;
+pub use right_camera_rotation::RightCameraRotation;
+pub use stages::{InvalidStage, StageChoices};
+pub use swap_check::Sides;
 pub use track::{Pyramid, Track, Tracker};
 pub use triangulate::{Linear, Midpoint, Optimal, PointRules, TRIANGULATORS, Triangulator, read_triangulator};
 pub use workspace::{Threads, Workspace};

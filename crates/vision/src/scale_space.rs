@@ -18,7 +18,7 @@ const IMAGE_SIGMA: f64 = 0.5;
 /// Where the Gaussians end (standard deviations).
 const CUT: f64 = 4.0;
 /// No octave is smaller (px).
-const LEAST_SIDE: usize = 16;
+const MIN_SIDE: usize = 16;
 
 /// An image under Gaussians of growing width, at half the resolution whenever the width has doubled.
 ///
@@ -27,7 +27,7 @@ const LEAST_SIDE: usize = 16;
 /// (x, y) · 2^o in the image.
 ///
 /// Levels are made when they are first asked for and kept: a descriptor that follows the detector on
-/// the same image finds them. They depend on the image alone. Octaves of more than [`MOST_WHOLE`] pixels are not kept but
+/// the same image finds them. They depend on the image alone. Octaves of more than [`MAX_FULL`] pixels are not kept but
 /// made again in strips of rows ([`sweep`](Self::sweep)), so that 64 Mpx take no 7 GB: below, about 32
 /// bytes a pixel are held, 130 with octave −1.
 ///
@@ -42,17 +42,17 @@ pub(crate) struct ScaleSpace {
     rows: Vec<Vec<f32>>,
     doubled: Vec<f32>,
     /// Pixels of the largest octave that is kept whole.
-    most_whole: usize,
+    max_full: usize,
 }
 
 impl Default for ScaleSpace {
     fn default() -> Self {
-        Self::keeping(MOST_WHOLE)
+        Self::keeping(MAX_FULL)
     }
 }
 
 /// Pixels of the largest octave that is kept whole: 200 MB.
-const MOST_WHOLE: usize = 8 << 20;
+const MAX_FULL: usize = 8 << 20;
 /// Rows on either side of a strip: those that the edge of the strip changes, up to the last level 48, and those that an
 /// extremum (12) or a descriptor (40) looks at beyond its own.
 const MARGIN: usize = 96;
@@ -100,7 +100,7 @@ pub(crate) fn sigma(octave: i32, level: f64) -> f64 {
 /// How many octaves from 0 on an image of this size has; at least one.
 pub(crate) fn octaves(width: usize, height: usize) -> i32 {
     let mut count = 1;
-    while width.min(height) >> count >= LEAST_SIDE {
+    while width.min(height) >> count >= MIN_SIDE {
         count += 1;
     }
     count
@@ -118,7 +118,7 @@ impl ScaleSpace {
     }
 
     /// An empty one that keeps octaves of so many pixels at most.
-    pub(crate) fn keeping(most_whole: usize) -> Self {
+    pub(crate) fn keeping(max_full: usize) -> Self {
         Self {
             image: None,
             octaves: Vec::new(),
@@ -126,7 +126,7 @@ impl ScaleSpace {
             kernel: Vec::new(),
             rows: Vec::new(),
             doubled: Vec::new(),
-            most_whole,
+            max_full,
         }
     }
 
@@ -139,18 +139,18 @@ impl ScaleSpace {
 
     /// Whether an octave is kept whole; of the others there are strips.
     pub(crate) fn keeps(&self, octave: i32) -> bool {
-        self.size(octave).iter().product::<usize>() <= self.most_whole
+        self.size(octave).iter().product::<usize>() <= self.max_full
     }
 
-    /// Shows `look` an octave with its levels made up to `level`: whole if it is kept, or else strip by strip, each with
+    /// Shows `visit` an octave with its levels made up to `level`: whole if it is kept, or else strip by strip, each with
     /// enough rows around it that nothing in it depends on the strips.
     ///
     /// # Panics
     /// When there is no image.
-    pub(crate) fn sweep(&mut self, octave: i32, level: usize, threads: Threads, mut look: impl FnMut(&Octave, Strip)) {
+    pub(crate) fn sweep(&mut self, octave: i32, level: usize, threads: Threads, mut visit: impl FnMut(&Octave, Strip)) {
         let [width, height] = self.size(octave);
         if self.keeps(octave) {
-            return look(self.octave(octave, level, threads), Strip { rows: 0..height, first: 0 });
+            return visit(self.octave(octave, level, threads), Strip { rows: 0..height, first: 0 });
         }
         if octave > 0 {
             self.begin(octave, threads);
@@ -166,12 +166,12 @@ impl ScaleSpace {
         }
         let level = if begins { level.max(INTERVALS) } else { level };
         // As many rows as are kept of other octaves, yet not lost among their surroundings; even, as the doubled ones are.
-        let step = (self.most_whole / width).saturating_sub(2 * MARGIN).max(2 * MARGIN) & !1;
+        let step = (self.max_full / width).saturating_sub(2 * MARGIN).max(2 * MARGIN) & !1;
         for begin in (0..height).step_by(step) {
             let rows = begin..(begin + step).min(height);
             let first = rows.start.saturating_sub(MARGIN);
             self.make(octave, first..(rows.end + MARGIN).min(height), level, threads);
-            look(&self.strip, Strip { rows: rows.clone(), first });
+            visit(&self.strip, Strip { rows: rows.clone(), first });
             if begins {
                 let inner = &self.strip.levels[INTERVALS][(rows.start - first) * width..(rows.end - first) * width];
                 halve(inner, width, &mut self.octaves[next].levels[0]);
@@ -357,15 +357,15 @@ mod tests {
     }
 
     #[test]
-    fn strips_show_what_the_whole_does() {
+    fn strips_show_what_the_full_does() {
         let value = |i: usize| ((i * 7919 + i / 90 * 31) % 251) as f32;
         let image = Image::new(90, 700, (0..90 * 700).map(value).collect()).unwrap();
-        let (mut whole, mut strips) = (ScaleSpace::default(), ScaleSpace::keeping(2000));
-        whole.look_at(&image);
+        let (mut full, mut strips) = (ScaleSpace::default(), ScaleSpace::keeping(2000));
+        full.look_at(&image);
         strips.look_at(&image);
         for octave in [1, -1, 0, 2, 3] {
             let level = LEVELS - 1;
-            let expected = whole.octave(octave, level, Threads::One);
+            let expected = full.octave(octave, level, Threads::One);
             let (mut seen, mut count) = (0, 0);
             strips.sweep(octave, level, Threads::One, |found, Strip { rows, first }| {
                 assert_eq!(rows.start, seen);

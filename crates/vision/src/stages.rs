@@ -18,15 +18,15 @@ pub struct StageChoices<'a> {
     /// Pairs left with right.
     pub matcher: &'a Choice,
     /// Aligns each pair between the cameras.
-    pub refine: &'a Choice,
+    pub refinement: &'a Choice,
     /// Turns pairs into points.
-    pub triangulation: &'a Choice,
+    pub triangulator: &'a Choice,
 }
 
 /// A stage that cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{error}")]
-pub struct UnfitStage {
+pub struct InvalidStage {
     /// Its field of [`StageChoices`].
     pub stage: &'static str,
     /// Of a filter, its place in the list.
@@ -39,10 +39,10 @@ impl FrontEnd {
     /// The stages of these choices, ready to work.
     ///
     /// # Errors
-    /// [`UnfitStage`]: the first that cannot be built.
-    pub fn build(choices: &StageChoices<'_>) -> Result<Self, UnfitStage> {
+    /// [`InvalidStage`]: the first that cannot be built.
+    pub fn build(choices: &StageChoices<'_>) -> Result<Self, InvalidStage> {
         let filter = |(place, choice)| {
-            FILTERS.build(choice).map_err(|error| UnfitStage { stage: "filters", place: Some(place), error })
+            FILTERS.build(choice).map_err(|error| InvalidStage { stage: "filters", place: Some(place), error })
         };
         Ok(Self {
             filters: choices.filters.iter().enumerate().map(filter).collect::<Result<_, _>>()?,
@@ -50,14 +50,14 @@ impl FrontEnd {
             locator: stage("locator", &LOCATORS, choices.locator)?,
             descriptor: stage("descriptor", &DESCRIPTORS, choices.descriptor)?,
             matcher: stage("matcher", &MATCHERS, choices.matcher)?,
-            refinement: stage("refine", &REFINEMENTS, choices.refine)?,
-            triangulator: stage("triangulation", &TRIANGULATORS, choices.triangulation)?,
+            refinement: stage("refinement", &REFINEMENTS, choices.refinement)?,
+            triangulator: stage("triangulator", &TRIANGULATORS, choices.triangulator)?,
         })
     }
 }
 
-fn stage<T: ?Sized>(stage: &'static str, of: &Registry<T>, choice: &Choice) -> Result<Box<T>, UnfitStage> {
-    of.build(choice).map_err(|error| UnfitStage { stage, place: None, error })
+fn stage<T: ?Sized>(stage: &'static str, of: &Registry<T>, choice: &Choice) -> Result<Box<T>, InvalidStage> {
+    of.build(choice).map_err(|error| InvalidStage { stage, place: None, error })
 }
 
 #[cfg(test)]
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unfit_stage_is_named_by_its_setting() {
+    fn an_invalid_stage_is_named_by_its_setting() {
         let filters = [Choice::named("clahe"), Choice::named("clahé")];
         let good = StageChoices {
             filters: &filters[..1],
@@ -73,26 +73,26 @@ mod tests {
             locator: &Choice::named("peak"),
             descriptor: &Choice::named("surf"),
             matcher: &Choice::named("epipolar-band"),
-            refine: &Choice::named("direct"),
-            triangulation: &Choice::named("optimal"),
+            refinement: &Choice::named("direct"),
+            triangulator: &Choice::named("optimal"),
         };
         assert!(FrontEnd::build(&good).is_ok());
         let wrong = &Choice::named("nothing-of-this-name");
-        let unfit = |choices| FrontEnd::build(&choices).map(|_| ()).unwrap_err();
-        let told = unfit(StageChoices { filters: &filters, ..good });
-        assert_eq!((told.stage, told.place), ("filters", Some(1)));
+        let invalid = |choices| FrontEnd::build(&choices).map(|_| ()).unwrap_err();
+        let reported = invalid(StageChoices { filters: &filters, ..good });
+        assert_eq!((reported.stage, reported.place), ("filters", Some(1)));
         let each = [
             ("detector", StageChoices { detector: wrong, ..good }),
             ("locator", StageChoices { locator: wrong, ..good }),
             ("descriptor", StageChoices { descriptor: wrong, ..good }),
             ("matcher", StageChoices { matcher: wrong, ..good }),
-            ("refine", StageChoices { refine: wrong, ..good }),
-            ("triangulation", StageChoices { triangulation: wrong, ..good }),
+            ("refinement", StageChoices { refinement: wrong, ..good }),
+            ("triangulator", StageChoices { triangulator: wrong, ..good }),
         ];
         for (name, choices) in each {
-            let told = unfit(choices);
-            assert_eq!((told.stage, told.place), (name, None));
-            assert_eq!(told.to_string(), told.error.to_string());
+            let reported = invalid(choices);
+            assert_eq!((reported.stage, reported.place), (name, None));
+            assert_eq!(reported.to_string(), reported.error.to_string());
         }
     }
 }

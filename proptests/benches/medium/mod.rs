@@ -1,7 +1,7 @@
 //! The problem of each family that stands for it.
 
 use seafix_referencing::problem_file::CoherenceProblem;
-use seafix_simulation::families::{Drawn, Family, Presence};
+use seafix_simulation::families::{Family, Generated, Presence};
 
 /// Their numbers among those of seed 1.
 pub(crate) const MEDIUM: [(Family, u64); 7] =
@@ -10,5 +10,5 @@ pub(crate) const MEDIUM: [(Family, u64); 7] =
 /// The one of the family in this place.
 pub(crate) fn problem(place: usize) -> CoherenceProblem {
     let (family, number) = MEDIUM[place];
-    Drawn::new(family, 1, number, Presence::Present).problem.problem()
+    Generated::new(family, 1, number, Presence::Present).problem.problem()
 }

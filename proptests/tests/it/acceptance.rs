@@ -8,7 +8,7 @@ use seafix_evaluation::Solved;
 use seafix_geometry::{Camera, Object, Point, Transform};
 use seafix_proptests::problems::Listed;
 use seafix_referencing::{Acceptance, Mahalanobis, Outcome, RigidConsensus, Search, judge};
-use seafix_simulation::families::{Drawn, Family, Presence};
+use seafix_simulation::families::{Family, Generated, Presence};
 
 /// Nothing is refused as absent by this much.
 const ANYTHING: f64 = 0.999_999;
@@ -22,41 +22,43 @@ struct Tried {
     /// Of that, the part of a pattern that looks like it.
     alike: f64,
     /// Of the same, the expected number of chance sets as good, with the crowd about it.
-    chance: f64,
+    nfa: f64,
     /// Why the default settings do not believe it; `None` where they do.
     refused: Option<&'static str>,
     right: bool,
     /// Whether the likeliest pose is right, believed or not.
-    likeliest: bool,
+    map_estimate: bool,
 }
 
 fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
-    let drawn = Drawn::new(family, seed, number, presence);
-    let listed = Listed::new(drawn.problem.problem());
+    let generated = Generated::new(family, seed, number, presence);
+    let listed = Listed::new(generated.problem.problem());
     let (file, problem) = (&listed.file, listed.problem());
-    let truth = Transform::<Camera, Object>::from_rows(&drawn.truth.t_cam_obj).expect("it is a rigid motion").inverse();
-    let rule = Solved { ideal_rms: drawn.truth.ideal_tre_rms, putative: file.putative.is_some() };
+    let truth =
+        Transform::<Camera, Object>::from_rows(&generated.truth.t_cam_obj).expect("it is a rigid motion").inverse();
+    let rule = Solved { ideal_rms: generated.truth.ideal_tre_rms, putative: file.putative.is_some() };
     let at: Vec<Point<Object>> = file.model.iter().map(|point| point.at).collect();
     // Nothing is refused for what chance gives either: the default's row is judged by the default.
-    let acceptance = Acceptance { absence: ANYTHING, chance_budget: f64::INFINITY, ..Acceptance::default() };
+    let acceptance = Acceptance { absence: ANYTHING, max_nfa: f64::INFINITY, ..Acceptance::default() };
     let found = RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0));
-    let belief = found.as_ref().ok().and_then(|found| found.belief.clone()).unwrap_or_default();
-    let likeliest = belief.explanations.first().is_some_and(|best| rule.holds(&best.object_from_camera, &truth, &at));
+    let posterior = found.as_ref().ok().and_then(|found| found.posterior.clone()).unwrap_or_default();
+    let map_estimate =
+        posterior.explanations.first().is_some_and(|best| rule.holds(&best.object_from_camera, &truth, &at));
     let (mut absent, mut alike, mut right) = (1.0, 1.0, false);
     let solver = Mahalanobis::default();
     let by_default = judge(&problem, found.clone(), &solver, &Acceptance::default(), None).outcome;
     let refused = by_default.reason();
     let attempt = judge(&problem, found, &solver, &acceptance, None);
     // With nothing refused as absent any second pose would be a copy: what the default answers is judged as it answers.
-    let answers = [by_default, attempt.outcome].into_iter().find(|outcome| matches!(outcome, Outcome::Referenced(_)));
-    if let Some(Outcome::Referenced(reference)) = answers {
-        let shares = belief.shares(&file.model, 0.08);
-        (absent, alike) = (shares.absent, shares.alike);
+    let answers = [by_default, attempt.outcome].into_iter().find(|outcome| matches!(outcome, Outcome::Fix(_)));
+    if let Some(Outcome::Fix(reference)) = answers {
+        let probabilities = posterior.probabilities(&file.model, 0.08);
+        (absent, alike) = (probabilities.absent, probabilities.alike);
         right = rule.holds(&reference.object_from_camera, &truth, &at);
     }
-    let crowd = belief.explanations.first().map_or(0.0, |best| best.ln_crowd);
-    let chance = attempt.expected_chance_sets.map_or(f64::INFINITY, |expected| expected * crowd.exp());
-    Tried { defined: drawn.truth.pose_defined, absent, alike, chance, refused, right, likeliest }
+    let clutter_density = posterior.explanations.first().map_or(0.0, |best| best.ln_clutter_density);
+    let nfa = attempt.nfa.map_or(f64::INFINITY, |expected| expected * clutter_density.exp());
+    Tried { defined: generated.truth.pose_defined, absent, alike, nfa, refused, right, map_estimate }
 }
 
 /// Solved (of the defined), wrong (of the answers, object present), and answered although the object is absent, for some
@@ -72,15 +74,15 @@ fn what_is_solved_depends_on_what_is_believed() {
     let number = |name: &str, default: &str| -> u64 { variable(name, default).parse().expect("a number") };
     let (present, absent, seed) =
         (number("ACCEPTANCE_PRESENT", "252"), number("ACCEPTANCE_ABSENT", "252"), number("ACCEPTANCE_SEED", "21"));
-    let (most, step) = (number("ACCEPTANCE_PAIRS", "4000000"), number("ACCEPTANCE_STEP", "1"));
+    let (max, step) = (number("ACCEPTANCE_PAIRS", "4000000"), number("ACCEPTANCE_STEP", "1"));
     println!(
         "| family | believed | solved % | wrong of answers | absent frames answered | likeliest right % |\n|---|---|---|---|---|---|"
     );
     for name in variable("ACCEPTANCE_FAMILIES", "abcdefg").chars() {
         let family: Family = name.to_string().parse().expect("a family");
         let small = |k: &u64| {
-            let problem = Drawn::new(family, seed, *k, Presence::Present).problem.problem();
-            problem.candidates().is_ok_and(|candidates| candidates.pairs() as u64 <= most)
+            let problem = Generated::new(family, seed, *k, Presence::Present).problem.problem();
+            problem.candidates().is_ok_and(|candidates| candidates.pairs() as u64 <= max)
         };
         let all = |count: u64, presence: Presence| -> Vec<Tried> {
             (0..)
@@ -92,7 +94,7 @@ fn what_is_solved_depends_on_what_is_believed() {
         };
         let (with, without) = (all(present, Presence::Present), all(absent, Presence::Absent));
         let defined = with.iter().filter(|one| one.defined).count();
-        let likeliest = with.iter().filter(|one| one.defined && one.likeliest).count();
+        let map_estimate = with.iter().filter(|one| one.defined && one.map_estimate).count();
         let row = |what: String, answered: &dyn Fn(&Tried) -> bool| {
             let given: Vec<&Tried> = with.iter().filter(|one| answered(one)).collect();
             let right = given.iter().filter(|one| one.right).count();
@@ -103,7 +105,7 @@ fn what_is_solved_depends_on_what_is_believed() {
                 given.len() - right,
                 given.len(),
                 without.len(),
-                100.0 * likeliest as f64 / defined.max(1) as f64,
+                100.0 * map_estimate as f64 / defined.max(1) as f64,
             );
         };
         row("default".to_owned(), &|one| one.refused.is_none());
@@ -113,13 +115,13 @@ fn what_is_solved_depends_on_what_is_believed() {
         // The defined that are not solved: why not, with the likeliest pose right and wrong.
         let mut reasons: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
         for one in with.iter().filter(|one| one.defined && !(one.refused.is_none() && one.right)) {
-            reasons.entry(one.refused.unwrap_or("answered")).or_default()[usize::from(!one.likeliest)] += 1;
+            reasons.entry(one.refused.unwrap_or("answered")).or_default()[usize::from(!one.map_estimate)] += 1;
         }
         println!("{name}, of {defined} not solved (likeliest pose right, wrong): {reasons:?}");
         // The default, or the expected number of chance sets and a bound of the probability of absence.
-        for (chance, absence) in [(1e-4, 1e-2), (3e-5, 1e-2), (1e-5, 1e-2), (3e-5, 5e-4), (1e-5, 5e-4)] {
-            let rare = |one: &Tried| one.chance <= chance && one.absent <= absence && one.alike <= 2e-5;
-            row(format!("{chance:.0e} sets, {absence:.0e}"), &|one| one.refused.is_none() || rare(one));
+        for (nfa, absence) in [(1e-4, 1e-2), (3e-5, 1e-2), (1e-5, 1e-2), (3e-5, 5e-4), (1e-5, 5e-4)] {
+            let rare = |one: &Tried| one.nfa <= nfa && one.absent <= absence && one.alike <= 2e-5;
+            row(format!("{nfa:.0e} sets, {absence:.0e}"), &|one| one.refused.is_none() || rare(one));
         }
     }
 }

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use seafix_referencing::{
     Acceptance, Attempt, Correspondence, Mahalanobis, Outcome, RigidConsensus, problem_file::CoherenceProblem,
 };
-use seafix_simulation::families::{Drawn, Family, Presence};
+use seafix_simulation::families::{Family, Generated, Presence};
 
 /// The numbers of the points of a problem in another order: the new place k has the old point order[k].
 struct Order {
@@ -67,27 +67,27 @@ fn no_order_of_the_points_changes_an_answer() {
 
 /// So many problems of each family with and without the object, of the first that have no more points than this, each in so many other
 /// orders.
-fn in_other_orders(problems: usize, most_points: usize, orders: usize) {
+fn in_other_orders(problems: usize, max_points: usize, orders: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(24);
     let mut outcomes = BTreeMap::new();
     for family in "abcdefg".chars().map(|name| name.to_string().parse::<Family>().expect("a family")) {
         for presence in [Presence::Present, Presence::Absent] {
-            let drawn = (0..40).map(|number| Drawn::new(family, 24, number, presence).problem.problem());
-            for problem in drawn.filter(|problem| problem.cloud.len() <= most_points).take(problems) {
+            let generated = (0..40).map(|number| Generated::new(family, 24, number, presence).problem.problem());
+            for problem in generated.filter(|problem| problem.cloud.len() <= max_points).take(problems) {
                 let first = attempt(&problem);
-                *outcomes.entry(first.outcome.reason().unwrap_or("referenced")).or_insert(0) += 1;
+                *outcomes.entry(first.outcome.reason().unwrap_or("fix")).or_insert(0) += 1;
                 for _ in 0..orders {
                     let order = Order::any(&problem, &mut rng);
                     let again = attempt(&order.of(&problem));
                     let name = format!("{} ({presence:?})", problem.id);
                     assert_eq!(first.outcome.reason(), again.outcome.reason(), "{name}");
-                    if let (Outcome::Referenced(one), Outcome::Referenced(other)) = (&first.outcome, &again.outcome) {
+                    if let (Outcome::Fix(one), Outcome::Fix(other)) = (&first.outcome, &again.outcome) {
                         assert_eq!(one.pairs, order.back(&other.pairs), "{name}");
                         let apart = one.object_from_camera.inverse() * other.object_from_camera;
                         assert!(apart.translation().norm() < 1e-9 && apart.rotation().angle() < 1e-9, "{name}");
                     }
                     assert_eq!((first.optimal, first.size_bound), (again.optimal, again.size_bound), "{name}");
-                    match (first.expected_chance_sets, again.expected_chance_sets) {
+                    match (first.nfa, again.nfa) {
                         (Some(one), Some(other)) => {
                             assert!((one - other).abs() <= 1e-6 * one, "{name}: {one}, {other}");
                         }
@@ -97,5 +97,5 @@ fn in_other_orders(problems: usize, most_points: usize, orders: usize) {
             }
         }
     }
-    assert!(outcomes.len() > 2 && outcomes["referenced"] > problems, "{outcomes:?}");
+    assert!(outcomes.len() > 2 && outcomes["fix"] > problems, "{outcomes:?}");
 }

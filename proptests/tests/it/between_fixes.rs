@@ -6,10 +6,10 @@ use seafix_component::Choice;
 use seafix_evaluation::clopper_pearson;
 use seafix_geometry::{Camera, Covariance6, Object, World};
 use seafix_navigation::{
-    Considered, Event, EveryFrame, FUSIONS, Fuse, Fusion, Interval, Navigated, Navigator, POLICIES, Place, Policy,
-    Situation, Standing, State,
+    ConsiderStates, Event, EveryFrame, FUSIONS, Fuse, Fusion, Interval, Navigated, Navigator, ObjectPlacement,
+    ObjectPose, POLICIES, Policy, Situation, State,
 };
-use seafix_proptests::{cases, law, poses::pose, voyage::Voyage, within};
+use seafix_proptests::{cases, law, navigation_scenario::NavigationScenario, poses::pose, within};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Every policy asks for a fix where there is none yet and an object is in view.
@@ -52,7 +52,7 @@ fn a_fusion_knows_no_origin() {
     let near = (pose::<Object, Camera>(5.0), proptest::array::uniform6(-3e-3..3e-3), pose::<Object, Object>(50.0));
     law(256, near, |(known, off, moved)| {
         let at =
-            |object_from_camera, sigma| Standing::new(object_from_camera, Covariance6::isotropic(0.5 * sigma, sigma));
+            |object_from_camera, sigma| ObjectPose::new(object_from_camera, Covariance6::isotropic(0.5 * sigma, sigma));
         let fixed = known.perturbed(&off.into());
         for name in FUSIONS.names() {
             let fusion = FUSIONS.build(&Choice::named(name)).unwrap();
@@ -77,13 +77,14 @@ fn a_fusion_knows_no_origin() {
 fn passing_there_and_back_changes_nothing() {
     let place = pose::<World, Object>(50.0);
     law(256, (pose::<Object, Camera>(5.0), place, pose::<World, Object>(50.0)), |(start, a, b)| {
-        let exact = |world_from_object| Place { world_from_object, covariance: Covariance6::new(Matrix6::zeros()) };
+        let exact =
+            |world_from_object| ObjectPlacement { world_from_object, covariance: Covariance6::new(Matrix6::zeros()) };
         let places = [exact(a), exact(b)];
-        let known = Standing::new(start, Covariance6::isotropic(1e-3, 1e-2));
-        let there = Navigated { object: 0, standing: known.clone() }.passed_to(1, &places);
+        let known = ObjectPose::new(start, Covariance6::isotropic(1e-3, 1e-2));
+        let there = Navigated { object: 0, object_pose: known.clone() }.passed_to(1, &places);
         let world = a * start;
-        within("there", (b * there.standing.object_from_camera).error_to(&world).norm(), 1e-10)?;
-        let back = there.passed_to(0, &places).standing;
+        within("there", (b * there.object_pose.object_from_camera).error_to(&world).norm(), 1e-10)?;
+        let back = there.passed_to(0, &places).object_pose;
         within("back", back.object_from_camera.error_to(&start).norm(), 1e-10)?;
         within("covariance", (back.covariance.matrix - known.covariance.matrix).amax(), 1e-14)
     });
@@ -91,17 +92,17 @@ fn passing_there_and_back_changes_nothing() {
 
 /// Mean NEES over dives and instants, each dive's mean counted once for the interval.
 fn consistency(dives: u32, steps: usize) -> (f64, f64) {
-    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 20.0 }, Fuse::default());
+    let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 20.0 }, Fuse::default());
     let mut means = Vec::new();
     for number in 0..dives.into() {
-        let mut sailing = voyage.set_out(number);
+        let mut sailing = scenario.set_out(number);
         let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
         let mut sum = 0.0;
         for step in 0..steps {
             let local = sailing.step();
             navigator.advance(1.0, Some(&local));
             if navigator.due(true) {
-                navigator.fix(&sailing.fix((step / 30) % voyage.objects));
+                navigator.fix(&sailing.fix((step / 30) % scenario.objects));
             }
             sum += sailing.nees(navigator.pose().expect("the first instant has a fix"));
         }
@@ -118,7 +119,7 @@ fn consistency(dives: u32, steps: usize) -> (f64, f64) {
 ///
 /// Seen to fail when the survey is left out of a passage.
 #[test]
-fn the_navigated_pose_errs_as_much_as_it_says() {
+fn the_navigated_pose_has_an_error_as_much_as_it_states() {
     let dives = cases(100);
     let (mean, error) = consistency(dives, 300);
     println!("NEES over {dives} dives of 300 s: {mean:.3} ± {error:.3}");
@@ -127,12 +128,12 @@ fn the_navigated_pose_errs_as_much_as_it_says() {
 
 /// NEES over dives that go past three objects and back, looking at their points: the mean of all dives and instants, and the
 /// share of instants at which the mean of the dives lies within its 95 % bounds.
-fn looked(dives: u32, policy: &dyn Policy, fusion: &dyn Fusion, considered: bool) -> (f64, f64) {
+fn navigated_errors(dives: u32, policy: &dyn Policy, fusion: &dyn Fusion, consider_states: bool) -> (f64, f64) {
     const STEPS: usize = 160;
-    let voyage = Voyage { objects: 3, meander: 0.0, ..Voyage::default() };
+    let scenario = NavigationScenario { objects: 3, meander: 0.0, ..NavigationScenario::default() };
     let mut sums = [0.0; STEPS];
     for number in 0..dives.into() {
-        let mut sailing = voyage.set_out(number);
+        let mut sailing = scenario.set_out(number);
         let mut navigator = Navigator::new(sailing.surveyed.clone(), policy, fusion);
         for (step, sum) in sums.iter_mut().enumerate() {
             if step == STEPS / 2 {
@@ -140,9 +141,12 @@ fn looked(dives: u32, policy: &dyn Policy, fusion: &dyn Fusion, considered: bool
             }
             let local = sailing.step();
             navigator.advance(1.0, Some(&local));
-            let mut fixes: Vec<Navigated> = (0..voyage.objects).filter_map(|object| sailing.look(object)).collect();
-            if !considered {
-                fixes.iter_mut().for_each(|fix| fix.standing = fix.standing.clone().considering(Considered::default()));
+            let mut fixes: Vec<Navigated> =
+                (0..scenario.objects).filter_map(|object| sailing.observe(object)).collect();
+            if !consider_states {
+                fixes.iter_mut().for_each(|fix| {
+                    fix.object_pose = fix.object_pose.clone().with_consider_states(ConsiderStates::default())
+                });
             }
             if step == 0 || navigator.due(!fixes.is_empty()) {
                 fixes.iter().for_each(|fix| drop(navigator.fix(fix)));
@@ -174,23 +178,23 @@ fn what_a_model_has_wrong_is_not_learned_from_many_fixes() {
         let policy = POLICIES.build(&choice).unwrap();
         for name in ["fuse", "replace"] {
             let fusion = FUSIONS.build(&Choice::named(name)).unwrap();
-            let (mean, within) = looked(dives, &*policy, &*fusion, true);
+            let (mean, within) = navigated_errors(dives, &*policy, &*fusion, true);
             println!("{choice:?} {name}: NEES {mean:.2}, within its bounds at {within:.2} of the instants");
             assert!((mean - 6.0).abs() < bound && within >= 0.9, "{choice:?} {name}: {mean} {within}");
         }
     }
-    let (alone, _) = looked(dives, &EveryFrame::default(), &Fuse::default(), false);
+    let (alone, _) = navigated_errors(dives, &EveryFrame::default(), &Fuse::default(), false);
     println!("taken for independent: NEES {alone:.2}");
     assert!(alone > 12.0, "{alone}");
 }
 
 /// Mean NEES in the end of dives that stay at one object, with a fix a second for a minute.
 fn stayed(dives: u32, fusion: &str, shared: f64) -> f64 {
-    let voyage = Voyage { objects: 1, shared, ..Voyage::default() };
+    let scenario = NavigationScenario { objects: 1, shared, ..NavigationScenario::default() };
     let (policy, fusion) = (Interval { seconds: 1.0 }, FUSIONS.build(&Choice::named(fusion)).expect("it is listed"));
     let mut sum = 0.0;
     for number in 0..dives.into() {
-        let mut sailing = voyage.set_out(number);
+        let mut sailing = scenario.set_out(number);
         let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &*fusion);
         for _ in 0..60 {
             navigator.advance(1.0, Some(&sailing.step()));
@@ -223,16 +227,16 @@ fn shared_errors_do_not_add_up_to_certainty() {
 ///
 /// Seen to fail when every fix passes.
 #[test]
-fn a_poor_glimpse_moves_no_pose() {
-    let voyage = Voyage { survey: (0.02, 0.05), ..Voyage::default() };
-    let mut sailing = voyage.set_out(0);
+fn a_poor_observation_moves_no_pose() {
+    let scenario = NavigationScenario { survey: (0.02, 0.05), ..NavigationScenario::default() };
+    let mut sailing = scenario.set_out(0);
     let (policy, fusion) = (Interval { seconds: 1.0 }, FUSIONS.build(&Choice::named("intersect")).unwrap());
     let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &*fusion);
     navigator.fix(&sailing.fix(0));
     let before = navigator.pose().unwrap().clone();
     let good = sailing.fix(1);
-    let poor = Standing::new(good.standing.object_from_camera, Covariance6::isotropic(0.1, 0.5));
-    assert_eq!(navigator.fix(&Navigated { standing: poor, object: good.object }), Event::Left);
+    let poor = ObjectPose::new(good.object_pose.object_from_camera, Covariance6::isotropic(0.1, 0.5));
+    assert_eq!(navigator.fix(&Navigated { object_pose: poor, object: good.object }), Event::Left);
     assert_eq!(navigator.pose(), Some(&before));
     assert_eq!(navigator.fix(&good), Event::Taken);
     assert_eq!(navigator.pose().unwrap().object, 1);
@@ -241,11 +245,14 @@ fn a_poor_glimpse_moves_no_pose() {
 /// Errors along 5 km with a fix every `every` seconds: RMS of the first and of the last third over the dives, and
 /// the slope (m per km) with its standard error.
 fn far(dives: u64, every: f64, steps: usize) -> (f64, f64, f64, f64) {
-    let (voyage, policy, fusion) =
-        (Voyage { objects: 1, ..Voyage::default() }, Interval { seconds: every }, Fuse::default());
+    let (scenario, policy, fusion) = (
+        NavigationScenario { objects: 1, ..NavigationScenario::default() },
+        Interval { seconds: every },
+        Fuse::default(),
+    );
     let (mut slopes, mut first, mut last) = (Vec::new(), 0.0, 0.0);
     for number in 0..dives {
-        let mut sailing = voyage.set_out(number);
+        let mut sailing = scenario.set_out(number);
         let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
         let (mut xs, mut ys) = (Vec::new(), Vec::new());
         for step in 0..steps {
@@ -256,8 +263,8 @@ fn far(dives: u64, every: f64, steps: usize) -> (f64, f64, f64, f64) {
             }
             // The error of the camera's place in its own surroundings: of the pose, not of a far origin.
             let known = navigator.pose().expect("the first instant has a fix");
-            let error = known.standing.object_from_camera.error_to(&sailing.truth(0));
-            xs.push(step as f64 * voyage.step * 1e-3);
+            let error = known.object_pose.object_from_camera.error_to(&sailing.truth(0));
+            xs.push(step as f64 * scenario.step * 1e-3);
             ys.push(error.fixed_rows::<3>(3).norm());
         }
         let third = steps / 3;
@@ -280,7 +287,7 @@ fn far(dives: u64, every: f64, steps: usize) -> (f64, f64, f64, f64) {
 /// Seen to fail when later fixes are not taken.
 #[test]
 fn fixes_bound_the_error_over_any_distance() {
-    let steps = (5000.0 / Voyage::default().step) as usize;
+    let steps = (5000.0 / NavigationScenario::default().step) as usize;
     let (first, last, slope, error) = far(20, 40.0, steps);
     println!(
         "fix every 40 s, 5 km: RMS {first:.4} m in the first third, {last:.4} m in the last; slope {slope:.2e} ± {error:.1e} m/km"
@@ -296,20 +303,26 @@ fn fixes_bound_the_error_over_any_distance() {
 /// Seen to fail when the covariance is not turned with the motion.
 #[test]
 fn dead_reckoning_grows_as_predicted() {
-    let voyage = Voyage { objects: 1, odometry: (1e-4, 0.0), fix: (1e-9, 1e-9), meander: 0.0, ..Voyage::default() };
+    let scenario = NavigationScenario {
+        objects: 1,
+        odometry: (1e-4, 0.0),
+        fix: (1e-9, 1e-9),
+        meander: 0.0,
+        ..NavigationScenario::default()
+    };
     let spread = |steps: usize| {
         let (mut real, mut said) = ([0.0; 2], [0.0; 2]);
         for number in 0..300 {
-            let mut sailing = voyage.set_out(number);
+            let mut sailing = scenario.set_out(number);
             let mut known = sailing.fix(0);
             for _ in 0..steps {
                 known = known.after(&sailing.step());
             }
-            let error = known.standing.object_from_camera.error_to(&sailing.truth(0));
+            let error = known.object_pose.object_from_camera.error_to(&sailing.truth(0));
             real[0] += error.fixed_rows::<3>(0).norm_squared();
             real[1] += error.fixed_rows::<3>(3).norm_squared();
-            said[0] += known.standing.covariance.attitude_sigma().powi(2);
-            said[1] += known.standing.covariance.position_sigma().powi(2);
+            said[0] += known.object_pose.covariance.attitude_sigma().powi(2);
+            said[1] += known.object_pose.covariance.position_sigma().powi(2);
         }
         ([(real[0] / 300.0).sqrt(), (real[1] / 300.0).sqrt()], [(said[0] / 300.0).sqrt(), (said[1] / 300.0).sqrt()])
     };
@@ -323,10 +336,10 @@ fn dead_reckoning_grows_as_predicted() {
 
 /// How many of `dives` dives reject one wrong fix and keep their pose.
 fn unmoved_by_one_wrong_fix(dives: u64) -> u64 {
-    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 10.0 }, Fuse::default());
+    let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 10.0 }, Fuse::default());
     let mut unmoved = 0;
     for number in 0..dives {
-        let mut sailing = voyage.set_out(number);
+        let mut sailing = scenario.set_out(number);
         let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
         navigator.advance(1.0, Some(&sailing.step()));
         for _ in 0..3 {
@@ -354,10 +367,11 @@ fn one_wrong_fix_is_rejected() {
 /// Of `dives` dives past `objects` objects, one of which was moved, each in its turn: how many report it, how many leave open
 /// which of two was moved, and how many reports name another.
 fn displaced(dives: u64, objects: usize, metres: f64, fusion: Fuse) -> [u64; 3] {
-    let (voyage, policy) = (Voyage { objects, ..Voyage::default() }, Interval { seconds: 5.0 });
+    let (scenario, policy) =
+        (NavigationScenario { objects, ..NavigationScenario::default() }, Interval { seconds: 5.0 });
     let (mut reported, mut open, mut false_reports) = (0, 0, 0);
     for number in 0..dives {
-        let mut sailing = voyage.set_out(number);
+        let mut sailing = scenario.set_out(number);
         let moved = (number as usize) % objects;
         // One that is displaced is turned too, by however little it is shifted.
         if metres > 0.0 {
@@ -420,10 +434,10 @@ fn wrong_fixes_and_displaced_objects_in_many_dives() {
     assert!(rejected.0 >= 0.999);
     for (objects, metres) in [3, 5].into_iter().flat_map(|objects| [0.1, 0.2, 0.5].map(|metres| (objects, metres))) {
         let [reported, open, false_reports] = displaced(5000, objects, metres, Fuse::default());
-        let share = clopper_pearson(reported as usize, 5000, 0.95);
+        let fraction = clopper_pearson(reported as usize, 5000, 0.95);
         let frames = 5000 * 30 * objects;
         println!(
-            "displaced by {metres} m, {objects} objects: {reported} of 5000 reported, interval {share:.4?}, {open} left open; \
+            "displaced by {metres} m, {objects} objects: {reported} of 5000 reported, interval {fraction:.4?}, {open} left open; \
              {false_reports} false reports in {frames} frames"
         );
         assert!(reported as f64 >= 0.99 * 5000.0);
@@ -437,11 +451,14 @@ fn wrong_fixes_and_displaced_objects_in_many_dives() {
 /// Seen to fail when of two objects that nothing else confirms the later is blamed.
 #[test]
 fn without_a_third_none_of_two_is_blamed() {
-    let (voyage, policy, fusion) =
-        (Voyage { objects: 2, ..Voyage::default() }, Interval { seconds: 5.0 }, Fuse::default());
-    let mut told = 0;
+    let (scenario, policy, fusion) = (
+        NavigationScenario { objects: 2, ..NavigationScenario::default() },
+        Interval { seconds: 5.0 },
+        Fuse::default(),
+    );
+    let mut n_reported = 0;
     for number in 0..200 {
-        let mut sailing = voyage.set_out(number);
+        let mut sailing = scenario.set_out(number);
         sailing.displace(number as usize % 2, 0.3);
         let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
         let mut disputed = 0;
@@ -460,10 +477,10 @@ fn without_a_third_none_of_two_is_blamed() {
         }
         assert_eq!(navigator.places(), sailing.surveyed);
         assert!(disputed == 0 || navigator.is_disputed(0) && navigator.is_disputed(1));
-        told += u64::from(disputed == 1);
+        n_reported += u64::from(disputed == 1);
     }
-    println!("{told} of 200 told once");
-    assert!(told >= 198);
+    println!("{n_reported} of 200 told once");
+    assert!(n_reported >= 198);
 }
 
 /// Where odometry is lost nothing is carried across, and the log says why.
@@ -471,18 +488,18 @@ fn without_a_third_none_of_two_is_blamed() {
 /// Seen to fail when the last fix outlives a break.
 #[test]
 fn a_break_is_no_motion() {
-    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 5.0 }, Fuse::default());
-    let mut sailing = voyage.set_out(0);
+    let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 5.0 }, Fuse::default());
+    let mut sailing = scenario.set_out(0);
     let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
-    assert_eq!(navigator.state(), State::Rough);
+    assert_eq!(navigator.state(), State::Prior);
     assert!(navigator.due(true) && navigator.state() == State::Searching);
     navigator.fix(&sailing.fix(0));
     navigator.advance(1.0, Some(&sailing.step()));
     assert_eq!(navigator.state(), State::DeadReckoning);
     navigator.advance(1.0, None);
-    assert_eq!((navigator.state(), navigator.pose()), (State::Rough, None));
+    assert_eq!((navigator.state(), navigator.pose()), (State::Prior, None));
     let states: Vec<State> = navigator.changes().iter().map(|change| change.to).collect();
-    assert_eq!(states, [State::Searching, State::Referenced, State::DeadReckoning, State::Rough]);
+    assert_eq!(states, [State::Searching, State::Fixed, State::DeadReckoning, State::Prior]);
     assert!(navigator.changes().iter().all(|change| !change.why.is_empty()));
 }
 
@@ -491,12 +508,12 @@ fn a_break_is_no_motion() {
 ///
 /// Seen to fail when only a rough pose can search.
 #[test]
-fn the_state_is_what_it_is_said_to_be() {
-    use State::{DeadReckoning, Referenced, Searching};
-    let (voyage, policy, fusion) = (Voyage::default(), Interval { seconds: 1.5 }, Fuse::default());
-    let mut sailing = voyage.set_out(0);
+fn the_state_is_what_it_is_stated_to_be() {
+    use State::{DeadReckoning, Fixed, Searching};
+    let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 1.5 }, Fuse::default());
+    let mut sailing = scenario.set_out(0);
     let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
-    assert!(!navigator.blind(0.0, false) || navigator.state() == State::Rough);
+    assert!(!navigator.blind(0.0, false) || navigator.state() == State::Prior);
     navigator.fix(&sailing.fix(0));
     assert!(!navigator.blind(1.0, true) && navigator.state() == State::DeadReckoning, "a fix of another instant");
     assert!(navigator.blind(2.0, true) && navigator.state() == State::DeadReckoning && navigator.pose().is_some());
@@ -509,7 +526,7 @@ fn the_state_is_what_it_is_said_to_be() {
         }
         states.push(navigator.state());
     }
-    assert_eq!(states, [DeadReckoning, Searching, Searching, DeadReckoning, Searching, Referenced]);
+    assert_eq!(states, [DeadReckoning, Searching, Searching, DeadReckoning, Searching, Fixed]);
     // Each change is told once, and leads from the state before.
     let changes = navigator.changes();
     assert!(changes.windows(2).all(|two| two[0].to == two[1].from && !two[1].why.is_empty()), "{changes:?}");

@@ -3,11 +3,11 @@
 use seafix_component::Choice;
 use seafix_navigation::{Event, FUSIONS, Navigated, Navigator, State};
 use seafix_proptests::{
-    graphs::{ANY, Graph, MOST, Posts, TURNS, Which, graphs},
+    graphs::{ANY, Graph, MAX, Posts, TURNS, Which, graphs},
     orders::{BLIND, Did, Happening, Kind, Ledger, Listener, Must, OBJECTS, Site, happens, is_better},
     searches::{Tried, searches},
 };
-use seafix_referencing::{Correspondence, Kabsch, Observations, Problem, Solver, Tolerance, Unidentified};
+use seafix_referencing::{Correspondence, Kabsch, Observations, Problem, Rejected, Solver, Tolerance};
 
 /// The least set that is an answer.
 const NEEDED: usize = 3;
@@ -72,12 +72,12 @@ fn hold_problem<'a>(searches: impl Iterator<Item = &'a (Tried, Measure)>, proble
         assert_eq!(agree, graph.adjacent(v, w), "vertices {v} and {w} of {graph:?}");
     }
     let mut cliques = graph.cliques();
-    let most = cliques[0].len();
+    let max = cliques[0].len();
     let rigid = cliques.iter().find(|set| set.len() >= NEEDED && is_rigid(problem, set)).map_or(0, Vec::len);
-    cliques.retain(|set| set.len() >= most.min(rigid));
+    cliques.retain(|set| set.len() >= max.min(rigid));
     for (search, measure) in searches {
         let said = || format!("{} of {graph:?}", search.name);
-        let size = if *measure == Measure::Rigidly { rigid } else { most };
+        let size = if *measure == Measure::Rigidly { rigid } else { max };
         match search.answer_to(problem) {
             Ok(found) => {
                 assert!(found.pairs.len() == size && cliques.contains(&found.pairs), "{}: {:?}", said(), found.pairs);
@@ -88,23 +88,23 @@ fn hold_problem<'a>(searches: impl Iterator<Item = &'a (Tried, Measure)>, proble
                     found.pairs
                 );
                 assert!(found.undecided.is_none(), "{}: {:?}", said(), found.undecided);
-                let bound = if search.claims.exact { most } else { graph.model_points() };
-                assert!((most..=bound).contains(&found.size_bound), "{}: {}", said(), found.size_bound);
+                let bound = if search.claims.exact { max } else { graph.model_points() };
+                assert!((max..=bound).contains(&found.size_bound), "{}: {}", said(), found.size_bound);
                 assert_eq!(found.optimal, search.claims.exact, "{}", said());
                 if search.claims.ties {
-                    let mut sets = found.rivals;
+                    let mut sets = found.alternatives;
                     sets.push(found.pairs);
                     sets.sort_unstable();
-                    let all = cliques.iter().take_while(|set| set.len() == most);
-                    assert!(found.rivals_complete && all.eq(&sets), "{}: {sets:?}", said());
+                    let all = cliques.iter().take_while(|set| set.len() == max);
+                    assert!(found.alternatives_complete && all.eq(&sets), "{}: {sets:?}", said());
                 }
             }
-            Err(Unidentified::TooFew { with_candidates, .. }) => {
+            Err(Rejected::TooFew { with_candidates, .. }) => {
                 assert!(with_candidates == graph.model_points() && with_candidates < NEEDED, "{}", said());
             }
-            Err(Unidentified::NoConsensus { best, .. }) => assert!(best == size && size < NEEDED, "{}: {best}", said()),
-            Err(Unidentified::NotFound { bound, .. }) => {
-                assert!(!search.claims.exact && size < NEEDED && bound >= most, "{}: {bound}", said());
+            Err(Rejected::NoConsensus { best, .. }) => assert!(best == size && size < NEEDED, "{}: {best}", said()),
+            Err(Rejected::NotFound { bound, .. }) => {
+                assert!(!search.claims.exact && size < NEEDED && bound >= max, "{}: {bound}", said());
             }
             Err(other) => panic!("{}: {other}", said()),
         }
@@ -118,9 +118,9 @@ fn hold_problem<'a>(searches: impl Iterator<Item = &'a (Tried, Measure)>, proble
 #[test]
 fn every_graph_of_six_vertices_is_searched_right() {
     let (searches, posts) = (exact(), Posts::default());
-    let all = (0..=MOST)
+    let all = (0..=MAX)
         .flat_map(|n| graphs(n, Which::Own, false))
-        .chain((0..MOST).flat_map(|n| graphs(n, Which::Shared, false)));
+        .chain((0..MAX).flat_map(|n| graphs(n, Which::Shared, false)));
     for (number, graph) in all.enumerate() {
         for model in 0..TURNS {
             // All searches once, those that name ties, whose order of vertices matters, in every order.
@@ -136,10 +136,10 @@ fn every_graph_of_six_vertices_is_searched_right() {
 #[ignore = "long: 2.5 million graphs"]
 fn every_graph_is_searched_right_whatever_its_vertices_are_called() {
     let (searches, posts) = (exact(), Posts::default());
-    for (number, graph) in (0..=MOST).flat_map(|n| graphs(n, Which::Own, true)).enumerate() {
+    for (number, graph) in (0..=MAX).flat_map(|n| graphs(n, Which::Own, true)).enumerate() {
         (0..TURNS).for_each(|model| hold(searches.iter(), &posts, &graph, [model, number % TURNS]));
     }
-    for (number, graph) in graphs(MOST, Which::Shared, false).into_iter().enumerate() {
+    for (number, graph) in graphs(MAX, Which::Shared, false).into_iter().enumerate() {
         hold(searches.iter(), &posts, &graph, [number % TURNS, number / TURNS % TURNS]);
     }
 }
@@ -204,8 +204,8 @@ impl Orders<'_> {
         self.remembers(navigator, past, happening, &did, trail);
 
         // What told nothing moved nothing, and without information none is gained.
-        let told = matches!(did, Did::Fix(Event::Doubted(_) | Event::Left) | Did::Said(_)) && !better;
-        if told {
+        let reported = matches!(did, Did::Fix(Event::Doubted(_) | Event::Left) | Did::Said(_)) && !better;
+        if reported {
             assert!(navigator.pose() == before.as_ref() && navigator.places() == places, "{trail:?}");
         } else {
             self.knows(navigator, ledger, trail);
@@ -231,33 +231,35 @@ impl Orders<'_> {
                     .site
                     .place(pose.object, if pose.object == 1 { seafix_proptests::orders::DISPLACED } else { 0 });
                 let camera = self.site.place(0, 0) * self.site.camera(0, ledger.steps, 0);
-                (place * pose.standing.object_from_camera).error_to(&camera).norm() < 1e-9
+                (place * pose.object_pose.object_from_camera).error_to(&camera).norm() < 1e-9
             };
             assert!(navigator.pose().is_none_or(right), "{trail:?}: {:?}", navigator.pose());
         }
 
         // Whether a fix is due is asked with what is the case.
-        if let (Happening::Due(in_view) | Happening::Blind(in_view), Some(told)) = (happening, self.listener.told()) {
+        if let (Happening::Due(in_view) | Happening::Blind(in_view), Some(reported)) =
+            (happening, self.listener.reported())
+        {
             let ahead = if matches!(happening, Happening::Blind(_)) { BLIND } else { 0.0 };
             let (seconds, metres) = ledger.since.map_or((f64::INFINITY, f64::INFINITY), |(seconds, steps)| {
                 (seconds + ahead, self.site.step.motion.translation().norm() * steps as f64)
             });
             let near = |a: f64, b: f64| a == b || (a - b).abs() < 1e-9;
             assert!(
-                near(told.seconds, seconds) && near(told.metres, metres) && told.in_view == in_view,
-                "{trail:?}: {told:?}"
+                near(reported.seconds, seconds) && near(reported.metres, metres) && reported.in_view == in_view,
+                "{trail:?}: {reported:?}"
             );
             let sigma = navigator.pose().map_or(f64::INFINITY, |pose| {
-                let position = pose.standing.covariance.matrix.fixed_view::<3, 3>(3, 3).into_owned();
+                let position = pose.object_pose.covariance.matrix.fixed_view::<3, 3>(3, 3).into_owned();
                 position.symmetric_eigenvalues().max().sqrt()
             });
-            assert!(near(told.sigma, sigma), "{trail:?}: {told:?}, {sigma}");
+            assert!(near(reported.sigma, sigma), "{trail:?}: {reported:?}, {sigma}");
         }
     }
 
     /// What the navigator knows is what the ledger says.
     fn knows(&self, navigator: &Navigator<'_>, ledger: &Ledger, trail: &[Happening]) {
-        let sound = |pose: &Navigated| pose.standing.covariance.matrix.cholesky().is_some();
+        let sound = |pose: &Navigated| pose.object_pose.covariance.matrix.cholesky().is_some();
         assert!(navigator.pose().is_none_or(sound), "{trail:?}: {:?}", navigator.pose());
         assert_eq!(navigator.pose().map(|pose| pose.object), ledger.known.map(|known| known.0), "{trail:?}");
         for object in 0..OBJECTS {
@@ -269,7 +271,7 @@ impl Orders<'_> {
             assert_eq!(pose.is_some(), ledger.known.is_some(), "{trail:?}");
             if let Some((pose, shifts)) = pose.zip(ledger.known_at(object)) {
                 let expected = self.site.camera(object, ledger.steps, shifts);
-                let off = pose.standing.object_from_camera.error_to(&expected).norm();
+                let off = pose.object_pose.object_from_camera.error_to(&expected).norm();
                 assert!(pose.object == object && off < 1e-9, "{trail:?}: the pose at {object} is off by {off}");
             }
         }
@@ -321,22 +323,22 @@ impl Orders<'_> {
         }
         let state = match (past.sought, past.now, past.taken) {
             (true, ..) => State::Searching,
-            (_, true, _) => State::Referenced,
+            (_, true, _) => State::Fixed,
             (.., true) => State::DeadReckoning,
-            _ => State::Rough,
+            _ => State::Prior,
         };
         assert_eq!((navigator.state(), navigator.pose().is_some()), (state, past.taken), "{trail:?}");
         let changes = navigator.changes();
-        let first = std::iter::once(State::Rough).chain(changes.iter().map(|change| change.to));
+        let first = std::iter::once(State::Prior).chain(changes.iter().map(|change| change.to));
         let chained = first.zip(changes).all(|(from, change)| change.from == from && change.to != from);
-        let told =
+        let reported =
             changes.iter().all(|change| !change.why.is_empty()) && changes.is_sorted_by(|a, b| a.seconds <= b.seconds);
-        assert!(chained && told && changes.last().is_none_or(|last| last.to == state), "{trail:?}: {changes:?}");
+        assert!(chained && reported && changes.last().is_none_or(|last| last.to == state), "{trail:?}: {changes:?}");
     }
 
     /// Without a fix a pose is known no better than before, with one of its object no worse.
     fn learns(&self, before: &Navigated, after: &Navigated, happening: Happening, did: &Did, trail: &[Happening]) {
-        let [old, new] = [before, after].map(|pose| pose.standing.covariance.matrix.determinant());
+        let [old, new] = [before, after].map(|pose| pose.object_pose.covariance.matrix.determinant());
         match (happening, did) {
             (Happening::Step, _) => assert!(new > old, "{trail:?}: {old:e} {new:e}"),
             (_, Did::Fix(Event::Taken)) if before.object == after.object => {
@@ -367,7 +369,7 @@ use Happening::{Blind, Due, Fix, Lost, Settle, Step};
 /// covariance grows without a fix and not with one, and two wrong fixes move nothing that is known.
 #[test]
 fn every_order_of_five_fixes_is_judged_right() {
-    let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Glimpse];
+    let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Imprecise];
     let alphabet: Vec<Happening> = kinds.into_iter().map(Fix).chain([Step, Lost]).collect();
     let seen = hold_orders(&alphabet, 5, "fuse");
     assert!(seen.iter().all(|&count| count > 12), "{seen:?}");
@@ -396,7 +398,7 @@ fn every_order_of_a_few_more_events_is_judged_right() {
 #[test]
 #[ignore = "long: 10 million instants"]
 fn every_order_of_six_events_is_judged_right() {
-    let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Glimpse];
+    let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Imprecise];
     let others = [Step, Lost, Due(true), Due(false), Blind(true), Blind(false), Settle(true)];
     let alphabet: Vec<Happening> = kinds.into_iter().map(Fix).chain(others).collect();
     for fusion in ["fuse", "intersect"] {

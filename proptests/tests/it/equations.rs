@@ -78,21 +78,21 @@ fn track(
     steps: usize,
 ) -> Vec<Transform<World, Body>> {
     let mut pose = Transform::new(start.0, start.1);
-    let mut way = vec![pose];
+    let mut path = vec![pose];
     for step in 0..steps {
         let phi = turns[step % turns.len()] * 0.03;
         let ahead = Vector3::new(0.3, 0.1, -0.05).component_mul(&turns[(step * 7 + 3) % turns.len()]);
         let motion = Transform::<Body, Body>::exp(&[phi.x, phi.y, phi.z, ahead.x, ahead.y, ahead.z].into());
         pose = (pose * motion).renormalized();
-        way.push(pose);
+        path.push(pose);
     }
-    way
+    path
 }
 
 /// Where the chain of odometry of a way carries its first pose, one step at a time, in rows.
-fn chained(way: &[Transform<World, Body>]) -> H<BodyAtFix, Body> {
+fn chained(path: &[Transform<World, Body>]) -> H<BodyAtFix, Body> {
     let first: H<BodyAtFix, Body> = H::from(Transform::identity());
-    way.windows(2).fold(first, |chain, pair| chain * H::<Body, Body>::from(pair[1].inverse() * pair[0]))
+    path.windows(2).fold(first, |chain, pair| chain * H::<Body, Body>::from(pair[1].inverse() * pair[0]))
 }
 
 /// P11. Chain (6): a fix at i carried to j by exact odometry equals a fix at j: ≤ 1e-10 after 2 000
@@ -103,13 +103,13 @@ fn chained(way: &[Transform<World, Body>]) -> H<BodyAtFix, Body> {
 fn a_fix_is_carried_by_odometry() {
     let turns = prop::collection::vec(vector(1.0), 31);
     law(16, (pose::<World, Object>(30.0), rotation(), vector(30.0), turns), |(placed, r, t, turns)| {
-        let way = track((r, t), &turns, 2000);
-        prop_assume!(way.iter().all(|pose| pose.translation().amax() <= REACH));
+        let path = track((r, t), &turns, 2000);
+        prop_assume!(path.iter().all(|pose| pose.translation().amax() <= REACH));
         let fix = |pose: &Transform<World, Body>| placed.inverse() * *pose;
-        let at_i = H::<BodyAtFix, Object>::from(fix(&way[0]).relabel());
-        let at_j = H::<Body, Object>::from(fix(&way[2000]));
-        within("(6) − (5)", (eq6(&chained(&way), &at_i).matrix - at_j.matrix).amax(), 1e-10)?;
-        prop_assert_eq!(eq6(&chained(&way[..1]), &at_i).matrix, at_i.matrix);
+        let at_i = H::<BodyAtFix, Object>::from(fix(&path[0]).relabel());
+        let at_j = H::<Body, Object>::from(fix(&path[2000]));
+        within("(6) − (5)", (eq6(&chained(&path), &at_i).matrix - at_j.matrix).amax(), 1e-10)?;
+        prop_assert_eq!(eq6(&chained(&path[..1]), &at_i).matrix, at_i.matrix);
         Ok(())
     });
 }
@@ -124,10 +124,10 @@ fn many_steps_are_one() {
         128,
         (pose::<World, Object>(30.0), rotation(), vector(30.0), turns, 1usize..200),
         |(placed, r, t, turns, n)| {
-            let way = track((r, t), &turns, n);
-            let at_i = H::<BodyAtFix, Object>::from((placed.inverse() * way[0]).relabel());
-            let one: H<BodyAtFix, Body> = H::from((way[n].inverse() * way[0]).relabel());
-            let many = eq6(&chained(&way), &at_i);
+            let path = track((r, t), &turns, n);
+            let at_i = H::<BodyAtFix, Object>::from((placed.inverse() * path[0]).relabel());
+            let one: H<BodyAtFix, Body> = H::from((path[n].inverse() * path[0]).relabel());
+            let many = eq6(&chained(&path), &at_i);
             within("many − one", (many.matrix - eq6(&one, &at_i).matrix).amax(), 1e-12 * n as f64)
         },
     );

@@ -92,9 +92,9 @@ fn the_chosen_object_is_the_frame_of_the_site() {
             object.id = format!("object {i}");
         }
         let site = Site { name: "site".to_owned(), frame, objects, warnings: Vec::new() };
-        let whole = &site.targets(TargetKind::Site).expect("every object's place is known")[0];
-        prop_assert_eq!(whole.world_from_object, site.objects[frame].world_from_object);
-        let mut points = whole.points.iter();
+        let full = &site.targets(TargetKind::Site).expect("every object's place is known")[0];
+        prop_assert_eq!(full.world_from_object, site.objects[frame].world_from_object);
+        let mut points = full.points.iter();
         for (i, object) in site.objects.iter().enumerate() {
             for (own, carried) in object.points.iter().zip(&mut points) {
                 if i == frame {
@@ -102,7 +102,7 @@ fn the_chosen_object_is_the_frame_of_the_site() {
                 }
                 let place = |target: &Option<Transform<World, Object>>, p| target.expect("a place is known") * p;
                 let (surveyed, site) =
-                    (place(&object.world_from_object, own.at), place(&whole.world_from_object, carried.at));
+                    (place(&object.world_from_object, own.at), place(&full.world_from_object, carried.at));
                 within("in the world", surveyed.distance(&site), 1e-12 * (1.0 + surveyed.coords.norm()))?;
             }
         }

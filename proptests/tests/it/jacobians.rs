@@ -134,9 +134,9 @@ fn errors_of_the_model() {
             let largest = errors.iter().map(|h| h.amax()).fold(0.0, f64::max);
             for (k, h) in errors.iter().enumerate() {
                 for axis in 0..3 {
-                    let by = |share: f64| {
+                    let by = |fraction: f64| {
                         let mut moved = data.clone();
-                        moved.points[k].model.coords[axis] += share * data.points[k].model_sigma;
+                        moved.points[k].model.coords[axis] += fraction * data.points[k].model_sigma;
                         solver.solve(&moved).map(|moved| pose.error_to(&moved))
                     };
                     let (Ok(plus), Ok(minus)) = (by(0.02), by(-0.02)) else { continue };

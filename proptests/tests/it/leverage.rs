@@ -6,12 +6,12 @@ use seafix_proptests::{
     cases,
     views::{View, any_turn, anywhere, exact_model},
 };
-use seafix_referencing::{Acceptance, Outcome, Refusal, rms_apart};
+use seafix_referencing::{Acceptance, Outcome, RejectionReason, rms_apart};
 use seafix_simulation::{Purpose, Stream};
 
 const SIGMA: f64 = 0.005;
 const DELTA: f64 = 4.0 * SIGMA;
-const SHELL: f64 = 0.3;
+const GATE: f64 = 0.3;
 
 /// A panel of ten points, 30 cm wide, on an object of three metres with forty more; of the panel eight points are seen, of the rest of
 /// the object `far`, and 200 points of clutter about the panel, two metres before the camera. With a rough pose, or without and among
@@ -27,8 +27,8 @@ fn panel(number: u64, far: usize, prior: bool) -> View {
     let seen = (0..8).chain(10..10 + far);
     let view = View::of(stream, exact_model(&at), camera_from_object, seen, SIGMA);
     let view = view.among(stream, if prior { 200 } else { 100 }, 2.0, [1.2; 3]);
-    let error = || [stream.normal3(0.02), anywhere(stream, [0.5 * SHELL; 3])];
-    if prior { view.before(SHELL, error) } else { view }
+    let error = || [stream.normal3(0.02), anywhere(stream, [0.5 * GATE; 3])];
+    if prior { view.before(GATE, error) } else { view }
 }
 
 /// A panel alone does not say where the far points of its object are, and clutter that is near one of them does not either: no pose
@@ -42,12 +42,12 @@ fn one_accidental_far_point_makes_no_pose() {
         for number in 0..frames.into() {
             let view = panel(number, 0, prior);
             match view.outcome(DELTA, &Acceptance::default()) {
-                Outcome::Referenced(fix) => {
+                Outcome::Fix(fix) => {
                     answered += 1;
                     let off = rms_apart(&view.model, &fix.object_from_camera, &view.truth);
                     beyond += u64::from(off > Acceptance::default().alert_limit);
                 }
-                Outcome::Unidentified(Refusal::Hinge { .. }) => hinges += 1,
+                Outcome::Rejected(RejectionReason::Hinge { .. }) => hinges += 1,
                 _ => {}
             }
         }
@@ -65,7 +65,7 @@ fn far_points_that_bear_each_other_out_make_one() {
     let off = |number: u64| {
         let view = panel(number, 6, true);
         match view.outcome(DELTA, &Acceptance::default()) {
-            Outcome::Referenced(fix) => Some(rms_apart(&view.model, &fix.object_from_camera, &view.truth)),
+            Outcome::Fix(fix) => Some(rms_apart(&view.model, &fix.object_from_camera, &view.truth)),
             _ => None,
         }
     };

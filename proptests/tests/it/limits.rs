@@ -80,7 +80,7 @@ fn table() {
 ///
 /// Seen to fail when covariances are a fifth too small, and when the right image is left out.
 #[test]
-fn weighed_solvers_reach_the_bound() {
+fn weighted_solvers_reach_the_bound() {
     for (_, rig) in cameras() {
         for name in ["mahalanobis", "stereo-reprojection"] {
             let solver = SOLVERS.build(&Choice::named(name)).expect("a solver");
@@ -290,14 +290,14 @@ fn four_compact_points_of_any_seed() {
 /// the answers covariances hold, and m2 and m3 are within 1.25 of the bound of all layouts. 10 000 draws a distance.
 #[test]
 #[ignore = "long: 6 cells"]
-fn three_compact_points_tell_what_is_as_likely() {
+fn three_compact_points_report_what_is_as_likely() {
     let missed: Vec<String> = [1.5, 3.25, 5.0].into_iter().flat_map(|distance| three_compact(distance, 500)).collect();
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
 /// The same at 5 m, short.
 #[test]
-fn three_compact_points_far_away_are_told_apart_or_known() {
+fn three_compact_points_far_away_are_distinguished_or_known() {
     let missed = three_compact(5.0, 100);
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
@@ -310,7 +310,8 @@ fn three_compact(distance: f64, draws: u64) -> Vec<String> {
     let all = placed(&settings, 1, 20);
     let mut missed = Vec::new();
     for solver in ["p3p-stereo", "stereo-reprojection"] {
-        let c = cell_of(&*build(solver), &settings, &all, &Asked { draws, covariance: true, rivals: Some(CHI2_1) });
+        let c =
+            cell_of(&*build(solver), &settings, &all, &Asked { draws, covariance: true, alternatives: Some(CHI2_1) });
         let line = format!(
             "{distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere of {}; m3 over \
              what the likelihood foresees {:.3}; bent by {:.2} at most",
@@ -336,18 +337,18 @@ fn three_compact(distance: f64, draws: u64) -> Vec<String> {
 /// Whether covariances hold over the answers of a cell of which other valleys were told: mean NEES, coverage, and how many were
 /// answered in another one. Of fewer draws than the long forms have, three standard errors more are allowed of the mean of so
 /// many χ²₆, and of a share of 0.95.
-fn is_known(c: &Cell, drawn: u64) -> bool {
-    let wide = allowance(drawn);
+fn is_known(c: &Cell, generated: u64) -> bool {
+    let wide = allowance(generated);
     let consistent = (5.8 - wide..=6.3 + wide).contains(&c.nees);
     let covers = (0.9428 - 0.06 * wide..=0.9571 + 0.06 * wide).contains(&c.coverage);
     // Half of one in a thousand, and three standard errors.
-    let rare = f64::from(c.elsewhere) <= 0.0005 * drawn as f64 + 3.0 * (0.0005 * drawn as f64).sqrt();
+    let rare = f64::from(c.elsewhere) <= 0.0005 * generated as f64 + 3.0 * (0.0005 * generated as f64).sqrt();
     consistent && covers && rare
 }
 
 /// By how many more three standard errors of a mean NEES of so few draws reach than those of 10 000.
-fn allowance(drawn: u64) -> f64 {
-    (3.0 * ((12.0_f64 / drawn as f64).sqrt() - (12.0_f64 / 10_000.0).sqrt())).max(0.0)
+fn allowance(generated: u64) -> f64 {
+    (3.0 * ((12.0_f64 / generated as f64).sqrt() - (12.0_f64 / 10_000.0).sqrt())).max(0.0)
 }
 
 /// χ²₁ at 99.9 %.
@@ -355,7 +356,7 @@ const CHI2_1: f64 = 10.827_566_170_662_733;
 
 /// The same of the two seeds with the worst layouts, short.
 #[test]
-fn four_compact_points_of_bad_layouts_are_told_apart_or_known() {
+fn four_compact_points_of_bad_layouts_are_distinguished_or_known() {
     let missed: Vec<String> = [8, 11].into_iter().flat_map(|seed| four_compact(seed, 5.0, 50)).collect();
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
@@ -370,13 +371,13 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
     meant.retain(|placed| is_meaningful(placed, settings.sigma_px, &bound(placed, &settings)));
     let mut missed = Vec::new();
     for solver in ["mahalanobis", "stereo-reprojection"] {
-        let asked = Asked { draws, covariance: true, rivals: Some(CHI2_1) };
+        let asked = Asked { draws, covariance: true, alternatives: Some(CHI2_1) };
         let c = cell_of(&*build(solver), &settings, &all, &asked);
         let m = cell_of(&*build(solver), &settings, &meant, &asked);
-        let drawn = draws * 20;
+        let generated = draws * 20;
         let line = format!(
             "seed {seed} {distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere \
-             of {drawn}; m3 over what the likelihood foresees {:.3}; bent by {:.2} at most; of {} layouts where the bound \
+             of {generated}; m3 over what the likelihood foresees {:.3}; bent by {:.2} at most; of {} layouts where the bound \
              means something (bent by {:.2} at most) m2 {:.3} m3 {:.3}",
             c.m2,
             c.m3,
@@ -393,9 +394,9 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
             m.m3
         );
         println!("{line}");
-        let wide = allowance(drawn);
+        let wide = allowance(generated);
         let reached = [m.m2, m.m3, c.m2, c.m3_foreseen].iter().all(|ratio| *ratio <= 1.05 + wide);
-        if !reached || !is_known(&c, drawn) {
+        if !reached || !is_known(&c, generated) {
             missed.push(line);
         }
     }

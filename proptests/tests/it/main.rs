@@ -2,16 +2,17 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
 
+mod a_contrario;
 mod acceptance;
 mod answers;
 mod between_fixes;
-mod chance;
+mod clutter_patterns;
 mod complete;
 mod consensus;
 mod dead_reckoning;
 mod equations;
 mod frames;
-mod imitations;
+mod gates;
 mod integrity;
 mod jacobians;
 mod leverage;
@@ -21,11 +22,11 @@ mod search_inputs;
 mod search_proofs;
 mod search_symmetries;
 mod searches;
-mod shells;
+mod self_symmetry;
 mod solvers;
 mod statistics;
 mod stereo;
 mod surfaces;
 mod trajectories;
 mod transforms;
-mod twins;
+mod vocabulary;

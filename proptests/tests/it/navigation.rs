@@ -5,7 +5,8 @@ use proptest::prelude::*;
 use seafix_component::Choice;
 use seafix_geometry::{Camera, Covariance6, Object, Pinhole, StereoRig, Transform, World};
 use seafix_navigation::{
-    Device, Journey, Local, Lost, ODOMETRIES, Odometry, Outcome, Reading, Standing, StereoPair, by_world,
+    Device, Lost, ODOMETRIES, ObjectPose, Odometry, OdometryOutcome, OdometryTrajectory, Reading, RelativeMotion,
+    StereoPair, by_world,
 };
 use seafix_proptests::{law, poses::pose, within};
 use seafix_vision::{Image, Threads};
@@ -15,8 +16,8 @@ fn exact<A: seafix_geometry::Frame, B: seafix_geometry::Frame>() -> Covariance6<
 }
 
 /// The steps between poses of one dive.
-fn steps(dive: &[Transform<World, Camera>]) -> Vec<Local> {
-    let step = |two: &[Transform<World, Camera>]| Local::new(two[0].inverse() * two[1], exact());
+fn steps(dive: &[Transform<World, Camera>]) -> Vec<RelativeMotion> {
+    let step = |two: &[Transform<World, Camera>]| RelativeMotion::new(two[0].inverse() * two[1], exact());
     dive.windows(2).map(step).collect()
 }
 
@@ -27,7 +28,7 @@ fn a_fix_is_carried_along() {
     let dive = prop::collection::vec(pose::<World, Camera>(10.0), 2001);
     law(8, (pose::<World, Object>(50.0), dive), |(world_from_object, dive)| {
         let fix = |at: &Transform<World, Camera>| by_world(&world_from_object, at);
-        let first = Standing::new(fix(&dive[0]), exact());
+        let first = ObjectPose::new(fix(&dive[0]), exact());
         let steps = steps(&dive);
         prop_assert_eq!(first.after_all(&[]).object_from_camera, first.object_from_camera);
         let last = first.after_all(&steps).object_from_camera;
@@ -41,10 +42,10 @@ fn a_fix_is_carried_along() {
 fn one_step_is_as_good_as_many() {
     let dive = prop::collection::vec(pose::<World, Camera>(10.0), 2..200);
     law(64, (pose::<Object, Camera>(10.0), dive), |(object_from_camera, dive)| {
-        let first = Standing::new(object_from_camera, exact());
+        let first = ObjectPose::new(object_from_camera, exact());
         let steps = steps(&dive);
         let motion = dive[0].inverse() * dive[dive.len() - 1];
-        let at_once = first.after(&Local::new(motion, exact())).object_from_camera;
+        let at_once = first.after(&RelativeMotion::new(motion, exact())).object_from_camera;
         let many = first.after_all(&steps).object_from_camera;
         within("many − one", (at_once.matrix() - many.matrix()).amax(), 1e-12 * steps.len() as f64)
     });
@@ -94,16 +95,16 @@ impl Slope {
         Self { rig, pairs: (0..count).map(pair).collect() }
     }
 
-    fn journey(&self, name: &str, threads: Threads, order: &[usize]) -> Journey {
+    fn trajectory(&self, name: &str, threads: Threads, order: &[usize]) -> OdometryTrajectory {
         let odometry = ODOMETRIES.build(&Choice::named(name)).unwrap();
-        let mut reckoning = odometry.begin(&self.rig, Transform::identity(), threads);
+        let mut session = odometry.begin(&self.rig, Transform::identity(), threads);
         for (time, &pair) in order.iter().enumerate() {
             let [left, right] = &self.pairs[pair];
             let stamp_ns = 1_000_000_000 + 100_000_000 * time as u64;
-            said(stamp_ns).iter().for_each(|reading| reckoning.sense(reading));
-            reckoning.advance(&StereoPair { stamp_ns, left, right }).unwrap();
+            said(stamp_ns).iter().for_each(|reading| session.sense(reading));
+            session.advance(&StereoPair { stamp_ns, left, right }).unwrap();
         }
-        reckoning.journey()
+        session.trajectory()
     }
 }
 
@@ -120,25 +121,25 @@ fn by_images() -> impl Iterator<Item = (&'static str, Box<dyn Odometry>)> {
     ODOMETRIES.names().map(built).filter(|(_, odometry)| !odometry.listens())
 }
 
-fn ways(journey: &Journey) -> Vec<Vector3<f64>> {
-    journey.waypoints().map(|pose| pose.world_from_camera.translation()).collect()
+fn paths(trajectory: &OdometryTrajectory) -> Vec<Vector3<f64>> {
+    trajectory.waypoints().map(|pose| pose.world_from_camera.translation()).collect()
 }
 
 /// Every odometry finds the way over a slope to 2 %, whichever way the baseline points, and the same with any threads.
 #[test]
-fn every_odometry_finds_a_short_way() {
+fn every_odometry_finds_a_short_path() {
     for baseline in [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.1, 0.0)] {
         let slope = Slope::new(6, baseline);
         for name in ODOMETRIES.names() {
-            let journey = slope.journey(name, Threads::One, &[0, 1, 2, 3, 4, 5]);
-            let found = ways(&journey);
-            assert_eq!(found.len(), 6, "{name}: {:?}", journey.outcomes);
+            let trajectory = slope.trajectory(name, Threads::One, &[0, 1, 2, 3, 4, 5]);
+            let found = paths(&trajectory);
+            assert_eq!(found.len(), 6, "{name}: {:?}", trajectory.outcomes);
             for (k, at) in found.iter().enumerate() {
                 let off = (at - Vector3::new(STEP * k as f64, 0.0, 0.0)).norm();
                 assert!(off < 0.02 * 5.0 * STEP, "{name}: {k} {off} {found:?}");
             }
-            let again = slope.journey(name, Threads::Pool, &[0, 1, 2, 3, 4, 5]);
-            assert_eq!(ways(&again), found, "{name}");
+            let again = slope.trajectory(name, Threads::Pool, &[0, 1, 2, 3, 4, 5]);
+            assert_eq!(paths(&again), found, "{name}");
         }
     }
 }
@@ -151,35 +152,35 @@ fn no_odometry_by_images_invents_a_motion() {
     let slope = Slope::new(3, Vector3::new(0.1, 0.0, 0.0));
     let black = Image::new(240, 180, vec![2.0; 240 * 180]).unwrap();
     for (name, odometry) in by_images() {
-        let mut reckoning = odometry.begin(&slope.rig, Transform::identity(), Threads::One);
+        let mut session = odometry.begin(&slope.rig, Transform::identity(), Threads::One);
         let mut give = |stamp_ns: u64, images: [&Image; 2]| {
-            let done = reckoning.advance(&StereoPair { stamp_ns, left: images[0], right: images[1] });
-            (done, reckoning.journey())
+            let done = session.advance(&StereoPair { stamp_ns, left: images[0], right: images[1] });
+            (done, session.trajectory())
         };
         let images = |k: usize| [&slope.pairs[k][0], &slope.pairs[k][1]];
         assert!(give(1_000_000_000, images(0)).0.is_ok());
         for stamp in [1_000_000_000, 999_999_999] {
-            let (done, journey) = give(stamp, images(1));
-            assert_eq!((done.unwrap_err().before_ns, journey.outcomes.len()), (1_000_000_000, 1), "{name}");
+            let (done, trajectory) = give(stamp, images(1));
+            assert_eq!((done.unwrap_err().before_ns, trajectory.outcomes.len()), (1_000_000_000, 1), "{name}");
         }
         assert!(give(1_100_000_000, images(1)).0.is_ok());
-        let outcome = |journey: &Journey| journey.outcomes.last().cloned().unwrap();
-        let (_, journey) = give(1_200_000_000, images(1));
-        assert!(matches!(outcome(&journey), Outcome::Skipped(Lost::Frozen(_))), "{name}: {journey:?}");
-        let (_, journey) = give(1_300_000_000, [images(2)[0], &black]);
-        assert!(matches!(outcome(&journey), Outcome::Skipped(Lost::Blank(..))), "{name}: {journey:?}");
-        let (_, journey) = give(1_400_000_000, images(2));
-        assert!(matches!(outcome(&journey), Outcome::Followed { .. }), "{name}: {journey:?}");
-        assert_eq!(journey.segments.len(), 1, "{name}");
+        let outcome = |trajectory: &OdometryTrajectory| trajectory.outcomes.last().cloned().unwrap();
+        let (_, trajectory) = give(1_200_000_000, images(1));
+        assert!(matches!(outcome(&trajectory), OdometryOutcome::Skipped(Lost::Frozen(_))), "{name}: {trajectory:?}");
+        let (_, trajectory) = give(1_300_000_000, [images(2)[0], &black]);
+        assert!(matches!(outcome(&trajectory), OdometryOutcome::Skipped(Lost::Blank(..))), "{name}: {trajectory:?}");
+        let (_, trajectory) = give(1_400_000_000, images(2));
+        assert!(matches!(outcome(&trajectory), OdometryOutcome::Followed { .. }), "{name}: {trajectory:?}");
+        assert_eq!(trajectory.segments.len(), 1, "{name}");
         // The same slope turned upside down is somewhere else.
         let flipped = |image: &Image| Image::new(240, 180, image.pixels().iter().rev().copied().collect()).unwrap();
         let turned: Vec<[Image; 2]> = (0..2).map(|k| [1, 0].map(|side| flipped(&slope.pairs[k][side]))).collect();
         for (k, pair) in turned.iter().enumerate() {
             assert!(give(1_500_000_000 + 100_000_000 * k as u64, [&pair[0], &pair[1]]).0.is_ok());
         }
-        let (_, journey) = give(1_700_000_000, [&turned[0][0], &turned[0][1]]);
-        assert_eq!(journey.segments.len(), 2, "{name}: {:?}", journey.outcomes);
-        let (before, after) = (&journey.segments[0], &journey.segments[1]);
+        let (_, trajectory) = give(1_700_000_000, [&turned[0][0], &turned[0][1]]);
+        assert_eq!(trajectory.segments.len(), 2, "{name}: {:?}", trajectory.outcomes);
+        let (before, after) = (&trajectory.segments[0], &trajectory.segments[1]);
         assert!(after.broken.is_some() && after.poses[0].local.is_none(), "{name}");
         let last = before.poses.last().unwrap().world_from_camera;
         assert_eq!(after.poses[0].world_from_camera, last, "{name}: the motion between is left out");

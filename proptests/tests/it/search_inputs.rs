@@ -14,7 +14,7 @@ use seafix_proptests::{
     searches::{Tried, nowhere, searches, sets},
 };
 use seafix_referencing::{
-    Acceptance, Candidates, Correspondence, Degenerate, ModelPoint, Outcome, SOLVERS, Tolerance, Unidentified, judge,
+    Acceptance, Candidates, Correspondence, Degenerate, ModelPoint, Outcome, Rejected, SOLVERS, Tolerance, judge,
 };
 
 const BUDGET: i64 = 20_000;
@@ -60,9 +60,9 @@ fn too_few_points_are_no_pose() {
         two.candidates.lists.iter_mut().skip(2).for_each(Vec::clear);
         for search in &searches {
             let answer = search.answer(&nothing);
-            prop_assert!(matches!(answer, Err(Unidentified::TooFew { with_candidates: 0, .. })), "{}", search.name);
+            prop_assert!(matches!(answer, Err(Rejected::TooFew { with_candidates: 0, .. })), "{}", search.name);
             let answer = search.answer(&two);
-            prop_assert!(matches!(answer, Err(Unidentified::TooFew { .. })), "{}: {answer:?}", search.name);
+            prop_assert!(matches!(answer, Err(Rejected::TooFew { .. })), "{}: {answer:?}", search.name);
         }
         Ok(())
     });
@@ -87,8 +87,9 @@ fn points_on_a_line_are_degenerate() {
     for search in each(BUDGET) {
         let problem = line.problem();
         let attempt = judge(&problem, search.answer(&line), &*solver, &Acceptance::default(), None);
-        let told = matches!(attempt.outcome, Outcome::Degenerate(Degenerate::Collinear { ratio, .. }) if ratio < 1e-3);
-        assert!(told, "{}: {:?}", search.name, attempt.outcome);
+        let reported =
+            matches!(attempt.outcome, Outcome::Degenerate(Degenerate::Collinear { ratio, .. }) if ratio < 1e-3);
+        assert!(reported, "{}: {:?}", search.name, attempt.outcome);
     }
 }
 
@@ -148,11 +149,11 @@ fn absurd_tolerances_end() {
                 let bound = match &answer {
                     Ok(found) => found.size_bound,
                     Err(
-                        Unidentified::Budget { bound, .. }
-                        | Unidentified::TooLarge { bound, .. }
-                        | Unidentified::NotFound { bound, .. },
+                        Rejected::Budget { bound, .. }
+                        | Rejected::TooLarge { bound, .. }
+                        | Rejected::NotFound { bound, .. },
                     ) => *bound,
-                    Err(Unidentified::Mirrored { .. }) => 20,
+                    Err(Rejected::Mirrored { .. }) => 20,
                     Err(other) => panic!("{}: {other}", search.name),
                 };
                 assert!((3..=20).contains(&bound), "{}: {bound}", search.name);
@@ -172,13 +173,11 @@ fn a_huge_cloud_ends() {
         match search.answer(&problem) {
             Ok(found) => assert!(found.size_bound >= found.pairs.len(), "{}", search.name),
             Err(
-                Unidentified::Budget { bound, .. }
-                | Unidentified::TooLarge { bound, .. }
-                | Unidentified::NotFound { bound, .. },
+                Rejected::Budget { bound, .. } | Rejected::TooLarge { bound, .. } | Rejected::NotFound { bound, .. },
             ) => {
                 assert!(bound >= 3, "{}", search.name);
             }
-            Err(Unidentified::Mirrored { best, .. }) => assert_eq!(best, 4, "{}", search.name),
+            Err(Rejected::Mirrored { best, .. }) => assert_eq!(best, 4, "{}", search.name),
             Err(other) => panic!("{}: {other}", search.name),
         }
     }
@@ -188,7 +187,7 @@ fn a_huge_cloud_ends() {
 ///
 /// Seen to fail where an iteration that the budget ended is taken for the last.
 #[test]
-fn a_spent_budget_is_told() {
+fn a_spent_budget_is_reported() {
     let problem = clutter(8, 6, 40, 0.3);
     for search in each(1).iter().filter(|search| search.has_budget()) {
         let answer = search.answer(&problem);
@@ -196,7 +195,7 @@ fn a_spent_budget_is_told() {
             Ok(found) => found.undecided.as_ref(),
             Err(refusal) => Some(refusal),
         };
-        assert!(matches!(ended, Some(Unidentified::Budget { .. })), "{}: {answer:?}", search.name);
+        assert!(matches!(ended, Some(Rejected::Budget { .. })), "{}: {answer:?}", search.name);
     }
 }
 
@@ -216,7 +215,7 @@ fn a_blow_up_ends_at_the_budget() {
                 assert!(size >= 3 && !found.optimal, "{}: {size}", search.name);
             }
             Err(refusal) => {
-                let nothing = matches!(refusal, Unidentified::TooFew { .. } | Unidentified::Budget { .. });
+                let nothing = matches!(refusal, Rejected::TooFew { .. } | Rejected::Budget { .. });
                 assert!(!nothing, "{}: {refusal}", search.name);
             }
         }

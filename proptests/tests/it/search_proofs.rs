@@ -11,7 +11,7 @@ use seafix_proptests::{
     problems::{MEDIUM, Planted, SMALL, planted},
     searches::{Tried, is_proved_largest, searches},
 };
-use seafix_referencing::{Candidates, Correspondence, Identification, ModelPoint, Problem, Tolerance, Unidentified};
+use seafix_referencing::{Candidates, Correspondence, Identification, ModelPoint, Problem, Rejected, Tolerance};
 use std::cell::Cell;
 
 /// Whether exact searches that came to their end say the same: size, refusal, and those that name all ties the same
@@ -20,7 +20,7 @@ fn agree(searches: &[Tried], planted: &Planted) -> Result<u32, TestCaseError> {
     let mut compared = 0;
     for orientation in [true, false] {
         let exact = searches.iter().filter(|search| search.claims.exact);
-        let mut first: Option<(&Tried, Result<Identification, Unidentified>)> = None;
+        let mut first: Option<(&Tried, Result<Identification, Rejected>)> = None;
         for search in exact.filter(|search| search.refuses_mirrors() == orientation) {
             let answer = search.answer(planted);
             let ended = match &answer {
@@ -39,14 +39,14 @@ fn agree(searches: &[Tried], planted: &Planted) -> Result<u32, TestCaseError> {
             match (said, &answer) {
                 (Ok(a), Ok(b)) => {
                     prop_assert_eq!(a.pairs.len(), b.pairs.len(), "{}", names);
-                    if a.rivals_complete && b.rivals_complete {
+                    if a.alternatives_complete && b.alternatives_complete {
                         prop_assert_eq!(&a.pairs, &b.pairs, "{}", names);
-                        prop_assert_eq!(a.rivals.len(), b.rivals.len(), "{}", names);
+                        prop_assert_eq!(a.alternatives.len(), b.alternatives.len(), "{}", names);
                     }
                 }
                 (a, b) => {
                     let reason =
-                        |answer: &Result<Identification, Unidentified>| answer.as_ref().err().map(Unidentified::reason);
+                        |answer: &Result<Identification, Rejected>| answer.as_ref().err().map(Rejected::reason);
                     prop_assert_eq!(reason(a), reason(b), "{}", names);
                 }
             }
@@ -91,10 +91,10 @@ fn bounds_hold(searches: &[Tried], planted: &Planted) -> TestCaseResult {
                 prop_assert!(size <= best && best <= bound, "{}: {size} ≤ {best} ≤ {bound}", search.name);
                 prop_assert!(!is_proved_largest(&found) || size == best, "{}: {size} is not {best}", search.name);
             }
-            Err(Unidentified::Budget { best: size, bound, .. }) => {
+            Err(Rejected::Budget { best: size, bound, .. }) => {
                 prop_assert!(size <= brute[0].size && best <= bound, "{}: {size}, {best} ≤ {bound}", search.name);
             }
-            Err(Unidentified::NoConsensus { .. }) => prop_assert!(best < 3, "{}: {best}", search.name),
+            Err(Rejected::NoConsensus { .. }) => prop_assert!(best < 3, "{}: {best}", search.name),
             Err(_) => {}
         }
     }
@@ -153,8 +153,8 @@ fn pruning_loses_nothing() {
         for (bounded, free) in with(true).zip(with(false)) {
             let mut answers = [bounded, free].map(|search| search.answer(&planted));
             answers.iter_mut().flatten().for_each(|found| found.tests = 0);
-            let [bounded_says, free_says] = answers;
-            prop_assert_eq!(bounded_says, free_says, "{}", &bounded.name);
+            let [bounded_answer, free_answer] = answers;
+            prop_assert_eq!(bounded_answer, free_answer, "{}", &bounded.name);
         }
         Ok(())
     });

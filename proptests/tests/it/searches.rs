@@ -12,17 +12,17 @@ use seafix_proptests::{
     problems::{LARGE, Planted, SMALL, planted},
     searches::{Tried, is_proved_largest, nowhere, searches, sets},
 };
-use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, SEARCHES, Tolerance, Unidentified};
+use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, Rejected, SEARCHES, Tolerance};
 
 /// Pair tests that leave time for thousands of cases.
 const BUDGET: i64 = 100_000;
 
 /// Seen to fail where a search says nothing of its time.
 #[test]
-fn every_search_says_what_it_maximises_whether_that_is_exact_and_what_time_it_takes() {
+fn every_search_states_what_it_maximises_whether_that_is_exact_and_what_time_it_takes() {
     for listing in SEARCHES.listings() {
-        let told: Vec<&str> = listing.properties.iter().map(|(of, _)| *of).collect();
-        assert_eq!(told, ["maximises", "exact", "time"], "{}", listing.name);
+        let reported: Vec<&str> = listing.properties.iter().map(|(of, _)| *of).collect();
+        assert_eq!(reported, ["maximises", "exact", "time"], "{}", listing.name);
         assert!(listing.properties.iter().all(|(_, what)| !what.is_empty()), "{}", listing.name);
     }
 }
@@ -174,21 +174,24 @@ fn no_admissible_set_is_larger() {
                         coherent.size
                     );
                     prop_assert!(
-                        found.rivals.iter().all(|rival| rival.len() == size && *rival != found.pairs),
+                        found
+                            .alternatives
+                            .iter()
+                            .all(|alternative| alternative.len() == size && *alternative != found.pairs),
                         "{name}"
                     );
                     // P34: all that tie are named, as long as they are few.
                     let largest = is_proved_largest(&found);
                     let few = best.sets.len() <= 64 && largest;
-                    prop_assert!(!search.claims.ties || !few || found.rivals_complete, "{name}: ties");
-                    let proof = largest || found.rivals_complete;
+                    prop_assert!(!search.claims.ties || !few || found.alternatives_complete, "{name}: ties");
+                    let proof = largest || found.alternatives_complete;
                     prop_assert!(search.claims.exact || !proof, "{name}: no proof");
                     if largest {
                         prop_assert_eq!((size, found.size_bound), (best.size, best.size), "{}", name);
                         proofs += 1;
                     }
-                    if found.rivals_complete {
-                        let mut named = found.rivals.clone();
+                    if found.alternatives_complete {
+                        let mut named = found.alternatives.clone();
                         named.push(found.pairs.clone());
                         named.sort();
                         let mut all = best.sets.clone();
@@ -196,35 +199,35 @@ fn no_admissible_set_is_larger() {
                         prop_assert_eq!(named, all, "{}", name);
                     }
                 }
-                Err(Unidentified::TooFew { with_candidates, needed }) => {
+                Err(Rejected::TooFew { with_candidates, needed }) => {
                     prop_assert_eq!(with_candidates, problem.candidates.with_candidates(), "{}", name);
                     prop_assert!(with_candidates < needed && best.size < needed, "{name}");
                     proofs += 1;
                 }
-                Err(Unidentified::NoConsensus { best: size, needed }) => {
+                Err(Rejected::NoConsensus { best: size, needed }) => {
                     prop_assert!(search.claims.exact, "{name} proves nothing");
                     prop_assert!(size <= best.size && best.size < needed, "{name}: brute {}", best.size);
                     refused.set(refused.get() + 1);
                     proofs += 1;
                 }
-                Err(Unidentified::NotFound { bound, needed }) => {
+                Err(Rejected::NotFound { bound, needed }) => {
                     prop_assert!(!search.claims.exact && needed == 3 && best.size <= bound, "{name}: {}", best.size);
                 }
-                Err(Unidentified::NoPrior) => prop_assert!(false, "{name} was given one"),
-                Err(Unidentified::Mirrored { best: size, proved }) if !search.claims.exact => {
+                Err(Rejected::NoPrior) => prop_assert!(false, "{name} was given one"),
+                Err(Rejected::Mirrored { best: size, proved }) if !search.claims.exact => {
                     prop_assert!(
                         !proved && search.refuses_mirrors() && size >= 4 && size <= coherent.size,
                         "{name}: {size}"
                     );
                 }
-                Err(Unidentified::Mirrored { best: size, .. }) => {
+                Err(Rejected::Mirrored { best: size, .. }) => {
                     prop_assert!(search.refuses_mirrors(), "{name}");
                     prop_assert!(best.size < 4 && size == coherent.size && size >= 4, "{name}: brute {}", best.size);
                     mirrored.set(mirrored.get() + 1);
                     proofs += 1;
                 }
-                Err(Unidentified::TooLarge { bound, .. }) => prop_assert!(best.size <= bound, "{name}"),
-                Err(Unidentified::Budget { best: size, bound, .. }) => {
+                Err(Rejected::TooLarge { bound, .. }) => prop_assert!(best.size <= bound, "{name}"),
+                Err(Rejected::Budget { best: size, bound, .. }) => {
                     prop_assert!(size <= coherent.size && best.size <= bound, "{name}: brute {}", best.size);
                 }
             }
@@ -258,11 +261,11 @@ fn a_planted_set_is_not_missed() {
                     let found_size = found.pairs.len();
                     prop_assert!(!is_proved_largest(&found) || found_size >= size, "{}: {found_size}", search.name);
                 }
-                Err(Unidentified::Budget { bound, .. } | Unidentified::NotFound { bound, .. }) => {
+                Err(Rejected::Budget { bound, .. } | Rejected::NotFound { bound, .. }) => {
                     prop_assert!(bound >= size, "{}: bound {bound}", search.name)
                 }
                 // What others take for a mirror image need not be all there is.
-                Err(Unidentified::Mirrored { .. }) if !search.claims.exact => {}
+                Err(Rejected::Mirrored { .. }) if !search.claims.exact => {}
                 Err(refusal) => prop_assert!(size <= 3, "{}: {refusal}", search.name),
             }
         }
@@ -316,12 +319,7 @@ fn a_mirror_image_is_refused() {
             if !search.claims.exact {
                 prop_assert!(answer.is_err() || !search.refuses_mirrors(), "{}: {:?}", &search.name, &answer);
             } else if search.refuses_mirrors() {
-                prop_assert_eq!(
-                    answer,
-                    Err(Unidentified::Mirrored { best: all.len(), proved: true }),
-                    "{}",
-                    &search.name
-                );
+                prop_assert_eq!(answer, Err(Rejected::Mirrored { best: all.len(), proved: true }), "{}", &search.name);
             } else {
                 let size = answer.as_ref().map_or(0, |found| found.pairs.len());
                 prop_assert_eq!(size, all.len(), "{}: {:?}", &search.name, &answer);

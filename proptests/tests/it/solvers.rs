@@ -6,12 +6,11 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use proptest::prelude::*;
 use seafix_geometry::{Camera, Object, Transform};
 use seafix_proptests::{
-    law,
+    distinctive, law,
     least_squares::least_squares,
     not_idle,
     poses::{apart, pose, vector},
     scenes::{Scene, bare, corners, extents, seen},
-    telling,
     variants::{Variant, variants},
     within,
 };
@@ -74,7 +73,11 @@ fn all_answer(solvers: &[Asked], cases: u32, pixels: bool) {
     for asked in solvers.iter().filter(|asked| pixels || asked.takes_bare) {
         let (due, answered) = (asked.due.get(), asked.answered.get());
         not_idle(&format!("{}: scenes with enough points", asked.name()), due, cases, 4);
-        assert!(!telling(cases) || answered * 10 >= due * 9, "{}: {answered} answers to {due} scenes", asked.name());
+        assert!(
+            !distinctive(cases) || answered * 10 >= due * 9,
+            "{}: {answered} answers to {due} scenes",
+            asked.name()
+        );
     }
     assert!(solvers.iter().any(|asked| asked.answered.get() > 0), "no solver answers");
 }
@@ -267,9 +270,9 @@ fn mirrored_points_leave_a_large_residual() {
     let cases = law(256, bare(10.0, 0.0), |scene| {
         let mirrored = scene.mirrored();
         let places: Vec<Vector3<f64>> = scene.points.iter().map(|point| point.model.coords).collect();
-        let [least, second, first] = extents(&places);
-        let expected = 4.0 * least;
-        let rounding = 1e-9 * (least + second + first);
+        let [min, second, first] = extents(&places);
+        let expected = 4.0 * min;
+        let rounding = 1e-9 * (min + second + first);
         for solver in solvers.iter().filter(|solver| solver.has_enough(&mirrored)) {
             let Ok(pose) = solver.solve(&mirrored) else { continue };
             let squares = mirrored.squares(&pose);
@@ -368,9 +371,9 @@ fn a_point_without_weight_is_no_point() {
                 same(solver, &without, &with)?;
             }
             for times in [0.25, 0.5] {
-                let mut weighed = scene.clone();
-                weighed.points.iter_mut().for_each(|point| point.measured.covariance *= times);
-                if let (Ok(before), Ok(after)) = (solver.solve(&scene), solver.solve(&weighed)) {
+                let mut weighted = scene.clone();
+                weighted.points.iter_mut().for_each(|point| point.measured.covariance *= times);
+                if let (Ok(before), Ok(after)) = (solver.solve(&scene), solver.solve(&weighted)) {
                     same(solver, &before, &after)?;
                     compared.set(compared.get() + 1);
                 }
@@ -463,8 +466,8 @@ fn only_consensus(points: &[Observation]) -> Option<Vec<usize>> {
     let kabsch = SOLVERS.build(&seafix_component::Choice::named("kabsch")).expect("it is listed");
     let mut found: Vec<Vec<usize>> = Vec::new();
     for set in 0..1u32 << points.len() {
-        let most = found.first().map_or(3, Vec::len);
-        if (set.count_ones() as usize) < most {
+        let max = found.first().map_or(3, Vec::len);
+        if (set.count_ones() as usize) < max {
             continue;
         }
         let members: Vec<usize> = (0..points.len()).filter(|k| set >> k & 1 == 1).collect();
@@ -474,7 +477,7 @@ fn only_consensus(points: &[Observation]) -> Option<Vec<usize>> {
             point.residual(&pose).norm() <= 4.5 * (point.measured.covariance.trace() / 3.0).sqrt()
         };
         if data.points.iter().all(near) {
-            if members.len() > most {
+            if members.len() > max {
                 found.clear();
             }
             found.push(members);
@@ -534,8 +537,8 @@ fn what_has_not_converged_is_refused() {
                 within(&format!("{name}, {iterations} iterations: standard deviations"), off, 0.02)?;
                 answered.set(answered.get() + 1);
             }
-            Err(Degenerate::Unconverged { steps, off, most }) => {
-                prop_assert!(steps > 0 && off > most, "{name}: {steps} {off} {most}");
+            Err(Degenerate::Unconverged { steps, off, max }) => {
+                prop_assert!(steps > 0 && off > max, "{name}: {steps} {off} {max}");
                 refused.set(refused.get() + 1);
             }
             Err(other) => prop_assert!(false, "{}: {}", name, other),

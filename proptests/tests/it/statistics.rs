@@ -55,9 +55,9 @@ fn adjusting_only_raises() {
             prop_assert!(raw <= new && new <= 1.0);
             prop_assert!(p.iter().zip(&adjusted).all(|(&other, &its)| raw > other || new <= its));
         }
-        let least = p.iter().copied().fold(1.0, f64::min);
+        let min = p.iter().copied().fold(1.0, f64::min);
         let first = adjusted.iter().copied().fold(1.0, f64::min);
-        prop_assert!((first - (least * p.len() as f64).min(1.0)).abs() < 1e-15);
+        prop_assert!((first - (min * p.len() as f64).min(1.0)).abs() < 1e-15);
         Ok(())
     });
 }

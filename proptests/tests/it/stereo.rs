@@ -211,8 +211,12 @@ fn predicted_depth_noise_is_that_of_many_draws() {
                     }
                 }
                 prop_assert_eq!(count, f64::from(DRAWS), "every draw is a point");
-                let drawn = (squares / count - (sum / count) * (sum / count)).sqrt();
-                within(&format!("{name}: σ_Z drawn over predicted, less 1"), (drawn / predicted - 1.0).abs(), 0.03)?;
+                let generated = (squares / count - (sum / count) * (sum / count)).sqrt();
+                within(
+                    &format!("{name}: σ_Z drawn over predicted, less 1"),
+                    (generated / predicted - 1.0).abs(),
+                    0.03,
+                )?;
             }
             tried.set(tried.get() + 1);
         }

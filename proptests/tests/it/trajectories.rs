@@ -17,13 +17,13 @@ fn plain(transform: &Transform<World, Camera>) -> Pose {
     Pose { rotation: transform.rotation_matrix(), position: transform.translation() }
 }
 
-fn moved(motion: &Transform<World, World>, way: &[Pose]) -> Vec<Pose> {
+fn moved(motion: &Transform<World, World>, path: &[Pose]) -> Vec<Pose> {
     let motion = Pose { rotation: motion.rotation_matrix(), position: motion.translation() };
-    way.iter().map(|pose| motion.then(pose)).collect()
+    path.iter().map(|pose| motion.then(pose)).collect()
 }
 
 /// A way, and an estimate of it: every pose off by up to 0.2 rad and 2 m an axis, the scale by a tenth.
-fn ways() -> impl Strategy<Value = (Vec<Pose>, Vec<Pose>)> {
+fn paths() -> impl Strategy<Value = (Vec<Pose>, Vec<Pose>)> {
     let step = (pose::<World, Camera>(REACH), vector(0.2), vector(2.0));
     (proptest::collection::vec(step, 4..40), 0.9..1.1).prop_map(|(steps, scale)| {
         let estimate = |(truth, turn, shift): &(Transform<World, Camera>, _, _)| {
@@ -37,7 +37,7 @@ fn ways() -> impl Strategy<Value = (Vec<Pose>, Vec<Pose>)> {
     })
 }
 
-fn laid(reference: &[Pose], estimate: &[Pose], with_scale: bool) -> Vec<Pose> {
+fn aligned(reference: &[Pose], estimate: &[Pose], with_scale: bool) -> Vec<Pose> {
     let alignment = align(reference, estimate, with_scale).expect("positions in space");
     estimate.iter().map(|pose| alignment.apply(pose)).collect()
 }
@@ -51,14 +51,14 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 ///
 /// Seen to fail when the relative pose takes the rotation without its transpose.
 #[test]
-fn a_way_is_at_no_distance_from_itself() {
-    law(256, ways(), |(way, _)| {
-        within("ape", Summary::of(&ape(&way, &way, Relation::Translation)).max, 0.0)?;
-        within("turn", Summary::of(&ape(&way, &way, Relation::AngleRad)).max, 1e-15)?;
-        let every = pairs(&way, Delta::Frames(1), true, 0.0);
-        within("rpe", Summary::of(&rpe(&way, &way, &every, Relation::Translation)).max, 1e-12)?;
-        let legs = drift(&way, &way, &[5.0, 50.0]);
-        within("drift", legs.iter().map(|leg| leg.translation).fold(0.0, f64::max), 1e-12)
+fn a_path_is_at_no_distance_from_itself() {
+    law(256, paths(), |(path, _)| {
+        within("ape", Summary::of(&ape(&path, &path, Relation::Translation)).max, 0.0)?;
+        within("turn", Summary::of(&ape(&path, &path, Relation::AngleRad)).max, 1e-15)?;
+        let every = pairs(&path, Delta::Frames(1), true, 0.0);
+        within("rpe", Summary::of(&rpe(&path, &path, &every, Relation::Translation)).max, 1e-12)?;
+        let segments = drift(&path, &path, &[5.0, 50.0]);
+        within("drift", segments.iter().map(|segment| segment.translation).fold(0.0, f64::max), 1e-12)
     });
 }
 
@@ -67,9 +67,9 @@ fn a_way_is_at_no_distance_from_itself() {
 /// Seen to fail when the translation of the alignment forgets the scale.
 #[test]
 fn an_alignment_takes_any_motion_back() {
-    law(256, (ways(), pose::<World, World>(REACH)), |((reference, estimate), motion)| {
+    law(256, (paths(), pose::<World, World>(REACH)), |((reference, estimate), motion)| {
         for with_scale in [false, true] {
-            let error = |estimate: &[Pose]| ape(&reference, &laid(&reference, estimate, with_scale), Relation::Full);
+            let error = |estimate: &[Pose]| ape(&reference, &aligned(&reference, estimate, with_scale), Relation::Full);
             within("change", largest_difference(&error(&estimate), &error(&moved(&motion, &estimate))), 1e-9)?;
         }
         Ok(())
@@ -82,7 +82,7 @@ fn an_alignment_takes_any_motion_back() {
 /// Seen to fail when a relative pose is taken in the frame of the world.
 #[test]
 fn relative_errors_know_no_origin() {
-    law(256, (ways(), pose::<World, World>(REACH)), |((reference, estimate), motion)| {
+    law(256, (paths(), pose::<World, World>(REACH)), |((reference, estimate), motion)| {
         let motioned = moved(&motion, &estimate);
         let every = pairs(&reference, Delta::Frames(1), true, 0.0);
         for relation in [Relation::Full, Relation::Translation, Relation::AngleRad, Relation::PointDistance] {
@@ -98,10 +98,10 @@ fn relative_errors_know_no_origin() {
 /// Seen to fail when the rotation of the alignment is taken the wrong way round.
 #[test]
 fn more_freedom_fits_better() {
-    law(256, ways(), |(reference, estimate)| {
+    law(256, paths(), |(reference, estimate)| {
         let rmse = |estimate: &[Pose]| Summary::of(&ape(&reference, estimate, Relation::Translation)).rmse;
-        let (raw, rigid) = (rmse(&estimate), rmse(&laid(&reference, &estimate, false)));
-        let similar = rmse(&laid(&reference, &estimate, true));
+        let (raw, rigid) = (rmse(&estimate), rmse(&aligned(&reference, &estimate, false)));
+        let similar = rmse(&aligned(&reference, &estimate, true));
         within("rigid over raw", rigid / raw, 1.0 + 1e-12)?;
         within("similar over rigid", similar / rigid, 1.0 + 1e-12)
     });
@@ -111,8 +111,8 @@ fn more_freedom_fits_better() {
 ///
 /// Seen to fail when the motion is applied from the right.
 #[test]
-fn the_first_pose_is_laid_on_the_first() {
-    law(256, ways(), |(reference, estimate)| {
+fn the_first_pose_is_placed_on_the_first() {
+    law(256, paths(), |(reference, estimate)| {
         let alignment = Alignment::onto(&reference[0], &estimate[0]);
         let first = [alignment.apply(&estimate[0])];
         within("first", ape(&reference[..1], &first, Relation::Full)[0], 1e-12 * REACH)

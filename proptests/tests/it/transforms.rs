@@ -63,10 +63,10 @@ fn an_inverse_undoes() {
 fn rotations_stay_rotations() {
     let perturbed = prop::array::uniform9(-1e-9..=1e-9f64);
     law(512, (pose::<Object, Camera>(REACH), pose::<Camera, Body>(REACH), vector(3.0), perturbed), |(a, b, phi, e)| {
-        let mut rough = a.matrix();
+        let mut moved = a.matrix();
         let noise = Matrix3::from_row_slice(&e);
-        rough.fixed_view_mut::<3, 3>(0, 0).copy_from(&(a.rotation_matrix() + noise));
-        let taken_in = Transform::<Object, Camera>::from_matrix(&rough);
+        moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&(a.rotation_matrix() + noise));
+        let taken_in = Transform::<Object, Camera>::from_matrix(&moved);
         let xi = Vector6::new(phi.x, phi.y, phi.z, 1.0, 2.0, 3.0);
         for (what, r) in [
             ("product", (a * b).rotation_matrix()),
@@ -101,7 +101,7 @@ fn a_million_compositions_stay_a_rotation() {
 ///
 /// Seen to fail when H is the column matrix itself, not its transpose.
 #[test]
-fn rows_and_columns_say_the_same() {
+fn rows_and_columns_state_the_same() {
     law(512, (pose::<Object, Camera>(REACH), point::<Camera>(REACH)), |(object_from_camera, p)| {
         let rows = H::<Camera, Object>::from(object_from_camera);
         within("p H − T p", (rows.apply(&p) - object_from_camera * p).amax(), 1e-12)?;
@@ -176,10 +176,10 @@ fn an_angle_is_an_angle() {
     let angles = prop_oneof![Just(0.0), Just(PI), 0.0..1e-7, PI - 1e-7..=PI, 0.0..=PI];
     let rounding = prop::array::uniform9(-1e-7..=1e-7f64);
     law(1024, (turn(angles.clone()), rounding, prop_oneof![Just(0.0), Just(1.0), Just(1e-8)]), |(r, e, scale)| {
-        let mut rough = Matrix4::identity();
+        let mut moved = Matrix4::identity();
         let matrix = r.to_rotation_matrix().into_inner() + Matrix3::from_row_slice(&e) * scale;
-        rough.fixed_view_mut::<3, 3>(0, 0).copy_from(&matrix);
-        let taken_in = Transform::<Site, Site>::from_matrix(&rough).expect("rounding of 1e-7 is accepted").rotation();
+        moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&matrix);
+        let taken_in = Transform::<Site, Site>::from_matrix(&moved).expect("rounding of 1e-7 is accepted").rotation();
         for q in [r, taken_in, r * r.inverse(), r * r] {
             let angle = so3::angle(&q);
             prop_assert!((0.0..=PI).contains(&angle), "{angle}");

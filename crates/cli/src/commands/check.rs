@@ -9,7 +9,7 @@ use seafix_experiment::{Plan, check_run, is_run};
 use seafix_io::ImageLimits;
 use seafix_log::{LogError, Reader, Recording};
 use seafix_referencing::{Site, TargetKind, problem_file};
-use seafix_simulation::field::SitePlan;
+use seafix_simulation::scene::SitePlan;
 
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, INPUT},
@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Of the motions of a target, and of the points that exclude one, so many are named.
-const MOST_NOTED: usize = 5;
+const MAX_NOTED: usize = 5;
 
 pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
     if let Some(missing) = paths.iter().find(|path| !path.exists()) {
@@ -96,8 +96,8 @@ fn examine(path: &Path, limits: ImageLimits) -> Examined {
             Ok(warning) => Examined { warnings: warning.into_iter().collect(), ..Examined::default() },
             // Sound, and no trial's: then a recording.
             Err(LogError::Foreign { .. }) if !is_of_a_trial(path) => {
-                let (faults, warnings, told) = check_recording(path, limits);
-                let note = if told.is_empty() { told } else { format!("note: {told}\n") };
+                let (faults, warnings, reported) = check_recording(path, limits);
+                let note = if reported.is_empty() { reported } else { format!("note: {reported}\n") };
                 Examined { faults: lines(faults), warnings, note }
             }
             Err(error) => Examined { faults: vec![error.to_string()], ..Examined::default() },
@@ -172,10 +172,10 @@ fn congruences(path: &Path) -> String {
     let mut notes = String::new();
     for target in targets.unwrap_or_default() {
         let all = target.congruences();
-        for congruence in all.iter().take(MOST_NOTED) {
+        for congruence in all.iter().take(MAX_NOTED) {
             let ids: Vec<String> =
-                congruence.broken_by.iter().take(MOST_NOTED).map(|&i| format!("`{}`", target.points[i].id)).collect();
-            let told = match ids.as_slice() {
+                congruence.broken_by.iter().take(MAX_NOTED).map(|&i| format!("`{}`", target.points[i].id)).collect();
+            let reported = match ids.as_slice() {
                 [] => "no point excludes it; add one that it does not map onto another".to_owned(),
                 ids => {
                     let more = congruence.broken_by.len() - ids.len();
@@ -183,10 +183,10 @@ fn congruences(path: &Path) -> String {
                     format!("identifying one of {}{more} excludes it", ids.join(", "))
                 }
             };
-            notes += &format!("note: `{}`: {}; {told}\n", target.name, congruence.describe(&target.points));
+            notes += &format!("note: `{}`: {}; {reported}\n", target.name, congruence.describe(&target.points));
         }
-        if all.len() > MOST_NOTED {
-            notes += &format!("note: `{}`: and {} more such motions\n", target.name, all.len() - MOST_NOTED);
+        if all.len() > MAX_NOTED {
+            notes += &format!("note: `{}`: and {} more such motions\n", target.name, all.len() - MAX_NOTED);
         }
     }
     notes

@@ -6,18 +6,18 @@ use clap::Args;
 use rayon::ThreadPoolBuilder;
 use seafix::{Pipeline, Rig};
 use seafix_component::{Choice, Fault};
-use seafix_data::dataset::{are_twins, partners_remedy, strangers, swapped_fault, twins_fault};
+use seafix_data::dataset::{are_identical, identical_images_fault, partners_remedy, strangers, swap_fault};
 use seafix_experiment::changed_pipeline;
 use seafix_geometry::StereoRig;
 use seafix_io::read_image;
-use seafix_vision::{FrontEnd, Image, Keypoint, Look, OffLines, Sides, StageTimes, Threads};
+use seafix_vision::{EpipolarCheck, FrontEnd, FrontEndOutput, Image, Keypoint, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
 use super::limits::Limits;
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
     ply,
-    terminal::{print, tell},
+    terminal::{notify, print},
 };
 
 #[derive(Debug, Args)]
@@ -70,14 +70,14 @@ impl Cloud {
         let limits = self.limits.of_images();
         let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
-        if are_twins(&left, &right) {
-            return Err(Failure::new(INPUT, twins_fault(&self.left, &self.right)));
+        if are_identical(&left, &right) {
+            return Err(Failure::new(INPUT, identical_images_fault(&self.left, &self.right)));
         }
         let sides = Sides::of_images(&left, &right, &rig);
-        if let Some(fault) = swapped_fault(sides, &self.left) {
+        if let Some(fault) = swap_fault(sides, &self.left) {
             return Err(Failure::new(INPUT, fault));
         }
-        let off_lines = off_lines_warning(OffLines::of_images(&left, &right, &rig), &rig, &file);
+        let epipolar_check = epipolar_warning(EpipolarCheck::of_images(&left, &right, &rig), &rig, &file);
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
@@ -85,13 +85,13 @@ impl Cloud {
         let (look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
         let warnings: Vec<Fault> = warning
             .into_iter()
-            .chain(off_lines)
+            .chain(epipolar_check)
             .chain(self.blind(&look, [&left, &right]))
             .chain(
                 strangers(sides, &self.left).or_else(|| nothing(&front_end, &look, [&left, &right], &rig, &self.left)),
             )
             .collect();
-        warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+        warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         if let Some(path) = &self.out {
             ply::write(path, &look.cloud, &left)?;
         }
@@ -123,10 +123,16 @@ impl Cloud {
         changed_pipeline(&pipeline, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))
     }
 
-    fn make(&self, front_end: &FrontEnd, left: &Image, right: &Image, rig: &StereoRig) -> (Look, Vec<StageTimes>) {
-        let mut look = Look::new(if self.threads > 1 { Threads::Pool } else { Threads::One });
+    fn make(
+        &self,
+        front_end: &FrontEnd,
+        left: &Image,
+        right: &Image,
+        rig: &StereoRig,
+    ) -> (FrontEndOutput, Vec<StageTimes>) {
+        let mut look = FrontEndOutput::new(if self.threads > 1 { Threads::Pool } else { Threads::One });
         let times = (0..self.repeat).map(|_| {
-            front_end.look(left, right, rig, &mut look);
+            front_end.run(left, right, rig, &mut look);
             look.times
         });
         let times = times.collect();
@@ -134,13 +140,13 @@ impl Cloud {
     }
 
     /// A word about each image in which there is nothing to find.
-    fn blind(&self, look: &Look, images: [&Image; 2]) -> Vec<Fault> {
+    fn blind(&self, look: &FrontEndOutput, images: [&Image; 2]) -> Vec<Fault> {
         let of = |((file, image), found): ((&PathBuf, &Image), &[Keypoint])| {
-            let (least, most) = image.pixels().iter().fold((f32::MAX, f32::MIN), |(a, b), &p| (a.min(p), b.max(p)));
+            let (min, max) = image.pixels().iter().fold((f32::MAX, f32::MIN), |(a, b), &p| (a.min(p), b.max(p)));
             found.is_empty().then(|| {
                 let [width, height] = [image.width(), image.height()];
                 Fault::new("an image without a key point", file)
-                    .value(format!("{width} x {height} px, grey levels from {least} to {most}"))
+                    .value(format!("{width} x {height} px, grey levels from {min} to {max}"))
                     .remedy("see whether its camera saw anything, and whether the detector asks for too much")
             })
         };
@@ -148,7 +154,7 @@ impl Cloud {
     }
 
     /// For people: how much was found, and how long each stage took.
-    fn people(&self, look: &Look, times: &[StageTimes]) -> String {
+    fn people(&self, look: &FrontEndOutput, times: &[StageTimes]) -> String {
         let [left, right] = look.keypoints().map(<[_]>::len);
         let depths = look.cloud.iter().map(|point| point.position.at.coords.z);
         let (near, far) = depths.fold((f64::INFINITY, 0.0_f64), |(near, far), z| (near.min(z), far.max(z)));
@@ -156,8 +162,8 @@ impl Cloud {
         let (matches, points) = (look.matches.len(), look.cloud.len());
         let mut text = format!("{left} and {right} key points, {matches} matches, {points} points{depth}\n");
         text += &format!("{:12}{:>10}{:>12}\n", "stage", "least ms", "median ms");
-        for (stage, [least, median]) in summary(times) {
-            text += &format!("{stage:12}{least:10.2}{median:12.2}\n");
+        for (stage, [min, median]) in summary(times) {
+            text += &format!("{stage:12}{min:10.2}{median:12.2}\n");
         }
         text + &format!(
             "{} {}, {} {}\n",
@@ -169,11 +175,11 @@ impl Cloud {
     }
 
     /// For programs: everything.
-    fn machines(&self, look: &Look, times: &[StageTimes], pipeline: &Pipeline, warnings: &[Fault]) -> String {
+    fn machines(&self, look: &FrontEndOutput, times: &[StageTimes], pipeline: &Pipeline, warnings: &[Fault]) -> String {
         let points: Vec<Value> = look.cloud.iter().map(point).collect();
         let times: serde_json::Map<String, Value> = summary(times)
             .into_iter()
-            .map(|(stage, [least, median])| (stage.to_owned(), json!({ "least": least, "median": median })))
+            .map(|(stage, [min, median])| (stage.to_owned(), json!({ "min": min, "median": median })))
             .collect();
         let value = json!({
             "left": name(&self.left),
@@ -191,8 +197,8 @@ impl Cloud {
                 "locator": pipeline.locator,
                 "descriptor": pipeline.descriptor,
                 "matcher": pipeline.matcher,
-                "refine": pipeline.refine,
-                "triangulation": pipeline.triangulation,
+                "refinement": pipeline.refinement,
+                "triangulator": pipeline.triangulator,
             },
         });
         value.to_string() + "\n"
@@ -200,7 +206,7 @@ impl Cloud {
 }
 
 /// A word where images and rig do not belong together.
-fn off_lines_warning(off: OffLines, rig: &StereoRig, file: &Path) -> Option<Fault> {
+fn epipolar_warning(off: EpipolarCheck, rig: &StereoRig, file: &Path) -> Option<Fault> {
     let lines = if rig.is_rectified() {
         "the same rows"
     } else if rig.is_rectified_upright() {
@@ -209,11 +215,11 @@ fn off_lines_warning(off: OffLines, rig: &StereoRig, file: &Path) -> Option<Faul
         "their epipolar lines"
     };
     off.contradict().then(|| {
-        let OffLines { matches, near, rms_px } = off;
+        let EpipolarCheck { matches, near, rms_px } = off;
         Fault::new("a rig that the images contradict", file)
             .value(format!(
                 "{near} of {matches} matches lie within {} px of {lines}, rms {rms_px:.1} px",
-                OffLines::NEAR
+                EpipolarCheck::NEAR
             ))
             .remedy("give the calibration of these images; images that are not rectified need their own rig")
     })
@@ -222,7 +228,7 @@ fn off_lines_warning(off: OffLines, rig: &StereoRig, file: &Path) -> Option<Faul
 /// A word where key points came to no point, and what the exchanged images would give.
 fn nothing(
     front_end: &FrontEnd,
-    look: &Look,
+    look: &FrontEndOutput,
     [left, right]: [&Image; 2],
     rig: &StereoRig,
     file: &Path,
@@ -231,8 +237,8 @@ fn nothing(
     if !look.cloud.is_empty() || in_left == 0 || in_right == 0 {
         return None;
     }
-    let mut exchanged = Look::new(Threads::One);
-    front_end.look(right, left, rig, &mut exchanged);
+    let mut exchanged = FrontEndOutput::new(Threads::One);
+    front_end.run(right, left, rig, &mut exchanged);
     let (matches, points) = (exchanged.matches.len(), exchanged.cloud.len());
     Some(
         Fault::new("key points and no point", file)
@@ -253,10 +259,10 @@ fn summary(times: &[StageTimes]) -> Vec<(&'static str, [f64; 2])> {
         let middle = all.len() / 2;
         [all[0], if all.len().is_multiple_of(2) { 0.5 * (all[middle - 1] + all[middle]) } else { all[middle] }]
     };
-    let whole = |stages: &Vec<(&str, f64)>| stages.iter().map(|(_, ms)| ms).sum();
+    let full = |stages: &Vec<(&str, f64)>| stages.iter().map(|(_, ms)| ms).sum();
     let names = stages[0].iter().enumerate();
     let each = names.map(|(index, (name, _))| (*name, of(stages.iter().map(|all| all[index].1).collect())));
-    each.chain([("total", of(stages.iter().map(whole).collect()))]).collect()
+    each.chain([("total", of(stages.iter().map(full).collect()))]).collect()
 }
 
 fn point(point: &seafix_geometry::MeasuredPoint) -> Value {

@@ -18,7 +18,7 @@ pub(crate) struct Diff {
     second: PathBuf,
     /// How many differing values of the results are shown one by one.
     #[arg(long, default_value_t = 10)]
-    most: usize,
+    max: usize,
 }
 
 impl Diff {
@@ -43,7 +43,7 @@ impl Diff {
                 count => format!("  {column}: {count} differ\n"),
             });
             text += &counts.collect::<String>();
-            text += &found.results.iter().take(self.most).map(line).collect::<String>();
+            text += &found.results.iter().take(self.max).map(line).collect::<String>();
         }
         print(&text)?;
         Ok(FINDINGS)

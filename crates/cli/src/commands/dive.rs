@@ -40,11 +40,11 @@ impl Dive {
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
         pool.install(|| {
-            let passage = trial
+            let sequence = trial
                 .source
                 .open(trial.resolved.seed, &plan.folder)
                 .map_err(|faults| Failure::faults(INPUT, &faults))?;
-            pairs::write(&*passage, &self.out, &self.licence)
+            pairs::write(&*sequence, &self.out, &self.licence)
         })
     }
 }

@@ -27,8 +27,8 @@ impl Export {
     pub(crate) fn execute(&self) -> Ended {
         let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
         let trial = plan.trials.first().ok_or_else(|| Failure::new(USAGE, "the experiment has no trial"))?;
-        let passage =
+        let sequence =
             trial.source.open(trial.resolved.seed, &plan.folder).map_err(|faults| Failure::faults(INPUT, &faults))?;
-        pairs::write(&*passage, &self.out, &self.licence)
+        pairs::write(&*sequence, &self.out, &self.licence)
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use seafix_experiment::merge;
 
-use super::run::{Place, tell_of};
+use super::run::{RunFolder, report_on};
 use crate::{
     exit::{DONE, Ended},
     signals,
@@ -18,7 +18,7 @@ pub(crate) struct Merge {
     #[arg(required = true)]
     shards: Vec<PathBuf>,
     #[command(flatten)]
-    place: Place,
+    place: RunFolder,
 }
 
 impl Merge {
@@ -28,7 +28,7 @@ impl Merge {
         let options = self.place.options();
         let finished = merge(&self.shards, &options, &progress);
         signals::end_at_once();
-        tell_of(&finished?, options.threads)?;
+        report_on(&finished?, options.threads)?;
         Ok(DONE)
     }
 }

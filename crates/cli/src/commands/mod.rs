@@ -12,9 +12,9 @@ mod compare;
 mod completions;
 mod diff;
 mod dive;
-mod draw;
 mod eval;
 mod export;
+mod generate;
 mod limits;
 mod list;
 mod merge;
@@ -49,7 +49,7 @@ pub(crate) enum Command {
     /// Follow a stereo rig through a data set: poses relative to the first.
     Odometry(odometry::Odometer),
     /// Draw identification problems with truth (coherence-problem/1).
-    Draw(draw::Draw),
+    Generate(generate::Generate),
     /// Compare runs of the same data: results side by side, and which differences are sure.
     Compare(compare::Compare),
     /// Say what differs between two runs: configuration, inputs, results.
@@ -105,7 +105,7 @@ impl Command {
             Self::Cloud(command) => command.execute(),
             Self::Model(command) => command.execute(),
             Self::Odometry(command) => command.execute(),
-            Self::Draw(command) => command.execute(),
+            Self::Generate(command) => command.execute(),
             Self::Compare(command) => command.execute(),
             Self::Diff(command) => command.execute(),
             Self::Eval(command) => command.execute(),

@@ -8,7 +8,7 @@ use seafix_component::Fault;
 use seafix_component::read_text;
 use seafix_data::{
     HandModel, HandPoint, ModelByHand,
-    dataset::{are_twins, twins_fault},
+    dataset::{are_identical, identical_images_fault},
 };
 use seafix_experiment::changed_pipeline;
 use seafix_io::read_image;
@@ -16,9 +16,9 @@ use serde_json::{Value, json};
 
 use super::limits::Limits;
 use crate::{
+    atomic_file,
     exit::{DONE, Ended, Failure, INPUT, USAGE},
-    terminal::{print, tell},
-    whole,
+    terminal::{notify, print},
 };
 
 #[derive(Debug, Args)]
@@ -62,9 +62,9 @@ impl Model {
     pub(crate) fn execute(&self) -> Ended {
         let usage = |message: String| Failure::new(USAGE, message);
         let input = |fault: Fault| Failure::new(INPUT, fault);
-        for (name, value, most) in [("reach", self.reach, 100.0), ("mark-sigma", self.mark_sigma, 100.0)] {
-            if !(value > 0.0 && value <= most) {
-                return Err(usage(format!("--{name} {value}: more than 0, at most {most} (px)")));
+        for (name, value, max) in [("reach", self.reach, 100.0), ("mark-sigma", self.mark_sigma, 100.0)] {
+            if !(value > 0.0 && value <= max) {
+                return Err(usage(format!("--{name} {value}: more than 0, at most {max} (px)")));
             }
         }
         let base = match &self.base[..] {
@@ -79,23 +79,23 @@ impl Model {
         let limits = self.limits.of_images();
         let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
         let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
-        if are_twins(&left, &right) {
-            return Err(Failure::new(INPUT, twins_fault(&self.left, &self.right)));
+        if are_identical(&left, &right) {
+            return Err(Failure::new(INPUT, identical_images_fault(&self.left, &self.right)));
         }
         let text = read_text(&self.points).map_err(input)?;
         let (reach, mark_sigma, object) = (self.reach, self.mark_sigma, self.id.clone());
         let by_hand = ModelByHand { front_end: &front_end, reach, mark_sigma, object, base };
         let model = by_hand.model([&left, &right], &rig, &text, &self.points).map_err(input)?;
-        model.warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+        model.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         let site = model.site.to_toml();
         if let Some(path) = &self.out {
-            whole::write(path, &site)?;
+            atomic_file::write(path, &site)?;
         }
         match (self.json, &self.out) {
             (true, _) => print(&machines(&model))?,
             (false, Some(_)) => print(&people(&model))?,
             (false, None) => {
-                people(&model).lines().for_each(tell);
+                people(&model).lines().for_each(notify);
                 print(&site)?;
             }
         }

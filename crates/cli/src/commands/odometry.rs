@@ -9,16 +9,18 @@ use std::{
 use clap::Args;
 use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
-use seafix_data::dataset::{Dataset, DatasetFrame, are_twins, realigned, swapped_at_first, tum, twins_fault};
+use seafix_data::dataset::{
+    Dataset, DatasetFrame, are_identical, identical_images_fault, right_camera_rotation, swapped_at_first, tum,
+};
 use seafix_experiment::changed;
-use seafix_navigation::{Journey, Lost, ODOMETRIES, Odometry, Outcome, Segment, StereoPair};
-use seafix_vision::{Image, Realigned, Threads};
+use seafix_navigation::{Lost, ODOMETRIES, Odometry, OdometryOutcome, OdometryTrajectory, Segment, StereoPair};
+use seafix_vision::{Image, RightCameraRotation, Threads};
 use serde_json::{Value, json};
 
 use crate::{
+    atomic_file::AtomicFile,
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
-    terminal::{Progress, print, tell},
-    whole::Whole,
+    terminal::{Progress, notify, print},
 };
 
 #[derive(Debug, Args)]
@@ -36,7 +38,7 @@ pub(crate) struct Odometer {
     set: Vec<String>,
     /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
     #[arg(long)]
-    repair: bool,
+    sort_stamps: bool,
     /// Take the rig as it is written, even where the images say that its cameras are turned another way.
     #[arg(long)]
     keep_rig: bool,
@@ -53,7 +55,7 @@ const LITTLE_AGREEMENT: f64 = 0.45;
 
 /// What came of all pairs.
 struct Trip {
-    journey: Journey,
+    trajectory: OdometryTrajectory,
     /// Stamp of each pair that the odometry was given.
     given: Vec<u64>,
     /// Stamp of each pair whose images could not be read, and why.
@@ -66,10 +68,10 @@ impl Odometer {
     pub(crate) fn execute(&self) -> Ended {
         let (odometry, settings) = self.build()?;
         let mut dataset =
-            Dataset::open_pairs(&self.dataset, self.repair).map_err(|faults| Failure::faults(INPUT, &faults))?;
+            Dataset::open_pairs(&self.dataset, self.sort_stamps).map_err(|faults| Failure::faults(INPUT, &faults))?;
         let odd = dataset.odd_times();
-        dataset.warnings.iter().chain(&odd).for_each(|warning| tell(&format!("warning: {warning}")));
-        if odometry.listens() && !dataset.hears() {
+        dataset.warnings.iter().chain(&odd).for_each(|warning| notify(&format!("warning: {warning}")));
+        if odometry.listens() && !dataset.has_readings() {
             let what = format!("no readings for odometry `{}`", self.odometry);
             let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
             let remedy =
@@ -81,25 +83,30 @@ impl Odometer {
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
         // A file that cannot be written shall not be found out after the work.
-        let out = self.out.as_deref().map(Whole::begin).transpose()?;
+        let out = self.out.as_deref().map(AtomicFile::begin).transpose()?;
         if let Some(fault) = swapped_at_first(&dataset) {
             return Err(Failure::new(INPUT, fault));
         }
-        let realigned = if self.keep_rig || odometry.listens() { None } else { realigned(&dataset) };
-        if let Some(found) = &realigned {
+        let right_camera_rotation =
+            if self.keep_rig || odometry.listens() { None } else { right_camera_rotation(&dataset) };
+        if let Some(found) = &right_camera_rotation {
             dataset.rig = found.rig;
         }
         let trip = pool.install(|| self.travel(&*odometry, &dataset))?;
         if let Some(fault) = trip.motionless(&dataset.folder) {
             return Err(Failure::new(INPUT, fault));
         }
-        let told = realigned.as_ref().map(|found| turned(found).to_string());
-        let warnings: Vec<String> = told.into_iter().chain(trip.warnings()).collect();
-        warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+        let reported = right_camera_rotation.as_ref().map(|found| turned(found).to_string());
+        let warnings: Vec<String> = reported.into_iter().chain(trip.warnings()).collect();
+        warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         if let Some(out) = out {
-            out.finish(poses(&trip.journey))?;
+            out.finish(poses(&trip.trajectory))?;
         }
-        print(&if self.json { machines(&trip, realigned.as_ref(), &warnings, &settings) } else { people(&trip) })?;
+        print(&if self.json {
+            machines(&trip, right_camera_rotation.as_ref(), &warnings, &settings)
+        } else {
+            people(&trip)
+        })?;
         Ok(DONE)
     }
 
@@ -116,7 +123,7 @@ impl Odometer {
     /// Leads every pair that can be read through the odometry.
     fn travel(&self, odometry: &dyn Odometry, dataset: &Dataset) -> Result<Trip, Failure> {
         let threads = if self.threads > 1 { Threads::Pool } else { Threads::One };
-        let mut reckoning = odometry.begin(&dataset.rig, dataset.body_from_camera, threads);
+        let mut session = odometry.begin(&dataset.rig, dataset.body_from_camera, threads);
         let progress = Progress::new();
         progress.expect(dataset.frames.len());
         let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
@@ -124,12 +131,12 @@ impl Odometer {
         let mut before = None;
         for frame in &dataset.frames {
             let readings = dataset.readings(before.replace(frame.stamp_ns), frame.stamp_ns);
-            readings.iter().for_each(|reading| reckoning.sense(reading));
-            match two_eyes(dataset, frame) {
+            readings.iter().for_each(|reading| session.sense(reading));
+            match stereo_images(dataset, frame) {
                 Err(fault) => {
                     let warning = format!("warning: {fault}");
                     if !said.contains(&warning) {
-                        tell(&warning);
+                        notify(&warning);
                         said.insert(warning);
                     }
                     unread.push((frame.stamp_ns, fault));
@@ -137,7 +144,7 @@ impl Odometer {
                 Ok((left, right)) => {
                     let pair = StereoPair { stamp_ns: frame.stamp_ns, left: &left, right: &right };
                     let start = Instant::now();
-                    reckoning.advance(&pair).map_err(|error| Failure::new(INPUT, error))?;
+                    session.advance(&pair).map_err(|error| Failure::new(INPUT, error))?;
                     odometry_ms += start.elapsed().as_secs_f64() * 1e3;
                     given.push(frame.stamp_ns);
                 }
@@ -152,33 +159,37 @@ impl Odometer {
                 .remedy("restore the images named above, or leave their lines out");
             return Err(Failure::new(INPUT, fault));
         }
-        Ok(Trip { journey: reckoning.journey(), given, unread, odometry_ms })
+        Ok(Trip { trajectory: session.trajectory(), given, unread, odometry_ms })
     }
 }
 
 /// A word on a rig that was turned.
-fn turned(found: &Realigned) -> String {
-    let [baseline, sight] = found.turn.map(f64::to_degrees);
+fn turned(found: &RightCameraRotation) -> String {
+    let [baseline, ray] = found.turn.map(f64::to_degrees);
     format!(
         "the images contradict the rig: what looks alike lies {:.1} px (median) off its epipolar lines; {:.1} px with the right \
-         camera turned by {baseline:.3}° about the baseline and {sight:.3}° about its line of sight, which was done \
+         camera turned by {baseline:.3}° about the baseline and {ray:.3}° about its line of sight, which was done \
          (`--keep-rig` leaves it): calibrate again, for what epipolar lines do not tell may be wrong too",
         found.given_px, found.left_px
     )
 }
 
 /// The two images of a frame, which one image twice is not.
-fn two_eyes(dataset: &Dataset, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
+fn stereo_images(dataset: &Dataset, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
     let (left, right) = dataset.pair(frame)?;
-    if are_twins(&left, &right) { Err(twins_fault(&frame.left, &frame.right)) } else { Ok((left, right)) }
+    if are_identical(&left, &right) {
+        Err(identical_images_fault(&frame.left, &frame.right))
+    } else {
+        Ok((left, right))
+    }
 }
 
 impl Trip {
     /// Stamps of the pairs that were left out, and why, in order of time.
     fn left_out(&self) -> Vec<(u64, String)> {
-        let skipped = self.given.iter().zip(&self.journey.outcomes).filter_map(|(stamp, outcome)| match outcome {
-            Outcome::Skipped(lost) => Some((*stamp, lost.to_string())),
-            Outcome::Began | Outcome::Followed { .. } => None,
+        let skipped = self.given.iter().zip(&self.trajectory.outcomes).filter_map(|(stamp, outcome)| match outcome {
+            OdometryOutcome::Skipped(lost) => Some((*stamp, lost.to_string())),
+            OdometryOutcome::Began | OdometryOutcome::Followed { .. } => None,
         });
         let unread = self.unread.iter().map(|(stamp, fault)| (*stamp, fault.to_string()));
         let mut all: Vec<_> = skipped.chain(unread).collect();
@@ -188,23 +199,23 @@ impl Trip {
 
     /// What to say where no pair was followed: how many there were, and what was wrong with most of them.
     fn motionless(&self, folder: &Path) -> Option<Fault> {
-        let outcomes = &self.journey.outcomes;
-        if outcomes.iter().any(|outcome| matches!(outcome, Outcome::Followed { .. })) {
+        let outcomes = &self.trajectory.outcomes;
+        if outcomes.iter().any(|outcome| matches!(outcome, OdometryOutcome::Followed { .. })) {
             return None;
         }
-        let (poses, pairs) = (self.journey.waypoints().count(), self.given.len() + self.unread.len());
+        let (poses, pairs) = (self.trajectory.waypoints().count(), self.given.len() + self.unread.len());
         let fault = Fault::new("no motion can be computed", folder);
         let counts = format!("{} from {}", counted(poses, "pose"), counted(pairs, "stereo pair"));
-        let skipped = |outcome: &Outcome| match outcome {
-            Outcome::Skipped(lost) => Some(lost.clone()),
-            Outcome::Began | Outcome::Followed { .. } => None,
+        let skipped = |outcome: &OdometryOutcome| match outcome {
+            OdometryOutcome::Skipped(lost) => Some(lost.clone()),
+            OdometryOutcome::Began | OdometryOutcome::Followed { .. } => None,
         };
-        let breaks = self.journey.segments.iter().filter_map(|segment| segment.broken.clone());
+        let breaks = self.trajectory.segments.iter().filter_map(|segment| segment.broken.clone());
         let reasons: Vec<Lost> = outcomes.iter().filter_map(skipped).chain(breaks).collect();
         let alike =
             |a: &Lost| reasons.iter().filter(|b| std::mem::discriminant(a) == std::mem::discriminant(b)).count();
         // A pair that begins a segment is not left out, and no motion leads to it all the same.
-        let told = |a: &Lost| {
+        let reported = |a: &Lost| {
             let same = |b: &Lost| std::mem::discriminant(a) == std::mem::discriminant(b);
             let out = outcomes.iter().filter_map(skipped).filter(same).count();
             match alike(a) - out {
@@ -213,11 +224,11 @@ impl Trip {
             }
         };
         // The first of the most frequent kind.
-        let most = reasons.iter().rev().max_by_key(|lost| alike(lost));
+        let max = reasons.iter().rev().max_by_key(|lost| alike(lost));
         let unread = self.unread.len();
-        Some(match most {
+        Some(match max {
             Some(lost) if alike(lost) >= unread => {
-                fault.value(format!("{counts}; {}: {lost}", told(lost))).remedy(match lost {
+                fault.value(format!("{counts}; {}: {lost}", reported(lost))).remedy(match lost {
                     Lost::Still { .. } => {
                         "see whether something fixed to the vehicle is in view, and paint it over in the images"
                     }
@@ -234,12 +245,12 @@ impl Trip {
 
     /// What is odd about the whole way.
     fn warnings(&self) -> Vec<String> {
-        let agreement = self.journey.agreement().filter(|share| *share < LITTLE_AGREEMENT);
-        let said = |share: f64| {
+        let agreement = self.trajectory.agreement().filter(|fraction| *fraction < LITTLE_AGREEMENT);
+        let said = |fraction: f64| {
             format!(
                 "only {:.0} % of the landmarks agree with the motion (median over the pairs): is something fixed to the \
                  vehicle in view, or are the cameras out of step?",
-                100.0 * share
+                100.0 * fraction
             )
         };
         agreement.map(said).into_iter().collect()
@@ -247,11 +258,11 @@ impl Trip {
 
     /// Landmarks found in a pair, of those sought: the least, and the means; `None` by an odometry without.
     fn landmarks(&self) -> Option<[f64; 3]> {
-        let followed: Vec<(usize, usize)> = self.journey.outcomes.iter().filter_map(of_followed).collect();
+        let followed: Vec<(usize, usize)> = self.trajectory.outcomes.iter().filter_map(of_followed).collect();
         let count = followed.len() as f64;
-        let least = followed.iter().map(|(_, found)| *found).min()?;
+        let min = followed.iter().map(|(_, found)| *found).min()?;
         let mean = |pick: fn(&(usize, usize)) -> usize| followed.iter().map(pick).sum::<usize>() as f64 / count;
-        Some([least as f64, mean(|one| one.1), mean(|one| one.0)])
+        Some([min as f64, mean(|one| one.1), mean(|one| one.0)])
     }
 
     fn pairs_a_second(&self) -> f64 {
@@ -259,17 +270,17 @@ impl Trip {
     }
 }
 
-fn of_followed(outcome: &Outcome) -> Option<(usize, usize)> {
+fn of_followed(outcome: &OdometryOutcome) -> Option<(usize, usize)> {
     match outcome {
-        Outcome::Followed { sought, found } if *sought > 0 => Some((*sought, *found)),
-        Outcome::Followed { .. } | Outcome::Began | Outcome::Skipped(_) => None,
+        OdometryOutcome::Followed { sought, found } if *sought > 0 => Some((*sought, *found)),
+        OdometryOutcome::Followed { .. } | OdometryOutcome::Began | OdometryOutcome::Skipped(_) => None,
     }
 }
 
 /// TUM's text: every pose, in order of time; a comment where a segment begins that is not joined to the one before.
-fn poses(journey: &Journey) -> String {
+fn poses(trajectory: &OdometryTrajectory) -> String {
     let mut text = "# world_from_camera, the world is the first left camera: seconds tx ty tz qx qy qz qw\n".to_owned();
-    for segment in &journey.segments {
+    for segment in &trajectory.segments {
         if let Some(why) = &segment.broken {
             text += &format!("# broken: the motion to here is unknown and left out ({why})\n");
         }
@@ -286,16 +297,16 @@ fn counted(count: usize, what: &str) -> String {
 
 /// For people: how far, how fast, and where not.
 fn people(trip: &Trip) -> String {
-    let journey = &trip.journey;
-    let poses = journey.waypoints().count();
+    let trajectory = &trip.trajectory;
+    let poses = trajectory.waypoints().count();
     let pairs = trip.given.len() + trip.unread.len();
     let (poses, pairs) = (counted(poses, "pose"), counted(pairs, "stereo pair"));
-    let mut text = format!("{poses} of {pairs} over {:.2} m", journey.length());
+    let mut text = format!("{poses} of {pairs} over {:.2} m", trajectory.length());
     text += &format!(", {:.1} pairs a second\n", trip.pairs_a_second());
-    if let Some([least, found, sought]) = trip.landmarks() {
-        text += &format!("{found:.0} of {sought:.0} landmarks found in a pair, at least {least:.0}\n");
+    if let Some([min, found, sought]) = trip.landmarks() {
+        text += &format!("{found:.0} of {sought:.0} landmarks found in a pair, at least {min:.0}\n");
     }
-    for segment in journey.segments.iter().filter(|segment| segment.broken.is_some()) {
+    for segment in trajectory.segments.iter().filter(|segment| segment.broken.is_some()) {
         text += &format!("broken before {}: {}\n", seconds(segment.poses[0].stamp_ns), why(segment));
     }
     let left_out = trip.left_out();
@@ -306,28 +317,33 @@ fn people(trip: &Trip) -> String {
         text += &format!("  {}: {why}\n", seconds(*stamp));
     }
     let count = trip.given.len() as f64;
-    let stages: Vec<String> = journey.times.iter().map(|(stage, ms)| format!("{stage} {:.1}", ms / count)).collect();
+    let stages: Vec<String> = trajectory.times.iter().map(|(stage, ms)| format!("{stage} {:.1}", ms / count)).collect();
     text + &format!("ms a pair: {}\n", stages.join(", "))
 }
 
 /// For programs: everything.
-fn machines(trip: &Trip, realigned: Option<&Realigned>, warnings: &[String], settings: &Choice) -> String {
-    let journey = &trip.journey;
+fn machines(
+    trip: &Trip,
+    right_camera_rotation: Option<&RightCameraRotation>,
+    warnings: &[String],
+    settings: &Choice,
+) -> String {
+    let trajectory = &trip.trajectory;
     let count = trip.given.len() as f64;
-    let segments: Vec<Value> = journey.segments.iter().map(segment).collect();
+    let segments: Vec<Value> = trajectory.segments.iter().map(segment).collect();
     let left_out: Vec<Value> =
         trip.left_out().into_iter().map(|(stamp_ns, why)| json!({ "stamp_ns": stamp_ns, "why": why })).collect();
     let times: serde_json::Map<String, Value> =
-        journey.times.iter().map(|(stage, ms)| ((*stage).to_owned(), json!(ms / count))).collect();
+        trajectory.times.iter().map(|(stage, ms)| ((*stage).to_owned(), json!(ms / count))).collect();
     let value = json!({
         "pairs": trip.given.len() + trip.unread.len(),
-        "poses": journey.waypoints().count(),
-        "length": journey.length(),
+        "poses": trajectory.waypoints().count(),
+        "length": trajectory.length(),
         "segments": segments,
         "left_out": left_out,
-        "landmarks": trip.landmarks().map(|[least, found, sought]| json!({ "least": least, "found": found, "sought": sought })),
-        "agreement": journey.agreement(),
-        "realigned": realigned.map(|found| json!({
+        "landmarks": trip.landmarks().map(|[min, found, sought]| json!({ "min": min, "found": found, "sought": sought })),
+        "agreement": trajectory.agreement(),
+        "right_camera_rotation": right_camera_rotation.map(|found| json!({
             "turn_deg": found.turn.map(f64::to_degrees),
             "right_from_left": found.rig.right_from_left().rows(),
             "pairs": found.pairs,

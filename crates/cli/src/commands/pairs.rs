@@ -2,20 +2,20 @@
 
 use std::path::Path;
 
-use seafix_data::{dataset, source::Passage};
+use seafix_data::{dataset, source::Sequence};
 
 use crate::{
     exit::{DONE, Ended, Failure, OUTPUT},
-    terminal::{Progress, print, tell},
+    terminal::{Progress, notify, print},
 };
 
-/// Writes all frames of `passage` to the folder `out`, which must not exist.
-pub(super) fn write(passage: &dyn Passage, out: &Path, licence: &str) -> Ended {
+/// Writes all frames of `sequence` to the folder `out`, which must not exist.
+pub(super) fn write(sequence: &dyn Sequence, out: &Path, licence: &str) -> Ended {
     let progress = Progress::new();
-    let count = passage.frames();
-    tell(&format!("{count} frames into {}", out.display()));
+    let count = sequence.frames();
+    notify(&format!("{count} frames into {}", out.display()));
     progress.expect(count);
-    let written = dataset::write(passage, out, licence, &|| progress.step(""));
+    let written = dataset::write(sequence, out, licence, &|| progress.step(""));
     progress.end();
     written.map_err(|fault| Failure::new(OUTPUT, fault))?;
     print(&format!("{count} stereo pairs in {}\n", out.display()))?;

@@ -16,7 +16,7 @@ use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, USAGE},
     publication::{self, Published},
     signals,
-    terminal::{Progress, print, tell},
+    terminal::{Progress, notify, print},
 };
 
 /// Runs the experiments of a list and reports them into a folder that can be kept beside the program. A run is kept, and made
@@ -66,14 +66,14 @@ impl Publish {
         }
         for one in &list {
             let how = if self.run(one)? { "kept run" } else { "new run" };
-            tell(&format!("{}: {how}", one.name));
+            notify(&format!("{}: {how}", one.name));
         }
         let written = |one: &Published| report(&self.runs.join(&one.name), &self.out.join(&one.name), Forms::SMALL);
         let written: Vec<_> = list.par_iter().map(written).collect();
         let written: Vec<Report> = written.into_iter().collect::<Result<_, _>>().map_err(failure)?;
-        written.iter().for_each(|report| tell(&format!("report: {}", report.page.display())));
+        written.iter().for_each(|report| notify(&format!("report: {}", report.page.display())));
         if self.only.is_empty() {
-            self.tell_of_others(&list);
+            self.distinguish_others(&list);
             let page = index(written.iter().map(|report| report.findings.as_str()), &self.out).map_err(failure)?;
             print(&format!("{}\n", page.display()))?;
         }
@@ -118,14 +118,14 @@ impl Publish {
     }
 
     /// Tells of reports of experiments that are not in the list, and how many. They stay: nobody asked for their removal.
-    fn tell_of_others(&self, list: &[Published]) -> usize {
+    fn distinguish_others(&self, list: &[Published]) -> usize {
         let Ok(entries) = fs::read_dir(&self.out) else { return 0 };
         let mut others: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
         others.retain(|path| is_report(path) && !list.iter().any(|one| path.ends_with(&one.name)));
         others.sort();
         for path in &others {
             let list = self.list.display();
-            tell(&format!("{}: a report that is not in {list}: remove it if it is not wanted", path.display()));
+            notify(&format!("{}: a report that is not in {list}: remove it if it is not wanted", path.display()));
         }
         others.len()
     }
@@ -148,7 +148,7 @@ impl Publish {
         }
         let mut holds = holding == list.len();
         if self.only.is_empty() {
-            holds &= self.tell_of_others(list) == 0;
+            holds &= self.distinguish_others(list) == 0;
             if unreadable.is_none() && !index_holds(findings.iter().map(String::as_str), &self.out) {
                 print(&format!("{} is not what the logs make\n", self.out.join("README.md").display()))?;
                 holds = false;

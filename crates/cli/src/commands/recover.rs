@@ -11,7 +11,7 @@ use seafix_log::{LogError, Reader, join_lacking, recover};
 
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT},
-    terminal::{print, tell},
+    terminal::{notify, print},
 };
 
 #[derive(Debug, Args)]
@@ -38,7 +38,7 @@ impl Recover {
         }
         let found = recover(&self.log, &out).map_err(failure)?;
         for lost in &found.lost {
-            tell(&format!("lost: {lost} in {}", self.log.display()));
+            notify(&format!("lost: {lost} in {}", self.log.display()));
         }
         print(&format!(
             "{}: {} messages, {} whole frames, up to stamp {} ns; {} messages of torn frames left out\n",
@@ -93,11 +93,11 @@ fn of_run(run: &Path, out: &Path) -> Ended {
             let part = saved.join(format!("{}.mcap", parts.len()));
             match recover(&log, &part) {
                 Ok(found) => {
-                    found.lost.iter().for_each(|lost| tell(&format!("lost: {lost} in {}", log.display())));
+                    found.lost.iter().for_each(|lost| notify(&format!("lost: {lost} in {}", log.display())));
                     parts.push(part);
                 }
                 Err(error) if is_of_output(&error) => return Err(failure(error)),
-                Err(error) => tell(&format!("lost: {error}")),
+                Err(error) => notify(&format!("lost: {error}")),
             }
         }
         let to = out.join(format!("{trial}.mcap"));

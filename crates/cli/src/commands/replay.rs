@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use seafix_experiment::{Options, Replay, ReplayFrom, run};
 
-use super::run::{Place, tell_of};
+use super::run::{RunFolder, report_on};
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, USAGE},
     signals,
@@ -29,7 +29,7 @@ pub(crate) struct Replayed {
     #[arg(long)]
     from: Option<From>,
     #[command(flatten)]
-    place: Place,
+    place: RunFolder,
     /// Log no durations: two runs of one replay then have the same bytes.
     #[arg(long)]
     untimed: bool,
@@ -63,7 +63,7 @@ impl Replayed {
         let finished = run(&plan, &options, &progress);
         signals::end_at_once();
         progress.end();
-        tell_of(&finished?, options.threads)?;
+        report_on(&finished?, options.threads)?;
         Ok(DONE)
     }
 }

@@ -96,13 +96,13 @@ impl Report {
 pub(crate) fn verified(run: &Path, folder: &Path) -> Result<(bool, String), Failure> {
     let verified = verify(run, folder).map_err(failure)?;
     let changed = changed_outputs(run).map_err(|fault| Failure::faults(INPUT, &[fault]))?;
-    let whole = changed.is_empty();
+    let full = changed.is_empty();
     let mut changed: String = changed.iter().map(|fault| format!("{fault}\n")).collect();
     if !run.join("manifest.json").exists() {
         changed += &format!("note: {} has no manifest: its logs were read, its tables not looked at\n", run.display());
     }
     print(&format!("{changed}{}", said(&verified, &folder.display().to_string())))?;
-    Ok((verified.holds() && whole, verified.findings))
+    Ok((verified.holds() && full, verified.findings))
 }
 
 /// What a verification found, for people.

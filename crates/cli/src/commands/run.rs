@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
-use seafix_experiment::{Estimate, Existing, Options, Plan, Shard, estimate, run};
+use seafix_experiment::{Existing, Options, Plan, RunEstimate, Shard, estimate, run};
 use seafix_report::{Forms, report};
 
 use crate::{
@@ -21,7 +21,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     #[command(flatten)]
-    place: Place,
+    place: RunFolder,
     /// Make only the k-th of n parts of the run; `seafix merge` joins them.
     #[arg(long, value_name = "K/N", requires = "out")]
     shard: Option<Shard>,
@@ -39,7 +39,7 @@ pub(crate) struct Run {
 
 /// Where a run goes, and who works on it.
 #[derive(Debug, Args)]
-pub(crate) struct Place {
+pub(crate) struct RunFolder {
     /// The folder of the run; it must not exist or be empty [default: the next free one below runs/].
     #[arg(long)]
     out: Option<PathBuf>,
@@ -56,7 +56,7 @@ pub(crate) struct Place {
     threads: Option<u16>,
 }
 
-impl Place {
+impl RunFolder {
     pub(crate) fn options(&self) -> Options {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let existing = match (self.resume, self.overwrite) {
@@ -73,7 +73,8 @@ impl Run {
     pub(crate) fn execute(&self) -> Ended {
         let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
         if self.dry_run {
-            return print(&told(&plan, &estimate(&plan, self.separate)?, self.place.options().threads)).map(|()| DONE);
+            return print(&reported(&plan, &estimate(&plan, self.separate)?, self.place.options().threads))
+                .map(|()| DONE);
         }
         let own = self.place.options();
         let options = Options { shard: self.shard, timed: !self.untimed, separate: self.separate, ..own };
@@ -85,14 +86,14 @@ impl Run {
         let finished = finished?;
         match self.shard {
             Some(shard) => print(&format!("shard {shard}: {}\n", finished.folder.display()))?,
-            None => tell_of(&finished, options.threads)?,
+            None => report_on(&finished, options.threads)?,
         }
         Ok(DONE)
     }
 }
 
 /// Trials, frames, disk and time, in words.
-fn told(plan: &Plan, estimate: &Estimate, threads: usize) -> String {
+fn reported(plan: &Plan, estimate: &RunEstimate, threads: usize) -> String {
     let lines = plan.trials.iter().zip(&estimate.frames);
     let mut text: String = lines.map(|(trial, frames)| format!("{:60} {frames:>9} frames\n", trial.name)).collect();
     let frames: usize = estimate.frames.iter().sum();
@@ -119,7 +120,7 @@ fn duration(seconds: f64) -> String {
 }
 
 /// Makes the report of a run that is complete on so many threads, and prints its summary.
-pub(crate) fn tell_of(finished: &seafix_experiment::Finished, threads: usize) -> Result<(), Failure> {
+pub(crate) fn report_on(finished: &seafix_experiment::Finished, threads: usize) -> Result<(), Failure> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Failure::new(OUTPUT, format!("no threads ({error}): {threads}")))?;
     let written = pool.install(|| report(&finished.folder, &finished.folder.join("report"), Forms::ALL));

@@ -33,8 +33,8 @@ fn experiment() -> Value {
     for stage in ["detector", "locator", "descriptor", "matcher", "search", "solver"] {
         pipeline.insert(stage.to_owned(), component(stage));
     }
-    for (stage, kind) in [("refine", "refinement"), ("triangulation", "triangulator")] {
-        pipeline.insert(stage.to_owned(), with_default(kind));
+    for stage in ["refinement", "triangulator"] {
+        pipeline.insert(stage.to_owned(), with_default(stage));
     }
     pipeline.insert("filters".to_owned(), json!({ "type": "array", "items": component("filter") }));
     pipeline.insert("target".to_owned(), json!({ "enum": ["object", "joint", "site"], "default": "object" }));
@@ -43,10 +43,10 @@ fn experiment() -> Value {
         navigation.insert(part.to_owned(), component(part));
     }
     navigation.insert("faults".to_owned(), said("how the odometry fails: kind, from, to, amount", "array"));
-    let network = properties(&toml::Table::try_from(Keyframes::default()).expect("settings are a table"));
+    let pose_graph = properties(&toml::Table::try_from(Keyframes::default()).expect("settings are a table"));
     navigation.insert(
-        "network".to_owned(),
-        json!({ "type": "object", "properties": network, "additionalProperties": false }),
+        "pose-graph".to_owned(),
+        json!({ "type": "object", "properties": pose_graph, "additionalProperties": false }),
     );
     let range = json!({
         "type": "object",

@@ -38,7 +38,7 @@ pub(crate) struct Solve {
     threads: u16,
     /// Where nothing is found in the shells, look in larger ones, then everywhere: the object may have been displaced.
     #[arg(long)]
-    widen: bool,
+    expand_gates: bool,
     /// One JSON object a line, for programs.
     #[arg(long)]
     json: bool,
@@ -81,7 +81,7 @@ impl Solve {
             search: (&settings.search.name, &*search),
             solver: (&settings.solver.name, &*solver),
             acceptance: &settings.acceptance,
-            widen: self.widen,
+            expand_gates: self.expand_gates,
         };
         let solve = |path: &PathBuf| {
             // Every problem has the same stream: its answer depends on no other.
@@ -120,7 +120,7 @@ impl Solve {
 }
 
 /// A stretch of so many standard deviations is told: of exact rigs and models one fix in fifteen thousand has it.
-const TOLD: f64 = 4.0;
+const REPORTED: f64 = 4.0;
 
 /// How far apart two poses put the object.
 fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
@@ -150,7 +150,7 @@ fn people(answer: &Answer) -> String {
         text += &format!(", scale {scale:.6}");
     }
     if let Some(stretch) = answer.integrity.as_ref().and_then(|it| it.stretch)
-        && stretch.value.abs() > TOLD * stretch.sigma
+        && stretch.value.abs() > REPORTED * stretch.sigma
     {
         let (by, sigma) = (100.0 * stretch.value.abs(), 100.0 * stretch.sigma);
         let longer = if stretch.value > 0.0 { "longer" } else { "shorter" };

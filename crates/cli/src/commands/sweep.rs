@@ -9,12 +9,12 @@ use clap::{Args, ValueEnum};
 use seafix_experiment::{Existing, Options, Plan, merge};
 use serde_json::Value;
 
-use super::run::tell_of;
+use super::run::report_on;
 use crate::{
     executor::{Array, Executor, HyperQueue, Local, Slurm},
     exit::{DONE, Ended, Failure, OUTPUT, USAGE},
     signals,
-    terminal::{Progress, tell},
+    terminal::{Progress, notify},
 };
 
 #[derive(Debug, Args)]
@@ -82,12 +82,12 @@ impl Sweep {
         let script = shards.join("shard.sh");
         fs::write(&script, self.script(&shards, executor.variable())?).map_err(|error| refuse(&script, error))?;
         let (tasks, threads) = (self.shards as usize, usize::from(self.threads));
-        tell(&format!("{tasks} shards of {} into {}", plan.name, shards.display()));
+        notify(&format!("{tasks} shards of {} into {}", plan.name, shards.display()));
         signals::listen();
         let ran = executor.run(&Array { script, tasks, threads, name: format!("seafix-{}", plan.name), logs });
         signals::end_at_once();
         ran?;
-        if signals::came() {
+        if signals::turned_out() {
             return Err(Failure::new(signals::exit_code(), "interrupted; the same command goes on where it ended"));
         }
         self.merge(&shards)
@@ -122,12 +122,12 @@ impl Sweep {
 
     fn merge(&self, shards: &Path) -> Ended {
         let folders: Vec<PathBuf> = (1..=self.shards).map(|k| shards.join(k.to_string())).collect();
-        let whole = |folder: &PathBuf| {
+        let full = |folder: &PathBuf| {
             let text = fs::read_to_string(folder.join("manifest.json")).unwrap_or_default();
             serde_json::from_str::<Value>(&text).is_ok_and(|manifest| manifest["state"] == "shard")
         };
         let missing: Vec<String> =
-            (1..=self.shards).zip(&folders).filter(|(_, folder)| !whole(folder)).map(|(k, _)| k.to_string()).collect();
+            (1..=self.shards).zip(&folders).filter(|(_, folder)| !full(folder)).map(|(k, _)| k.to_string()).collect();
         if !missing.is_empty() {
             let what = format!(
                 "shards {} did not end; what they said is in {}; the same command goes on with them",
@@ -141,7 +141,7 @@ impl Sweep {
         let progress = Progress::new();
         let finished = merge(&folders, &options, &progress);
         progress.end();
-        tell_of(&finished?, cores)?;
+        report_on(&finished?, cores)?;
         fs::remove_dir_all(shards)
             .map_err(|error| Failure::new(OUTPUT, format!("cannot remove {}: {error}", shards.display())))?;
         Ok(DONE)
@@ -162,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_harmless_in_the_shell() {
+    fn words_are_harmless_in_the_gate() {
         assert_eq!(quoted("a b$(c)'d"), r"'a b$(c)'\''d'");
     }
 }

@@ -22,13 +22,13 @@ impl Executor for Local {
 
     fn run(&self, array: &Array) -> Result<(), Failure> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let most = (cores / array.threads.max(1)).max(1);
+        let max = (cores / array.threads.max(1)).max(1);
         let mut running: Vec<Child> = Vec::new();
         for task in 1..=array.tasks {
-            while running.len() >= most {
+            while running.len() >= max {
                 wait(&mut running);
             }
-            if signals::came() {
+            if signals::turned_out() {
                 break;
             }
             running.push(self.begin(array, task)?);

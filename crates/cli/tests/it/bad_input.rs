@@ -182,7 +182,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
     let rows = fs::read_to_string(out.join("results.csv")).unwrap().lines().count() - 1;
     assert_eq!(rows, 1, "one pair, one object");
     assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains(counted));
-    let (code, said, out) = run("strict", &["--set", "source.strict=true"]);
+    let (code, said, out) = run("strict", &["--set", "source.reject-mismatched-images=true"]);
     assert!(code == Some(3) && said.contains("c.pgm") && !out.exists(), "{said}");
     // Two of three belong to another calibration.
     sample.change("frames.csv", "2000000000,a.pgm,c.pgm", "2000000000,a.pgm,c.pgm\n3000000000,c.pgm,c.pgm");
@@ -328,8 +328,8 @@ fn one_image_for_both_cameras() {
     assert!(code == Some(0) && said.contains("in order"), "{said}");
     fs::copy(sample.path("a.pgm"), sample.path("b.pgm")).unwrap();
     let (code, said) = checked(&sample);
-    let told = said.contains("left and right images that are the same in") && said.contains("1 of 1 pairs");
-    assert!(code == Some(1) && told && !said.contains("in order"), "{said}");
+    let reported = said.contains("left and right images that are the same in") && said.contains("1 of 1 pairs");
+    assert!(code == Some(1) && reported && !said.contains("in order"), "{said}");
     sample.refused(3, &["a.pgm", "left and right images that are the same", "one image twice has no depth"]);
     // Two images of nothing are alike and no mistake.
     let dark = format!("P2\n64 48\n255\n{}", "9\n".repeat(64 * 48));
@@ -432,7 +432,7 @@ fn all_faults_of_an_experiment_at_once() {
     let text = "sorce = 'dive'\nquestion = ''\n\
         source = { name = 'dive', frames = 'x', raet = 2.0, water = { attenuaton = 2.0 } }\n\
         [pipeline]\nsolver = 'kabsh'\n  window = 0\nsearch = { name = 'icp', budget = 'many', x = 1 }\n\
-        refine = 'none\n\
+        refinement = 'none\n\
         [[vary]]\nkey = 'pipeline.search'\nvalues = ['icp', 'gicpp']\n[[vary]]\nkey = 'pipeline.window'\nvalues = []\n";
     let (_folder, file) = experiment(text);
     let check = program().args(["check", &file]).output().unwrap();
@@ -473,7 +473,7 @@ fn all_faults_of_an_experiment_at_once() {
 /// Each at the key or value itself, also where a component's name is misspelt, and on axes. Seen to fail where what is misspelt ends
 /// the search, and where an axis is told by its header.
 #[test]
-fn a_fault_is_told_where_it_stands() {
+fn a_fault_is_reported_where_it_stands() {
     let start = "question = 'why'\n";
     for (text, places) in [
         (
@@ -515,10 +515,10 @@ fn a_fault_is_told_where_it_stands() {
         ),
         (
             "source = 'virtual-points'\n[pipeline.acceptance]\nleast-points = 1\nconfidence = 2.0\n[pipeline.gate]\nbox = -1.0\n\
-             [[navigation.faults]]\nkind = 'off'\nfrom = 3.0\nto = 1.0\n[navigation.network.settings]\noverlap = 3.0\n\
+             [[navigation.faults]]\nkind = 'off'\nfrom = 3.0\nto = 1.0\n[navigation.pose-graph.settings]\noverlap = 3.0\n\
              recognition = { solver = 'kabch', draws = 0 }\n",
             &[
-                ("least-points = 1", "4:16"),
+                ("min-points = 1", "4:16"),
                 ("confidence = 2", "5:14"),
                 ("box = -1", "7:7"),
                 ("faults[0].to = 1", "11:6"),
@@ -631,19 +631,19 @@ fn settings_of_the_pipeline_out_of_range() {
     for setting in [
         "acceptance.confidence=2",
         "acceptance.confidence=nan",
-        "acceptance.least-points=0",
+        "acceptance.min-points=0",
         "gate={chi-square=1.5}",
         "gate={box=-1}",
         "tolerance={sigmas=-1}",
         "tolerance={fixed=nan}",
-        "refine.window=10000",
-        "triangulation.sigma-px=-1",
+        "refinement.window=10000",
+        "triangulator.sigma-px=-1",
         "filters=[{name='median',radius=9}]",
         "detector.sigma=nan",
         "descriptor.scale=-1",
         "matcher.ratio=-1",
         "search.budget=0",
-        "solver.least-ratio=nan",
+        "solver.min-ratio=nan",
     ] {
         let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n");
         let set = format!("pipeline.{setting}");
@@ -680,7 +680,7 @@ fn a_bad_problem_among_good_ones() {
     let lines: Vec<serde_json::Value> =
         String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(lines[0]["error"].as_str().unwrap().contains("bad.json"));
-    assert_eq!(lines[1]["outcome"], "referenced", "{}", lines[1]);
+    assert_eq!(lines[1]["outcome"], "fix", "{}", lines[1]);
 }
 
 const PROBLEM: &str = r#"{"format": "coherence-problem/1", "id": "t",

@@ -6,8 +6,8 @@ use std::process::Command;
 
 mod bad_input;
 mod cloud;
-mod draw;
 mod eval;
+mod generate;
 #[cfg(unix)]
 mod hyperqueue;
 mod layers;

@@ -15,7 +15,7 @@ const STEP: f64 = 0.04;
 const PAIRS: usize = 8;
 
 /// Two walls that stand in a corner, textured with waves and random tiles; the rig moves along x.
-struct Passage {
+struct Sequence {
     folder: TempDir,
 }
 
@@ -51,22 +51,22 @@ fn view(x: f64) -> Vec<u8> {
     bytes
 }
 
-impl Passage {
+impl Sequence {
     fn new() -> Self {
-        let passage = Self { folder: TempDir::new().unwrap() };
+        let sequence = Self { folder: TempDir::new().unwrap() };
         let [width, height] = SIZE;
         let camera = format!("size = [{width}, {height}]\nfx = {FOCAL}\nfy = {FOCAL}\ncx = 159.5\ncy = 119.5\n");
         let rows = format!("[[1.0,0.0,0.0,-{BASELINE}],[0.0,1.0,0.0,0.0],[0.0,0.0,1.0,0.0],[0.0,0.0,0.0,1.0]]");
         let head = "format = \"seafix-dataset/1\"\nname = \"walls\"\nlicence = \"CC0-1.0\"\nframes = \"frames.csv\"\n";
         let rig = format!("[rig]\nright_from_left = {rows}\n[rig.left]\n{camera}[rig.right]\n{camera}");
-        passage.put("dataset.toml", format!("{head}{rig}"));
+        sequence.put("dataset.toml", format!("{head}{rig}"));
         for pair in 0..PAIRS {
             let x = STEP * pair as f64;
-            passage.put(&format!("l{pair}.pgm"), view(x));
-            passage.put(&format!("r{pair}.pgm"), view(x + BASELINE));
+            sequence.put(&format!("l{pair}.pgm"), view(x));
+            sequence.put(&format!("r{pair}.pgm"), view(x + BASELINE));
         }
-        passage.frames(&(0..PAIRS).map(|pair| (pair as u64, pair)).collect::<Vec<_>>());
-        passage
+        sequence.frames(&(0..PAIRS).map(|pair| (pair as u64, pair)).collect::<Vec<_>>());
+        sequence
     }
 
     /// Writes frames.csv: (tenths of a second, which pair of images).
@@ -123,7 +123,7 @@ impl Passage {
     }
 
     /// The x of every pose.
-    fn ways(all: &Value) -> Vec<f64> {
+    fn paths(all: &Value) -> Vec<f64> {
         let segments = all["segments"].as_array().unwrap();
         let poses = segments.iter().flat_map(|segment| segment["poses"].as_array().unwrap());
         poses.map(|pose| pose["world_from_camera"][0][3].as_f64().unwrap()).collect()
@@ -133,91 +133,91 @@ impl Passage {
 /// A rig whose right camera stands otherwise than it is written: that is told, and the way is found all the same; `--keep-rig`
 /// takes it as it is written, and then nothing is found.
 #[test]
-fn a_camera_that_is_turned_is_told_and_turned_back() {
-    let passage = Passage::new();
-    assert!(passage.json(&[])["realigned"].is_null());
-    passage.turn(1.0);
-    let all = passage.json(&[]);
-    let turn = &all["realigned"]["turn_deg"];
+fn a_camera_that_is_turned_is_reported_and_turned_back() {
+    let sequence = Sequence::new();
+    assert!(sequence.json(&[])["right_camera_rotation"].is_null());
+    sequence.turn(1.0);
+    let all = sequence.json(&[]);
+    let turn = &all["right_camera_rotation"]["turn_deg"];
     assert!((turn[0].as_f64().unwrap().abs() - 1.0).abs() < 0.02, "{turn}");
     assert!(turn[1].as_f64().unwrap().abs() < 0.05, "{turn}");
     assert!(all["warnings"][0].as_str().unwrap().contains("the images contradict the rig"), "{all}");
-    let ways = Passage::ways(&all);
-    assert_eq!(ways.len(), PAIRS);
-    assert!((ways[PAIRS - 1] - STEP * (PAIRS - 1) as f64).abs() < 0.005, "{ways:?}");
-    let said = passage.refusal(&["--keep-rig"], 3);
+    let paths = Sequence::paths(&all);
+    assert_eq!(paths.len(), PAIRS);
+    assert!((paths[PAIRS - 1] - STEP * (PAIRS - 1) as f64).abs() < 0.005, "{paths:?}");
+    let said = sequence.refusal(&["--keep-rig"], 3);
     assert!(said.contains("no motion can be computed"), "{said}");
 }
 
 #[test]
-fn the_way_is_found_written_and_told() {
-    let passage = Passage::new();
-    let all = passage.json(&[]);
-    let ways = Passage::ways(&all);
-    assert_eq!((ways.len(), ways[0]), (PAIRS, 0.0), "{all}");
-    for (pair, x) in ways.iter().enumerate() {
-        assert!((x - STEP * pair as f64).abs() < 0.01 * STEP * PAIRS as f64, "{pair}: {ways:?}");
+fn the_path_is_found_written_and_reported() {
+    let sequence = Sequence::new();
+    let all = sequence.json(&[]);
+    let paths = Sequence::paths(&all);
+    assert_eq!((paths.len(), paths[0]), (PAIRS, 0.0), "{all}");
+    for (pair, x) in paths.iter().enumerate() {
+        assert!((x - STEP * pair as f64).abs() < 0.01 * STEP * PAIRS as f64, "{pair}: {paths:?}");
     }
     // Threads change nothing, and the file has the same poses.
-    assert_eq!(passage.json(&["--threads", "3"])["segments"], all["segments"]);
-    let file = passage.path("way.tum");
-    let said = passage.odometry(&["--out", file.to_str().unwrap()], 0).out;
+    assert_eq!(sequence.json(&["--threads", "3"])["segments"], all["segments"]);
+    let file = sequence.path("way.tum");
+    let said = sequence.odometry(&["--out", file.to_str().unwrap()], 0).out;
     assert!(said.starts_with(&format!("{PAIRS} poses of {PAIRS} stereo pairs over 0.28 m")), "{said}");
     let text = fs::read_to_string(&file).unwrap();
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
     assert_eq!(lines.len(), PAIRS);
     assert!(lines[1].starts_with("1.100000000 "), "{text}");
-    assert!(!passage.path("way.tum.partial").exists());
+    assert!(!sequence.path("way.tum.partial").exists());
 }
 
 #[test]
-fn what_cannot_be_used_is_left_out_and_told() {
-    let passage = Passage::new();
+fn what_cannot_be_used_is_left_out_and_reported() {
+    let sequence = Sequence::new();
     let black = format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes();
-    passage.put("r2.pgm", [black, vec![0; SIZE[0] * SIZE[1]]].concat());
-    fs::remove_file(passage.path("l4.pgm")).unwrap();
+    sequence.put("r2.pgm", [black, vec![0; SIZE[0] * SIZE[1]]].concat());
+    fs::remove_file(sequence.path("l4.pgm")).unwrap();
     // Pair 6 again, as from a frozen camera.
-    passage.frames(&[(0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (7, 6), (8, 7)]);
-    let all = passage.json(&[]);
+    sequence.frames(&[(0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (7, 6), (8, 7)]);
+    let all = sequence.json(&[]);
     let why: Vec<&str> = all["left_out"].as_array().unwrap().iter().map(|one| one["why"].as_str().unwrap()).collect();
     assert_eq!(why.len(), 3, "{why:?}");
     assert!(why[0].contains("right image shows nothing"), "{why:?}");
     assert!(why[1].contains("l4.pgm"), "{why:?}");
     assert!(why[2].contains("left image is the one before"), "{why:?}");
     assert_eq!(all["segments"].as_array().unwrap().len(), 1);
-    let ways = Passage::ways(&all);
-    assert_eq!(ways.len(), 6);
-    assert!((ways[5] - 7.0 * STEP).abs() < 0.01 * 7.0 * STEP, "{ways:?}");
+    let paths = Sequence::paths(&all);
+    assert_eq!(paths.len(), 6);
+    assert!((paths[5] - 7.0 * STEP).abs() < 0.01 * 7.0 * STEP, "{paths:?}");
 }
 
 #[test]
-fn a_gap_and_a_leap_break_the_way() {
-    let passage = Passage::new();
-    passage.frames(&[(0, 0), (1, 1), (80, 2), (81, 3)]);
-    let all = passage.json(&[]);
+fn a_gap_and_a_leap_break_the_path() {
+    let sequence = Sequence::new();
+    sequence.frames(&[(0, 0), (1, 1), (80, 2), (81, 3)]);
+    let all = sequence.json(&[]);
     let segments = all["segments"].as_array().unwrap();
     assert_eq!(segments.len(), 2, "{all}");
     assert!(segments[1]["broken"].as_str().unwrap().contains("7.900 s"), "{all}");
-    let ways = Passage::ways(&all);
-    assert_eq!(ways[1], ways[2], "the motion between is left out, not guessed");
+    let paths = Sequence::paths(&all);
+    assert_eq!(paths[1], paths[2], "the motion between is left out, not guessed");
     // Faster than is believed at every pair: no motion at all.
-    let said = passage.refusal(&["--set", "most-speed=0.1"], 3);
+    let said = sequence.refusal(&["--set", "max-speed=0.1"], 3);
     assert!(said.contains("0.1 m/s"), "{said}");
-    passage.frames(&[(0, 0), (1, 1), (1_000_000_000, 2), (1_000_000_001, 3)]);
-    let why = passage.json(&[])["segments"][1]["broken"].to_string();
+    sequence.frames(&[(0, 0), (1, 1), (1_000_000_000, 2), (1_000_000_001, 3)]);
+    let why = sequence.json(&[])["segments"][1]["broken"].to_string();
     assert!(why.contains("seconds and nanoseconds mixed?"), "{why}");
 }
 
 #[test]
 fn what_cannot_be_is_refused_in_one_line() {
-    let passage = Passage::new();
-    let refusal = |more: &[&str], code: i32| passage.refusal(more, code);
+    let sequence = Sequence::new();
+    let refusal = |more: &[&str], code: i32| sequence.refusal(more, code);
     assert!(refusal(&["--set", "window=0"], 2).contains("1 to 100"));
     assert!(refusal(&["--odometry", "sterio"], 2).contains("did you mean `stereo`?"));
     assert!(refusal(&["--set", "windou=3"], 2).contains("did you mean `window`?"));
     assert!(refusal(&["--set", "follow.window=4"], 2).contains("odd number"));
     assert!(refusal(&["--out", "/nowhere/way.tum"], 4).contains("/nowhere/way.tum"));
-    passage.frames(&[(0, 0), (1, 1), (1, 2)]);
+    sequence.frames(&[(0, 0), (1, 1), (1, 2)]);
     let said = refusal(&[], 3);
     assert!(said.contains("frames.csv:4") && said.contains("not after the one before"), "{said}");
 }
@@ -225,36 +225,36 @@ fn what_cannot_be_is_refused_in_one_line() {
 /// Each of two pairs has too few points to follow and to begin with: what comes after is a segment, and says why.
 #[test]
 fn no_break_goes_unannounced() {
-    let passage = Passage::new();
-    [3, 4].into_iter().for_each(|pair| passage.spoil(pair));
-    let all = passage.json(&[]);
+    let sequence = Sequence::new();
+    [3, 4].into_iter().for_each(|pair| sequence.spoil(pair));
+    let all = sequence.json(&[]);
     let segments = all["segments"].as_array().unwrap();
     assert_eq!((segments.len(), all["left_out"].as_array().unwrap().len()), (2, 2), "{all}");
     assert!(segments[0]["broken"].is_null() && segments[1]["broken"].is_string(), "{all}");
-    let file = passage.path("way.tum");
-    let said = passage.odometry(&["--out", file.to_str().unwrap()], 0).out;
+    let file = sequence.path("way.tum");
+    let said = sequence.odometry(&["--out", file.to_str().unwrap()], 0).out;
     assert!(said.contains("broken before 1.500000000 s"), "{said}");
     assert!(fs::read_to_string(&file).unwrap().contains("# broken"));
 }
 
 #[test]
 fn no_motion_is_no_result() {
-    let passage = Passage::new();
-    let file = passage.path("way.tum");
+    let sequence = Sequence::new();
+    let file = sequence.path("way.tum");
     let out = ["--out", file.to_str().unwrap()];
-    let nothing = || !file.exists() && !passage.path("way.tum.partial").exists();
-    passage.frames(&[(0, 0)]);
-    let said = passage.refusal(&out, 3);
+    let nothing = || !file.exists() && !sequence.path("way.tum.partial").exists();
+    sequence.frames(&[(0, 0)]);
+    let said = sequence.refusal(&out, 3);
     assert!(said.contains("1 pose from 1 stereo pair; a motion needs two") && nothing(), "{said}");
     let black = [format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes(), vec![0; SIZE[0] * SIZE[1]]].concat();
-    (0..3).for_each(|pair| passage.put(&format!("l{pair}.pgm"), &black));
-    passage.frames(&[(0, 0), (1, 1), (2, 2)]);
-    let said = passage.refusal(&out, 3);
+    (0..3).for_each(|pair| sequence.put(&format!("l{pair}.pgm"), &black));
+    sequence.frames(&[(0, 0), (1, 1), (2, 2)]);
+    let said = sequence.refusal(&out, 3);
     assert!(said.contains("0 poses from 3 stereo pairs; 3 left out: the left image shows nothing"), "{said}");
     assert!(nothing());
     // More than half of the images are not there: each is named once, and then the rule.
-    passage.frames(&[(0, 20), (1, 21), (2, 5)]);
-    let said = passage.refusal(&out, 3);
+    sequence.frames(&[(0, 20), (1, 21), (2, 5)]);
+    let said = sequence.refusal(&out, 3);
     assert!(said.contains("fewer than half of the stereo pairs can be read") && said.contains("1 of 3"), "{said}");
     assert_eq!(said.matches("l20.pgm").count(), 1, "{said}");
     assert!(nothing());
@@ -262,41 +262,41 @@ fn no_motion_is_no_result() {
 
 #[test]
 fn exchanged_images_are_refused() {
-    let passage = Passage::new();
+    let sequence = Sequence::new();
     for pair in 0..PAIRS {
         let x = STEP * pair as f64;
-        passage.put(&format!("r{pair}.pgm"), view(x));
-        passage.put(&format!("l{pair}.pgm"), view(x + BASELINE));
+        sequence.put(&format!("r{pair}.pgm"), view(x));
+        sequence.put(&format!("l{pair}.pgm"), view(x + BASELINE));
     }
-    let said = passage.refusal(&[], 3);
+    let said = sequence.refusal(&[], 3);
     assert!(said.contains("changed places"), "{said}");
 }
 
 /// Seen to fail when the two images are not compared: a pair without depth was only a pair that could not be followed.
 #[test]
 fn one_image_twice_is_left_out_or_refused() {
-    let passage = Passage::new();
-    passage.put("r3.pgm", view(STEP * 3.0));
-    let all = passage.json(&[]);
+    let sequence = Sequence::new();
+    sequence.put("r3.pgm", view(STEP * 3.0));
+    let all = sequence.json(&[]);
     let why: Vec<&str> = all["left_out"].as_array().unwrap().iter().map(|one| one["why"].as_str().unwrap()).collect();
     assert!(why.len() == 1 && why[0].contains("left and right images that are the same"), "{why:?}");
-    assert_eq!(Passage::ways(&all).len(), PAIRS - 1);
-    (0..PAIRS).for_each(|pair| passage.put(&format!("r{pair}.pgm"), view(STEP * pair as f64)));
-    let said = passage.refusal(&[], 3);
+    assert_eq!(Sequence::paths(&all).len(), PAIRS - 1);
+    (0..PAIRS).for_each(|pair| sequence.put(&format!("r{pair}.pgm"), view(STEP * pair as f64)));
+    let said = sequence.refusal(&[], 3);
     assert!(said.contains("left and right images that are the same") && said.contains("l0.pgm"), "{said}");
 }
 
 /// A data set whose Doppler log and gyro are tables is reckoned without looking at its images; one without is refused.
 #[test]
-fn readings_lead_the_way() {
-    let passage = Passage::new();
+fn readings_lead_the_path() {
+    let sequence = Sequence::new();
     let by_readings = ["--odometry", "dvl-gyro"];
-    let said = passage.refusal(&by_readings, 3);
+    let said = sequence.refusal(&by_readings, 3);
     assert!(said.contains("no readings for odometry `dvl-gyro`") && said.contains("doppler"), "{said}");
-    let text = fs::read_to_string(passage.path("dataset.toml")).unwrap();
+    let text = fs::read_to_string(sequence.path("dataset.toml")).unwrap();
     let named =
         text.replace("dataset/1\"", "dataset/1.2\"").replace("[rig]", "doppler = \"d.csv\"\ngyro = \"g.csv\"\n[rig]");
-    passage.put("dataset.toml", named);
+    sequence.put("dataset.toml", named);
     let table = |columns: &str, numbers: &str| {
         let line = |k: u64| {
             let stamp = 1_000_000_000 + 50_000_000 * k;
@@ -305,49 +305,49 @@ fn readings_lead_the_way() {
         format!("stamp_ns,arrival_ns,{columns},sigma\n") + &(0..2 * PAIRS as u64).map(line).collect::<String>()
     };
     // Forward is the camera's own frame here; no noise, so that a value may repeat.
-    passage.put("d.csv", table("vx,vy,vz", &format!("{},0,0,0", STEP / 0.1)));
-    passage.put("g.csv", table("wx,wy,wz", "0,0,0,0"));
-    let all = passage.json(&by_readings);
-    let ways = Passage::ways(&all);
-    assert_eq!(ways.len(), PAIRS, "{all}");
-    assert!(ways.iter().enumerate().all(|(pair, x)| (x - STEP * pair as f64).abs() < 1e-9), "{ways:?}");
+    sequence.put("d.csv", table("vx,vy,vz", &format!("{},0,0,0", STEP / 0.1)));
+    sequence.put("g.csv", table("wx,wy,wz", "0,0,0,0"));
+    let all = sequence.json(&by_readings);
+    let paths = Sequence::paths(&all);
+    assert_eq!(paths.len(), PAIRS, "{all}");
+    assert!(paths.iter().enumerate().all(|(pair, x)| (x - STEP * pair as f64).abs() < 1e-9), "{paths:?}");
     assert!(all["landmarks"].is_null() && all["warnings"].as_array().unwrap().is_empty(), "{all}");
-    fs::remove_file(passage.path("g.csv")).unwrap();
-    assert!(passage.refusal(&by_readings, 3).contains("g.csv"));
+    fs::remove_file(sequence.path("g.csv")).unwrap();
+    assert!(sequence.refusal(&by_readings, 3).contains("g.csv"));
 }
 
 #[test]
-fn a_sound_way_is_not_doubted() {
-    let all = Passage::new().json(&[]);
+fn a_sound_path_is_not_doubted() {
+    let all = Sequence::new().json(&[]);
     assert!(all["agreement"].as_f64().unwrap() > 0.35 && all["warnings"].as_array().unwrap().is_empty(), "{all}");
 }
 
 /// Pairs that are out of order are refused, or sorted where that is asked for.
 #[test]
 fn pairs_out_of_order_are_sorted_on_request() {
-    let passage = Passage::new();
-    let sorted = Passage::ways(&passage.json(&[]));
-    passage.frames(&[(0, 0), (2, 2), (1, 1), (3, 3), (3, 5), (4, 4), (5, 5), (6, 6), (7, 7)]);
-    assert!(passage.refusal(&[], 3).contains("frames.csv:4"));
-    assert_eq!(Passage::ways(&passage.json(&["--repair"])), sorted);
+    let sequence = Sequence::new();
+    let sorted = Sequence::paths(&sequence.json(&[]));
+    sequence.frames(&[(0, 0), (2, 2), (1, 1), (3, 3), (3, 5), (4, 4), (5, 5), (6, 6), (7, 7)]);
+    assert!(sequence.refusal(&[], 3).contains("frames.csv:4"));
+    assert_eq!(Sequence::paths(&sequence.json(&["--sort-stamps"])), sorted);
 }
 
 /// Stamps that cannot be are named as such, not the images: by `check`, and by an odometry that finds no motion with them.
 ///
 /// Seen to fail when nobody looks at the times.
 #[test]
-fn impossible_times_are_told() {
-    let passage = Passage::new();
+fn impossible_times_are_reported() {
+    let sequence = Sequence::new();
     let stamped = |stamp: &dyn Fn(u64) -> u64| {
         let lines = (0..PAIRS as u64).map(|k| format!("{},l{k}.pgm,r{k}.pgm\n", stamp(k)));
-        passage.put("frames.csv", "stamp_ns,left,right\n".to_owned() + &lines.collect::<String>());
-        ended_with(0, program().arg("check").arg(passage.folder.path())).out
+        sequence.put("frames.csv", "stamp_ns,left,right\n".to_owned() + &lines.collect::<String>());
+        ended_with(0, program().arg("check").arg(sequence.folder.path())).out
     };
     let leap = stamped(&|k| 1_000_000_000 + k * 100_000_000 + if k < 4 { 0 } else { 1_000_000_000_000_000_000 });
     assert!(leap.contains("warning: stamps that leap by more than a year in") && leap.contains("mixed?"), "{leap}");
     let near = stamped(&|k| 1_000_000_000 + 100 * k);
     assert!(near.contains("warning: pairs too near in time in") && near.contains("one of 7"), "{near}");
-    let said = passage.refusal(&[], 3);
+    let said = sequence.refusal(&[], 3);
     assert!(
         said.contains("as 0.000100 ms passed: are the stamps right?") && said.contains("check the stamps"),
         "{said}"
@@ -359,7 +359,7 @@ fn impossible_times_are_told() {
 ///
 /// Seen to fail when the command writes the tables and names them nowhere.
 #[test]
-fn a_dive_is_reckoned_by_its_readings() {
+fn a_dive_is_integrated_by_its_readings() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("dive.toml");
     let small = "frames = 6\nrate = 5.0\nrig.size = [256, 192]\nrig.focal = 125.0\n";
@@ -372,15 +372,15 @@ fn a_dive_is_reckoned_by_its_readings() {
     assert!(all["poses"].as_u64().unwrap() >= 5 && all["length"].as_f64().unwrap() > 0.1, "{all}");
 }
 
-impl Passage {
+impl Sequence {
     /// Lays, over a share of the columns of every pair's images, what cameras elsewhere see: the share, and where the one and the
     /// other are at each pair (m).
-    fn overlay(&self, ways: impl Fn(usize) -> (f64, f64, f64)) {
+    fn overlay(&self, paths: impl Fn(usize) -> (f64, f64, f64)) {
         let [width, height] = SIZE;
         let head = format!("P5\n{width} {height}\n255\n").len();
         for pair in 0..PAIRS {
-            let (share, ground, other) = ways(pair);
-            let columns = (share * width as f64) as usize;
+            let (fraction, ground, other) = paths(pair);
+            let columns = (fraction * width as f64) as usize;
             for (name, x) in [("l", 0.0), ("r", BASELINE)] {
                 let (mut image, over) = (view(ground + x), view(other + x));
                 for from in (0..height).map(|row| head + row * width) {
@@ -399,12 +399,15 @@ impl Passage {
 /// when what was doubted is believed as soon as the ground is out of view.
 #[test]
 fn a_part_of_the_vehicle_is_no_ground() {
-    let passage = Passage::new();
-    for share in [0.5, 0.65, 0.8] {
+    let sequence = Sequence::new();
+    for fraction in [0.5, 0.65, 0.8] {
         // In the end the ground is out of view.
-        passage.overlay(|pair| (if pair < 5 { share } else { 0.97 }, STEP * pair as f64, 1.0));
-        let said = passage.refusal(&[], 3);
-        assert!(said.contains("stand still in the image") && said.contains("fixed to the vehicle"), "{share}: {said}");
+        sequence.overlay(|pair| (if pair < 5 { fraction } else { 0.97 }, STEP * pair as f64, 1.0));
+        let said = sequence.refusal(&[], 3);
+        assert!(
+            said.contains("stand still in the image") && said.contains("fixed to the vehicle"),
+            "{fraction}: {said}"
+        );
     }
 }
 
@@ -412,10 +415,10 @@ fn a_part_of_the_vehicle_is_no_ground() {
 ///
 /// Seen to fail when the warning is held back.
 #[test]
-fn much_that_disagrees_is_told() {
-    let passage = Passage::new();
-    passage.overlay(|pair| (0.5, STEP * pair as f64, 1.0 - STEP * pair as f64));
-    let said = passage.odometry(&[], 0).error;
+fn much_that_disagrees_is_reported() {
+    let sequence = Sequence::new();
+    sequence.overlay(|pair| (0.5, STEP * pair as f64, 1.0 - STEP * pair as f64));
+    let said = sequence.odometry(&[], 0).error;
     assert!(said.contains("of the landmarks agree with the motion") && said.contains("fixed to the vehicle"), "{said}");
 }
 
@@ -424,14 +427,14 @@ fn much_that_disagrees_is_told() {
 /// Seen to fail when nobody asks where landmarks were before, and when a pair that is passed by becomes a key frame.
 #[test]
 fn a_vehicle_that_stops_stands_still() {
-    let passage = Passage::new();
+    let sequence = Sequence::new();
     let stop = STEP * (PAIRS / 2) as f64;
-    passage.overlay(|pair| (0.4, (STEP * pair as f64).min(stop), 1.0 - 3.0 * STEP * pair as f64));
+    sequence.overlay(|pair| (0.4, (STEP * pair as f64).min(stop), 1.0 - 3.0 * STEP * pair as f64));
     // With few key frames: those from before the stop are not given up for others that show the same.
-    let all = passage.json(&["--set", "window=3"]);
-    let ways = Passage::ways(&all);
-    assert_eq!((ways.len(), all["segments"].as_array().unwrap().len()), (PAIRS, 1), "{all}");
-    assert!(ways.iter().enumerate().all(|(pair, x)| (x - (STEP * pair as f64).min(stop)).abs() < 0.005), "{ways:?}");
+    let all = sequence.json(&["--set", "window=3"]);
+    let paths = Sequence::paths(&all);
+    assert_eq!((paths.len(), all["segments"].as_array().unwrap().len()), (PAIRS, 1), "{all}");
+    assert!(paths.iter().enumerate().all(|(pair, x)| (x - (STEP * pair as f64).min(stop)).abs() < 0.005), "{paths:?}");
 }
 
 /// Where nothing tells whether it stands, no motion is told; how it went on from there is, once it moves.
@@ -439,12 +442,12 @@ fn a_vehicle_that_stops_stands_still() {
 /// Seen to fail when such pairs break the way, and when standing is believed.
 #[test]
 fn a_vehicle_that_starts_is_followed_from_where_it_stood() {
-    let passage = Passage::new();
+    let sequence = Sequence::new();
     let start = |pair: usize| STEP * pair.saturating_sub(PAIRS / 2) as f64;
-    passage.overlay(|pair| (0.4, start(pair), 1.0 - 3.0 * STEP * pair as f64));
-    let all = passage.json(&[]);
-    let (ways, left_out) = (Passage::ways(&all), all["left_out"].as_array().unwrap().len());
+    sequence.overlay(|pair| (0.4, start(pair), 1.0 - 3.0 * STEP * pair as f64));
+    let all = sequence.json(&[]);
+    let (paths, left_out) = (Sequence::paths(&all), all["left_out"].as_array().unwrap().len());
     assert_eq!((left_out, all["segments"].as_array().unwrap().len()), (PAIRS / 2, 1), "{all}");
     let right = |(at, pair): (&f64, usize)| (at - start(pair)).abs() < 0.005;
-    assert!(ways[0] == 0.0 && ways[1..].iter().zip(PAIRS / 2 + 1..).all(right), "{ways:?}");
+    assert!(paths[0] == 0.0 && paths[1..].iter().zip(PAIRS / 2 + 1..).all(right), "{paths:?}");
 }

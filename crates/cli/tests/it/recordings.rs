@@ -181,7 +181,7 @@ fn ran(folder: &Path) -> (usize, usize, Vec<String>) {
         let kept = rows.iter().filter(|row| keep(row)).map(|row| row[frame].to_owned());
         kept.collect::<std::collections::BTreeSet<String>>().len()
     };
-    let (all, fixed) = (frames(&|_| true), frames(&|row| row[outcome] == "referenced"));
+    let (all, fixed) = (frames(&|_| true), frames(&|row| row[outcome] == "fix"));
     let manifest = fs::read(folder.join("out/manifest.json")).unwrap();
     let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
     let warnings = manifest["inputs"][0]["warnings"].as_array().unwrap();
@@ -189,7 +189,7 @@ fn ran(folder: &Path) -> (usize, usize, Vec<String>) {
 }
 
 #[test]
-fn a_sound_recording_is_told_and_run() {
+fn a_sound_recording_is_reported_and_run() {
     let bag = Bag::sound();
     let (code, said) = bag.checked();
     assert_eq!(code, 0, "{said}");

@@ -121,18 +121,18 @@ fn kill(times: u64, frames: usize) {
     let folder = folder.path();
     let start = Instant::now();
     assert_eq!(ended(&run(folder, "whole", &[]).output().unwrap()).0, Some(0));
-    let mut whole = start.elapsed();
+    let mut full = start.elapsed();
     let (mut lost, mut killed) = (0, 0);
     for time in 0..times {
         let out = format!("run-{time}");
         let mut child = run(folder, &out, &[]).spawn().unwrap();
         // Spread over the run by the golden ratio. A busy machine may have become a quicker one.
-        let (begun, moment) = (Instant::now(), whole.mul_f64((time as f64 * 0.618_033_988_75).fract()));
+        let (begun, moment) = (Instant::now(), full.mul_f64((time as f64 * 0.618_033_988_75).fract()));
         while begun.elapsed() < moment && child.try_wait().unwrap().is_none() {
             sleep(Duration::from_micros(200));
         }
         if child.try_wait().unwrap().is_some() {
-            whole = whole.min(begun.elapsed());
+            full = full.min(begun.elapsed());
         }
         child.kill().unwrap();
         killed += u64::from(child.wait().unwrap().code().is_none());
@@ -203,7 +203,7 @@ fn two_runs_in_one_folder() {
 
 /// Seen to fail where nobody looks into the folder.
 #[test]
-fn a_run_that_is_there_stays_unless_told_otherwise() {
+fn a_run_that_is_there_stays_unless_reported_otherwise() {
     let folder = experiment(4);
     let folder = folder.path();
     let run = |more: &[&str]| ended(&run(folder, "out", more).output().unwrap());
@@ -218,7 +218,7 @@ fn a_run_that_is_there_stays_unless_told_otherwise() {
     assert_eq!(run(&["--overwrite", "--set", "seed=4"]).0, Some(0));
     assert!(files(&folder.join("out")) != before);
     // A run over key frames leaves its network.
-    fs::write(folder.join("out/001-solver-kabsch.network"), "").unwrap();
+    fs::write(folder.join("out/001-solver-kabsch.pose-graph"), "").unwrap();
     assert_eq!(run(&["--overwrite"]).0, Some(0));
     fs::write(folder.join("out/thesis.txt"), "all my work").unwrap();
     let (code, error) = run(&["--overwrite"]);
@@ -228,7 +228,7 @@ fn a_run_that_is_there_stays_unless_told_otherwise() {
 
 /// A file that may grow no further is an error like a full disk.
 #[test]
-fn a_file_that_may_grow_no_further_is_said() {
+fn a_file_that_may_grow_no_further_is_stated() {
     let folder = experiment(40);
     let folder = folder.path();
     let limited = |arguments: &str, blocks: u32| {
@@ -367,7 +367,7 @@ fn a_folder_that_another_run_has_is_no_finished_run() {
 
 /// Seen to fail where nobody looks whether the shard has a piece.
 #[test]
-fn an_empty_shard_says_so() {
+fn an_empty_shard_states_so() {
     let folder = experiment(30);
     let (code, error) = ended(&run(folder.path(), "out", &["--shard", "7/7"]).output().unwrap());
     assert!(code == Some(0) && error.contains("an empty shard in out: 7/7; the run has 2 pieces"), "{error}");
@@ -482,7 +482,7 @@ fn fail(takes: impl Fn(u64) -> bool) {
 }
 
 #[test]
-fn a_full_disk_is_said_and_nothing_is_lost() {
+fn a_full_disk_is_stated_and_nothing_is_lost() {
     fail(|every| every % 61 == 1);
 }
 

@@ -30,12 +30,12 @@ fn solve(arguments: &[&str]) -> std::process::Output {
 }
 
 #[test]
-fn a_fix_says_what_supports_it() {
+fn a_fix_states_what_supports_it() {
     let folder = tempfile::tempdir().unwrap();
     let output = solve(&[&problem(&folder), "--json"]);
     assert_eq!(output.status.code(), Some(0));
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(answer["outcome"], "referenced");
+    assert_eq!(answer["outcome"], "fix");
     let integrity = &answer["integrity"];
     assert_eq!((&integrity["redundancy"], &integrity["freedom"]), (&json!("excludable"), &json!(15)));
     assert!(integrity["chi2"].as_f64().unwrap() < 1e-9 && integrity["chi2_limit"].as_f64().unwrap() > 15.0);
@@ -44,8 +44,8 @@ fn a_fix_says_what_supports_it() {
     assert!(integrity["protection"]["attitude"].as_f64().unwrap() > 0.0);
     // A twentieth of the diameter, of some two metres, is no less than ten centimetres.
     assert_eq!(integrity["alert_limit"], 0.1);
-    for (share, is) in [(1.01, "within"), (0.99, "beyond")] {
-        let limit = share * level;
+    for (fraction, is) in [(1.01, "within"), (0.99, "beyond")] {
+        let limit = fraction * level;
         let output = solve(&[&problem(&folder), "--set", &format!("acceptance.alert-limit={limit}")]);
         let said = String::from_utf8(output.stdout).unwrap();
         let expected = format!("; {is} the alert limit of {limit:.3} m");
@@ -73,7 +73,7 @@ fn nearly_symmetric(folder: &tempfile::TempDir, off: f64) -> String {
 ///
 /// Seen to fail where levels take no account of other poses.
 #[test]
-fn a_level_that_is_missing_says_why() {
+fn a_level_that_is_missing_states_why() {
     let folder = tempfile::tempdir().unwrap();
     let said = |off| String::from_utf8(solve(&[&nearly_symmetric(&folder, off)]).stdout).unwrap();
     assert!(said(4.0).contains("ambiguous"), "{}", said(4.0));
@@ -115,8 +115,8 @@ fn settings_are_used_and_wrong_ones_named() {
     };
     let (code, text) = said(&["--search", "maximum-clique", "--set", "search.budget=1"]);
     assert!(code == 0 && text.contains(r#""reason":"budget""#), "{text}");
-    let (code, text) = said(&["--set", "acceptance.least-points=100"]);
-    assert!(code == 0 && text.contains(r#""outcome":"unidentified""#), "{text}");
+    let (code, text) = said(&["--set", "acceptance.min-points=100"]);
+    assert!(code == 0 && text.contains(r#""outcome":"rejected""#), "{text}");
     for (setting, named) in [
         ("search.budgte=1", "`budgte`, did you mean `budget`?"),
         ("search.budget=0", "budget"),

@@ -10,7 +10,7 @@ use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
 use seafix_component::Fault;
 use seafix_geometry::StereoPixels;
-use seafix_vision::{Image, Realigned, Sides, look_alikes};
+use seafix_vision::{Image, RightCameraRotation, Sides, repeated_patterns};
 
 use seafix_io::{ImageLimits, image::regular};
 
@@ -25,14 +25,14 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
         Ok(dataset) => Dataset { limits, ..dataset },
         Err(faults) => return (faults, Vec::new()),
     };
-    let (mut faults, twins) = look_through(&dataset);
-    faults.extend(twins.fault(&dataset));
+    let (mut faults, identical) = inspect_images(&dataset);
+    faults.extend(identical.fault(&dataset));
     faults.extend(hash_faults(&dataset));
     let mut warnings = dataset.warnings.clone();
     warnings.extend(dataset.odd_times());
     if faults.is_empty() {
         let (sides, table) = (sides(&dataset), dataset.folder.join(&dataset.table));
-        faults.extend(swapped_fault(sides, &table));
+        faults.extend(swap_fault(sides, &table));
         warnings.extend(strangers(sides, &table));
     }
     (faults, warnings)
@@ -44,79 +44,80 @@ impl Dataset {
         const YEAR_NS: u64 = 31_557_600_000_000_000;
         let table = self.folder.join(&self.table);
         let steps = || self.frames.windows(2).map(|two| [two[0].stamp_ns, two[1].stamp_ns]);
-        let told = |what: &str, odd: &dyn Fn(u64) -> bool, remedy: &str| {
+        let reported = |what: &str, odd: &dyn Fn(u64) -> bool, remedy: &str| {
             let all: Vec<[u64; 2]> = steps().filter(|[before, after]| odd(after - before)).collect();
             let [before, after] = all.first()?;
             let value = format!("from {before} to {after} ns, one of {}", all.len());
             Some(Fault::new(what, &table).value(value).remedy(remedy))
         };
         let leap =
-            told("stamps that leap by more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
+            reported("stamps that leap by more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
         let remedy = "a camera takes no two pairs within a millisecond: are they nanoseconds?";
-        leap.into_iter().chain(told("pairs too near in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
+        leap.into_iter().chain(reported("pairs too near in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
     }
 }
 
 /// Pairs whose two images are the same, pixel by pixel.
 #[derive(Debug, Default)]
-pub struct Twins {
+pub struct IdenticalImages {
     count: usize,
     first: Option<(PathBuf, PathBuf)>,
 }
 
 /// Decodes all images of the data set: what is wrong with them, and which pairs are one image twice.
-pub fn look_through(dataset: &Dataset) -> (Vec<Fault>, Twins) {
+pub fn inspect_images(dataset: &Dataset) -> (Vec<Fault>, IdenticalImages) {
     let seen: Vec<(Option<Fault>, bool)> = dataset
         .frames
         .par_iter()
         .map(|frame| match dataset.pair(frame) {
             Err(fault) => (Some(fault), false),
-            Ok((left, right)) => (None, are_twins(&left, &right)),
+            Ok((left, right)) => (None, are_identical(&left, &right)),
         })
         .collect();
-    let mut twins = Twins { count: seen.iter().filter(|(_, twin)| *twin).count(), first: None };
-    let first = seen.iter().position(|(_, twin)| *twin).map(|first| &dataset.frames[first]);
-    twins.first = first.map(|frame| (frame.left.clone(), frame.right.clone()));
+    let mut identical =
+        IdenticalImages { count: seen.iter().filter(|(_, identical_pair)| *identical_pair).count(), first: None };
+    let first = seen.iter().position(|(_, identical_pair)| *identical_pair).map(|first| &dataset.frames[first]);
+    identical.first = first.map(|frame| (frame.left.clone(), frame.right.clone()));
     let mut faults: Vec<Fault> = seen.into_iter().filter_map(|(fault, _)| fault).collect();
     faults.dedup();
-    (faults, twins)
+    (faults, identical)
 }
 
 /// Whether two images are one: cameras apart never see the same, unless there is nothing to see.
-pub fn are_twins(left: &Image, right: &Image) -> bool {
+pub fn are_identical(left: &Image, right: &Image) -> bool {
     let flat = || left.pixels().iter().all(|pixel| *pixel == left.pixels()[0]);
     left == right && !flat()
 }
 
 /// What is wrong with the pair of these two files where they hold one image.
-pub fn twins_fault(left: &Path, right: &Path) -> Fault {
+pub fn identical_images_fault(left: &Path, right: &Path) -> Fault {
     Fault::new("left and right images that are the same", left)
         .value(format!("the pixels of {}", right.display()))
         .remedy("give the image of the other camera; one image twice has no depth")
 }
 
-impl Twins {
+impl IdenticalImages {
     pub fn fault(&self, dataset: &Dataset) -> Option<Fault> {
         let (left, right) = self.first.as_ref()?;
-        let fault = twins_fault(left, right);
+        let fault = identical_images_fault(left, right);
         let value = format!("{}, and so {} of {} pairs", fault.value, self.count, dataset.frames.len());
         Some(fault.value(value))
     }
 }
 
 /// Frames whose images are looked at for their order.
-pub const LOOKED_AT: usize = 3;
+pub const INSPECTED_PAIRS: usize = 3;
 /// Pairs that are asked where the rig stands.
 const ASKED: usize = 8;
 
 /// Left and right images that have changed places, as three frames from the whole length of the set show.
 pub fn swapped(dataset: &Dataset) -> Option<Fault> {
-    swapped_fault(sides(dataset), &dataset.folder.join(&dataset.table))
+    swap_fault(sides(dataset), &dataset.folder.join(&dataset.table))
 }
 
 /// What three frames from the whole length of the set say of the order of their images.
 fn sides(dataset: &Dataset) -> Sides {
-    let step = dataset.frames.len().div_ceil(LOOKED_AT).max(1);
+    let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
     let pairs = dataset.frames.iter().step_by(step).filter_map(|frame| dataset.pair(frame).ok());
     let sides = pairs.map(|(left, right)| Sides::of_images(&left, &right, &dataset.rig));
     sides.fold(Sides::default(), Sides::add)
@@ -125,28 +126,29 @@ fn sides(dataset: &Dataset) -> Sides {
 /// The same by the first pairs that can tell, for a set whose images need not all be good: the first that speaks for
 /// their places ends the search, three that speak against it decide.
 pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
-    let (mut sides, mut told) = (Sides::default(), 0);
+    let (mut sides, mut reported) = (Sides::default(), 0);
     for (left, right) in dataset.frames.iter().filter_map(|frame| dataset.pair(frame).ok()) {
         sides = sides + Sides::of_images(&left, &right, &dataset.rig);
-        told += usize::from(sides.can_tell());
-        if told == LOOKED_AT || sides.can_tell() && !sides.are_swapped() {
+        reported += usize::from(sides.is_decisive());
+        if reported == INSPECTED_PAIRS || sides.is_decisive() && !sides.are_swapped() {
             break;
         }
     }
-    swapped_fault(sides, &dataset.folder.join(&dataset.table))
+    swap_fault(sides, &dataset.folder.join(&dataset.table))
 }
 
 /// The rig of `dataset` turned to where pairs of its images say that it stands, of so many of them, evenly over the set; `None`
 /// where they do not contradict it. Images that cannot be read say nothing.
-pub fn realigned(dataset: &Dataset) -> Option<Realigned> {
+pub fn right_camera_rotation(dataset: &Dataset) -> Option<RightCameraRotation> {
     let apart = dataset.frames.len().div_ceil(ASKED).max(1);
     let some = dataset.frames.iter().step_by(apart).filter_map(|frame| dataset.pair(frame).ok());
-    let seen: Vec<StereoPixels> = some.flat_map(|(left, right)| look_alikes(&left, &right, &dataset.rig)).collect();
-    Realigned::of(&seen, &dataset.rig)
+    let seen: Vec<StereoPixels> =
+        some.flat_map(|(left, right)| repeated_patterns(&left, &right, &dataset.rig)).collect();
+    RightCameraRotation::of(&seen, &dataset.rig)
 }
 
 /// What is wrong with the images of `file` if left and right have changed places.
-pub fn swapped_fault(sides: Sides, file: &Path) -> Option<Fault> {
+pub fn swap_fault(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_swapped().then(|| {
         Fault::new("left and right images that have changed places", file)
             .value(format!("{} of {} matches lie behind the cameras", sides.exchanged, sides.exchanged + sides.given))

@@ -19,7 +19,7 @@ use super::{
 use crate::trajectory::Trajectory;
 
 /// Lines of the truth farther apart than this (ns) say nothing of what is between them.
-const MOST_GAP_NS: u64 = 50_000_000;
+const MAX_GAP_NS: u64 = 50_000_000;
 const CAMERAS: [&str; 2] = ["cam0", "cam1"];
 const TRUTH: &str = "state_groundtruth_estimate0";
 
@@ -62,7 +62,7 @@ pub(super) fn read(folder: &Path, home: &Path, pairs_only: bool) -> Result<Datas
         };
         let (Some(left), Some(right)) = (place(0, &left_images[i]), place(1, &right_images[j])) else { continue };
         let stamp_ns = left_images[i].0;
-        let truth = between(&truth, stamp_ns, MOST_GAP_NS);
+        let truth = between(&truth, stamp_ns, MAX_GAP_NS);
         frames.push(DatasetFrame { stamp_ns, left, right, truth, prior: None, visible: Vec::new() });
     }
     if !truth.is_empty() && frames.iter().any(|frame| frame.truth.is_none()) {
@@ -181,7 +181,7 @@ impl Sheet {
     }
 
     fn numbers_of(&self, key: &str, value: &Yaml) -> Result<Vec<f64>, Fault> {
-        let number = |value: &Yaml| value.as_f64().or_else(|| value.as_i64().map(|whole| whole as f64));
+        let number = |value: &Yaml| value.as_f64().or_else(|| value.as_i64().map(|full| full as f64));
         let numbers = value.as_vec().and_then(|list| list.iter().map(number).collect::<Option<Vec<f64>>>());
         numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite())).ok_or_else(|| {
             self.fault(key, format!("`{key}` is no list of numbers")).remedy("give a sensor.yaml of EuRoC")

@@ -11,7 +11,7 @@ use super::{
     Dataset, DatasetFrame,
     folder::{inside, is_absent},
 };
-use crate::source::Heard;
+use crate::source::SensorBuffer;
 
 /// A data set in the layout of others: no site, no prior.
 pub(super) struct Foreign {
@@ -39,7 +39,7 @@ impl From<Foreign> for Dataset {
             frames,
             objects: Vec::new(),
             has_visibility: false,
-            heard: Heard::default(),
+            sensor_buffer: SensorBuffer::default(),
             bits: 16,
             limits: ImageLimits::default(),
             table,

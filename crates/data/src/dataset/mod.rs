@@ -14,9 +14,10 @@ pub mod tables;
 pub mod tum;
 mod write;
 
-pub use check::{LOOKED_AT, hash_faults, hex, input_hashes, look_through, sha256, swapped};
+pub use check::{INSPECTED_PAIRS, hash_faults, hex, input_hashes, inspect_images, sha256, swapped};
 pub use check::{
-    are_twins, check, partners_remedy, realigned, strangers, swapped_at_first, swapped_fault, twins_fault,
+    are_identical, check, identical_images_fault, partners_remedy, right_camera_rotation, strangers, swap_fault,
+    swapped_at_first,
 };
 pub use kitti::Cameras;
 pub use open::{Dataset, DatasetFrame, is_one};

@@ -22,7 +22,7 @@ use super::{
     folder::{inside, is_absent},
     kitti, ports, tables, tum,
 };
-use crate::source::Heard;
+use crate::source::SensorBuffer;
 
 /// A data set whose description, tables and paths are in order. Its images are
 /// read frame by frame.
@@ -47,7 +47,7 @@ pub struct Dataset {
     /// Whether the set says which feature points are visible.
     pub has_visibility: bool,
     /// What its Doppler log and gyro told.
-    pub heard: Heard,
+    pub sensor_buffer: SensorBuffer,
     /// Depth of the pixels in images of 16 bits.
     pub bits: u8,
     /// How large an image may be; the reader's, not the data set's, to say.
@@ -115,16 +115,16 @@ impl Dataset {
     }
 
     /// Reads what odometry may know of the data set in `folder`: rig, stereo pairs and readings. Site, truth and prior are
-    /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair). `repair` as in
+    /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair). `sort_stamps` as in
     /// [`open_repaired`](Self::open_repaired).
     ///
     /// # Errors
     /// Everything else that is wrong with it, at once.
-    pub fn open_pairs(folder: &Path, repair: bool) -> Result<Self, Vec<Fault>> {
-        Self::read(folder, true, repair)
+    pub fn open_pairs(folder: &Path, sort_stamps: bool) -> Result<Self, Vec<Fault>> {
+        Self::read(folder, true, sort_stamps)
     }
 
-    fn read(folder: &Path, pairs_only: bool, repair: bool) -> Result<Self, Vec<Fault>> {
+    fn read(folder: &Path, pairs_only: bool, sort_stamps: bool) -> Result<Self, Vec<Fault>> {
         let file = folder.join("dataset.toml");
         if !folder.is_dir() {
             return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
@@ -147,8 +147,17 @@ impl Dataset {
             described.keep_pairs_only();
         }
         let (faults, warnings) = (Vec::new(), Vec::new());
-        Reader { folder, file: &file, source: &source, described: &described, pairs_only, repair, faults, warnings }
-            .read()
+        Reader {
+            folder,
+            file: &file,
+            source: &source,
+            described: &described,
+            pairs_only,
+            sort_stamps,
+            faults,
+            warnings,
+        }
+        .read()
     }
 }
 
@@ -165,13 +174,13 @@ impl Dataset {
     }
 
     /// Whether both its Doppler log and its gyro are heard.
-    pub fn hears(&self) -> bool {
-        self.heard.is_whole()
+    pub fn has_readings(&self) -> bool {
+        self.sensor_buffer.is_complete()
     }
 
     /// What Doppler log and gyro told up to `now` (ns), up to `before` left out.
     pub fn readings(&self, before: Option<u64>, now: u64) -> Vec<Reading> {
-        self.heard.between(before, now)
+        self.sensor_buffer.between(before, now)
     }
 
     /// The two images of `frame`.
@@ -186,7 +195,7 @@ impl Dataset {
     /// Leaves out the pairs with an image of another size than its camera was calibrated for, as a set recorded in two
     /// modes has them, and warns of them. If more than half of the pairs would go, all stay: then it is the
     /// calibration that belongs elsewhere, and reading them says so.
-    pub fn leave_out_misfits(&mut self) {
+    pub fn leave_out_mismatches(&mut self) {
         let sizes = [self.rig.left().size(), self.rig.right().size()];
         let faults: Vec<Option<Fault>> = self
             .frames
@@ -195,11 +204,11 @@ impl Dataset {
                 [&frame.left, &frame.right].into_iter().zip(sizes).find_map(|(path, size)| size_fault(path, size))
             })
             .collect();
-        let (all, misfits) = (faults.len(), faults.iter().flatten().count());
-        let Some(first) = faults.iter().flatten().next().filter(|_| 2 * misfits <= all) else { return };
+        let (all, mismatches) = (faults.len(), faults.iter().flatten().count());
+        let Some(first) = faults.iter().flatten().next().filter(|_| 2 * mismatches <= all) else { return };
         self.warnings.push(Fault {
-            what: format!("{misfits} of {all} pairs left out: {}", first.what),
-            remedy: "`strict = true` of the source refuses them".to_owned(),
+            what: format!("{mismatches} of {all} pairs left out: {}", first.what),
+            remedy: "`reject-mismatched-images = true` of the source refuses them".to_owned(),
             ..first.clone()
         });
         let mut fits = faults.iter().map(Option::is_none);
@@ -214,7 +223,7 @@ struct Reader<'a> {
     source: &'a str,
     described: &'a Description,
     pairs_only: bool,
-    repair: bool,
+    sort_stamps: bool,
     faults: Vec<Fault>,
     warnings: Vec<Fault>,
 }
@@ -236,8 +245,9 @@ impl Reader<'_> {
             self.faults.push(fault);
             Transform::identity()
         });
-        let repair = self.repair;
-        let frame_lines = self.table(&d.frames, |text, file| tables::frames(text, file, repair)).unwrap_or_default();
+        let sort_stamps = self.sort_stamps;
+        let frame_lines =
+            self.table(&d.frames, |text, file| tables::frames(text, file, sort_stamps)).unwrap_or_default();
         let site = d.site.as_deref().and_then(|name| self.site(name));
         let truth = d.truth.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
         let prior = d.prior.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
@@ -311,7 +321,7 @@ impl Reader<'_> {
                 frames,
                 objects,
                 has_visibility: visibility.is_some(),
-                heard: Heard::new(doppler.into_iter().chain(gyro).collect()),
+                sensor_buffer: SensorBuffer::new(doppler.into_iter().chain(gyro).collect()),
                 bits,
                 limits: ImageLimits::default(),
                 hashes: d.hashes.clone().into_iter().collect(),

@@ -26,23 +26,23 @@ pub(super) struct VisibleLine {
     pub(super) point: String,
 }
 
-/// `stamp_ns,left,right`, in order of time; those that are not are refused, or, with `repair`, sorted, of each stamp the first
+/// `stamp_ns,left,right`, in order of time; those that are not are refused, or, with `sort_stamps`, sorted, of each stamp the first
 /// kept.
-pub(super) fn frames(text: &str, file: &Path, repair: bool) -> Table<FrameLine> {
+pub(super) fn frames(text: &str, file: &Path, sort_stamps: bool) -> Table<FrameLine> {
     let mut frames: Vec<FrameLine> = Vec::new();
     for (line, [stamp, left, right]) in rows(text, file, ["stamp_ns", "left", "right"])? {
         let stamp_ns = number(stamp, line, file)?;
-        if !repair && frames.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
+        if !sort_stamps && frames.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
             return Err(Fault::new("a stamp that is not after the one before", file)
                 .on_line(line)
                 .value(stamp)
                 .remedy(
-                    "sort the lines by time, one a stereo pair; `repair` does it and keeps the first of each stamp",
+                    "sort the lines by time, one a stereo pair; `sort-stamps` does it and keeps the first of each stamp",
                 ));
         }
         frames.push(FrameLine { line, stamp_ns, left: left.to_owned(), right: right.to_owned() });
     }
-    if repair {
+    if sort_stamps {
         frames.sort_by_key(|frame| frame.stamp_ns);
         frames.dedup_by_key(|frame| frame.stamp_ns);
     }
@@ -232,7 +232,7 @@ mod tests {
         assert!(message("stamp_ns,left,right\n").starts_with("no stereo pair"));
         assert_eq!(frames("stamp_ns,left,right\n1,a.png,b.png\n\n", file, false).unwrap()[0].left, "a.png");
         let mixed = "stamp_ns,left,right\n2,b,b\n1,a,a\n2,c,c\n";
-        assert!(message(mixed).contains("`repair` does it"));
+        assert!(message(mixed).contains("`sort-stamps` does it"));
         let lefts: Vec<String> = frames(mixed, file, true).unwrap().into_iter().map(|frame| frame.left).collect();
         assert_eq!(lefts, ["a", "b"]);
     }

@@ -171,16 +171,16 @@ pub fn at<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64) -> Option<Tra
         .map(|(_, pose)| *pose)
 }
 
-/// The pose at `stamp`: that within a millisecond of it, else between its neighbours, if they are no more than `most_gap`
+/// The pose at `stamp`: that within a millisecond of it, else between its neighbours, if they are no more than `max_gap`
 /// (ns) apart; the position in proportion to time, the attitude by the shortest turn.
-pub fn between<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64, most_gap: u64) -> Option<Transform<A, B>> {
+pub fn between<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64, max_gap: u64) -> Option<Transform<A, B>> {
     let after = poses.partition_point(|(time, _)| *time < stamp);
     at(poses, stamp).or_else(|| {
         let ((t0, before), (t1, after)) = (poses.get(after.checked_sub(1)?)?, poses.get(after)?);
-        let share = (stamp - t0) as f64 / (t1 - t0) as f64;
-        let turn = before.rotation().try_slerp(&after.rotation(), share, 1e-9)?;
-        let place = before.translation().lerp(&after.translation(), share);
-        (t1 - t0 <= most_gap).then(|| Transform::new(turn, place))
+        let fraction = (stamp - t0) as f64 / (t1 - t0) as f64;
+        let turn = before.rotation().try_slerp(&after.rotation(), fraction, 1e-9)?;
+        let place = before.translation().lerp(&after.translation(), fraction);
+        (t1 - t0 <= max_gap).then(|| Transform::new(turn, place))
     })
 }
 
@@ -190,12 +190,12 @@ pub fn nanoseconds(word: &str) -> Option<u64> {
         let seconds: f64 = word.parse().ok()?;
         return (seconds.is_finite() && (0.0..1.8e10).contains(&seconds)).then(|| (seconds * 1e9).round() as u64);
     }
-    let (whole, part) = word.split_once('.').unwrap_or((word, ""));
+    let (full, part) = word.split_once('.').unwrap_or((word, ""));
     if !part.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
     let nanos: u64 = format!("{:0<9.9}", part).parse().ok()?;
-    whole.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos)
+    full.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos)
 }
 
 #[cfg(test)]
@@ -229,7 +229,7 @@ mod tests {
 
     /// Seen to fail when nobody looks at the order.
     #[test]
-    fn w_first_is_suspected_where_no_one_says_otherwise() {
+    fn w_first_is_suspected_where_no_one_states_otherwise() {
         let read = |text: &str| -> Result<Vec<Stamped<World, Camera>>, Fault> {
             parse_lines(text.lines().enumerate().map(|(index, line)| (index + 1, line)), Path::new("truth.tum"))
         };

@@ -12,16 +12,16 @@ use seafix_geometry::{Camera, Covariance6, Transform, World};
 use seafix_io::dataset::{Description, FORMATS, PriorSigma, RigNumbers};
 
 use super::{check::input_hashes, png::write_png, tum};
-use crate::source::{Eyes, Passage};
+use crate::source::{FrameData, Sequence};
 
-/// Writes every frame of `passage` as a data set in `folder`, which must not exist: images, frames,
+/// Writes every frame of `sequence` as a data set in `folder`, which must not exist: images, frames,
 /// site, truth, prior and visibility where they are known, and what sensors said, with the hash of every file. The folder
 /// has its name only when it is complete. `done` is called after every frame.
 ///
 /// # Errors
 /// A passage without images, a folder that exists, or a file that cannot be written.
-pub fn write(passage: &dyn Passage, folder: &Path, licence: &str, done: &dyn Fn()) -> Result<(), Fault> {
-    if !passage.images() {
+pub fn write(sequence: &dyn Sequence, folder: &Path, licence: &str, done: &dyn Fn()) -> Result<(), Fault> {
+    if !sequence.images() {
         return Err(
             Fault::new("a source without images", folder).remedy("choose one that renders or reads stereo pairs")
         );
@@ -37,11 +37,11 @@ pub fn write(passage: &dyn Passage, folder: &Path, licence: &str, done: &dyn Fn(
     }
     fs::create_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
     let name = folder.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned());
-    fill(passage, &partial, [&name, licence], done)?;
+    fill(sequence, &partial, [&name, licence], done)?;
     fs::rename(&partial, folder).map_err(|error| failed(folder, &error))
 }
 
-fn fill(passage: &dyn Passage, folder: &Path, [name, licence]: [&str; 2], done: &dyn Fn()) -> Result<(), Fault> {
+fn fill(sequence: &dyn Sequence, folder: &Path, [name, licence]: [&str; 2], done: &dyn Fn()) -> Result<(), Fault> {
     let put =
         |name: &str, text: &str| fs::write(folder.join(name), text).map_err(|error| failed(&folder.join(name), &error));
     let mut frames = "stamp_ns,left,right\n".to_owned();
@@ -50,28 +50,28 @@ fn fill(passage: &dyn Passage, folder: &Path, [name, licence]: [&str; 2], done: 
     let mut truths: Vec<tum::Stamped<World, Camera>> = Vec::new();
     let mut priors: Vec<tum::Stamped<World, Camera>> = Vec::new();
     let mut covariances = Vec::new();
-    for index in 0..passage.frames() {
-        let sight = passage.sight(index)?;
+    for index in 0..sequence.frames() {
+        let sensor_frame = sequence.sensor_frame(index)?;
         done();
-        if let Eyes::Pair(left, right) = &sight.eyes {
+        if let FrameData::Stereo(left, right) = &sensor_frame.frame_data {
             let (left_name, right_name) = (format!("left{index:03}.png"), format!("right{index:03}.png"));
-            write_png(&folder.join(&left_name), left, passage.bits())?;
-            write_png(&folder.join(&right_name), right, passage.bits())?;
-            frames += &format!("{},{left_name},{right_name}\n", sight.stamp_ns);
+            write_png(&folder.join(&left_name), left, sequence.bits())?;
+            write_png(&folder.join(&right_name), right, sequence.bits())?;
+            frames += &format!("{},{left_name},{right_name}\n", sensor_frame.stamp_ns);
         }
-        priors.extend(sight.prior.map(|prior| (sight.stamp_ns, prior.world_from_camera)));
-        covariances.extend(sight.prior.map(|prior| (sight.stamp_ns, prior.covariance)));
-        let Some(truth) = passage.truth(index) else { continue };
-        truths.push((sight.stamp_ns, truth.world_from_camera));
+        priors.extend(sensor_frame.prior.map(|prior| (sensor_frame.stamp_ns, prior.world_from_camera)));
+        covariances.extend(sensor_frame.prior.map(|prior| (sensor_frame.stamp_ns, prior.covariance)));
+        let Some(truth) = sequence.truth(index) else { continue };
+        truths.push((sensor_frame.stamp_ns, truth.world_from_camera));
         for (o, p) in truth.visible.iter().flatten() {
-            let object = &passage.site().objects[*o];
+            let object = &sequence.site().objects[*o];
             let table = visibility.get_or_insert_with(|| "stamp_ns,object,point\n".to_owned());
-            *table += &format!("{},{},{}\n", sight.stamp_ns, object.id, object.points[*p].id);
+            *table += &format!("{},{},{}\n", sensor_frame.stamp_ns, object.id, object.points[*p].id);
         }
         objects.get_or_insert(truth.world_from_object);
     }
     put("frames.csv", &frames)?;
-    put("site.toml", &passage.site().to_toml())?;
+    put("site.toml", &sequence.site().to_toml())?;
     if !truths.is_empty() {
         put("truth.tum", &tum::print(&truths))?;
     }
@@ -86,36 +86,36 @@ fn fill(passage: &dyn Passage, folder: &Path, [name, licence]: [&str; 2], done: 
     if varied {
         put("prior_covariance.csv", &table_of_covariances(&covariances))?;
     }
-    let objects = objects.map(|objects| table_of_objects(passage, &objects));
+    let objects = objects.map(|objects| table_of_objects(sequence, &objects));
     if let Some(table) = &objects {
         put("objects.csv", table)?;
     }
-    let sensors = passage.sensors();
+    let sensors = sequence.sensors();
     for (name, table) in &sensors {
         put(name, table)?;
     }
-    let hears = passage.hears() && !sensors.is_empty();
+    let has_readings = sequence.has_readings() && !sensors.is_empty();
     let known = |file: &str, is: bool| is.then(|| file.to_owned());
     let description = Description {
-        format: FORMATS[if hears { 2 } else { 1 }].to_owned(),
+        format: FORMATS[if has_readings { 2 } else { 1 }].to_owned(),
         name: name.to_owned(),
         licence: licence.to_owned(),
-        origin: Some(passage.name().to_owned()),
+        origin: Some(sequence.name().to_owned()),
         frames: "frames.csv".to_owned(),
         site: known("site.toml", true),
         truth: known("truth.tum", !truths.is_empty()),
         prior: known("prior.tum", !priors.is_empty()),
-        prior_sigma: passage
+        prior_sigma: sequence
             .prior_sigma()
             .map(|(position, attitude)| PriorSigma { position, attitude_deg: attitude.to_degrees() }),
         prior_covariance: known("prior_covariance.csv", varied),
         visibility: known("visibility.csv", visibility.is_some()),
         objects: known("objects.csv", objects.is_some()),
-        doppler: known("doppler.csv", hears),
-        gyro: known("gyro.csv", hears),
-        body_from_camera: Some(passage.body_from_camera().rows()),
-        bits: (passage.bits() > 8).then(|| passage.bits()),
-        rig: RigNumbers::of(passage.rig(), passage.ports().map(|port| port.map(|port| port.numbers()))),
+        doppler: known("doppler.csv", has_readings),
+        gyro: known("gyro.csv", has_readings),
+        body_from_camera: Some(sequence.body_from_camera().rows()),
+        bits: (sequence.bits() > 8).then(|| sequence.bits()),
+        rig: RigNumbers::of(sequence.rig(), sequence.ports().map(|port| port.map(|port| port.numbers()))),
         hashes: input_hashes(folder)?.into_iter().collect::<BTreeMap<_, _>>(),
     };
     put("dataset.toml", &toml::to_string(&description).expect("a description is plain values"))
@@ -133,10 +133,10 @@ fn table_of_covariances(all: &[(u64, Covariance6<World, Camera>)]) -> String {
 }
 
 /// `object,m00,…`: where each object truly is.
-fn table_of_objects(passage: &dyn Passage, places: &[Option<Transform<World, seafix_geometry::Object>>]) -> String {
+fn table_of_objects(sequence: &dyn Sequence, places: &[Option<Transform<World, seafix_geometry::Object>>]) -> String {
     let columns: Vec<String> = (0..16).map(|i| format!("m{}{}", i / 4, i % 4)).collect();
     let mut text = format!("object,{}\n", columns.join(","));
-    for (object, place) in passage.site().objects.iter().zip(places) {
+    for (object, place) in sequence.site().objects.iter().zip(places) {
         if let Some(place) = place {
             let numbers: Vec<String> = place.rows().iter().flatten().map(f64::to_string).collect();
             text += &format!("{},{}\n", object.id, numbers.join(","));

@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_are_read_and_what_is_wrong_is_told_with_its_line() {
+    fn marks_are_read_and_what_is_wrong_is_reported_with_its_line() {
         let text = "id,left_u,left_v,right_u,right_v\nA,1,2,3,4.5\nB,639.5,0,,\nC,-0.5,9,8,7\n";
         let marks = read(text, Path::new("clicks.csv"), [[640, 480]; 2]).unwrap();
         assert_eq!(marks[0].right, Some(Pixel { u: 3.0, v: 4.5 }));

@@ -12,7 +12,9 @@ use nalgebra::Matrix3;
 use seafix_component::{Choice, Fault, nearest};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Pixel, Point, StereoRig, Transform, triad};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
-use seafix_vision::{Descriptors, FrontEnd, Image, Keypoint, MATCHERS, Pair, Place, Refinement, Unrefined, View};
+use seafix_vision::{
+    Descriptors, FrontEnd, Image, Keypoint, MATCHERS, Pair, Refinement, UncertainPixel, Unrefined, View,
+};
 
 pub use marks::Mark;
 
@@ -76,7 +78,7 @@ impl HandPoint {
 const ONE_POINT: f64 = 1e-3;
 
 /// The least sine of the angle at P1 that a base by hand should have.
-const LEAST_SINE: f64 = 0.1;
+const MIN_SINE: f64 = 0.1;
 /// Model coordinates are written to this (m).
 const GRAIN: f64 = 1e-7;
 
@@ -142,17 +144,17 @@ impl ModelByHand<'_> {
     ) -> Result<Seen, Fault> {
         let fault = |what: String| Fault::new(what, file).on_line(mark.line).value(format!("`{}`", mark.id));
         let corner = self.corner(left, &keypoints[0], mark.left);
-        let place = corner.unwrap_or_else(|| Place::independent(mark.left, self.mark_sigma));
+        let place = corner.unwrap_or_else(|| UncertainPixel::independent(mark.left, self.mark_sigma));
         let start = match mark.right {
-            Some(marked) => {
-                self.corner(right, &keypoints[1], marked).unwrap_or_else(|| Place::independent(marked, self.mark_sigma))
-            }
+            Some(marked) => self
+                .corner(right, &keypoints[1], marked)
+                .unwrap_or_else(|| UncertainPixel::independent(marked, self.mark_sigma)),
             None => {
                 let sought = seek([left, right], place.at, rig).ok_or_else(|| {
                     fault("the point is not found in the right image".to_owned())
                         .remedy("mark it there too: right_u, right_v")
                 })?;
-                Place::independent(sought, 1.0)
+                UncertainPixel::independent(sought, 1.0)
             }
         };
         let sought = mark.right.and_then(|_| seek([left, right], place.at, rig));
@@ -186,12 +188,12 @@ impl ModelByHand<'_> {
     }
 
     /// The corner that a mark means: of those within reach the nearest.
-    fn corner(&self, image: &Image, keypoints: &[Keypoint], mark: Pixel) -> Option<Place> {
+    fn corner(&self, image: &Image, keypoints: &[Keypoint], mark: Pixel) -> Option<UncertainPixel> {
         let by_hand = Keypoint { at: mark, response: 0.0, scale: keypoints.first().map_or(1.0, |one| one.scale) };
         let near = keypoints.iter().filter(|keypoint| keypoint.at.distance(&mark) <= self.reach);
         let starts: Vec<Keypoint> = near.copied().chain([by_hand]).collect();
         let places = self.front_end.locator.locate(image, &starts).into_iter().flatten();
-        let off = |place: &Place| place.at.distance(&mark);
+        let off = |place: &UncertainPixel| place.at.distance(&mark);
         places.filter(|place| off(place) <= self.reach).min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
@@ -223,12 +225,12 @@ impl ModelByHand<'_> {
         };
         let (a, b) = (at(base[1]) - at(base[0]), at(base[2]) - at(base[0]));
         let sine = a.cross(&b).norm() / (a.norm() * b.norm());
-        if sine >= LEAST_SINE {
+        if sine >= MIN_SINE {
             return Ok(base);
         }
         let names = base.map(|index| seen[index].mark.id.clone()).join(", ");
         Err(Fault::new("the base points are nearly on a line", file)
-            .value(format!("{names}: sine {sine:.3}, at least {LEAST_SINE} is needed"))
+            .value(format!("{names}: sine {sine:.3}, at least {MIN_SINE} is needed"))
             .remedy("mark a point aside of them, or choose others with --base"))
     }
 }

@@ -73,11 +73,11 @@ impl<'a> Cdr<'a> {
         Ok(numbers)
     }
 
-    /// The length of a sequence of things that take `least` bytes each.
-    pub(super) fn length(&mut self, least: usize) -> Read<usize> {
+    /// The length of a sequence of things that take `min` bytes each.
+    pub(super) fn length(&mut self, min: usize) -> Read<usize> {
         let length = self.u32()? as usize;
         let left = self.bytes.len().saturating_sub(self.at);
-        match length.checked_mul(least) {
+        match length.checked_mul(min) {
             Some(needed) if needed <= left => Ok(length),
             _ => Err(format!("a length of {length} at byte {}, where {left} bytes are left", self.at - 4 + HEADER)),
         }

@@ -165,9 +165,9 @@ impl Odometry {
 /// The transforms of a `tf2_msgs/TFMessage`.
 pub(crate) fn transforms(message: &[u8]) -> Read<Vec<ChildPose>> {
     /// A header with an empty name, a child without one, and seven numbers.
-    const LEAST: usize = 8 + 5 + 5 + 56;
+    const MIN: usize = 8 + 5 + 5 + 56;
     let mut cdr = Cdr::new(message)?;
-    let count = cdr.length(LEAST)?;
+    let count = cdr.length(MIN)?;
     let one = |cdr: &mut Cdr<'_>| Ok(ChildPose { header: header(cdr)?, child: cdr.string()?, pose: pose(cdr)? });
     let transforms = (0..count).map(|_| one(&mut cdr)).collect::<Read<_>>()?;
     cdr.end()?;

@@ -41,34 +41,34 @@ impl Tree {
         self.edges.values_mut().for_each(|edge| edge.poses.sort_by_key(|(stamp, _)| *stamp));
     }
 
-    /// The pose of `from` in `to` at `stamp`: between two poses no more than `most_gap` (ns) apart.
+    /// The pose of `from` in `to` at `stamp`: between two poses no more than `max_gap` (ns) apart.
     pub(crate) fn look_up<A: Frame, B: Frame>(
         &self,
         to: &str,
         from: &str,
         stamp: u64,
-        most_gap: u64,
+        max_gap: u64,
     ) -> Option<Transform<A, B>> {
         let name = |frame: &str| frame.trim_start_matches('/').to_owned();
-        let (to_root, from_root) = (self.to_root(name(to), stamp, most_gap), self.to_root(name(from), stamp, most_gap));
+        let (to_root, from_root) = (self.to_root(name(to), stamp, max_gap), self.to_root(name(from), stamp, max_gap));
         let (from_up, to_up) = from_root
             .iter()
             .find_map(|(frame, up)| Some((up, &to_root.iter().find(|(other, _)| other == frame)?.1)))?;
         // From the child up to the first common frame, and down again.
-        let whole = to_up.inverse() * *from_up;
-        Some(whole.relabel())
+        let full = to_up.inverse() * *from_up;
+        Some(full.relabel())
     }
 
     /// A frame and those above it, each with the pose of the first in it, as far as they are known at `stamp`.
-    fn to_root(&self, frame: String, stamp: u64, most_gap: u64) -> Vec<(String, Transform<AnyFrame, AnyFrame>)> {
-        let mut way = vec![(frame, Transform::identity())];
-        while let Some((here, up)) = way.last().filter(|_| way.len() < DEEPEST) {
+    fn to_root(&self, frame: String, stamp: u64, max_gap: u64) -> Vec<(String, Transform<AnyFrame, AnyFrame>)> {
+        let mut chain = vec![(frame, Transform::identity())];
+        while let Some((here, up)) = chain.last().filter(|_| chain.len() < DEEPEST) {
             let Some(edge) = self.edges.get(here) else { break };
-            let Some(pose) = edge.at(stamp, most_gap) else { break };
+            let Some(pose) = edge.at(stamp, max_gap) else { break };
             let next = (edge.parent.clone(), pose * *up);
-            way.push(next);
+            chain.push(next);
         }
-        way
+        chain
     }
 }
 
@@ -78,7 +78,7 @@ struct AnyFrame;
 impl Frame for AnyFrame {}
 
 impl Edge {
-    fn at(&self, stamp: u64, most_gap: u64) -> Option<Transform<AnyFrame, AnyFrame>> {
-        if self.is_static { self.poses.last().map(|(_, pose)| *pose) } else { between(&self.poses, stamp, most_gap) }
+    fn at(&self, stamp: u64, max_gap: u64) -> Option<Transform<AnyFrame, AnyFrame>> {
+        if self.is_static { self.poses.last().map(|(_, pose)| *pose) } else { between(&self.poses, stamp, max_gap) }
     }
 }

@@ -14,7 +14,7 @@ use seafix_vision::{Image, Sides};
 
 use super::{Mcap, logged::fault, topics::Topics};
 use crate::{
-    dataset::{LOOKED_AT, are_twins, left_out, pairs, strangers, swapped_fault, tum::Stamped},
+    dataset::{INSPECTED_PAIRS, are_identical, left_out, pairs, strangers, swap_fault, tum::Stamped},
     ros::{self, CameraInfo, CompressedImage, Odometry, Tree},
 };
 
@@ -70,8 +70,8 @@ impl Bag {
         let warnings = reader.warnings;
         let (path, settings) = (path.to_owned(), settings.clone());
         let mut bag = Self { path, recording, settings, topics, tree, frames, rig, pairs, warnings };
-        bag.look_through()?;
-        bag.look_at_the_sides()?;
+        bag.inspect_images()?;
+        bag.appear_at_the_sides()?;
         Ok(bag)
     }
 
@@ -92,7 +92,7 @@ impl Bag {
     }
 
     /// What it holds, in a line.
-    pub(super) fn told(&self) -> String {
+    pub(super) fn notes(&self) -> String {
         let ([left, right], [w, h]) = (&self.topics.images, self.rig.left().size());
         let (first, last) = (self.pairs[0].0, self.pairs[self.pairs.len() - 1].0);
         let poses = self.recording.topics().iter().filter(|topic| ros::plain(&topic.schema) == "nav_msgs/Odometry");
@@ -107,27 +107,27 @@ impl Bag {
     }
 
     /// Decodes all pairs once: those that cannot be read are left out, so that none ends a run midway.
-    fn look_through(&mut self) -> Result<(), Fault> {
+    fn inspect_images(&mut self) -> Result<(), Fault> {
         /// Pairs are read in the order of the file, and so many of them decoded at a time.
         const AT_ONCE: usize = 16;
         /// Pairs left out that are told one by one.
-        const TOLD: usize = 10;
+        const REPORTED: usize = 10;
         let bytes = |entry: &Entry| self.recording.message(entry).map_err(|error| fault(&self.path, &error));
         let mut seen: Vec<Result<bool, Fault>> = Vec::with_capacity(self.pairs.len());
         for some in self.pairs.chunks(AT_ONCE) {
             let read = some.iter().map(|(_, [left, right])| Ok([bytes(left)?, bytes(right)?]));
             let read = read.collect::<Result<Vec<_>, Fault>>()?;
-            let look = |((_, [left, right]), [l, r]): (&(u64, [Entry; 2]), &[Vec<u8>; 2])| {
-                self.decoded([left, right], [l, r]).map(|(left, right)| are_twins(&left, &right))
+            let inspect = |((_, [left, right]), [l, r]): (&(u64, [Entry; 2]), &[Vec<u8>; 2])| {
+                self.decoded([left, right], [l, r]).map(|(left, right)| are_identical(&left, &right))
             };
-            seen.extend(some.par_iter().zip(&read).map(look).collect::<Vec<_>>());
+            seen.extend(some.par_iter().zip(&read).map(inspect).collect::<Vec<_>>());
         }
         let all = self.pairs.len();
-        let twins = seen.iter().filter(|one| **one == Ok(true)).count();
-        if twins > 0 {
+        let identical = seen.iter().filter(|one| **one == Ok(true)).count();
+        if identical > 0 {
             let fault = Fault::new("left and right images that are the same", &self.path);
             let [left, right] = &self.topics.images;
-            let fault = fault.value(format!("{left} and {right}, {twins} of {all} pairs"));
+            let fault = fault.value(format!("{left} and {right}, {identical} of {all} pairs"));
             return Err(fault.remedy("name the topic of the other camera; one image twice has no depth"));
         }
         let lost: Vec<Fault> = seen.iter().filter_map(|one| one.clone().err()).collect();
@@ -135,28 +135,28 @@ impl Bag {
             let remedy = format!("so are {} of {all} pairs; at least half must be readable", lost.len());
             return Err(Fault { remedy, ..lost[0].clone() });
         }
-        let more = lost.len().saturating_sub(TOLD);
+        let more = lost.len().saturating_sub(REPORTED);
         if more > 0 {
             let fault = Fault::new("pairs that cannot be read", &self.path).value(format!("{} of {all}", lost.len()));
             self.warnings.push(fault.remedy("they are left out"));
         }
-        let told =
-            lost.into_iter().take(TOLD).map(|fault| Fault { remedy: "its pair is left out".to_owned(), ..fault });
-        self.warnings.extend(told);
+        let reported =
+            lost.into_iter().take(REPORTED).map(|fault| Fault { remedy: "its pair is left out".to_owned(), ..fault });
+        self.warnings.extend(reported);
         let mut readable = seen.iter().map(Result::is_ok);
         self.pairs.retain(|_| readable.next().unwrap_or(false));
         Ok(())
     }
 
     /// Whether the images are the cameras' they are said to be, as some pairs from the whole length show.
-    fn look_at_the_sides(&mut self) -> Result<(), Fault> {
-        let step = self.pairs.len().div_ceil(LOOKED_AT).max(1);
+    fn appear_at_the_sides(&mut self) -> Result<(), Fault> {
+        let step = self.pairs.len().div_ceil(INSPECTED_PAIRS).max(1);
         let mut sides = Sides::default();
         for index in (0..self.pairs.len()).step_by(step) {
             let (left, right) = self.pair(index)?;
             sides = sides + Sides::of_images(&left, &right, &self.rig);
         }
-        if let Some(fault) = swapped_fault(sides, &self.path) {
+        if let Some(fault) = swap_fault(sides, &self.path) {
             return Err(fault.remedy("exchange the topics `left` and `right`, or `left-info` and `right-info`"));
         }
         self.warnings.extend(strangers(sides, &self.path));
@@ -243,10 +243,10 @@ impl Messages<'_> {
         }
         let fault = |what: &str, at: &(u64, Entry, String)| {
             let fault = Fault::new(what, self.path).value(format!("{topic}: {} ns", at.0));
-            fault.remedy("`repair = true` sorts them and keeps the first of each stamp")
+            fault.remedy("`sort-stamps = true` sorts them and keeps the first of each stamp")
         };
         let wrong = images.windows(2).find(|pair| pair[0].0 >= pair[1].0);
-        if let (Some([before, after]), false) = (wrong, self.settings.repair) {
+        if let (Some([before, after]), false) = (wrong, self.settings.sort_stamps) {
             let what = if before.0 == after.0 { "two images with one stamp" } else { "stamps that go back" };
             return Err(fault(what, after));
         }

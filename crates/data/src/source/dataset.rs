@@ -8,8 +8,8 @@ use seafix_io::ImageLimits;
 use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
-use super::{CalibratedPort, Eyes, Passage, Sight, Source, Told, Truth, WorldPrior};
-use crate::dataset::{Dataset, hash_faults, input_hashes, look_through, swapped};
+use super::{CalibratedPort, FrameData, Hints, SensorFrame, Sequence, Source, Truth, WorldPrior};
+use crate::dataset::{Dataset, hash_faults, input_hashes, inspect_images, swapped};
 
 /// Reads a `seafix-dataset/1` folder, one of EuRoC, or a sequence of KITTI.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -25,9 +25,9 @@ pub struct DatasetSource {
     pub max_bytes: u64,
     /// Whether one image of another size than the calibration refuses the whole set; otherwise its pair is left out
     /// and counted, as long as at least half of the pairs stay.
-    pub strict: bool,
+    pub reject_mismatched_images: bool,
     /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
-    pub repair: bool,
+    pub sort_stamps: bool,
 }
 
 impl Default for DatasetSource {
@@ -38,8 +38,8 @@ impl Default for DatasetSource {
             site: String::new(),
             max_pixels: pixels,
             max_bytes: bytes,
-            strict: false,
-            repair: false,
+            reject_mismatched_images: false,
+            sort_stamps: false,
         }
     }
 }
@@ -52,25 +52,25 @@ impl Component for DatasetSource {
     fn check(&self) -> Result<(), String> {
         in_range(!self.path.is_empty(), "path", "''", "the folder of a data set, relative to the experiment file")?;
         // What TOML can say.
-        let most = i64::MAX as u64;
-        in_range((1..=most).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
-        in_range((1..=most).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
+        let max = i64::MAX as u64;
+        in_range((1..=max).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
+        in_range((1..=max).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
     }
 }
 
 impl Source for DatasetSource {
-    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
         let path = folder.join(&self.path);
-        let read = if self.repair { Dataset::open_repaired(&path) } else { Dataset::open(&path) };
+        let read = if self.sort_stamps { Dataset::open_repaired(&path) } else { Dataset::open(&path) };
         let mut dataset = read?.within(limits);
-        if !self.strict {
-            dataset.leave_out_misfits();
+        if !self.reject_mismatched_images {
+            dataset.leave_out_mismatches();
         }
         Recorded::open(dataset, &self.site, folder)
     }
 
-    fn may_hear(&self) -> bool {
+    fn may_have_readings(&self) -> bool {
         true
     }
 }
@@ -83,7 +83,7 @@ pub(super) struct Recorded {
 
 impl Recorded {
     /// The data set with the site in the file `site`, relative to `folder`, or its own.
-    pub(super) fn open(mut dataset: Dataset, site: &str, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    pub(super) fn open(mut dataset: Dataset, site: &str, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         if !site.is_empty() {
             let file = folder.join(site);
             dataset.site = Some(Site::parse(&read_text(&file).map_err(|fault| vec![fault])?, &file)?);
@@ -93,8 +93,8 @@ impl Recorded {
             return Err(vec![fault.remedy("a fix needs a known object: add `site = \"site.toml\"`")]);
         };
         // Every image is decoded once before anything is written: a damaged one shall not end a run midway.
-        let (mut faults, twins) = look_through(&dataset);
-        faults.extend(twins.fault(&dataset));
+        let (mut faults, identical) = inspect_images(&dataset);
+        faults.extend(identical.fault(&dataset));
         faults.extend(hash_faults(&dataset));
         if faults.is_empty() {
             faults.extend(swapped(&dataset));
@@ -103,7 +103,7 @@ impl Recorded {
     }
 }
 
-impl Passage for Recorded {
+impl Sequence for Recorded {
     fn name(&self) -> &str {
         &self.dataset.name
     }
@@ -129,8 +129,8 @@ impl Passage for Recorded {
         if self.dataset.bits < 16 { self.dataset.bits } else { 8 }
     }
 
-    fn hears(&self) -> bool {
-        self.dataset.hears()
+    fn has_readings(&self) -> bool {
+        self.dataset.has_readings()
     }
 
     fn ports(&self) -> [Option<CalibratedPort>; 2] {
@@ -150,16 +150,16 @@ impl Passage for Recorded {
         &self.dataset.warnings
     }
 
-    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+    fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault> {
         let frame = &self.dataset.frames[index];
         let (left, right) = self.dataset.pair(frame)?;
         let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
         let before = index.checked_sub(1).map(|before| self.dataset.frames[before].stamp_ns);
-        Ok(Sight {
+        Ok(SensorFrame {
             stamp_ns: frame.stamp_ns,
-            eyes: Eyes::Pair(left, right),
+            frame_data: FrameData::Stereo(left, right),
             prior,
-            told: Told::Nothing,
+            hints: Hints::Nothing,
             readings: self.dataset.readings(before, frame.stamp_ns),
         })
     }

@@ -9,7 +9,9 @@ use seafix_simulation::{CALIBRATION_RANGE, Mission, PlannedMission, optics::Port
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
-use super::{CalibratedPort, Eyes, Heard, Passage, Sight, Source, Told, Truth, WorldPrior, readings};
+use super::{
+    CalibratedPort, FrameData, Hints, SensorBuffer, SensorFrame, Sequence, Source, Truth, WorldPrior, readings,
+};
 
 /// A vehicle's dive over a site given as data, under lamps in water: rendered stereo pairs, or clouds of
 /// the same views with `as-points`.
@@ -28,26 +30,26 @@ impl Component for Dive {
 }
 
 impl Source for Dive {
-    fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         let mission = self.0.plan(seed, 0, folder)?;
         let settings = mission.settings();
         let name = format!("dive over {}, seed {seed}, c = {} 1/m", settings.site, settings.water.c());
-        let heard = readings::heard(&mission);
-        Ok(Box::new(Dived { mission, heard, name }))
+        let sensor_buffer = readings::sensor_buffer(&mission);
+        Ok(Box::new(Dived { mission, sensor_buffer, name }))
     }
 
-    fn may_hear(&self) -> bool {
+    fn may_have_readings(&self) -> bool {
         true
     }
 }
 
 struct Dived {
     mission: PlannedMission,
-    heard: Heard,
+    sensor_buffer: SensorBuffer,
     name: String,
 }
 
-impl Passage for Dived {
+impl Sequence for Dived {
     fn name(&self) -> &str {
         &self.name
     }
@@ -91,26 +93,26 @@ impl Passage for Dived {
         [port.clone(), port]
     }
 
-    fn hears(&self) -> bool {
-        self.heard.is_whole()
+    fn has_readings(&self) -> bool {
+        self.sensor_buffer.is_complete()
     }
 
     fn sensors(&self) -> Vec<(String, String)> {
         readings::tables(&self.mission)
     }
 
-    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+    fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault> {
         let instant = self.mission.instant(index);
-        let eyes = if self.images() {
+        let frame_data = if self.images() {
             let (left, right, _) = instant.render(Threads::Pool);
-            Eyes::Pair(left, right)
+            FrameData::Stereo(left, right)
         } else {
-            Eyes::Points(instant.points())
+            FrameData::Points(instant.points())
         };
         let prior = instant.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
         let before = index.checked_sub(1).map(|before| self.mission.instant(before).stamp_ns);
-        let readings = self.heard.between(before, instant.stamp_ns);
-        Ok(Sight { stamp_ns: instant.stamp_ns, eyes, prior, told: Told::Nothing, readings })
+        let readings = self.sensor_buffer.between(before, instant.stamp_ns);
+        Ok(SensorFrame { stamp_ns: instant.stamp_ns, frame_data, prior, hints: Hints::Nothing, readings })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

@@ -6,7 +6,7 @@ use seafix_component::{Component, Fault, in_range};
 use seafix_io::ImageLimits;
 use serde::{Deserialize, Serialize};
 
-use super::{DatasetSource, Passage, Source, dataset::Recorded};
+use super::{DatasetSource, Sequence, Source, dataset::Recorded};
 use crate::dataset::Dataset;
 
 /// Reads a folder in the layout of the EuRoC data sets: `mav0/cam0`, `mav0/cam1`, `mav0/state_groundtruth_estimate0`.
@@ -43,15 +43,15 @@ impl Component for Euroc {
             site,
             max_pixels: self.max_pixels,
             max_bytes: self.max_bytes,
-            strict: true,
-            repair: false,
+            reject_mismatched_images: true,
+            sort_stamps: false,
         }
         .check()
     }
 }
 
 impl Source for Euroc {
-    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
         let dataset = Dataset::open_euroc(&folder.join(&self.path))?;
         Recorded::open(dataset.within(limits), &self.site, folder)

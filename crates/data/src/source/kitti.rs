@@ -6,7 +6,7 @@ use seafix_component::{Component, Fault, in_range};
 use seafix_io::ImageLimits;
 use serde::{Deserialize, Serialize};
 
-use super::{DatasetSource, Passage, Source, dataset::Recorded};
+use super::{DatasetSource, Sequence, Source, dataset::Recorded};
 use crate::dataset::{Cameras, Dataset};
 
 /// Reads an odometry sequence of KITTI: `calib.txt`, `times.txt`, `image_0`, `image_1`, the truth in `poses.txt` or
@@ -46,15 +46,15 @@ impl Component for Kitti {
             site,
             max_pixels: self.max_pixels,
             max_bytes: self.max_bytes,
-            strict: true,
-            repair: false,
+            reject_mismatched_images: true,
+            sort_stamps: false,
         }
         .check()
     }
 }
 
 impl Source for Kitti {
-    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         let limits = ImageLimits { pixels: self.max_pixels, bytes: self.max_bytes };
         let dataset = Dataset::open_kitti(&folder.join(&self.path), self.cameras)?;
         Recorded::open(dataset.within(limits), &self.site, folder)

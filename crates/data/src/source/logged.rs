@@ -10,8 +10,8 @@ use seafix_navigation::Device;
 use seafix_referencing::Site;
 use seafix_vision::Image;
 
-use super::{Eyes, Passage, Reading, Sight, Truth, WorldPrior, problem_passage::no_site};
-use crate::{dataset::sha256, exact};
+use super::{FrameData, LoggedInput, SensorFrame, Sequence, Truth, WorldPrior, problem_sequence::no_site};
+use crate::{dataset::sha256, log_conversion};
 
 /// A trial's log as a passage: what its method was given, its judge's truth, but none of its answers.
 pub(super) struct Logged {
@@ -21,9 +21,9 @@ pub(super) struct Logged {
     rig: StereoRig,
     body_from_camera: Transform<Body, Camera>,
     images: bool,
-    named: bool,
+    labelled: bool,
     posed: bool,
-    hears: bool,
+    has_readings: bool,
     numbers: Vec<u64>,
     warnings: Vec<Fault>,
     path: String,
@@ -31,7 +31,7 @@ pub(super) struct Logged {
 
 impl Logged {
     /// The log in `path`; `reading` says whether its images or its clouds are looked at.
-    pub(super) fn open(path: &Path, reading: Reading) -> Result<Self, Vec<Fault>> {
+    pub(super) fn open(path: &Path, reading: LoggedInput) -> Result<Self, Vec<Fault>> {
         let one = |fault| vec![fault];
         let frames = Frames::open(path).map_err(|error| one(fault(path, &error)))?;
         let header = frames.header();
@@ -39,9 +39,9 @@ impl Logged {
             return Err(one(Fault::new("a log without frames", path).remedy("it says nothing that could be replayed")));
         }
         let images = match (reading, frames.has_images(0)) {
-            (Reading::Clouds, _) | (Reading::Any, false) => false,
+            (LoggedInput::Clouds, _) | (LoggedInput::Any, false) => false,
             (_, true) => true,
-            (Reading::Images, false) => {
+            (LoggedInput::Images, false) => {
                 let fault = Fault::new("a log without images", path);
                 return Err(one(fault.remedy("read its clouds, and leave the stages before the search as they are")));
             }
@@ -51,16 +51,16 @@ impl Logged {
             .map_err(|error| one(Fault::new(format!("body_from_camera: {error}"), path)))?;
         let mut warnings = Vec::new();
         let (mut numbers, mut exact) = (Vec::with_capacity(frames.len()), true);
-        let (mut posed, mut named) = (false, true);
+        let (mut posed, mut labelled) = (false, true);
         let mut devices = std::collections::BTreeSet::new();
         for place in 0..frames.len() {
             let frame = frames.frame(place, false).map_err(|error| one(fault(path, &error)))?;
             numbers.push(frame.frame);
             exact &= frame.inputs.as_ref().is_some_and(|inputs| !images || inputs.exact_images);
             posed |= frame.inputs.as_ref().is_some_and(|inputs| inputs.problem.is_some());
-            named &= frame.inputs.as_ref().is_some_and(|inputs| inputs.names.is_some());
-            let told = frame.inputs.iter().flat_map(|inputs| &inputs.readings);
-            devices.extend(told.map(|reading| reading.device.clone()));
+            labelled &= frame.inputs.as_ref().is_some_and(|inputs| inputs.names.is_some());
+            let hints = frame.inputs.iter().flat_map(|inputs| &inputs.readings);
+            devices.extend(hints.map(|reading| reading.device.clone()));
         }
         if !exact {
             let what =
@@ -79,9 +79,9 @@ impl Logged {
             rig,
             body_from_camera,
             images,
-            named,
+            labelled,
             posed,
-            hears: Device::ALL.iter().all(|device| devices.contains(device.name())),
+            has_readings: Device::ALL.iter().all(|device| devices.contains(device.name())),
             numbers,
             warnings,
             path: path.display().to_string(),
@@ -111,7 +111,7 @@ fn rig(record: &RigRecord) -> Result<StereoRig, String> {
     let right_from_left: Transform<RightCamera, Camera> = match record.right_from_left_rotation {
         Some(rotation) => {
             let translation = std::array::from_fn(|row| record.right_from_left[row][3]);
-            exact::transform(&ExactPose { rotation, translation })
+            log_conversion::transform(&ExactPose { rotation, translation })
         }
         None => Transform::from_rows(&record.right_from_left).map_err(|error| format!("right_from_left: {error}"))?,
     };
@@ -124,7 +124,7 @@ fn image(grey: &GreyImage) -> Result<Image, String> {
     Image::new(grey.width as usize, grey.height as usize, pixels).map_err(|error| error.to_string())
 }
 
-impl Passage for Logged {
+impl Sequence for Logged {
     fn name(&self) -> &str {
         &self.name
     }
@@ -145,16 +145,16 @@ impl Passage for Logged {
         self.images
     }
 
-    fn named(&self) -> bool {
-        self.named
+    fn labelled(&self) -> bool {
+        self.labelled
     }
 
     fn posed(&self) -> bool {
         self.posed
     }
 
-    fn hears(&self) -> bool {
-        self.hears
+    fn has_readings(&self) -> bool {
+        self.has_readings
     }
 
     fn frames(&self) -> usize {
@@ -178,31 +178,31 @@ impl Passage for Logged {
         &self.warnings
     }
 
-    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+    fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault> {
         let frame = self.frame(index, self.images)?;
         let broken = |what: String| Fault::new(what, Path::new(&self.path)).value(format!("frame {}", frame.frame));
         let rounded = Inputs::default();
         let inputs = frame.inputs.as_deref().unwrap_or(&rounded);
         let cloud = match frame.inputs {
-            Some(_) => exact::cloud(&frame.cloud, inputs)
+            Some(_) => log_conversion::cloud(&frame.cloud, inputs)
                 .ok_or_else(|| broken("a point whose pixels have no covariance".to_owned()))?,
             None => self.old_cloud(&frame),
         };
-        let told = exact::told(inputs, &cloud);
-        let readings = exact::readings(inputs).map_err(broken)?;
+        let hints = log_conversion::hints(inputs, &cloud);
+        let readings = log_conversion::readings(inputs).map_err(broken)?;
         let prior = match frame.inputs {
-            Some(_) => exact::prior(inputs),
+            Some(_) => log_conversion::prior(inputs),
             None => self.old_prior(&frame).map_err(broken)?,
         };
-        let eyes = match &frame.images {
+        let frame_data = match &frame.images {
             Some([left, _]) if left.width != self.rig.left().size()[0] => {
                 let fault = broken("an image that was logged as a thumbnail".to_owned());
                 return Err(fault.remedy("read the clouds, or log the images of the run"));
             }
-            Some([left, right]) => Eyes::Pair(image(left).map_err(broken)?, image(right).map_err(broken)?),
-            None => Eyes::Points(cloud),
+            Some([left, right]) => FrameData::Stereo(image(left).map_err(broken)?, image(right).map_err(broken)?),
+            None => FrameData::Points(cloud),
         };
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior, told, readings })
+        Ok(SensorFrame { stamp_ns: frame.stamp_ns, frame_data, prior, hints, readings })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -211,7 +211,7 @@ impl Passage for Logged {
             Some(_) => vec![None],
             None => self.site.objects.iter().map(|object| object.world_from_object).collect(),
         };
-        Some(exact::truth_of(inputs.truth.as_ref()?, surveyed))
+        Some(log_conversion::truth_of(inputs.truth.as_ref()?, surveyed))
     }
 
     fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
@@ -229,7 +229,7 @@ impl Logged {
         let isotropic = Matrix4::<f64>::identity() * (sigma * sigma);
         let rows = std::array::from_fn(|r| std::array::from_fn(|c| isotropic[(r, c)]));
         let inputs = Inputs { pixel_covariances: pairs.map(|_| rows).collect(), ..Inputs::default() };
-        exact::cloud(&frame.cloud, &inputs).expect("every pair of pixels was given a covariance")
+        log_conversion::cloud(&frame.cloud, &inputs).expect("every pair of pixels was given a covariance")
     }
 
     /// The rough pose of such a log, with the standard deviations that are typical of it.

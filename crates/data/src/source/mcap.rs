@@ -7,13 +7,13 @@ use seafix_io::ImageLimits;
 use seafix_log::Recording;
 use serde::{Deserialize, Serialize};
 
-use super::{Passage, Source, logged, logged::Logged, recorded::Recorded};
+use super::{Sequence, Source, logged, logged::Logged, recorded::Recorded};
 use crate::{dataset::SAME_INSTANT_NS, ros::Views};
 
 /// Which of what a run logged is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Reading {
+pub enum LoggedInput {
     /// Images where there are any, else clouds.
     #[default]
     Any,
@@ -31,7 +31,7 @@ pub struct Mcap {
     /// The file; relative to the experiment file.
     pub path: String,
     /// Of our own logs: `images`, `clouds`, or `any`, images where there are any.
-    pub read: Reading,
+    pub read: LoggedInput,
     /// The file of the site to look for; relative to the experiment file. Its world is that of the poses.
     pub site: String,
     /// Topics of the left and the right images (Image, CompressedImage); empty: those whose names say so.
@@ -55,9 +55,9 @@ pub struct Mcap {
     /// Images of one instant have stamps within this (s).
     pub tolerance: f64,
     /// Between poses farther apart than this (s) nothing is known.
-    pub most_gap: f64,
+    pub max_gap: f64,
     /// Whether images out of order are sorted and the first of each stamp kept, instead of refused.
-    pub repair: bool,
+    pub sort_stamps: bool,
     /// Depth of the pixels in images of 16 bits.
     pub bits: u8,
     /// The most pixels that an image's header may declare.
@@ -72,7 +72,7 @@ impl Default for Mcap {
         let none = String::new;
         Self {
             path: none(),
-            read: Reading::Any,
+            read: LoggedInput::Any,
             site: none(),
             left: none(),
             right: none(),
@@ -84,8 +84,8 @@ impl Default for Mcap {
             prior_attitude_deg: 0.0,
             truth: none(),
             tolerance: SAME_INSTANT_NS as f64 * 1e-9,
-            most_gap: 0.2,
-            repair: false,
+            max_gap: 0.2,
+            sort_stamps: false,
             bits: 16,
             max_pixels: pixels,
             max_bytes: bytes,
@@ -101,7 +101,7 @@ impl Mcap {
 
     /// The longest time between two poses (ns).
     pub(super) fn gap_ns(&self) -> u64 {
-        (self.most_gap * 1e9) as u64
+        (self.max_gap * 1e9) as u64
     }
 }
 
@@ -114,20 +114,20 @@ impl Component for Mcap {
         in_range(!self.path.is_empty(), "path", "''", "an .mcap file, relative to the experiment file")?;
         let seconds = |value: f64| (0.0..=1e6).contains(&value);
         in_range(seconds(self.tolerance), "tolerance", self.tolerance, "0 to 1e6 seconds")?;
-        in_range(seconds(self.most_gap), "most-gap", self.most_gap, "0 to 1e6 seconds")?;
+        in_range(seconds(self.max_gap), "max-gap", self.max_gap, "0 to 1e6 seconds")?;
         let (position, attitude) = (self.prior_position, self.prior_attitude_deg);
         in_range((0.0..=1e3).contains(&position), "prior-position", position, "0 to 1000")?;
         in_range((0.0..=180.0).contains(&attitude), "prior-attitude-deg", attitude, "0 to 180")?;
         in_range((position > 0.0) == (attitude > 0.0), "prior-attitude-deg", attitude, "both deviations, or neither")?;
         in_range([8, 12, 16].contains(&self.bits), "bits", self.bits, "8, 12 or 16")?;
-        let most = i64::MAX as u64;
-        in_range((1..=most).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
-        in_range((1..=most).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
+        let max = i64::MAX as u64;
+        in_range((1..=max).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
+        in_range((1..=max).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
     }
 }
 
 impl Source for Mcap {
-    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         let path = folder.join(&self.path);
         let one = |fault| vec![fault];
         let recording = Recording::open(&path, |_| false).map_err(|error| one(logged::fault(&path, &error)))?;
@@ -141,7 +141,7 @@ impl Source for Mcap {
         Ok(Box::new(Recorded::open(&path, self, folder)?))
     }
 
-    fn may_hear(&self) -> bool {
+    fn may_have_readings(&self) -> bool {
         true
     }
 }

@@ -10,17 +10,17 @@ use seafix_referencing::Site;
 mod bag;
 mod dataset;
 mod dive;
-mod drawn_pairs;
-mod drawn_problems;
 mod euroc;
-mod heard;
+mod generated_pairs;
+mod generated_problems;
 mod kitti;
 mod logged;
 mod mcap;
-mod problem_passage;
+mod problem_sequence;
 mod problems;
 mod readings;
 mod recorded;
+mod sensor_buffer;
 mod topics;
 mod virtual_dive;
 mod virtual_images;
@@ -29,21 +29,21 @@ mod virtual_points;
 
 pub use dataset::DatasetSource;
 pub use dive::Dive;
-pub use drawn_pairs::DrawnPairs;
-pub use drawn_problems::DrawnProblems;
 pub use euroc::Euroc;
+pub use generated_pairs::GeneratedPairs;
+pub use generated_problems::GeneratedProblems;
 pub use kitti::Kitti;
-pub use mcap::{Mcap, Reading};
+pub use mcap::{LoggedInput, Mcap};
 
 pub use crate::{dataset::Cameras, ros::Views};
-pub use heard::Heard;
 pub use problems::Problems;
 pub use recorded::check_recording;
+pub use sensor_buffer::SensorBuffer;
 pub use virtual_images::VirtualImages;
 pub use virtual_layouts::VirtualLayouts;
 pub use virtual_points::VirtualPoints;
 
-pub use seafix::{Eyes, Sight, Told, WorldPrior};
+pub use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
 
 /// What is true at one instant. The runner compares with it; no method is given it.
 #[derive(Debug, Clone)]
@@ -73,7 +73,7 @@ pub struct TrueAnswer {
 pub use crate::dataset::CalibratedPort;
 
 /// A sequence of instants, simulated or recorded, opened and checked.
-pub trait Passage: Send + Sync {
+pub trait Sequence: Send + Sync {
     /// Its name, for people.
     fn name(&self) -> &str;
     /// What there is to see; without objects where each instant brings its own.
@@ -85,7 +85,7 @@ pub trait Passage: Send + Sync {
     /// Whether it gives images rather than clouds.
     fn images(&self) -> bool;
     /// Whether every point says which one it is, so that nothing is searched.
-    fn named(&self) -> bool {
+    fn labelled(&self) -> bool {
         false
     }
     /// Whether every instant is a problem about an object of its own: the passage has then no site.
@@ -114,7 +114,7 @@ pub trait Passage: Send + Sync {
         [None, None]
     }
     /// Whether both the vehicle's Doppler log and its gyro are heard.
-    fn hears(&self) -> bool {
+    fn has_readings(&self) -> bool {
         false
     }
     /// What the vehicle's navigation sensors said, as tables: names of files and their CSV text.
@@ -129,7 +129,7 @@ pub trait Passage: Send + Sync {
     ///
     /// # Errors
     /// A file that cannot be read.
-    fn sight(&self, index: usize) -> Result<Sight, Fault>;
+    fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault>;
     /// What is true at instant `index`, where it is known.
     fn truth(&self, index: usize) -> Option<Truth>;
     /// Files it was made from, with their SHA-256.
@@ -146,13 +146,13 @@ pub trait Source: Send + Sync + std::fmt::Debug {
     ///
     /// # Errors
     /// Everything that is wrong with it, at once.
-    fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>>;
+    fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>>;
     /// Whether its points have pixels, which some solvers need.
     fn has_pixels(&self) -> bool {
         true
     }
     /// Whether it may have readings of the vehicle's Doppler log and gyro; what it opens says whether it has.
-    fn may_hear(&self) -> bool {
+    fn may_have_readings(&self) -> bool {
         false
     }
 }
@@ -163,8 +163,8 @@ pub static SOURCES: Registry<dyn Source> = Registry::new(
     &[
         entry!(DatasetSource),
         entry!(Dive),
-        entry!(DrawnPairs),
-        entry!(DrawnProblems),
+        entry!(GeneratedPairs),
+        entry!(GeneratedProblems),
         entry!(Euroc),
         entry!(Kitti),
         entry!(Mcap),
@@ -176,9 +176,9 @@ pub static SOURCES: Registry<dyn Source> = Registry::new(
 );
 
 /// The site of a problem, which is about an object of its own; `None` where the passage's is looked at.
-pub fn own_site(sight: &Sight) -> Option<Site> {
-    match &sight.told {
-        Told::Problem(problem) => Some(problem_passage::site_of(problem)),
+pub fn own_site(sensor_frame: &SensorFrame) -> Option<Site> {
+    match &sensor_frame.hints {
+        Hints::Problem(problem) => Some(problem_sequence::site_of(problem)),
         _ => None,
     }
 }

@@ -14,8 +14,8 @@ use seafix_referencing::problem_file::{self, CoherenceProblem};
 use serde::{Deserialize, Serialize, de::IgnoredAny};
 
 use super::{
-    Passage, Source, TrueAnswer,
-    problem_passage::{Posed, ProblemPassage},
+    Sequence, Source, TrueAnswer,
+    problem_sequence::{Posed, ProblemSequence},
 };
 use crate::dataset::sha256;
 
@@ -39,14 +39,14 @@ impl Component for Problems {
 }
 
 impl Source for Problems {
-    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         let path = folder.join(&self.path);
         let one = |fault| vec![fault];
         let mut files = Vec::new();
         gather(&path, &mut files).map_err(one)?;
         files.sort();
         if files.is_empty() {
-            let remedy = "name a folder of .json files; `seafix draw` makes some";
+            let remedy = "name a folder of .json files; `seafix generate` makes some";
             return Err(one(Fault::new("no problem", &path).remedy(remedy)));
         }
         let (mut posed, mut inputs, mut faults) = (Vec::new(), Vec::new(), Vec::new());
@@ -69,7 +69,7 @@ impl Source for Problems {
         let contents: String = contents.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
         let name = format!("{} problems in {}, SHA-256 {contents}", posed.len(), self.path);
         let frames = posed.len();
-        Ok(Box::new(ProblemPassage::new(name, frames, move |index| posed[index].clone(), inputs)))
+        Ok(Box::new(ProblemSequence::new(name, frames, move |index| posed[index].clone(), inputs)))
     }
 
     fn has_pixels(&self) -> bool {

@@ -3,22 +3,22 @@
 use std::fmt::Write;
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_navigation::{Device, Reading as Told};
-use seafix_simulation::{PlannedMission, sensors::Reading};
+use seafix_navigation::{Device, Reading};
+use seafix_simulation::{PlannedMission, sensors::TimedReading};
 
-use super::Heard;
+use super::SensorBuffer;
 
 /// What the Doppler log and the gyro told, and how much noise their data sheets say is in it.
-pub(super) fn heard(mission: &PlannedMission) -> Heard {
+pub(super) fn sensor_buffer(mission: &PlannedMission) -> SensorBuffer {
     let readings = mission.readings();
     let noise = Noise::of(mission);
-    let told = |device, time: f64, arrival: f64, value: Vector3<f64>, sigma: f64| {
+    let sample = |device, time: f64, arrival: f64, value: Vector3<f64>, sigma: f64| {
         let covariance = Matrix3::identity() * (sigma * sigma);
-        (mission.stamp(arrival), Told { device, stamp_ns: mission.stamp(time), value, covariance })
+        (mission.stamp(arrival), Reading { device, stamp_ns: mission.stamp(time), value, covariance })
     };
-    let doppler = readings.doppler.iter().map(|r| told(Device::Doppler, r.time, r.arrival, r.value, noise.doppler));
-    let gyro = readings.attitude.iter().map(|r| told(Device::Gyro, r.time, r.arrival, r.value.rate, noise.gyro));
-    Heard::new(doppler.chain(gyro).collect())
+    let doppler = readings.doppler.iter().map(|r| sample(Device::Doppler, r.time, r.arrival, r.value, noise.doppler));
+    let gyro = readings.attitude.iter().map(|r| sample(Device::Gyro, r.time, r.arrival, r.value.rate, noise.gyro));
+    SensorBuffer::new(doppler.chain(gyro).collect())
 }
 
 /// Standard deviations of the noise of a reading, each axis: velocity (m/s), rate of turn (rad/s).
@@ -78,8 +78,8 @@ fn lbl(mission: &PlannedMission) -> Vec<(&'static str, String)> {
     }
     for answer in mission.readings().lbl {
         let [stamp, arrival] = [answer.time, answer.arrival].map(|time| mission.stamp(time));
-        let (heard, fix) = &answer.value;
-        for (k, range) in heard.0.iter().take(places.len()).enumerate() {
+        let (sensor_buffer, fix) = &answer.value;
+        for (k, range) in sensor_buffer.0.iter().take(places.len()).enumerate() {
             if let Some(range) = range {
                 put(&mut ranges, format_args!("{stamp},{arrival},{k},{range}"));
             }
@@ -94,7 +94,7 @@ fn lbl(mission: &PlannedMission) -> Vec<(&'static str, String)> {
 
 fn table<V>(
     columns: &str,
-    readings: &[Reading<V>],
+    readings: &[TimedReading<V>],
     mission: &PlannedMission,
     numbers: impl Fn(&V) -> Vec<f64>,
 ) -> String {
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_say_what_the_sensors_said_to_the_bit() {
+    fn tables_state_what_the_sensors_stated_to_the_bit() {
         let mission = mission();
         let said = mission.readings();
         let tables: BTreeMap<String, (String, Vec<Vec<String>>)> =
@@ -202,10 +202,10 @@ mod tests {
             vec![said.rate.x, said.rate.y, said.rate.z, q.i, q.j, q.k, q.w]
         });
         // Ranges, as many as were heard, and where they put the vehicle.
-        let heard = said.lbl.iter().map(|answer| answer.value.0.0.iter().flatten().count()).sum::<usize>();
+        let sensor_buffer = said.lbl.iter().map(|answer| answer.value.0.0.iter().flatten().count()).sum::<usize>();
         assert_eq!(
             (&tables["ranges.csv"].0[..], tables["ranges.csv"].1.len()),
-            ("stamp_ns,arrival_ns,transponder,range", heard)
+            ("stamp_ns,arrival_ns,transponder,range", sensor_buffer)
         );
         let first = said.lbl.iter().flat_map(|a| a.value.0.0).flatten().next().unwrap();
         assert_eq!(number(&tables["ranges.csv"].1[0][3]), first);
@@ -232,8 +232,8 @@ mod tests {
         // The route, as the setting `route.waypoints` takes it.
         let (columns, rows) = &tables["waypoints.csv"];
         assert_eq!(columns, "north,east,height");
-        let way: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|k| number(&row[k]))).collect();
-        assert_eq!(way, mission.waypoints());
-        assert!(way.len() > 2 && way.iter().all(|place| (place[2] - 3.5).abs() < 1e-9), "{way:?}");
+        let waypoints: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|k| number(&row[k]))).collect();
+        assert_eq!(waypoints, mission.waypoints());
+        assert!(waypoints.len() > 2 && waypoints.iter().all(|place| (place[2] - 3.5).abs() < 1e-9), "{waypoints:?}");
     }
 }

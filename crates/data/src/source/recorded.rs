@@ -7,7 +7,7 @@ use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform, World};
 use seafix_io::ImageLimits;
 use seafix_referencing::Site;
 
-use super::{Eyes, Mcap, Passage, Sight, Told, Truth, WorldPrior, bag::Bag};
+use super::{FrameData, Hints, Mcap, SensorFrame, Sequence, Truth, WorldPrior, bag::Bag};
 use crate::dataset::{
     sha256,
     tum::{Stamped, between},
@@ -31,7 +31,7 @@ pub(super) struct Recorded {
 pub fn check_recording(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>, String) {
     let settings = Mcap { max_pixels: limits.pixels, max_bytes: limits.bytes, ..Mcap::default() };
     match Bag::open(path, &settings) {
-        Ok(bag) => (Vec::new(), bag.warnings.clone(), bag.told()),
+        Ok(bag) => (Vec::new(), bag.warnings.clone(), bag.notes()),
         Err(fault) => (vec![fault], Vec::new(), String::new()),
     }
 }
@@ -62,8 +62,7 @@ impl Recorded {
             if !given.is_empty() && without > 0 {
                 let fault = Fault::new(format!("stereo pairs without a {name}"), path);
                 let value = format!("{without} of {}, {given}", bag.pairs.len());
-                warnings
-                    .push(fault.value(value).remedy("poses farther apart than `most-gap` say nothing between them"));
+                warnings.push(fault.value(value).remedy("poses farther apart than `max-gap` say nothing between them"));
             }
         }
         warnings.extend(site.warnings.clone());
@@ -72,7 +71,7 @@ impl Recorded {
     }
 }
 
-impl Passage for Recorded {
+impl Sequence for Recorded {
     fn name(&self) -> &str {
         self.path.file_name().and_then(|name| name.to_str()).unwrap_or("recording")
     }
@@ -106,15 +105,15 @@ impl Passage for Recorded {
         &self.warnings
     }
 
-    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+    fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault> {
         let stamp_ns = &self.bag.pairs[index].0;
         let (left, right) = self.bag.pair(index)?;
-        let eyes = Eyes::Pair(left, right);
+        let frame_data = FrameData::Stereo(left, right);
         let prior = between(&self.prior, *stamp_ns, self.gap_ns).map(|world_from_camera| {
             let nearest = self.prior.partition_point(|(time, _)| time < stamp_ns).min(self.covariances.len() - 1);
             WorldPrior { world_from_camera, covariance: self.covariances[nearest] }
         });
-        Ok(Sight { stamp_ns: *stamp_ns, eyes, prior, told: Told::Nothing, readings: Vec::new() })
+        Ok(SensorFrame { stamp_ns: *stamp_ns, frame_data, prior, hints: Hints::Nothing, readings: Vec::new() })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

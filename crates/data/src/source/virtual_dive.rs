@@ -8,9 +8,9 @@ use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform};
 use seafix_referencing::Site;
 use seafix_simulation::{Dive, PlannedDive};
 
-use super::{Eyes, Passage, Sight, Told, Truth, WorldPrior};
+use super::{FrameData, Hints, SensorFrame, Sequence, Truth, WorldPrior};
 
-pub(super) fn open(dive: &Dive, seed: u64, images: bool) -> Result<Box<dyn Passage>, Vec<Fault>> {
+pub(super) fn open(dive: &Dive, seed: u64, images: bool) -> Result<Box<dyn Sequence>, Vec<Fault>> {
     let dive =
         dive.plan(seed, 0).map_err(|error| vec![Fault::new(error.to_string(), Path::new("the source's settings"))])?;
     let name = format!(
@@ -27,7 +27,7 @@ struct Virtual {
     images: bool,
 }
 
-impl Passage for Virtual {
+impl Sequence for Virtual {
     fn name(&self) -> &str {
         &self.name
     }
@@ -63,19 +63,25 @@ impl Passage for Virtual {
         (!self.images).then_some(self.dive.settings().points.sigma_px)
     }
 
-    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+    fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault> {
         let frame = self.dive.frame(index);
-        let eyes = if self.images {
+        let frame_data = if self.images {
             let (left, right) = frame.render();
-            Eyes::Pair(left, right)
+            FrameData::Stereo(left, right)
         } else {
-            Eyes::Points(frame.points())
+            FrameData::Points(frame.points())
         };
         let prior = WorldPrior {
             world_from_camera: frame.prior.world_from_camera,
             covariance: Covariance6::isotropic(frame.prior.attitude_sigma, frame.prior.position_sigma),
         };
-        Ok(Sight { stamp_ns: frame.stamp_ns, eyes, prior: Some(prior), told: Told::Nothing, readings: Vec::new() })
+        Ok(SensorFrame {
+            stamp_ns: frame.stamp_ns,
+            frame_data,
+            prior: Some(prior),
+            hints: Hints::Nothing,
+            readings: Vec::new(),
+        })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {

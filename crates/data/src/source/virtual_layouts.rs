@@ -10,7 +10,7 @@ use seafix_referencing::{ModelPoint, Site, SiteObject};
 use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
 use serde::{Deserialize, Serialize};
 
-use super::{Eyes, Passage, Sight, Source, Told, Truth, WorldPrior};
+use super::{FrameData, Hints, SensorFrame, Sequence, Source, Truth, WorldPrior};
 
 /// Many draws of many layouts, as clouds of noisy points: every layout is an object of one site, or several that share its
 /// points, a kilometre from the next, and frame k is draw k / `layouts` of layout k mod `layouts`.
@@ -34,7 +34,7 @@ pub struct VirtualLayouts {
     /// Share of the draws in which one point, any of them, is a wrong match: another one, uniform in its shell.
     pub wrong_match_rate: f64,
     /// Half-size (m) of the shell in which a wrong match lies.
-    pub shell: f64,
+    pub gate: f64,
     /// The cameras.
     pub rig: VirtualRig,
     /// How many objects the points of a layout belong to, in turn.
@@ -42,7 +42,7 @@ pub struct VirtualLayouts {
     /// Standard deviation of each surveyed world coordinate of the objects' base points (m), drawn once.
     pub survey_sigma: f64,
     /// Whether every point says which one it is, so that nothing is left to be identified.
-    pub named: bool,
+    pub labelled: bool,
 }
 
 impl Default for VirtualLayouts {
@@ -57,11 +57,11 @@ impl Default for VirtualLayouts {
             sigma_px,
             model_sigma,
             wrong_match_rate: 0.0,
-            shell: 0.25,
+            gate: 0.25,
             rig,
             objects: 1,
             survey_sigma: 0.0,
-            named: true,
+            labelled: true,
         }
     }
 }
@@ -83,13 +83,13 @@ impl Component for VirtualLayouts {
         // Written so that a NaN is refused too.
         let far = self.distance > 0.0 && self.distance <= 100.0;
         in_range(far, "distance", self.distance, "a positive number of metres, at most 100")?;
-        let noise = |value: f64, most: f64| value >= 0.0 && value <= most;
+        let noise = |value: f64, max: f64| value >= 0.0 && value <= max;
         in_range(noise(self.sigma_px, 100.0), "sigma-px", self.sigma_px, "0 to 100")?;
         in_range(noise(self.model_sigma, 1.0), "model-sigma", self.model_sigma, "0 to 1")?;
         in_range(noise(self.survey_sigma, 1.0), "survey-sigma", self.survey_sigma, "0 to 1")?;
         in_range(noise(self.wrong_match_rate, 1.0), "wrong-match-rate", self.wrong_match_rate, "a share from 0 to 1")?;
-        let shell = self.shell > 0.0 && self.shell <= 10.0;
-        in_range(shell, "shell", self.shell, "a positive number of metres, at most 10")?;
+        let gate = self.gate > 0.0 && self.gate <= 10.0;
+        in_range(gate, "gate", self.gate, "a positive number of metres, at most 10")?;
         let enough = self.objects >= 1 && 3 * self.objects <= self.points;
         in_range(enough, "objects", self.objects, "1 or more, with three points each")?;
         self.rig.build().map(|_| ()).map_err(|error| error.to_string())
@@ -97,7 +97,7 @@ impl Component for VirtualLayouts {
 }
 
 impl Source for VirtualLayouts {
-    fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         let place = |number: usize| {
             let Self { shape, points, distance, sigma_px, model_sigma, rig, .. } = self.clone();
             let layout = Layout { shape, points, number: number as u64, distance, sigma_px, model_sigma, rig };
@@ -192,7 +192,7 @@ impl Layouts {
         let mut stream = Stream::new(self.seed, layout as u64, draw, Purpose::Mismatches);
         (stream.unit() < self.settings.wrong_match_rate).then(|| {
             let (placed, wrong) = (&self.placed[layout], stream.below(self.settings.points));
-            (wrong, placed.elsewhere(&placed.model[wrong], self.settings.shell, &mut stream))
+            (wrong, placed.elsewhere(&placed.model[wrong], self.settings.gate, &mut stream))
         })
     }
 
@@ -201,7 +201,7 @@ impl Layouts {
     }
 }
 
-impl Passage for Layouts {
+impl Sequence for Layouts {
     fn name(&self) -> &str {
         &self.name
     }
@@ -222,8 +222,8 @@ impl Passage for Layouts {
         false
     }
 
-    fn named(&self) -> bool {
-        self.settings.named
+    fn labelled(&self) -> bool {
+        self.settings.labelled
     }
 
     fn frames(&self) -> usize {
@@ -238,7 +238,7 @@ impl Passage for Layouts {
         Some(self.settings.sigma_px)
     }
 
-    fn sight(&self, index: usize) -> Result<Sight, Fault> {
+    fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault> {
         let (layout, draw) = self.of(index);
         let (position, attitude) = PRIOR;
         let mut stream = Stream::new(self.seed, layout as u64, draw, Purpose::Prior);
@@ -255,13 +255,13 @@ impl Passage for Layouts {
         {
             cloud[wrong] = other;
         }
-        let told = match self.settings.named {
-            true => Told::Names((0..cloud.len()).map(|point| self.name_of(layout, point)).collect()),
-            false => Told::Nothing,
+        let hints = match self.settings.labelled {
+            true => Hints::Names((0..cloud.len()).map(|point| self.name_of(layout, point)).collect()),
+            false => Hints::Nothing,
         };
-        let eyes = Eyes::Points(cloud);
+        let frame_data = FrameData::Points(cloud);
         let stamp_ns = index as u64 * 100_000_000;
-        Ok(Sight { stamp_ns, eyes, prior: Some(prior), told, readings: Vec::new() })
+        Ok(SensorFrame { stamp_ns, frame_data, prior: Some(prior), hints, readings: Vec::new() })
     }
 
     fn truth(&self, index: usize) -> Option<Truth> {
@@ -287,12 +287,12 @@ mod tests {
     #[test]
     fn a_frame_is_a_draw_of_a_layout_seen_from_its_true_pose() {
         let settings = VirtualLayouts { layouts: 3, frames: 7, sigma_px: 0.0, ..VirtualLayouts::default() };
-        let passage = settings.open(1, Path::new(".")).unwrap();
-        assert_eq!((passage.frames(), passage.site().objects.len()), (7, 3));
+        let sequence = settings.open(1, Path::new(".")).unwrap();
+        assert_eq!((sequence.frames(), sequence.site().objects.len()), (7, 3));
         for index in 0..7 {
-            let (sight, truth) = (passage.sight(index).unwrap(), passage.truth(index).unwrap());
-            let Eyes::Points(cloud) = sight.eyes else { panic!("points") };
-            let object = &passage.site().objects[index % 3];
+            let (sensor_frame, truth) = (sequence.sensor_frame(index).unwrap(), sequence.truth(index).unwrap());
+            let FrameData::Points(cloud) = sensor_frame.frame_data else { panic!("points") };
+            let object = &sequence.site().objects[index % 3];
             let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[index % 3].unwrap();
             for (seen, known) in cloud.iter().zip(&object.points) {
                 assert!((camera_from_object * known.at).distance(&seen.position.at) < 1e-9);
@@ -301,12 +301,12 @@ mod tests {
     }
 
     #[test]
-    fn wrong_matches_come_at_their_rate_and_lie_in_their_shell() {
+    fn wrong_matches_come_at_their_rate_and_lie_in_their_gate() {
         let right = VirtualLayouts { layouts: 5, frames: 2000, ..VirtualLayouts::default() };
         let some = VirtualLayouts { wrong_match_rate: 0.1, ..right.clone() };
         let [right, some] = [right, some].map(|settings| settings.open(1, Path::new(".")).unwrap());
-        let cloud = |passage: &dyn Passage, index| match passage.sight(index).unwrap().eyes {
-            Eyes::Points(cloud) => cloud,
+        let cloud = |sequence: &dyn Sequence, index| match sequence.sensor_frame(index).unwrap().frame_data {
+            FrameData::Points(cloud) => cloud,
             _ => panic!("points"),
         };
         let mut draws = 0;
@@ -326,13 +326,13 @@ mod tests {
     #[test]
     fn of_all_layouts_that_is_attempted_whose_points_are_there() {
         let settings = VirtualLayouts { layouts: 20, frames: 20, ..VirtualLayouts::default() };
-        let passage = settings.open(1, Path::new(".")).unwrap();
+        let sequence = settings.open(1, Path::new(".")).unwrap();
         let pipeline =
             seafix::Pipeline { solver: seafix_component::Choice::named("kabsch"), ..seafix::Pipeline::default() };
-        let (stages, targets) = (pipeline.build().unwrap(), passage.site().targets(pipeline.target).unwrap());
+        let (stages, targets) = (pipeline.build().unwrap(), sequence.site().targets(pipeline.target).unwrap());
         let mut rng = Stream::new(1, 0, 0, Purpose::Search);
         for index in 0..20 {
-            let found = stages.reference(&passage.sight(index).unwrap(), &targets, passage.rig(), rng.rng());
+            let found = stages.compute_fix(&sequence.sensor_frame(index).unwrap(), &targets, sequence.rig(), rng.rng());
             let attempted: Vec<usize> = found.attempts.iter().map(|attempt| attempt.target).collect();
             assert_eq!(attempted, [index % 20]);
         }
@@ -348,14 +348,14 @@ mod tests {
             frames: 4,
             ..VirtualLayouts::default()
         };
-        let passage = settings.open(1, Path::new(".")).unwrap();
-        assert_eq!(passage.site().objects.iter().map(|o| o.points.len()).collect::<Vec<_>>(), [5, 4, 4, 5, 4, 4]);
+        let sequence = settings.open(1, Path::new(".")).unwrap();
+        assert_eq!(sequence.site().objects.iter().map(|o| o.points.len()).collect::<Vec<_>>(), [5, 4, 4, 5, 4, 4]);
         for index in 0..4 {
-            let (sight, truth) = (passage.sight(index).unwrap(), passage.truth(index).unwrap());
-            let Eyes::Points(cloud) = sight.eyes else { panic!("points") };
-            let Told::Names(names) = sight.told else { panic!("named") };
+            let (sensor_frame, truth) = (sequence.sensor_frame(index).unwrap(), sequence.truth(index).unwrap());
+            let FrameData::Points(cloud) = sensor_frame.frame_data else { panic!("points") };
+            let Hints::Names(names) = sensor_frame.hints else { panic!("named") };
             for (seen, (object, point)) in cloud.iter().zip(names) {
-                let known = &passage.site().objects[object];
+                let known = &sequence.site().objects[object];
                 let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[object].unwrap();
                 assert!((camera_from_object * known.points[point].at).distance(&seen.position.at) < 1e-9);
                 let off = known.world_from_object.unwrap().error_to(&truth.world_from_object[object].unwrap());

@@ -6,7 +6,7 @@ use seafix_component::{Component, Fault};
 use seafix_simulation::Dive;
 use serde::{Deserialize, Serialize};
 
-use super::{Passage, Source, virtual_dive::open};
+use super::{Sequence, Source, virtual_dive::open};
 
 /// The same dive as `virtual-images`, as clouds of noisy points: no image is made, none is looked at.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -24,7 +24,7 @@ impl Component for VirtualPoints {
 }
 
 impl Source for VirtualPoints {
-    fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Passage>, Vec<Fault>> {
+    fn open(&self, seed: u64, _folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         open(&self.0, seed, false)
     }
 }

@@ -8,11 +8,11 @@ use seafix_evaluation::trajectory::Pose;
 use seafix_log::{FrameRecord, Matrix4, Reader, TrialHeader};
 
 use super::Trajectory;
-use seafix::THE_WAY_IS_UNKNOWN;
+use seafix::UNKNOWN_MOTION;
 
 /// One of the ways of the left camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum LoggedTrajectory {
     /// As it really went, in the world.
     True,
     /// By odometry alone, from the first pair on; where the way was lost it is broken, and goes on where it ended.
@@ -27,7 +27,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// A log that cannot be read, or one without such a way.
-    pub fn of_log(file: &Path, way: Way) -> Result<Self, Fault> {
+    pub fn of_log(file: &Path, which: LoggedTrajectory) -> Result<Self, Fault> {
         let unreadable = |error: seafix_log::LogError| Fault::new(error.to_string(), file);
         let reader = Reader::open(file).map_err(unreadable)?.without_images();
         let header = reader.header().clone();
@@ -36,9 +36,9 @@ impl Trajectory {
         let mut here = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
         for frame in reader {
             let frame = frame.map_err(unreadable)?;
-            let found = match way {
-                Way::True => frame.truth.as_ref().map(|truth| pose(&truth.world_from_camera)),
-                Way::Odometry => step(&frame).map(|step| {
+            let found = match which {
+                LoggedTrajectory::True => frame.truth.as_ref().map(|truth| pose(&truth.world_from_camera)),
+                LoggedTrajectory::Odometry => step(&frame).map(|step| {
                     match step {
                         Step::Begin => {}
                         Step::Go(motion) => here = after(&here, &motion),
@@ -46,7 +46,7 @@ impl Trajectory {
                     }
                     here
                 }),
-                Way::Navigated => navigated(&header, &frame),
+                LoggedTrajectory::Navigated => navigated(&header, &frame),
             };
             if let Some(pose) = found {
                 stamps.push(frame.stamp_ns);
@@ -54,8 +54,8 @@ impl Trajectory {
             }
         }
         if poses.is_empty() {
-            let (what, remedy) = match way {
-                Way::True => ("a log without truth", "give a trajectory to measure against"),
+            let (what, remedy) = match which {
+                LoggedTrajectory::True => ("a log without truth", "give a trajectory to measure against"),
                 _ => ("a log without navigation", "run an experiment with a table [navigation]"),
             };
             return Err(Fault::new(what, file).remedy(remedy));
@@ -80,7 +80,7 @@ fn step(frame: &FrameRecord) -> Option<Step> {
     match &odometry.motion {
         Some((motion, _)) => Some(Step::Go(pose(motion))),
         None if odometry.lost.is_empty() => Some(Step::Begin),
-        None => odometry.lost.ends_with(THE_WAY_IS_UNKNOWN).then_some(Step::Broken),
+        None => odometry.lost.ends_with(UNKNOWN_MOTION).then_some(Step::Broken),
     }
 }
 

@@ -13,7 +13,7 @@ use seafix_evaluation::trajectory::Pose;
 
 use crate::dataset::tum::nanoseconds;
 
-pub use log::Way;
+pub use log::LoggedTrajectory;
 
 /// The poses of a body along its way, as a file holds them.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,9 +51,9 @@ impl Format {
     /// The format of a text, by the separator and the number of columns of its first line with numbers.
     fn of_text(text: &str) -> Option<Self> {
         let line = lines(text).next()?.1;
-        let whole = |stamp: &str| stamp.trim().parse::<u64>().is_ok();
+        let full = |stamp: &str| stamp.trim().parse::<u64>().is_ok();
         match (line.contains(','), line.split_whitespace().count()) {
-            (true, _) if text.contains("#timestamp") || line.split(',').next().is_some_and(whole) => Some(Self::Euroc),
+            (true, _) if text.contains("#timestamp") || line.split(',').next().is_some_and(full) => Some(Self::Euroc),
             (false, 12) => Some(Self::Kitti),
             _ => Some(Self::Tum),
         }
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_format_is_told_by_content() {
+    fn the_format_is_reported_by_content() {
         assert_eq!(Format::of_text("# x\n1 0 0 0 0 0 0 1\n"), Some(Format::Tum));
         assert_eq!(Format::of_text("1 0 0 0 0 1 0 0 0 0 1 0\n"), Some(Format::Kitti));
         assert_eq!(
@@ -236,11 +236,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("walk");
         std::fs::write(&file, text).unwrap();
-        let way = Trajectory::read_repaired(&file).unwrap();
-        assert_eq!(way.poses.iter().map(|pose| pose.position.x).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
-        assert_eq!(way.breaks, [2]);
+        let trajectory = Trajectory::read_repaired(&file).unwrap();
+        assert_eq!(trajectory.poses.iter().map(|pose| pose.position.x).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
+        assert_eq!(trajectory.breaks, [2]);
         for format in [Format::Tum, Format::Euroc] {
-            assert_eq!(read(&way.print(format)).unwrap().breaks, [2], "{format:?}");
+            assert_eq!(read(&trajectory.print(format)).unwrap().breaks, [2], "{format:?}");
         }
         std::fs::write(&file, "2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 2\n").unwrap();
         let said = Trajectory::read_repaired(&file).unwrap_err().to_string();

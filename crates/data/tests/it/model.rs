@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use seafix::{Eyes, Pipeline};
+use seafix::{FrameData, Pipeline};
 use seafix_component::Choice;
 use seafix_data::{
     HandModel, ModelByHand,
-    source::{Passage, SOURCES},
+    source::{SOURCES, Sequence},
 };
 use seafix_geometry::Point;
 
-fn sample() -> Box<dyn Passage> {
+fn sample() -> Box<dyn Sequence> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets");
     let source = SOURCES.build(&Choice::named("dataset").with("path", "virtual-sample")).unwrap();
     source.open(0, &folder).unwrap()
@@ -18,16 +18,16 @@ fn sample() -> Box<dyn Passage> {
 
 /// The object of which a frame shows most, and marks on its points, each `off` px from where it is, in all directions; the
 /// right ones only if `both`.
-fn marks(passage: &dyn Passage, frame: usize, off: f64, both: bool) -> (usize, String) {
-    let truth = passage.truth(frame).unwrap();
+fn marks(sequence: &dyn Sequence, frame: usize, off: f64, both: bool) -> (usize, String) {
+    let truth = sequence.truth(frame).unwrap();
     let visible = truth.visible.unwrap();
-    let objects = 0..passage.site().objects.len();
-    let most = objects.max_by_key(|&o| visible.iter().filter(|(object, _)| *object == o).count()).unwrap();
-    let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[most].unwrap();
+    let objects = 0..sequence.site().objects.len();
+    let max = objects.max_by_key(|&o| visible.iter().filter(|(object, _)| *object == o).count()).unwrap();
+    let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[max].unwrap();
     let mut text = "id,left_u,left_v,right_u,right_v\n".to_owned();
-    for (k, &(_, p)) in visible.iter().filter(|(object, _)| *object == most).enumerate() {
-        let point = &passage.site().objects[most].points[p];
-        let seen = passage.rig().project(&(camera_from_object * point.at)).unwrap();
+    for (k, &(_, p)) in visible.iter().filter(|(object, _)| *object == max).enumerate() {
+        let point = &sequence.site().objects[max].points[p];
+        let seen = sequence.rig().project(&(camera_from_object * point.at)).unwrap();
         let moved = |x: f64, y: f64, turn: f64| {
             let (dy, dx) = (2.4 * k as f64 + turn).sin_cos();
             format!("{:.2},{:.2}", x + off * dx, y + off * dy)
@@ -36,15 +36,15 @@ fn marks(passage: &dyn Passage, frame: usize, off: f64, both: bool) -> (usize, S
         let right = if both { moved(seen.right.u, seen.right.v, 1.0) } else { ",".to_owned() };
         text += &format!("{},{left},{right}\n", point.id);
     }
-    (most, text)
+    (max, text)
 }
 
-fn model(passage: &dyn Passage, frame: usize, text: &str, base: Option<[String; 3]>) -> Result<HandModel, String> {
+fn model(sequence: &dyn Sequence, frame: usize, text: &str, base: Option<[String; 3]>) -> Result<HandModel, String> {
     let front_end = Pipeline::default().front_end().unwrap();
     let by_hand =
         ModelByHand { front_end: &front_end, reach: 4.0, mark_sigma: 1.0, object: "by hand".to_owned(), base };
-    let Eyes::Pair(left, right) = passage.sight(frame).unwrap().eyes else { panic!("a pair") };
-    let found = by_hand.model([&left, &right], passage.rig(), text, Path::new("clicks.csv"));
+    let FrameData::Stereo(left, right) = sequence.sensor_frame(frame).unwrap().frame_data else { panic!("a pair") };
+    let found = by_hand.model([&left, &right], sequence.rig(), text, Path::new("clicks.csv"));
     found.map_err(|fault| fault.to_string())
 }
 
@@ -53,11 +53,11 @@ fn model(passage: &dyn Passage, frame: usize, text: &str, base: Option<[String; 
 /// their covariances say.
 #[test]
 fn marks_a_pixel_off_make_a_model_to_millimetres() {
-    let passage = sample();
+    let sequence = sample();
     for (frame, both) in [(0, true), (2, true), (2, false), (4, false)] {
-        let (object, text) = marks(&*passage, frame, 1.5, both);
-        let found = model(&*passage, frame, &text, None).unwrap();
-        let known = &passage.site().objects[object];
+        let (object, text) = marks(&*sequence, frame, 1.5, both);
+        let found = model(&*sequence, frame, &text, None).unwrap();
+        let known = &sequence.site().objects[object];
         let truly = |id: &str| known.points.iter().find(|point| point.id == id).unwrap().at;
         let corners: Vec<_> = found.points.iter().filter(|point| point.corner && point.aligned).collect();
         assert!(corners.len() >= 5 && 4 * corners.len() >= 3 * found.points.len(), "{} corners", corners.len());
@@ -79,11 +79,11 @@ fn marks_a_pixel_off_make_a_model_to_millimetres() {
 /// P1 is the origin, P3 on the x axis, P2 in the plane z = 0 with y < 0; the pose takes the cloud there.
 #[test]
 fn the_frame_is_that_of_the_base() {
-    let passage = sample();
-    let (_, text) = marks(&*passage, 2, 1.0, true);
+    let sequence = sample();
+    let (_, text) = marks(&*sequence, 2, 1.0, true);
     let ids: Vec<&str> = text.lines().skip(1).map(|line| line.split(',').next().unwrap()).collect();
     let base = [ids[3], ids[0], ids[5]].map(str::to_owned);
-    let found = model(&*passage, 2, &text, Some(base.clone())).unwrap();
+    let found = model(&*sequence, 2, &text, Some(base.clone())).unwrap();
     let site = &found.site.objects[0];
     assert_eq!(site.base.map(|index| site.points[index].id.clone()), base);
     let [p1, p2, p3] = site.base.map(|index| site.points[index].at);
@@ -100,11 +100,11 @@ fn the_frame_is_that_of_the_base() {
 /// A right mark that is wrong along the epipolar line is a point like any other but for what the images show: 25 px are metres.
 /// Seen to fail where the two are not compared.
 #[test]
-fn a_right_mark_that_the_images_contradict_is_told() {
-    let passage = sample();
+fn a_right_mark_that_the_images_contradict_is_reported() {
+    let sequence = sample();
     for frame in [0, 2, 4] {
-        let (_, text) = marks(&*passage, frame, 1.0, true);
-        let sound = model(&*passage, frame, &text, None).unwrap();
+        let (_, text) = marks(&*sequence, frame, 1.0, true);
+        let sound = model(&*sequence, frame, &text, None).unwrap();
         let untold: Vec<String> = sound.warnings.iter().map(ToString::to_string).collect();
         assert!(untold.is_empty(), "{untold:?}");
         let lines: Vec<&str> = text.lines().collect();
@@ -112,20 +112,23 @@ fn a_right_mark_that_the_images_contradict_is_told() {
             let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
             // In a rectified pair the epipolar line is the row.
             cells[3] = (cells[3].parse::<f64>().unwrap() - 25.0).to_string();
-            let Ok(found) = model(&*passage, frame, &text.replace(line, &cells.join(",")), None) else { continue };
-            let told: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
+            let Ok(found) = model(&*sequence, frame, &text.replace(line, &cells.join(",")), None) else { continue };
+            let reported: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
             let place = format!("clicks.csv:{}: `{}`", k + 1, cells[0]);
-            assert!(told.len() == 1 && told[0].contains(&place) && told[0].contains("px from where"), "{told:?}");
+            assert!(
+                reported.len() == 1 && reported[0].contains(&place) && reported[0].contains("px from where"),
+                "{reported:?}"
+            );
         }
     }
 }
 
 #[test]
 fn marks_that_mean_no_point_are_refused_with_their_line() {
-    let passage = sample();
-    let (_, text) = marks(&*passage, 2, 1.0, true);
+    let sequence = sample();
+    let (_, text) = marks(&*sequence, 2, 1.0, true);
     let refusal = |text: &str, base: Option<[&str; 3]>| {
-        model(&*passage, 2, text, base.map(|base| base.map(str::to_owned))).unwrap_err()
+        model(&*sequence, 2, text, base.map(|base| base.map(str::to_owned))).unwrap_err()
     };
     let lines: Vec<&str> = text.lines().collect();
     let split = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();

@@ -14,7 +14,7 @@ const BLOCKS: usize = 400;
 /// From so many values on the median is found by halving, not by sorting every resample.
 const MANY: usize = 20_000;
 /// What was drawn last of more than [`MANY`]: a report asks for it again and again, from several threads.
-static LAST: Mutex<Option<Arc<Drawn>>> = Mutex::new(None);
+static LAST: Mutex<Option<Arc<Resamples>>> = Mutex::new(None);
 
 /// The percentile bootstrap over blocks of consecutive values (Politis and Romano, A circular block-resampling
 /// procedure for stationary data, 1992).
@@ -59,7 +59,7 @@ impl Bootstrap {
         }
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let mut places = vec![0; n];
-        let mut drawn: Vec<f64> = (0..self.resamples.max(1))
+        let mut sampled: Vec<f64> = (0..self.resamples.max(1))
             .map(|_| {
                 for block in places.chunks_mut(self.block.max(1)) {
                     let begin = place_below(n, &mut random);
@@ -69,7 +69,7 @@ impl Bootstrap {
             })
             .collect();
         let alpha = 1.0 - confidence;
-        (quantile(&mut drawn, 0.5 * alpha), quantile(&mut drawn, 1.0 - 0.5 * alpha))
+        (quantile(&mut sampled, 0.5 * alpha), quantile(&mut sampled, 1.0 - 0.5 * alpha))
     }
 
     /// The interval of the median of `values`.
@@ -78,25 +78,25 @@ impl Bootstrap {
     /// and how often that is so follows from sums of blocks; its ends are values then, not means of two neighbours.
     pub fn median(&self, values: &[f64], confidence: f64) -> (f64, f64) {
         if values.len() <= MANY {
-            let mut drawn = Vec::with_capacity(values.len());
+            let mut sampled = Vec::with_capacity(values.len());
             return self.interval(values.len(), confidence, |at| {
-                drawn.clear();
-                drawn.extend(at.iter().map(|&i| values[i]));
-                median(&mut drawn)
+                sampled.clear();
+                sampled.extend(at.iter().map(|&i| values[i]));
+                median(&mut sampled)
             });
         }
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         let half = values.len().div_ceil(2);
-        let drawn = self.draw(values.len());
-        // The least value that the median exceeds in no more than 1 − `share` of the resamples.
-        let end = |share: f64| {
-            let wanted = share * self.resamples.max(1) as f64;
+        let sampled = self.draw(values.len());
+        // The least value that the median exceeds in no more than 1 − `fraction` of the resamples.
+        let end = |fraction: f64| {
+            let wanted = fraction * self.resamples.max(1) as f64;
             let (mut low, mut high) = (0, sorted.len() - 1);
             while low < high {
                 let middle = low.midpoint(high);
                 let below = |value: &f64| value.total_cmp(&sorted[middle]).is_le();
-                let sums = drawn.sums(values.iter().map(below));
+                let sums = sampled.sums(values.iter().map(below));
                 match sums.into_iter().filter(|sum| *sum >= half).count() as f64 >= wanted {
                     true => high = middle,
                     false => low = middle + 1,
@@ -109,42 +109,42 @@ impl Bootstrap {
     }
 
     /// The blocks of every resample of n values; n is not zero.
-    fn draw(&self, n: usize) -> Arc<Drawn> {
+    fn draw(&self, n: usize) -> Arc<Resamples> {
         if n <= MANY {
-            return Arc::new(self.drawn(n));
+            return Arc::new(self.sampled(n));
         }
         let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
         match &*last {
-            Some(drawn) if drawn.of == (*self, n) => Arc::clone(drawn),
+            Some(sampled) if sampled.of == (*self, n) => Arc::clone(sampled),
             _ => {
                 // Given back first: two of them at once are the most that a report holds of anything.
                 *last = None;
-                Arc::clone(last.insert(Arc::new(self.drawn(n))))
+                Arc::clone(last.insert(Arc::new(self.sampled(n))))
             }
         }
     }
 
-    fn drawn(&self, n: usize) -> Drawn {
+    fn sampled(&self, n: usize) -> Resamples {
         let block = self.block.clamp(1, n);
         let resamples = self.resamples.max(1);
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let whole = n / block;
-        let mut begins = Vec::with_capacity(resamples * whole);
+        let full = n / block;
+        let mut begins = Vec::with_capacity(resamples * full);
         let mut rest = Vec::new();
         for resample in 0..resamples as u64 {
-            begins.extend((0..whole).map(|_| (place_below(n, &mut random) as u64) << 32 | resample));
+            begins.extend((0..full).map(|_| (place_below(n, &mut random) as u64) << 32 | resample));
             if !n.is_multiple_of(block) {
                 rest.push(place_below(n, &mut random));
             }
         }
         begins.sort_unstable();
-        Drawn { of: (*self, n), block, begins, rest }
+        Resamples { of: (*self, n), block, begins, rest }
     }
 }
 
 /// The blocks of all resamples, by where they begin: sums over them go through the values in order, not to and fro.
 #[derive(Debug)]
-struct Drawn {
+struct Resamples {
     /// What was asked to draw, and of how many values.
     of: (Bootstrap, usize),
     /// How long a block is here.
@@ -155,7 +155,7 @@ struct Drawn {
     rest: Vec<usize>,
 }
 
-impl Drawn {
+impl Resamples {
     /// How many events each resample has.
     fn sums(&self, events: impl Iterator<Item = bool>) -> Vec<usize> {
         // Events before each place.

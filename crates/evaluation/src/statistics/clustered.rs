@@ -40,7 +40,7 @@ pub fn of_blocks(k: usize, n: usize, block: usize, confidence: f64) -> (f64, f64
 /// Not less than 1, nor more than the block's length; `k` of the events are.
 fn design_effect(events: &[bool], k: usize, block: usize) -> f64 {
     let n = events.len();
-    let (longest, share) = (block as f64, k as f64 / n as f64);
+    let (longest, fraction) = (block as f64, k as f64 / n as f64);
     let rarer = 2 * k <= n;
     let runs = (0..n).filter(|&i| events[i] == rarer && (i == 0 || events[i - 1] != rarer)).count();
     if runs == 0 {
@@ -49,10 +49,10 @@ fn design_effect(events: &[bool], k: usize, block: usize) -> f64 {
     let mut sum = events[..block].iter().filter(|event| **event).count();
     let mut square = 0.0;
     for begin in 0..n {
-        square += (sum as f64 - longest * share).powi(2);
+        square += (sum as f64 - longest * fraction).powi(2);
         sum = sum + usize::from(events[(begin + block) % n]) - usize::from(events[begin]);
     }
-    let alone = longest * share * (1.0 - share);
+    let alone = longest * fraction * (1.0 - fraction);
     let found = (square / n as f64 / alone).max(1.0);
     (found * (1.0 + (2.0 / runs as f64).sqrt())).min(longest)
 }
@@ -68,7 +68,7 @@ mod tests {
     use crate::clopper_pearson;
 
     #[test]
-    fn few_events_say_little_and_no_share_that_was_seen_is_left_out() {
+    fn few_events_state_little_and_no_fraction_that_was_seen_is_left_out() {
         // Three of seven, each alone, in blocks of two: 1.8 times fewer than seven.
         let (low, high) = clustered(&[true, false, true, false, true, false, false], 2, 0.95);
         assert!(low > 0.02 && low < 0.1 && high > 0.8 && high < 0.95, "{low} {high}");
@@ -83,15 +83,15 @@ mod tests {
     #[test]
     fn events_that_come_in_runs_are_no_surer_than_their_runs() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        for share in [0.5, 0.9] {
+        for fraction in [0.5, 0.9] {
             let mut held = 0;
             for _ in 0..1000 {
-                let runs = (0..60).map(|_| (random.next_u64() as f64) < share * 2f64.powi(64));
+                let runs = (0..60).map(|_| (random.next_u64() as f64) < fraction * 2f64.powi(64));
                 let events: Vec<bool> = runs.flat_map(|event| [event; 10]).collect();
                 let (low, high) = clustered(&events, 20, 0.95);
-                held += usize::from(low <= share && share <= high);
+                held += usize::from(low <= fraction && fraction <= high);
             }
-            assert!(held > 930, "{share}: {held} of 1000");
+            assert!(held > 930, "{fraction}: {held} of 1000");
         }
     }
 }

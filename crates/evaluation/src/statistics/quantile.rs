@@ -13,10 +13,10 @@ pub fn quantile(values: &mut [f64], p: f64) -> f64 {
     }
     values.sort_unstable_by(f64::total_cmp);
     let place = p.clamp(0.0, 1.0) * (values.len() - 1) as f64;
-    let (below, share) = (place.floor() as usize, place.fract());
+    let (below, fraction) = (place.floor() as usize, place.fract());
     match values.get(below + 1) {
         // An infinite neighbour (a failure counted as infinity) must not turn an exact hit into NaN.
-        Some(above) if share > 0.0 => between(values[below], *above, share),
+        Some(above) if fraction > 0.0 => between(values[below], *above, fraction),
         _ => values[below],
     }
 }
@@ -43,8 +43,8 @@ pub fn median(values: &mut [f64]) -> f64 {
 }
 
 /// Between a number and infinity stands infinity of that sign; between the two infinities nothing is known.
-fn between(low: f64, high: f64, share: f64) -> f64 {
-    if low == high || low == f64::NEG_INFINITY && high.is_finite() { low } else { low + share * (high - low) }
+fn between(low: f64, high: f64, fraction: f64) -> f64 {
+    if low == high || low == f64::NEG_INFINITY && high.is_finite() { low } else { low + fraction * (high - low) }
 }
 
 #[cfg(test)]

@@ -52,29 +52,29 @@ pub fn signed_rank(pairs: &[(f64, f64)]) -> SignedRank {
     if n == 0 {
         return SignedRank { differing: 0, p: 1.0, effect: 0.0 };
     }
-    let least = above.min(below);
-    let p = if n <= EXACT { counted(&doubled, least) } else { approximate(n, ties, least) };
+    let min = above.min(below);
+    let p = if n <= EXACT { counted(&doubled, min) } else { approximate(n, ties, min) };
     SignedRank { differing: n, p, effect: (below as f64 - above as f64) / all as f64 }
 }
 
-/// Twice the share of all 2ⁿ choices of signs whose doubled rank sum is at most `least`.
-fn counted(doubled: &[u64], least: u64) -> f64 {
-    let mut ways = vec![0.0; least as usize + 1];
-    ways[0] = 1.0;
+/// Twice the share of all 2ⁿ choices of signs whose doubled rank sum is at most `min`.
+fn counted(doubled: &[u64], min: u64) -> f64 {
+    let mut paths = vec![0.0; min as usize + 1];
+    paths[0] = 1.0;
     for &rank in doubled {
-        for sum in (rank as usize..ways.len()).rev() {
-            ways[sum] += ways[sum - rank as usize];
+        for sum in (rank as usize..paths.len()).rev() {
+            paths[sum] += paths[sum - rank as usize];
         }
     }
-    let share = ways.iter().sum::<f64>() / 2_f64.powi(doubled.len() as i32);
-    (2.0 * share).min(1.0)
+    let fraction = paths.iter().sum::<f64>() / 2_f64.powi(doubled.len() as i32);
+    (2.0 * fraction).min(1.0)
 }
 
-fn approximate(n: usize, ties: f64, least: u64) -> f64 {
+fn approximate(n: usize, ties: f64, min: u64) -> f64 {
     let n = n as f64;
     let mean = n * (n + 1.0) / 4.0;
     let variance = n * (n + 1.0) * (2.0 * n + 1.0) / 24.0 - ties / 48.0;
-    let z = (mean - least as f64 / 2.0 - 0.5).max(0.0) / variance.sqrt();
+    let z = (mean - min as f64 / 2.0 - 0.5).max(0.0) / variance.sqrt();
     (2.0 * Normal::standard().sf(z)).min(1.0)
 }
 
@@ -84,7 +84,7 @@ mod tests {
 
     /// Seen to hang while such pairs counted.
     #[test]
-    fn what_is_no_number_says_nothing() {
+    fn what_is_no_number_states_nothing() {
         let pairs = [(1.0, 2.0), (1.0, 3.0), (2.0, 5.0)];
         let with = [&pairs[..], &[(f64::NAN, 1.0), (2.0, f64::NAN), (f64::NAN, f64::NAN)]].concat();
         assert_eq!(signed_rank(&with), signed_rank(&pairs));
@@ -112,8 +112,8 @@ mod tests {
         let mut order: Vec<f64> = values.clone();
         order.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
         let below: usize = order.iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| 2 * (i + 1)).sum();
-        let least = below.min(EXACT * (EXACT + 1) - below) as u64;
-        let (exact, near) = (signed_rank(&pairs).p, approximate(EXACT, 0.0, least));
+        let min = below.min(EXACT * (EXACT + 1) - below) as u64;
+        let (exact, near) = (signed_rank(&pairs).p, approximate(EXACT, 0.0, min));
         assert!((exact - near).abs() < 0.02 * exact + 1e-4, "{exact} {near}");
     }
 

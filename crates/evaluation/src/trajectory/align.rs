@@ -45,7 +45,7 @@ impl Alignment {
 
 /// Why no alignment is determined.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum Degenerate {
+pub enum UndeterminedAlignment {
     /// Too few poses.
     #[error("{0} poses; an alignment takes 3")]
     TooFew(usize),
@@ -65,15 +65,15 @@ pub enum Degenerate {
 /// 1991), s = 1 unless `with_scale`.
 ///
 /// # Errors
-/// [`Degenerate`] with fewer than three poses, or positions on one line: the rotation about it is open.
+/// [`UndeterminedAlignment`] with fewer than three poses, or positions on one line: the rotation about it is open.
 ///
 /// # Panics
 /// When the two are not of one length.
-pub fn align(reference: &[Pose], estimate: &[Pose], with_scale: bool) -> Result<Alignment, Degenerate> {
+pub fn align(reference: &[Pose], estimate: &[Pose], with_scale: bool) -> Result<Alignment, UndeterminedAlignment> {
     assert_eq!(reference.len(), estimate.len(), "trajectories of one length");
     let n = reference.len();
     if n < 3 {
-        return Err(Degenerate::TooFew(n));
+        return Err(UndeterminedAlignment::TooFew(n));
     }
     let mean = |poses: &[Pose]| poses.iter().map(|pose| pose.position).sum::<Vector3<f64>>() / n as f64;
     let (to, from) = (mean(reference), mean(estimate));
@@ -89,7 +89,7 @@ pub fn align(reference: &[Pose], estimate: &[Pose], with_scale: bool) -> Result<
     let [first, second, third] = svd.singular_values.into();
     // Rounding leaves a line about eps of its length squared across.
     if !(second > f64::EPSILON * first.max(1.0)) {
-        return Err(Degenerate::OneLine { first, second });
+        return Err(UndeterminedAlignment::OneLine { first, second });
     }
     let sign = if u.determinant() * v_t.determinant() < 0.0 { -1.0 } else { 1.0 };
     let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
@@ -124,14 +124,14 @@ mod tests {
     #[test]
     fn a_line_and_a_point_are_refused() {
         let line = [0.0, 1.0, 2.0, 5.0].map(|x| at([x, 2.0 * x, -x]));
-        assert!(matches!(align(&line, &line, false), Err(Degenerate::OneLine { .. })));
+        assert!(matches!(align(&line, &line, false), Err(UndeterminedAlignment::OneLine { .. })));
         let point = [at([7.0; 3]); 5];
-        assert!(matches!(align(&point, &point, false), Err(Degenerate::OneLine { .. })));
-        assert_eq!(align(&line[..2], &line[..2], false), Err(Degenerate::TooFew(2)));
+        assert!(matches!(align(&point, &point, false), Err(UndeterminedAlignment::OneLine { .. })));
+        assert_eq!(align(&line[..2], &line[..2], false), Err(UndeterminedAlignment::TooFew(2)));
     }
 
     #[test]
-    fn one_pose_is_laid_on_another() {
+    fn one_pose_is_placed_on_another() {
         let turn = *Rotation3::from_euler_angles(0.1, 0.2, 0.3).matrix();
         let (a, b) = (Pose { rotation: turn, position: [1.0, 2.0, 3.0].into() }, at([4.0, 5.0, 6.0]));
         let moved = Alignment::onto(&a, &b).apply(&b);

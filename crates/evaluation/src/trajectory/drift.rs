@@ -4,7 +4,7 @@ use super::{Pose, path_lengths, relation::angle};
 
 /// What an estimate drifts over one stretch of the reference's path.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Leg {
+pub struct DriftSegment {
     /// The pose it starts from.
     pub from: usize,
     /// The pose it ends at.
@@ -25,18 +25,18 @@ pub struct Leg {
 ///
 /// # Panics
 /// When the two are not of one length.
-pub fn drift(reference: &[Pose], estimate: &[Pose], lengths: &[f64]) -> Vec<Leg> {
+pub fn drift(reference: &[Pose], estimate: &[Pose], lengths: &[f64]) -> Vec<DriftSegment> {
     assert_eq!(reference.len(), estimate.len(), "trajectories of one length");
     let path = path_lengths(reference);
-    let leg = |from: usize, length: f64| {
+    let segment = |from: usize, length: f64| {
         let to = from + path[from..].partition_point(|end| end - path[from] < length);
         let (a, b) = (reference[from], reference.get(to)?);
         let error = estimate[from].to(&estimate[to]).to(&a.to(b));
         let (translation, rotation) = (error.position.norm() / length, angle(&error.rotation) / length);
-        Some(Leg { from, to, length, translation, rotation })
+        Some(DriftSegment { from, to, length, translation, rotation })
     };
-    let leg = &leg;
-    lengths.iter().flat_map(|&length| (0..reference.len()).filter_map(move |from| leg(from, length))).collect()
+    let segment = &segment;
+    lengths.iter().flat_map(|&length| (0..reference.len()).filter_map(move |from| segment(from, length))).collect()
 }
 
 #[cfg(test)]
@@ -48,8 +48,8 @@ mod tests {
         let line = |scale: f64| -> Vec<Pose> {
             (0..21).map(|i| Pose { position: [f64::from(i) * scale, 0.0, 0.0].into(), ..Pose::IDENTITY }).collect()
         };
-        let legs = drift(&line(1.0), &line(1.01), &[5.0, 40.0]);
-        assert_eq!(legs.len(), 16, "starts with five metres ahead of them; forty are never reached");
-        assert!(legs.iter().all(|leg| (leg.translation - 0.01).abs() < 1e-12 && leg.rotation < 1e-12));
+        let segments = drift(&line(1.0), &line(1.01), &[5.0, 40.0]);
+        assert_eq!(segments.len(), 16, "starts with five metres ahead of them; forty are never reached");
+        assert!(segments.iter().all(|segment| (segment.translation - 0.01).abs() < 1e-12 && segment.rotation < 1e-12));
     }
 }

@@ -20,9 +20,9 @@ mod pairs;
 mod relation;
 mod summary;
 
-pub use align::{Alignment, Degenerate, align};
+pub use align::{Alignment, UndeterminedAlignment, align};
 pub use associate::associate;
-pub use drift::{Leg, drift};
+pub use drift::{DriftSegment, drift};
 pub use pairs::{Delta, pairs};
 pub use relation::Relation;
 pub use summary::Summary;

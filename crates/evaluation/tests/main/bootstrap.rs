@@ -11,10 +11,10 @@ const SCIPY: &str = include_str!("../fixtures/probability.txt");
 fn the_ends_leave_half_of_alpha_each() {
     let bootstrap = Bootstrap { resamples: 101, block: 1, seed: 9 };
     let counted = |confidence: f64| {
-        let mut drawn = -1.0;
+        let mut sampled = -1.0;
         bootstrap.interval(5, confidence, |_| {
-            drawn += 1.0;
-            drawn
+            sampled += 1.0;
+            sampled
         })
     };
     for (confidence, low) in [(0.9, 5.0), (0.5, 25.0), (0.98, 1.0), (0.0, 50.0), (1.0, 0.0)] {
@@ -29,17 +29,17 @@ fn the_ends_leave_half_of_alpha_each() {
         (7.0, 7.0),
         "one resample in blocks of one at the least"
     );
-    let mut drawn = 0;
+    let mut sampled = 0;
     once.interval(3, 0.9, |_| {
-        drawn += 1;
+        sampled += 1;
         0.0
     });
-    assert_eq!(drawn, 1);
+    assert_eq!(sampled, 1);
 }
 
 /// Every place as often as every other, whichever place of its block: 20 000 draws of each of 5 places have σ = 126.
 #[test]
-fn every_place_is_drawn_alike() {
+fn every_place_is_generated_alike() {
     let mut counts = [[0_i32; 5]; 5];
     Bootstrap { resamples: 20_000, block: 3, seed: 11 }.interval(5, 0.9, |places| {
         assert_eq!(places.len(), 5);
@@ -67,7 +67,7 @@ fn scipy_has_the_same_interval() {
 }
 
 #[test]
-fn blocks_are_as_long_as_the_literature_says() {
+fn blocks_are_as_long_as_the_literature_states() {
     let block = |n: usize| Bootstrap::of(n, 1).block;
     // ⌈n^⅓⌉ up to 400^{3/2} = 8000 values, ⌈n/400⌉ beyond.
     assert_eq!([block(1), block(8), block(9), block(27), block(28)], [1, 2, 3, 3, 4]);
@@ -84,8 +84,8 @@ fn the_median_of_many_is_that_of_the_resamples_in_order() {
         let values: Vec<f64> = (0..n).map(|i| (i * 7919 % 20_011) as f64).collect();
         let bootstrap = Bootstrap { resamples: 5, block, seed: 2 };
         let mut medians = Vec::new();
-        let drawn = Bootstrap { block: block.min(n), ..bootstrap };
-        drawn.interval(n, 0.9, |at| {
+        let sampled = Bootstrap { block: block.min(n), ..bootstrap };
+        sampled.interval(n, 0.9, |at| {
             let mut resample: Vec<f64> = at.iter().map(|&i| values[i]).collect();
             medians.push(*resample.select_nth_unstable_by(n.div_ceil(2) - 1, f64::total_cmp).1);
             0.0

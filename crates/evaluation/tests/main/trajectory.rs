@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_evaluation::trajectory::{
-    Alignment, Degenerate, Delta, Pose, Relation, Summary, align, ape, associate, drift, pairs, path_lengths, rpe,
+    Alignment, Delta, Pose, Relation, Summary, UndeterminedAlignment, align, ape, associate, drift, pairs,
+    path_lengths, rpe,
 };
 
 use crate::{names, near, numbers};
@@ -141,11 +142,11 @@ fn the_drift_is_kitti_s() {
     let wanted = numbers(EVO, "drift");
     let found = drift(&reference, &estimate, &[1.5, 3.0, 6.0, 100.0]);
     assert_eq!(found.len(), wanted.len() / 5);
-    for (leg, wanted) in found.iter().zip(wanted.chunks(5)) {
-        assert_eq!([leg.from as f64, leg.to as f64, leg.length], wanted[..3]);
-        assert!((leg.translation / wanted[3] - 1.0).abs() < 1e-12, "{leg:?}: {}", wanted[3]);
+    for (segment, wanted) in found.iter().zip(wanted.chunks(5)) {
+        assert_eq!([segment.from as f64, segment.to as f64, segment.length], wanted[..3]);
+        assert!((segment.translation / wanted[3] - 1.0).abs() < 1e-12, "{segment:?}: {}", wanted[3]);
         // The table's angle is an arc cosine's.
-        assert!((leg.rotation - wanted[4]).abs() < 1e-9, "{leg:?}: {}", wanted[4]);
+        assert!((segment.rotation - wanted[4]).abs() < 1e-9, "{segment:?}: {}", wanted[4]);
     }
 }
 
@@ -177,15 +178,18 @@ fn a_line_is_one_up_to_rounding() {
         align(&poses, &poses, false)
     };
     let edge = (2.0 * f64::EPSILON).sqrt();
-    assert!(cross(1.0, 1.01 * edge).is_ok() && matches!(cross(1.0, 0.99 * edge), Err(Degenerate::OneLine { .. })));
+    assert!(
+        cross(1.0, 1.01 * edge).is_ok()
+            && matches!(cross(1.0, 0.99 * edge), Err(UndeterminedAlignment::OneLine { .. }))
+    );
     // 100 m: first = 5000 m².
     let edge = (2.0 * 5000.0 * f64::EPSILON).sqrt();
     assert!(cross(100.0, 1.01 * edge).is_ok());
-    let Err(Degenerate::OneLine { first, second }) = cross(100.0, 0.99 * edge) else { panic!("a line") };
+    let Err(UndeterminedAlignment::OneLine { first, second }) = cross(100.0, 0.99 * edge) else { panic!("a line") };
     assert!((first - 5000.0).abs() < 1e-9 && (second / (0.99 * 0.99 * 5000.0 * f64::EPSILON) - 1.0).abs() < 0.1);
     let three = [at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0), at(0.0, 1.0, 0.0)];
     assert!(align(&three, &three, false).is_ok(), "three are enough");
-    assert_eq!(align(&[], &[], true), Err(Degenerate::TooFew(0)));
+    assert_eq!(align(&[], &[], true), Err(UndeterminedAlignment::TooFew(0)));
 }
 
 /// A mirrored estimate is laid on by a rotation all the same; Umeyama's scale takes the third singular value negative.

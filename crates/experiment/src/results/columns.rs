@@ -34,7 +34,7 @@ impl<'a> Row<'a> {
 /// A value of the table; `None` where it is unknown.
 pub(super) enum Cell {
     Text(String),
-    Whole(Option<i64>),
+    Integer(Option<i64>),
     Real(Option<f64>),
     Flag(Option<bool>),
 }
@@ -43,7 +43,7 @@ pub(super) enum Cell {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Text,
-    Whole,
+    Integer,
     Real,
     Flag,
 }
@@ -66,8 +66,8 @@ macro_rules! columns {
 /// The columns, in order. Times are milliseconds, lengths metres, angles radians.
 pub static COLUMNS: &[Column] = columns![
     Text "trial" = |r: &Row<'_>| r.trial.to_owned(),
-    Whole "frame" = |r: &Row<'_>| Some(r.frame.frame as i64),
-    Whole "stamp_ns" = |r: &Row<'_>| Some(r.frame.stamp_ns as i64),
+    Integer "frame" = |r: &Row<'_>| Some(r.frame.frame as i64),
+    Integer "stamp_ns" = |r: &Row<'_>| Some(r.frame.stamp_ns as i64),
     Text "object" = |r: &Row<'_>| r.target.object.clone(),
     Text "search" = |r: &Row<'_>| r.target.search.clone(),
     Text "solver" = |r: &Row<'_>| r.target.solver.clone(),
@@ -75,9 +75,9 @@ pub static COLUMNS: &[Column] = columns![
     Text "reason" = |r: &Row<'_>| r.target.reason.clone(),
     Flag "wrong" = |r: &Row<'_>| r.target.evaluation.wrong,
     Flag "wrong_pairs" = |r: &Row<'_>| r.target.evaluation.wrong_pairs,
-    Whole "visible" = |r: &Row<'_>| r.target.evaluation.visible.map(i64::from),
-    Whole "identified" = |r: &Row<'_>| r.target.evaluation.identified.map(i64::from),
-    Whole "correct_pairs" = |r: &Row<'_>| r.target.evaluation.correct_pairs.map(i64::from),
+    Integer "visible" = |r: &Row<'_>| r.target.evaluation.visible.map(i64::from),
+    Integer "identified" = |r: &Row<'_>| r.target.evaluation.identified.map(i64::from),
+    Integer "correct_pairs" = |r: &Row<'_>| r.target.evaluation.correct_pairs.map(i64::from),
     Real "m1_rms" = |r: &Row<'_>| r.target.evaluation.m1_rms,
     Real "m1_unused_rms" = |r: &Row<'_>| r.target.evaluation.m1_unused_rms,
     Real "m2_rms" = |r: &Row<'_>| r.target.evaluation.m2_rms,
@@ -88,9 +88,9 @@ pub static COLUMNS: &[Column] = columns![
     Real "m3_bound" = |r: &Row<'_>| r.target.evaluation.m3_bound,
     Real "residual_rms" = |r: &Row<'_>| r.target.residual_rms,
     Flag "optimal" = |r: &Row<'_>| r.target.optimal,
-    Whole "size_bound" = |r: &Row<'_>| r.target.size_bound.map(|n| n as i64),
-    Real "expected_chance_sets" = |r: &Row<'_>| r.target.expected_chance_sets,
-    Whole "tests" = |r: &Row<'_>| r.target.tests.map(|n| n as i64),
+    Integer "size_bound" = |r: &Row<'_>| r.target.size_bound.map(|n| n as i64),
+    Real "nfa" = |r: &Row<'_>| r.target.nfa,
+    Integer "tests" = |r: &Row<'_>| r.target.tests.map(|n| n as i64),
     Real "detect_ms" = |r: &Row<'_>| r.frame.times.detect_ms,
     Real "locate_ms" = |r: &Row<'_>| r.frame.times.locate_ms,
     Real "describe_ms" = |r: &Row<'_>| r.frame.times.describe_ms,
@@ -109,14 +109,14 @@ pub static COLUMNS: &[Column] = columns![
     Real "navigated_m3_attitude" = |r: &Row<'_>| r.navigation()?.errors.m3_attitude,
     Real "navigated_nees" = |r: &Row<'_>| r.navigation()?.errors.nees,
     Real "unreferenced_m3_position" = |r: &Row<'_>| r.navigation()?.errors.unreferenced_m3_position,
-    Whole "inspected_points" = |r: &Row<'_>| Some(r.frame.inspected.len() as i64),
+    Integer "inspected_points" = |r: &Row<'_>| Some(r.frame.inspected.len() as i64),
     Text "inspected" = |r: &Row<'_>| r.inspected().map_or_else(String::new, |point| format!("{}/{}", point.object, point.point)),
     Real "inspected_range" = |r: &Row<'_>| r.inspected().map(InspectedPoint::range),
     Real "inspected_error" = |r: &Row<'_>| r.inspected()?.error(),
     Real "inspected_nees" = |r: &Row<'_>| r.inspected()?.nees,
     Text "redundancy" = |r: &Row<'_>| r.integrity().map_or_else(String::new, |it| it.redundancy.clone()),
     Real "chi2" = |r: &Row<'_>| Some(r.integrity()?.chi2),
-    Whole "chi2_freedom" = |r: &Row<'_>| Some(r.integrity()?.freedom as i64),
+    Integer "chi2_freedom" = |r: &Row<'_>| Some(r.integrity()?.freedom as i64),
     Real "chi2_limit" = |r: &Row<'_>| Some(r.integrity()?.chi2_limit),
     Real "separation" = |r: &Row<'_>| r.integrity()?.separation,
     Real "separation_two" = |r: &Row<'_>| r.integrity()?.separation_two,

@@ -19,7 +19,7 @@ use super::table::{self, ROW_GROUP, Table};
 
 /// The rows of one trial in the tables of one piece.
 #[derive(Debug, Clone)]
-pub(crate) struct Stretch {
+pub(crate) struct TrialRows {
     /// The piece's table as CSV, without a head.
     pub(crate) csv: PathBuf,
     /// Where the rows begin in it, and how long they are (bytes).
@@ -33,10 +33,10 @@ pub(crate) struct Stretch {
 }
 
 /// Writes the rows of all stretches, in order, below one head.
-pub(crate) fn join_csv(stretches: &[Stretch], to: &Path) -> io::Result<()> {
+pub(crate) fn join_csv(stretches: &[TrialRows], to: &Path) -> io::Result<()> {
     let mut all = BufWriter::with_capacity(1 << 18, File::create(to)?);
     all.write_all(Table::head().as_bytes())?;
-    for Stretch { csv, text: (start, length), .. } in stretches {
+    for TrialRows { csv, text: (start, length), .. } in stretches {
         let mut piece = File::open(csv)?;
         piece.seek(SeekFrom::Start(*start))?;
         let copied = io::copy(&mut piece.take(*length), &mut all)?;
@@ -52,10 +52,10 @@ const SMALL: usize = ROW_GROUP / 8;
 
 /// Writes the rows of all stretches, in order. Row groups that are not small are copied as they are; smaller ones are
 /// collected, so that a table of many small pieces has few row groups.
-pub(crate) fn join_parquet(stretches: &[Stretch], to: &Path) -> Result<(), ParquetError> {
+pub(crate) fn join_parquet(stretches: &[TrialRows], to: &Path) -> Result<(), ParquetError> {
     let mut all = table::create(to)?;
     let mut waiting = Table::default();
-    for Stretch { parquet, groups: (first, count), .. } in stretches {
+    for TrialRows { parquet, groups: (first, count), .. } in stretches {
         let file = File::open(parquet)?;
         let read = SerializedFileReader::new(file.try_clone()?)?;
         for group in *first..first + count {
@@ -106,14 +106,14 @@ mod tests {
     use std::fs;
 
     fn frame(number: u64, object: &str) -> FrameRecord {
-        let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "chance");
+        let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "absent");
         target.evaluation.visible = (!number.is_multiple_of(3)).then_some(4);
         target.residual_rms = Some(number as f64 / 7.0);
         FrameRecord { frame: number, stamp_ns: 7, targets: vec![target], ..Default::default() }
     }
 
     /// The tables of one piece.
-    fn piece(folder: &Path, frames: std::ops::Range<u64>) -> Stretch {
+    fn piece(folder: &Path, frames: std::ops::Range<u64>) -> TrialRows {
         let at = |ending: &str| folder.join(format!("{}.{ending}", frames.start));
         let (csv, parquet) = (at("csv"), at("parquet"));
         let rows = (frames.end - frames.start) as usize;
@@ -124,7 +124,7 @@ mod tests {
         let mut file = table::create(&parquet).unwrap();
         let groups = (0, table.write(&mut file, true).unwrap());
         file.close().unwrap();
-        Stretch { csv, text, parquet, groups, rows }
+        TrialRows { csv, text, parquet, groups, rows }
     }
 
     #[test]
@@ -133,11 +133,11 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         // Small pieces, one with two row groups of which the first is full, and a small one again.
         let cuts = [0, 5, 9, 9 + 8192 + 100, 9 + 2 * 8192 + 100, 9 + 2 * 8192 + 107];
-        let pieces: Vec<Stretch> = cuts.windows(2).map(|cut| piece(folder.path(), cut[0]..cut[1])).collect();
+        let pieces: Vec<TrialRows> = cuts.windows(2).map(|cut| piece(folder.path(), cut[0]..cut[1])).collect();
         join_csv(&pieces, &at("results.csv")).unwrap();
         join_parquet(&pieces, &at("results.parquet")).unwrap();
-        let whole = piece(folder.path(), 0..cuts[5]);
-        let text = fs::read_to_string(&whole.csv).unwrap();
+        let full = piece(folder.path(), 0..cuts[5]);
+        let text = fs::read_to_string(&full.csv).unwrap();
         assert_eq!(fs::read_to_string(at("results.csv")).unwrap(), Table::head() + &text);
         let reader = SerializedFileReader::new(File::open(at("results.parquet")).unwrap()).unwrap();
         assert!(reader.num_row_groups() <= 4, "{} row groups", reader.num_row_groups());

@@ -6,5 +6,5 @@ mod table;
 
 pub use columns::COLUMNS;
 pub(crate) use columns::Row;
-pub(crate) use join::{Stretch, join_csv, join_parquet};
+pub(crate) use join::{TrialRows, join_csv, join_parquet};
 pub(crate) use table::{Table, create as create_parquet};

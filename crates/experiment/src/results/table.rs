@@ -31,7 +31,7 @@ pub(crate) struct Table {
 #[derive(Debug)]
 enum Values {
     Text(Vec<ByteArray>),
-    Whole(Vec<i64>, Vec<i16>),
+    Integer(Vec<i64>, Vec<i16>),
     Real(Vec<f64>, Vec<i16>),
     Flag(Vec<bool>, Vec<i16>),
 }
@@ -40,7 +40,7 @@ impl Default for Table {
     fn default() -> Self {
         let empty = |kind| match kind {
             Kind::Text => Values::Text(Vec::new()),
-            Kind::Whole => Values::Whole(Vec::new(), Vec::new()),
+            Kind::Integer => Values::Integer(Vec::new(), Vec::new()),
             Kind::Real => Values::Real(Vec::new(), Vec::new()),
             Kind::Flag => Values::Flag(Vec::new(), Vec::new()),
         };
@@ -107,7 +107,7 @@ impl Values {
         }
         match (self, cell) {
             (Self::Text(all), Cell::Text(word)) => all.push(ByteArray::from(word.into_bytes())),
-            (Self::Whole(all, levels), Cell::Whole(value)) => known((all, levels), value),
+            (Self::Integer(all, levels), Cell::Integer(value)) => known((all, levels), value),
             (Self::Real(all, levels), Cell::Real(value)) => known((all, levels), value),
             (Self::Flag(all, levels), Cell::Flag(value)) => known((all, levels), value),
             _ => unreachable!("a column fills cells of its own kind"),
@@ -119,7 +119,7 @@ impl Values {
             (Self::Text(all), ColumnReader::ByteArrayColumnReader(mut reader)) => {
                 reader.read_records(rows, None, None, all).map(drop)
             }
-            (Self::Whole(all, levels), ColumnReader::Int64ColumnReader(mut reader)) => {
+            (Self::Integer(all, levels), ColumnReader::Int64ColumnReader(mut reader)) => {
                 reader.read_records(rows, Some(levels), None, all).map(drop)
             }
             (Self::Real(all, levels), ColumnReader::DoubleColumnReader(mut reader)) => {
@@ -144,7 +144,7 @@ impl Values {
                 let words: Vec<ByteArray> = all.drain(..rows).collect();
                 writer.write_batch(&words, None, None).map(drop)
             }
-            (Self::Whole(all, levels), ColumnWriter::Int64ColumnWriter(writer)) => {
+            (Self::Integer(all, levels), ColumnWriter::Int64ColumnWriter(writer)) => {
                 let (values, levels) = first(all, levels, rows);
                 writer.write_batch(&values, Some(&levels), None).map(drop)
             }
@@ -167,7 +167,7 @@ pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetE
         .iter()
         .map(|column| match column.kind {
             Kind::Text => format!("REQUIRED BYTE_ARRAY {} (UTF8);", column.name),
-            Kind::Whole => format!("OPTIONAL INT64 {};", column.name),
+            Kind::Integer => format!("OPTIONAL INT64 {};", column.name),
             Kind::Real => format!("OPTIONAL DOUBLE {};", column.name),
             Kind::Flag => format!("OPTIONAL BOOLEAN {};", column.name),
         })
@@ -188,7 +188,7 @@ fn write_cell(text: &mut String, cell: &Cell) {
             quote(text, word);
             Ok(())
         }
-        Cell::Whole(Some(number)) => write!(text, "{number}"),
+        Cell::Integer(Some(number)) => write!(text, "{number}"),
         // All its digits; very small ones with an exponent instead of many zeros.
         Cell::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
         Cell::Real(Some(x)) => write!(text, "{x}"),
@@ -219,7 +219,7 @@ mod tests {
     fn a_row_is_a_line_and_unknown_is_empty() {
         let mut table = Table::default();
         for object in ["a,b", "=1+1"] {
-            let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "chance");
+            let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "absent");
             target.evaluation.visible = Some(4);
             let frame = FrameRecord { frame: 2, stamp_ns: 7, targets: vec![target], ..Default::default() };
             Row::of("001", &frame).for_each(|row| table.add(&row));

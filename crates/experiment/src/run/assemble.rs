@@ -10,13 +10,13 @@ use rayon::{ThreadPool, prelude::*};
 
 use super::{
     Observer, RunError,
-    store::{Sealed, network},
+    store::{Sealed, pose_graph},
 };
 use seafix_data::dataset::sha256;
 
 use crate::{
     manifest::Manifest,
-    results::{Stretch, join_csv, join_parquet},
+    results::{TrialRows, join_csv, join_parquet},
 };
 
 /// Writes the logs and tables of the run that `manifest` describes from its pieces, in their order; `false` when the
@@ -31,13 +31,13 @@ pub(super) fn assemble(
     let mut stretches = Vec::new();
     let mut outputs: Vec<Output> = Vec::new();
     for trial in &manifest.trials {
-        let of_trial: Vec<(&Sealed, Stretch)> =
+        let of_trial: Vec<(&Sealed, TrialRows)> =
             pieces.iter().filter_map(|piece| Some((piece, piece.stretch(&trial.name)?))).collect();
         let logs = of_trial.iter().map(|(piece, _)| piece.log(&trial.name)).collect();
         outputs.push(Output { path: folder.join(&trial.log), kind: Kind::Log(logs) });
         // What one run knows after its last frame: a source that is navigated is one piece.
-        if let Some(laid) = of_trial.iter().find_map(|(piece, _)| piece.network(&trial.name)) {
-            outputs.push(Output { path: folder.join(network(&trial.name)), kind: Kind::Network(laid) });
+        if let Some(graph_text) = of_trial.iter().find_map(|(piece, _)| piece.pose_graph(&trial.name)) {
+            outputs.push(Output { path: folder.join(pose_graph(&trial.name)), kind: Kind::PoseGraph(graph_text) });
         }
         stretches.extend(of_trial.into_iter().map(|(_, stretch)| stretch));
     }
@@ -61,9 +61,9 @@ struct Output<'a> {
 
 enum Kind<'a> {
     Log(Vec<PathBuf>),
-    Network(PathBuf),
-    Csv(&'a [Stretch]),
-    Parquet(&'a [Stretch]),
+    PoseGraph(PathBuf),
+    Csv(&'a [TrialRows]),
+    Parquet(&'a [TrialRows]),
 }
 
 impl Output<'_> {
@@ -78,8 +78,8 @@ impl Output<'_> {
                     return Ok(None);
                 }
             }
-            Kind::Network(laid) => {
-                self.complete(|path| fs::copy(laid, path).map(drop).map_err(|error| error.to_string()))?
+            Kind::PoseGraph(graph_text) => {
+                self.complete(|path| fs::copy(graph_text, path).map(drop).map_err(|error| error.to_string()))?
             }
             Kind::Csv(stretches) => self.complete(|path| join_csv(stretches, path).map_err(|e| e.to_string()))?,
             Kind::Parquet(stretches) => {

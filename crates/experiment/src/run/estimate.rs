@@ -9,7 +9,7 @@ use std::{
 use seafix_component::Fault;
 use seafix_log::Writer;
 
-use super::{RunError, cut, group};
+use super::{RunError, group, partition};
 use crate::{
     Plan,
     results::{Row, Table},
@@ -17,7 +17,7 @@ use crate::{
 
 /// What a run would take.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct RunEstimate {
     /// Frames of each trial, in the order of the plan's trials.
     pub frames: Vec<usize>,
     /// About so many bytes of log and results; while they are joined, twice as many lie on the disk.
@@ -32,7 +32,7 @@ pub struct Estimate {
     pub spent: Duration,
 }
 
-impl Estimate {
+impl RunEstimate {
     /// About how long on so many threads.
     pub fn on(&self, threads: usize) -> Duration {
         self.work.div_f64(threads.max(1) as f64).max(self.longest)
@@ -40,7 +40,7 @@ impl Estimate {
 }
 
 /// Frames of each source that are tried at least, where it has as many: the first is cold.
-const LEAST: usize = 4;
+const MIN: usize = 4;
 /// Together they may take so long, and each at most its share.
 const LONGEST: Duration = Duration::from_secs(20);
 
@@ -49,12 +49,12 @@ const LONGEST: Duration = Duration::from_secs(20);
 ///
 /// # Errors
 /// Everything that is wrong with the inputs, and a temporary folder that cannot be written.
-pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
+pub fn estimate(plan: &Plan, separate: bool) -> Result<RunEstimate, RunError> {
     let groups = group::open(plan, separate)?;
-    let pieces = cut::cut(&groups);
+    let pieces = partition::cut(&groups);
     let input = |fault: Fault| RunError::Input(vec![fault]);
     let place = Scratch::new()?;
-    let mut estimate = Estimate {
+    let mut estimate = RunEstimate {
         frames: Vec::new(),
         bytes: 0,
         work: Duration::ZERO,
@@ -63,7 +63,7 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
         spent: Duration::ZERO,
     };
     for (number, group) in groups.iter().enumerate() {
-        let (count, mut voyages) = (group.passage.frames(), group.voyages());
+        let (count, mut sessions) = (group.sequence.frames(), group.sessions());
         let mut writers = Vec::new();
         for (trial, header) in group.headers.iter().enumerate() {
             writers.push(Writer::create(&place.0.join(format!("{trial}.mcap")), header)?);
@@ -72,15 +72,15 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
         let budget = LONGEST.div_f64(groups.len() as f64);
         let (begun, mut warm) = (Instant::now(), Vec::new());
         let (mut tried, mut failures) = (0, 0);
-        while tried < count && (tried < LEAST || begun.elapsed() < budget) {
+        while tried < count && (tried < MIN || begun.elapsed() < budget) {
             let first = Instant::now();
             let index = place_of(tried, count, group.navigates());
-            let looked = group.look(index, &mut voyages).map_err(input)?;
-            let (records, levels) = group.record(index, looked, &[], |_, _| true);
+            let group_frame = group.observe(index, &mut sessions).map_err(input)?;
+            let (records, levels) = group.record(index, group_frame, &[], |_, _| true);
             for (which, (record, writer)) in records.iter().zip(&mut writers).enumerate() {
                 // Frames come in an order of their own; stamps in logs do not decrease.
                 let record = seafix_log::FrameRecord { stamp_ns: tried as u64, ..record.clone() };
-                failures += usize::from(crate::thin::failed(&record));
+                failures += usize::from(crate::log_decimation::failed(&record));
                 let trial = group.trials[which];
                 writer.frame_with(&record, levels.pngs(trial.resolved.log.images))?;
                 Row::of(&trial.name, &record).for_each(|row| table.add(&row));
@@ -88,7 +88,7 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
             tried += 1;
             warm.push(first.elapsed());
         }
-        drop(voyages);
+        drop(sessions);
         let closing = Instant::now();
         for writer in writers {
             writer.finish()?;
@@ -101,14 +101,16 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
         let a_frame = (all - cold).div_f64((tried - usize::from(tried > 1)).max(1) as f64)
             + closing.elapsed().div_f64(tried.max(1) as f64);
         let trials = group.trials.len() as f64;
-        let share = failures as f64 / (tried as f64 * trials).max(1.0);
-        let logged: f64 = pieces.iter().filter(|piece| piece.group == number).map(|piece| piece.expected(share)).sum();
+        let fraction = failures as f64 / (tried as f64 * trials).max(1.0);
+        let logged: f64 =
+            pieces.iter().filter(|piece| piece.group == number).map(|piece| piece.expected(fraction)).sum();
         let frame_bytes = written.saturating_sub(empty) as f64 / tried.max(1) as f64;
         // The same rows stand in a Parquet file, a third as long.
         let rows = table.text.len() as f64 * 4.0 / 3.0 / tried.max(1) as f64;
         estimate.bytes += (empty as f64 + frame_bytes * logged + rows * count as f64) as u64;
         estimate.work += cold + a_frame.mul_f64(count as f64);
-        let longest = pieces.iter().filter(|piece| piece.group == number).map(cut::Piece::frames).max().unwrap_or(0);
+        let longest =
+            pieces.iter().filter(|piece| piece.group == number).map(partition::Piece::frames).max().unwrap_or(0);
         estimate.longest = estimate.longest.max(a_frame.mul_f64(longest as f64));
         estimate.tried += tried;
         estimate.spent += begun.elapsed();
@@ -118,7 +120,7 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<Estimate, RunError> {
         .iter()
         .map(|trial| {
             let own = groups.iter().find(|group| group.trials.iter().any(|other| std::ptr::eq(*other, trial)));
-            own.map_or(0, |group| group.passage.frames())
+            own.map_or(0, |group| group.sequence.frames())
         })
         .collect();
     Ok(estimate)

@@ -46,7 +46,7 @@ impl Drop for Lock {
 const LOCK: &str = ".lock";
 
 /// What can be seen of the folder before anything is opened, computed or written.
-pub(super) fn look(options: &Options) -> Result<(), Fault> {
+pub(super) fn inspect(options: &Options) -> Result<(), Fault> {
     match &options.out {
         Some(out) if options.existing == Existing::Refuse && !free(out)? => Err(taken(out)),
         _ => Ok(()),
@@ -61,7 +61,7 @@ impl Claim {
             let lock = lock(&folder).map_err(RunError::Output)?;
             return Ok(Self { folder, finished: None, outdated: None, lock });
         };
-        look(options).map_err(RunError::Output)?;
+        inspect(options).map_err(RunError::Output)?;
         fs::create_dir_all(out).map_err(|error| RunError::Output(unmade(out, &error)))?;
         let mut claim =
             Self { folder: out.clone(), finished: None, outdated: None, lock: lock(out).map_err(RunError::Output)? };
@@ -215,7 +215,7 @@ fn clear(out: &Path) -> Result<(), RunError> {
     let own = |name: &str| {
         let name = name.trim_end_matches(".partial");
         [LOCK, manifest::NAME, "results.csv", "results.parquet", "pieces", "report"].contains(&name)
-            || [".mcap", store::NETWORK].iter().any(|end| name.ends_with(end))
+            || [".mcap", store::POSE_GRAPH].iter().any(|end| name.ends_with(end))
     };
     if let Some(foreign) = names.iter().find(|name| !own(name)) {
         let fault = Fault::new("the output folder holds something that no run made", &out.join(foreign));

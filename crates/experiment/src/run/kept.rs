@@ -10,13 +10,12 @@ use seafix_component::Fault;
 use seafix_log::{FrameRecord, Reader};
 
 use super::{
-    Observer, Options, RunError, cut,
-    cut::Piece,
-    group,
+    Observer, Options, RunError, group, partition,
+    partition::Piece,
     store::{Sealed, Store},
-    work,
+    worker,
 };
-use crate::{Plan, manifest, manifest::Manifest, results::Stretch};
+use crate::{Plan, manifest, manifest::Manifest, results::TrialRows};
 
 /// A part of a kept run that was made again.
 #[derive(Debug)]
@@ -43,7 +42,7 @@ pub fn remake(
     let input = |fault: Fault| RunError::Input(vec![fault]);
     let kept = Manifest::read(folder).map_err(input)?;
     let groups = group::open(plan, false)?;
-    let pieces = cut::cut(&groups);
+    let pieces = partition::cut(&groups);
     let manifest = Manifest::new(plan, options, &groups, pieces.len()).map_err(input)?;
     if !kept.stands_for(&manifest, folder) {
         let fault = Fault::new("not the run that would be made now", &folder.join(manifest::NAME));
@@ -53,9 +52,9 @@ pub fn remake(
     let piece = pieces[chosen as usize].shortened(frames);
     let group = &groups[piece.group];
     let scratch = Scratch::new(options.out.as_deref().unwrap_or(folder))?;
-    observer.begins(piece.frames() * group.trials.len(), cut::bytes(&groups, &[&piece]), scratch.0);
+    observer.begins(piece.frames() * group.trials.len(), partition::bytes(&groups, &[&piece]), scratch.0);
     let store = Store::open(scratch.0)?;
-    if !work::work(&groups, &[&piece], &store, &options.pool()?, false, observer)? {
+    if !worker::work(&groups, &[&piece], &store, &options.pool()?, false, observer)? {
         return Err(RunError::Interrupted(folder.to_owned()));
     }
     let lost = || RunError::Output(Fault::new("a piece that was not stored as it was made", scratch.0));
@@ -94,13 +93,13 @@ impl Drop for Scratch<'_> {
 }
 
 fn said(group: &group::Group<'_>, piece: &Piece) -> String {
-    let number = |index: usize| group.passage.number(index);
+    let number = |index: usize| group.sequence.number(index);
     format!("frames {} to {}", number(piece.first), number(piece.end.max(piece.first + 1) - 1))
 }
 
 /// The rows of a trial, as text.
 fn rows(sealed: &Sealed, trial: &str) -> std::io::Result<String> {
-    let Some(Stretch { csv, text: (start, length), .. }) = sealed.stretch(trial) else { return Ok(String::new()) };
+    let Some(TrialRows { csv, text: (start, length), .. }) = sealed.stretch(trial) else { return Ok(String::new()) };
     let (mut file, mut text) = (File::open(csv)?, String::new());
     file.seek(SeekFrom::Start(start))?;
     file.take(length).read_to_string(&mut text)?;

@@ -11,28 +11,28 @@ use seafix_component::Fault;
 use seafix_log::LogError;
 
 mod assemble;
-mod cut;
 mod estimate;
 mod folder;
 mod group;
 mod kept;
 mod merge;
 mod options;
-mod share;
+mod partition;
+mod sharing;
 mod store;
-mod work;
+mod worker;
 
-pub use estimate::{Estimate, estimate};
+pub use estimate::{RunEstimate, estimate};
 pub use kept::{Remade, remake};
 pub use merge::merge;
 pub use options::{Existing, Options, Shard};
 
 use crate::{Plan, manifest::Manifest};
-use cut::Piece;
 use folder::Claim;
 pub(crate) use group::Group;
 #[cfg(test)]
 pub(crate) use group::open;
+use partition::Piece;
 use store::Store;
 
 /// Watches a run, and may end it. The runner itself prints nothing.
@@ -107,10 +107,10 @@ pub struct Finished {
 /// [`RunError`]: everything that is wrong with the inputs, before anything is written; or the output
 /// that could not be written; or that it was interrupted.
 pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
-    folder::look(options).map_err(RunError::Output)?;
+    folder::inspect(options).map_err(RunError::Output)?;
     let groups = group::open(plan, options.separate)?;
-    groups.iter().flat_map(|group| group.passage.warnings()).for_each(|warning| observer.warns(warning));
-    let pieces = cut::cut(&groups);
+    groups.iter().flat_map(|group| group.sequence.warnings()).for_each(|warning| observer.warns(warning));
+    let pieces = partition::cut(&groups);
     let mut manifest =
         Manifest::new(plan, options, &groups, pieces.len()).map_err(|fault| RunError::Input(vec![fault]))?;
 
@@ -124,14 +124,14 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     }
     let frames = |pieces: &[&Piece]| pieces.iter().map(|piece| piece.frames() * groups[piece.group].trials.len()).sum();
     // A shard is what it is made of: one whose pieces were damaged since is made again.
-    let whole = || mine.iter().all(|piece| Store::of(&claim.folder).sound(piece.number).is_some());
-    if let Some(finished) = claim.finished.as_ref().filter(|_| options.shard.is_none() || whole()) {
+    let full = || mine.iter().all(|piece| Store::of(&claim.folder).sound(piece.number).is_some());
+    if let Some(finished) = claim.finished.as_ref().filter(|_| options.shard.is_none() || full()) {
         if options.shard.is_none() {
             Store::of(&claim.folder).remove()?;
         }
         return Ok(Finished { rows: finished.rows, folder: claim.folder, kept: true });
     }
-    observer.begins(frames(&mine), cut::bytes(&groups, &mine), &claim.folder);
+    observer.begins(frames(&mine), partition::bytes(&groups, &mine), &claim.folder);
     // First: a folder without it holds no run.
     manifest.write(&claim.folder, "running")?;
     let store = Store::open(&claim.folder)?;
@@ -141,7 +141,7 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
         observer.resumes(frames(&made));
     }
     let pool = options.pool()?;
-    let mut done = work::work(&groups, &missing, &store, &pool, options.timed, observer)?;
+    let mut done = worker::work(&groups, &missing, &store, &pool, options.timed, observer)?;
     claim.holds()?;
     if done && options.shard.is_some() {
         manifest.write(&claim.folder, "shard")?;

@@ -13,8 +13,8 @@ use std::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{RunError, work::Output};
-use crate::results::{Stretch, create_parquet};
+use super::{RunError, worker::Output};
+use crate::results::{TrialRows, create_parquet};
 
 const FORMAT: &str = "seafix-piece/1";
 
@@ -32,13 +32,13 @@ pub(super) struct Seal {
     pub(super) piece: usize,
     first: usize,
     end: usize,
-    pub(super) trials: Vec<Share>,
+    pub(super) trials: Vec<TrialPart>,
     files: BTreeMap<String, Sum>,
 }
 
 /// What of a piece is one trial's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Share {
+pub(super) struct TrialPart {
     pub(super) name: String,
     pub(super) rows: usize,
     /// Where its rows begin in `rows.csv`, and how long they are (bytes).
@@ -68,25 +68,25 @@ impl Sealed {
     }
 
     /// The network that a trial laid, where it is kept.
-    pub(super) fn network(&self, trial: &str) -> Option<PathBuf> {
-        let name = network(trial);
+    pub(super) fn pose_graph(&self, trial: &str) -> Option<PathBuf> {
+        let name = pose_graph(trial);
         self.seal.files.contains_key(&name).then(|| self.folder.join(name))
     }
 
     /// The rows of a trial, where this piece has some.
-    pub(super) fn stretch(&self, trial: &str) -> Option<Stretch> {
-        let share = self.seal.trials.iter().find(|share| share.name == trial)?;
+    pub(super) fn stretch(&self, trial: &str) -> Option<TrialRows> {
+        let part = self.seal.trials.iter().find(|part| part.name == trial)?;
         let (csv, parquet) = (self.folder.join(CSV), self.folder.join(PARQUET));
-        Some(Stretch { csv, text: share.text, parquet, groups: share.groups, rows: share.rows })
+        Some(TrialRows { csv, text: part.text, parquet, groups: part.groups, rows: part.rows })
     }
 }
 
 /// How the file of a trial's network ends.
-pub(super) const NETWORK: &str = ".network";
+pub(super) const POSE_GRAPH: &str = ".pose-graph";
 
 /// The file of a trial's network.
-pub(super) fn network(trial: &str) -> String {
-    format!("{trial}{NETWORK}")
+pub(super) fn pose_graph(trial: &str) -> String {
+    format!("{trial}{POSE_GRAPH}")
 }
 
 const CSV: &str = "rows.csv";
@@ -120,8 +120,8 @@ impl Store {
         let folder = self.at(number);
         let seal: Seal = serde_json::from_slice(&fs::read(folder.join(SEAL)).ok()?).ok()?;
         let sound = |(name, sum): (&String, &Sum)| self::sum(&folder.join(name)).is_ok_and(|found| found == *sum);
-        let whole = seal.format == FORMAT && seal.piece == number && seal.files.iter().all(sound);
-        whole.then_some(Sealed { folder, seal })
+        let full = seal.format == FORMAT && seal.piece == number && seal.files.iter().all(sound);
+        full.then_some(Sealed { folder, seal })
     }
 
     /// All pieces that are there and whole, in their order.
@@ -198,19 +198,19 @@ impl Draft {
         let (mut trials, mut length, mut groups) = (Vec::new(), 0, 0);
         let mut csv = File::create(at(CSV)).map_err(|error| RunError::unwritable(&at(CSV), error))?;
         let mut parquet = create_parquet(&at(PARQUET)).map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
-        for Output { trial, mut log, thinned, mut table, network: laid } in outputs {
+        for Output { trial, mut log, thinned, mut table, pose_graph: graph_text } in outputs {
             log.totals(&thinned.totals)?;
             log.finish()?;
             files.push(format!("{trial}.mcap"));
-            if let Some(text) = laid {
-                let name = network(&trial);
+            if let Some(text) = graph_text {
+                let name = pose_graph(&trial);
                 fs::write(at(&name), text).map_err(|error| RunError::unwritable(&at(&name), error))?;
                 files.push(name);
             }
             let (rows, text) = (table.rows, table.text.len() as u64);
             csv.write_all(table.text.as_bytes()).map_err(|error| RunError::unwritable(&at(CSV), error))?;
             let more = table.write(&mut parquet, true).map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
-            trials.push(Share { name: trial, rows, text: (length, text), groups: (groups, more) });
+            trials.push(TrialPart { name: trial, rows, text: (length, text), groups: (groups, more) });
             (length, groups) = (length + text, groups + more);
         }
         parquet.close().map_err(|error| RunError::unwritable(&at(PARQUET), error))?;

@@ -22,9 +22,9 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
 
 /// What says how many frames a trial has: everything of its source, or, without what only changes how they look, its settings
 /// outside of tables.
-fn key(trial: &Trial, whole: bool) -> String {
+fn key(trial: &Trial, full: bool) -> String {
     let mut source = trial.resolved.source.clone();
-    if !whole {
+    if !full {
         source.settings.retain(|_, value| !value.is_table());
         return format!("{source:?}");
     }
@@ -32,13 +32,13 @@ fn key(trial: &Trial, whole: bool) -> String {
 }
 
 /// Trials, and frames over all of them; every source is opened, or one of those that differ in tables alone.
-fn counted(plan: &Plan, whole: bool) -> (usize, usize) {
+fn counted(plan: &Plan, full: bool) -> (usize, usize) {
     // Trials of one source share its frames.
     let mut frames: BTreeMap<String, usize> = BTreeMap::new();
     let of = |trial: &Trial| {
-        *frames.entry(key(trial, whole)).or_insert_with(|| {
-            let passage = trial.source.open(trial.resolved.seed, &plan.folder);
-            passage.map(|passage| passage.frames()).unwrap_or_else(|faults| panic!("{faults:?}"))
+        *frames.entry(key(trial, full)).or_insert_with(|| {
+            let sequence = trial.source.open(trial.resolved.seed, &plan.folder);
+            sequence.map(|sequence| sequence.frames()).unwrap_or_else(|faults| panic!("{faults:?}"))
         })
     };
     (plan.trials.len(), plan.trials.iter().map(of).sum())
@@ -46,7 +46,7 @@ fn counted(plan: &Plan, whole: bool) -> (usize, usize) {
 
 /// `# Cost: 7 trials, 420 frames; 5 min of one core (an EPYC, other work beside), 1.3 GB of log; estimated.`, one line: time
 /// and disk as measured, or as `--dry-run` estimates them. What can be counted is counted again.
-fn stated(whole: bool) {
+fn stated(full: bool) {
     let mut all = Vec::new();
     files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments"), &mut all);
     assert!(all.len() > 20, "{} experiments", all.len());
@@ -54,7 +54,7 @@ fn stated(whole: bool) {
     for file in all {
         let text = fs::read_to_string(&file).unwrap();
         let costs: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("# Cost: ")).collect();
-        let (trials, frames) = counted(&Plan::read(&file, &[]).unwrap(), whole);
+        let (trials, frames) = counted(&Plan::read(&file, &[]).unwrap(), full);
         let plural = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
         let counts = format!("{}, {}; ", plural(trials, "trial"), plural(frames, "frame"));
         let states = |cost: &&str| {

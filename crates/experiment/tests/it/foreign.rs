@@ -140,7 +140,7 @@ fn kitti_sequences_hold_the_same() {
 
 /// Seen to fail when only the stamps are counted.
 #[test]
-fn images_beyond_the_last_stamp_are_told() {
+fn images_beyond_the_last_stamp_are_reported() {
     let folder = TempDir::new().unwrap();
     let sequence = kitti(folder.path());
     let count = own().frames.len();
@@ -174,7 +174,7 @@ fn a_site_makes_them_sources() {
     let columns: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     let (outcome, wrong) = ("outcome", "wrong");
     let of = |name: &str| columns[0].iter().position(|column| *column == name).unwrap();
-    assert!(columns.iter().any(|row| row[of(outcome)] == "referenced"), "{table}");
+    assert!(columns.iter().any(|row| row[of(outcome)] == "fix"), "{table}");
     assert!(columns.iter().all(|row| row[of(wrong)] != "true"), "a wrong fix: {table}");
     let refused = Plan::read(&file, &["source.site=".to_owned()]).unwrap_err();
     assert!(refused[0].to_string().contains("the file of a site"), "{}", refused[0]);

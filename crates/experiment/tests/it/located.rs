@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix::{Eyes, Pipeline};
-use seafix_data::source::Passage;
+use seafix::{FrameData, Pipeline};
+use seafix_data::source::Sequence;
 use seafix_experiment::{Plan, changed_pipeline};
 use seafix_geometry::StereoPixels;
-use seafix_vision::{Look, Threads};
+use seafix_vision::{FrontEndOutput, Threads};
 
 /// A feature point that both cameras see, and the pair of pixels nearest to where it is shown.
 struct Corner {
@@ -18,21 +18,21 @@ struct Corner {
 
 /// The visible feature points of a passage that have a pair of pixels within 2 px of the left image of them, and how many
 /// have none.
-fn corners(passage: &dyn Passage, settings: &[&str]) -> (Vec<Corner>, usize) {
+fn corners(sequence: &dyn Sequence, settings: &[&str]) -> (Vec<Corner>, usize) {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let front_end = changed_pipeline(&Pipeline::default(), &settings).unwrap().front_end().unwrap();
-    let (mut look, mut found, mut missed) = (Look::new(Threads::Pool), Vec::new(), 0);
-    for index in 0..passage.frames() {
-        let Eyes::Pair(left, right) = passage.sight(index).unwrap().eyes else { continue };
-        front_end.look(&left, &right, passage.rig(), &mut look);
-        let truth = passage.truth(index).unwrap();
+    let (mut output, mut found, mut missed) = (FrontEndOutput::new(Threads::Pool), Vec::new(), 0);
+    for index in 0..sequence.frames() {
+        let FrameData::Stereo(left, right) = sequence.sensor_frame(index).unwrap().frame_data else { continue };
+        front_end.run(&left, &right, sequence.rig(), &mut output);
+        let truth = sequence.truth(index).unwrap();
         for (object, point) in truth.visible.unwrap() {
             let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[object].unwrap();
-            let at = camera_from_object * passage.site().objects[object].points[point].at;
-            let Some(shown) = passage.rig().project(&at) else { continue };
+            let at = camera_from_object * sequence.site().objects[object].points[point].at;
+            let Some(shown) = sequence.rig().project(&at) else { continue };
             let off = |seen: &StereoPixels| seen.left.distance(&shown.left);
             let nearest =
-                look.cloud.iter().filter_map(|point| point.pixels).min_by(|a, b| off(&a.at).total_cmp(&off(&b.at)));
+                output.cloud.iter().filter_map(|point| point.pixels).min_by(|a, b| off(&a.at).total_cmp(&off(&b.at)));
             let Some(seen) = nearest.filter(|seen| off(&seen.at) < 2.0) else {
                 missed += 1;
                 continue;
@@ -55,7 +55,7 @@ fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
 }
 
-fn passage(experiment: &str) -> Box<dyn Passage> {
+fn sequence(experiment: &str) -> Box<dyn Sequence> {
     let plan = Plan::read(&project(experiment), &[]).unwrap();
     plan.trials[0].source.open(plan.experiment.seed, &plan.folder).unwrap()
 }
@@ -71,8 +71,8 @@ fn spread(corners: &[&Corner]) -> [f64; 4] {
 /// What no corner was fitted to lies off it by several times as much as what one was, says so, and does so in both images
 /// alike. Seen to fail without `peak-px`: its errors were 4 times what was claimed.
 #[test]
-fn a_key_point_says_how_far_off_its_corner_it_lies() {
-    let sample = passage("experiments/virtual-sample.toml");
+fn a_key_point_states_how_far_off_its_corner_it_lies() {
+    let sample = sequence("experiments/virtual-sample.toml");
     let (peaks, _) = corners(&*sample, &["locator=peak"]);
     let (found, _) = corners(&*sample, &[]);
     let fitted: Vec<&Corner> = found.iter().filter(|corner| corner.claimed[0] < FITTED).collect();
@@ -91,7 +91,7 @@ const FITTED: f64 = 0.5;
 #[test]
 #[ignore = "table"]
 fn corners_of_a_dive() {
-    let dive = passage("experiments/dive.toml");
+    let dive = sequence("experiments/dive.toml");
     println!("RMS of 60 pairs: left an axis, disparity (px); both over what is claimed");
     for (name, settings) in [("locator peak", &["locator=peak"][..]), ("default", &[])] {
         let (found, missed) = corners(&*dive, settings);

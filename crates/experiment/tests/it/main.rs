@@ -6,7 +6,7 @@ mod costs;
 mod foreign;
 mod located;
 mod logging_cost;
-mod network;
+mod pose_graph;
 mod problems;
 mod replay;
 mod run;

@@ -2,11 +2,11 @@
 
 use std::{fs, path::Path};
 
-use seafix::Eyes;
-use seafix_data::source::{DrawnProblems, Source};
+use seafix::FrameData;
+use seafix_data::source::{GeneratedProblems, Source};
 use seafix_experiment::{Options, Plan, Silent, run};
 use seafix_log::{Evaluation, FrameRecord, Outcome, TargetRecord, TargetTimes, read};
-use seafix_simulation::families::{Drawn, Family, Presence};
+use seafix_simulation::families::{Family, Generated, Presence};
 use tempfile::TempDir;
 
 /// The only row of every frame of the only trial, without durations.
@@ -29,12 +29,12 @@ fn rows(folder: &Path, experiment: &str) -> Vec<TargetRecord> {
         .collect()
 }
 
-/// Problems of a family as `seafix draw` writes them, in folders below `folder`.
+/// Problems of a family as `seafix generate` writes them, in folders below `folder`.
 fn draw(folder: &Path, family: Family, count: u64) {
     let folder = folder.join(family.name());
     fs::create_dir_all(&folder).unwrap();
     for number in 0..count {
-        let Drawn { problem, truth } = Drawn::new(family, 1, number, Presence::Present);
+        let Generated { problem, truth } = Generated::new(family, 1, number, Presence::Present);
         let file = |end: &str| folder.join(format!("{}{end}", problem.id));
         fs::write(file(".json"), serde_json::to_string(&problem).unwrap()).unwrap();
         fs::write(file(".truth.json"), serde_json::to_string(&truth).unwrap()).unwrap();
@@ -44,25 +44,25 @@ fn draw(folder: &Path, family: Family, count: u64) {
 const FILES: &str = "source = { name = 'problems', path = 'all' }";
 
 #[test]
-fn problems_in_files_are_those_that_were_drawn() {
+fn problems_in_files_are_those_that_were_generated() {
     for (family, count) in [(Family::A, 12), (Family::D, 2), (Family::E, 4)] {
         let folder = TempDir::new().unwrap();
         draw(&folder.path().join("all"), family, count);
         let files = rows(folder.path(), FILES);
         let name = family.name();
-        let drawn = format!("source = {{ name = 'drawn-problems', family = '{name}', frames = {count} }}");
+        let generated = format!("source = {{ name = 'generated-problems', family = '{name}', frames = {count} }}");
         // The reader of JSON takes numbers to the last bit but one: what came of them is the same, not their every digit.
         let essence = |row: &TargetRecord| {
             let Evaluation { wrong, wrong_pairs, visible, identified, correct_pairs, .. } = row.evaluation;
             let counts = (wrong, wrong_pairs, visible, identified, correct_pairs);
             (row.object.clone(), row.outcome, row.reason.clone(), row.pairs.clone(), row.candidates.clone(), counts)
         };
-        for (file, drawn) in files.iter().zip(rows(folder.path(), &drawn)) {
-            assert_eq!(essence(file), essence(&drawn), "family {name}");
-            let [a, b] = [file, &drawn].map(|row| row.evaluation.m2_rms.unwrap_or(-1.0));
+        for (file, generated) in files.iter().zip(rows(folder.path(), &generated)) {
+            assert_eq!(essence(file), essence(&generated), "family {name}");
+            let [a, b] = [file, &generated].map(|row| row.evaluation.m2_rms.unwrap_or(-1.0));
             assert!((a - b).abs() < 1e-9, "{a} {b}");
         }
-        assert!(files.iter().any(|row| row.outcome == Outcome::Referenced && row.evaluation.wrong == Some(false)));
+        assert!(files.iter().any(|row| row.outcome == Outcome::Fix && row.evaluation.wrong == Some(false)));
     }
 }
 
@@ -91,7 +91,7 @@ fn every_frame_has_an_object_of_its_own() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("e.toml");
     let write = |more: &str| {
-        let source = "source = { name = 'drawn-problems', frames = 5, first = 3 }";
+        let source = "source = { name = 'generated-problems', frames = 5, first = 3 }";
         fs::write(
             &file,
             format!("question = 'Which?'\nseed = 1\n{source}\n[pipeline]\nsolver = 'mahalanobis'\n{more}"),
@@ -104,10 +104,10 @@ fn every_frame_has_an_object_of_its_own() {
     let log = read(&out.join(format!("{}.mcap", plan.trials[0].name))).unwrap();
     assert!(log.header.targets.is_empty() && log.header.site.is_empty());
     for (frame, number) in log.frames.iter().zip(3..) {
-        let drawn = Drawn::new(Family::A, 1, number, Presence::Present).problem;
+        let generated = Generated::new(Family::A, 1, number, Presence::Present).problem;
         let model = frame.model(&log.header, &frame.targets[0].object).unwrap();
-        assert_eq!(model.id, drawn.id);
-        assert_eq!(model.points.iter().map(|point| point.at).collect::<Vec<_>>(), drawn.model);
+        assert_eq!(model.id, generated.id);
+        assert_eq!(model.points.iter().map(|point| point.at).collect::<Vec<_>>(), generated.model);
     }
     // What is no object by itself is nothing that a problem could be about.
     for kind in ["site", "joint"] {
@@ -117,23 +117,28 @@ fn every_frame_has_an_object_of_its_own() {
 }
 
 #[test]
-fn of_any_number_of_problems_only_those_looked_at_are_drawn() {
-    let source = DrawnProblems { frames: 1_000_000_000, ..DrawnProblems::default() };
-    let passage = source.open(1, Path::new(".")).unwrap();
-    let last = passage.frames() - 1;
-    let drawn = Drawn::new(Family::A, 1, last as u64, Presence::Present);
-    let (Eyes::Points(cloud), Some(truth)) = (passage.sight(last).unwrap().eyes, passage.truth(last)) else {
+fn of_any_number_of_problems_only_those_examined_are_generated() {
+    let source = GeneratedProblems { frames: 1_000_000_000, ..GeneratedProblems::default() };
+    let sequence = source.open(1, Path::new(".")).unwrap();
+    let last = sequence.frames() - 1;
+    let generated = Generated::new(Family::A, 1, last as u64, Presence::Present);
+    let (FrameData::Points(cloud), Some(truth)) =
+        (sequence.sensor_frame(last).unwrap().frame_data, sequence.truth(last))
+    else {
         panic!("points and truth")
     };
-    assert_eq!((cloud.len(), truth.answer.unwrap().pairs.len()), (drawn.problem.cloud.len(), drawn.truth.pairs.len()));
+    assert_eq!(
+        (cloud.len(), truth.answer.unwrap().pairs.len()),
+        (generated.problem.cloud.len(), generated.truth.pairs.len())
+    );
 }
 
 #[test]
 fn any_pose_is_wrong_where_none_is_defined() {
     let folder = TempDir::new().unwrap();
-    let absent = "source = { name = 'drawn-problems', family = 'a', frames = 40, absent = true }";
+    let absent = "source = { name = 'generated-problems', family = 'paper-scale', frames = 40, absent = true }";
     for row in rows(folder.path(), absent) {
-        assert_eq!(row.evaluation.wrong, Some(row.outcome == Outcome::Referenced));
+        assert_eq!(row.evaluation.wrong, Some(row.outcome == Outcome::Fix));
     }
 }
 

@@ -20,7 +20,7 @@ const EXPERIMENTS: [(&str, &str); 7] = [
         "[source]\nname = 'virtual-layouts'\nlayouts = 2\nobjects = 3\nframes = 6\nsurvey-sigma = 0.002\n[pipeline]\ntarget = 'joint'\nwindow = 3\n",
     ),
     ("site", "[source]\nname = 'virtual-points'\nframes = 3\n[pipeline]\ntarget = 'site'\n"),
-    ("problems", "[source]\nname = 'drawn-problems'\nframes = 8\n[pipeline]\nsolver = 'mahalanobis'\n"),
+    ("problems", "[source]\nname = 'generated-problems'\nframes = 8\n[pipeline]\nsolver = 'mahalanobis'\n"),
 ];
 
 /// The frames of the only trial of a plan, without durations.
@@ -72,9 +72,9 @@ fn the_logged_configuration_gives_the_logged_results() {
             assert_eq!(replay.trials[0].name, plan.trials[0].name);
             let again = frames(&replay, folder.path(), threads);
             assert_eq!(without_images(again), without_images(original.clone()), "{name}, {threads} threads");
-            let told: usize = original.iter().map(|frame| frame.inputs.as_ref().unwrap().readings.len()).sum();
+            let reported: usize = original.iter().map(|frame| frame.inputs.as_ref().unwrap().readings.len()).sum();
             let moved = original.iter().filter_map(|frame| frame.navigation.as_ref()?.odometry.motion).count();
-            assert!(name != "readings" || told > 20 && moved == 4, "{told} readings, {moved} motions");
+            assert!(name != "readings" || reported > 20 && moved == 4, "{reported} readings, {moved} motions");
         }
         if name == "images" {
             let replay = Replay { from: ReplayFrom::Images, ..Replay::default() }.plan(&log).unwrap();

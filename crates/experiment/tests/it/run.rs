@@ -80,7 +80,7 @@ fn methods_are_compared_on_the_same_noise() {
 }
 
 /// Five pairs of a dive, a fifth of a second apart, a fix every half second.
-const VOYAGE: &str = "question = 'Does the way between fixes hold?'\n\
+const SESSION: &str = "question = 'Does the way between fixes hold?'\n\
     [source]\nname = 'dive'\nframes = 5\nrate = 5.0\nstart = 30.4\n\
     rig.size = [512, 384]\nrig.focal = 250.0\nwater.attenuation = 0.15\n\
     [navigation]\npolicy = { name = 'interval', seconds = 0.5 }\n";
@@ -89,13 +89,13 @@ const VOYAGE: &str = "question = 'Does the way between fixes hold?'\n\
 #[test]
 fn a_pose_is_carried_between_fixes() {
     let folder = TempDir::new().unwrap();
-    let log = logs(folder.path(), VOYAGE, &[], 2).remove(0);
+    let log = logs(folder.path(), SESSION, &[], 2).remove(0);
     let known: Vec<_> = log.frames.iter().map(|frame| frame.navigation.as_ref().unwrap()).collect();
     let tried: Vec<bool> = known.iter().map(|known| known.due).collect();
     assert_eq!(tried, [true, false, false, true, false], "{known:#?}");
     for (frame, known) in log.frames.iter().zip(&known) {
         assert_eq!(known.due, frame.targets[0].reason != "not-due");
-        let state = if known.due { "referenced" } else { "dead reckoning" };
+        let state = if known.due { "fix" } else { "dead reckoning" };
         assert_eq!(known.state, state, "{known:#?}");
         assert_eq!(known.odometry.motion.is_some(), frame.frame > 0);
         // Both are carried from the first fix; after the second they differ.
@@ -110,12 +110,12 @@ fn a_pose_is_carried_between_fixes() {
 ///
 /// Seen to fail when a frame without a motion is called rough and not due.
 #[test]
-fn images_that_tell_nothing_leave_the_pose_known() {
+fn images_that_report_nothing_leave_the_pose_known() {
     let folder = TempDir::new().unwrap();
     let dark = "source.faults=[{ device = 'images', kind = 'off', from = 30.9, to = 31.1, amount = 0.0 }]";
-    let log = logs(folder.path(), VOYAGE, &[dark], 2).remove(0);
+    let log = logs(folder.path(), SESSION, &[dark], 2).remove(0);
     let states: Vec<&str> = log.frames.iter().map(|frame| &*frame.navigation.as_ref().unwrap().state).collect();
-    assert_eq!(states, ["referenced", "dead reckoning", "dead reckoning", "dead reckoning", "referenced"]);
+    assert_eq!(states, ["fix", "dead reckoning", "dead reckoning", "dead reckoning", "fix"]);
     let black = &log.frames[3];
     let known = black.navigation.as_ref().unwrap();
     assert_eq!((&*black.targets[0].reason, known.due, &known.pose), ("no-data", true, &None), "{known:#?}");
@@ -197,13 +197,13 @@ const DRAWING: &str = "question = 'Does it matter who searches?'\nseed = 5\n\
     [source]\nname = 'virtual-points'\nframes = 6\npoints.clutter = 60\n\
     [pipeline]\nsearch = 'ransac'\n\
     [[vary]]\nkey = 'pipeline.solver'\nvalues = ['triad', 'kabsch']\n\
-    [[vary]]\nkey = 'pipeline.widen'\nvalues = [false, true]\n\
+    [[vary]]\nkey = 'pipeline.expand-gates'\nvalues = [false, true]\n\
     [[vary]]\nkey = 'pipeline.gate.chi-square'\nvalues = [0.05, 0.3]\n";
 
 /// Seen to fail where trials with different locators share a front end, and where trials whose shells may grow share a
 /// search.
 #[test]
-fn trials_that_share_stages_answer_as_each_alone() {
+fn trials_that_fraction_stages_answer_as_each_alone() {
     let folder = TempDir::new().unwrap();
     for experiment in [SHARING, DRAWING] {
         let options = Options { threads: 2, ..Options::into("") };

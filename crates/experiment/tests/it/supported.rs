@@ -15,7 +15,7 @@ use seafix_geometry::{MeasuredPoint, Pixel, Point, StereoPixels, UncertainPixels
 use seafix_log::{FrameRecord, Outcome, TrialLog, read};
 use seafix_referencing::{
     Acceptance, Candidates, Correspondence, ModelPoint, Outcome as Answer, Problem, StereoReprojection, Tolerance,
-    judge_named,
+    judge_labelled,
 };
 use seafix_simulation::VirtualRig;
 use tempfile::TempDir;
@@ -63,7 +63,7 @@ fn what_supports_a_fix_stands_in_log_and_table() {
         let mut fixes = 0;
         for (frame, row) in frames.iter().zip(&rows) {
             let target = &frame.targets[0];
-            if target.outcome != Outcome::Referenced {
+            if target.outcome != Outcome::Fix {
                 assert!(target.integrity.is_none() && row["redundancy"].is_empty() && row["chi2"].is_empty());
                 continue;
             }
@@ -92,7 +92,7 @@ fn what_supports_a_fix_stands_in_log_and_table() {
 ///
 /// Seen to fail when the position's level is logged as the attitude's.
 #[test]
-fn the_log_and_the_table_say_what_the_fix_says() {
+fn the_log_and_the_table_state_what_the_fix_states() {
     let (log, rows) = run_of(
         "[source]\nname = 'virtual-layouts'\nlayouts = 4\nframes = 24\npoints = 9\n[pipeline]\nacceptance = { two-wrong-rate = 0.01 }\n",
     );
@@ -125,12 +125,12 @@ fn the_log_and_the_table_say_what_the_fix_says() {
         let candidates = Candidates::from_pairs(9, (0..9).map(|k| (k, k)));
         let (tolerance, prior) = (Tolerance::Sigmas(3.0), None);
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
-        let attempt = judge_named(&problem, pairs, &StereoReprojection::default(), &acceptance, Some(&rig));
-        let Answer::Referenced(fix) = attempt.outcome else { panic!("{:?}", attempt.outcome) };
+        let attempt = judge_labelled(&problem, pairs, &StereoReprojection::default(), &acceptance, Some(&rig));
+        let Answer::Fix(fix) = attempt.outcome else { panic!("{:?}", attempt.outcome) };
         let (said, it) = (&fix.integrity, target.integrity.as_ref().unwrap());
         assert_eq!(target.object_from_camera, Some(fix.object_from_camera.rows()));
         assert_eq!((it.redundancy.as_str(), it.freedom), (said.redundancy.name(), said.freedom as u64));
-        let fix_says = [
+        let fix_text = [
             Some(fix.residual_rms),
             Some(said.chi2),
             Some(said.chi2_limit),
@@ -141,7 +141,7 @@ fn the_log_and_the_table_say_what_the_fix_says() {
             said.stretch.map(|it| it.value),
             said.stretch.map(|it| it.sigma),
         ];
-        let log_says = [
+        let log_value = [
             target.residual_rms,
             Some(it.chi2),
             Some(it.chi2_limit),
@@ -152,8 +152,8 @@ fn the_log_and_the_table_say_what_the_fix_says() {
             it.stretch,
             it.stretch_sigma,
         ];
-        assert_eq!(fix_says, log_says);
-        assert!(fix_says.iter().all(Option::is_some), "{fix_says:?}");
+        assert_eq!(fix_text, log_value);
+        assert!(fix_text.iter().all(Option::is_some), "{fix_text:?}");
         let columns = [
             "chi2",
             "chi2_limit",
@@ -164,7 +164,7 @@ fn the_log_and_the_table_say_what_the_fix_says() {
             "stretch",
             "stretch_sigma",
         ];
-        assert_eq!(columns.map(|name| row[name].parse::<f64>().ok())[..], fix_says[1..]);
+        assert_eq!(columns.map(|name| row[name].parse::<f64>().ok())[..], fix_text[1..]);
         // Residuals are C·H − P of each pair, and their root mean square is what is logged.
         for (pair, residual) in fix.pairs.iter().zip(&fix.residuals) {
             let at = fix.object_from_camera * cloud[pair.cloud].position.at;
@@ -177,10 +177,10 @@ fn the_log_and_the_table_say_what_the_fix_says() {
 
 /// Half of all true sets fail a test of so little confidence, together as well as alone.
 #[test]
-fn a_joint_fix_that_fails_says_why() {
+fn a_joint_fix_that_fails_states_why() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 2\nobjects = 2\npoints = 12\nframes = 60\nsurvey-sigma = 0.002\n";
     let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nconfidence = 0.4\n"));
-    let fixes = frames.iter().flat_map(|frame| &frame.targets).filter(|target| target.outcome == Outcome::Referenced);
+    let fixes = frames.iter().flat_map(|frame| &frame.targets).filter(|target| target.outcome == Outcome::Fix);
     let (joined, failed): (Vec<_>, Vec<_>) = fixes.partition(|target| target.detail.starts_with("joint fix over "));
     assert!(!failed.is_empty() && !joined.is_empty(), "{} failed, {} joined", failed.len(), joined.len());
     for target in failed {
@@ -191,7 +191,7 @@ fn a_joint_fix_that_fails_says_why() {
 
 /// An object of which too few points are seen takes part with those, and both say so; its own fix stays refused.
 #[test]
-fn a_joint_fix_says_what_took_part() {
+fn a_joint_fix_states_what_took_part() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 3\nobjects = 3\npoints = 14\nframes = 30\nsurvey-sigma = 0.001\n";
     // Objects of five, five and four points, of which five are asked for.
     let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nleast-points = 5\n"));
@@ -199,7 +199,7 @@ fn a_joint_fix_says_what_took_part() {
     for frame in &frames {
         for target in &frame.targets {
             match target.outcome {
-                Outcome::Referenced => {
+                Outcome::Fix => {
                     assert!(target.detail.starts_with("joint fix over `layout"), "{}", target.detail)
                 }
                 _ => {

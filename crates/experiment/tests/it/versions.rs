@@ -16,15 +16,15 @@ use seafix_geometry::{
     Camera, Covariance6, MeasuredPoint, Object, Pinhole, Pixel, Point, RightCamera, StereoPixels, StereoRig, Transform,
     UncertainPixels, UncertainPoint,
 };
-use seafix_navigation::{Device, FUSIONS, ODOMETRIES, POLICIES, Reading, Situation, Standing, StereoPair};
+use seafix_navigation::{Device, FUSIONS, ODOMETRIES, ObjectPose, POLICIES, Reading, Situation, StereoPair};
 use seafix_referencing::{
     Acceptance, Candidates, Correspondence, Gate, ModelPoint, Observations, Prior, PriorBound, Problem, SEARCHES,
     SOLVERS, Tolerance, candidates, judge,
 };
 use seafix_simulation::{Purpose, Stream};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptors, FILTERS, Image, Keypoint, LOCATORS, MATCHERS, Pair, Place, REFINEMENTS,
-    TRIANGULATORS, Threads, View,
+    DESCRIPTORS, DETECTORS, Descriptors, FILTERS, Image, Keypoint, LOCATORS, MATCHERS, Pair, REFINEMENTS,
+    TRIANGULATORS, Threads, UncertainPixel, View,
 };
 
 const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/versions.txt");
@@ -69,28 +69,28 @@ fn faults(table: &BTreeMap<String, Line>, now: &BTreeMap<String, Line>) -> (Vec<
         (Some((old, _)), Some((new, _))) => new > old,
         _ => false,
     };
-    let (mut told, mut writable) = (Vec::new(), true);
+    let (mut reported, mut writable) = (Vec::new(), true);
     for (part, (version, print)) in now {
         let Some((old, known)) = table.get(part) else {
-            told.push(format!("{part} is new; run {COMMAND}"));
+            reported.push(format!("{part} is new; run {COMMAND}"));
             continue;
         };
         let explained = raised(part)
             || now.keys().any(|other| raised(other) && rests_on(part).iter().any(|start| other.starts_with(start)));
         if version < old {
-            told.push(format!("the VERSION of {part} fell from {old} to {version}; a version only rises"));
+            reported.push(format!("the VERSION of {part} fell from {old} to {version}; a version only rises"));
             writable = false;
         } else if print != known && !explained {
-            told.push(format!("results of {part} changed; raise its VERSION and run {COMMAND}"));
+            reported.push(format!("results of {part} changed; raise its VERSION and run {COMMAND}"));
             writable = false;
         } else if (version, print) != (old, known) {
-            told.push(format!("{part} has another version or rests on what has; run {COMMAND}"));
+            reported.push(format!("{part} has another version or rests on what has; run {COMMAND}"));
         }
     }
-    told.extend(
+    reported.extend(
         table.keys().filter(|part| !now.contains_key(*part)).map(|part| format!("{part} is gone; run {COMMAND}")),
     );
-    (told, writable)
+    (reported, writable)
 }
 
 #[test]
@@ -98,14 +98,14 @@ fn versions_change_with_results() {
     let now = fingerprints();
     let text = fs::read_to_string(TABLE).unwrap_or_default();
     let table: BTreeMap<String, Line> = text.lines().filter(|line| !line.starts_with('#')).map(line).collect();
-    let (told, writable) = faults(&table, &now);
+    let (reported, writable) = faults(&table, &now);
     if std::env::var_os("SEAFIX_UPDATE").is_some() && writable {
         let head = format!("# part, version, fingerprint of its results; {COMMAND}\n");
         let lines = now.iter().map(|(part, (version, print))| format!("{part} {version} {print}\n"));
         fs::write(TABLE, head + &lines.collect::<String>()).unwrap();
         return;
     }
-    assert!(told.is_empty(), "{}", told.join("\n"));
+    assert!(reported.is_empty(), "{}", reported.join("\n"));
 }
 
 fn line(text: &str) -> (String, Line) {
@@ -122,8 +122,8 @@ fn another_result_asks_for_another_version() {
     let table = of(&[("solver kabsch", 1, "a"), ("solver triad", 1, "b"), ("odometry icp", 1, "c")]);
     assert_eq!(faults(&table, &table), (Vec::new(), true));
     let changed = of(&[("solver kabsch", 1, "x"), ("solver triad", 1, "b"), ("odometry icp", 1, "c")]);
-    let told = format!("results of solver kabsch changed; raise its VERSION and run {COMMAND}");
-    assert_eq!(faults(&table, &changed), (vec![told], false));
+    let reported = format!("results of solver kabsch changed; raise its VERSION and run {COMMAND}");
+    assert_eq!(faults(&table, &changed), (vec![reported], false));
     // An odometry owns solvers; one solver does not own another.
     let raised = of(&[("solver kabsch", 2, "x"), ("solver triad", 1, "b"), ("odometry icp", 1, "y")]);
     assert!(faults(&table, &raised).1);
@@ -207,25 +207,25 @@ fn fingerprints() -> BTreeMap<String, Line> {
         let answers = [right, wrong].map(|pairs| {
             let data = Observations::of(&pairs, &world.model, &world.cloud, Some(&world.rig));
             let pose =
-                solver.solve(&data).map(|at| (at, solver.covariance(&data, &at), solver.rivals(&data, &at, 4.0)));
+                solver.solve(&data).map(|at| (at, solver.covariance(&data, &at), solver.alternatives(&data, &at, 4.0)));
             (pose, solver.used(&data), solver.scale(&data))
         });
         assert!(answers[0].0.is_ok(), "{solver:?}: {answers:?}");
         fingerprint(&answers)
     });
     each(&ODOMETRIES, &mut add, |odometry| {
-        let mut reckoning = odometry.begin(&world.rig, Transform::identity(), Threads::One);
+        let mut session = odometry.begin(&world.rig, Transform::identity(), Threads::One);
         for (index, (left, right)) in world.views.iter().enumerate() {
             let stamp_ns = index as u64 * 500_000_000;
             for device in Device::ALL {
                 let value = Vector3::new(0.08, 0.01, -0.02);
                 let covariance = Matrix3::identity() * 1e-6;
-                reckoning.sense(&Reading { device, stamp_ns, value, covariance });
+                session.sense(&Reading { device, stamp_ns, value, covariance });
             }
-            reckoning.advance(&StereoPair { stamp_ns, left, right }).unwrap();
+            session.advance(&StereoPair { stamp_ns, left, right }).unwrap();
         }
-        let journey = reckoning.journey();
-        fingerprint(&(journey.segments, journey.outcomes))
+        let trajectory = session.trajectory();
+        fingerprint(&(trajectory.segments, trajectory.outcomes))
     });
     each(&POLICIES, &mut add, |policy| {
         let lengths = [0.0, 0.01, 0.05, 0.1, 0.5, 1.0, 3.0, 5.0, 10.0, 20.0, 40.0, 100.0, f64::INFINITY];
@@ -234,25 +234,35 @@ fn fingerprints() -> BTreeMap<String, Line> {
         fingerprint(&[due(false), due(true)])
     });
     each(&FUSIONS, &mut add, |fusion| {
-        let known = Standing::new(pose(0.0), Covariance6::isotropic(2e-3, 0.02));
+        let known = ObjectPose::new(pose(0.0), Covariance6::isotropic(2e-3, 0.02));
         let takes = [0.5, 1.0, 30.0].map(|k| {
-            let fix = Standing::new(pose(0.005 * k), Covariance6::isotropic(3e-3, 0.01));
+            let fix = ObjectPose::new(pose(0.005 * k), Covariance6::isotropic(3e-3, 0.01));
             (fusion.take(&known, &fix), fusion.passes(&known, &fix))
         });
         fingerprint(&takes)
     });
     for (name, settings) in [
         ("dive", "frames = 1\nrig = { size = [48, 36], focal = 24.0 }"),
-        ("drawn-pairs", "frames = 1\npairs = 20"),
-        ("drawn-problems", "frames = 1"),
+        ("generated-pairs", "frames = 1\npairs = 20"),
+        ("generated-problems", "frames = 1"),
         ("virtual-images", "frames = 1\nrig = { size = [48, 36], focal = 24.0 }"),
         ("virtual-layouts", "frames = 1"),
         ("virtual-points", "frames = 1"),
     ] {
         let choice = Choice { name: name.to_owned(), settings: toml::from_str(settings).unwrap() };
-        let passage = SOURCES.build(&choice).unwrap().open(7, Path::new("")).unwrap();
-        let sight = passage.sight(0).unwrap();
-        add("source", name, fingerprint(&(&sight.eyes, &sight.prior, &sight.told, &sight.readings, passage.truth(0))));
+        let sequence = SOURCES.build(&choice).unwrap().open(7, Path::new("")).unwrap();
+        let sensor_frame = sequence.sensor_frame(0).unwrap();
+        add(
+            "source",
+            name,
+            fingerprint(&(
+                &sensor_frame.frame_data,
+                &sensor_frame.prior,
+                &sensor_frame.hints,
+                &sensor_frame.readings,
+                sequence.truth(0),
+            )),
+        );
     }
 
     let seen = world.pixels();
@@ -271,7 +281,7 @@ fn fingerprints() -> BTreeMap<String, Line> {
     add(
         "shared",
         "navigation",
-        results(&format!("name = 'virtual-images'\nframes = 3\n{small}"), "[navigation.network]"),
+        results(&format!("name = 'virtual-images'\nframes = 3\n{small}"), "[navigation.pose-graph]"),
     );
 
     let versions = components().concat().into_iter().map(|one| (one.kind, one.name, one.version));
@@ -465,7 +475,7 @@ impl World {
 
     fn pairs(&self) -> Vec<Pair> {
         let corners = self.corners();
-        let place = |keypoint: &Keypoint| Place { at: keypoint.at, covariance: Matrix2::identity() * 0.04 };
+        let place = |keypoint: &Keypoint| UncertainPixel { at: keypoint.at, covariance: Matrix2::identity() * 0.04 };
         corners.iter().zip(&self.shifted(&corners)).map(|(a, b)| Pair { left: place(a), right: place(b) }).collect()
     }
 

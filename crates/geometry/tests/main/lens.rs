@@ -115,7 +115,7 @@ fn the_shortest_list_is_one_that_files_know() {
 }
 
 #[test]
-fn a_camera_tells_its_numbers() {
+fn a_camera_reports_its_numbers() {
     let camera = camera(&[]);
     assert_eq!(camera.size(), [640, 480]);
     assert_eq!(camera.focal(), [533.4, 541.7]);

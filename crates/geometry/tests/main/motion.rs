@@ -115,7 +115,7 @@ fn three_points_in_a_line_define_no_frame() {
     assert!((sine - 0.9e-9).abs() < 1e-15, "{sine}");
     let p = Point::<World>::new(1.0, 1.0, 1.0);
     let found = triad::<World, Object>(&p, &p, &Point::new(4.0, 0.0, 0.0)).unwrap_err();
-    assert_eq!((found.sine, found.least), (0.0, 1e-9));
+    assert_eq!((found.sine, found.min), (0.0, 1e-9));
 }
 
 /// P1 = (1, 1, 1), P3 along y, P2 along x from it: x = (0, 1, 0), z = (1, 0, 0) × (0, 1, 0), y = z × x = (−1, 0, 0).

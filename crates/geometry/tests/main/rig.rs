@@ -192,10 +192,10 @@ fn parallel_rays_meet_nowhere() {
 #[test]
 fn a_point_less_known_than_far_is_refused() {
     let rig = aside([0.0; 3], [-0.3, 0.0, 0.0]);
-    let at = |share: f64| {
+    let at = |fraction: f64| {
         // At 30 m the depth's sigma is 6 σ_d m.
         let exact = rig.project(&Point::new(0.15, 0.0, 30.0)).unwrap();
-        let seen = UncertainPixels::independent(exact, share * 5.0 / std::f64::consts::SQRT_2);
+        let seen = UncertainPixels::independent(exact, fraction * 5.0 / std::f64::consts::SQRT_2);
         [rig.triangulate(&seen), rig.triangulate_midpoint(&seen), rig.triangulate_linear(&seen)]
     };
     assert!(at(0.98).iter().all(Result::is_ok));

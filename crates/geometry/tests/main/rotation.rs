@@ -84,7 +84,7 @@ fn a_matrix_near_half_a_turn_keeps_its_axis() {
 
 /// Both signs of a quaternion are one rotation.
 #[test]
-fn the_long_way_round_is_not_taken() {
+fn the_long_orientation_is_not_taken() {
     let turn = so3::exp(&Vector3::new(0.0, 0.0, 1.5 * std::f64::consts::PI));
     assert!((so3::log(&turn).z + 0.5 * std::f64::consts::PI).abs() < 1e-15);
     assert!((so3::angle(&turn) - 0.5 * std::f64::consts::PI).abs() < 1e-15);

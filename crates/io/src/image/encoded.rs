@@ -67,11 +67,11 @@ mod tests {
         };
         assert_eq!(objection(&frame(1)), None);
         assert_eq!(objection(&frame(4)).map(|(what, _)| what), Some("an image of four inks (CMYK)"));
-        let whole = frame(3);
-        for end in 2..whole.len() {
-            assert_eq!(objection(&whole[..end]), Some(EARLY), "{end}");
+        let complete = frame(3);
+        for end in 2..complete.len() {
+            assert_eq!(objection(&complete[..end]), Some(EARLY), "{end}");
         }
         // What a camera hangs on behind the image is no part of it.
-        assert_eq!(objection(&[&whole[..], b"trailer"].concat()), None);
+        assert_eq!(objection(&[&complete[..], b"trailer"].concat()), None);
     }
 }

@@ -109,12 +109,12 @@ fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits
         )));
     }
     if [width, height] != expected {
-        return Err(misfit(path, [width, height], expected));
+        return Err(size_mismatch(path, [width, height], expected));
     }
     Ok(())
 }
 
-fn misfit(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
+fn size_mismatch(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
     Fault::new("an image of another size than the calibration", path)
         .value(format!("{width}×{height}, calibrated {w}×{h}"))
         .remedy("give the images the rig was calibrated with, or correct `size`")
@@ -132,7 +132,7 @@ pub fn declared_size(path: &Path) -> Option<[u32; 2]> {
 /// The fault of an image whose header declares another size than `expected`; none where there is no header to read.
 pub fn size_fault(path: &Path, expected: [u32; 2]) -> Option<Fault> {
     let size = declared_size(path)?;
-    (size != expected).then(|| misfit(path, size, expected))
+    (size != expected).then(|| size_mismatch(path, size, expected))
 }
 
 /// Rec. 709's weights of red, green and blue, in ten thousandths.
@@ -156,20 +156,20 @@ fn levels_of(samples: &[u16], channels: usize, width: usize, white: u16, opaque:
     if pixels.clone().any(|pixel| pixel[..colours].iter().any(|&value| value > white)) {
         let greatest = |pixel: &[u16]| pixel[..colours].iter().copied().max().unwrap_or(0);
         let all = pixels.clone().map(greatest).enumerate();
-        let (at, most) = all.max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).unwrap_or_default();
-        let (x, y, least) = (at % width.max(1), at / width.max(1), if most < 4096 { 12 } else { 16 });
+        let (at, max) = all.max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).unwrap_or_default();
+        let (x, y, min) = (at % width.max(1), at / width.max(1), if max < 4096 { 12 } else { 16 });
         return Err(Fault::new("a pixel beyond the depth", here)
-            .value(format!("{most} at ({x}, {y}), white is {white}"))
-            .remedy(format!("its images have more bits than `bits` of dataset.toml says; give bits = {least}")));
+            .value(format!("{max} at ({x}, {y}), white is {white}"))
+            .remedy(format!("its images have more bits than `bits` of dataset.toml says; give bits = {min}")));
     }
     // Integers up to here: a grey pixel comes out the same whether it is stored as grey or as colour.
-    let whole = f64::from(LUMA.iter().sum::<u32>()) * f64::from(white);
+    let complete = f64::from(LUMA.iter().sum::<u32>()) * f64::from(white);
     let level = |pixel: &[u16]| {
         let luma: u32 = match pixel {
             [grey] | [grey, _] => u32::from(*grey) * LUMA.iter().sum::<u32>(),
             _ => pixel.iter().zip(LUMA).map(|(&value, weight)| u32::from(value) * weight).sum(),
         };
-        (f64::from(luma) * 255.0 / whole) as f32
+        (f64::from(luma) * 255.0 / complete) as f32
     };
     Ok(pixels.map(level).collect())
 }
@@ -276,12 +276,12 @@ mod tests {
     #[test]
     fn a_truncated_image_is_refused_wherever_it_ends() {
         let samples: Vec<u8> = (0..48_usize).map(|i| (i * 37 % 251) as u8).collect();
-        for (name, whole) in [("a.png", png(&samples, GREY)), ("a.jpg", jpeg(&samples)), ("a.pgm", pgm(&samples))] {
-            assert!(read(name, &whole, [8, 6], 16).is_ok());
+        for (name, complete) in [("a.png", png(&samples, GREY)), ("a.jpg", jpeg(&samples)), ("a.pgm", pgm(&samples))] {
+            assert!(read(name, &complete, [8, 6], 16).is_ok());
             // The PNG's last chunk, 12 bytes, says no more than that there is none.
-            let last = if name == "a.png" { whole.len() - 13 } else { whole.len() - 1 };
+            let last = if name == "a.png" { complete.len() - 13 } else { complete.len() - 1 };
             for end in [0, 1, 5, 20, last / 2, last - 10, last] {
-                assert!(read(name, &whole[..end], [8, 6], 16).is_err(), "{name}: {end} of {}", whole.len());
+                assert!(read(name, &complete[..end], [8, 6], 16).is_err(), "{name}: {end} of {}", complete.len());
             }
         }
         // The wrong extension does not matter: the content says what it is.
@@ -305,9 +305,9 @@ mod tests {
     #[test]
     fn the_limits_are_the_caller_s() {
         let samples: Vec<u8> = (0..48).collect();
-        let whole = png(&samples, GREY);
-        let limited = |pixels, bytes| within(ImageLimits { pixels, bytes }, "a.png", &whole, [8, 6], 16);
-        let enough = whole.len() as u64 + 48;
+        let complete = png(&samples, GREY);
+        let limited = |pixels, bytes| within(ImageLimits { pixels, bytes }, "a.png", &complete, [8, 6], 16);
+        let enough = complete.len() as u64 + 48;
         assert!(limited(48, enough).is_ok());
         let said = limited(47, enough).unwrap_err();
         assert!(
@@ -316,7 +316,7 @@ mod tests {
             ),
             "{said}"
         );
-        let said = limited(48, whole.len() as u64 - 1).unwrap_err();
+        let said = limited(48, complete.len() as u64 - 1).unwrap_err();
         assert!(
             said.contains("bytes are read; `--max-bytes`, in an experiment `source.max-bytes`, allows more"),
             "{said}"

@@ -31,7 +31,7 @@ pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::Refere
         alternatives: target.alternatives.iter().map(alternative).collect(),
         optimal: target.optimal,
         size_bound: target.size_bound,
-        expected_chance_sets: target.expected_chance_sets,
+        expected_chance_sets: target.nfa,
         tests: target.tests,
         residual_rms: target.residual_rms,
         integrity: target.integrity.as_ref().map(integrity_message),
@@ -74,9 +74,9 @@ fn pair_messages(pairs: &[Pair]) -> Vec<proto::Pair> {
 
 fn outcome_message(outcome: Outcome) -> proto::Outcome {
     match outcome {
-        Outcome::Referenced => proto::Outcome::Referenced,
+        Outcome::Fix => proto::Outcome::Referenced,
         Outcome::Ambiguous => proto::Outcome::Ambiguous,
-        Outcome::Unidentified => proto::Outcome::Unidentified,
+        Outcome::Rejected => proto::Outcome::Unidentified,
         Outcome::Degenerate => proto::Outcome::Degenerate,
     }
 }
@@ -87,9 +87,9 @@ pub(crate) fn result_record(
     candidates: proto::Candidates,
 ) -> Result<TargetRecord, Malformed> {
     let outcome = match message.outcome() {
-        proto::Outcome::Referenced => Outcome::Referenced,
+        proto::Outcome::Referenced => Outcome::Fix,
         proto::Outcome::Ambiguous => Outcome::Ambiguous,
-        proto::Outcome::Unidentified => Outcome::Unidentified,
+        proto::Outcome::Unidentified => Outcome::Rejected,
         proto::Outcome::Degenerate => Outcome::Degenerate,
         proto::Outcome::Unspecified => return Err(Malformed(format!("outcome {} is unknown", message.outcome))),
     };
@@ -115,7 +115,7 @@ pub(crate) fn result_record(
         alternatives: message.alternatives.into_iter().map(alternative).collect::<Result<_, _>>()?,
         optimal: message.optimal,
         size_bound: message.size_bound,
-        expected_chance_sets: message.expected_chance_sets,
+        nfa: message.expected_chance_sets,
         tests: message.tests,
         residual_rms: message.residual_rms,
         integrity: message.integrity.map(integrity_record),

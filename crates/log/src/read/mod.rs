@@ -78,7 +78,7 @@ impl Reader {
     /// trial.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let mut source = Source::open(path)?;
-        while let Some(message) = source.next_message(|_, _| Take::Whole)? {
+        while let Some(message) = source.next_message(|_, _| Take::Full)? {
             if &*message.topic == topic::HEADER {
                 let header = message.decode(path, "TrialHeader").and_then(|header| {
                     convert::header_record(header).map_err(|error| foreign(path, &message, &error.0))
@@ -134,7 +134,7 @@ impl Reader {
 
     /// The next message behind the header as it stands in the file; `None` at the end, when every check sum held.
     pub(crate) fn next_message(&mut self) -> Result<Option<Message>, LogError> {
-        self.source.next_message(|_, _| Take::Whole)
+        self.source.next_message(|_, _| Take::Full)
     }
 
     /// Whether a frame read so far has images in the log, decoded or not.
@@ -181,9 +181,9 @@ impl Reader {
     /// The messages of the next frames; none at the end.
     fn some_messages(&mut self) -> Result<Vec<Vec<Message>>, LogError> {
         /// So many frames are read at a time, or so many bytes.
-        const MOST: (usize, usize) = (256, 16 << 20);
+        const MAX: (usize, usize) = (256, 16 << 20);
         let (mut frames, mut bytes) = (Vec::new(), 0);
-        while frames.len() < MOST.0 && bytes < MOST.1 {
+        while frames.len() < MAX.0 && bytes < MAX.1 {
             let Some(messages) = self.next_messages()? else { break };
             bytes += messages.iter().map(|message| message.data.len()).sum::<usize>();
             frames.push(messages);
@@ -201,10 +201,10 @@ impl Reader {
             | topic::INSPECTION
             | topic::TIMING
             | topic::FRAME
-            | topic::TOTALS => Take::Whole,
-            topic::INPUTS if inputs => Take::Whole,
+            | topic::TOTALS => Take::Full,
+            topic::INPUTS if inputs => Take::Full,
             topic if !topic::IMAGES.contains(&topic) => Take::Nothing,
-            _ if images.wanted(stamp) => Take::Whole,
+            _ if images.wanted(stamp) => Take::Full,
             _ => Take::Mark,
         };
         let mut messages = Vec::new();

@@ -61,8 +61,8 @@ impl Pending {
                     let closing = [frame.images, frame.results];
                     convert::frame_record(frame).map(|frame| (frame, closing))
                 };
-                let whole = closed.map_err(|error| error.0).and_then(|closed| std::mem::take(self).close(closed));
-                return whole.map(Some).map_err(|what| foreign(path, message, &what));
+                let full = closed.map_err(|error| error.0).and_then(|closed| std::mem::take(self).close(closed));
+                return full.map(Some).map_err(|what| foreign(path, message, &what));
             }
             _ => {}
         }

@@ -75,7 +75,7 @@ struct Channel {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Take {
     /// All of it.
-    Whole,
+    Full,
     /// That it is there.
     Mark,
     /// Nothing.
@@ -194,7 +194,7 @@ impl Source {
                     self.messages += 1;
                     self.last_ns = header.log_time;
                     let data = match take(&channel.topic, header.log_time) {
-                        Take::Whole => data.into_owned().into(),
+                        Take::Full => data.into_owned().into(),
                         Take::Mark => Bytes::new(),
                         Take::Nothing => continue,
                     };

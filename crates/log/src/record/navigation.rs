@@ -8,7 +8,7 @@ pub const ELSEWHERE: &str = "m from its place";
 /// What a trial that navigates between fixes knew after a pair.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NavigationRecord {
-    /// What the pose rests on: `rough`, `searching`, `referenced` or `dead reckoning`.
+    /// What the pose rests on: `prior_pose`, `searching`, `fixed` or `dead session`.
     pub state: String,
     /// Whether a fix was tried.
     pub due: bool,

@@ -62,7 +62,7 @@ impl Region {
 impl TargetRecord {
     /// The region that the fix is in; `None` without a fix, its truth or its limit.
     pub fn region(&self) -> Option<Region> {
-        let error = self.evaluation.m3_position.filter(|_| self.outcome == Outcome::Referenced)?;
+        let error = self.evaluation.m3_position.filter(|_| self.outcome == Outcome::Fix)?;
         let level = self.integrity.as_ref().and_then(|it| it.protection_position);
         Some(Region::of(error, level, self.evaluation.alert_limit?))
     }
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn error_level_and_limit_say_the_region() {
+    fn error_level_and_limit_state_the_region() {
         let of = |error, level| Region::of(error, Some(level), 0.10);
         let around = [(0.01, 0.02), (0.03, 0.02), (0.11, 0.02), (0.11, 0.12), (0.13, 0.12), (0.02, 0.12)];
         let regions = around.map(|(error, level)| of(error, level).name());

@@ -15,7 +15,7 @@ pub struct TargetRecord {
     pub solver: String,
     /// What came of it.
     pub outcome: Outcome,
-    /// Why not, in one word of the results' vocabulary (`too-few`, `chance`, `budget`, …); empty when
+    /// Why not, in one word of the results' vocabulary (`too-few`, `nfa`, `budget`, …); empty when
     /// referenced.
     pub reason: String,
     /// Why not, in a sentence with numbers; where a joint fix was asked for, what took part in it, what did not and why,
@@ -38,7 +38,7 @@ pub struct TargetRecord {
     /// No admissible set has more pairs than this.
     pub size_bound: Option<u64>,
     /// Expected number of chance sets at least as large as the one found.
-    pub expected_chance_sets: Option<f64>,
+    pub nfa: Option<f64>,
     /// Pair tests that the search spent.
     pub tests: Option<u64>,
     /// Root mean square of C·H − P over the pairs (m).
@@ -59,7 +59,7 @@ impl TargetRecord {
             object: object.to_owned(),
             search: search.to_owned(),
             solver: solver.to_owned(),
-            outcome: Outcome::Unidentified,
+            outcome: Outcome::Rejected,
             reason: reason.to_owned(),
             detail: String::new(),
             object_from_camera: None,
@@ -70,7 +70,7 @@ impl TargetRecord {
             alternatives: Vec::new(),
             optimal: None,
             size_bound: None,
-            expected_chance_sets: None,
+            nfa: None,
             tests: None,
             residual_rms: None,
             integrity: None,
@@ -94,25 +94,25 @@ impl TargetRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Outcome {
     /// A pose that passed every test.
-    Referenced,
+    Fix,
     /// Several poses explain the data equally well.
     Ambiguous,
     /// No set of points was identified, or the set was not believed.
-    Unidentified,
+    Rejected,
     /// The identified points determine no pose.
     Degenerate,
 }
 
 impl Outcome {
     /// All outcomes.
-    pub const ALL: [Self; 4] = [Self::Referenced, Self::Ambiguous, Self::Unidentified, Self::Degenerate];
+    pub const ALL: [Self; 4] = [Self::Fix, Self::Ambiguous, Self::Rejected, Self::Degenerate];
 
     /// The word for it in files.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Referenced => "referenced",
+            Self::Fix => "fix",
             Self::Ambiguous => "ambiguous",
-            Self::Unidentified => "unidentified",
+            Self::Rejected => "rejected",
             Self::Degenerate => "degenerate",
         }
     }

@@ -56,7 +56,7 @@ const NINETY_FIVE: f64 = 12.591_587_243_743_977;
 impl Totals {
     /// Adds a frame.
     pub fn add(&mut self, frame: &FrameRecord) {
-        let fixes = || frame.targets.iter().filter(|target| target.outcome == Outcome::Referenced);
+        let fixes = || frame.targets.iter().filter(|target| target.outcome == Outcome::Fix);
         self.frames += 1;
         self.referenced_frames += u64::from(fixes().next().is_some());
         self.wrong_frames += u64::from(fixes().any(|fix| fix.evaluation.wrong == Some(true)));
@@ -65,7 +65,7 @@ impl Totals {
             if target.evaluation.alert_limit.is_some() {
                 self.regions.get_or_insert_default();
             }
-            if target.outcome != Outcome::Referenced {
+            if target.outcome != Outcome::Fix {
                 let reason = if target.reason.is_empty() { target.outcome.name() } else { &target.reason };
                 *self.reasons.entry(reason.to_owned()).or_default() += 1;
                 continue;

@@ -15,9 +15,9 @@ use crate::{FrameRecord, TrialHeader};
 pub(crate) fn annotations(header: &TrialHeader, frame: &FrameRecord, side: usize) -> ImageAnnotations {
     let camera = [&header.rig.left, &header.rig.right][side];
     let columns = frame.images.as_ref().map_or(camera.size[0], |images| images[side].width);
-    let share = f64::from(columns) / f64::from(camera.size[0]);
+    let fraction = f64::from(columns) / f64::from(camera.size[0]);
     // From the centre of the first pixel at (0, 0) to its corner at (0, 0), and to a thumbnail's pixels.
-    let mark = |[u, v]: [f64; 2]| Point2 { x: (u + 0.5) * share, y: (v + 0.5) * share };
+    let mark = |[u, v]: [f64; 2]| Point2 { x: (u + 0.5) * fraction, y: (v + 0.5) * fraction };
     let seen = |cloud: u32| {
         frame.cloud[cloud as usize].pixels.map(|pixels| if side == 0 { pixels.left } else { pixels.right })
     };

@@ -15,16 +15,16 @@ fn log() -> (tempfile::TempDir, PathBuf, Vec<u8>) {
 }
 
 #[test]
-fn cut_at_any_byte_it_says_so() {
+fn cut_at_any_byte_it_states_so() {
     let (_folder, path, bytes) = log();
-    let whole = read(&path).unwrap();
+    let full = read(&path).unwrap();
     for length in (0..bytes.len()).rev().step_by(61).chain(bytes.len() - 60..bytes.len()) {
         fs::write(&path, &bytes[..length]).unwrap();
         let error = read(&path).unwrap_err();
         let expected = if length < 8 { "not an MCAP file" } else { "has no footer" };
         assert!(error.to_string().contains(expected), "{length}: {error}");
         if let Ok(reader) = Reader::open(&path) {
-            for (frame, expected) in reader.map_while(Result::ok).zip(&whole.frames) {
+            for (frame, expected) in reader.map_while(Result::ok).zip(&full.frames) {
                 assert!(frame == *expected, "{length}");
             }
         }

@@ -25,7 +25,7 @@ fn where_parts_end_leaves_no_trace() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     write(&at("whole.mcap"), 0..9, false);
-    let whole = fs::read(at("whole.mcap")).unwrap();
+    let full = fs::read(at("whole.mcap")).unwrap();
     for cuts in [&[0, 9][..], &[0, 1, 9], &[0, 4, 4, 7, 9]] {
         let parts: Vec<_> = cuts
             .windows(2)
@@ -36,7 +36,7 @@ fn where_parts_end_leaves_no_trace() {
             })
             .collect();
         assert!(join(&parts, &at("joined.mcap"), || true).unwrap());
-        assert!(fs::read(at("joined.mcap")).unwrap() == whole, "cut at {cuts:?}");
+        assert!(fs::read(at("joined.mcap")).unwrap() == full, "cut at {cuts:?}");
     }
 }
 
@@ -65,7 +65,7 @@ fn a_part_that_is_damaged_ends_the_joining() {
 }
 
 #[test]
-fn joining_stops_when_it_is_told() {
+fn joining_stops_when_it_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     write(&at("a.mcap"), 0..2, true);

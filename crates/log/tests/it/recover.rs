@@ -17,7 +17,7 @@ const FRAMES: u64 = 600;
 struct Log {
     folder: tempfile::TempDir,
     bytes: Vec<u8>,
-    whole: TrialLog,
+    full: TrialLog,
 }
 
 impl Log {
@@ -25,8 +25,8 @@ impl Log {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.mcap");
         synthetic::write(&path, frames);
-        let (bytes, whole) = (fs::read(&path).unwrap(), read(&path).unwrap());
-        Self { folder, bytes, whole }
+        let (bytes, full) = (fs::read(&path).unwrap(), read(&path).unwrap());
+        Self { folder, bytes, full }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -58,23 +58,23 @@ impl Log {
             Err(error) => panic!("a saved log is a sound one: {error}"),
         };
         assert_eq!(found.frames, again.frames.len() as u64);
-        assert!(again.header == self.whole.header);
+        assert!(again.header == self.full.header);
         Ok((found, again))
     }
 }
 
 /// Frames that are among those written, in their order.
-fn are_of(found: &TrialLog, whole: &TrialLog) -> bool {
-    let mut left = whole.frames.iter();
+fn are_of(found: &TrialLog, full: &TrialLog) -> bool {
+    let mut left = full.frames.iter();
     found.frames.iter().all(|frame| left.any(|other| other == frame))
 }
 
 #[test]
-fn a_sound_log_is_saved_whole() {
+fn a_sound_log_is_saved_full() {
     let log = Log::new(FRAMES);
     assert!(log.chunks().len() > 2, "{:?}", log.chunks());
     let (found, again) = log.recover(&log.bytes).unwrap();
-    assert!(again == log.whole);
+    assert!(again == log.full);
     assert_eq!((found.lost.len(), found.dropped), (0, 0));
 }
 
@@ -82,22 +82,22 @@ fn a_sound_log_is_saved_whole() {
 ///
 /// Seen to fail when the frame that a chunk's end tears is written as well.
 #[test]
-fn cut_at_any_byte_whole_frames_are_saved() {
+fn cut_at_any_byte_full_frames_are_saved() {
     let log = Log::new(FRAMES);
     let chunks = log.chunks();
-    let mut least = vec![0; chunks.len() + 1];
+    let mut min = vec![0; chunks.len() + 1];
     for (i, &(_, end)) in chunks.iter().enumerate() {
-        least[i + 1] = log.recover(&log.bytes[..end]).unwrap().1.frames.len();
+        min[i + 1] = log.recover(&log.bytes[..end]).unwrap().1.frames.len();
     }
-    assert!(least.windows(2).all(|pair| pair[0] < pair[1]), "each chunk has frames of its own: {least:?}");
-    assert_eq!(*least.last().unwrap(), log.whole.frames.len(), "the last chunk holds the last frame");
+    assert!(min.windows(2).all(|pair| pair[0] < pair[1]), "each chunk has frames of its own: {min:?}");
+    assert_eq!(*min.last().unwrap(), log.full.frames.len(), "the last chunk holds the last frame");
     let places = (0..log.bytes.len()).step_by(49_999).chain(chunks.iter().flat_map(|&(a, b)| [a + 1, b - 1, b, b + 1]));
     for length in places {
         let before = chunks.iter().filter(|(_, end)| *end <= length).count();
         match log.recover(&log.bytes[..length]) {
             Ok((found, again)) => {
-                assert_eq!(again.frames.len(), least[before], "{length}");
-                assert!(again.frames == log.whole.frames[..least[before]], "{length}");
+                assert_eq!(again.frames.len(), min[before], "{length}");
+                assert!(again.frames == log.full.frames[..min[before]], "{length}");
                 let footer = length > chunks.last().unwrap().1;
                 assert!(footer || !found.lost.is_empty(), "{length}");
             }
@@ -116,7 +116,7 @@ fn any_flipped_bit_costs_its_chunk() {
         let mut altered = log.bytes.clone();
         altered[place] ^= 1 << (place % 8);
         if let Ok((found, again)) = log.recover(&altered) {
-            assert!(are_of(&again, &log.whole), "byte {place}");
+            assert!(are_of(&again, &log.full), "byte {place}");
             let inside = log.chunks().iter().any(|&(a, b)| (a + 9..b).contains(&place));
             assert!(!inside || !found.lost.is_empty(), "byte {place}");
         }
@@ -131,8 +131,8 @@ fn a_chunk_lost_in_the_middle_leaves_the_others() {
     altered[(start + end) / 2] ^= 1;
     let (found, again) = log.recover(&altered).unwrap();
     assert!(found.lost[0].contains(&format!("at byte {start}")), "{:?}", found.lost);
-    assert!(again.frames.first() == log.whole.frames.first() && again.frames.last() == log.whole.frames.last());
-    assert!(are_of(&again, &log.whole) && again.frames.len() < FRAMES as usize - 1);
+    assert!(again.frames.first() == log.full.frames.first() && again.frames.last() == log.full.frames.last());
+    assert!(are_of(&again, &log.full) && again.frames.len() < FRAMES as usize - 1);
 }
 
 /// One bit of the kind of a chunk's record turns it into another kind, or one that is unknown.
@@ -146,8 +146,8 @@ fn a_chunk_that_is_taken_for_another_record_is_a_gap() {
         let mut altered = log.bytes.clone();
         altered[start] ^= 1 << bit;
         let (found, again) = log.recover(&altered).unwrap();
-        assert!(are_of(&again, &log.whole) && !found.lost.is_empty(), "bit {bit}");
-        assert!(again.frames.last() == log.whole.frames.last(), "bit {bit}: {:?}", found.lost);
+        assert!(are_of(&again, &log.full) && !found.lost.is_empty(), "bit {bit}");
+        assert!(again.frames.last() == log.full.frames.last(), "bit {bit}: {:?}", found.lost);
     }
 }
 

@@ -75,8 +75,8 @@ fn frames_decoded_side_by_side_are_those_read_one_by_one() {
     assert_eq!(all, expected);
     assert!(reader.has_images() && reader.totals().is_some());
     assert!(reader.next().is_none());
-    let whole = fs::read(&path).unwrap();
-    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    let full = fs::read(&path).unwrap();
+    fs::write(&path, &full[..full.len() / 2]).unwrap();
     let cut_off = Reader::open(&path).unwrap().for_each_frame(drop).unwrap_err();
     assert!(matches!(cut_off, LogError::Truncated { .. }), "{cut_off}");
 }

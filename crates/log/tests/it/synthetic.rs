@@ -2,7 +2,7 @@
 
 use seafix_log::*;
 
-pub(crate) const EYE: Matrix4 =
+pub(crate) const IDENTITY: Matrix4 =
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
 /// Numbers that look random and are the same everywhere.
@@ -14,7 +14,7 @@ pub(crate) fn noise(seed: u64) -> f64 {
 }
 
 pub(crate) fn at(x: f64, y: f64, z: f64) -> Matrix4 {
-    let mut place = EYE;
+    let mut place = IDENTITY;
     (place[0][3], place[1][3], place[2][3]) = (x, y, z);
     place
 }
@@ -84,7 +84,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         })
         .collect();
     let mut fixed = TargetRecord::refused("A", "maximum-clique", "kabsch", "");
-    fixed.outcome = Outcome::Referenced;
+    fixed.outcome = Outcome::Fix;
     fixed.object_from_camera = Some(at(value(1), value(2), -3.0));
     let mut covariance = [[0.0; 6]; 6];
     (0..6).for_each(|i| covariance[i][i] = 1e-5 * (i + 1) as f64);
@@ -93,10 +93,10 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
     fixed.pairs = vec![Pair { model: 0, cloud: 1 }, Pair { model: 2, cloud: 5 }, Pair { model: 4, cloud: 11 }];
     fixed.used = vec![0, 2];
     fixed.alternatives =
-        vec![Alternative { object_from_camera: EYE, pairs: vec![Pair { model: 1, cloud: 0 }], score: -7.5 }];
+        vec![Alternative { object_from_camera: IDENTITY, pairs: vec![Pair { model: 1, cloud: 0 }], score: -7.5 }];
     fixed.optimal = Some(true);
     fixed.size_bound = Some(3);
-    fixed.expected_chance_sets = Some(1e-4);
+    fixed.nfa = Some(1e-4);
     fixed.tests = Some(1234);
     fixed.residual_rms = Some(0.004);
     fixed.integrity = Some(Integrity {

@@ -13,14 +13,14 @@ pub(super) type Biased = SMatrix<f64, 6, 4>;
 
 /// What both devices said, in order of time.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Heard {
+pub(super) struct DeviceSignals {
     pub(super) doppler: Signal,
     pub(super) gyro: Signal,
 }
 
 /// Where the body is at one time, and how its place errs: ξ = by · (scale, bias) + what noise adds.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct IntegratedPose {
     pub(super) stamp_ns: u64,
     /// The body, in the frame that the journey began with.
     pub(super) start_from_body: Transform<Body, Body>,
@@ -31,17 +31,23 @@ pub(super) struct Place {
     pub(super) held: Matrix6<f64>,
 }
 
-impl Place {
+impl IntegratedPose {
     pub(super) fn new(stamp_ns: u64, start_from_body: Transform<Body, Body>) -> Self {
         let (settled, held) = (Matrix6::zeros(), Matrix6::zeros());
         Self { stamp_ns, start_from_body, by: Biased::zeros(), settled, held }
     }
 }
 
-impl Heard {
+impl DeviceSignals {
     /// From a place to a later time. Noise of a device counts from `new` on, the time up to which it was known before
     /// (Doppler log, gyro).
-    pub(super) fn carry(&self, from: &Place, to: u64, new: [u64; 2], settings: &DvlGyro) -> Option<Place> {
+    pub(super) fn carry(
+        &self,
+        from: &IntegratedPose,
+        to: u64,
+        new: [u64; 2],
+        settings: &DvlGyro,
+    ) -> Option<IntegratedPose> {
         let mut stamps: Vec<u64> = self.doppler.within(from.stamp_ns, to).collect();
         stamps.extend(self.gyro.within(from.stamp_ns, to));
         stamps.push(to);
@@ -51,7 +57,7 @@ impl Heard {
     }
 
     /// Over a stretch without a reading between its ends.
-    fn step(&self, from: &Place, to: u64, new: [u64; 2], settings: &DvlGyro) -> Option<Place> {
+    fn step(&self, from: &IntegratedPose, to: u64, new: [u64; 2], settings: &DvlGyro) -> Option<IntegratedPose> {
         let h = seconds(from.stamp_ns, to);
         let (velocity, rate) = (self.doppler.midway(from.stamp_ns, to)?, self.gyro.midway(from.stamp_ns, to)?);
         let lever = so3::skew(&Vector3::from(settings.at));
@@ -87,7 +93,7 @@ impl Heard {
         }
         let across = motion.inverse().adjoint();
         let carried = |m: &Matrix6<f64>| across * m * across.transpose();
-        Some(Place {
+        Some(IntegratedPose {
             stamp_ns: to,
             start_from_body: (from.start_from_body * motion).renormalized(),
             by: across * from.by + by * h,

@@ -1,7 +1,7 @@
 //! Dead reckoning without images.
 
+mod dead_reckoning;
 mod integral;
-mod reckoning;
 mod signal;
 
 use seafix_component::{Component, in_range};
@@ -9,8 +9,8 @@ use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
-use crate::{Odometry, Reckoning};
-use reckoning::DeadReckoning;
+use crate::{Odometry, OdometrySession};
+use dead_reckoning::DeadReckoning;
 
 /// Dead reckoning by a Doppler velocity log and a gyro: what a vehicle without cameras goes by.
 ///
@@ -23,9 +23,9 @@ use reckoning::DeadReckoning;
 /// holding the last ones is put right with the next pair. Images are not looked at.
 ///
 /// The covariance has the noise of the readings, what velocity and rate may do between them, and, as errors that
-/// [last](crate::Lasting), the log's scale and the gyro's bias (an Ornstein–Uhlenbeck process).
+/// [last](crate::CorrelatedError), the log's scale and the gyro's bias (an Ornstein–Uhlenbeck process).
 ///
-/// A device that is silent for more than `most-gap`, or says only what no vehicle does, breaks the segment.
+/// A device that is silent for more than `max-gap`, or says only what no vehicle does, breaks the segment.
 ///
 /// Source: Groves, *Principles of GNSS, inertial, and multisensor integrated navigation systems*, 2013, ch. 5 and 6; Schmidt,
 /// *Application of state-space methods to navigation problems*, 1966.
@@ -45,11 +45,11 @@ pub struct DvlGyro {
     /// The same of the rate of turn (degrees/s a root of a second).
     pub unsteady_turn_deg: f64,
     /// A longer silence of either device breaks the segment, and a reading that comes later is of no use (s).
-    pub most_gap: f64,
+    pub max_gap: f64,
     /// A faster velocity is not believed (m/s).
-    pub most_speed: f64,
+    pub max_speed: f64,
     /// A faster turn is not believed (degrees/s).
-    pub most_turn_deg: f64,
+    pub max_turn_deg: f64,
 }
 
 impl Default for DvlGyro {
@@ -61,9 +61,9 @@ impl Default for DvlGyro {
             tau: 300.0,
             unsteady: 0.01,
             unsteady_turn_deg: 0.2,
-            most_gap: 2.0,
-            most_speed: 5.0,
-            most_turn_deg: 90.0,
+            max_gap: 2.0,
+            max_speed: 5.0,
+            max_turn_deg: 90.0,
         }
     }
 }
@@ -85,9 +85,9 @@ impl Component for DvlGyro {
         from("tau", self.tau, 1e-3, 1e9)?;
         from("unsteady", self.unsteady, 0.0, 100.0)?;
         from("unsteady-turn-deg", self.unsteady_turn_deg, 0.0, 1e4)?;
-        from("most-gap", self.most_gap, 1e-3, 3600.0)?;
-        from("most-speed", self.most_speed, 1e-3, 1e3)?;
-        from("most-turn-deg", self.most_turn_deg, 1e-3, 1e5)
+        from("max-gap", self.max_gap, 1e-3, 3600.0)?;
+        from("max-speed", self.max_speed, 1e-3, 1e3)?;
+        from("max-turn-deg", self.max_turn_deg, 1e-3, 1e5)
     }
 }
 
@@ -101,7 +101,7 @@ impl Odometry for DvlGyro {
         _: &'a StereoRig,
         body_from_camera: Transform<Body, Camera>,
         _: Threads,
-    ) -> Box<dyn Reckoning + 'a> {
+    ) -> Box<dyn OdometrySession + 'a> {
         Box::new(DeadReckoning::new(self, body_from_camera))
     }
 }

@@ -58,8 +58,8 @@ impl Signal {
     pub(super) fn silence(&self, from: u64, to: u64) -> f64 {
         let around = self.readings.partition_point(|reading| reading.stamp_ns <= from);
         let first = around.checked_sub(1).map_or(from, |before| self.readings[before].stamp_ns);
-        let heard = self.readings[around..].iter().map(|reading| reading.stamp_ns).take_while(|stamp| *stamp < to);
-        let (longest, last) = heard.fold((0, first), |(longest, last), stamp| (longest.max(stamp - last), stamp));
+        let signals = self.readings[around..].iter().map(|reading| reading.stamp_ns).take_while(|stamp| *stamp < to);
+        let (longest, last) = signals.fold((0, first), |(longest, last), stamp| (longest.max(stamp - last), stamp));
         // What follows `to` may say how it went on until there.
         let after = self.readings.iter().map(|reading| reading.stamp_ns).find(|stamp| *stamp >= to).unwrap_or(to);
         seconds(0, longest.max(after - last))
@@ -83,9 +83,14 @@ impl Signal {
             (Some(last), None) => held(last, seconds(last.stamp_ns, middle), true),
             (Some(before), Some(after)) => {
                 let gap = seconds(before.stamp_ns, after.stamp_ns);
-                let share = (seconds(before.stamp_ns, from) + 0.5 * seconds(from, to)) / gap;
+                let fraction = (seconds(before.stamp_ns, from) + 0.5 * seconds(from, to)) / gap;
                 let noise = (before.covariance + after.covariance) * (0.5 * gap);
-                Some(Value { at: before.value.lerp(&after.value, share), noise, wander: gap * gap / 12.0, held: false })
+                Some(Value {
+                    at: before.value.lerp(&after.value, fraction),
+                    noise,
+                    wander: gap * gap / 12.0,
+                    held: false,
+                })
             }
         }
     }

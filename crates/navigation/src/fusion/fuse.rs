@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Contradiction, Fusion,
-    join::{considered, gate},
+    join::{consider_states, gate},
 };
-use crate::Standing;
+use crate::ObjectPose;
 
 /// Gates a fix by its innovation, then takes the pose of least covariance between both.
 ///
 /// With F = J_r(r)⁻¹ the innovation is r = log(T_known⁻¹ T_fix) = ξ_known − F ξ_fix. All fixes of an object err by what its
 /// model has wrong, so that the two errors have X = E\[ξ_known (F ξ_fix)ᵀ\] in common: models and surveys are
-/// considered as Schmidt does it ([`Considered`](crate::Considered)). A fix with rᵀ S⁻¹ r beyond χ²₆(`confidence`),
+/// considered as Schmidt does it ([`ConsiderStates`](crate::ConsiderStates)). A fix with rᵀ S⁻¹ r beyond χ²₆(`confidence`),
 /// S = Σ_known + F Σ_fix Fᵀ − X − Xᵀ, is rejected; else the gain is (Σ_known − X) S⁻¹. Taken as independent, sixty fixes
 /// would make a pose eight times surer than one, and the model is as wrong as before.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -43,9 +43,9 @@ impl Component for Fuse {
 }
 
 impl Fusion for Fuse {
-    fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
+    fn take(&self, known: &ObjectPose, fix: &ObjectPose) -> Result<ObjectPose, Contradiction> {
         gate(known, fix, self.confidence)?;
-        Ok(considered(known, fix).unwrap_or_else(|| fix.clone()))
+        Ok(consider_states(known, fix).unwrap_or_else(|| fix.clone()))
     }
 }
 
@@ -54,13 +54,13 @@ mod tests {
     use super::*;
     use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-    fn at(xi: [f64; 6], sigma: f64) -> Standing {
+    fn at(xi: [f64; 6], sigma: f64) -> ObjectPose {
         let object_from_camera = Transform::<Object, Camera>::exp(&xi.into());
-        Standing::new(object_from_camera, Covariance6::isotropic(sigma, sigma))
+        ObjectPose::new(object_from_camera, Covariance6::isotropic(sigma, sigma))
     }
 
     #[test]
-    fn equal_knowledge_meets_half_way() {
+    fn equal_knowledge_meets_half_path() {
         let (a, b) = (at([0.0; 6], 0.1), at([0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 0.1));
         let both = Fuse::default().take(&a, &b).expect("it agrees");
         assert!((both.object_from_camera.translation().x - 0.05).abs() < 1e-12);

@@ -8,7 +8,7 @@ use super::{
     Contradiction, Fusion,
     join::{carried_back, gate, joined},
 };
-use crate::Standing;
+use crate::ObjectPose;
 
 /// Gates a fix by its innovation, then takes the covariance intersection of both.
 ///
@@ -41,18 +41,18 @@ impl Component for Intersect {
 }
 
 impl Fusion for Intersect {
-    fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
+    fn take(&self, known: &ObjectPose, fix: &ObjectPose) -> Result<ObjectPose, Contradiction> {
         gate(known, fix, self.confidence)?;
         let innovation = known.object_from_camera.error_to(&fix.object_from_camera);
         let fix_here = carried_back(&fix.covariance.matrix, &innovation);
         let both = known.covariance.matrix.try_inverse().zip(fix_here.try_inverse());
-        let omega = both.map_or(0.0, |(known, fix)| least_determinant(&known, &fix));
+        let omega = both.map_or(0.0, |(known, fix)| min_determinant(&known, &fix));
         Ok(joined(known, fix, [omega, 1.0 - omega]).unwrap_or_else(|| fix.clone()))
     }
 }
 
 /// The ω in [0, 1] with the greatest det(ω A + (1 − ω) B): its logarithm is concave, a golden section finds it.
-fn least_determinant(a: &Matrix6<f64>, b: &Matrix6<f64>) -> f64 {
+fn min_determinant(a: &Matrix6<f64>, b: &Matrix6<f64>) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_8;
     let log_det = |omega: f64| {
         let factor = (a * omega + b * (1.0 - omega)).cholesky();
@@ -82,9 +82,9 @@ mod tests {
     use super::*;
     use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-    fn at(x: f64, sigma: f64) -> Standing {
+    fn at(x: f64, sigma: f64) -> ObjectPose {
         let object_from_camera = Transform::<Object, Camera>::exp(&[0.0, 0.0, 0.0, x, 0.0, 0.0].into());
-        Standing::new(object_from_camera, Covariance6::isotropic(sigma, sigma))
+        ObjectPose::new(object_from_camera, Covariance6::isotropic(sigma, sigma))
     }
 
     #[test]
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn each_knows_another_axis() {
-        let turned = |mut s: Standing, axis: usize| {
+        let turned = |mut s: ObjectPose, axis: usize| {
             s.covariance.matrix[(axis, axis)] = 1.0;
             s
         };

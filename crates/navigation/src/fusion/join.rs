@@ -5,11 +5,11 @@ use seafix_geometry::{Covariance6, right_jacobian_inverse};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::Contradiction;
-use crate::{Considered, Standing};
+use crate::{ConsiderStates, ObjectPose};
 
 /// Whether a fix agrees with what was known: rᵀ S⁻¹ r ≤ χ²₆(`confidence`), r = log(T_known⁻¹ T_fix), S its covariance as
 /// far as it is known what both have in common.
-pub(crate) fn gate(known: &Standing, fix: &Standing, confidence: f64) -> Result<(), Contradiction> {
+pub(crate) fn gate(known: &ObjectPose, fix: &ObjectPose, confidence: f64) -> Result<(), Contradiction> {
     let six = ChiSquared::new(6.0).expect("six degrees of freedom");
     let limit = six.inverse_cdf(confidence);
     let innovation = known.object_from_camera.error_to(&fix.object_from_camera);
@@ -32,10 +32,10 @@ struct Innovation {
 }
 
 impl Innovation {
-    fn of(known: &Standing, fix: &Standing) -> Self {
+    fn of(known: &ObjectPose, fix: &ObjectPose) -> Self {
         let r = known.object_from_camera.error_to(&fix.object_from_camera);
         let back = right_jacobian_inverse(&r);
-        let common = known.considered.common(&fix.considered) * back.transpose();
+        let common = known.consider_states.common(&fix.consider_states) * back.transpose();
         let own = back * fix.covariance.matrix * back.transpose();
         let covariance = known.covariance.matrix + own - common - common.transpose();
         Self { r, back, common, covariance }
@@ -47,7 +47,7 @@ impl Innovation {
 /// K = (Σ_known − X) S⁻¹, ξ = (I − K) ξ_known + K F ξ_fix about T_known Exp(K r).
 ///
 /// The covariance is that of this sum whatever K is (Joseph's form). `None` where S is singular.
-pub(super) fn considered(known: &Standing, fix: &Standing) -> Option<Standing> {
+pub(super) fn consider_states(known: &ObjectPose, fix: &ObjectPose) -> Option<ObjectPose> {
     let Innovation { r, back, common, covariance } = Innovation::of(known, fix);
     let gain = covariance.cholesky()?.solve(&(known.covariance.matrix - common).transpose()).transpose();
     let step = gain * r;
@@ -57,17 +57,17 @@ pub(super) fn considered(known: &Standing, fix: &Standing) -> Option<Standing> {
     let own = back * fix.covariance.matrix * back.transpose();
     let mixed = stay * common * go.transpose();
     let sum = stay * known.covariance.matrix * stay.transpose() + go * own * go.transpose() + mixed + mixed.transpose();
-    Some(Standing {
+    Some(ObjectPose {
         object_from_camera: known.object_from_camera.perturbed(&step).renormalized(),
         covariance: Covariance6::new((sum + sum.transpose()) * 0.5),
-        shares: stay * known.shares + go * back * fix.shares,
-        considered: sum_of(known, &stay, fix, &(go * back)),
+        sensitivities: stay * known.sensitivities + go * back * fix.sensitivities,
+        consider_states: sum_of(known, &stay, fix, &(go * back)),
     })
 }
 
 /// What A ξ_known + B ξ_fix shares with models and surveys.
-fn sum_of(known: &Standing, a: &Matrix6<f64>, fix: &Standing, b: &Matrix6<f64>) -> Considered {
-    known.considered.carried(a).plus(&fix.considered.carried(b))
+fn sum_of(known: &ObjectPose, a: &Matrix6<f64>, fix: &ObjectPose, b: &Matrix6<f64>) -> ConsiderStates {
+    known.consider_states.carried(a).plus(&fix.consider_states.carried(b))
 }
 
 /// Two rounds settle it: an innovation within the gate is a few standard deviations.
@@ -75,7 +75,7 @@ const ROUNDS: usize = 3;
 
 /// The pose with the least w₁ ‖log(T_known⁻¹ T)‖² + w₂ ‖log(T_fix⁻¹ T)‖², each in its own metric; `None` where a
 /// covariance is singular.
-pub(super) fn joined(known: &Standing, fix: &Standing, weights: [f64; 2]) -> Option<Standing> {
+pub(super) fn joined(known: &ObjectPose, fix: &ObjectPose, weights: [f64; 2]) -> Option<ObjectPose> {
     let known_information = known.covariance.matrix.try_inverse()? * weights[0];
     let fix_information = fix.covariance.matrix.try_inverse()? * weights[1];
     let mut pose = known.object_from_camera;
@@ -97,11 +97,11 @@ pub(super) fn joined(known: &Standing, fix: &Standing, weights: [f64; 2]) -> Opt
     let covariance = Covariance6::new(information.cholesky()?.inverse());
     // Of each so much stays as it weighed.
     let [stay, go] = pulls.map(|pull| covariance.matrix * pull);
-    Some(Standing {
+    Some(ObjectPose {
         object_from_camera: pose,
         covariance,
-        shares: stay * known.shares + go * fix.shares,
-        considered: sum_of(known, &stay, fix, &go),
+        sensitivities: stay * known.sensitivities + go * fix.sensitivities,
+        consider_states: sum_of(known, &stay, fix, &go),
     })
 }
 

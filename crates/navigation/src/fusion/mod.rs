@@ -7,7 +7,7 @@ mod replace;
 
 use seafix_component::{Registry, entry};
 
-use crate::Standing;
+use crate::ObjectPose;
 
 pub use fuse::Fuse;
 pub use intersect::Intersect;
@@ -30,12 +30,12 @@ pub trait Fusion: Send + Sync + std::fmt::Debug {
     ///
     /// # Errors
     /// [`Contradiction`] when the fix is not to be believed.
-    fn take(&self, known: &Standing, fix: &Standing) -> Result<Standing, Contradiction>;
+    fn take(&self, known: &ObjectPose, fix: &ObjectPose) -> Result<ObjectPose, Contradiction>;
 
     /// Whether the pose passes to another object: `there` is what would be known relative to it, `here` what is known
     /// relative to the object of the last fix. The object ahead is the one that counts, but a glimpse of it at the edge of
     /// the image is a fix far worse than the pose carried here.
-    fn passes(&self, here: &Standing, there: &Standing) -> bool {
+    fn passes(&self, here: &ObjectPose, there: &ObjectPose) -> bool {
         /// So many times less certain is far worse.
         const POOR: f64 = 2.0;
         there.covariance.position_sigma() <= POOR * here.covariance.position_sigma()

@@ -4,7 +4,7 @@ use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{Contradiction, Fusion};
-use crate::Standing;
+use crate::ObjectPose;
 
 /// Believes every fix, and nothing else from then on.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -19,11 +19,11 @@ impl Component for Replace {
 }
 
 impl Fusion for Replace {
-    fn take(&self, _: &Standing, fix: &Standing) -> Result<Standing, Contradiction> {
+    fn take(&self, _: &ObjectPose, fix: &ObjectPose) -> Result<ObjectPose, Contradiction> {
         Ok(fix.clone())
     }
 
-    fn passes(&self, _: &Standing, _: &Standing) -> bool {
+    fn passes(&self, _: &ObjectPose, _: &ObjectPose) -> bool {
         true
     }
 }

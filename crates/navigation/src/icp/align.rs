@@ -12,7 +12,7 @@ use crate::Lost;
 const GATE: f64 = 11.345;
 /// So many times more partners than the same cloud has elsewhere, where it has them by chance: away by half the reach to each side.
 /// The best place of a cloud that does not belong there has some more than any place.
-const BEYOND_CHANCE: usize = 2;
+const BEYOND_NFA: usize = 2;
 /// The reach narrows by this factor from step to step, down to its share `NARROWEST`.
 const NARROWING: f64 = 0.5;
 const NARROWEST: f64 = 0.005;
@@ -34,7 +34,7 @@ pub(super) struct Ground {
 
 /// Where a cloud lies on another.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Laid {
+pub(super) struct Registered {
     pub(super) key_from_now: Transform<Camera, Camera>,
     pub(super) covariance: Covariance6<Camera, Camera>,
     /// Points with a partner.
@@ -76,14 +76,19 @@ impl Ground {
     }
 
     /// Lays `now` upon it, from `guess` on and, where that leads nowhere, from the offset that most pairs of points have.
-    pub(super) fn lay(&self, settings: &Icp, now: &Self, guess: &Transform<Camera, Camera>) -> Result<Laid, Lost> {
+    pub(super) fn register(
+        &self,
+        settings: &Icp,
+        now: &Self,
+        guess: &Transform<Camera, Camera>,
+    ) -> Result<Registered, Lost> {
         self.from(settings, now, guess).or_else(|lost| {
             let shifted = self.offset(settings, now, guess).ok_or(lost)?;
             self.from(settings, now, &shifted)
         })
     }
 
-    fn from(&self, settings: &Icp, now: &Self, guess: &Transform<Camera, Camera>) -> Result<Laid, Lost> {
+    fn from(&self, settings: &Icp, now: &Self, guess: &Transform<Camera, Camera>) -> Result<Registered, Lost> {
         let mut pose = *guess;
         let mut width = 1.0;
         // So wide that the first partners may be anywhere in reach; in the end the points' own noise alone.
@@ -148,7 +153,7 @@ impl Ground {
     }
 
     /// Whether the points say that they lie so, and how well that is known.
-    fn judge(&self, settings: &Icp, now: &Self, pose: Transform<Camera, Camera>) -> Result<Laid, Lost> {
+    fn judge(&self, settings: &Icp, now: &Self, pose: Transform<Camera, Camera>) -> Result<Registered, Lost> {
         let pairs = self.partners(settings, now, &pose);
         let found = pairs.len();
         let smaller = self.len().min(now.len());
@@ -157,9 +162,9 @@ impl Ground {
             let shifted = Transform::new(pose.rotation(), pose.translation() + side * (0.5 * settings.reach));
             self.partners(settings, now, &shifted).len()
         });
-        let chance = elsewhere.into_iter().max().unwrap_or(0);
-        let least = (settings.least_share * smaller as f64).ceil() as usize;
-        let needed = settings.least_points.max(least).max(BEYOND_CHANCE * chance);
+        let at_random = elsewhere.into_iter().max().unwrap_or(0);
+        let min = (settings.min_fraction * smaller as f64).ceil() as usize;
+        let needed = settings.min_points.max(min).max(BEYOND_NFA * at_random);
         if found < needed {
             return Err(Lost::NoConsensus { found, matches: smaller, needed });
         }
@@ -182,7 +187,7 @@ impl Ground {
         // Partners that fit worse than their noise know less.
         let chi2: f64 = pairs.iter().map(Pair::apart).sum();
         let freedom = (3 * found) as f64 - 6.0;
-        Ok(Laid {
+        Ok(Registered {
             key_from_now: pose,
             covariance: Covariance6::new(covariance * (chi2 / freedom).max(1.0)),
             partners: found,
@@ -289,15 +294,15 @@ mod tests {
             assert_eq!(settings.check(), Ok(()));
             let key = Ground::new(&settings, &cloud(&Transform::identity(), 1, |k| k % 8 != 0));
             let now = Ground::new(&settings, &cloud(&truth.inverse(), 2, |k| k % 8 != 3));
-            let laid = key.lay(&settings, &now, &Transform::identity()).unwrap();
-            let error = laid.key_from_now.error_to(&truth);
+            let registered = key.register(&settings, &now, &Transform::identity()).unwrap();
+            let error = registered.key_from_now.error_to(&truth);
             // Planes that slip tell less than points that do not.
-            let most = if distance == Distance::Plane { 1e-2 } else { 2e-3 };
-            assert!(error.amax() < most, "{distance:?}: {error:?}");
-            let nees = error.dot(&(laid.covariance.matrix.try_inverse().unwrap() * error));
+            let max = if distance == Distance::Plane { 1e-2 } else { 2e-3 };
+            assert!(error.amax() < max, "{distance:?}: {error:?}");
+            let nees = error.dot(&(registered.covariance.matrix.try_inverse().unwrap() * error));
             // χ²₆ at 1 − 1e-5.
             assert!(nees < 34.9, "{distance:?}: {nees}");
-            assert!(laid.partners > 200, "{distance:?}: {}", laid.partners);
+            assert!(registered.partners > 200, "{distance:?}: {}", registered.partners);
         }
     }
 
@@ -309,7 +314,7 @@ mod tests {
             let key = Ground::new(&settings, &cloud(&Transform::identity(), 1, |_| true));
             let turned = Transform::exp(&Vector6::new(0.0, 0.0, std::f64::consts::PI, 0.3, 0.2, 0.0));
             let now = Ground::new(&settings, &cloud(&turned, 2, |_| true));
-            let lost = key.lay(&settings, &now, &Transform::identity());
+            let lost = key.register(&settings, &now, &Transform::identity());
             assert!(matches!(lost, Err(Lost::NoConsensus { .. } | Lost::Weak(_))), "{distance:?}: {lost:?}");
         }
     }

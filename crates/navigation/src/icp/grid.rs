@@ -25,14 +25,14 @@ impl Grid {
     /// Every point within `reach`, at most the grid's own, with its distance squared; in an order that depends on the cloud alone.
     pub(super) fn within(&self, at: &Vector3<f64>, reach: f64) -> impl Iterator<Item = (usize, f64)> {
         let [x, y, z] = cube(at, self.side);
-        let (at, most) = (*at, reach * reach);
+        let (at, max) = (*at, reach * reach);
         let around =
             (-1..=1).flat_map(move |i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
         around
             .filter_map(|cube| self.cubes.get(&cube))
             .flatten()
             .map(move |&index| (index, (self.points[index] - at).norm_squared()))
-            .filter(move |(_, far)| *far <= most)
+            .filter(move |(_, far)| *far <= max)
     }
 
     /// The nearest point within `reach`; of two as near the first.

@@ -2,15 +2,15 @@
 
 mod align;
 mod grid;
-mod reckoning;
+mod tracker;
 
 use seafix_component::{Choice, Component, in_range};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_vision::{FrontEnd, StageChoices, Threads, read_refinement, read_triangulator};
 use serde::{Deserialize, Serialize};
 
-use crate::{Odometry, Reckoning};
-use reckoning::IcpReckoning;
+use crate::{Odometry, OdometrySession};
+use tracker::IcpTracker;
 
 /// What makes two points near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -56,10 +56,10 @@ pub struct Icp {
     pub matcher: Choice,
     /// Aligns each pair between the cameras.
     #[serde(deserialize_with = "read_refinement")]
-    pub refine: Choice,
+    pub refinement: Choice,
     /// Turns pairs into points.
     #[serde(deserialize_with = "read_triangulator")]
-    pub triangulation: Choice,
+    pub triangulator: Choice,
     /// What makes two points near.
     pub distance: Distance,
     /// Share of the nearest pairs that is fitted: points of one cloud that the other has not have no partner.
@@ -71,17 +71,17 @@ pub struct Icp {
     /// Neighbours that say how the surface lies.
     pub neighbours: usize,
     /// Fewer points with a partner are no answer.
-    pub least_points: usize,
+    pub min_points: usize,
     /// So is a smaller share of them.
-    pub least_share: f64,
+    pub min_fraction: f64,
     /// A pair becomes a key frame when less than this share of its points have a partner.
-    pub keyframe_share: f64,
+    pub keyframe_fraction: f64,
     /// A motion known worse than this is no answer: one standard deviation over the three axes together (m).
-    pub most_sigma: f64,
+    pub max_sigma: f64,
     /// A longer time without a pair that can be followed breaks the segment (s).
-    pub most_gap: f64,
+    pub max_gap: f64,
     /// A faster motion is not believed (m/s).
-    pub most_speed: f64,
+    pub max_speed: f64,
 }
 
 impl Default for Icp {
@@ -93,19 +93,19 @@ impl Default for Icp {
             locator: Choice::named("peak"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band").with("max-depth", deep),
-            refine: Choice::named("direct").with("warp", "slanted"),
-            triangulation: Choice::named("optimal").with("max-depth", deep),
+            refinement: Choice::named("direct").with("warp", "slanted"),
+            triangulator: Choice::named("optimal").with("max-depth", deep),
             distance: Distance::Measured,
             keep: 0.7,
             reach: 0.4,
             iterations: 20,
             neighbours: 8,
-            least_points: 15,
-            least_share: 0.2,
-            keyframe_share: 0.4,
-            most_sigma: 1.0,
-            most_gap: 5.0,
-            most_speed: 50.0,
+            min_points: 15,
+            min_fraction: 0.2,
+            keyframe_fraction: 0.4,
+            max_sigma: 1.0,
+            max_gap: 5.0,
+            max_speed: 50.0,
         }
     }
 }
@@ -119,17 +119,17 @@ impl Component for Icp {
     fn check(&self) -> Result<(), String> {
         self.front_end()?;
         let positive = |name, x: f64, what| in_range(x > 0.0 && x.is_finite(), name, x, what);
-        let share = |name, x: f64| in_range((0.0..=1.0).contains(&x), name, x, "a share from 0 to 1");
+        let fraction = |name, x: f64| in_range((0.0..=1.0).contains(&x), name, x, "a share from 0 to 1");
         in_range(self.keep > 0.0 && self.keep <= 1.0, "keep", self.keep, "a share above 0, at most 1")?;
         positive("reach", self.reach, "a positive length (m)")?;
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
         in_range((3..=100).contains(&self.neighbours), "neighbours", self.neighbours, "3 to 100")?;
-        in_range(self.least_points >= 6, "least-points", self.least_points, "at least 6")?;
-        share("least-share", self.least_share)?;
-        share("keyframe-share", self.keyframe_share)?;
-        positive("most-sigma", self.most_sigma, "a positive length (m)")?;
-        positive("most-gap", self.most_gap, "a positive time (s)")?;
-        positive("most-speed", self.most_speed, "a positive speed (m/s)")
+        in_range(self.min_points >= 6, "min-points", self.min_points, "at least 6")?;
+        fraction("min-fraction", self.min_fraction)?;
+        fraction("keyframe-fraction", self.keyframe_fraction)?;
+        positive("max-sigma", self.max_sigma, "a positive length (m)")?;
+        positive("max-gap", self.max_gap, "a positive time (s)")?;
+        positive("max-speed", self.max_speed, "a positive speed (m/s)")
     }
 }
 
@@ -141,10 +141,10 @@ impl Icp {
             locator: &self.locator,
             descriptor: &self.descriptor,
             matcher: &self.matcher,
-            refine: &self.refine,
-            triangulation: &self.triangulation,
+            refinement: &self.refinement,
+            triangulator: &self.triangulator,
         };
-        FrontEnd::build(&choices).map_err(|unfit| unfit.to_string())
+        FrontEnd::build(&choices).map_err(|invalid| invalid.to_string())
     }
 }
 
@@ -154,8 +154,8 @@ impl Odometry for Icp {
         rig: &'a StereoRig,
         _: Transform<Body, Camera>,
         threads: Threads,
-    ) -> Box<dyn Reckoning + 'a> {
+    ) -> Box<dyn OdometrySession + 'a> {
         let front_end = self.front_end().expect("a component's settings were checked");
-        Box::new(IcpReckoning::new(self, front_end, rig, threads))
+        Box::new(IcpTracker::new(self, front_end, rig, threads))
     }
 }

@@ -74,15 +74,15 @@ pub(crate) fn consensus(
         *best = Some(tried);
     };
     guesses.iter().for_each(|guess| offer(*guess, &mut best));
-    let mut drawn = 0;
-    while drawn < rules.draws {
-        let share = best.as_ref().map_or(0.0, |best| best.inliers.len() as f64 / count as f64);
-        let missed = 1.0 - share.powi(size as i32);
+    let mut sampled = 0;
+    while sampled < rules.draws {
+        let fraction = best.as_ref().map_or(0.0, |best| best.inliers.len() as f64 / count as f64);
+        let missed = 1.0 - fraction.powi(size as i32);
         let needed = libm::log(1.0 - rules.confidence) / libm::log(missed.clamp(1e-12, 1.0 - 1e-12));
-        if drawn as f64 >= needed {
+        if sampled as f64 >= needed {
             break;
         }
-        drawn += 1;
+        sampled += 1;
         let mut three = Vec::with_capacity(size);
         while three.len() < size {
             let index = rng.random_range(0..count);
@@ -106,7 +106,7 @@ pub(crate) fn is_still(best: &Consensus, data: &Observations<'_>, rig: &StereoRi
 }
 
 /// How many of the points that are elsewhere than a motion expects them agree with each other on another one.
-pub(crate) fn rival(
+pub(crate) fn competitor(
     best: &Consensus,
     data: &Observations<'_>,
     rig: &StereoRig,
@@ -132,9 +132,9 @@ fn judge(data: &Observations<'_>, rig: &StereoRig, rules: &Rules, motion: Transf
     let (mut inliers, mut score) = (Vec::new(), 0.0);
     for (index, point) in data.points.iter().enumerate() {
         let Some(squared) = squared_distance(point, rig, &later_from_earlier) else { continue };
-        let share = squared / (rules.px * rules.px);
-        if share < 1.0 {
-            score += 1.0 - share;
+        let fraction = squared / (rules.px * rules.px);
+        if fraction < 1.0 {
+            score += 1.0 - fraction;
             inliers.push(index);
         }
     }

@@ -5,13 +5,13 @@ use seafix_geometry::{Camera, Pixel, StereoRig, Transform, World};
 use seafix_vision::{Direct, Expected, Image, Track, Workspace};
 
 use super::{
-    landmark::{LEAST, Landmark, project},
+    landmark::{Landmark, MIN, project},
     pose::Found,
 };
 
 /// A key frame: its pose, and the image that its landmarks' patches are taken from.
 #[derive(Debug)]
-pub(super) struct KeyFrame {
+pub(super) struct WindowKeyFrame {
     pub(super) world_from_camera: Transform<World, Camera>,
     /// Its left image, as long as it is in the window.
     pub(super) image: Option<Image>,
@@ -30,18 +30,18 @@ pub(super) struct Followed {
 const GIVEN_UP: u32 = 2;
 /// A patch that is shown this many times larger or smaller than it was has other detail: along its most stretched
 /// direction, and as an area.
-const MOST_STRETCH: f64 = 3.0;
+const MAX_SCALE_ERROR: f64 = 3.0;
 
 /// Seeks landmarks where `world_from_camera` expects them.
 #[expect(clippy::too_many_arguments, reason = "one call site; each is a different thing")]
 pub(super) fn follow(
     refine: &Direct,
     rig: &StereoRig,
-    frames: &[KeyFrame],
+    frames: &[WindowKeyFrame],
     landmarks: &[Landmark],
     images: [&Image; 2],
     world_from_camera: &Transform<World, Camera>,
-    (most, calibration): (usize, f64),
+    (max, calibration): (usize, f64),
     work: &mut Workspace,
 ) -> Followed {
     let camera_from_world = world_from_camera.inverse();
@@ -49,7 +49,7 @@ pub(super) fn follow(
     // The landmarks of the last key frames first: their patches have changed least.
     let mut expected: Vec<(usize, [Expected; 2])> = Vec::new();
     for (index, landmark) in landmarks.iter().enumerate().rev() {
-        if expected.len() == most {
+        if expected.len() == max {
             break;
         }
         let frame = &frames[landmark.anchor];
@@ -85,7 +85,7 @@ pub(super) fn follow(
         followed.found.extend(begun.iter().zip(&tracks).filter_map(|((index, left, _), right)| {
             let right = (*right)?;
             let pixels = Vector4::new(left.at.u, left.at.v, right.at.u, right.at.v);
-            let mut noise = Matrix4::identity() * (calibration * calibration).max(LEAST * LEAST);
+            let mut noise = Matrix4::identity() * (calibration * calibration).max(MIN * MIN);
             for (k, track) in [(0, left), (2, &right)] {
                 let mut block = noise.fixed_view_mut::<2, 2>(k, k);
                 block += track.covariance;
@@ -99,7 +99,7 @@ pub(super) fn follow(
 
 impl Followed {
     /// For the pose.
-    pub(super) fn for_pose(&self, frames: &[KeyFrame], landmarks: &[Landmark]) -> Vec<Found> {
+    pub(super) fn for_pose(&self, frames: &[WindowKeyFrame], landmarks: &[Landmark]) -> Vec<Found> {
         let found = self.found.iter().map(|(index, pixels, noise)| {
             let landmark = &landmarks[*index];
             Found {
@@ -133,7 +133,7 @@ fn expect(
         let shape = shapes[side];
         let stretched = shape.norm();
         let area = shape.determinant();
-        let likely = stretched < MOST_STRETCH && area > 1.0 / MOST_STRETCH && area < MOST_STRETCH;
+        let likely = stretched < MAX_SCALE_ERROR && area > 1.0 / MAX_SCALE_ERROR && area < MAX_SCALE_ERROR;
         let along = likely.then(|| shape.try_inverse()).flatten()? * deeper[side];
         let along = along.try_normalize(1e-12).unwrap_or_else(Vector2::x);
         let shape = if nearly_still(&shape) { Matrix2::identity() } else { shape };

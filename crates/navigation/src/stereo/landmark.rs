@@ -16,7 +16,7 @@ pub(super) struct Landmark {
     /// The covariance of (x, y, w), given the poses.
     pub(super) covariance: Matrix3<f64>,
     /// Where key frames saw it, in order of time, the first of them its own.
-    pub(super) views: Vec<Sighting>,
+    pub(super) views: Vec<LandmarkObservation>,
     /// How many pairs in succession should have shown it and did not.
     pub(super) misses: u32,
     /// Derivative of w by x and y over its neighbourhood: how its surface slants.
@@ -25,7 +25,7 @@ pub(super) struct Landmark {
 
 /// Where the two images of a key frame show a landmark.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sighting {
+pub(super) struct LandmarkObservation {
     /// The key frame.
     pub(super) frame: usize,
     /// The four pixel coordinates.
@@ -133,7 +133,7 @@ impl Landmark {
         }
         let by = project(rig, &here, &at)?.by_landmark(&here);
         let covariance = (by.transpose() * information * by).cholesky()?.inverse();
-        let view = Sighting { frame: anchor, pixels: seen, information };
+        let view = LandmarkObservation { frame: anchor, pixels: seen, information };
         let place = pixels.at.left;
         (at.z > 0.0).then_some(Self {
             anchor,
@@ -164,14 +164,14 @@ fn aligned(pixels: &UncertainPixels, calibration: f64) -> Matrix2<f64> {
 
 /// The information of a landmark's own view: only calibration blurs the place that defines it.
 fn information(aligned: &Matrix2<f64>, calibration: f64) -> Option<Matrix4<f64>> {
-    let mut covariance = Matrix4::identity() * (calibration * calibration).max(LEAST * LEAST);
+    let mut covariance = Matrix4::identity() * (calibration * calibration).max(MIN * MIN);
     let mut right = covariance.fixed_view_mut::<2, 2>(2, 2);
     right += aligned;
     covariance.cholesky().map(|factor| factor.inverse())
 }
 
 /// No pixel is known better than this (px).
-pub(super) const LEAST: f64 = 0.02;
+pub(super) const MIN: f64 = 0.02;
 
 #[cfg(test)]
 mod tests {

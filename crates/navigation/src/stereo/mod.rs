@@ -2,11 +2,11 @@
 
 pub(crate) mod consensus;
 mod follow;
+pub(crate) mod front_end;
 mod landmark;
-pub(crate) mod look;
 pub(crate) mod pose;
-mod reckoning;
 mod taken;
+mod tracker;
 mod window;
 
 use seafix_component::{Choice, Component, in_range};
@@ -18,8 +18,8 @@ use seafix_vision::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{Odometry, Reckoning};
-use reckoning::StereoReckoning;
+use crate::{Odometry, OdometrySession};
+use tracker::StereoTracker;
 
 /// Visual odometry of a calibrated stereo rig.
 ///
@@ -55,10 +55,10 @@ pub struct Stereo {
     pub matcher: Choice,
     /// Aligns each pair between the cameras.
     #[serde(deserialize_with = "read_refinement")]
-    pub refine: Choice,
+    pub refinement: Choice,
     /// Turns pairs into points.
     #[serde(deserialize_with = "read_triangulator")]
-    pub triangulation: Choice,
+    pub triangulator: Choice,
     /// Pairs points with those of the pair before; the rig plays no part.
     pub between: Choice,
     /// The motion of three points, for the consensus.
@@ -72,7 +72,7 @@ pub struct Stereo {
     /// Draws at most.
     pub draws: usize,
     /// Fewer points that agree are no consensus.
-    pub least_points: usize,
+    pub min_points: usize,
     /// How landmarks are found again in new images.
     pub follow: Direct,
     /// At most so many landmarks are sought in a pair.
@@ -80,16 +80,16 @@ pub struct Stereo {
     /// A landmark begins no nearer to another (px).
     pub apart_px: f64,
     /// A pair becomes a key frame when it sees less than this share of the landmarks of the last key frame.
-    pub keyframe_share: f64,
+    pub keyframe_fraction: f64,
     /// Key frames that are adjusted together, from 1 to 100; with 1 none are.
     pub window: usize,
     /// A motion known worse than this is no answer: one standard deviation over the three axes together (m).
-    pub most_sigma: f64,
+    pub max_sigma: f64,
     /// A longer time without a pair that can be followed breaks the segment (s).
-    pub most_gap: f64,
+    pub max_gap: f64,
     /// A faster motion is not believed (m/s). The default leaves room for a car's; a vehicle that inspects does not go 3 m/s, and
     /// what it is told to be unable to do it cannot be misled into.
-    pub most_speed: f64,
+    pub max_speed: f64,
     /// What is drawn at random follows from this.
     pub seed: u64,
 }
@@ -104,23 +104,23 @@ impl Default for Stereo {
             locator: Choice::named("peak"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band").with("max-depth", deep),
-            refine: Choice::named("direct").with("warp", "slanted"),
-            triangulation: Choice::named("optimal").with("max-depth", deep),
+            refinement: Choice::named("direct").with("warp", "slanted"),
+            triangulator: Choice::named("optimal").with("max-depth", deep),
             between: Choice::named("mutual-ratio"),
             minimal: Choice::named("p3p-stereo"),
             solver: Choice::named("stereo-reprojection"),
             consensus_px: 2.0,
             confidence: 0.999,
             draws: 300,
-            least_points: 15,
+            min_points: 15,
             follow: Direct { reach: 4.0, warp: Warp::Slanted, ..Direct::default() },
             landmarks: 500,
             apart_px: 8.0,
-            keyframe_share: 0.7,
+            keyframe_fraction: 0.7,
             window: 6,
-            most_sigma: 1.0,
-            most_gap: 5.0,
-            most_speed: 50.0,
+            max_sigma: 1.0,
+            max_gap: 5.0,
+            max_speed: 50.0,
             seed: 0,
         }
     }
@@ -140,22 +140,22 @@ impl Component for Stereo {
         let confident = self.confidence > 0.0 && self.confidence < 1.0;
         in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
         in_range(self.draws > 0, "draws", self.draws, "at least 1")?;
-        in_range(self.least_points >= 6, "least-points", self.least_points, "at least 6")?;
-        let enough = self.landmarks >= self.least_points;
-        in_range(enough, "landmarks", self.landmarks, "at least least-points")?;
+        in_range(self.min_points >= 6, "min-points", self.min_points, "at least 6")?;
+        let enough = self.landmarks >= self.min_points;
+        in_range(enough, "landmarks", self.landmarks, "at least min-points")?;
         positive("apart-px", self.apart_px, "a positive number of pixels")?;
-        let share = (0.0..=1.0).contains(&self.keyframe_share);
-        in_range(share, "keyframe-share", self.keyframe_share, "a share from 0 to 1")?;
+        let fraction = (0.0..=1.0).contains(&self.keyframe_fraction);
+        in_range(fraction, "keyframe-fraction", self.keyframe_fraction, "a share from 0 to 1")?;
         in_range((1..=100).contains(&self.window), "window", self.window, "1 to 100 key frames")?;
-        positive("most-sigma", self.most_sigma, "a positive length (m)")?;
-        positive("most-gap", self.most_gap, "a positive time (s)")?;
-        positive("most-speed", self.most_speed, "a positive speed (m/s)")
+        positive("max-sigma", self.max_sigma, "a positive length (m)")?;
+        positive("max-gap", self.max_gap, "a positive time (s)")?;
+        positive("max-speed", self.max_speed, "a positive speed (m/s)")
     }
 }
 
 /// The stages, built.
 #[derive(Debug)]
-pub(crate) struct Stages {
+pub(crate) struct StereoStages {
     pub(crate) front_end: FrontEnd,
     pub(crate) descriptor: Box<dyn Descriptor>,
     pub(crate) between: Box<dyn Matcher>,
@@ -164,7 +164,7 @@ pub(crate) struct Stages {
 }
 
 impl Stereo {
-    pub(crate) fn stages(&self) -> Result<Stages, String> {
+    pub(crate) fn stages(&self) -> Result<StereoStages, String> {
         let said = |error: seafix_component::BuildError| error.to_string();
         let choices = StageChoices {
             filters: &self.filters,
@@ -172,11 +172,11 @@ impl Stereo {
             locator: &self.locator,
             descriptor: &self.descriptor,
             matcher: &self.matcher,
-            refine: &self.refine,
-            triangulation: &self.triangulation,
+            refinement: &self.refinement,
+            triangulator: &self.triangulator,
         };
-        Ok(Stages {
-            front_end: FrontEnd::build(&choices).map_err(|unfit| unfit.to_string())?,
+        Ok(StereoStages {
+            front_end: FrontEnd::build(&choices).map_err(|invalid| invalid.to_string())?,
             descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
             between: MATCHERS.build(&self.between).map_err(said)?,
             minimal: SOLVERS.build(&self.minimal).map_err(said)?,
@@ -191,8 +191,8 @@ impl Odometry for Stereo {
         rig: &'a StereoRig,
         _: Transform<Body, Camera>,
         threads: Threads,
-    ) -> Box<dyn Reckoning + 'a> {
+    ) -> Box<dyn OdometrySession + 'a> {
         let stages = self.stages().expect("a component's settings were checked");
-        Box::new(StereoReckoning::new(self, stages, rig, threads))
+        Box::new(StereoTracker::new(self, stages, rig, threads))
     }
 }

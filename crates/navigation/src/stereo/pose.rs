@@ -31,7 +31,7 @@ pub(crate) struct Pose {
 /// Where the loss turns from squares to logarithms, in units of χ² of four degrees of freedom (Cauchy).
 pub(super) const SOFT: f64 = 8.0;
 /// A landmark beyond this χ² does not agree: four degrees of freedom, 1 in 1000.
-pub(super) const MOST: f64 = 18.5;
+pub(super) const MAX: f64 = 18.5;
 const STEPS: usize = 15;
 
 /// The most likely pose near `start`: least Σ ρ(rᵀ S⁻¹ r), r the four pixel residuals of a landmark,
@@ -58,7 +58,7 @@ pub(crate) fn refine(rig: &StereoRig, found: &[Found], start: &Transform<World, 
         .zip(&weights)
         .map(|(one, weight)| {
             let chi = weight.and_then(|weight| residual(rig, one, &pose).map(|r| r.dot(&(weight * r))));
-            chi.is_some_and(|chi| chi < MOST)
+            chi.is_some_and(|chi| chi < MAX)
         })
         .collect();
     (pose.is_finite()).then_some(Pose { world_from_camera: pose, covariance, agrees })
@@ -96,7 +96,7 @@ pub(crate) fn joint(rig: &StereoRig, found: &[Found], start: &Transform<World, C
             let rest = r - by_pose * xi;
             let weighted = weight * rest;
             places[index] = found[index].at + found[index].covariance * (by.transpose() * weighted);
-            agrees[index] = rest.dot(&weighted) < MOST;
+            agrees[index] = rest.dot(&weighted) < MAX;
         }
         // A thousandth of a standard deviation.
         if step >= 2 && gradient.dot(&xi) < 1e-6 {

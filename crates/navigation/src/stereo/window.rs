@@ -4,22 +4,22 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 use seafix_geometry::{Camera, StereoRig, Transform, World};
 
 use super::{
-    follow::KeyFrame,
+    follow::WindowKeyFrame,
     landmark::{Landmark, project},
-    pose::{MOST, SOFT},
+    pose::{MAX, SOFT},
 };
 
 /// Steps at most, those not taken among them.
 const STEPS: usize = 10;
 /// A step that lowers the cost by a smaller share than this is the last.
-const LEAST_GAIN: f64 = 1e-4;
+const MIN_GAIN: f64 = 1e-4;
 
 /// A robust bundle adjustment: the poses of the key frames from `first` on, and all landmarks that two of them saw, to
 /// the least Σ ρ(rᵀ S⁻¹ r) over all sightings, ρ Cauchy's loss. The landmarks are eliminated first (Schur complement).
 /// Key frames before `first` stand as they are and hold the rest.
 ///
 /// Sightings that do not agree in the end are dropped.
-pub(super) fn adjust(rig: &StereoRig, frames: &mut [KeyFrame], landmarks: &mut [Landmark], first: usize) {
+pub(super) fn adjust(rig: &StereoRig, frames: &mut [WindowKeyFrame], landmarks: &mut [Landmark], first: usize) {
     let count = frames.len() - first;
     let active: Vec<usize> = (0..landmarks.len())
         .filter(|&index| {
@@ -53,7 +53,7 @@ pub(super) fn adjust(rig: &StereoRig, frames: &mut [KeyFrame], landmarks: &mut [
             Some(next) => {
                 here = next;
                 damping = f64::max(0.1 * damping, 1e-9);
-                if before - here.cost < LEAST_GAIN * before {
+                if before - here.cost < MIN_GAIN * before {
                     break;
                 }
             }
@@ -76,7 +76,7 @@ pub(super) fn adjust(rig: &StereoRig, frames: &mut [KeyFrame], landmarks: &mut [
 }
 
 /// Drops sightings that do not agree.
-fn prune(rig: &StereoRig, frames: &[KeyFrame], landmarks: &mut [Landmark], active: &[usize]) {
+fn prune(rig: &StereoRig, frames: &[WindowKeyFrame], landmarks: &mut [Landmark], active: &[usize]) {
     for &index in active {
         let (anchor, at) = (landmarks[index].anchor, landmarks[index].at);
         let world_from_anchor = frames[anchor].world_from_camera;
@@ -84,7 +84,7 @@ fn prune(rig: &StereoRig, frames: &[KeyFrame], landmarks: &mut [Landmark], activ
             let here_from_anchor = frames[view.frame].world_from_camera.inverse() * world_from_anchor;
             project(rig, &here_from_anchor, &at).is_some_and(|seen| {
                 let r = view.pixels - seen.pixels;
-                r.dot(&(view.information * r)) < MOST
+                r.dot(&(view.information * r)) < MAX
             })
         });
     }
@@ -116,7 +116,7 @@ struct Reduced {
 impl Equations {
     fn of(
         rig: &StereoRig,
-        frames: &[KeyFrame],
+        frames: &[WindowKeyFrame],
         landmarks: &[Landmark],
         active: &[usize],
         first: usize,
@@ -144,7 +144,7 @@ impl Equations {
     fn landmark(
         &mut self,
         rig: &StereoRig,
-        frames: &[KeyFrame],
+        frames: &[WindowKeyFrame],
         inverses: &[Transform<Camera, World>],
         landmark: &Landmark,
         first: usize,

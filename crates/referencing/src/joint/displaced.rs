@@ -2,7 +2,7 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
-use super::{Glimpse, JointFix, Member, Placement, joint_fix};
+use super::{JointFix, Member, ObjectObservations, Placement, joint_fix};
 use crate::{Degenerate, candidates::chi_square};
 
 /// The camera relative to an object, and its covariance.
@@ -43,7 +43,7 @@ pub enum Unjoined {
     },
 }
 
-/// One fix over all `glimpses`, the last of which is asked for; surveys that the images contradict at this `confidence`
+/// One fix over all `observations_by_frame`, the last of which is asked for; surveys that the images contradict at this `confidence`
 /// are given up, one object after the other: always that without whose survey χ² is least. An object of which no glimpse
 /// has three points cannot say where it stands itself: instead of its survey its points are given up.
 ///
@@ -55,42 +55,47 @@ pub enum Unjoined {
 pub fn joint_fixes(
     rig: &StereoRig,
     members: &[Member],
-    glimpses: &[Glimpse],
+    observations_by_frame: &[ObjectObservations],
     confidence: f64,
 ) -> Result<JointFixes, Unjoined> {
     /// Points that say where an object stands.
     const ENOUGH: usize = 3;
-    let (mut members, mut glimpses) = (members.to_vec(), glimpses.to_vec());
+    let (mut members, mut observations_by_frame) = (members.to_vec(), observations_by_frame.to_vec());
     let (mut displaced, mut left_out) = (Vec::new(), Vec::new());
-    let mut fix = joint_fix(rig, &members, &glimpses)?;
-    let most = |object: usize, glimpses: &[Glimpse]| glimpses.iter().map(|g| g.count(object)).max().unwrap_or(0);
+    let mut fix = joint_fix(rig, &members, &observations_by_frame)?;
+    let max = |object: usize, observations_by_frame: &[ObjectObservations]| {
+        observations_by_frame.iter().map(|g| g.count(object)).max().unwrap_or(0)
+    };
     let limit = |fix: &JointFix| chi_square(fix.freedom.max(1), confidence);
     // Written so that a NaN is refused too.
     while !(fix.chi2 <= limit(&fix)) {
         let seen = (0..members.len()).filter(|&o| members[o].placement != Placement::Displaced);
-        let (held, weak): (Vec<usize>, Vec<usize>) =
-            seen.filter(|&o| most(o, &glimpses) > 0).partition(|&o| most(o, &glimpses) >= ENOUGH);
+        let (held, weak): (Vec<usize>, Vec<usize>) = seen
+            .filter(|&o| max(o, &observations_by_frame) > 0)
+            .partition(|&o| max(o, &observations_by_frame) >= ENOUGH);
         // One object must stand where it is said to: nothing else relates the camera to the site.
         let given_up = if held.len() < 2 { Vec::new() } else { held };
         let without = |&object: &usize| {
-            let (mut members, mut glimpses) = (members.clone(), glimpses.clone());
-            if most(object, &glimpses) < ENOUGH {
-                glimpses.iter_mut().for_each(|glimpse| glimpse.points.retain(|(o, _)| *o != object));
+            let (mut members, mut observations_by_frame) = (members.clone(), observations_by_frame.clone());
+            if max(object, &observations_by_frame) < ENOUGH {
+                observations_by_frame
+                    .iter_mut()
+                    .for_each(|object_observations| object_observations.points.retain(|(o, _)| *o != object));
             } else {
                 members[object].placement = Placement::Displaced;
             }
-            let fix = joint_fix(rig, &members, &glimpses).ok()?;
-            Some((object, members, glimpses, fix))
+            let fix = joint_fix(rig, &members, &observations_by_frame).ok()?;
+            Some((object, members, observations_by_frame, fix))
         };
         let best = given_up.iter().chain(&weak).filter_map(without).min_by(|a, b| a.3.chi2.total_cmp(&b.3.chi2));
         let Some((object, fewer, left, better)) = best else {
             return Err(Unjoined::Contradiction { chi2: fix.chi2, limit: limit(&fix) });
         };
         if fewer[object].placement == Placement::Displaced { &mut displaced } else { &mut left_out }.push(object);
-        (members, glimpses, fix) = (fewer, left, better);
+        (members, observations_by_frame, fix) = (fewer, left, better);
     }
-    let instant = glimpses.len() - 1; // a fix of none is refused above
-    let last = &glimpses[instant];
+    let instant = observations_by_frame.len() - 1; // a fix of none is refused above
+    let last = &observations_by_frame[instant];
     displaced.sort_unstable();
     left_out.sort_unstable();
     Ok(JointFixes {

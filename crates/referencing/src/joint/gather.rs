@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
 
-use super::{Glimpse, JointFix, Member, Placement, joint_fix};
+use super::{JointFix, Member, ObjectObservations, Placement, joint_fix};
 use crate::{
     Acceptance, Candidates, Correspondence, Degenerate, Gate, ModelPoint, Observations, Prior, PriorBound, Target,
     candidates, candidates::chi_square,
@@ -34,12 +34,12 @@ pub enum Unadded {
     #[error(
         "chance gives {expected:.1e} sets of {size} points where the others put them; at most {budget:.1e} are accepted"
     )]
-    Chance {
+    AContrario {
         /// Pairs that were found.
         size: usize,
         /// Expected number of chance sets of this size or larger.
         expected: f64,
-        /// [`Acceptance::chance_budget`].
+        /// [`Acceptance::max_nfa`].
         budget: f64,
     },
     /// Together they are not where the others put them.
@@ -64,7 +64,7 @@ pub enum Unadded {
 /// predicted, with the covariance of both, and a cloud point that no fixed object uses is a candidate within the
 /// Mahalanobis gate of [`Acceptance::confidence`] (Bar-Shalom and Fortmann, *Tracking and Data Association*, 1988),
 /// where Stage 1 has `listed` it, if Stage 1 looked. Pairs are kept that have no other candidate on either
-/// side, where chance gives less than [`Acceptance::chance_budget`] sets of as many, and, since an object's points share the
+/// side, where chance gives less than [`Acceptance::max_nfa`] sets of as many, and, since an object's points share the
 /// error of its survey and all share the camera's, where the joint fix with them has a χ² no larger than is likely.
 /// Objects are added in their order.
 ///
@@ -82,13 +82,13 @@ pub fn gather(
 ) -> Gathered {
     let mut gathered = Gathered::default();
     let members: Vec<Member> = targets.iter().map(Target::member).collect();
-    let mut glimpse = Glimpse::default();
+    let mut object_observations = ObjectObservations::default();
     let mut free: Vec<bool> = cloud.iter().map(|point| point.pixels.is_some()).collect();
     for (object, pairs) in fixed {
-        glimpse.see(*object, &Observations::of(pairs, &targets[*object].points, cloud, Some(rig)));
+        object_observations.see(*object, &Observations::of(pairs, &targets[*object].points, cloud, Some(rig)));
         pairs.iter().for_each(|pair| free[pair.cloud] = false);
     }
-    let Some(mut fix) = agreeing(rig, &members, &glimpse, acceptance.confidence) else { return gathered };
+    let Some(mut fix) = agreeing(rig, &members, &object_observations, acceptance.confidence) else { return gathered };
     let (site_from_camera, covariance) = &fix.site_from_camera[0];
     let mut others: Vec<Gates> = Vec::new();
     for (object, target) in targets.iter().enumerate().filter(|(object, _)| fixed.iter().all(|(o, _)| o != object)) {
@@ -107,7 +107,7 @@ pub fn gather(
         let (object, points) = (gates.object, &targets[gates.object].points);
         let pairs = gates.alone(&claims);
         match gates.bears(&pairs, cloud, &free, acceptance).and_then(|()| {
-            let mut more = glimpse.clone();
+            let mut more = object_observations.clone();
             more.see(object, &Observations::of(&pairs, points, cloud, Some(rig)));
             let next = joint_fix(rig, &members, std::slice::from_ref(&more))?;
             let (size, chi2) = (pairs.len(), next.chi2 - fix.chi2);
@@ -116,7 +116,7 @@ pub fn gather(
             if chi2 <= limit { Ok((more, next)) } else { Err(Unadded::Contradiction { size, chi2, limit }) }
         }) {
             Ok(better) => {
-                (glimpse, fix) = better;
+                (object_observations, fix) = better;
                 gathered.added.push((object, pairs));
             }
             Err(why) => gathered.left_out.push((object, why)),
@@ -127,8 +127,13 @@ pub fn gather(
 }
 
 /// The joint fix of one glimpse, where its χ² is likely.
-fn agreeing(rig: &StereoRig, members: &[Member], glimpse: &Glimpse, confidence: f64) -> Option<JointFix> {
-    let fix = joint_fix(rig, members, std::slice::from_ref(glimpse)).ok()?;
+fn agreeing(
+    rig: &StereoRig,
+    members: &[Member],
+    object_observations: &ObjectObservations,
+    confidence: f64,
+) -> Option<JointFix> {
+    let fix = joint_fix(rig, members, std::slice::from_ref(object_observations)).ok()?;
     (fix.chi2 <= chi_square(fix.freedom.max(1), confidence)).then_some(fix)
 }
 
@@ -196,10 +201,10 @@ impl Gates {
         if pairs.is_empty() {
             return Err(Unadded::Several { points: self.lists.iter().filter(|list| !list.is_empty()).count() });
         }
-        let (size, budget) = (pairs.len(), acceptance.chance_budget);
+        let (size, budget) = (pairs.len(), acceptance.max_nfa);
         let expected = self.expected(size, cloud, free, acceptance.confidence);
         // Written so that a NaN is refused too.
-        if expected <= budget { Ok(()) } else { Err(Unadded::Chance { size, expected, budget }) }
+        if expected <= budget { Ok(()) } else { Err(Unadded::AContrario { size, expected, budget }) }
     }
 
     /// The expected number of sets of `size` points or more that chance puts into the gates: Σ_{j ≥ size} e_j(p), e_j the
@@ -243,7 +248,7 @@ mod tests {
     use super::*;
     use crate::joint::{
         joint_fixes,
-        tests::{MODEL, SIGMA, instant, normal, rig, standing},
+        tests::{MODEL, SIGMA, instant, normal, pose_of, rig},
     };
     use crate::{Site, SiteObject, TargetKind};
     use rand::{RngExt, SeedableRng};
@@ -265,7 +270,7 @@ mod tests {
     fn scene(seen: [usize; 3], survey_sigma: f64, clutter: usize, rng: &mut ChaCha8Rng) -> Scene {
         let rig = rig();
         let (mut objects, mut truly, mut places, mut shows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for (k, stands) in [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)].into_iter().enumerate() {
+        for (k, stands) in [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)].into_iter().enumerate() {
             let stands: Transform<World, Object> = stands.relabel();
             let points: Vec<Point<World>> = MODEL.iter().map(|&at| stands * Point::from(at)).collect();
             let base = [points[0], points[1], points[2]];
@@ -317,13 +322,13 @@ mod tests {
 
         /// The pose relative to the first object by these pairs.
         fn fix(&self, all: &[(usize, Vec<Correspondence>)]) -> crate::RelativePose {
-            let mut glimpse = Glimpse::default();
+            let mut object_observations = ObjectObservations::default();
             for (object, pairs) in all {
                 let points = &self.targets[*object].points;
-                glimpse.see(*object, &Observations::of(pairs, points, &self.cloud, Some(&self.rig)));
+                object_observations.see(*object, &Observations::of(pairs, points, &self.cloud, Some(&self.rig)));
             }
             let members: Vec<Member> = self.targets.iter().map(Target::member).collect();
-            joint_fixes(&self.rig, &members, &[glimpse], 0.9999).unwrap().object_from_camera[0].unwrap()
+            joint_fixes(&self.rig, &members, &[object_observations], 0.9999).unwrap().object_from_camera[0].unwrap()
         }
 
         /// The true pose relative to an object.
@@ -382,7 +387,7 @@ mod tests {
 
     /// Seen to fail when the first of several candidates is taken.
     #[test]
-    fn what_takes_no_part_is_told_why() {
+    fn what_takes_no_part_is_reported_why() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
         let why = |scene: &Scene| scene.gathered().left_out.into_iter().map(|(_, why)| why).collect::<Vec<_>>();
         // One cloud point is twice there: which of the two is the object's is not known.

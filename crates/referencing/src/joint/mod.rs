@@ -22,7 +22,7 @@ use crate::{
 };
 pub use displaced::{JointFixes, RelativePose, Unjoined, joint_fixes};
 pub use gather::{Gathered, Unadded, gather};
-use system::{State, System};
+use system::{JointState, System};
 
 /// What is known of where an object stands in the site's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,12 +50,12 @@ pub struct Member {
 
 /// What one instant saw: points with the index of their object, model places in that object's frame.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Glimpse {
+pub struct ObjectObservations {
     /// The points.
     pub points: Vec<(usize, Observation)>,
 }
 
-impl Glimpse {
+impl ObjectObservations {
     /// Adds points of an object.
     pub fn see(&mut self, object: usize, data: &Observations<'_>) {
         self.points.extend(data.points.iter().map(|point| (object, *point)));
@@ -116,32 +116,38 @@ impl JointFix {
 ///
 /// # Panics
 /// When the index of an object is out of range.
-pub fn joint_fix(rig: &StereoRig, members: &[Member], glimpses: &[Glimpse]) -> Result<JointFix, Degenerate> {
-    let mut poses = Vec::with_capacity(glimpses.len());
-    for glimpse in glimpses {
-        if glimpse.points.iter().any(|(_, point)| point.pixels.is_none()) {
+pub fn joint_fix(
+    rig: &StereoRig,
+    members: &[Member],
+    observations_by_frame: &[ObjectObservations],
+) -> Result<JointFix, Degenerate> {
+    let mut poses = Vec::with_capacity(observations_by_frame.len());
+    for object_observations in observations_by_frame {
+        if object_observations.points.iter().any(|(_, point)| point.pixels.is_none()) {
             return Err(Degenerate::NoPixels);
         }
         let in_site = |(object, point): &(usize, Observation)| Observation {
             model: members[*object].site_from_object * point.model,
             ..*point
         };
-        let data = Observations { points: glimpse.points.iter().map(in_site).collect(), rig: Some(rig) };
+        let data = Observations { points: object_observations.points.iter().map(in_site).collect(), rig: Some(rig) };
         wide_enough(&data)?;
         poses.push(least_squares(&data.points));
     }
     if poses.is_empty() {
         return Err(Degenerate::TooFew { found: 0, needed: 3 });
     }
-    let start = State { poses, places: members.iter().map(|member| member.site_from_object).collect() };
-    let system = System::new(rig, members, glimpses)?;
+    let start = JointState { poses, places: members.iter().map(|member| member.site_from_object).collect() };
+    let system = System::new(rig, members, observations_by_frame)?;
     let (state, chi2) = system.minimize(start)?;
     let covariance = system.covariance(&state)?;
     let block = |at: Option<usize>| {
         at.map_or_else(Matrix6::zeros, |b| Matrix6::from_fn(|i, j| covariance[(6 * b + i, 6 * b + j)]))
     };
     Ok(JointFix {
-        site_from_camera: (0..glimpses.len()).map(|f| (state.poses[f], Covariance6::new(block(Some(f))))).collect(),
+        site_from_camera: (0..observations_by_frame.len())
+            .map(|f| (state.poses[f], Covariance6::new(block(Some(f)))))
+            .collect(),
         site_from_object: (0..members.len())
             .map(|o| (state.places[o], Covariance6::new(block(system.unknown(o)))))
             .collect(),

@@ -4,15 +4,15 @@ use faer::{Mat, Side, linalg::solvers::Solve};
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, StereoRig, Transform, so3::skew};
 
-use super::{Glimpse, Member, Placement};
+use super::{Member, ObjectObservations, Placement};
 use crate::{
     Degenerate, Observation,
-    solve::{PixelTarget, Sightings, Term, converged, inverse, rounding},
+    solve::{PixelTarget, PixelTerms, Term, converged, inverse, rounding},
 };
 
 /// All unknowns: the pose of each instant and the place of each object.
 #[derive(Debug, Clone)]
-pub(super) struct State {
+pub(super) struct JointState {
     pub(super) poses: Vec<Transform<Object, Camera>>,
     pub(super) places: Vec<Transform<Object, Object>>,
 }
@@ -20,8 +20,8 @@ pub(super) struct State {
 /// The problem, its weights made ready.
 pub(super) struct System<'a> {
     members: &'a [Member],
-    glimpses: &'a [Glimpse],
-    sightings: Vec<Sightings<'a>>,
+    observations_by_frame: &'a [ObjectObservations],
+    pixel_terms: Vec<PixelTerms<'a>>,
     /// For each object the block of its six unknowns; `None` where it stands exactly.
     unknowns: Vec<Option<usize>>,
     /// The inverse of each survey's covariance.
@@ -36,23 +36,31 @@ struct Linearized {
 }
 
 /// Steps of one descent.
-const MOST_STEPS: u64 = 100;
+const MAX_STEPS: u64 = 100;
 /// Below this decrement the cost has no digits left to tell better from worse.
 const NEAR: f64 = 1e-4;
 /// Below this decrement nothing is left to gain.
 const NOTHING: f64 = 1e-18;
 
 impl<'a> System<'a> {
-    pub(super) fn new(rig: &'a StereoRig, members: &'a [Member], glimpses: &'a [Glimpse]) -> Result<Self, Degenerate> {
-        let mut sightings = Vec::with_capacity(glimpses.len());
-        for glimpse in glimpses {
-            let points: Vec<Observation> = glimpse.points.iter().map(|(_, point)| *point).collect();
-            let mut seen = Sightings::new(rig);
+    pub(super) fn new(
+        rig: &'a StereoRig,
+        members: &'a [Member],
+        observations_by_frame: &'a [ObjectObservations],
+    ) -> Result<Self, Degenerate> {
+        let mut pixel_terms = Vec::with_capacity(observations_by_frame.len());
+        for object_observations in observations_by_frame {
+            let points: Vec<Observation> = object_observations.points.iter().map(|(_, point)| *point).collect();
+            let mut seen = PixelTerms::new(rig);
             seen.see(&points, PixelTarget::Pixels)?;
-            sightings.push(seen);
+            pixel_terms.push(seen);
         }
-        let seen = |object: usize| glimpses.iter().any(|glimpse| glimpse.points.iter().any(|(o, _)| *o == object));
-        let mut blocks = glimpses.len();
+        let seen = |object: usize| {
+            observations_by_frame
+                .iter()
+                .any(|object_observations| object_observations.points.iter().any(|(o, _)| *o == object))
+        };
+        let mut blocks = observations_by_frame.len();
         let mut unknowns = Vec::with_capacity(members.len());
         let mut surveys = Vec::with_capacity(members.len());
         for (object, member) in members.iter().enumerate() {
@@ -65,7 +73,7 @@ impl<'a> System<'a> {
                 _ => None,
             });
         }
-        Ok(Self { members, glimpses, sightings, unknowns, surveys, blocks })
+        Ok(Self { members, observations_by_frame, pixel_terms, unknowns, surveys, blocks })
     }
 
     /// The block of an object's six unknowns.
@@ -75,20 +83,23 @@ impl<'a> System<'a> {
 
     /// Pixel coordinates and survey numbers, less the unknowns.
     pub(super) fn freedom(&self) -> usize {
-        let pixels: usize = self.glimpses.iter().map(|glimpse| 4 * glimpse.points.len()).sum();
+        let pixels: usize =
+            self.observations_by_frame.iter().map(|object_observations| 4 * object_observations.points.len()).sum();
         (pixels + 6 * self.surveys.iter().flatten().count()).saturating_sub(6 * self.blocks)
     }
 
     /// `live`: weights at the fitted points; else at the measured ones, so that costs can be compared.
-    fn linearize(&self, state: &State, live: bool) -> Result<Linearized, Degenerate> {
+    fn linearize(&self, state: &JointState, live: bool) -> Result<Linearized, Degenerate> {
         let size = 6 * self.blocks;
         let mut all = Linearized { normal: Mat::zeros(size, size), gradient: Mat::zeros(size, 1), cost: 0.0 };
-        for (f, (glimpse, sightings)) in self.glimpses.iter().zip(&self.sightings).enumerate() {
+        for (f, (object_observations, pixel_terms)) in
+            self.observations_by_frame.iter().zip(&self.pixel_terms).enumerate()
+        {
             let (r, t) = (state.poses[f].rotation_matrix(), state.poses[f].translation());
-            for (k, (object, point)) in glimpse.points.iter().enumerate() {
+            for (k, (object, point)) in object_observations.points.iter().enumerate() {
                 let place = &state.places[*object];
                 let at: Vector3<f64> = r.tr_mul(&((*place * point.model).coords - t));
-                let term = if live { sightings.live(k, &at) } else { sightings.frozen(k, &at) };
+                let term = if live { pixel_terms.live(k, &at) } else { pixel_terms.frozen(k, &at) };
                 let term = term.ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
                 all.cost += term.cost;
                 // Under T Exp(ξ) the place moves by [p]× φ − ρ, under S Exp(η) by R (ρ − [P]× φ).
@@ -126,20 +137,20 @@ impl<'a> System<'a> {
         if all.cost.is_finite() { Ok(all) } else { Err(Degenerate::NotFinite) }
     }
 
-    fn moved(&self, state: &State, step: &Mat<f64>) -> State {
+    fn moved(&self, state: &JointState, step: &Mat<f64>) -> JointState {
         let six = |block: usize| Vector6::from_fn(|i, _| step[(6 * block + i, 0)]);
         let poses = state.poses.iter().enumerate().map(|(f, pose)| pose.perturbed(&six(f)).renormalized());
         let places = state.places.iter().zip(&self.unknowns).map(|(place, unknown)| match unknown {
             Some(block) => place.perturbed(&six(*block)).renormalized(),
             None => *place,
         });
-        State { poses: poses.collect(), places: places.collect() }
+        JointState { poses: poses.collect(), places: places.collect() }
     }
 
     /// The least cost near a state, and that cost.
-    pub(super) fn minimize(&self, mut state: State) -> Result<(State, f64), Degenerate> {
+    pub(super) fn minimize(&self, mut state: JointState) -> Result<(JointState, f64), Degenerate> {
         let (mut here, mut damping) = (self.linearize(&state, false)?, 0.0);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let (step, decrement) = here.step(damping)?;
             if damping == 0.0 && decrement <= NEAR {
                 break;
@@ -155,7 +166,7 @@ impl<'a> System<'a> {
             }
         }
         let (mut here, mut last) = (self.linearize(&state, true)?, f64::INFINITY);
-        for taken in 0..MOST_STEPS {
+        for taken in 0..MAX_STEPS {
             let (step, decrement) = here.step(0.0)?;
             if !(decrement < last) {
                 return converged(taken, last.sqrt()).map(|()| (state, here.cost));
@@ -167,11 +178,11 @@ impl<'a> System<'a> {
             }
             last = decrement;
         }
-        converged(MOST_STEPS, last.sqrt()).map(|()| (state, here.cost))
+        converged(MAX_STEPS, last.sqrt()).map(|()| (state, here.cost))
     }
 
     /// The inverse of the normal equations at a state.
-    pub(super) fn covariance(&self, state: &State) -> Result<Mat<f64>, Degenerate> {
+    pub(super) fn covariance(&self, state: &JointState) -> Result<Mat<f64>, Degenerate> {
         let all = self.linearize(state, true)?;
         let factor = all.normal.llt(Side::Lower).map_err(|_| all.singular())?;
         Ok(factor.solve(Mat::<f64>::identity(6 * self.blocks, 6 * self.blocks)))
@@ -223,15 +234,15 @@ impl Linearized {
         let rows = self.normal.nrows();
         let root = |i: usize| if self.normal[(i, i)] > 0.0 { 1.0 / self.normal[(i, i)].sqrt() } else { 0.0 };
         let scaled = Mat::from_fn(rows, rows, |i, j| self.normal[(i.max(j), i.min(j))] * root(i) * root(j));
-        let least = scaled.self_adjoint_eigenvalues(Side::Lower).ok().and_then(|values| values.first().copied());
-        Degenerate::Singular { share: least.unwrap_or(f64::NAN), least: rounding(rows) }
+        let min = scaled.self_adjoint_eigenvalues(Side::Lower).ok().and_then(|values| values.first().copied());
+        Degenerate::Singular { fraction: min.unwrap_or(f64::NAN), min: rounding(rows) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::joint::tests::{glimpse, instant, normal, rig, standing};
+    use crate::joint::tests::{instant, normal, object_observations, pose_of, rig};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::Covariance6;
@@ -244,7 +255,7 @@ mod tests {
     fn derivatives_are_those_of_the_cost() {
         let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(11));
         for _ in 0..20 {
-            let said = [standing(0.0, 0.0), standing(0.8, 0.3), standing(-0.9, 0.2)];
+            let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.3), pose_of(-0.9, 0.2)];
             // As sharp as the pixels, and not the same in all directions: what turns a survey's pull is seen then.
             let mut root = nalgebra::Matrix6::from_fn(|_, _| 2e-4 * normal(&mut rng));
             root.set_diagonal(&Vector6::new(1e-3, 2e-3, 4e-4, 3e-3, 6e-4, 1e-3));
@@ -254,10 +265,10 @@ mod tests {
                 .zip([Placement::Exact, Placement::Surveyed(survey), Placement::Displaced])
                 .map(|(&site_from_object, placement)| Member { site_from_object, placement })
                 .collect();
-            let seen = [0, 1].map(|k| glimpse(&rig, &said, k, 1.0, &mut rng));
+            let seen = [0, 1].map(|k| object_observations(&rig, &said, k, 1.0, &mut rng));
             let system = System::new(&rig, &members, &seen).unwrap();
             let mut off = |size: f64| Vector6::from_fn(|_, _| normal(&mut rng) * size);
-            let state = State {
+            let state = JointState {
                 poses: (0..2).map(|k| instant(k).perturbed(&off(0.02))).collect(),
                 places: said
                     .iter()

@@ -18,7 +18,7 @@ pub(super) fn rig() -> StereoRig {
     StereoRig::new(camera, camera, Transform::exp(&[0.0, 0.0, 0.0, -0.25, 0.0, 0.0].into())).unwrap()
 }
 
-pub(super) fn standing(x: f64, turn: f64) -> Transform<Object, Object> {
+pub(super) fn pose_of(x: f64, turn: f64) -> Transform<Object, Object> {
     Transform::exp(&[0.0, turn, 0.0, x, 0.2 * x, 0.0].into())
 }
 
@@ -32,13 +32,13 @@ pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// What an instant sees of the objects standing truly there, with `noise` times σ of pixel noise.
-pub(super) fn glimpse(
+pub(super) fn object_observations(
     rig: &StereoRig,
     places: &[Transform<Object, Object>],
     k: usize,
     noise: f64,
     rng: &mut ChaCha8Rng,
-) -> Glimpse {
+) -> ObjectObservations {
     let mut points = Vec::new();
     for (object, place) in places.iter().enumerate() {
         for at in MODEL {
@@ -53,17 +53,17 @@ pub(super) fn glimpse(
             points.push((object, Observation { measured, pixels: Some(pixels), model, model_sigma: 0.0 }));
         }
     }
-    Glimpse { points }
+    ObjectObservations { points }
 }
 
 #[test]
 fn one_object_alone_is_the_fix_of_one_object() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(1));
-    let seen = glimpse(&rig, &[standing(0.0, 0.0)], 1, 1.0, &mut rng);
+    let seen = object_observations(&rig, &[pose_of(0.0, 0.0)], 1, 1.0, &mut rng);
     let data = Observations { points: seen.points.iter().map(|(_, p)| *p).collect(), rig: Some(&rig) };
     let expected = StereoReprojection::default().solve(&data).unwrap();
     let covariance = StereoReprojection::default().covariance(&data, &expected).unwrap();
-    let member = Member { site_from_object: standing(0.0, 0.0), placement: Placement::Exact };
+    let member = Member { site_from_object: pose_of(0.0, 0.0), placement: Placement::Exact };
     let fix = joint_fix(&rig, &[member], &[seen]).unwrap();
     let (pose, own) = &fix.site_from_camera[0];
     assert!(expected.error_to(pose).amax() < 1e-10);
@@ -74,11 +74,11 @@ fn one_object_alone_is_the_fix_of_one_object() {
 #[test]
 fn a_displaced_object_is_found_where_it_is() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(2));
-    let (said, truly) = (standing(0.8, 0.0), standing(0.86, 0.05));
-    let seen = [0, 1].map(|k| glimpse(&rig, &[standing(0.0, 0.0), truly], k, 0.0, &mut rng));
+    let (said, truly) = (pose_of(0.8, 0.0), pose_of(0.86, 0.05));
+    let seen = [0, 1].map(|k| object_observations(&rig, &[pose_of(0.0, 0.0), truly], k, 0.0, &mut rng));
     let members = |of_second| {
         [
-            Member { site_from_object: standing(0.0, 0.0), placement: Placement::Exact },
+            Member { site_from_object: pose_of(0.0, 0.0), placement: Placement::Exact },
             Member { site_from_object: said, placement: of_second },
         ]
     };
@@ -92,10 +92,11 @@ fn a_displaced_object_is_found_where_it_is() {
     let misled = joint_fix(&rig, &members(Placement::Exact), &seen).unwrap();
     assert!(misled.chi2 > 100.0 * misled.freedom as f64, "{}", misled.chi2);
     // Alone in view and displaced, it says nothing of the site.
-    let alone = Glimpse { points: seen[0].points.iter().filter(|(object, _)| *object == 1).copied().collect() };
+    let alone =
+        ObjectObservations { points: seen[0].points.iter().filter(|(object, _)| *object == 1).copied().collect() };
     let refused = joint_fix(&rig, &members(Placement::Displaced), &[alone]);
-    assert!(matches!(refused, Err(Degenerate::Singular { share, least }) if share <= least), "{refused:?}");
-    let few = Glimpse { points: seen[0].points[..2].to_vec() };
+    assert!(matches!(refused, Err(Degenerate::Singular { fraction, min }) if fraction <= min), "{refused:?}");
+    let few = ObjectObservations { points: seen[0].points[..2].to_vec() };
     let refused = joint_fix(&rig, &members(Placement::Exact), &[few]);
     assert_eq!(refused, Err(Degenerate::TooFew { found: 2, needed: 3 }));
 }
@@ -110,12 +111,12 @@ fn a_survey_is_one_error_an_object() {
     let draws = 400;
     let (mut nees, mut chi2, mut freedom) = (0.0, 0.0, 0);
     for _ in 0..draws {
-        let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+        let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
         let mut truly = said;
         for place in &mut truly[1..] {
             *place = place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 1e-2));
         }
-        let seen = [0, 1].map(|k| glimpse(&rig, &truly, k, 1.0, &mut rng));
+        let seen = [0, 1].map(|k| object_observations(&rig, &truly, k, 1.0, &mut rng));
         let members: Vec<Member> = said
             .iter()
             .enumerate()
@@ -143,7 +144,7 @@ fn a_survey_is_one_error_an_object() {
 fn relative_to_each_object_the_fix_is_better_than_its_own() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(4));
     let survey = Covariance6::<Object, Object>::isotropic(5e-4, 5e-4);
-    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+    let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
     let members: Vec<Member> = said
         .iter()
         .map(|&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) })
@@ -152,7 +153,7 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
     let (mut nees, mut joint, mut alone) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for _ in 0..draws {
         let truly = said.map(|place| place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 5e-4)));
-        let seen = [0, 1].map(|k| glimpse(&rig, &truly, k, 1.0, &mut rng));
+        let seen = [0, 1].map(|k| object_observations(&rig, &truly, k, 1.0, &mut rng));
         let fixes = joint_fixes(&rig, &members, &seen, 0.9999).expect("a likely draw");
         assert_eq!(fixes.displaced, Vec::<usize>::new());
         for object in 0..3 {
@@ -176,11 +177,11 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
 /// Three surveyed objects, and where they truly stand: the second elsewhere.
 fn one_displaced() -> (Vec<Member>, [Transform<Object, Object>; 3]) {
     let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
-    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+    let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
     let member = |&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) };
     let members: Vec<Member> = said.iter().map(member).collect();
     let mut truly = said;
-    truly[1] = standing(0.86, 0.05);
+    truly[1] = pose_of(0.86, 0.05);
     (members, truly)
 }
 
@@ -188,7 +189,7 @@ fn one_displaced() -> (Vec<Member>, [Transform<Object, Object>; 3]) {
 fn a_survey_that_the_images_contradict_is_given_up() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(5));
     let (members, truly) = one_displaced();
-    let seen = glimpse(&rig, &truly, 1, 1.0, &mut rng);
+    let seen = object_observations(&rig, &truly, 1, 1.0, &mut rng);
     let fixes = joint_fixes(&rig, &members, std::slice::from_ref(&seen), 0.999).unwrap();
     assert_eq!(fixes.displaced, [1]);
     for (object, place) in truly.iter().enumerate() {
@@ -217,7 +218,7 @@ fn a_survey_that_the_images_contradict_is_given_up() {
 #[test]
 fn no_direction_is_known_worse_than_from_the_object_alone() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(9));
-    let said = [standing(0.0, 0.0), standing(0.8, 0.0), standing(-0.9, 0.2)];
+    let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
     for round in 0..40 {
         let survey = 10f64.powf(rng.random_range(-5.0..-1.0));
         let members: Vec<Member> = said
@@ -227,7 +228,7 @@ fn no_direction_is_known_worse_than_from_the_object_alone() {
                 placement: Placement::Surveyed(Covariance6::isotropic(survey, survey)),
             })
             .collect();
-        let mut seen = glimpse(&rig, &said, 1, 0.0, &mut rng);
+        let mut seen = object_observations(&rig, &said, 1, 0.0, &mut rng);
         let few = round % 3;
         let mut shown = [0; 3];
         seen.points.retain(|(object, _)| {
@@ -254,7 +255,7 @@ fn no_direction_is_known_worse_than_from_the_object_alone() {
 fn of_an_object_of_two_points_the_points_are_given_up() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(10));
     let (members, truly) = one_displaced();
-    let mut seen = glimpse(&rig, &truly, 1, 1.0, &mut rng);
+    let mut seen = object_observations(&rig, &truly, 1, 1.0, &mut rng);
     let mut shown = 0;
     seen.points.retain(|(object, _)| {
         shown += usize::from(*object == 1);

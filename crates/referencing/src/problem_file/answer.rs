@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{CoherenceProblem, read};
 use crate::{
-    Acceptance, Alternative, Correspondence, Integrity, Observations, Outcome, Search, Solver, reference::alert_limit,
+    Acceptance, Alternative, Correspondence, Integrity, Observations, Outcome, Search, Solver, accept::alert_limit,
 };
 
 /// The method that answers: what is used, and under which name it is reported.
@@ -20,8 +20,8 @@ pub struct Method<'a> {
     pub solver: (&'a str, &'a dyn Solver),
     /// When an answer is believed.
     pub acceptance: &'a Acceptance,
-    /// Whether the object is sought further off where it is not found ([`CoherenceProblem::attempt_widened`]).
-    pub widen: bool,
+    /// Whether the object is sought further off where it is not found ([`CoherenceProblem::attempt_with_expanding_gates`]).
+    pub expand_gates: bool,
 }
 
 /// A pose that was not the answer, as it is printed.
@@ -110,7 +110,7 @@ pub struct Answer {
     pub file: String,
     /// The problem's name.
     pub id: String,
-    /// `referenced`, `ambiguous`, `unidentified` or `degenerate`.
+    /// `fixed`, `ambiguous`, `rejected` or `degenerate`.
     pub outcome: &'static str,
     /// Why there is no pose.
     pub reason: Option<&'static str>,
@@ -144,7 +144,7 @@ pub struct Answer {
     /// No admissible set has more pairs.
     pub size_bound: Option<usize>,
     /// Expected number of chance sets as large as the one found.
-    pub expected_chance_sets: Option<f64>,
+    pub nfa: Option<f64>,
     /// Pair tests of the search.
     pub tests: Option<u64>,
     /// Whether all was looked at that may lead to a second copy of the object, whole or in part; of searches that look for one.
@@ -180,13 +180,13 @@ pub enum Line {
 pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng: &mut dyn Rng) -> Answer {
     let start = Instant::now();
     let (search, solver) = (method.search.1, method.solver.1);
-    let attempt = match method.widen {
-        true => problem.attempt_widened(search, solver, method.acceptance, rng),
+    let attempt = match method.expand_gates {
+        true => problem.attempt_with_expanding_gates(search, solver, method.acceptance, rng),
         false => problem.attempt(search, solver, method.acceptance, rng),
     };
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
-    let reference = match &attempt.outcome {
-        Outcome::Referenced(reference) => Some(reference),
+    let fix = match &attempt.outcome {
+        Outcome::Fix(fix) => Some(fix),
         _ => None,
     };
     Answer {
@@ -195,22 +195,19 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
         outcome: attempt.outcome.name(),
         reason: attempt.outcome.reason(),
         explanation: attempt.outcome.explanation(),
-        t_cam_obj: reference.map(|reference| rows(&reference.object_from_camera)),
-        covariance: reference.map(|reference| {
-            std::array::from_fn(|row| std::array::from_fn(|column| reference.covariance.matrix[(row, column)]))
-        }),
-        pairs: reference.map(|reference| indices(&reference.pairs)),
-        scale: reference.and_then(|reference| {
-            solver.scale(&Observations::of(&reference.pairs, &problem.model, &problem.cloud, None))
-        }),
-        behind: reference.map_or_else(Vec::new, |reference| {
-            let clouds = reference.pairs.iter().map(|pair| pair.cloud);
+        t_cam_obj: fix.map(|fix| rows(&fix.object_from_camera)),
+        covariance: fix
+            .map(|fix| std::array::from_fn(|row| std::array::from_fn(|column| fix.covariance.matrix[(row, column)]))),
+        pairs: fix.map(|fix| indices(&fix.pairs)),
+        scale: fix.and_then(|fix| solver.scale(&Observations::of(&fix.pairs, &problem.model, &problem.cloud, None))),
+        behind: fix.map_or_else(Vec::new, |fix| {
+            let clouds = fix.pairs.iter().map(|pair| pair.cloud);
             clouds.filter(|&cloud| !(problem.cloud[cloud].position.at.coords.z > 0.0)).collect()
         }),
-        unbelieved: (reference.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
-        integrity: reference.map(|reference| {
+        unbelieved: (fix.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
+        integrity: fix.map(|fix| {
             let (risk, limit) = (method.acceptance.risk, alert_limit(&problem.model, method.acceptance));
-            Support::of(&reference.integrity, risk, limit)
+            Support::of(&fix.integrity, risk, limit)
         }),
         alternatives: match &attempt.outcome {
             Outcome::Ambiguous(all) => all.iter().map(OtherPose::from).collect(),
@@ -223,7 +220,7 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
         margin: attempt.margin(),
         optimal: attempt.optimal,
         size_bound: attempt.size_bound,
-        expected_chance_sets: attempt.expected_chance_sets.filter(|expected| expected.is_finite()),
+        nfa: attempt.nfa.filter(|expected| expected.is_finite()),
         tests: attempt.tests,
         copies_sought: attempt.copies_sought,
         evidence_gap: attempt.evidence_gap,

@@ -9,24 +9,23 @@ use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, Uncertain
 
 use super::json::{RawPrior, Source};
 use crate::{
-    Acceptance, Attempt, Candidates, Gate, ModelPoint, Prior, PriorBound, Problem, Search, Shell, Solver, Tolerance,
-    Unidentified, candidates, reference,
+    Acceptance, Attempt, BoundingBox, Candidates, Gate, ModelPoint, Prior, PriorBound, Problem, Rejected, Search,
+    Solver, Tolerance, candidates, compute_fix, search_with_expanding_gates,
     site::{COINCIDENT, diameter, nearest_two},
-    until_found,
 };
 
 /// The format this reader understands.
 pub const FORMAT: &str = "coherence-problem/1";
 /// More candidate pairs than this are not listed: no search could use them.
-const MOST_CANDIDATES: usize = 4_000_000;
+const MAX_CANDIDATES: usize = 4_000_000;
 /// Of a problem that may have more, so many model points are looked at before pairs are counted.
 const AT_A_TIME: usize = 8;
 
 /// Larger files, and clouds of more points, are refused: with them a problem takes less than 500 MB.
-const MOST_BYTES: u64 = 48 << 20;
-const MOST_POINTS: usize = 500_000;
+const MAX_BYTES: u64 = 48 << 20;
+const MAX_POINTS: usize = 500_000;
 /// A point known worse than this (m) is not known, and the cube of its variance is still a number.
-const MOST_SIGMA: f64 = 1e15;
+const MAX_SIGMA: f64 = 1e15;
 /// Largest coordinate of a model (m): beyond, a double no longer tells micrometres. A cloud may have blunders farther away.
 const FARTHEST: f64 = 1e9;
 
@@ -61,8 +60,8 @@ impl CoherenceProblem {
         }
         let raw = source.read()?;
         for (name, rows) in [("model", &raw.model), ("cloud", &raw.cloud)] {
-            if rows.len() > MOST_POINTS {
-                let remedy = format!("at most {MOST_POINTS} are taken; thin the points out");
+            if rows.len() > MAX_POINTS {
+                let remedy = format!("at most {MAX_POINTS} are taken; thin the points out");
                 let fault = source.fault(format!("too many points in `{name}`"), &[name]);
                 return Err(fault.value(rows.len()).remedy(remedy));
             }
@@ -72,8 +71,8 @@ impl CoherenceProblem {
                 source.fault(format!("model point {index} is no part of an object"), &["model", &index.to_string()]);
             return Err(fault.remedy(format!("give metres, none beyond {FARTHEST:e}")));
         }
-        let is_sigma = |sigma: f64| (0.0..=MOST_SIGMA).contains(&sigma);
-        let of_sigma = || format!("give metres, zero to {MOST_SIGMA:e}");
+        let is_sigma = |sigma: f64| (0.0..=MAX_SIGMA).contains(&sigma);
+        let of_sigma = || format!("give metres, zero to {MAX_SIGMA:e}");
         if !is_sigma(raw.sigma) {
             return Err(source.fault("`sigma` is out of range", &["sigma"]).remedy(of_sigma()));
         }
@@ -100,8 +99,9 @@ impl CoherenceProblem {
         }
         // Two points or fewer are answered "too few", whatever Δ says of them. The diameter is at least
         // the diagonal of the shell over √3: it is computed only where that does not settle it.
-        let shell = Shell::around(model.iter().map(|point| point.at));
-        let settled = shell.map_or(0.0, |shell| shell.max.distance(&shell.min)) / 12f64.sqrt();
+        let bounding_box = BoundingBox::around(model.iter().map(|point| point.at));
+        let settled =
+            bounding_box.map_or(0.0, |bounding_box| bounding_box.max.distance(&bounding_box.min)) / 12f64.sqrt();
         let large = model.len() > 2 && raw.delta > settled && raw.delta > diameter(&model) / 2.0;
         if !(raw.delta > 0.0) || large {
             let greatest = number(diameter(&model) / 2.0);
@@ -140,18 +140,18 @@ impl CoherenceProblem {
     ///
     /// # Errors
     /// There are too many to list.
-    pub fn candidates(&self) -> Result<Candidates, Unidentified> {
+    pub fn candidates(&self) -> Result<Candidates, Rejected> {
         self.candidates_from(self.prior.as_ref())
     }
 
-    fn candidates_from(&self, prior: Option<&Prior>) -> Result<Candidates, Unidentified> {
+    fn candidates_from(&self, prior: Option<&Prior>) -> Result<Candidates, Rejected> {
         let (n, m) = (self.model.len(), self.cloud.len());
         if let Some(pairs) = &self.putative {
             return Ok(Candidates::from_pairs(n, pairs.iter().copied()));
         }
-        let too_large = |size, what| Unidentified::TooLarge { size, what, most: MOST_CANDIDATES, bound: n.min(m) };
+        let too_large = |size, what| Rejected::TooLarge { size, what, max: MAX_CANDIDATES, bound: n.min(m) };
         let all = n.saturating_mul(m);
-        if all <= MOST_CANDIDATES {
+        if all <= MAX_CANDIDATES {
             return Ok(candidates(&self.model, &self.cloud, prior, &Gate::default(), None));
         }
         if prior.is_none() {
@@ -162,7 +162,7 @@ impl CoherenceProblem {
         for part in self.model.chunks(AT_A_TIME) {
             let part = candidates(part, &self.cloud, prior, &Gate::default(), None);
             size += part.pairs();
-            if size > MOST_CANDIDATES {
+            if size > MAX_CANDIDATES {
                 return Err(too_large(size, "candidate pairs or more"));
             }
             found.lists.extend(part.lists);
@@ -183,7 +183,7 @@ impl CoherenceProblem {
 
     /// The same, and where nothing is found in the shells, in larger ones, then without: the object may have been
     /// displaced.
-    pub fn attempt_widened(
+    pub fn attempt_with_expanding_gates(
         &self,
         search: &dyn Search,
         solver: &dyn Solver,
@@ -192,7 +192,7 @@ impl CoherenceProblem {
     ) -> Attempt {
         let method = (search, solver, acceptance);
         let first = self.attempt_from(self.prior.as_ref(), method, rng);
-        until_found(first, self.prior.as_ref(), |prior| self.attempt_from(prior, method, rng))
+        search_with_expanding_gates(first, self.prior.as_ref(), |prior| self.attempt_from(prior, method, rng))
     }
 
     fn attempt_from(
@@ -212,7 +212,7 @@ impl CoherenceProblem {
             tolerance: Tolerance::Fixed(self.delta),
             prior,
         };
-        reference(&problem, search, solver, acceptance, None, rng)
+        compute_fix(&problem, search, solver, acceptance, None, rng)
     }
 }
 
@@ -237,8 +237,8 @@ impl RawPrior {
 /// As [`read_text`], the file has more than 48 MiB, or [`CoherenceProblem::parse`] refuses it.
 pub fn read(file: &Path) -> Result<CoherenceProblem, Fault> {
     let bytes = std::fs::metadata(file).map_or(0, |about| about.len());
-    if bytes > MOST_BYTES {
-        let remedy = format!("at most {} MiB are read; thin the points out", MOST_BYTES >> 20);
+    if bytes > MAX_BYTES {
+        let remedy = format!("at most {} MiB are read; thin the points out", MAX_BYTES >> 20);
         return Err(Fault::new("the problem is too large", file).value(format!("{bytes} bytes")).remedy(remedy));
     }
     CoherenceProblem::parse(&read_text(file)?, file)

@@ -7,7 +7,7 @@ use seafix_component::{Fault, counted, number};
 
 use super::CoherenceProblem;
 use crate::{
-    PriorBound, RigidConsensus, Unidentified,
+    PriorBound, Rejected, RigidConsensus,
     search::{FEWER, NEEDED},
     site::{COINCIDENT, SUSPICIOUS, congruences, nearest_two},
     solve::{ON_A_LINE, second_ratio},
@@ -18,19 +18,19 @@ const FAR_BELOW: f64 = 0.1;
 /// A shell so many times as large as half of the cloud leaves nothing out.
 const FAR_ABOVE: f64 = 10.0;
 /// No object farther off than this (m) is seen.
-const OUT_OF_SIGHT: f64 = 1e6;
+const OUT_OF_VIEW: f64 = 1e6;
 /// Larger models are not looked through for symmetries: their triangles are too many.
-const MOST_LOOKED_THROUGH: usize = 100;
+const MAX_CHECKED: usize = 100;
 /// A motion that leaves each point within so many standard deviations of another is not told from none.
-const TOLD_APART: f64 = 3.0;
+const DISTINGUISHED: f64 = 3.0;
 
 /// The warnings of a file.
-struct Told<'a> {
+struct Hints<'a> {
     file: &'a Path,
     all: Vec<Fault>,
 }
 
-impl Told<'_> {
+impl Hints<'_> {
     fn warn(&mut self, what: &str, value: impl Into<String>, remedy: &str) {
         self.all.push(Fault::new(what, self.file).value(value.into()).remedy(remedy));
     }
@@ -42,31 +42,31 @@ impl CoherenceProblem {
     /// no pose follows; a prior that has the object out of sight, or bounds nothing; coordinates that look like other units than
     /// metres; more candidates than are searched.
     pub fn warnings(&self, file: &Path) -> Vec<Fault> {
-        let mut told = Told { file, all: Vec::new() };
-        self.of_the_model(&mut told);
-        self.of_the_cloud(&mut told);
-        self.of_the_noise(&mut told);
-        self.of_putative(&mut told);
-        let before = told.all.len();
-        self.of_the_prior(&mut told);
-        let sound = told.all.len() == before;
-        self.of_candidates(&mut told, sound);
-        told.all
+        let mut reported = Hints { file, all: Vec::new() };
+        self.of_the_model(&mut reported);
+        self.of_the_cloud(&mut reported);
+        self.of_the_noise(&mut reported);
+        self.of_putative(&mut reported);
+        let before = reported.all.len();
+        self.of_the_prior(&mut reported);
+        let sound = reported.all.len() == before;
+        self.of_candidates(&mut reported, sound);
+        reported.all
     }
 
-    fn of_the_model(&self, told: &mut Told<'_>) {
+    fn of_the_model(&self, reported: &mut Hints<'_>) {
         if self.model.len() < NEEDED {
             let value = counted(self.model.len(), "point");
-            told.warn("the model has too few points", value, "a pose needs at least three");
+            reported.warn("the model has too few points", value, "a pose needs at least three");
         }
         if let Some((i, k, distance)) = nearest_two(&self.model, 2.0 * self.delta) {
             let value = format!("points {i} and {k}, {} m apart, and Δ = {} m", number(distance), number(self.delta));
             let remedy = "one may be taken for the other; keep model points 2Δ apart";
-            told.warn("model points are nearer than 2Δ", value, remedy);
+            reported.warn("model points are nearer than 2Δ", value, remedy);
         }
         if let Some(ratio) = on_a_line(&self.model_places()) {
             let remedy = "a turn about the line changes nothing that is measured; add a point beside it";
-            told.warn("the model's points lie on a line", of_extents(ratio), remedy);
+            reported.warn("the model's points lie on a line", of_extents(ratio), remedy);
         }
         if let Some((degrees, off)) = self.symmetry() {
             let value = format!(
@@ -75,68 +75,68 @@ impl CoherenceProblem {
                 number(self.typical_sigma())
             );
             let remedy = "both poses explain what is seen; only a prior tells them apart, or a point that has no image";
-            told.warn("the model is symmetric", value, remedy);
+            reported.warn("the model is symmetric", value, remedy);
         }
         let extent = self.extent();
         if self.model.len() > 1 && !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
             let value = format!("the model lies in a box of {} m from corner to corner", number(extent));
-            told.warn("units?", value, "coordinates are in metres");
+            reported.warn("units?", value, "coordinates are in metres");
         }
     }
 
-    fn of_the_cloud(&self, told: &mut Told<'_>) {
+    fn of_the_cloud(&self, reported: &mut Hints<'_>) {
         match self.cloud.len() {
-            0 => return told.warn("the cloud has no points", "0 points", "nothing can be found in it"),
+            0 => return reported.warn("the cloud has no points", "0 points", "nothing can be found in it"),
             few if few < NEEDED => {
                 let value = counted(few, "point");
-                return told.warn("the cloud has too few points", value, "a pose needs at least three");
+                return reported.warn("the cloud has too few points", value, "a pose needs at least three");
             }
             _ => {}
         }
         let places = self.cloud_places();
-        let (whole, half) = (extent(&places), extent(&nearer_half(&places)));
-        if whole < COINCIDENT {
-            let value = format!("{} in a box of {} m", counted(places.len(), "point"), number(whole));
-            return told.warn("the cloud's points lie in one place", value, "a pose needs three places");
+        let (full, half) = (extent(&places), extent(&nearer_half(&places)));
+        if full < COINCIDENT {
+            let value = format!("{} in a box of {} m", counted(places.len(), "point"), number(full));
+            return reported.warn("the cloud's points lie in one place", value, "a pose needs three places");
         }
-        if let Some(ratio) = most_on_a_line(&places) {
+        if let Some(ratio) = largest_on_a_line(&places) {
             let remedy = "a turn about the line changes nothing that is measured; no pose follows";
-            told.warn("the cloud's points lie on a line", of_extents(ratio), remedy);
+            reported.warn("the cloud's points lie on a line", of_extents(ratio), remedy);
         }
         let nearest = nearest_two(&self.model, f64::INFINITY).map_or(0.0, |(.., distance)| distance);
-        if nearest > whole + self.delta {
-            let (whole, nearest) = (number(whole), number(nearest));
-            let value = format!("a box of {whole} m from corner to corner, and no two model points within {nearest} m");
-            told.warn("the cloud is smaller than the model", value, "coordinates of both are in metres");
-        } else if whole < SUSPICIOUS[0] || half > SUSPICIOUS[1] {
-            let (points, size) = if whole < SUSPICIOUS[0] { ("the cloud", whole) } else { ("half of the cloud", half) };
+        if nearest > full + self.delta {
+            let (full, nearest) = (number(full), number(nearest));
+            let value = format!("a box of {full} m from corner to corner, and no two model points within {nearest} m");
+            reported.warn("the cloud is smaller than the model", value, "coordinates of both are in metres");
+        } else if full < SUSPICIOUS[0] || half > SUSPICIOUS[1] {
+            let (points, size) = if full < SUSPICIOUS[0] { ("the cloud", full) } else { ("half of the cloud", half) };
             let value = format!("{points} lies in a box of {} m from corner to corner", number(size));
-            told.warn("units?", value, "coordinates are in metres");
+            reported.warn("units?", value, "coordinates are in metres");
         } else if self.model.len() > 1 && all_apart(&places, self.extent() + self.delta) {
             let value = format!("no two cloud points are within the {} m of the model's box", number(self.extent()));
-            told.warn("the cloud's points are too far apart", value, "coordinates of both are in metres");
+            reported.warn("the cloud's points are too far apart", value, "coordinates of both are in metres");
         }
     }
 
-    fn of_the_noise(&self, told: &mut Told<'_>) {
+    fn of_the_noise(&self, reported: &mut Hints<'_>) {
         let variances = || self.cloud.iter().map(|point| point.position.covariance.diagonal());
         let remedy = "nothing is measured better than a nanometre; give its standard deviation";
         if let Some(exact) = variances().position(|all| all.max() == 0.0) {
-            told.warn("points without noise", format!("cloud point {exact}, 0 m"), remedy);
+            reported.warn("points without noise", format!("cloud point {exact}, 0 m"), remedy);
         }
         if let Some((point, all)) = variances().enumerate().find(|(_, all)| all.min() == 0.0 && all.max() > 0.0) {
             let row: Vec<String> = all.iter().map(|variance| number(variance.sqrt())).collect();
             let value = format!("cloud point {point}, [{}] m", row.join(", "));
-            told.warn("an axis without noise beside others", value, remedy);
+            reported.warn("an axis without noise beside others", value, remedy);
         }
         let (sigma, extent) = (self.typical_sigma(), self.extent());
         if self.model.len() >= NEEDED && sigma > extent {
             let value =
                 format!("σ = {} m, and the model's box has {} m from corner to corner", number(sigma), number(extent));
-            told.warn("noise larger than the model", value, "standard deviations are in metres");
+            reported.warn("noise larger than the model", value, "standard deviations are in metres");
         } else if self.delta < FAR_BELOW * sigma {
             let value = format!("Δ = {} m, σ = {} m", number(self.delta), number(sigma));
-            told.warn(
+            reported.warn(
                 "`delta` is far below the noise",
                 value,
                 "hardly a true pair would agree; 3√2 σ lets nearly all agree",
@@ -144,7 +144,7 @@ impl CoherenceProblem {
         }
     }
 
-    fn of_putative(&self, told: &mut Told<'_>) {
+    fn of_putative(&self, reported: &mut Hints<'_>) {
         let Some(pairs) = &self.putative else { return };
         let models = distinct(pairs.iter().map(|(model, _)| *model));
         let clouds = distinct(pairs.iter().map(|(_, cloud)| *cloud));
@@ -153,21 +153,21 @@ impl CoherenceProblem {
                 let points = counted(used.len(), &format!("{which} point"));
                 let value = format!("{} of {points}", counted(pairs.len(), "pair"));
                 let remedy = "a pose needs pairs of three; leave `putative` out to have all considered";
-                return told.warn("`putative` has too few pairs", value, remedy);
+                return reported.warn("`putative` has too few pairs", value, remedy);
             }
         }
         for (which, used, all) in [("model", &models, self.model_places()), ("cloud", &clouds, self.cloud_places())] {
             let places: Vec<Vector3<f64>> = used.iter().map(|&index| all[index]).collect();
             // Of all points on a line it is told already.
-            if let Some(ratio) = most_on_a_line(&places).filter(|_| most_on_a_line(&all).is_none()) {
+            if let Some(ratio) = largest_on_a_line(&places).filter(|_| largest_on_a_line(&all).is_none()) {
                 let value = format!("{} of {}, {}", used.len(), all.len(), of_extents(ratio));
                 let remedy = "no pose follows from pairs on a line; give pairs of a point beside it";
-                told.warn(&format!("the {which} points of `putative` lie on a line"), value, remedy);
+                reported.warn(&format!("the {which} points of `putative` lie on a line"), value, remedy);
             }
         }
     }
 
-    fn of_the_prior(&self, told: &mut Told<'_>) {
+    fn of_the_prior(&self, reported: &mut Hints<'_>) {
         let Some(prior) = &self.prior else { return };
         if self.model.is_empty() {
             return;
@@ -176,57 +176,57 @@ impl CoherenceProblem {
         let predicted = || self.model.iter().map(|point| (camera_from_object * point.at).coords);
         let nearest = predicted().map(|place| place.amax()).fold(f64::INFINITY, f64::min);
         let foremost = predicted().map(|place| place.z).fold(f64::NEG_INFINITY, f64::max);
-        if nearest > OUT_OF_SIGHT {
+        if nearest > OUT_OF_VIEW {
             let value = format!("its nearest point is {} m off along an axis", number(nearest));
-            told.warn("the prior puts the object far away", value, "`T_cam_obj` is camera_from_object, in metres");
+            reported.warn("the prior puts the object far away", value, "`T_cam_obj` is camera_from_object, in metres");
         } else if foremost <= 0.0 {
             let value = format!("its foremost point has z = {} m", number(foremost));
             let remedy = "`T_cam_obj` is camera_from_object, z forward; is it the inverse?";
-            told.warn("the prior puts the whole object behind the camera", value, remedy);
+            reported.warn("the prior puts the whole object behind the camera", value, remedy);
         }
         let PriorBound::Box(half) = prior.bound else { return };
         let cloud = extent(&nearer_half(&self.cloud_places()));
         if half < FAR_BELOW * self.typical_sigma() {
             let value = format!("{} m, σ = {} m", number(half), number(self.typical_sigma()));
             let remedy = "hardly a true point would lie in its shell; give by how much the pose may be off";
-            told.warn("`prior.shell_half_m` is far below the noise", value, remedy);
+            reported.warn("`prior.shell_half_m` is far below the noise", value, remedy);
         } else if half > FAR_ABOVE * cloud && self.cloud.len() >= NEEDED {
             let value = format!("{} m, and half of the cloud lies in a box of {} m", number(half), number(cloud));
             let remedy =
                 "every point is in every shell; it is in metres, and a prior that bounds nothing is best left out";
-            told.warn("`prior.shell_half_m` leaves nothing out", value, remedy);
+            reported.warn("`prior.shell_half_m` leaves nothing out", value, remedy);
         }
     }
 
     /// A motion of the model onto itself that noise does not tell from none: its turn (°), and how far (m) its points then lie from
     /// those whose places they take.
     fn symmetry(&self) -> Option<(f64, f64)> {
-        if self.model.len() > MOST_LOOKED_THROUGH {
+        if self.model.len() > MAX_CHECKED {
             return None;
         }
-        let whole = congruences(&self.model).into_iter().filter(|found| found.broken_by.is_empty());
-        let mut told =
-            whole.map(|found| (found.motion.rotation().angle().to_degrees(), found.farthest_off(&self.model)));
-        told.find(|(_, off)| *off <= TOLD_APART * self.typical_sigma())
+        let full = congruences(&self.model).into_iter().filter(|found| found.broken_by.is_empty());
+        let mut reported =
+            full.map(|found| (found.motion.rotation().angle().to_degrees(), found.farthest_off(&self.model)));
+        reported.find(|(_, off)| *off <= DISTINGUISHED * self.typical_sigma())
     }
 
     /// What a search would not begin with; shells without points are told only of a prior with which nothing else is wrong.
-    fn of_candidates(&self, told: &mut Told<'_>, sound: bool) {
-        let most = RigidConsensus::default().most_pairs;
+    fn of_candidates(&self, reported: &mut Hints<'_>, sound: bool) {
+        let max = RigidConsensus::default().max_pairs;
         let mut many = |pairs: String| {
-            told.warn("too many candidate pairs", format!("{pairs}, and `rigid-consensus` takes {most}"), FEWER);
+            reported.warn("too many candidate pairs", format!("{pairs}, and `rigid-consensus` takes {max}"), FEWER);
         };
         match self.candidates() {
-            Err(Unidentified::TooLarge { size, .. }) => many(format!("{size} at least")),
+            Err(Rejected::TooLarge { size, .. }) => many(format!("{size} at least")),
             Err(refused) => many(refused.to_string()),
-            Ok(found) if found.pairs() > most => many(found.pairs().to_string()),
+            Ok(found) if found.pairs() > max => many(found.pairs().to_string()),
             Ok(found) => {
                 let enough = self.model.len() >= NEEDED && self.cloud.len() >= NEEDED;
                 let some = found.with_candidates();
                 if sound && enough && self.putative.is_none() && some < NEEDED {
                     let value = format!("{some} of {} model points", self.model.len());
                     let remedy = "a pose needs three; is `T_cam_obj` camera_from_object, and the shell large enough?";
-                    told.warn("too few shells of the prior hold a cloud point", value, remedy);
+                    reported.warn("too few shells of the prior hold a cloud point", value, remedy);
                 }
             }
         }
@@ -258,8 +258,8 @@ impl CoherenceProblem {
 fn extent(places: &[Vector3<f64>]) -> f64 {
     let corner =
         |outer: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| places.iter().copied().reduce(|a, b| outer(&a, &b));
-    let (least, greatest) = (corner(Vector3::inf), corner(Vector3::sup));
-    least.zip(greatest).map_or(0.0, |(least, greatest)| (greatest - least).norm())
+    let (min, greatest) = (corner(Vector3::inf), corner(Vector3::sup));
+    min.zip(greatest).map_or(0.0, |(min, greatest)| (greatest - min).norm())
 }
 
 /// Second extent over first of three points or more that lie on a line, or in one place.
@@ -276,7 +276,7 @@ fn of_extents(ratio: f64) -> String {
 }
 
 /// [`on_a_line`] of points of which a few may be blunders: far away, they make any cloud long and thin.
-fn most_on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
+fn largest_on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
     on_a_line(places).filter(|_| on_a_line(&nearer_half(places)).is_some())
 }
 

@@ -1,6 +1,6 @@
 //! The association graph with weights: how well each coherent pair of pairs agrees.
 
-use super::{Unidentified, association::Association, grow::most_possible};
+use super::{Rejected, association::Association, grow::max_possible};
 use crate::Problem;
 
 /// A symmetric matrix over the vertices, zero where they are not coherent; its upper half by rows.
@@ -16,13 +16,13 @@ impl Affinity {
     /// Edges weighed by `weight` of their difference over Δ, 0 to 1.
     ///
     /// # Errors
-    /// [`Unidentified::TooLarge`]: they are more than `most`.
+    /// [`Rejected::TooLarge`]: they are more than `max`.
     pub(super) fn of(
         problem: &Problem<'_>,
         graph: &Association,
-        most: usize,
+        max: usize,
         weight: impl Fn(f64) -> f64,
-    ) -> Result<Self, Unidentified> {
+    ) -> Result<Self, Rejected> {
         let count = graph.vertices.len();
         let mut all = Self { starts: vec![0], columns: Vec::new(), weights: Vec::new() };
         for v in 0..count {
@@ -34,14 +34,9 @@ impl Affinity {
                 all.columns.push(w as u32);
                 all.weights.push(weight(if off > 0.0 { off / delta } else { 0.0 }) as f32);
             }
-            if all.columns.len() > most {
+            if all.columns.len() > max {
                 let size = (0..count).map(|v| graph.adjacency.ones(v).filter(|&w| w > v).count()).sum();
-                return Err(Unidentified::TooLarge {
-                    size,
-                    what: "coherent pairs",
-                    most,
-                    bound: most_possible(problem),
-                });
+                return Err(Rejected::TooLarge { size, what: "coherent pairs", max, bound: max_possible(problem) });
             }
             all.starts.push(all.columns.len());
         }

@@ -8,7 +8,7 @@ use crate::{Correspondence, Observations, Problem, Tolerance, solve::least_squar
 /// Points nearer to a line than this share of the model's extent fix no rotation about it.
 const SLIM: f64 = 0.05;
 /// The least set that tells something of a pose; fewer pairs agree everywhere.
-const LEAST: usize = 3;
+const MIN: usize = 3;
 
 /// Whether it is proved that every admissible set as large as `best` or larger, seen or not, has
 /// more than a third of `best`'s number of pairs where the rigid motion of `best` puts them, and not all of
@@ -34,14 +34,14 @@ pub(super) fn all_alike(
     fitting.sort_unstable();
     fitting.dedup();
     let places: Vec<Vector3<f64>> = fitting.iter().map(|&i| problem.model[i].at.coords).collect();
-    let shared = (best.len() / 3).max(most_along_a_line(&places));
-    let least = best.len().saturating_sub(shared);
-    if shared < LEAST || least < LEAST {
+    let shared = (best.len() / 3).max(largest_along_a_line(&places));
+    let min = best.len().saturating_sub(shared);
+    if shared < MIN || min < MIN {
         return (false, 0);
     }
     let rest = graph.restricted(|pair| !fits(pair));
     let mut cliques = clique::Search::new(problem, &rest, sense, budget);
-    let largest = cliques.run(least, 1);
+    let largest = cliques.run(min, 1);
     (largest.complete && largest.found.is_empty(), budget - cliques.left())
 }
 
@@ -57,19 +57,19 @@ pub(super) fn slack(problem: &Problem<'_>, pair: Correspondence) -> f64 {
 }
 
 /// The most points along one line through two of them.
-fn most_along_a_line(points: &[Vector3<f64>]) -> usize {
+fn largest_along_a_line(points: &[Vector3<f64>]) -> usize {
     let extent = points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f64::max);
-    let mut most = points.len().min(2);
+    let mut max = points.len().min(2);
     for (i, a) in points.iter().enumerate() {
         for (j, b) in points.iter().enumerate().skip(i + 1) {
             let Some(along) = (b - a).try_normalize(0.0) else { continue };
             // Nearer than this to the line, which is squared once and for all.
             let slim = (SLIM * extent).powi(2);
             let others = points.iter().skip(j + 1).filter(|p| (*p - a).cross(&along).norm_squared() <= slim);
-            most = most.max(2 + others.count());
+            max = max.max(2 + others.count());
         }
     }
-    most
+    max
 }
 
 #[cfg(test)]
@@ -83,9 +83,9 @@ mod tests {
     #[test]
     fn points_along_a_line_are_counted() {
         let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
-        assert_eq!(most_along_a_line(&[]), 0);
-        assert_eq!(most_along_a_line(&[at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0)]), 2);
-        assert_eq!(most_along_a_line(&[at(0.0, 1.0), at(0.0, 0.0), at(1.0, 0.01), at(2.0, 0.0), at(1.0, 1.0)]), 3);
+        assert_eq!(largest_along_a_line(&[]), 0);
+        assert_eq!(largest_along_a_line(&[at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0)]), 2);
+        assert_eq!(largest_along_a_line(&[at(0.0, 1.0), at(0.0, 0.0), at(1.0, 0.01), at(2.0, 0.0), at(1.0, 1.0)]), 3);
     }
 
     /// Twelve points seen where they are, and as many again beside them (`shift`, m), each pair a candidate.

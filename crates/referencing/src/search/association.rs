@@ -37,24 +37,24 @@ impl Association {
             sites.push(&model, &cloud, reach, sure);
         }
         sites.pad();
-        let twins = twins(&vertices);
-        let (mut looks, mut next_model) = (Vec::new(), 0);
+        let same_cloud = same_cloud(&vertices);
+        let (mut comparisons, mut next_model) = (Vec::new(), 0);
         for (a, &pair) in vertices.iter().enumerate() {
             while next_model < vertices.len() && vertices[next_model].model == pair.model {
                 next_model += 1;
             }
             let first = next_model / LANES;
-            sites.look(a, first, &mut looks);
+            sites.compare(a, first, &mut comparisons);
             // One model point, one cloud point: never two of them.
-            let same = twins[a].iter().copied().filter(|&b| b >= next_model);
-            same.for_each(|b| looks[b / LANES - first].near &= !(1 << (b % LANES)));
-            if let Some(look) = looks.first_mut() {
-                look.near &= u64::MAX << (next_model % LANES);
+            let same = same_cloud[a].iter().copied().filter(|&b| b >= next_model);
+            same.for_each(|b| comparisons[b / LANES - first].near &= !(1 << (b % LANES)));
+            if let Some(compare) = comparisons.first_mut() {
+                compare.near &= u64::MAX << (next_model % LANES);
             }
             let row = adjacency.row_mut(a);
-            for (word, look) in (first..).zip(&looks) {
-                let mut edges = look.near & look.sure;
-                for k in ones_of(0, look.near & !look.sure) {
+            for (word, compare) in (first..).zip(&comparisons) {
+                let mut edges = compare.near & compare.sure;
+                for k in ones_of(0, compare.near & !compare.sure) {
                     let agree = problem.coherent(pair, vertices[word * LANES + k]);
                     edges |= u64::from(agree) << k;
                 }
@@ -84,23 +84,23 @@ pub(super) fn reach(problem: &Problem<'_>, pair: Correspondence) -> (f64, f64) {
     // Distances themselves are rounded, by a share of the coordinates.
     let (known, measured) = (problem.model[pair.model].at, problem.cloud[pair.cloud].position.at);
     let rounding = 1e-13 * known.coords.amax().max(measured.coords.amax());
-    let most = problem.share_of_delta(pair) * (1.0 + 1e-9) + rounding;
-    let least = match problem.tolerance {
+    let max = problem.fraction_of_delta(pair) * (1.0 + 1e-9) + rounding;
+    let min = match problem.tolerance {
         Tolerance::Fixed(delta) => 0.5 * delta * (1.0 - 1e-9) - rounding,
         Tolerance::Sigmas(_) => -1.0,
     };
-    (most, least)
+    (max, min)
 }
 
 /// For each vertex the later ones of the same cloud point.
-fn twins(vertices: &[Correspondence]) -> Vec<Vec<usize>> {
+fn same_cloud(vertices: &[Correspondence]) -> Vec<Vec<usize>> {
     let mut by_cloud: Vec<usize> = (0..vertices.len()).collect();
     by_cloud.sort_by_key(|&v| (vertices[v].cloud, v));
-    let mut twins = vec![Vec::new(); vertices.len()];
+    let mut same_cloud = vec![Vec::new(); vertices.len()];
     for same in by_cloud.chunk_by(|&a, &b| vertices[a].cloud == vertices[b].cloud) {
-        same.iter().enumerate().for_each(|(place, &v)| twins[v] = same[place + 1..].to_vec());
+        same.iter().enumerate().for_each(|(place, &v)| same_cloud[v] = same[place + 1..].to_vec());
     }
-    twins
+    same_cloud
 }
 
 /// Points by their coordinates; of equals the first.

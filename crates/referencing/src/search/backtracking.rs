@@ -5,11 +5,11 @@ use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, MOST_TIES, NEEDED, Search, Unidentified,
+    BUDGET, Identification, MAX_TIES, NEEDED, Rejected, Search,
     association::vertices,
     bounded,
-    grow::{feasible, most_possible, so_far},
-    maximum_clique::least_residual,
+    grow::{feasible, max_possible, so_far},
+    maximum_clique::min_residual,
     orientation::{Sense, wholly_mirrored},
     volumes::Volumes,
 };
@@ -32,12 +32,12 @@ pub(crate) struct Backtracking {
     /// Pair tests.
     pub(crate) budget: u64,
     /// More candidate pairs than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for Backtracking {
     fn default() -> Self {
-        Self { orientation: true, bound: true, budget: BUDGET, most_pairs: 40_000 }
+        Self { orientation: true, bound: true, budget: BUDGET, max_pairs: 40_000 }
     }
 }
 
@@ -56,13 +56,13 @@ impl Component for Backtracking {
     ];
 
     fn check(&self) -> Result<(), String> {
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
 impl Search for Backtracking {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
         let volumes = Volumes::of(problem, &vertices);
         let mut run = Run {
@@ -76,16 +76,16 @@ impl Search for Backtracking {
             found: Vec::new(),
             cap: 1,
         };
-        let (budget, possible) = (self.budget, most_possible(problem));
-        let complete = run.largest(1, MOST_TIES);
+        let (budget, possible) = (self.budget, max_possible(problem));
+        let complete = run.largest(1, MAX_TIES);
         let mut ties = std::mem::take(&mut run.found);
         let size = ties.first().map_or(0, Vec::len);
         if size < NEEDED {
             let tests = self.budget - run.left;
             return match complete {
-                true => Err(Unidentified::NoConsensus { best: size, needed: NEEDED }),
+                true => Err(Rejected::NoConsensus { best: size, needed: NEEDED }),
                 false => {
-                    let ended = Unidentified::Budget { budget, best: size, bound: possible, tests };
+                    let ended = Rejected::Budget { budget, best: size, bound: possible, tests };
                     so_far(problem, self.orientation, ended)
                 }
             };
@@ -96,7 +96,7 @@ impl Search for Backtracking {
             run.sense = if size == NEEDED { Sense::Any } else { Sense::Mirrored };
             run.largest(size + 1, 1);
             if let Some(image) = run.found.first().map(|set| run.pairs(set)) {
-                let mirrored = Unidentified::Mirrored { best: image.len(), proved: complete };
+                let mirrored = Rejected::Mirrored { best: image.len(), proved: complete };
                 match (size == NEEDED, wholly_mirrored(problem, &image)) {
                     (true, true) => return Err(mirrored),
                     (_, true) => undecided = Some(mirrored),
@@ -106,18 +106,18 @@ impl Search for Backtracking {
         }
         let tests = self.budget - run.left;
         ties.sort();
-        let rivals_complete = complete && ties.len() < MOST_TIES;
-        let best = ties.swap_remove(least_residual(problem, &vertices, &ties));
+        let alternatives_complete = complete && ties.len() < MAX_TIES;
+        let best = ties.swap_remove(min_residual(problem, &vertices, &ties));
         let bound = if complete { size } else { possible };
-        if !rivals_complete && undecided.is_none() {
-            undecided = Some(Unidentified::Budget { budget, best: size, bound, tests });
+        if !alternatives_complete && undecided.is_none() {
+            undecided = Some(Rejected::Budget { budget, best: size, bound, tests });
         }
         Ok(Identification {
-            rivals: ties.iter().map(|set| run.pairs(set)).collect(),
-            rivals_complete,
+            alternatives: ties.iter().map(|set| run.pairs(set)).collect(),
+            alternatives_complete,
             optimal: complete,
             undecided,
-            belief: None,
+            posterior: None,
             ..Identification::unproved(run.pairs(&best), bound, tests)
         })
     }
@@ -141,9 +141,9 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// The largest sets of at least `least` members, up to `cap`; whether it came to its end.
-    fn largest(&mut self, least: usize, cap: usize) -> bool {
-        (self.best, self.cap, self.found) = (least, cap, Vec::new());
+    /// The largest sets of at least `min` members, up to `cap`; whether it came to its end.
+    fn largest(&mut self, min: usize, cap: usize) -> bool {
+        (self.best, self.cap, self.found) = (min, cap, Vec::new());
         let all: Vec<usize> = (0..self.vertices.len()).collect();
         // Points with few candidates first: what they contradict is struck early.
         let mut lists: Vec<Vec<usize>> =
@@ -227,6 +227,6 @@ mod tests {
     fn settings_out_of_range_are_refused() {
         assert_eq!(Backtracking::default().check(), Ok(()));
         assert!(Backtracking { budget: 0, ..Backtracking::default() }.check().is_err());
-        assert!(Backtracking { most_pairs: 2, ..Backtracking::default() }.check().is_err());
+        assert!(Backtracking { max_pairs: 2, ..Backtracking::default() }.check().is_err());
     }
 }

@@ -73,9 +73,9 @@ impl BitSet {
 
     /// Removes every number below `from`.
     pub(super) fn drop_below(&mut self, from: usize) {
-        let whole = (from / WORD).min(self.words.len());
-        self.words[..whole].fill(0);
-        if let Some(word) = self.words.get_mut(whole) {
+        let full_words = (from / WORD).min(self.words.len());
+        self.words[..full_words].fill(0);
+        if let Some(word) = self.words.get_mut(full_words) {
             *word &= u64::MAX << (from % WORD);
         }
     }
@@ -218,15 +218,15 @@ mod tests {
     #[test]
     fn the_upper_half_is_mirrored() {
         for size in [0, 1, 63, 64, 65, 200] {
-            let (mut half, mut whole) = (BitMatrix::zeros(size), BitMatrix::zeros(size));
+            let (mut half, mut full_words) = (BitMatrix::zeros(size), BitMatrix::zeros(size));
             for i in 0..size {
                 for j in (i + 1..size).filter(|j| (i * 31 + j * 17) % 7 < 2) {
                     half.row_mut(i)[j / WORD] |= 1 << (j % WORD);
-                    whole.connect(i, j);
+                    full_words.connect(i, j);
                 }
             }
             half.mirror_upper();
-            assert_eq!(half.bits, whole.bits, "{size}");
+            assert_eq!(half.bits, full_words.bits, "{size}");
         }
     }
 

@@ -3,15 +3,15 @@
 use super::{
     association::Association,
     bitset::{BitSet, degrees},
-    fours::Fours,
     local::{Local, Workshop},
     orientation::Sense,
+    quadruples::Quadruples,
     volumes::Volumes,
 };
 use crate::Problem;
 
 /// Up to this many points every four are tested for orientation while the set grows.
-pub(super) const MOST_ORIENTED: usize = 40;
+pub(super) const MAX_ORIENTED: usize = 40;
 /// Further points are tested against the first so many only (four of 500 points are 2.6 · 10⁹), and
 /// the answer is proved by a complete test at the end, or not called optimal.
 const FEW_ORIENTED: usize = 16;
@@ -41,7 +41,7 @@ pub(super) struct Cliques {
 pub(super) struct Search<'a> {
     graph: &'a Association,
     volumes: Volumes<'a>,
-    fours: Fours,
+    quadruples: Quadruples,
     /// What fours are refused.
     sense: Sense,
     /// Tests left: a vertex coloured, or four points tested for orientation.
@@ -53,7 +53,7 @@ pub(super) struct Search<'a> {
     /// Vertices that can be in a clique of interest.
     alive: BitSet,
     /// Least size that is still of interest.
-    least: usize,
+    min: usize,
     /// The largest cliques so far.
     found: Vec<Vec<usize>>,
     /// With 1 the first of the largest is kept, with more all of the size of interest.
@@ -78,13 +78,13 @@ impl<'a> Search<'a> {
         Self {
             graph,
             volumes: Volumes::of(problem, &graph.vertices),
-            fours: Fours::default(),
+            quadruples: Quadruples::default(),
             sense,
             left: budget,
             degree,
             models_from,
             alive,
-            least: 1,
+            min: 1,
             found: Vec::new(),
             cap: 1,
             work: Workshop::of(graph),
@@ -101,12 +101,12 @@ impl<'a> Search<'a> {
         self.sense = sense;
     }
 
-    /// The largest cliques of at least `least` members: the first that was found and up to `cap` that tie with it.
+    /// The largest cliques of at least `min` members: the first that was found and up to `cap` that tie with it.
     ///
     /// First one of the largest and the proof that none is larger, then what ties with it, with the
     /// budget that is left.
-    pub(super) fn run(&mut self, least: usize, cap: usize) -> Cliques {
-        (self.least, self.cap, self.found) = (least.max(1), 1, Vec::new());
+    pub(super) fn run(&mut self, min: usize, cap: usize) -> Cliques {
+        (self.min, self.cap, self.found) = (min.max(1), 1, Vec::new());
         self.greedy();
         self.peel();
         let mut open = Vec::new();
@@ -122,7 +122,7 @@ impl<'a> Search<'a> {
                 open.push(vertex);
             }
             if self.within(vertex, &local).is_err() {
-                (complete, bound) = (false, self.most_possible());
+                (complete, bound) = (false, self.max_possible());
                 break;
             }
         }
@@ -133,12 +133,12 @@ impl<'a> Search<'a> {
         Cliques { found, all, bound: bound.min(self.partite()).max(best), complete }
     }
 
-    /// The neighbours after a vertex, as far as a clique of `least` members with it may need them.
-    fn later_neighbours(&mut self, vertex: usize, least: usize) -> Local {
+    /// The neighbours after a vertex, as far as a clique of `min` members with it may need them.
+    fn later_neighbours(&mut self, vertex: usize, min: usize) -> Local {
         let mut neighbours = self.alive.clone();
         neighbours.intersect(self.graph.adjacency.row(vertex));
         neighbours.drop_below(vertex + 1);
-        Local::of(self.graph, neighbours, least, &mut self.work)
+        Local::of(self.graph, neighbours, min, &mut self.work)
     }
 
     /// Takes vertices away that have too few neighbours left for a clique as large as the largest.
@@ -160,7 +160,7 @@ impl<'a> Search<'a> {
     }
 
     /// A bound on every clique, by cores: k members have k − 1 neighbours among themselves.
-    fn most_possible(&self) -> usize {
+    fn max_possible(&self) -> usize {
         let mut sorted = self.degree.clone();
         sorted.sort_unstable_by(|a, b| b.cmp(a));
         // The most vertices of which each has one neighbour less than they are.
@@ -169,7 +169,7 @@ impl<'a> Search<'a> {
 
     /// The size of the largest so far, or the least that is of interest.
     fn tie(&self) -> usize {
-        self.found.first().map_or(self.least, Vec::len)
+        self.found.first().map_or(self.min, Vec::len)
     }
 
     /// Adds all cliques as large as the largest, from the vertices at these places of the order;
@@ -178,11 +178,11 @@ impl<'a> Search<'a> {
         if cap <= 1 || self.found.is_empty() {
             return false;
         }
-        (self.least, self.cap) = (self.tie(), cap);
+        (self.min, self.cap) = (self.tie(), cap);
         let first = self.found.pop().expect("there is one");
         let mut all = true;
         for &vertex in open {
-            let local = self.later_neighbours(vertex, self.least);
+            let local = self.later_neighbours(vertex, self.min);
             if self.within(vertex, &local).is_err() {
                 all = false;
                 break;
@@ -213,8 +213,8 @@ impl<'a> Search<'a> {
         for &start in starts.iter().take(STARTS) {
             let mut neighbours = BitSet::full(self.degree.len());
             neighbours.intersect(self.graph.adjacency.row(start));
-            let local = Local::of(self.graph, neighbours, self.least, &mut self.work);
-            if local.vertices.len() + 1 < self.least {
+            let local = Local::of(self.graph, neighbours, self.min, &mut self.work);
+            if local.vertices.len() + 1 < self.min {
                 continue;
             }
             let mut clique = vec![start];
@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
                     clique.push(local.vertices[next]);
                 }
             }
-            if clique.len() >= self.least {
+            if clique.len() >= self.min {
                 self.keep(&clique);
             }
             if self.left <= reserve {
@@ -241,15 +241,15 @@ impl<'a> Search<'a> {
             return false;
         }
         let members = decisive_members(clique);
-        self.left = self.left.saturating_sub(Fours::count(members.len()));
-        self.fours.refused(&self.volumes, self.sense, members, vertex)
+        self.left = self.left.saturating_sub(Quadruples::count(members.len()));
+        self.quadruples.refused(&self.volumes, self.sense, members, vertex)
     }
 
     fn keep(&mut self, clique: &[usize]) {
         let mut clique = clique.to_vec();
         clique.sort_unstable();
         if self.cap == 1 {
-            self.least = clique.len() + 1;
+            self.min = clique.len() + 1;
             self.found.clear();
         }
         self.found.push(clique);
@@ -257,24 +257,24 @@ impl<'a> Search<'a> {
 
     /// The cliques of `vertex` and some of its later neighbours.
     fn within(&mut self, vertex: usize, local: &Local) -> Result<(), Stop> {
-        if self.least <= 1 {
+        if self.min <= 1 {
             self.keep(&[vertex]);
         }
-        if local.vertices.len() + 1 < self.least {
+        if local.vertices.len() + 1 < self.min {
             return Ok(());
         }
         self.expand(local, &mut vec![vertex], BitSet::full(local.vertices.len()))
     }
 
     fn expand(&mut self, local: &Local, clique: &mut Vec<usize>, mut candidates: BitSet) -> Result<(), Stop> {
-        let needed = |search: &Self| search.least.saturating_sub(clique.len());
+        let needed = |search: &Self| search.min.saturating_sub(clique.len());
         if local.partite(&candidates) < needed(self) {
             return Ok(());
         }
         let coloured = local.colour(&candidates, needed(self).max(1));
         self.spend(candidates.len() as u64)?;
         for (vertex, colour) in coloured.into_iter().rev() {
-            if colour < self.least.saturating_sub(clique.len()) {
+            if colour < self.min.saturating_sub(clique.len()) {
                 return Ok(());
             }
             let mut next = candidates.clone();
@@ -282,7 +282,7 @@ impl<'a> Search<'a> {
             candidates.remove(vertex);
             self.orient(local, clique, local.vertices[vertex], &mut next)?;
             clique.push(local.vertices[vertex]);
-            if clique.len() >= self.least {
+            if clique.len() >= self.min {
                 self.keep(clique);
                 if self.cap > 1 && self.found.len() >= self.cap {
                     return Err(Stop);
@@ -324,7 +324,7 @@ impl<'a> Search<'a> {
 
 /// The members that a further point is tested against.
 pub(super) fn decisive_members(clique: &[usize]) -> &[usize] {
-    if clique.len() < MOST_ORIENTED { clique } else { &clique[..FEW_ORIENTED] }
+    if clique.len() < MAX_ORIENTED { clique } else { &clique[..FEW_ORIENTED] }
 }
 
 #[cfg(test)]

@@ -5,10 +5,10 @@ use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    BUDGET, Identification, NEEDED, Rejected, Search,
     association::by_coordinates,
     bounded,
-    grow::{feasible, most_possible},
+    grow::{feasible, max_possible},
     structural_coherence::{Enumeration, Samples},
 };
 use crate::Problem;
@@ -28,12 +28,12 @@ pub(crate) struct CompleteEnumeration {
     /// Pair tests before it gives up.
     pub(crate) budget: u64,
     /// More pairs of a model and a cloud point than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for CompleteEnumeration {
     fn default() -> Self {
-        Self { samples: Samples::Combinations, orientation: true, budget: BUDGET, most_pairs: 4_000_000 }
+        Self { samples: Samples::Combinations, orientation: true, budget: BUDGET, max_pairs: 4_000_000 }
     }
 }
 
@@ -52,12 +52,12 @@ impl Component for CompleteEnumeration {
     ];
 
     fn check(&self) -> Result<(), String> {
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
 impl Search for CompleteEnumeration {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         // Without a prior candidates are no shells: they say which pairs there may be.
         if problem.prior.is_none() {
             let points = by_coordinates(problem.model.iter().map(|point| point.at));
@@ -67,25 +67,25 @@ impl Search for CompleteEnumeration {
                     .map(|k| list[k])
                     .collect()
             };
-            feasible(problem, self.most_pairs)?;
+            feasible(problem, self.max_pairs)?;
             let lists: Vec<(usize, Vec<usize>)> = points
                 .into_iter()
                 .map(|i| (i, at(&problem.candidates.lists[i])))
                 .filter(|(_, list)| !list.is_empty())
                 .collect();
             let lists = lists.iter().map(|(i, list)| (*i, list.as_slice())).collect();
-            let longest = most_possible(problem);
+            let longest = max_possible(problem);
             return Enumeration::of(problem, lists, self.samples, self.orientation, self.budget).run(longest);
         }
         let (points, cloud) = (problem.model.len(), problem.cloud.len());
         let with_candidates = if cloud > 0 { points } else { 0 };
         if with_candidates < NEEDED {
-            return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
+            return Err(Rejected::TooFew { with_candidates, needed: NEEDED });
         }
         let size = points.saturating_mul(cloud);
-        if size > self.most_pairs {
-            let (most, bound) = (self.most_pairs, points.min(cloud));
-            return Err(Unidentified::TooLarge { size, what: "candidate pairs", most, bound });
+        if size > self.max_pairs {
+            let (max, bound) = (self.max_pairs, points.min(cloud));
+            return Err(Rejected::TooLarge { size, what: "candidate pairs", max, bound });
         }
         let all = by_coordinates(problem.cloud.iter().map(|point| point.position.at));
         let points = by_coordinates(problem.model.iter().map(|point| point.at));
@@ -102,6 +102,6 @@ mod tests {
     fn settings_out_of_range_are_refused() {
         assert_eq!(CompleteEnumeration::default().check(), Ok(()));
         assert!(CompleteEnumeration { budget: 0, ..CompleteEnumeration::default() }.check().is_err());
-        assert!(CompleteEnumeration { most_pairs: 2, ..CompleteEnumeration::default() }.check().is_err());
+        assert!(CompleteEnumeration { max_pairs: 2, ..CompleteEnumeration::default() }.check().is_err());
     }
 }

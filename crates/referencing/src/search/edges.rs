@@ -18,7 +18,7 @@ pub(super) struct Sites {
 
 /// What one look at 64 pairs says, a bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Look {
+pub(super) struct EdgeBits {
     /// The distances may agree.
     pub(super) near: u64,
     /// They do.
@@ -38,28 +38,28 @@ impl Sites {
 
     /// Fills the last word.
     pub(super) fn pad(&mut self) {
-        let whole = self.reach.len().next_multiple_of(LANES);
-        self.at.iter_mut().for_each(|column| column.resize(whole, f64::NAN));
-        self.reach.resize(whole, f64::NAN);
-        self.sure.resize(whole, f64::NAN);
+        let full = self.reach.len().next_multiple_of(LANES);
+        self.at.iter_mut().for_each(|column| column.resize(full, f64::NAN));
+        self.reach.resize(full, f64::NAN);
+        self.sure.resize(full, f64::NAN);
     }
 
     /// Vertex `a` with the vertices of word `from` and all later words.
-    pub(super) fn look(&self, a: usize, from: usize, looks: &mut Vec<Look>) {
-        look(&self.at.each_ref().map(Vec::as_slice), &self.reach, &self.sure, a, from, looks);
+    pub(super) fn compare(&self, a: usize, from: usize, comparisons: &mut Vec<EdgeBits>) {
+        compare(&self.at.each_ref().map(Vec::as_slice), &self.reach, &self.sure, a, from, comparisons);
     }
 }
 
 /// With A and B the squared distances in model and cloud, |√A − √B| ≤ r ⇔ A + B ≤ r² or
 /// (A − B)² ≤ r² (2 (A + B) − r²): no root is drawn.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn look(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, looks: &mut Vec<Look>) {
+fn compare(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, comparisons: &mut Vec<EdgeBits>) {
     let [mx, my, mz, cx, cy, cz] = at.map(|column| column[from * LANES..].as_chunks::<LANES>().0);
     let (reach_of, sure_of) =
         (reach[from * LANES..].as_chunks::<LANES>().0, sure[from * LANES..].as_chunks::<LANES>().0);
     let here = at.map(|column| column[a]);
     let (my_reach, my_sure) = (reach[a], sure[a]);
-    looks.clear();
+    comparisons.clear();
     for word in 0..mx.len() {
         let (mx, my, mz, cx, cy, cz) = (&mx[word], &my[word], &mz[word], &cx[word], &cy[word], &cz[word]);
         let (reach, sure) = (&reach_of[word], &sure_of[word]);
@@ -78,7 +78,7 @@ fn look(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, lo
             let s2 = s * s;
             certain[k] = u8::from((s > 0.0) & ((sum <= s2) | (square <= s2 * (twice - s2))));
         }
-        looks.push(Look { near: packed(&near), sure: packed(&certain) });
+        comparisons.push(EdgeBits { near: packed(&near), sure: packed(&certain) });
     }
 }
 
@@ -94,8 +94,8 @@ mod tests {
             sites.push(&Vector3::new(known, 0.0, 0.0), &Vector3::new(0.0, measured, 0.0), 0.5, 0.3);
         }
         sites.pad();
-        let mut looks = Vec::new();
-        sites.look(0, 0, &mut looks);
-        assert_eq!(looks, [Look { near: 0b00111, sure: 0b00011 }]);
+        let mut comparisons = Vec::new();
+        sites.compare(0, 0, &mut comparisons);
+        assert_eq!(comparisons, [EdgeBits { near: 0b00111, sure: 0b00011 }]);
     }
 }

@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, Search, Unidentified, bounded,
+    BUDGET, Identification, Rejected, Search, bounded,
     closest::Closest,
     grow::{conclude_within, feasible},
     pose::refined,
@@ -32,12 +32,12 @@ pub(crate) struct Gicp {
     /// Distances before it ends.
     pub(crate) budget: u64,
     /// More candidate pairs than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for Gicp {
     fn default() -> Self {
-        Self { orientation: true, keep: 0.6, iterations: 50, budget: BUDGET, most_pairs: 4_000_000 }
+        Self { orientation: true, keep: 0.6, iterations: 50, budget: BUDGET, max_pairs: 4_000_000 }
     }
 }
 
@@ -53,10 +53,10 @@ impl Component for Gicp {
 
     fn check(&self) -> Result<(), String> {
         // Written so that a NaN is refused too.
-        let share = self.keep > 0.0 && self.keep <= 1.0;
-        in_range(share, "keep", self.keep, "a share above 0, at most 1")?;
+        let fraction = self.keep > 0.0 && self.keep <= 1.0;
+        in_range(fraction, "keep", self.keep, "a share above 0, at most 1")?;
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
@@ -64,9 +64,9 @@ impl Component for Gicp {
 const FLOOR: f64 = 1e-6;
 
 impl Search for Gicp {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
-        let prior = problem.prior.ok_or(Unidentified::NoPrior)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
+        let prior = problem.prior.ok_or(Rejected::NoPrior)?;
         let &Self { keep, iterations, budget, .. } = self;
         let distance = |pose: &Transform<Object, Camera>, pair: Correspondence| {
             let (known, seen) = (&problem.model[pair.model], &problem.cloud[pair.cloud].position);

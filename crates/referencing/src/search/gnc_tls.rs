@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Identification, NEEDED, Search, Unidentified,
+    Identification, NEEDED, Rejected, Search,
     alike::slack,
     association::vertices,
     grow::{conclude, feasible},
@@ -27,12 +27,12 @@ pub(crate) struct GncTls {
     /// By how much μ grows a step.
     pub(crate) growth: f64,
     /// More candidate pairs than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for GncTls {
     fn default() -> Self {
-        Self { orientation: true, growth: 1.4, most_pairs: 1_000_000 }
+        Self { orientation: true, growth: 1.4, max_pairs: 1_000_000 }
     }
 }
 
@@ -53,13 +53,13 @@ impl Component for GncTls {
     fn check(&self) -> Result<(), String> {
         let grows = self.growth > 1.0 && self.growth <= 10.0;
         in_range(grows, "growth", self.growth, "a number above 1, at most 10")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")
+        in_range(self.max_pairs >= NEEDED, "max-pairs", self.max_pairs, "3 or more candidate pairs")
     }
 }
 
 impl Search for GncTls {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
         // From the convex problem alone: sets of three of thousands of pairs, most of them wrong, lead nowhere.
         let solver = solve::GncTls { growth: self.growth, triples: 0, ..solve::GncTls::default() };
@@ -86,6 +86,6 @@ mod tests {
     fn settings_out_of_range_are_refused() {
         assert_eq!(GncTls::default().check(), Ok(()));
         assert!(GncTls { growth: 1.0, ..GncTls::default() }.check().is_err());
-        assert!(GncTls { most_pairs: 2, ..GncTls::default() }.check().is_err());
+        assert!(GncTls { max_pairs: 2, ..GncTls::default() }.check().is_err());
     }
 }

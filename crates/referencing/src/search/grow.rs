@@ -3,22 +3,22 @@
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{
-    Identification, NEEDED, Unidentified,
+    Identification, NEEDED, Rejected,
     association::vertices,
-    clique::{MOST_ORIENTED, decisive_members},
-    fours::Fours,
+    clique::{MAX_ORIENTED, decisive_members},
     orientation::{Sense, unmirrored, wholly_mirrored},
-    pose::share,
+    pose::fraction,
+    quadruples::Quadruples,
     volumes::Volumes,
 };
 use crate::{Correspondence, Problem};
 
 /// Pairs that are looked at where any set will do, and how many sets are begun with them.
-const MOST_GROWN: usize = 2048;
+const MAX_GROWN: usize = 2048;
 const BEGINNINGS: usize = 16;
 
 /// Fours that are tested of a set too large for all of them.
-const MOST_FOURS: u64 = 1_000_000;
+const MAX_QUADRUPLES: u64 = 1_000_000;
 
 /// Takes each pair in turn that is coherent with all that were taken and makes no refused four with three of
 /// them; in the order taken.
@@ -29,9 +29,9 @@ pub(super) fn grow(
     tests: &mut u64,
 ) -> Vec<Correspondence> {
     let volumes = Volumes::of(problem, ranked);
-    let (mut taken, mut fours) = (Vec::new(), Fours::default());
+    let (mut taken, mut quadruples) = (Vec::new(), Quadruples::default());
     for next in 0..ranked.len() {
-        if admits(&volumes, &mut fours, sense, &taken, next, tests) {
+        if admits(&volumes, &mut quadruples, sense, &taken, next, tests) {
             taken.push(next);
         }
     }
@@ -41,7 +41,7 @@ pub(super) fn grow(
 /// Whether a vertex is coherent with every one taken and makes no refused four with three of them.
 pub(super) fn admits(
     volumes: &Volumes<'_>,
-    fours: &mut Fours,
+    quadruples: &mut Quadruples,
     sense: Sense,
     taken: &[usize],
     next: usize,
@@ -57,8 +57,8 @@ pub(super) fn admits(
         return true;
     }
     let members = decisive_members(taken);
-    *tests += Fours::count(members.len());
-    !fours.refused(volumes, sense, members, next)
+    *tests += Quadruples::count(members.len());
+    !quadruples.refused(volumes, sense, members, next)
 }
 
 /// The answer of a strategy that prefers these pairs in this order: the admissible set they grow into.
@@ -67,29 +67,29 @@ pub(super) fn admits(
 /// three are no answer, more are not to be believed by themselves.
 ///
 /// # Errors
-/// [`Unidentified::NotFound`] with fewer than three, [`Unidentified::Mirrored`].
+/// [`Rejected::NotFound`] with fewer than three, [`Rejected::Mirrored`].
 pub(super) fn conclude(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
     orientation: bool,
     mut tests: u64,
-) -> Result<Identification, Unidentified> {
+) -> Result<Identification, Rejected> {
     let sense = if orientation { Sense::Proper } else { Sense::Any };
     let mut pairs = grow(problem, ranked, sense, &mut tests);
     if pairs.len() < NEEDED {
-        return Err(Unidentified::NotFound { bound: most_possible(problem), needed: NEEDED });
+        return Err(Rejected::NotFound { bound: max_possible(problem), needed: NEEDED });
     }
     let mut undecided = None;
     if orientation {
-        if pairs.len() > MOST_ORIENTED {
-            let kept = unmirrored(problem, pairs, MOST_FOURS);
+        if pairs.len() > MAX_ORIENTED {
+            let kept = unmirrored(problem, pairs, MAX_QUADRUPLES);
             tests += kept.tests;
             pairs = kept.pairs;
         }
         let all: Vec<_> = pairs.iter().copied().chain(vertices(problem)).collect();
         let image = grow(problem, &all, Sense::Mirrored, &mut tests);
-        if image.len() > pairs.len() && wholly_mirrored(problem, &image[..image.len().min(MOST_ORIENTED)]) {
-            let mirrored = Unidentified::Mirrored { best: image.len(), proved: false };
+        if image.len() > pairs.len() && wholly_mirrored(problem, &image[..image.len().min(MAX_ORIENTED)]) {
+            let mirrored = Rejected::Mirrored { best: image.len(), proved: false };
             if pairs.len() <= NEEDED {
                 return Err(mirrored);
             }
@@ -97,32 +97,32 @@ pub(super) fn conclude(
         }
     }
     pairs.sort_unstable();
-    Ok(Identification { undecided, ..Identification::unproved(pairs, most_possible(problem), tests) })
+    Ok(Identification { undecided, ..Identification::unproved(pairs, max_possible(problem), tests) })
 }
 
 /// The same of a search that may have ended at its budget, having spent so many tests: that is why its set is not to be believed,
 /// or why there is none.
 ///
 /// # Errors
-/// As [`conclude`], but [`Unidentified::Budget`] alone where the budget ended.
+/// As [`conclude`], but [`Rejected::Budget`] alone where the budget ended.
 pub(super) fn conclude_within(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
     orientation: bool,
     tests: u64,
     ended: Option<(u64, u64)>,
-) -> Result<Identification, Unidentified> {
+) -> Result<Identification, Rejected> {
     let concluded = conclude(problem, ranked, orientation, tests);
     let Some((budget, tests)) = ended else { return concluded };
-    let ended = |best, bound| Unidentified::Budget { budget, best, bound, tests };
+    let ended = |best, bound| Rejected::Budget { budget, best, bound, tests };
     match concluded {
         Ok(found) => {
             let ended = ended(found.pairs.len(), found.size_bound);
             Ok(Identification { undecided: found.undecided.or(Some(ended)), ..found })
         }
-        Err(Unidentified::NotFound { bound, .. }) => Err(ended(0, bound)),
+        Err(Rejected::NotFound { bound, .. }) => Err(ended(0, bound)),
         // What is left of a mirror image may be all that the ranking had so far.
-        Err(Unidentified::Mirrored { .. }) => so_far(problem, orientation, ended(0, most_possible(problem))),
+        Err(Rejected::Mirrored { .. }) => so_far(problem, orientation, ended(0, max_possible(problem))),
         Err(other) => Err(other),
     }
 }
@@ -132,14 +132,10 @@ pub(super) fn conclude_within(
 ///
 /// # Errors
 /// The reason itself, where nothing grows.
-pub(super) fn so_far(
-    problem: &Problem<'_>,
-    orientation: bool,
-    why: Unidentified,
-) -> Result<Identification, Unidentified> {
-    let Unidentified::Budget { budget, bound, mut tests, .. } = why else { return Err(why) };
+pub(super) fn so_far(problem: &Problem<'_>, orientation: bool, why: Rejected) -> Result<Identification, Rejected> {
+    let Rejected::Budget { budget, bound, mut tests, .. } = why else { return Err(why) };
     let sense = if orientation { Sense::Proper } else { Sense::Any };
-    let some = evenly(vertices(problem), MOST_GROWN);
+    let some = evenly(vertices(problem), MAX_GROWN);
     let sets = grown(&some, problem, sense, &mut tests);
     let Some(pairs) = sets.into_iter().next() else { return Err(why) };
     if orientation {
@@ -149,20 +145,20 @@ pub(super) fn so_far(
             return Err(why);
         }
     }
-    let undecided = Some(Unidentified::Budget { budget, best: pairs.len(), bound, tests });
+    let undecided = Some(Rejected::Budget { budget, best: pairs.len(), bound, tests });
     Ok(Identification { undecided, ..Identification::unproved(pairs, bound, tests) })
 }
 
 /// Admissible sets of pairs that contradict a pose, for comparison with it, the largest first.
 pub(crate) fn elsewhere(problem: &Problem<'_>, pose: &Transform<Object, Camera>) -> Vec<Vec<Correspondence>> {
-    let contradicts = |pair: &Correspondence| !(share(problem, pose, *pair) <= 1.0);
+    let contradicts = |pair: &Correspondence| !(fraction(problem, pose, *pair) <= 1.0);
     let against: Vec<Correspondence> = vertices(problem).into_iter().filter(contradicts).collect();
-    grown(&evenly(against, MOST_GROWN), problem, Sense::Proper, &mut 0)
+    grown(&evenly(against, MAX_GROWN), problem, Sense::Proper, &mut 0)
 }
 
 /// So many of them, taken evenly.
-fn evenly(all: Vec<Correspondence>, most: usize) -> Vec<Correspondence> {
-    let step = all.len().div_ceil(most).max(1);
+fn evenly(all: Vec<Correspondence>, max: usize) -> Vec<Correspondence> {
+    let step = all.len().div_ceil(max).max(1);
     all.into_iter().step_by(step).collect()
 }
 
@@ -182,7 +178,7 @@ fn grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, tests: &mut
 }
 
 /// No set has more pairs than there are model points with candidates, nor than there are candidates.
-pub(super) fn most_possible(problem: &Problem<'_>) -> usize {
+pub(super) fn max_possible(problem: &Problem<'_>) -> usize {
     let mut clouds: Vec<usize> = problem.candidates.lists.iter().flatten().copied().collect();
     clouds.sort_unstable();
     clouds.dedup();
@@ -192,16 +188,16 @@ pub(super) fn most_possible(problem: &Problem<'_>) -> usize {
 /// What every search asks first: three model points with candidates, and no more pairs than it can hold.
 ///
 /// # Errors
-/// [`Unidentified::TooFew`], [`Unidentified::TooLarge`].
-pub(super) fn feasible(problem: &Problem<'_>, most_pairs: usize) -> Result<(), Unidentified> {
+/// [`Rejected::TooFew`], [`Rejected::TooLarge`].
+pub(super) fn feasible(problem: &Problem<'_>, max_pairs: usize) -> Result<(), Rejected> {
     let with_candidates = problem.candidates.with_candidates();
     if with_candidates < NEEDED {
-        return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
+        return Err(Rejected::TooFew { with_candidates, needed: NEEDED });
     }
     let size = problem.candidates.pairs();
-    if size > most_pairs {
-        let bound = most_possible(problem);
-        return Err(Unidentified::TooLarge { size, what: "candidate pairs", most: most_pairs, bound });
+    if size > max_pairs {
+        let bound = max_possible(problem);
+        return Err(Rejected::TooLarge { size, what: "candidate pairs", max: max_pairs, bound });
     }
     Ok(())
 }

@@ -5,13 +5,13 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
     bounded,
-    fours::Fours,
-    grow::{admits, conclude, feasible, most_possible, so_far},
+    grow::{admits, conclude, feasible, max_possible, so_far},
     orientation::Sense,
-    pose::{fitted, share},
+    pose::{fitted, fraction},
+    quadruples::Quadruples,
     volumes::Volumes,
 };
 use crate::{Correspondence, Problem};
@@ -33,12 +33,12 @@ pub(crate) struct InterpretationTree {
     /// Pair tests.
     pub(crate) budget: u64,
     /// More candidate pairs than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for InterpretationTree {
     fn default() -> Self {
-        Self { orientation: true, enough: 1.0, budget: BUDGET, most_pairs: 40_000 }
+        Self { orientation: true, enough: 1.0, budget: BUDGET, max_pairs: 40_000 }
     }
 }
 
@@ -57,15 +57,15 @@ impl Component for InterpretationTree {
     ];
 
     fn check(&self) -> Result<(), String> {
-        let share = self.enough > 0.0 && self.enough <= 1.0;
-        in_range(share, "enough", self.enough, "a share above 0, at most 1")?;
-        bounded(self.budget, self.most_pairs)
+        let fraction = self.enough > 0.0 && self.enough <= 1.0;
+        in_range(fraction, "enough", self.enough, "a share above 0, at most 1")?;
+        bounded(self.budget, self.max_pairs)
     }
 }
 
 impl Search for InterpretationTree {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
         let volumes = Volumes::of(problem, &vertices);
         let numbers: Vec<usize> = (0..vertices.len()).collect();
@@ -75,7 +75,7 @@ impl Search for InterpretationTree {
             problem,
             vertices: &vertices,
             volumes: &volumes,
-            fours: Fours::default(),
+            quadruples: Quadruples::default(),
             levels: &levels,
             settings: self,
             enough,
@@ -85,7 +85,7 @@ impl Search for InterpretationTree {
         tree.descend(0, &mut Vec::new());
         if tree.best.is_empty() && tree.tests >= self.budget {
             let (budget, tests) = (self.budget, tree.tests);
-            let ended = Unidentified::Budget { budget, best: 0, bound: most_possible(problem), tests };
+            let ended = Rejected::Budget { budget, best: 0, bound: max_possible(problem), tests };
             return so_far(problem, self.orientation, ended);
         }
         let ranked: Vec<Correspondence> = tree.best.iter().map(|&v| vertices[v]).collect();
@@ -97,7 +97,7 @@ struct Tree<'a> {
     problem: &'a Problem<'a>,
     vertices: &'a [Correspondence],
     volumes: &'a Volumes<'a>,
-    fours: Fours,
+    quadruples: Quadruples,
     levels: &'a [&'a [usize]],
     settings: &'a InterpretationTree,
     enough: usize,
@@ -117,7 +117,7 @@ impl Tree<'_> {
         }
         let sense = if self.settings.orientation { Sense::Proper } else { Sense::Any };
         for &vertex in self.levels[level] {
-            if admits(self.volumes, &mut self.fours, sense, taken, vertex, &mut self.tests) {
+            if admits(self.volumes, &mut self.quadruples, sense, taken, vertex, &mut self.tests) {
                 taken.push(vertex);
                 self.descend(level + 1, taken);
                 taken.pop();
@@ -130,7 +130,7 @@ impl Tree<'_> {
         let pairs: Vec<Correspondence> = taken.iter().map(|&v| self.vertices[v]).collect();
         self.tests += pairs.len() as u64;
         let pose = fitted(self.problem, &pairs);
-        pose.is_some_and(|pose| pairs.iter().all(|&pair| share(self.problem, &pose, pair) <= 1.0))
+        pose.is_some_and(|pose| pairs.iter().all(|&pair| fraction(self.problem, &pose, pair) <= 1.0))
     }
 }
 

@@ -6,12 +6,12 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
     bounded,
-    fours::Fours,
-    grow::{admits, conclude, feasible, most_possible, so_far},
+    grow::{admits, conclude, feasible, max_possible, so_far},
     orientation::Sense,
+    quadruples::Quadruples,
     volumes::Volumes,
 };
 use crate::{Correspondence, Problem, Tolerance, candidates::chi_square};
@@ -35,12 +35,12 @@ pub(crate) struct JointCompatibility {
     /// Pair tests.
     pub(crate) budget: u64,
     /// More candidate pairs than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for JointCompatibility {
     fn default() -> Self {
-        Self { orientation: true, confidence: 0.99, budget: BUDGET, most_pairs: 40_000 }
+        Self { orientation: true, confidence: 0.99, budget: BUDGET, max_pairs: 40_000 }
     }
 }
 
@@ -62,13 +62,13 @@ impl Component for JointCompatibility {
     fn check(&self) -> Result<(), String> {
         let confident = self.confidence > 0.0 && self.confidence < 1.0;
         in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
 impl Search for JointCompatibility {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
         let volumes = Volumes::of(problem, &vertices);
         let numbers: Vec<usize> = (0..vertices.len()).collect();
@@ -78,7 +78,7 @@ impl Search for JointCompatibility {
             problem,
             vertices: &vertices,
             volumes: &volumes,
-            fours: Fours::default(),
+            quadruples: Quadruples::default(),
             levels: &levels,
             settings: self,
             limits,
@@ -88,7 +88,7 @@ impl Search for JointCompatibility {
         run.descend(0, &mut Vec::new(), &Joint::default());
         if run.best.0.len() < NEEDED && run.tests >= self.budget {
             let (budget, best, tests) = (self.budget, run.best.0.len(), run.tests);
-            let ended = Unidentified::Budget { budget, best, bound: most_possible(problem), tests };
+            let ended = Rejected::Budget { budget, best, bound: max_possible(problem), tests };
             return so_far(problem, self.orientation, ended);
         }
         let ranked: Vec<Correspondence> = run.best.0.iter().map(|&v| vertices[v]).collect();
@@ -112,7 +112,7 @@ struct Run<'a> {
     problem: &'a Problem<'a>,
     vertices: &'a [Correspondence],
     volumes: &'a Volumes<'a>,
-    fours: Fours,
+    quadruples: Quadruples,
     levels: &'a [&'a [usize]],
     settings: &'a JointCompatibility,
     /// Quantiles of χ² by degrees of freedom.
@@ -129,14 +129,14 @@ impl Run<'_> {
         if taken.len() > self.best.0.len() || (taken.len() == self.best.0.len() && joint.square < self.best.1) {
             self.best = (taken.clone(), joint.square);
         }
-        let most = taken.len() + self.levels.len() - level;
-        let hopeless = most < self.best.0.len() || (most == self.best.0.len() && joint.square >= self.best.1);
+        let max = taken.len() + self.levels.len() - level;
+        let hopeless = max < self.best.0.len() || (max == self.best.0.len() && joint.square >= self.best.1);
         if level == self.levels.len() || hopeless || self.tests >= self.settings.budget {
             return;
         }
         let sense = if self.settings.orientation { Sense::Proper } else { Sense::Any };
         for &vertex in self.levels[level] {
-            if !admits(self.volumes, &mut self.fours, sense, taken, vertex, &mut self.tests) {
+            if !admits(self.volumes, &mut self.quadruples, sense, taken, vertex, &mut self.tests) {
                 continue;
             }
             if let Some(longer) = self.joined(joint, taken, vertex) {

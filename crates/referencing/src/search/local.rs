@@ -30,31 +30,31 @@ pub(super) struct Workshop {
 
 impl Workshop {
     pub(super) fn of(graph: &Association) -> Self {
-        let most = |of: fn(&crate::Correspondence) -> usize| graph.vertices.iter().map(of).max().map_or(0, |m| m + 1);
+        let max = |of: fn(&crate::Correspondence) -> usize| graph.vertices.iter().map(of).max().map_or(0, |m| m + 1);
         Self {
             place: vec![0; graph.vertices.len()],
-            models: Names::upto(most(|pair| pair.model)),
-            clouds: Names::upto(most(|pair| pair.cloud)),
+            models: Names::upto(max(|pair| pair.model)),
+            clouds: Names::upto(max(|pair| pair.cloud)),
             degrees: Vec::new(),
         }
     }
 }
 
 impl Local {
-    /// Of `members`, neighbours of one vertex, those that can be in a clique of `least` members with it:
-    /// each needs `least − 2` of the others as neighbours. Ordered by degree, so that colouring begins with the
+    /// Of `members`, neighbours of one vertex, those that can be in a clique of `min` members with it:
+    /// each needs `min − 2` of the others as neighbours. Ordered by degree, so that colouring begins with the
     /// well-connected. Empty where they are too few.
-    pub(super) fn of(graph: &Association, mut members: BitSet, least: usize, work: &mut Workshop) -> Self {
+    pub(super) fn of(graph: &Association, mut members: BitSet, min: usize, work: &mut Workshop) -> Self {
         let mut kept: Vec<usize> = members.iter().collect();
         loop {
-            if kept.len() + 1 < least {
+            if kept.len() + 1 < min {
                 return Self::default();
             }
             degrees(&graph.adjacency, &members, &kept, &mut work.degrees);
             let before = kept.len();
             let mut degree = work.degrees.iter();
             kept.retain(|&v| {
-                let stays = degree.next().is_some_and(|degree| degree + 2 >= least);
+                let stays = degree.next().is_some_and(|degree| degree + 2 >= min);
                 if !stays {
                     members.remove(v);
                 }
@@ -101,9 +101,9 @@ impl Local {
         models.len().min(clouds.len())
     }
 
-    /// Greedy colouring: vertices with their colours from `least` on, in ascending order of colour.
+    /// Greedy colouring: vertices with their colours from `min` on, in ascending order of colour.
     /// A clique among the vertices up to one of them has at most its colour's number of members.
-    pub(super) fn colour(&self, candidates: &BitSet, least: usize) -> Vec<(usize, usize)> {
+    pub(super) fn colour(&self, candidates: &BitSet, min: usize) -> Vec<(usize, usize)> {
         let mut coloured = Vec::new();
         let mut rest = candidates.clone();
         let mut colour = 0;
@@ -115,7 +115,7 @@ impl Local {
                 free.subtract(self.adjacency.row(vertex), vertex);
                 rest.remove(vertex);
                 from = vertex + 1;
-                if colour >= least {
+                if colour >= min {
                     coloured.push((vertex, colour));
                 }
             }

@@ -5,11 +5,11 @@ use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, MOST_TIES, NEEDED, Search, Unidentified,
+    BUDGET, Identification, MAX_TIES, NEEDED, Rejected, Search,
     alike::all_alike,
     association::Association,
     bounded,
-    clique::{self, MOST_ORIENTED},
+    clique::{self, MAX_ORIENTED},
     grow::{feasible, so_far},
     orientation::{Sense, unmirrored, wholly_mirrored},
 };
@@ -27,15 +27,15 @@ pub struct MaximumClique {
     pub budget: u64,
     /// How many other sets of the same size are reported, those that share least with the best first,
     /// where it is proved that the others are like the best; where it is not, all that were met are.
-    pub rivals: usize,
+    pub alternatives: usize,
     /// More candidate pairs than this are not searched: their graph would not fit into memory
     /// (40 000 take 200 MB).
-    pub most_pairs: usize,
+    pub max_pairs: usize,
 }
 
 impl Default for MaximumClique {
     fn default() -> Self {
-        Self { orientation: true, budget: BUDGET, rivals: 64, most_pairs: 40_000 }
+        Self { orientation: true, budget: BUDGET, alternatives: 64, max_pairs: 40_000 }
     }
 }
 
@@ -54,27 +54,27 @@ impl Component for MaximumClique {
     ];
 
     fn check(&self) -> Result<(), String> {
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
 impl Search for MaximumClique {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let budget = self.budget;
         let graph = Association::of(problem);
         // The rest is for the proof that what ties is alike.
-        let share = budget - budget / 4;
+        let fraction = budget - budget / 4;
         let sense = if self.orientation { Sense::Proper } else { Sense::Any };
-        let mut cliques = clique::Search::new(problem, &graph, sense, share);
-        let largest = cliques.run(1, MOST_TIES);
+        let mut cliques = clique::Search::new(problem, &graph, sense, fraction);
+        let largest = cliques.run(1, MAX_TIES);
         let size = largest.found.first().map_or(0, Vec::len);
         if size < NEEDED {
-            let tests = graph.tests + (share - cliques.left());
+            let tests = graph.tests + (fraction - cliques.left());
             return match largest.complete {
-                true => Err(Unidentified::NoConsensus { best: size, needed: NEEDED }),
+                true => Err(Rejected::NoConsensus { best: size, needed: NEEDED }),
                 false => {
-                    let ended = Unidentified::Budget { budget, best: size, bound: largest.bound, tests };
+                    let ended = Rejected::Budget { budget, best: size, bound: largest.bound, tests };
                     so_far(problem, self.orientation, ended)
                 }
             };
@@ -84,24 +84,24 @@ impl Search for MaximumClique {
         }
         let larger_image = self.larger_image(size, &mut cliques);
         let mut ties = largest.found;
-        let best = least_residual(problem, &graph.vertices, &ties);
+        let best = min_residual(problem, &graph.vertices, &ties);
         let clique = ties.swap_remove(best);
         let mut pairs = pairs_of(&graph, &clique);
-        let mut rivals: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
-        Self::least_alike_first(&pairs, &mut rivals);
-        let mut tests = graph.tests + (share - cliques.left());
+        let mut alternatives: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
+        Self::different_first(&pairs, &mut alternatives);
+        let mut tests = graph.tests + (fraction - cliques.left());
         let (mut optimal, mut all) = (largest.complete, largest.all);
         let mut decided = all;
-        if !all || rivals.len() > self.rivals {
-            let (alike, spent) = all_alike(problem, &graph, &pairs, sense, budget - share + cliques.left());
+        if !all || alternatives.len() > self.alternatives {
+            let (alike, spent) = all_alike(problem, &graph, &pairs, sense, budget - fraction + cliques.left());
             tests += spent;
             if alike {
                 decided = true;
-                all = all && rivals.len() <= self.rivals;
-                rivals.truncate(self.rivals);
+                all = all && alternatives.len() <= self.alternatives;
+                alternatives.truncate(self.alternatives);
             }
         }
-        if self.orientation && size > MOST_ORIENTED {
+        if self.orientation && size > MAX_ORIENTED {
             // In the order of the graph: whom to drop does not depend on the order of the points.
             let kept = unmirrored(problem, clique.iter().map(|&vertex| graph.vertices[vertex]).collect(), budget);
             tests += kept.tests;
@@ -111,17 +111,17 @@ impl Search for MaximumClique {
             pairs.sort_unstable();
         }
         let undecided = larger_image.or_else(|| {
-            (!decided).then_some(Unidentified::Budget { budget, best: pairs.len(), bound: largest.bound, tests })
+            (!decided).then_some(Rejected::Budget { budget, best: pairs.len(), bound: largest.bound, tests })
         });
         Ok(Identification {
             pairs,
-            rivals,
-            rivals_complete: all,
+            alternatives,
+            alternatives_complete: all,
             optimal,
             size_bound: largest.bound,
             tests,
             undecided,
-            belief: None,
+            posterior: None,
         })
     }
 }
@@ -134,34 +134,32 @@ impl MaximumClique {
         problem: &Problem<'_>,
         graph: &Association,
         cliques: &mut clique::Search<'_>,
-    ) -> Result<(), Unidentified> {
+    ) -> Result<(), Rejected> {
         cliques.set_sense(Sense::Any);
         let coherent = cliques.run(NEEDED + 1, 1);
         cliques.set_sense(Sense::Proper);
         match coherent.found.first().map(|clique| pairs_of(graph, clique)) {
-            Some(set) if wholly_mirrored(problem, &set) => {
-                Err(Unidentified::Mirrored { best: set.len(), proved: true })
-            }
+            Some(set) if wholly_mirrored(problem, &set) => Err(Rejected::Mirrored { best: set.len(), proved: true }),
             _ => Ok(()),
         }
     }
 
     /// A mirror image of the model with more points than the set found: then the set is what a flat part
     /// of that image leaves, and no fix.
-    fn larger_image(&self, size: usize, cliques: &mut clique::Search<'_>) -> Option<Unidentified> {
+    fn larger_image(&self, size: usize, cliques: &mut clique::Search<'_>) -> Option<Rejected> {
         if !self.orientation {
             return None;
         }
         cliques.set_sense(Sense::Mirrored);
         let images = cliques.run(size + 1, 1);
         cliques.set_sense(Sense::Proper);
-        images.found.first().map(|image| Unidentified::Mirrored { best: image.len(), proved: false })
+        images.found.first().map(|image| Rejected::Mirrored { best: image.len(), proved: false })
     }
 
     /// Puts the rivals that share the fewest pairs with the best set first.
-    fn least_alike_first(best: &[Correspondence], rivals: &mut [Vec<Correspondence>]) {
-        rivals.sort_by_cached_key(|rival| {
-            (rival.iter().filter(|pair| best.binary_search(pair).is_ok()).count(), rival.clone())
+    fn different_first(best: &[Correspondence], alternatives: &mut [Vec<Correspondence>]) {
+        alternatives.sort_by_cached_key(|alternative| {
+            (alternative.iter().filter(|pair| best.binary_search(pair).is_ok()).count(), alternative.clone())
         });
     }
 }
@@ -176,7 +174,7 @@ fn pairs_of(graph: &Association, clique: &[usize]) -> Vec<Correspondence> {
 /// The place of the set with the least residual of a rigid fit. Residuals that differ by rounding
 /// only are equal, and then the coordinates decide, in whose order the vertices stand: the answer does
 /// not depend on the order of the cloud.
-pub(super) fn least_residual(problem: &Problem<'_>, vertices: &[Correspondence], cliques: &[Vec<usize>]) -> usize {
+pub(super) fn min_residual(problem: &Problem<'_>, vertices: &[Correspondence], cliques: &[Vec<usize>]) -> usize {
     let quantum = 1e-9 * problem.model.iter().map(|point| point.at.coords.amax()).fold(f64::MIN_POSITIVE, f64::max);
     let rank = |clique: &[usize]| {
         let pairs: Vec<Correspondence> = clique.iter().map(|&vertex| vertices[vertex]).collect();

@@ -9,14 +9,12 @@ mod affinity;
 mod alike;
 mod association;
 mod backtracking;
-mod belief;
 mod bitset;
 mod clique;
 mod closest;
 mod complete_enumeration;
 mod consensus;
 mod edges;
-mod fours;
 mod gicp;
 mod gnc_tls;
 mod grow;
@@ -28,6 +26,8 @@ mod maximum_clique;
 mod orientation;
 mod pose;
 mod pose_vote;
+mod posterior;
+mod quadruples;
 mod ransac;
 mod rigid_consensus;
 mod spectral;
@@ -35,27 +35,27 @@ mod structural_coherence;
 mod volumes;
 mod weighted_clique;
 
-pub use belief::{Belief, Explanation, Shares};
-pub use consensus::{Imitation, LookAlike};
+pub use consensus::{RepeatedPattern, StructuredClutter};
 pub(crate) use grow::elsewhere;
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]
 pub(crate) use orientation::mirrored;
-pub(crate) use pose::share;
+pub(crate) use pose::fraction;
+pub use posterior::{Explanation, Posterior, PosteriorProbabilities};
 pub use rigid_consensus::RigidConsensus;
 pub use structural_coherence::{Samples, StructuralCoherence};
 
 /// Decides which cloud points are which model points.
 ///
 /// Every search has a budget of pair tests beyond those that build its graph (default 10⁷); past it the answer is the best
-/// identification so far, not `optimal`, with [`Unidentified::Budget`] as what leaves it undecided; that alone where no three
+/// identification so far, not `optimal`, with [`Rejected::Budget`] as what leaves it undecided; that alone where no three
 /// pairs were found to agree.
 pub trait Search: Send + Sync + std::fmt::Debug {
     /// The best set of correspondences by this search's own measure.
     ///
     /// # Errors
-    /// [`Unidentified`]: the data allow no answer, with the numbers that say why.
-    fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Unidentified>;
+    /// [`Rejected`]: the data allow no answer, with the numbers that say why.
+    fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Rejected>;
 }
 
 /// A coherent, one-to-one set of correspondences.
@@ -64,9 +64,9 @@ pub struct Identification {
     /// The set, in the order of the model points.
     pub pairs: Vec<Correspondence>,
     /// Other sets of the same size, as far as the search looks for them.
-    pub rivals: Vec<Vec<Correspondence>>,
-    /// Whether `rivals` holds every other set of the same size.
-    pub rivals_complete: bool,
+    pub alternatives: Vec<Vec<Correspondence>>,
+    /// Whether `alternatives` holds every other set of the same size.
+    pub alternatives_complete: bool,
     /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
     pub optimal: bool,
     /// No admissible set has more pairs than this.
@@ -76,9 +76,9 @@ pub struct Identification {
     /// Why the set is not to be believed by itself: a larger set is a mirror image, or the search ended
     /// before it had seen, or ruled out, every set as large that is unlike it. `None` also of a search
     /// that looks for no rivals.
-    pub undecided: Option<Unidentified>,
+    pub undecided: Option<Rejected>,
     /// How likely this pose and others are; `None` of a search that counts.
-    pub belief: Option<Belief>,
+    pub posterior: Option<Posterior>,
 }
 
 impl Identification {
@@ -86,13 +86,13 @@ impl Identification {
     pub fn unproved(pairs: Vec<Correspondence>, bound: usize, tests: u64) -> Self {
         Self {
             pairs,
-            rivals: Vec::new(),
-            rivals_complete: false,
+            alternatives: Vec::new(),
+            alternatives_complete: false,
             optimal: false,
             size_bound: bound,
             tests,
             undecided: None,
-            belief: None,
+            posterior: None,
         }
     }
 }
@@ -102,7 +102,7 @@ pub(crate) const FEWER: &str = "give a rough pose or smaller shells, or thin the
 
 /// Why nothing was identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Unidentified {
+pub enum Rejected {
     /// Fewer than three model points have a candidate.
     #[error("{} with a candidate; a pose needs {needed}", counted(*.with_candidates, "model point"))]
     TooFew {
@@ -135,14 +135,14 @@ pub enum Unidentified {
         tests: u64,
     },
     /// More than the search holds in memory: it did not begin.
-    #[error("{size} {what} are more than the {most} that the search takes; {}", FEWER)]
+    #[error("{size} {what} are more than the {max} that the search takes; {}", FEWER)]
     TooLarge {
         /// How many there are.
         size: usize,
         /// What there is too much of.
         what: &'static str,
         /// How many may be.
-        most: usize,
+        max: usize,
         /// No set is larger than this.
         bound: usize,
     },
@@ -167,7 +167,7 @@ pub enum Unidentified {
     },
 }
 
-impl Unidentified {
+impl Rejected {
     /// Whether it says that there is nothing, and not only that nothing was found.
     pub fn is_proved(&self) -> bool {
         matches!(self, Self::TooFew { .. } | Self::NoConsensus { .. } | Self::Mirrored { proved: true, .. })
@@ -211,12 +211,12 @@ pub static SEARCHES: Registry<dyn Search> = Registry::new(
 /// The default budget of a search: pair tests beyond those that build its graph.
 pub(crate) const BUDGET: u64 = 10_000_000;
 /// What is wrong with the two limits that most searches have.
-fn bounded(budget: u64, most_pairs: usize) -> Result<(), String> {
+fn bounded(budget: u64, max_pairs: usize) -> Result<(), String> {
     in_range(budget > 0, "budget", budget, "1 or more pair tests")?;
-    in_range(most_pairs >= NEEDED, "most-pairs", most_pairs, "3 or more candidate pairs")
+    in_range(max_pairs >= NEEDED, "max-pairs", max_pairs, "3 or more candidate pairs")
 }
 
 /// The least set that a pose can come from.
 pub(crate) const NEEDED: usize = 3;
 /// Sets of the largest size that are looked at before the best of them is chosen.
-const MOST_TIES: usize = 4096;
+const MAX_TIES: usize = 4096;

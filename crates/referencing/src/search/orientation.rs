@@ -101,7 +101,7 @@ fn volume([a, b, c, d]: &[Vector3<f64>; 4]) -> f64 {
 /// Whether every decisive four of the set are a mirror image, and there is one.
 pub(crate) fn wholly_mirrored(problem: &Problem<'_>, set: &[Correspondence]) -> bool {
     let mut some = false;
-    for four in fours(set) {
+    for four in quadruples(set) {
         let model = four.map(|pair| problem.model[pair.model].at.coords);
         let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
         let known = volume(&model);
@@ -116,7 +116,7 @@ pub(crate) fn wholly_mirrored(problem: &Problem<'_>, set: &[Correspondence]) -> 
 }
 
 /// All subsets of four.
-pub(crate) fn fours(set: &[Correspondence]) -> impl Iterator<Item = [Correspondence; 4]> + '_ {
+pub(crate) fn quadruples(set: &[Correspondence]) -> impl Iterator<Item = [Correspondence; 4]> + '_ {
     let n = set.len();
     (0..n).flat_map(move |i| {
         (i + 1..n)
@@ -136,15 +136,15 @@ pub(crate) struct Unmirrored {
 /// The set without the members of mirrored fours: the member of most of them is dropped, of equals
 /// the last, until there is none.
 ///
-/// Every four is tested where they are no more than `most`. Of a larger set those are that have three members
+/// Every four is tested where they are no more than `max`. Of a larger set those are that have three members
 /// in a well-spread core: a member whose image is mirrored is so with every triangle it is far from. What
 /// such a set says is then tested as a whole by the residuals of a rigid fit.
-pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, most: u64) -> Unmirrored {
+pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, max: u64) -> Unmirrored {
     let (mut complete, mut tests) = (true, 0);
     loop {
-        let all = choose(pairs.len(), 4) <= most;
+        let all = choose(pairs.len(), 4) <= max;
         complete = complete && all;
-        let core = if all { (0..pairs.len()).collect() } else { core(problem, &pairs, most) };
+        let core = if all { (0..pairs.len()).collect() } else { core(problem, &pairs, max) };
         let volumes = Volumes::of(problem, &pairs);
         let mut opposed: Vec<[u32; 4]> = Vec::new();
         'fours: for (place, &d) in core.iter().enumerate() {
@@ -157,7 +157,7 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
                         tests += 1;
                         if volumes.refuses(Sense::Proper, &plane, a) {
                             opposed.push([a, b, c, d].map(|i| i as u32));
-                            if opposed.len() >= MOST_LISTED {
+                            if opposed.len() >= MAX_LISTED {
                                 break 'fours;
                             }
                         }
@@ -182,17 +182,17 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
 }
 
 /// Mirrored fours that are listed before members are dropped (1.6 MB).
-const MOST_LISTED: usize = 100_000;
+const MAX_LISTED: usize = 100_000;
 /// Members of the core of a set that is too large to be tested whole.
 const CORE: usize = 40;
 
 /// Members far from each other in the model, at most [`CORE`], so few that all their triangles with all
-/// members are no more than `most`: always the farthest from those taken, from the first on.
-fn core(problem: &Problem<'_>, pairs: &[Correspondence], most: u64) -> Vec<usize> {
+/// members are no more than `max`: always the farthest from those taken, from the first on.
+fn core(problem: &Problem<'_>, pairs: &[Correspondence], max: u64) -> Vec<usize> {
     let at = |i: usize| problem.model[pairs[i].model].at;
     let mut taken = vec![0];
     let mut off: Vec<f64> = (0..pairs.len()).map(|i| at(i).distance(&at(0))).collect();
-    while taken.len() < CORE && choose(taken.len() + 1, 3).saturating_mul(pairs.len() as u64) <= most {
+    while taken.len() < CORE && choose(taken.len() + 1, 3).saturating_mul(pairs.len() as u64) <= max {
         let next = (0..pairs.len()).max_by(|&i, &j| off[i].total_cmp(&off[j])).unwrap_or(0);
         if !(off[next] > 0.0) {
             break;
@@ -222,7 +222,7 @@ mod tests {
     }
 
     /// What is left of 60 points whose last five stand on the wrong side of the plane z = 0.
-    fn left(most: u64) -> Unmirrored {
+    fn left(max: u64) -> Unmirrored {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let places: Vec<Vector3<f64>> = (0..60)
             .map(|i| {
@@ -241,7 +241,7 @@ mod tests {
         let tolerance = Tolerance::Fixed(0.01);
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
         let pairs: Vec<Correspondence> = (0..60).map(|i| Correspondence { model: i, cloud: i }).collect();
-        unmirrored(&problem, pairs, most)
+        unmirrored(&problem, pairs, max)
     }
 
     #[test]

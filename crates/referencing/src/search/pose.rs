@@ -11,7 +11,7 @@ pub(super) fn fitted(problem: &Problem<'_>, pairs: &[Correspondence]) -> Option<
 }
 
 /// How far a pair is from where the pose puts it, as a share of what it may be off.
-pub(crate) fn share(problem: &Problem<'_>, pose: &Transform<Object, Camera>, pair: Correspondence) -> f64 {
+pub(crate) fn fraction(problem: &Problem<'_>, pose: &Transform<Object, Camera>, pair: Correspondence) -> f64 {
     let off = (*pose * problem.cloud[pair.cloud].position.at).distance(&problem.model[pair.model].at);
     off / slack(problem, pair)
 }
@@ -22,8 +22,11 @@ pub(super) fn explained(
     vertices: &[Correspondence],
     pose: &Transform<Object, Camera>,
 ) -> Vec<(f64, Correspondence)> {
-    let mut near: Vec<(f64, Correspondence)> =
-        vertices.iter().map(|&pair| (share(problem, pose, pair), pair)).filter(|(share, _)| *share <= 1.0).collect();
+    let mut near: Vec<(f64, Correspondence)> = vertices
+        .iter()
+        .map(|&pair| (fraction(problem, pose, pair), pair))
+        .filter(|(fraction, _)| *fraction <= 1.0)
+        .collect();
     near.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let (mut models, mut clouds) = (BitSet::empty(problem.model.len()), BitSet::empty(problem.cloud.len()));
     near.retain(|(_, pair)| {
@@ -45,12 +48,12 @@ pub(super) fn refined(
     start: Transform<Object, Camera>,
     tests: &mut u64,
 ) -> (f64, Vec<Correspondence>) {
-    const MOST_ROUNDS: usize = 10;
+    const MAX_ROUNDS: usize = 10;
     let (mut best, mut pairs, mut pose) = (f64::NEG_INFINITY, Vec::new(), start);
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         *tests += vertices.len() as u64;
         let near = explained(problem, vertices, &pose);
-        let worth: f64 = near.iter().map(|(share, _)| 1.0 - share * share).sum();
+        let worth: f64 = near.iter().map(|(fraction, _)| 1.0 - fraction * fraction).sum();
         if !(worth > best) {
             break;
         }

@@ -6,7 +6,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, Search, Unidentified,
+    BUDGET, Identification, Rejected, Search,
     association::vertices,
     bounded,
     grow::{conclude_within, feasible},
@@ -32,12 +32,12 @@ pub(crate) struct PoseVote {
     /// Pairs of offsets compared and residuals before it ends.
     pub(crate) budget: u64,
     /// More candidate pairs than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for PoseVote {
     fn default() -> Self {
-        Self { orientation: true, radius: 0.1, tries: 50, budget: BUDGET, most_pairs: 4_000_000 }
+        Self { orientation: true, radius: 0.1, tries: 50, budget: BUDGET, max_pairs: 4_000_000 }
     }
 }
 
@@ -56,14 +56,14 @@ impl Component for PoseVote {
         let positive = self.radius > 0.0 && self.radius.is_finite();
         in_range(positive, "radius", self.radius, "a positive number of metres")?;
         in_range(self.tries > 0, "tries", self.tries, "1 or more")?;
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
 impl Search for PoseVote {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
-        let prior = problem.prior.ok_or(Unidentified::NoPrior)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
+        let prior = problem.prior.ok_or(Rejected::NoPrior)?;
         let camera_from_object = prior.object_from_camera.inverse();
         let vertices = vertices(problem);
         let offset = |pair: &Correspondence| {

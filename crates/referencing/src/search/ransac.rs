@@ -5,11 +5,11 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
     bounded,
-    grow::{conclude_within, feasible, most_possible, so_far},
-    pose::{fitted, refined, share},
+    grow::{conclude_within, feasible, max_possible, so_far},
+    pose::{fitted, fraction, refined},
 };
 use crate::{Correspondence, Problem};
 
@@ -30,12 +30,12 @@ pub(crate) struct Ransac {
     /// Pair tests and residuals before it ends.
     pub(crate) budget: u64,
     /// More candidate pairs than this are not searched.
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
 }
 
 impl Default for Ransac {
     fn default() -> Self {
-        Self { orientation: true, confidence: 0.999, budget: BUDGET, most_pairs: 4_000_000 }
+        Self { orientation: true, confidence: 0.999, budget: BUDGET, max_pairs: 4_000_000 }
     }
 }
 
@@ -53,13 +53,13 @@ impl Component for Ransac {
     fn check(&self) -> Result<(), String> {
         let confident = self.confidence > 0.0 && self.confidence < 1.0;
         in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
 impl Search for Ransac {
-    fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
         let count = vertices.len();
         let (mut tests, mut trials, mut needed) = (0, 0u64, f64::INFINITY);
@@ -79,24 +79,24 @@ impl Search for Ransac {
             tests += count as u64;
             // Vertices stand by model point: the best candidate of each counts.
             let of = |same: &[Correspondence]| {
-                let least = same.iter().map(|&pair| share(problem, &pose, pair)).fold(1.0, f64::min);
-                (1.0 - least * least, u64::from(least < 1.0))
+                let min = same.iter().map(|&pair| fraction(problem, &pose, pair)).fold(1.0, f64::min);
+                (1.0 - min * min, u64::from(min < 1.0))
             };
             let groups = vertices.chunk_by(|a, b| a.model == b.model).map(of);
             let (score, inliers) = groups.fold((0.0, 0), |(score, all), (worth, one)| (score + worth, all + one));
             if score > best.0 {
                 best = (score, Some(pose));
-                let share = inliers as f64 / count as f64;
-                needed = libm::log(1.0 - self.confidence) / libm::log1p(-share.powi(3).min(1.0 - 1e-12));
+                let fraction = inliers as f64 / count as f64;
+                needed = libm::log(1.0 - self.confidence) / libm::log1p(-fraction.powi(3).min(1.0 - 1e-12));
             }
         }
         let spent = tests;
         let Some(pose) = best.1 else {
-            let bound = most_possible(problem);
+            let bound = max_possible(problem);
             return match tests < self.budget {
-                true => Err(Unidentified::NotFound { bound, needed: NEEDED }),
+                true => Err(Rejected::NotFound { bound, needed: NEEDED }),
                 false => {
-                    let ended = Unidentified::Budget { budget: self.budget, best: 0, bound, tests };
+                    let ended = Rejected::Budget { budget: self.budget, best: 0, bound, tests };
                     so_far(problem, self.orientation, ended)
                 }
             };

@@ -7,14 +7,14 @@ use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Belief, Explanation, Identification, NEEDED, Search, Unidentified,
-    belief::COPY,
-    bounded,
+    Explanation, Identification, NEEDED, Posterior, Rejected, Search, bounded,
     consensus::{
-        Crowd, Graph, Imitation, Mode, Occupied, Pattern, Proved, Rough, Seeds, Swept, Terms, mirror_image, prove,
+        ClutterDensity, ConsistencyGraph, Mode, Occupied, Pattern, PriorTerms, Proved, Seeds, StructuredClutter, Swept,
+        Terms, mirror_image, prove,
     },
-    grow::{feasible, grow, most_possible, so_far},
+    grow::{feasible, grow, max_possible, so_far},
     orientation::Sense,
+    posterior::COPY,
 };
 use crate::Problem;
 
@@ -37,7 +37,7 @@ use crate::Problem;
 /// pairs, each model point's term over all candidates near its place: what fits in a crowd is as likely clutter. And
 /// beside the object and clutter alone stand more explanations: a pattern that the object repeats in part goes on, with
 /// the object in it or without; and where poses elsewhere explain what clutter spread evenly would not show, clutter
-/// imitates the object, which is among the imitations or not ([`Imitation`]). So do putative pairs that mistake points for their
+/// imitates the object, which is among the imitations or not ([`StructuredClutter`]). So do putative pairs that mistake points for their
 /// like, where the model stands as well in other ways on the same places: each of them is met by many.
 ///
 /// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
@@ -55,7 +55,7 @@ use crate::Problem;
 /// exponential in K, and never more than the budget, which is told when it ends the search; the proof has as much again. What is
 /// looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
 /// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
-/// copy of it may be passed over, where [`Belief::copies_sought`] is false; and what shows less evidence than nine nats is no
+/// copy of it may be passed over, where [`Posterior::copies_sought`] is false; and what shows less evidence than nine nats is no
 /// copy. The tolerance and the prior's greatest rotation prune the graph; they do not judge the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
@@ -64,14 +64,14 @@ pub struct RigidConsensus {
     pub budget: u64,
     /// More candidate pairs than this are not searched: their graph would not fit into memory
     /// (40 000 take 200 MB).
-    pub most_pairs: usize,
+    pub max_pairs: usize,
     /// Whether it is proved that no set is likelier, as far as the budget again does: then the answer is called optimal.
     pub prove: bool,
 }
 
 impl Default for RigidConsensus {
     fn default() -> Self {
-        Self { budget: 400_000_000, most_pairs: 40_000, prove: false }
+        Self { budget: 400_000_000, max_pairs: 40_000, prove: false }
     }
 }
 
@@ -96,7 +96,7 @@ impl Component for RigidConsensus {
     ];
 
     fn check(&self) -> Result<(), String> {
-        bounded(self.budget, self.most_pairs)
+        bounded(self.budget, self.max_pairs)
     }
 }
 
@@ -113,21 +113,21 @@ const BESIDE: f64 = 14.0;
 const LEAD: usize = 4;
 /// The looks for parts of a copy, and the tenth of it those for imitations, may always cost as much (words read: a fraction of a
 /// millisecond), where the whole was found at once.
-const LEAST_EFFORT: u64 = 50_000;
+const MIN_EFFORT: u64 = 50_000;
 /// Sums in another order differ by less (nats).
 const ROUNDING: f64 = 1e-9;
 /// Pair tests of the graph that take as long as a word read.
 const PAIRS_A_WORD: u64 = 16;
 
 impl Search for RigidConsensus {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
-        let bound = most_possible(problem);
-        let nothing = Unidentified::NotFound { bound, needed: NEEDED };
-        let Some(rough) = Rough::of(problem) else { return Err(nothing) };
-        let graph = Graph::of(problem, &rough);
-        let terms = Terms::of(problem, &rough, &graph);
-        let parts = (&terms, &rough, &graph);
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
+        let bound = max_possible(problem);
+        let nothing = Rejected::NotFound { bound, needed: NEEDED };
+        let Some(prior_terms) = PriorTerms::of(problem) else { return Err(nothing) };
+        let graph = ConsistencyGraph::of(problem, &prior_terms);
+        let terms = Terms::of(problem, &prior_terms, &graph);
+        let parts = (&terms, &prior_terms, &graph);
         let none = BTreeSet::new();
         let mut swept = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget).sweep();
         let mut tests = graph.tests + swept.tests;
@@ -138,10 +138,10 @@ impl Search for RigidConsensus {
         tests += proved.as_ref().map_or(0, |proved| proved.tests);
         // Up to a hundred megabytes that nobody needs from here on.
         swept.pairs = Vec::new();
-        let mut crowd = Crowd::default();
-        let mut weighed = |swept: &mut Swept| {
+        let mut clutter_density = ClutterDensity::default();
+        let mut weighted = |swept: &mut Swept| {
             for mode in &mut swept.modes {
-                crowd.weigh(problem, parts, mode);
+                clutter_density.weigh(problem, parts, mode);
             }
             let by =
                 |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
@@ -149,53 +149,53 @@ impl Search for RigidConsensus {
         };
         // What is not likely even in evenly spread clutter is refused whatever the clutter is like.
         if strong(&swept) {
-            weighed(&mut swept);
+            weighted(&mut swept);
         }
-        let ended = |best: usize, tests| Unidentified::Budget { budget: self.budget, best, bound, tests };
+        let ended = |best: usize, tests| Rejected::Budget { budget: self.budget, best, bound, tests };
         let Some(best) = swept.modes.first() else {
             return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, tests)) };
         };
         if let Some(image) = mirror_image(problem.model, parts, best) {
-            return Err(Unidentified::Mirrored { best: image.members.len(), proved: false });
+            return Err(Rejected::Mirrored { best: image.members.len(), proved: false });
         }
         // A second copy of the object in what is left of the cloud, and a pose to hold the likeliest against.
-        let mut look_alike = None;
+        let mut repeated_pattern = None;
         let mut beside = Swept { complete: true, parts: true, ..Swept::default() };
         let mut copies_sought = None;
-        let mut imitation = None;
+        let mut structured_clutter = None;
         let mut unlikely = None;
         if best.ln_evidence >= STRONG {
             let pattern = Pattern::of(problem.model);
             let elsewhere = |mode: &Mode| mode.members.iter().filter(|&&v| best.holds(v)).count() < NEEDED;
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
-            let least = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
+            let min = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
             let left = self.budget.saturating_sub(swept.tests);
             let work = swept.tests + graph.tests / PAIRS_A_WORD;
-            let whole = work.max(LEAST_EFFORT);
+            let full = work.max(MIN_EFFORT);
             beside = if pattern.is_some() {
-                Seeds::new(problem.model, parts, &taken, (least, STRONG), left).sweep()
+                Seeds::new(problem.model, parts, &taken, (min, STRONG), left).sweep()
             } else {
                 // Parts of it: pairs are looked at for twice, and followed for half of the time that the whole took.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
                 let seeds = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), left);
-                seeds.with_parts(least, left.min(2 * whole), left.min(whole / 2)).sweep()
+                seeds.with_parts(min, left.min(2 * full), left.min(full / 2)).sweep()
             };
             // Where the object has a pattern that goes on, parts of it are to be seen anyway.
             copies_sought = Some(beside.complete && beside.parts && pattern.is_none());
             // What poses elsewhere say of the clutter, those that are as likely as no object, in an eighth of that time.
-            let effort = left.min((work / 8).max(LEAST_EFFORT / 10));
+            let effort = left.min((work / 8).max(MIN_EFFORT / 10));
             let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
             tests += others.tests;
-            weighed(&mut others);
-            let occupied = Occupied::of(problem, best, pattern.as_ref().and_then(Pattern::telling));
+            weighted(&mut others);
+            let occupied = Occupied::of(problem, best, pattern.as_ref().and_then(Pattern::distinctive));
             let mistaken = occupied.mistaken(problem, (&terms, &graph), &others.modes);
             others.modes.retain(elsewhere);
-            let imitations = others.modes.iter().map(|other| occupied.imitation(problem, parts, other));
-            let weight = |of: &Imitation| of.ln_evidence + of.ln_alone;
-            imitation = imitations.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b)));
-            weighed(&mut beside);
+            let clutter_patterns = others.modes.iter().map(|other| occupied.structured_clutter(problem, parts, other));
+            let weight = |of: &StructuredClutter| of.ln_evidence + of.ln_alone;
+            structured_clutter = clutter_patterns.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b)));
+            weighted(&mut beside);
             tests += beside.tests;
-            look_alike = pattern.map(|pattern| pattern.look_alike(problem, &terms, &graph, best));
+            repeated_pattern = pattern.map(|pattern| pattern.repeated_pattern(problem, &terms, &graph, best));
             unlikely = others.modes.into_iter().next();
             if unlikely.is_none() && swept.modes.iter().chain(&beside.modes).all(|mode| !elsewhere(mode)) {
                 unlikely = Seeds::new(problem.model, parts, &none, (NEEDED, f64::NEG_INFINITY), 0).elsewhere(best);
@@ -215,23 +215,23 @@ impl Search for RigidConsensus {
             pairs: mode.pairs(&graph),
             object_from_camera: mode.motion.transform().inverse(),
             ln_evidence: mode.ln_evidence,
-            ln_crowd: mode.ln_crowd,
+            ln_clutter_density: mode.ln_clutter_density,
         };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
         Ok(Identification {
-            rivals: Vec::new(),
-            rivals_complete: false,
+            alternatives: Vec::new(),
+            alternatives_complete: false,
             // What is proved of a pose is not proved of what is left of its pairs where some contradict each other.
             optimal: evidence_gap == Some(0.0) && pairs.len() == best.members.len(),
             size_bound: bound,
             tests,
             undecided: (!complete).then(|| ended(pairs.len(), tests)),
-            belief: Some(Belief {
+            posterior: Some(Posterior {
                 explanations: explain(&swept),
                 beside: explain(&beside),
                 copies_sought,
-                look_alike,
-                imitation,
+                repeated_pattern,
+                structured_clutter,
                 unlikely: unlikely.as_ref().map(explanation),
                 evidence_gap,
             }),
@@ -253,7 +253,7 @@ mod tests {
         [[0.0, 0.0, 0.0], [1.3, 0.0, 0.0], [0.3, -0.9, 0.0], [0.8, 0.6, 0.5], [-0.4, 0.7, 0.9], [0.1, -0.3, 1.2]];
 
     /// The points 3 m before the camera, as far off as `wrong` says, each its own candidate.
-    fn answered(prior: Option<&Prior>, wrong: impl Fn(usize) -> Vector3<f64>) -> Result<Identification, Unidentified> {
+    fn answered(prior: Option<&Prior>, wrong: impl Fn(usize) -> Vector3<f64>) -> Result<Identification, Rejected> {
         answered_by(&RigidConsensus::default(), prior, wrong)
     }
 
@@ -261,7 +261,7 @@ mod tests {
         search: &RigidConsensus,
         prior: Option<&Prior>,
         wrong: impl Fn(usize) -> Vector3<f64>,
-    ) -> Result<Identification, Unidentified> {
+    ) -> Result<Identification, Rejected> {
         let model: Vec<ModelPoint> = PLACES.iter().map(|at| ModelPoint::exact("", Point::from(*at))).collect();
         let cloud: Vec<MeasuredPoint> = (0..PLACES.len())
             .map(|i| Vector3::from(PLACES[i]) + Vector3::new(0.0, 0.0, 3.0) + wrong(i))
@@ -279,7 +279,7 @@ mod tests {
         let proving = RigidConsensus { prove: true, ..RigidConsensus::default() };
         let noise = |i: usize| Vector3::new(0.005, -0.005, 0.0025) * (i as f64 - 2.5);
         let [plain, proved] = [&RigidConsensus::default(), &proving].map(|by| answered_by(by, None, noise).unwrap());
-        let gap = |found: &Identification| found.belief.as_ref().expect("one is weighed").evidence_gap;
+        let gap = |found: &Identification| found.posterior.as_ref().expect("one is weighed").evidence_gap;
         assert_eq!((plain.optimal, gap(&plain)), (false, None));
         assert_eq!((proved.optimal, gap(&proved)), (true, Some(0.0)));
         assert_eq!(plain.pairs, proved.pairs);
@@ -294,9 +294,9 @@ mod tests {
         let proving = RigidConsensus { prove: true, ..RigidConsensus::default() };
         let apart = |i: usize| Vector3::new([-0.022, 0.022, 0.0, 0.0, 0.0, 0.0][i], 0.0, 0.0);
         let found = answered_by(&proving, None, apart).unwrap();
-        let belief = found.belief.as_ref().expect("one is weighed");
-        assert_eq!((found.pairs.len(), belief.explanations[0].pairs.len()), (5, 6));
-        assert_eq!((found.optimal, belief.evidence_gap), (false, Some(0.0)));
+        let posterior = found.posterior.as_ref().expect("one is weighed");
+        assert_eq!((found.pairs.len(), posterior.explanations[0].pairs.len()), (5, 6));
+        assert_eq!((found.optimal, posterior.evidence_gap), (false, Some(0.0)));
     }
 
     #[test]
@@ -307,7 +307,7 @@ mod tests {
         let models: Vec<usize> = found.pairs.iter().map(|pair| pair.model).collect();
         assert_eq!(models, [0, 1, 2, 3, 4]);
         assert!(found.undecided.is_none());
-        assert_eq!(found.belief.expect("one is weighed").copies_sought, Some(true));
+        assert_eq!(found.posterior.expect("one is weighed").copies_sought, Some(true));
     }
 
     #[test]
@@ -324,7 +324,7 @@ mod tests {
             let bound = PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05));
             let prior = Prior { object_from_camera: Transform::new(UnitQuaternion::identity(), at), bound };
             let found = answered(Some(&prior), |_| Vector3::zeros()).unwrap();
-            found.belief.unwrap().explanations[0].ln_evidence
+            found.posterior.unwrap().explanations[0].ln_evidence
         };
         // Two standard deviations cost two nats; the pose itself is known to 0.015 m at the camera, 3 m from the
         // points: ½ · 0.1²/(0.05² + 0.015²) = 1.83.

@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Identification, NEEDED, Search, Unidentified,
+    Identification, NEEDED, Rejected, Search,
     affinity::{Affinity, by_weight, normalized},
     association::Association,
     grow::{conclude, feasible},
@@ -26,14 +26,14 @@ pub(crate) struct Spectral {
     /// Power iterations at most.
     pub(crate) iterations: usize,
     /// More candidate pairs than this are not searched (40 000 take 200 MB).
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
     /// Nor more edges than this (8 bytes each).
-    pub(crate) most_edges: usize,
+    pub(crate) max_edges: usize,
 }
 
 impl Default for Spectral {
     fn default() -> Self {
-        Self { orientation: true, iterations: 100, most_pairs: 40_000, most_edges: 30_000_000 }
+        Self { orientation: true, iterations: 100, max_pairs: 40_000, max_edges: 30_000_000 }
     }
 }
 
@@ -50,16 +50,16 @@ impl Component for Spectral {
 
     fn check(&self) -> Result<(), String> {
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
-        in_range(self.most_pairs >= NEEDED, "most-pairs", self.most_pairs, "3 or more candidate pairs")?;
-        in_range(self.most_edges > 0, "most-edges", self.most_edges, "1 or more")
+        in_range(self.max_pairs >= NEEDED, "max-pairs", self.max_pairs, "3 or more candidate pairs")?;
+        in_range(self.max_edges > 0, "max-edges", self.max_edges, "1 or more")
     }
 }
 
 impl Search for Spectral {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let graph = Association::of(problem);
-        let affinity = Affinity::of(problem, &graph, self.most_edges, |off| 1.0 - off * off)?;
+        let affinity = Affinity::of(problem, &graph, self.max_edges, |off| 1.0 - off * off)?;
         let mut x = vec![1.0; graph.vertices.len()];
         let (mut next, mut plain) = (x.clone(), x.clone());
         let mut tests = graph.tests;
@@ -91,6 +91,6 @@ mod tests {
     fn settings_out_of_range_are_refused() {
         assert_eq!(Spectral::default().check(), Ok(()));
         assert!(Spectral { iterations: 0, ..Spectral::default() }.check().is_err());
-        assert!(Spectral { most_edges: 0, ..Spectral::default() }.check().is_err());
+        assert!(Spectral { max_edges: 0, ..Spectral::default() }.check().is_err());
     }
 }

@@ -5,10 +5,10 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Search, Unidentified,
+    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
     grow::so_far,
-    orientation::{fours, mirrored, wholly_mirrored},
+    orientation::{mirrored, quadruples, wholly_mirrored},
 };
 use crate::{Correspondence, Problem};
 
@@ -66,10 +66,10 @@ impl Component for StructuralCoherence {
 }
 
 impl Search for StructuralCoherence {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         let with_candidates = problem.candidates.with_candidates();
         if with_candidates < NEEDED {
-            return Err(Unidentified::TooFew { with_candidates, needed: NEEDED });
+            return Err(Rejected::TooFew { with_candidates, needed: NEEDED });
         }
         // Points are numbered by their coordinates: the answer does not depend on the order they came in.
         // A model point without candidates is in no sample's product: leaving it out changes no answer.
@@ -103,7 +103,7 @@ struct Refused {
     deepest: usize,
     /// What that costs for one choice of candidates of the points that follow: pair tests, and drawing.
     tests: u64,
-    drawn: u64,
+    sampled: u64,
 }
 
 /// To draw a sample of q points costs as much as q²/256 pair tests: nothing at the paper's scale, and more than its tests
@@ -120,7 +120,7 @@ pub(super) struct Enumeration<'a> {
     budget: u64,
     tests: u64,
     /// What drawing samples has cost, in pair tests.
-    drawn: u64,
+    sampled: u64,
     /// Size of the largest coherent set met so far, as the beginning of a longer sample.
     best: usize,
     /// Size of the first, hence largest, coherent sample that was wholly a mirror image.
@@ -135,32 +135,32 @@ impl<'a> Enumeration<'a> {
         orientation: bool,
         budget: u64,
     ) -> Self {
-        Self { problem, lists, samples, orientation, budget, tests: 0, drawn: 0, best: 0, mirrored: None }
+        Self { problem, lists, samples, orientation, budget, tests: 0, sampled: 0, best: 0, mirrored: None }
     }
 
     /// The first coherent sample, of at most `longest` points.
-    pub(super) fn run(mut self, longest: usize) -> Result<Identification, Unidentified> {
+    pub(super) fn run(mut self, longest: usize) -> Result<Identification, Rejected> {
         for q in (NEEDED..=self.lists.len().min(longest)).rev() {
             match self.samples_of(q) {
                 // Three points have no orientation: these are what is left of a mirror image.
                 Ok(Some(_)) if q == NEEDED && self.mirrored.is_some() => {
-                    return Err(Unidentified::Mirrored { best: self.mirrored.unwrap_or(q), proved: true });
+                    return Err(Rejected::Mirrored { best: self.mirrored.unwrap_or(q), proved: true });
                 }
                 Ok(Some(mut pairs)) => {
                     pairs.sort_unstable();
                     // A longer sample was a mirror image: what is left of it is no fix.
-                    let undecided = self.mirrored.map(|best| Unidentified::Mirrored { best, proved: false });
+                    let undecided = self.mirrored.map(|best| Rejected::Mirrored { best, proved: false });
                     return Ok(Identification {
                         optimal: true,
                         undecided,
-                        belief: None,
+                        posterior: None,
                         ..Identification::unproved(pairs, q, self.tests)
                     });
                 }
                 Ok(None) => {}
                 Err(Spent) => {
                     let (budget, best) = (self.budget, self.best);
-                    let ended = Unidentified::Budget { budget, best, bound: q, tests: self.tests };
+                    let ended = Rejected::Budget { budget, best, bound: q, tests: self.tests };
                     return so_far(self.problem, self.orientation, ended);
                 }
             }
@@ -172,26 +172,27 @@ impl<'a> Enumeration<'a> {
                 Ok(None) => {}
                 Err(Spent) => {
                     let (budget, best) = (self.budget, self.best);
-                    return Err(Unidentified::Budget { budget, best, bound: 2, tests: self.tests });
+                    return Err(Rejected::Budget { budget, best, bound: 2, tests: self.tests });
                 }
             }
         }
-        Err(Unidentified::NoConsensus { best: self.best, needed: NEEDED })
+        Err(Rejected::NoConsensus { best: self.best, needed: NEEDED })
     }
 
     /// The first coherent choice of candidates among the samples of length `q`.
     fn samples_of(&mut self, q: usize) -> Result<Option<Vec<Correspondence>>, Spent> {
         let mut sample: Vec<usize> = (0..q).collect();
         loop {
-            let (tests, drawn) = (self.tests, self.drawn);
+            let (tests, sampled) = (self.tests, self.sampled);
             let deepest = match self.product_of(&sample)? {
                 Product::Coherent(found) => return Ok(Some(found)),
                 Product::Refused { deepest } => deepest,
             };
             // All later samples that begin with the same points are refused by the same tests: they are counted, not made.
             let after = self.choices(&sample[deepest + 1..]);
-            let share = |spent: u64| (u128::from(spent) / after) as u64;
-            let refused = Refused { deepest, tests: share(self.tests - tests), drawn: share(self.drawn - drawn) };
+            let fraction = |spent: u64| (u128::from(spent) / after) as u64;
+            let refused =
+                Refused { deepest, tests: fraction(self.tests - tests), sampled: fraction(self.sampled - sampled) };
             self.pass_over(&refused, &mut sample)?;
             if !self.next(&mut sample, deepest) {
                 return Ok(None);
@@ -249,18 +250,18 @@ impl<'a> Enumeration<'a> {
     /// found to agree.
     fn count(&mut self, q: usize, tests: u64, choices: u128, agree: usize) -> Result<(), Spent> {
         let drawing = (q * q) as u64 / DRAWING;
-        let whole = u128::from(self.left() / (drawing + tests)).min(choices);
+        let full = u128::from(self.left() / (drawing + tests)).min(choices);
         // No more than the budget.
-        self.tests += whole as u64 * tests;
-        self.drawn += whole as u64 * drawing;
-        if whole > 0 {
+        self.tests += full as u64 * tests;
+        self.sampled += full as u64 * drawing;
+        if full > 0 {
             self.best = self.best.max(agree);
         }
-        if whole == choices {
+        if full == choices {
             return Ok(());
         }
         // The next choice is the one in which the budget ends.
-        self.drawn += drawing;
+        self.sampled += drawing;
         let last = self.left();
         self.tests += last;
         let agreed = (1..=q).take_while(|&points| all_pairs(points) <= last).last();
@@ -270,7 +271,7 @@ impl<'a> Enumeration<'a> {
 
     /// What is left of the budget.
     fn left(&self) -> u64 {
-        self.budget.saturating_sub(self.tests + self.drawn)
+        self.budget.saturating_sub(self.tests + self.sampled)
     }
 
     /// Whether no four of pairs that agree in all distances are mirrored.
@@ -278,7 +279,7 @@ impl<'a> Enumeration<'a> {
         if !self.orientation {
             return Ok(true);
         }
-        for four in fours(pairs) {
+        for four in quadruples(pairs) {
             if self.left() == 0 {
                 return Err(Spent);
             }
@@ -301,14 +302,14 @@ impl<'a> Enumeration<'a> {
         }
         // Of the samples that begin like this one up to `place`, this one is counted already.
         let (mut place, mut counted) = (refused.deepest, self.choices(&sample[refused.deepest + 1..]));
-        let each = u128::from(refused.tests + refused.drawn);
+        let each = u128::from(refused.tests + refused.sampled);
         loop {
             let left = u128::from(self.left());
             let more = self.continuations(sample, place, left.saturating_add(counted));
             let choices = more.saturating_mul(self.choices(&sample[refused.deepest + 1..=place])) - counted;
             if choices.saturating_mul(each) <= left {
                 self.tests += choices as u64 * refused.tests;
-                self.drawn += choices as u64 * refused.drawn;
+                self.sampled += choices as u64 * refused.sampled;
                 if place == refused.deepest {
                     return Ok(());
                 }
@@ -328,8 +329,8 @@ impl<'a> Enumeration<'a> {
     }
 
     /// The choices of candidates for what follows after `place` in all samples that begin like this one: the sum, over these
-    /// samples, of products. Exact up to `most`, and otherwise more than that.
-    fn continuations(&self, sample: &[usize], place: usize, most: u128) -> u128 {
+    /// samples, of products. Exact up to `max`, and otherwise more than that.
+    fn continuations(&self, sample: &[usize], place: usize, max: u128) -> u128 {
         let (begun, q) = (&sample[..=place], sample.len() - place - 1);
         let follows = |point: &usize| match self.samples {
             Samples::Combinations => *point > begun[place],
@@ -337,7 +338,7 @@ impl<'a> Enumeration<'a> {
         };
         let rest = (0..self.lists.len()).filter(follows).map(|point| self.lists[point].1.len() as u128);
         let rest: Vec<u128> = rest.collect();
-        let sets = products(&rest, q, most);
+        let sets = products(&rest, q, max);
         match self.samples {
             Samples::Combinations => sets,
             Samples::Permutations => (1..=q as u128).fold(sets, u128::saturating_mul),
@@ -359,14 +360,14 @@ fn all_pairs(points: usize) -> u64 {
 }
 
 /// The sum of the products of all subsets of `k` of these numbers, none of which is 0: the elementary symmetric polynomial.
-/// Exact up to `most`, and otherwise more than that.
-fn products(numbers: &[u128], k: usize, most: u128) -> u128 {
+/// Exact up to `max`, and otherwise more than that.
+fn products(numbers: &[u128], k: usize, max: u128) -> u128 {
     let n = numbers.len();
     // There are as many subsets: where there are too many, nothing needs to be summed up.
     let mut subsets = 1_u128;
     for i in 0..k.min(n - k) {
         subsets = subsets.saturating_mul((n - i) as u128) / (i as u128 + 1);
-        if subsets > most {
+        if subsets > max {
             return u128::MAX;
         }
     }
@@ -374,8 +375,8 @@ fn products(numbers: &[u128], k: usize, most: u128) -> u128 {
     sums[0] = 1;
     for (i, number) in numbers.iter().enumerate() {
         // Smaller subsets would not grow to k numbers any more.
-        let least = (k + i + 1).saturating_sub(n).max(1);
-        for size in (least..=k.min(i + 1)).rev() {
+        let min = (k + i + 1).saturating_sub(n).max(1);
+        for size in (min..=k.min(i + 1)).rev() {
             sums[size] = sums[size].saturating_add(sums[size - 1].saturating_mul(*number));
         }
     }
@@ -401,8 +402,8 @@ fn next_arrangement(sample: &mut [usize], place: usize, n: usize) -> bool {
         if let Some(value) = next {
             sample[place] = value;
             for later in place + 1..sample.len() {
-                let least = (0..n).find(|value| !sample[..later].contains(value));
-                sample[later] = least.expect("a sample is not longer than what it is drawn from");
+                let min = (0..n).find(|value| !sample[..later].contains(value));
+                sample[later] = min.expect("a sample is not longer than what it is drawn from");
             }
             return true;
         }
@@ -464,7 +465,7 @@ mod tests {
             }
         }
 
-        fn search(&self, search: &StructuralCoherence) -> Result<Identification, Unidentified> {
+        fn search(&self, search: &StructuralCoherence) -> Result<Identification, Rejected> {
             search.search(&self.problem(), &mut rand_chacha::ChaCha8Rng::seed_from_u64(0))
         }
 
@@ -487,14 +488,14 @@ mod tests {
     fn budget_of(ended: &Identification) -> (u64, usize, usize) {
         assert!(!ended.optimal);
         match ended.undecided {
-            Some(Unidentified::Budget { budget, best, bound, .. }) => (budget, best, bound),
+            Some(Rejected::Budget { budget, best, bound, .. }) => (budget, best, bound),
             ref other => panic!("{other:?}"),
         }
     }
 
     /// Four points that agree are the first sample: six distances and one volume.
     #[test]
-    fn the_tests_of_a_sample_are_its_distances_and_its_fours() {
+    fn the_tests_of_a_sample_are_its_distances_and_its_quadruples() {
         for samples in [Samples::Permutations, Samples::Combinations] {
             let found = Scene::of(&PLACES, &PLACES).search(&search(samples, 7)).unwrap();
             assert_eq!((found.pairs.len(), found.tests, found.size_bound, found.optimal), (4, 7, 4, true));
@@ -535,12 +536,12 @@ mod tests {
 
     /// No three points agree: of three whose second and third do, the two are found, by arrangements or by pairs in the end.
     #[test]
-    fn the_size_of_the_largest_set_is_told_where_it_is_too_small() {
+    fn the_size_of_the_largest_set_is_reported_where_it_is_too_small() {
         let (model, mut cloud) = (&PLACES[..3], [[9.0, 9.0, 9.0], PLACES[1], PLACES[2]]);
         let best = |cloud: &[[f64; 3]], samples, budget| match Scene::of(model, cloud).search(&search(samples, budget))
         {
-            Err(Unidentified::NoConsensus { best, needed: 3 }) => Ok(best),
-            Err(Unidentified::Budget { best, bound, tests, .. }) => Err((best, bound, tests)),
+            Err(Rejected::NoConsensus { best, needed: 3 }) => Ok(best),
+            Err(Rejected::Budget { best, bound, tests, .. }) => Err((best, bound, tests)),
             other => panic!("{other:?}"),
         };
         for samples in [Samples::Permutations, Samples::Combinations] {
@@ -554,17 +555,17 @@ mod tests {
         for samples in [Samples::Permutations, Samples::Combinations] {
             assert_eq!(best(&cloud, samples, 100), Ok(1));
         }
-        let few = Unidentified::TooFew { with_candidates: 2, needed: 3 };
+        let few = Rejected::TooFew { with_candidates: 2, needed: 3 };
         assert_eq!(Scene::of(model, &cloud[..2]).search(&search(Samples::Permutations, 9)), Err(few));
     }
 
     /// Four points and their mirror image: no fix with orientation, and one without.
     #[test]
-    fn a_mirror_image_is_told_with_its_size() {
+    fn a_mirror_image_is_reported_with_its_size() {
         let image = PLACES.map(|[x, y, z]| [x, y, -z]);
         for samples in [Samples::Permutations, Samples::Combinations] {
             let refused = Scene::of(&PLACES, &image).search(&search(samples, 1000)).unwrap_err();
-            assert_eq!(refused, Unidentified::Mirrored { best: 4, proved: true });
+            assert_eq!(refused, Rejected::Mirrored { best: 4, proved: true });
             let distances = StructuralCoherence { orientation: false, ..search(samples, 1000) };
             assert_eq!(Scene::of(&PLACES, &image).search(&distances).unwrap().pairs.len(), 4);
         }
@@ -578,7 +579,7 @@ mod tests {
         let image = model.map(|[x, y, z]| [x, y, -z]);
         let found = Scene::of(&model, &image).search(&search(Samples::Combinations, 10_000)).unwrap();
         assert_eq!(found.pairs.len(), 4);
-        assert_eq!(found.undecided, Some(Unidentified::Mirrored { best: 6, proved: false }));
+        assert_eq!(found.undecided, Some(Rejected::Mirrored { best: 6, proved: false }));
     }
 
     /// The first candidates of the list of each point are tried first, those of the last point in turn.
@@ -595,7 +596,7 @@ mod tests {
     /// All that a search may say, made test by test: samples, choices and pairs in the order that the enumeration counts them in.
     fn literally(scene: &Scene, problem: &Problem<'_>, search: &StructuralCoherence) -> (Option<usize>, u64, usize) {
         let n = scene.model.len();
-        let (mut tests, mut drawn, mut best) = (0, 0, 0);
+        let (mut tests, mut sampled, mut best) = (0, 0, 0);
         for q in (NEEDED..=n).rev() {
             let mut sample: Vec<usize> = (0..q).collect();
             loop {
@@ -606,11 +607,11 @@ mod tests {
                     let pair =
                         |place: usize| Correspondence { model: sample[place], cloud: lists[place][choice[place]] };
                     let pairs: Vec<Correspondence> = (0..q).map(pair).collect();
-                    drawn += (q * q) as u64 / DRAWING;
+                    sampled += (q * q) as u64 / DRAWING;
                     let mut coherent = true;
                     'tests: for place in 0..q {
                         for before in 0..place {
-                            if tests + drawn >= search.budget {
+                            if tests + sampled >= search.budget {
                                 return (None, tests, best);
                             }
                             tests += 1;
@@ -654,14 +655,14 @@ mod tests {
         use rand::RngExt;
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         for case in 0..60 {
-            let (points, most) = if case < 55 { (3 + case % 3, 3) } else { (17 + case % 2, 2) };
+            let (points, max) = if case < 55 { (3 + case % 3, 3) } else { (17 + case % 2, 2) };
             let mut place = || std::array::from_fn(|_| f64::from(rng.random_range(0..3_u32)));
             let model: Vec<[f64; 3]> = (0..points).map(|_| place()).collect();
             let mut cloud = model.clone();
             (0..points).step_by(2).for_each(|i| cloud[i] = place());
             let mut scene = Scene::of(&model, &cloud);
             let some = |i: usize, rng: &mut rand_chacha::ChaCha8Rng| {
-                let list: Vec<usize> = (0..rng.random_range(1..=most)).map(|k| (i + k) % points).collect();
+                let list: Vec<usize> = (0..rng.random_range(1..=max)).map(|k| (i + k) % points).collect();
                 list.into_iter().map(move |j| (i, j))
             };
             let pairs: Vec<(usize, usize)> = (0..points).flat_map(|i| some(i, &mut rng)).collect();

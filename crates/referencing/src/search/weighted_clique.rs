@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Identification, Search, Unidentified,
+    Identification, Rejected, Search,
     affinity::{Affinity, by_weight, normalized},
     association::Association,
     bounded,
@@ -30,14 +30,14 @@ pub(crate) struct WeightedClique {
     /// Operations on edges, and pair tests, before the ascent ends.
     pub(crate) budget: u64,
     /// More candidate pairs than this are not searched (40 000 take 200 MB).
-    pub(crate) most_pairs: usize,
+    pub(crate) max_pairs: usize,
     /// Nor more edges than this (8 bytes each).
-    pub(crate) most_edges: usize,
+    pub(crate) max_edges: usize,
 }
 
 impl Default for WeightedClique {
     fn default() -> Self {
-        Self { orientation: true, iterations: 500, budget: 2_000_000_000, most_pairs: 40_000, most_edges: 30_000_000 }
+        Self { orientation: true, iterations: 500, budget: 2_000_000_000, max_pairs: 40_000, max_edges: 30_000_000 }
     }
 }
 
@@ -57,17 +57,17 @@ impl Component for WeightedClique {
 
     fn check(&self) -> Result<(), String> {
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
-        bounded(self.budget, self.most_pairs)?;
-        in_range(self.most_edges > 0, "most-edges", self.most_edges, "1 or more")
+        bounded(self.budget, self.max_pairs)?;
+        in_range(self.max_edges > 0, "max-edges", self.max_edges, "1 or more")
     }
 }
 
 impl Search for WeightedClique {
-    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Unidentified> {
-        feasible(problem, self.most_pairs)?;
+    fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        feasible(problem, self.max_pairs)?;
         let graph = Association::of(problem);
         let weight = |off: f64| libm::exp(-4.5 * off * off);
-        let affinity = Affinity::of(problem, &graph, self.most_edges, weight)?;
+        let affinity = Affinity::of(problem, &graph, self.max_edges, weight)?;
         let mut ascent = Ascent::of(&affinity, graph.vertices.len());
         let spent = |ascent: &Ascent<'_>| graph.tests + ascent.products * affinity.edges() as u64;
         let mut ended = None;
@@ -175,6 +175,6 @@ mod tests {
     fn settings_out_of_range_are_refused() {
         assert_eq!(WeightedClique::default().check(), Ok(()));
         assert!(WeightedClique { iterations: 0, ..WeightedClique::default() }.check().is_err());
-        assert!(WeightedClique { most_pairs: 2, ..WeightedClique::default() }.check().is_err());
+        assert!(WeightedClique { max_pairs: 2, ..WeightedClique::default() }.check().is_err());
     }
 }

@@ -7,20 +7,20 @@ use super::{ModelPoint, target::diameter};
 use crate::{Kabsch, Observation, Observations, Solver};
 
 /// A motion must map at least this share of the points, and at least four.
-const LEAST_SHARE: f64 = 0.6;
-const LEAST_POINTS: usize = 4;
+const MIN_FRACTION: f64 = 0.6;
+const MIN_POINTS: usize = 4;
 /// Poses no further apart (m, root mean square over the points), or than this share of the diameter, are
 /// one answer; half of it is what a point may be off its image.
 const ALERT_LIMIT: f64 = 0.10;
-const ALERT_SHARE: f64 = 0.05;
+const ALERT_FRACTION: f64 = 0.05;
 /// Second side of a triangle over its longest, and its height over that, below which it fixes no motion well. Of a slender model
 /// half of what the best of its triangles has.
-const LEAST_RATIO: f64 = 0.2;
+const MIN_RATIO: f64 = 0.2;
 /// Comparisons of two points that the search may take; of models too large for all triangles these are
 /// taken evenly until it is spent.
-const MOST_WORK: usize = 300_000_000;
+const MAX_WORK: usize = 300_000_000;
 /// More motions than this are not listed.
-const MOST_MOTIONS: usize = 200;
+const MAX_MOTIONS: usize = 200;
 /// Of larger models a motion is tried on so many points first, of which it must map so many.
 const TRIED: usize = 16;
 const TRIED_MAPPED: usize = 5;
@@ -47,25 +47,25 @@ pub struct Congruence {
 /// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
 pub(crate) fn congruences(points: &[ModelPoint]) -> Vec<Congruence> {
     let n = points.len();
-    if n < LEAST_POINTS {
+    if n < MIN_POINTS {
         return Vec::new();
     }
-    let alert = ALERT_LIMIT.min(ALERT_SHARE * diameter(points));
-    let search = Finder { at: points.iter().map(|p| p.at).collect(), tolerance: alert / 2.0, alert, least: least(n) };
+    let alert = ALERT_LIMIT.min(ALERT_FRACTION * diameter(points));
+    let search = Finder { at: points.iter().map(|p| p.at).collect(), tolerance: alert / 2.0, alert, min: min(n) };
     let mut found = search.all();
     found.sort_by(|a, b| b.pairs.len().cmp(&a.pairs.len()).then_with(|| a.pairs.cmp(&b.pairs)));
     found
 }
 
-fn least(n: usize) -> usize {
-    ((LEAST_SHARE * n as f64).ceil() as usize).max(LEAST_POINTS)
+fn min(n: usize) -> usize {
+    ((MIN_FRACTION * n as f64).ceil() as usize).max(MIN_POINTS)
 }
 
 struct Finder {
     at: Vec<Point<Object>>,
     tolerance: f64,
     alert: f64,
-    least: usize,
+    min: usize,
 }
 
 impl Finder {
@@ -75,14 +75,14 @@ impl Finder {
         let mut found: Vec<Congruence> = Vec::new();
         // Of a large model a number of triangles that are far apart: the stride is odd, no multiple of a row.
         let triangles = n * (n - 1) * (n - 2) / 6;
-        let stride = (triangles.saturating_mul(n * n) / (MOST_WORK / 4)).max(1) | 1;
+        let stride = (triangles.saturating_mul(n * n) / (MAX_WORK / 4)).max(1) | 1;
         let own = |[a, b, c]: [usize; 3]| ratio([distance[a][b], distance[b][c], distance[a][c]]);
         let some = || triples(n).enumerate().filter(|(number, _)| (number + 1) % stride == 0).map(|(_, three)| three);
-        let least = some().map(own).fold(0.0, f64::max).min(2.0 * LEAST_RATIO) / 2.0;
+        let min = some().map(own).fold(0.0, f64::max).min(2.0 * MIN_RATIO) / 2.0;
         let mut work = 0;
-        for three in some().filter(|three| own(*three) >= least && least > 0.0) {
+        for three in some().filter(|three| own(*three) >= min && min > 0.0) {
             self.images(three, &distance, &mut found, &mut work);
-            if found.len() >= MOST_MOTIONS || work >= MOST_WORK {
+            if found.len() >= MAX_MOTIONS || work >= MAX_WORK {
                 break;
             }
         }
@@ -105,7 +105,7 @@ impl Finder {
                     if [a, b, c] != [i, j, k] && !known(found, &pairs) {
                         self.add(&pairs, found, work);
                     }
-                    if *work >= MOST_WORK || found.len() >= MOST_MOTIONS {
+                    if *work >= MAX_WORK || found.len() >= MAX_MOTIONS {
                         return;
                     }
                 }
@@ -128,7 +128,7 @@ impl Finder {
         // Three points alone fit worse than all: a wider search, then the tolerance itself.
         let mut mapped = self.map(&motion, 2.0 * self.tolerance);
         for _ in 0..2 {
-            if mapped.len() < self.least {
+            if mapped.len() < self.min {
                 return;
             }
             *work += n * n;
@@ -136,7 +136,7 @@ impl Finder {
             motion = better;
             mapped = self.map(&motion, self.tolerance);
         }
-        if mapped.len() < self.least || self.apart(&motion, &Transform::identity()) <= self.alert {
+        if mapped.len() < self.min || self.apart(&motion, &Transform::identity()) <= self.alert {
             return;
         }
         let same = found.iter().position(|known| self.apart(&known.motion, &motion) <= self.alert);
@@ -168,7 +168,7 @@ impl Finder {
             let Some((j, square)) = nearest.min_by(|a, b| a.1.total_cmp(&b.1)) else { break };
             if square > tolerance * tolerance {
                 missed += 1;
-                if n - missed < self.least {
+                if n - missed < self.min {
                     return Vec::new();
                 }
             } else if onto[j].is_none_or(|(_, other)| square < other) {
@@ -331,6 +331,6 @@ mod tests {
     #[test]
     fn five_hundred_points_are_bounded() {
         let grid = (0..500).map(|i| [0.3 * f64::from(i % 25), 0.3 * f64::from(i / 25), 0.05 * f64::from((i * i) % 7)]);
-        assert!(congruences(&model(grid)).len() <= MOST_MOTIONS);
+        assert!(congruences(&model(grid)).len() <= MAX_MOTIONS);
     }
 }

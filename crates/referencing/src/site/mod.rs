@@ -3,10 +3,10 @@
 //! Two levels, as in the paper: a production system (site) of objects; every object has its own
 //! frame by the Fig. 2 rule, and the site's frame is that of one chosen object.
 
+mod bounding_box;
 mod check;
 mod congruence;
 mod file;
-mod shell;
 mod target;
 
 use std::path::Path;
@@ -15,10 +15,10 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use seafix_component::Fault;
 use seafix_geometry::{Covariance6, Object, Point, Transform, World, triad};
 
+pub use bounding_box::BoundingBox;
 pub(crate) use check::{COINCIDENT, SUSPICIOUS};
 pub use congruence::Congruence;
 pub(crate) use congruence::congruences;
-pub use shell::Shell;
 pub use target::{NoWorld, Target, TargetKind};
 pub(crate) use target::{diameter, nearest_two};
 
@@ -48,19 +48,19 @@ impl ModelPoint {
     /// attitude are known to some degrees.
     pub fn shows_itself(&self, camera: &Vector3<f64>) -> bool {
         self.normal.is_none_or(|normal| {
-            let sight = camera - self.at.coords;
-            normal.dot(&sight) > BACK * normal.norm() * sight.norm()
+            let ray = camera - self.at.coords;
+            normal.dot(&ray) > BACK * normal.norm() * ray.norm()
         })
     }
 
     /// The angle (rad, 0 to π) between the normal and the line of sight to a camera there (object frame); `None` if the point
     /// is seen from everywhere.
-    pub fn sight_angle(&self, camera: &Vector3<f64>) -> Option<f64> {
+    pub fn incidence_angle(&self, camera: &Vector3<f64>) -> Option<f64> {
         self.normal.map(|normal| normal.angle(&(camera - self.at.coords)))
     }
 
     /// The greatest angle (rad) between normal and line of sight at which a point still shows itself.
-    pub fn most_sight_angle() -> f64 {
+    pub fn max_incidence_angle() -> f64 {
         libm::acos(BACK)
     }
 }
@@ -97,14 +97,14 @@ pub struct SiteObject {
 
 impl SiteObject {
     /// The min–max shell of the feature points in the object's own frame.
-    pub fn shell(&self) -> Shell<Object> {
-        Shell::around(self.points.iter().map(|point| point.at)).expect("an object has at least three points")
+    pub fn bounding_box(&self) -> BoundingBox<Object> {
+        BoundingBox::around(self.points.iter().map(|point| point.at)).expect("an object has at least three points")
     }
 
     /// The min–max shell of the feature points in the world; `None` where no world is known.
-    pub fn shell_in_world(&self) -> Option<Shell<World>> {
+    pub fn bounding_box_in_world(&self) -> Option<BoundingBox<World>> {
         let world_from_object = self.world_from_object?;
-        Shell::around(self.points.iter().map(|point| world_from_object * point.at))
+        BoundingBox::around(self.points.iter().map(|point| world_from_object * point.at))
     }
 
     /// How well the survey knows where the object stands: the covariance of
@@ -184,8 +184,8 @@ impl Site {
     }
 
     /// The min–max shell of the whole site in the world; `None` unless every object's place is known.
-    pub fn shell_in_world(&self) -> Option<Shell<World>> {
-        self.objects.iter().map(SiteObject::shell_in_world).reduce(|a, b| Some(a?.union(&b?)))?
+    pub fn bounding_box_in_world(&self) -> Option<BoundingBox<World>> {
+        self.objects.iter().map(SiteObject::bounding_box_in_world).reduce(|a, b| Some(a?.union(&b?)))?
     }
 
     /// What is searched for: each object by itself, or the whole site as one.

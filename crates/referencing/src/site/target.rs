@@ -6,7 +6,7 @@ use nalgebra::{Matrix6, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, World};
 use serde::{Deserialize, Serialize};
 
-use super::{Congruence, ModelPoint, Shell, Site, SiteObject, congruence};
+use super::{BoundingBox, Congruence, ModelPoint, Site, SiteObject, congruence};
 use crate::{Member, Placement, Prior, PriorBound};
 
 /// What is searched for.
@@ -102,8 +102,8 @@ impl Target {
     }
 
     /// The min–max shell of its points in its own frame.
-    pub fn shell(&self) -> Shell<Object> {
-        Shell::around(self.points.iter().map(|point| point.at)).expect("a target has at least three points")
+    pub fn bounding_box(&self) -> BoundingBox<Object> {
+        BoundingBox::around(self.points.iter().map(|point| point.at)).expect("a target has at least three points")
     }
 
     fn of(object: &SiteObject) -> Self {
@@ -127,20 +127,20 @@ pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
     let mut far: Vec<(f64, &Vector3<f64>)> =
         points.iter().map(|point| ((point.at.coords - middle).norm(), &point.at.coords)).collect();
     far.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-    let mut most = 0.0f64;
+    let mut max = 0.0f64;
     for (i, (from, a)) in far.iter().enumerate() {
         // The furthest of the others tells whether any can be further from this one than what is known.
-        if from + far[0].0 <= most {
+        if from + far[0].0 <= max {
             break;
         }
         for (other, b) in &far[..i] {
-            if from + other <= most {
+            if from + other <= max {
                 break;
             }
-            most = most.max((*a - *b).norm());
+            max = max.max((*a - *b).norm());
         }
     }
-    most
+    max
 }
 
 /// The two nearest of the points that are nearer than `limit` (m), the first of them first, and how far apart they are; `None` where
@@ -156,12 +156,12 @@ pub(crate) fn nearest_two(points: &[ModelPoint], limit: f64) -> Option<(usize, u
     let mut nearest: Option<(usize, usize, f64)> = None;
     for (place, &(here, i)) in along.iter().enumerate() {
         for &(there, k) in along[..place].iter().rev() {
-            let most = nearest.map_or(limit, |(.., distance)| distance);
-            if here - there > most || most == 0.0 {
+            let max = nearest.map_or(limit, |(.., distance)| distance);
+            if here - there > max || max == 0.0 {
                 break;
             }
             let distance = points[i].at.distance(&points[k].at);
-            if distance < most {
+            if distance < max {
                 nearest = Some((i.min(k), i.max(k), distance));
             }
         }
@@ -173,12 +173,12 @@ pub(crate) fn nearest_two(points: &[ModelPoint], limit: f64) -> Option<(usize, u
 pub(super) fn targets(site: &Site, kind: TargetKind) -> Result<Vec<Target>, NoWorld> {
     match kind {
         TargetKind::Object | TargetKind::Joint => Ok(site.objects.iter().map(Target::of).collect()),
-        TargetKind::Site => Ok(vec![whole(site)?]),
+        TargetKind::Site => Ok(vec![full(site)?]),
     }
 }
 
 /// All points of the site in the frame of its frame object, carried there through Eq. (1).
-fn whole(site: &Site) -> Result<Target, NoWorld> {
+fn full(site: &Site) -> Result<Target, NoWorld> {
     let frame = site.frame_object();
     let (mut points, mut firsts) = (Vec::new(), Vec::new());
     for (index, object) in site.objects.iter().enumerate() {

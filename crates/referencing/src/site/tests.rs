@@ -70,9 +70,9 @@ fn a_good_site_stands_where_it_was_surveyed() {
     let at = plate.world_from_object.unwrap() * Point::new(1.0, 1.0, 1.0);
     assert!(at.distance(&Point::new(11.0, 21.0, 31.0)) < 1e-12, "{at:?}");
     assert_eq!(plate.points[0].normal, Some(Vector3::z()), "normals become unit vectors");
-    let shell = site.shell_in_world().unwrap();
-    assert!(shell.min.distance(&Point::new(10.0, 19.0, 29.0)) < 1e-12, "{shell:?}");
-    assert!(shell.max.distance(&Point::new(16.0, 20.5, 30.0)) < 1e-12, "{shell:?}");
+    let bounding_box = site.bounding_box_in_world().unwrap();
+    assert!(bounding_box.min.distance(&Point::new(10.0, 19.0, 29.0)) < 1e-12, "{bounding_box:?}");
+    assert!(bounding_box.max.distance(&Point::new(16.0, 20.5, 30.0)) < 1e-12, "{bounding_box:?}");
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn a_site_written_and_read_is_the_same() {
 }
 
 #[test]
-fn the_whole_site_is_one_target_in_its_frame() {
+fn the_full_site_is_one_target_in_its_frame() {
     let site = parse(GOOD).unwrap();
     let [target] = &site.targets(TargetKind::Site).unwrap()[..] else { panic!("one target") };
     let ids: Vec<&str> = target.points.iter().map(|point| point.id.as_str()).collect();
@@ -103,7 +103,7 @@ fn a_site_without_a_world_has_objects_only() {
     let site = parse(&text).unwrap();
     assert_eq!(site.targets(TargetKind::Site), Err(NoWorld { object: "frame".to_owned() }));
     assert_eq!(site.targets(TargetKind::Object).unwrap().len(), 2);
-    assert_eq!(site.shell_in_world(), None);
+    assert_eq!(site.bounding_box_in_world(), None);
 }
 
 #[test]

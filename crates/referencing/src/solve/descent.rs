@@ -146,7 +146,7 @@ const NOTHING: f64 = 1e-20;
 pub(super) const NEAR: f64 = 1e-4;
 /// Steps of one descent. Half a dozen are enough of nearly all; few weak points lie in a long curved valley, where Gauss's and
 /// Newton's steps are too short or too long by nearly all of themselves.
-const MOST_STEPS: u64 = 500;
+const MAX_STEPS: u64 = 500;
 
 /// The least cost reached from `start` by Levenberg's and Marquardt's damped steps, to where a step is shorter than
 /// √`near` standard deviations. The weights of `term` must not depend on the pose: every step must lower the cost.
@@ -163,7 +163,7 @@ pub(super) fn descend(
 ) -> Result<(Transform<Object, Camera>, Linearized), Degenerate> {
     let here = linearize(points, start, term)?;
     let (mut pose, mut here, mut damping) = (*start, here, 0.0);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let (step, decrement) = here.determined(damping)?;
         if damping == 0.0 && decrement <= near {
             break;
@@ -194,18 +194,18 @@ pub(super) fn settle(
     here: Linearized,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
 ) -> Result<(Transform<Object, Camera>, Linearized), Degenerate> {
-    let (mut pose, mut here, mut last, mut share) = (start, here, f64::INFINITY, 1.0);
-    for taken in 0..MOST_STEPS {
+    let (mut pose, mut here, mut last, mut fraction) = (start, here, f64::INFINITY, 1.0);
+    for taken in 0..MAX_STEPS {
         let (step, decrement) = here.determined(0.0)?;
         if !(decrement < last) {
             // Rounding is all that is left, or the steps lead beyond the minimum.
             let done = converged(taken, last.sqrt());
-            if done.is_ok() || share < LEAST_SHARE {
+            if done.is_ok() || fraction < MIN_FRACTION {
                 return done.map(|()| (pose, here));
             }
-            share *= 0.5;
+            fraction *= 0.5;
         }
-        pose = moved(&pose, &(step * share));
+        pose = moved(&pose, &(step * fraction));
         // Steps shrink by a constant factor at least: that the next is nothing is known before it is taken.
         let rate = if last.is_finite() { decrement / last } else { SHRINK };
         if decrement * rate <= NOTHING {
@@ -214,11 +214,11 @@ pub(super) fn settle(
         last = decrement;
         here = linearize(points, &pose, term)?;
     }
-    converged(MOST_STEPS, last.sqrt()).map(|()| (pose, here))
+    converged(MAX_STEPS, last.sqrt()).map(|()| (pose, here))
 }
 
 /// With so small a share of the steps nothing is to be hoped for.
-const LEAST_SHARE: f64 = 0.01;
+const MIN_FRACTION: f64 = 0.01;
 /// By how much the first decrement is taken to fall.
 const SHRINK: f64 = 1e-2;
 

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver,
+    degeneracy::{check, fraction},
     descent::{Term, minimize},
     roots::widest,
     sandwich,
-    spread::{check, share},
 };
 use crate::Observations;
 
@@ -24,12 +24,12 @@ use crate::Observations;
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct FastLocalMatrix {
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 impl Default for FastLocalMatrix {
     fn default() -> Self {
-        Self { least_ratio: 1e-3 }
+        Self { min_ratio: 1e-3 }
     }
 }
 
@@ -39,15 +39,15 @@ impl Component for FastLocalMatrix {
     const SOURCE: &'static str = "ours, after a phrase in Bobkov, Kudryashov, Inzartsev 2021";
 
     fn check(&self) -> Result<(), String> {
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
 impl Solver for FastLocalMatrix {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         let [a, b, c] = widest(data).map(|i| data.points[i]);
-        let line = |thin: seafix_geometry::Collinear| Degenerate::Collinear { ratio: thin.sine, least: thin.least };
+        let line = |thin: seafix_geometry::Collinear| Degenerate::Collinear { ratio: thin.sine, min: thin.min };
         let camera = triad::<Camera, Object>(&a.measured.at, &b.measured.at, &c.measured.at).map_err(line)?;
         let object = triad::<Object, Object>(&a.model, &b.model, &c.model).map_err(line)?;
         let unweighted = |k: usize, at: &Vector3<f64>| {
@@ -61,7 +61,7 @@ impl Solver for FastLocalMatrix {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        sandwich::or_resampled(data, at, |_| 1.0, |drawn| self.solve(drawn))
+        sandwich::or_resampled(data, at, |_| 1.0, |sampled| self.solve(sampled))
     }
 }
 

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver,
+    degeneracy::{check, fraction},
     irls::distance,
     kabsch::{self, fit_weighted},
     sandwich,
-    spread::{check, share},
     weighted_kabsch::variance,
 };
 use crate::Observations;
@@ -31,12 +31,12 @@ pub(crate) struct GncTls {
     /// How many sets of three points are tried where points are left out: 1000 are all of nineteen points.
     pub(crate) triples: usize,
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 impl Default for GncTls {
     fn default() -> Self {
-        Self { threshold: 4.5, growth: 1.4, triples: 1000, least_ratio: 1e-3 }
+        Self { threshold: 4.5, growth: 1.4, triples: 1000, min_ratio: 1e-3 }
     }
 }
 
@@ -53,24 +53,24 @@ impl Component for GncTls {
         let grows = self.growth > 1.0 && self.growth <= 10.0;
         in_range(grows, "growth", self.growth, "a number above 1, at most 10")?;
         in_range(self.triples <= 100_000, "triples", self.triples, "0 to 100000")?;
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
 /// How often a start may change what it keeps.
-const MOST_TURNS: usize = 10;
+const MAX_TURNS: usize = 10;
 /// Steps of the iteration: μ passes through twenty decades.
-const MOST_STEPS: usize = 200;
+const MAX_STEPS: usize = 200;
 
 impl Solver for GncTls {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         Ok(self.keep(data)?.0)
     }
 
     /// The points it keeps.
     fn used(&self, data: &Observations<'_>) -> Vec<usize> {
-        let kept = check(data, self.minimum(), self.least_ratio).and_then(|()| self.keep(data));
+        let kept = check(data, self.minimum(), self.min_ratio).and_then(|()| self.keep(data));
         let kept = kept.map(|(_, kept)| kept).unwrap_or_default();
         (0..kept.len()).filter(|&k| kept[k]).collect()
     }
@@ -83,7 +83,7 @@ impl Solver for GncTls {
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let kept = self.used(data).into_iter().map(|k| data.points[k]).collect();
         let kept = Observations { points: kept, rig: data.rig };
-        sandwich::or_resampled(&kept, at, |_| 1.0, |drawn| Ok(kabsch::fit(&drawn.points)))
+        sandwich::or_resampled(&kept, at, |_| 1.0, |sampled| Ok(kabsch::fit(&sampled.points)))
     }
 }
 
@@ -115,14 +115,14 @@ impl GncTls {
         let sum = |pose: &_| -> f64 {
             points.iter().map(|point| variance(point) * distance(point, pose).powi(2).min(c2)).sum()
         };
-        let mut least = sum(&pose);
+        let mut min = sum(&pose);
         let n = points.len();
         let all = n * (n - 1) * (n - 2) / 6;
         // Of more than are tried every so-manieth.
         let stride = all.div_ceil(self.triples.max(1));
         for three in (0..all).step_by(stride).take(self.triples).map(|m| triple(m, n)) {
             let mut chosen: Vec<bool> = (0..n).map(|k| three.contains(&k)).collect();
-            for _ in 0..MOST_TURNS {
+            for _ in 0..MAX_TURNS {
                 let weights: Vec<f64> = chosen.iter().map(|&kept| f64::from(u8::from(kept))).collect();
                 if !self.determined(data, &weights) {
                     break;
@@ -131,8 +131,8 @@ impl GncTls {
                 let next: Vec<bool> = points.iter().map(|point| distance(point, &other).powi(2) <= c2).collect();
                 if next == chosen {
                     let found = sum(&other);
-                    if found < least * (1.0 - 1e-9) {
-                        (least, pose, kept) = (found, other, next);
+                    if found < min * (1.0 - 1e-9) {
+                        (min, pose, kept) = (found, other, next);
                     }
                     break;
                 }
@@ -155,7 +155,7 @@ impl GncTls {
         let mut weights = vec![1.0; points.len()];
         if 2.0 * largest > c2 {
             let mut mu = c2 / (2.0 * largest - c2);
-            for _ in 0..MOST_STEPS {
+            for _ in 0..MAX_STEPS {
                 let weight = |d2: f64| {
                     if d2 <= c2 * mu / (mu + 1.0) {
                         1.0
@@ -184,7 +184,7 @@ impl GncTls {
     /// Whether the points that these weights keep are three and no line.
     fn determined(&self, data: &Observations<'_>, weights: &[f64]) -> bool {
         let kept = data.points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(point, _)| *point).collect();
-        check(&Observations { points: kept, rig: data.rig }, self.minimum(), self.least_ratio).is_ok()
+        check(&Observations { points: kept, rig: data.rig }, self.minimum(), self.min_ratio).is_ok()
     }
 }
 

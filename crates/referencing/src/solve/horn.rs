@@ -6,8 +6,9 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver, sandwich,
-    spread::{centroid, check, share},
+    Degenerate, Solver,
+    degeneracy::{centroid, check, fraction},
+    sandwich,
 };
 use crate::Observations;
 
@@ -17,12 +18,12 @@ use crate::Observations;
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Horn {
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 impl Default for Horn {
     fn default() -> Self {
-        Self { least_ratio: 1e-3 }
+        Self { min_ratio: 1e-3 }
     }
 }
 
@@ -32,7 +33,7 @@ impl Component for Horn {
     const SOURCE: &'static str = "Horn, Closed-form solution of absolute orientation using unit quaternions, 1987";
 
     fn check(&self) -> Result<(), String> {
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
@@ -42,7 +43,7 @@ impl Solver for Horn {
     }
 
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         let model = centroid(data.points.iter().map(|point| point.model.coords));
         let measured = centroid(data.points.iter().map(|point| point.measured.at.coords));
         let s: Matrix3<f64> = data
@@ -69,6 +70,6 @@ impl Solver for Horn {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        sandwich::or_resampled(data, at, |_| 1.0, |drawn| self.solve(drawn))
+        sandwich::or_resampled(data, at, |_| 1.0, |sampled| self.solve(sampled))
     }
 }

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver, converged,
+    degeneracy::{check, fraction},
     kabsch::fit_weighted,
     normal::singular,
     resampled::{self, Answer},
     sandwich,
-    spread::{check, share},
     weighted_kabsch::variance,
 };
 use crate::{Observation, Observations};
@@ -40,12 +40,12 @@ pub(crate) struct Irls {
     /// Where Huber's loss turns linear, and Cauchy's c (standard deviations of a point).
     pub(crate) threshold: f64,
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 impl Default for Irls {
     fn default() -> Self {
-        Self { loss: Loss::Huber, threshold: 3.0, least_ratio: 1e-3 }
+        Self { loss: Loss::Huber, threshold: 3.0, min_ratio: 1e-3 }
     }
 }
 
@@ -58,12 +58,12 @@ impl Component for Irls {
         // Written so that a NaN is refused too.
         let positive = self.threshold > 0.0 && self.threshold.is_finite();
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
 /// Steps of the iteration.
-const MOST_STEPS: u64 = 200;
+const MAX_STEPS: u64 = 200;
 /// A step (standard deviations of the pose) after which an answer that only serves a covariance is at its minimum: what is
 /// left, a few times as much, adds a ten-thousandth to the variance.
 const STILL: f64 = 1e-3;
@@ -84,7 +84,7 @@ impl Solver for Irls {
         let known = sandwich::covariance(data, at, |k| self.weight(&data.points[k], at))?;
         let length = known.matrix.cholesky().ok_or_else(|| singular(&known.matrix))?;
         let still = |step: &Vector6<f64>| step.dot(&length.solve(step)) <= STILL * STILL;
-        resampled::covariance(|drawn| self.follow(drawn, still), data, at, self.bends())
+        resampled::covariance(|sampled| self.follow(sampled, still), data, at, self.bends())
     }
 }
 
@@ -95,21 +95,21 @@ impl Irls {
         data: &Observations<'_>,
         still: impl Fn(&Vector6<f64>) -> bool,
     ) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         let mut pose = fit_weighted(&data.points, |_| 1.0);
         let mut last = f64::INFINITY;
-        for taken in 1..=MOST_STEPS {
+        for taken in 1..=MAX_STEPS {
             let next = fit_weighted(&data.points, |k| self.weight(&data.points[k], &pose));
             let step = pose.error_to(&next);
             if still(&step) {
                 return Ok(next);
             }
-            if taken == MOST_STEPS {
+            if taken == MAX_STEPS {
                 // Steps shrink by a constant factor or ever more slowly: what all that would follow add up to.
                 let known = sandwich::covariance(data, &next, |k| self.weight(&data.points[k], &next))?;
                 let length = known.matrix.cholesky().map_or(f64::INFINITY, |c| step.dot(&c.solve(&step)).sqrt());
                 let shrink = step.norm() / last;
-                let off = if shrink < 1.0 { length * shrink / (1.0 - shrink) } else { length * MOST_STEPS as f64 };
+                let off = if shrink < 1.0 { length * shrink / (1.0 - shrink) } else { length * MAX_STEPS as f64 };
                 return converged(taken, off).map(|()| next);
             }
             (pose, last) = (next, step.norm());

@@ -6,8 +6,9 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver, sandwich,
-    spread::{check, share},
+    Degenerate, Solver,
+    degeneracy::{check, fraction},
+    sandwich,
 };
 use crate::{Observation, Observations};
 
@@ -20,12 +21,12 @@ use crate::{Observation, Observations};
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Kabsch {
     /// Second extent of the points over the first below which they count as a line.
-    pub least_ratio: f64,
+    pub min_ratio: f64,
 }
 
 impl Default for Kabsch {
     fn default() -> Self {
-        Self { least_ratio: 1e-3 }
+        Self { min_ratio: 1e-3 }
     }
 }
 
@@ -36,7 +37,7 @@ impl Component for Kabsch {
                                   Umeyama, Least-squares estimation of transformation parameters, 1991";
 
     fn check(&self) -> Result<(), String> {
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
@@ -46,7 +47,7 @@ impl Solver for Kabsch {
     }
 
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         Ok(fit(&data.points))
     }
 
@@ -55,7 +56,7 @@ impl Solver for Kabsch {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        sandwich::or_resampled(data, at, |_| 1.0, |drawn| self.solve(drawn))
+        sandwich::or_resampled(data, at, |_| 1.0, |sampled| self.solve(sampled))
     }
 }
 
@@ -90,7 +91,7 @@ pub(super) fn fit_weighted(points: &[Observation], weight: impl Fn(usize) -> f64
 fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
     let mut a = [0, 1, 2].map(|k| m.column(k).into_owned());
     let mut v = [Vector3::x(), Vector3::y(), Vector3::z()];
-    for _ in 0..MOST_SWEEPS {
+    for _ in 0..MAX_SWEEPS {
         let mut turned = false;
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let (alpha, beta, gamma) = (a[p].norm_squared(), a[q].norm_squared(), a[p].dot(&a[q]));
@@ -110,7 +111,7 @@ fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
         }
     }
     let size = [0, 1, 2].map(|k| a[k].norm_squared());
-    let weakest = (0..3).fold(0, |least, k| if size[k] < size[least] { k } else { least });
+    let weakest = (0..3).fold(0, |min, k| if size[k] < size[min] { k } else { min });
     // Cyclic order: the third is the cross product of the two after it.
     let (i, j) = ((weakest + 1) % 3, (weakest + 2) % 3);
     let (u1, u2) = (a[i].normalize(), a[j].normalize());
@@ -120,7 +121,7 @@ fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
 /// Cosine of two columns that count as orthogonal.
 const ORTHOGONAL: f64 = 1e-15;
 /// Three or four sweeps are enough; convergence is quadratic.
-const MOST_SWEEPS: usize = 30;
+const MAX_SWEEPS: usize = 30;
 
 #[cfg(test)]
 mod tests {
@@ -133,7 +134,7 @@ mod tests {
     fn settings_out_of_range_are_refused() {
         assert_eq!(Kabsch::default().check(), Ok(()));
         for bad in [-0.1, 1.0, f64::NAN] {
-            assert!(Kabsch { least_ratio: bad }.check().is_err(), "{bad}");
+            assert!(Kabsch { min_ratio: bad }.check().is_err(), "{bad}");
         }
     }
 
@@ -170,7 +171,7 @@ mod tests {
     fn the_rotation_maximises_the_trace() {
         let turn = |angles: [f64; 3]| seafix_geometry::so3::exp(&angles.into()).to_rotation_matrix().into_inner();
         let (u, v) = (turn([0.4, -0.3, 1.1]), turn([-0.7, 2.0, 0.2]));
-        for (values, most) in [
+        for (values, max) in [
             ([3.0, 2.0, 1.0], 6.0),
             ([1.0, 3.0, 2.0], 6.0),
             ([2.0, 1.0, 3.0], 6.0),
@@ -183,7 +184,7 @@ mod tests {
         ] {
             let m = u * Matrix3::from_diagonal(&values.into()) * v.transpose();
             let r = rotation_of(&m);
-            assert!((r.transpose() * m).trace() / most - 1.0 > -1e-14, "{values:?}: {}", (r.transpose() * m).trace());
+            assert!((r.transpose() * m).trace() / max - 1.0 > -1e-14, "{values:?}: {}", (r.transpose() * m).trace());
             assert!((r.transpose() * r - Matrix3::identity()).amax() < 1e-14, "{values:?}");
             assert!((r.determinant() - 1.0).abs() < 1e-14, "{values:?}");
         }

@@ -21,12 +21,12 @@ pub(crate) struct LBfgs {
     /// Iterations at most.
     pub(crate) iterations: u64,
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 impl Default for LBfgs {
     fn default() -> Self {
-        Self { iterations: 200, least_ratio: 1e-3 }
+        Self { iterations: 200, min_ratio: 1e-3 }
     }
 }
 
@@ -43,7 +43,7 @@ impl Component for LBfgs {
 
 impl Optimiser for LBfgs {
     fn limits(&self) -> (u64, f64) {
-        (self.iterations, self.least_ratio)
+        (self.iterations, self.min_ratio)
     }
 
     fn lower(

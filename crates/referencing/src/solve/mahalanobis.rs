@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
 use super::{
-    Degenerate, Rival, Solver,
+    AlternativePose, Degenerate, Solver,
+    degeneracy::{check, fraction},
     descent::{Term, linearize, minimize, model_errors},
+    initial_poses::{alternatives, maximum_likelihood},
     kabsch,
-    profile::widened,
-    sightings::{FEW, Sightings, Target},
-    spread::{check, share},
-    starts::{likeliest, rivals},
+    pixel_terms::{FEW, PixelTerms, TermTarget},
+    profile::inflated,
 };
 use crate::{Observation, Observations};
 
@@ -29,7 +29,7 @@ use crate::{Observation, Observations};
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mahalanobis {
     /// Second extent of the points over the first below which they count as a line.
-    pub least_ratio: f64,
+    pub min_ratio: f64,
     /// Whether covariances and displacements are seen from the fitted points, where pixels and rig are known.
     pub refit: bool,
     /// How many starts at most, where pixels and rig are known: one is the unweighted fit alone.
@@ -38,7 +38,7 @@ pub struct Mahalanobis {
 
 impl Default for Mahalanobis {
     fn default() -> Self {
-        Self { least_ratio: 1e-3, refit: true, starts: 5 }
+        Self { min_ratio: 1e-3, refit: true, starts: 5 }
     }
 }
 
@@ -50,7 +50,7 @@ impl Component for Mahalanobis {
 
     fn check(&self) -> Result<(), String> {
         in_range((1..=5).contains(&self.starts), "starts", self.starts, "1 to 5")?;
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
@@ -59,11 +59,11 @@ impl Solver for Mahalanobis {
         self.solved(data, |pose, _| Ok(*pose))
     }
 
-    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
+    fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let Some(rig) = self.rig(data) else { return Vec::new() };
-        let mut sightings = Sightings::new(rig);
-        match sightings.see(&data.points, Target::Triangulated) {
-            Ok(()) => rivals(data, rig, self.starts, &sightings, at, most),
+        let mut pixel_terms = PixelTerms::new(rig);
+        match pixel_terms.see(&data.points, TermTarget::Triangulated) {
+            Ok(()) => alternatives(data, rig, self.starts, &pixel_terms, at, max),
             Err(_) => Vec::new(),
         }
     }
@@ -77,11 +77,11 @@ impl Solver for Mahalanobis {
             let measured = Measured::of(&data.points);
             return covariance(data, at, &|k, place| Some(measured.term(k, place)));
         };
-        let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Triangulated)?;
+        let mut all = PixelTerms::new(rig);
+        all.see(&data.points, TermTarget::Triangulated)?;
         let live = |k: usize, place: &_| all.live(k, place);
         let first = covariance(data, at, &live)?;
-        Ok(Covariance6::new(widened(&data.points, at, first.matrix, &live)))
+        Ok(Covariance6::new(inflated(&data.points, at, first.matrix, &live)))
     }
 
     fn model_errors(
@@ -93,8 +93,8 @@ impl Solver for Mahalanobis {
             let measured = Measured::of(&data.points);
             return model_errors(&data.points, at, &|k, place: &_| Some(measured.term(k, place)));
         };
-        let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Triangulated)?;
+        let mut all = PixelTerms::new(rig);
+        all.see(&data.points, TermTarget::Triangulated)?;
         model_errors(&data.points, at, &|k, place: &_| all.live(k, place))
     }
 }
@@ -118,15 +118,15 @@ impl Mahalanobis {
         data: &Observations<'_>,
         work: impl FnOnce(&Transform<Object, Camera>, Terms<'_>) -> Result<R, Degenerate>,
     ) -> Result<R, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         let Some(rig) = self.rig(data) else {
             let (start, measured) = (kabsch::fit(&data.points), Measured::of(&data.points));
             let term = |k: usize, at: &_| Some(measured.term(k, at));
             return work(&minimize(&data.points, &start, &term)?, &term);
         };
-        let mut sightings = Sightings::new(rig);
-        sightings.see(&data.points, Target::Triangulated)?;
-        work(&likeliest(data, rig, self.starts, &sightings)?, &|k, place| sightings.live(k, place))
+        let mut pixel_terms = PixelTerms::new(rig);
+        pixel_terms.see(&data.points, TermTarget::Triangulated)?;
+        work(&maximum_likelihood(data, rig, self.starts, &pixel_terms)?, &|k, place| pixel_terms.live(k, place))
     }
 
     fn rig<'a>(&self, data: &Observations<'a>) -> Option<&'a StereoRig> {
@@ -176,15 +176,15 @@ mod tests {
         StereoRig::new(camera, camera, Transform::exp(&Vector6::new(0.02, -0.05, 0.01, -0.25, 0.01, 0.02))).unwrap()
     }
 
-    /// The points as the rig sees them from 4 m, each pixel coordinate with an error of up to `most` (px).
-    fn seen(rig: &StereoRig, most: f64) -> Observations<'_> {
+    /// The points as the rig sees them from 4 m, each pixel coordinate with an error of up to `max` (px).
+    fn seen(rig: &StereoRig, max: f64) -> Observations<'_> {
         let pose = Transform::<Object, Camera>::exp(&Vector6::new(0.4, -0.3, 0.7, 0.2, 0.3, -4.0));
         let points = PLACES.iter().enumerate().map(|(k, at)| {
             let mut pixels = UncertainPixels {
                 at: rig.project(&(pose.inverse() * Point::from(*at))).unwrap(),
                 covariance: Matrix4::identity() * 0.09,
             };
-            let off = |p: f64| most * ((k as f64 + 1.0) * p).sin();
+            let off = |p: f64| max * ((k as f64 + 1.0) * p).sin();
             pixels.at.left.u += off(2.0);
             pixels.at.left.v += off(3.0);
             pixels.at.right.u += off(5.0);
@@ -205,7 +205,7 @@ mod tests {
         let message = Mahalanobis { starts: 0, ..Mahalanobis::default() }.check().unwrap_err();
         assert_eq!(message, "starts = 0; give 1 to 5");
         for bad in [-0.1, 1.0, f64::NAN] {
-            assert!(Mahalanobis { least_ratio: bad, ..Mahalanobis::default() }.check().is_err(), "{bad}");
+            assert!(Mahalanobis { min_ratio: bad, ..Mahalanobis::default() }.check().is_err(), "{bad}");
         }
     }
 
@@ -298,17 +298,17 @@ mod tests {
 
     /// Points and no rig have one valley.
     #[test]
-    fn bare_points_have_no_rivals() {
+    fn bare_points_have_no_alternatives() {
         let rig = rig();
         let data = Observations { rig: None, ..seen(&rig, 1.0) };
         let solver = Mahalanobis::default();
         let at = solver.solve(&data).unwrap();
-        assert!(solver.rivals(&data, &at, 1e9).is_empty());
+        assert!(solver.alternatives(&data, &at, 1e9).is_empty());
     }
 
     /// A plate of 0.2 m at 4 m, tilted by 20°: the depths are known to some 5 cm, which does not tell the side to which it is tilted.
     #[test]
-    fn a_small_tilted_plate_may_be_tilted_the_other_way() {
+    fn a_small_tilted_plate_may_be_tilted_the_other_path() {
         let rig = rig();
         let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.35);
         let at = Transform::<Object, Camera>::new(turn, -(turn * Vector3::new(0.0, 0.0, 4.0)));
@@ -322,13 +322,16 @@ mod tests {
             Observation { measured, pixels: Some(pixels), model, model_sigma: 0.0 }
         });
         let data = Observations { points: points.to_vec(), rig: Some(&rig) };
-        let rivals = |solver: Mahalanobis, most: f64| solver.rivals(&data, &at, most);
-        let found = rivals(Mahalanobis::default(), 40.0);
-        assert!(!found.is_empty() && found.iter().all(|rival| rival.worse > 0.0 && rival.worse <= 40.0), "{found:?}");
+        let alternatives = |solver: Mahalanobis, max: f64| solver.alternatives(&data, &at, max);
+        let found = alternatives(Mahalanobis::default(), 40.0);
+        assert!(
+            !found.is_empty() && found.iter().all(|alternative| alternative.worse > 0.0 && alternative.worse <= 40.0),
+            "{found:?}"
+        );
         let turned = seafix_geometry::so3::angle(&(at.rotation().inverse() * found[0].pose.rotation()));
         assert!((0.4..1.0).contains(&turned), "{turned}");
-        assert!(rivals(Mahalanobis { starts: 1, ..Mahalanobis::default() }, 40.0).is_empty());
-        assert!(rivals(Mahalanobis { refit: false, ..Mahalanobis::default() }, 40.0).is_empty());
-        assert!(rivals(Mahalanobis::default(), 0.5 * found[0].worse).is_empty());
+        assert!(alternatives(Mahalanobis { starts: 1, ..Mahalanobis::default() }, 40.0).is_empty());
+        assert!(alternatives(Mahalanobis { refit: false, ..Mahalanobis::default() }, 40.0).is_empty());
+        assert!(alternatives(Mahalanobis::default(), 0.5 * found[0].worse).is_empty());
     }
 }

@@ -6,15 +6,16 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::Observations;
 
-pub(crate) mod deletion;
+mod degeneracy;
 mod descent;
-mod eyes;
 mod fast_local_matrix;
 mod gnc_tls;
 mod horn;
+mod initial_poses;
 mod irls;
 mod kabsch;
 mod l_bfgs;
+pub(crate) mod leave_out;
 pub(crate) mod likelihood;
 mod mahalanobis;
 mod nelder_mead;
@@ -23,16 +24,15 @@ mod numerical;
 mod p3p;
 mod p3p_stereo;
 mod pixel_cost;
+mod pixel_terms;
 mod profile;
 mod resampled;
 mod roots;
 mod sandwich;
-mod sightings;
-mod signs;
-mod spread;
-mod starts;
+pub(crate) mod scale_error;
+mod sigma_directions;
+mod stereo_cameras;
 mod stereo_reprojection;
-pub(crate) mod stretch;
 #[cfg(test)]
 mod tests;
 mod triad;
@@ -40,16 +40,16 @@ mod umeyama;
 mod weighted_kabsch;
 mod whitened;
 
+pub(crate) use degeneracy::{ON_A_LINE, second_ratio};
 pub(crate) use descent::Term;
 pub(crate) use gnc_tls::GncTls;
 pub use kabsch::Kabsch;
 pub(crate) use kabsch::fit as least_squares;
 pub use mahalanobis::Mahalanobis;
 pub(crate) use normal::{inverse, rounding};
-pub(crate) use sightings::{Sightings, Target as PixelTarget};
-pub(crate) use spread::{ON_A_LINE, second_ratio};
+pub(crate) use pixel_terms::{PixelTerms, TermTarget as PixelTarget};
+pub use scale_error::ScaleError;
 pub use stereo_reprojection::StereoReprojection;
-pub use stretch::Stretch;
 pub use triad::{Choose, Triad};
 
 /// Geometry that determines no pose.
@@ -65,13 +65,13 @@ pub enum Degenerate {
     },
     /// The points lie (nearly) on a line: the rotation about it is unknown.
     #[error(
-        "the points are nearly collinear: their second extent is {ratio:.2e} of the first, at least {least:.2e} is needed"
+        "the points are nearly collinear: their second extent is {ratio:.2e} of the first, at least {min:.2e} is needed"
     )]
     Collinear {
         /// Second singular value over the first.
         ratio: f64,
         /// The least accepted.
-        least: f64,
+        min: f64,
     },
     /// A measured point lies behind the left camera.
     #[error("point {index} was measured {depth:.3} m before the left camera; a camera sees what is in front of it")]
@@ -83,36 +83,36 @@ pub enum Degenerate {
     },
     /// All points are so far away that the two cameras see them from one place.
     #[error(
-        "even the best measured distance is uncertain by {share:.2} of itself, at most {most:.2} is accepted: the \
+        "even the best measured distance is uncertain by {fraction:.2} of itself, at most {max:.2} is accepted: the \
          points are too far away for the baseline"
     )]
     Far {
         /// Least standard deviation of a distance over the distance.
-        share: f64,
+        fraction: f64,
         /// The most accepted.
-        most: f64,
+        max: f64,
     },
     /// The solver looks at pixels, and there are none, or no rig.
     #[error("the points have no pixels or there is no rig; `mahalanobis` takes points alone")]
     NoPixels,
     /// The measured points have not the size of the model's.
-    #[error("the model is {scale:.4} times as large as what was measured; {most} off one is accepted")]
+    #[error("the model is {scale:.4} times as large as what was measured; {max} off one is accepted")]
     Scale {
         /// The scale of the best similarity.
         scale: f64,
         /// Largest accepted distance from one.
-        most: f64,
+        max: f64,
     },
     /// The normal equations have no solution: some motion changes nothing that was measured.
     #[error(
         "the points leave a motion undetermined: their information, scaled to ones on its diagonal, has the least \
-         eigenvalue {share:.1e}; more than rounding, {least:.1e}, is needed"
+         eigenvalue {fraction:.1e}; more than rounding, {min:.1e}, is needed"
     )]
     Singular {
         /// The least eigenvalue of the scaled information.
-        share: f64,
+        fraction: f64,
         /// The least that is told from none.
-        least: f64,
+        min: f64,
     },
     /// A number is not finite.
     #[error("a coordinate is not finite")]
@@ -132,22 +132,24 @@ pub enum Degenerate {
         depth: f64,
     },
     /// Other noise of the same size leaves too few answers to tell how they scatter.
-    #[error("of {drawn} draws of other noise only {answered} have an answer; nine of ten are needed for a covariance")]
+    #[error(
+        "of {sampled} draws of other noise only {answered} have an answer; nine of ten are needed for a covariance"
+    )]
     Scattered {
         /// Draws with an answer.
         answered: usize,
         /// All draws.
-        drawn: usize,
+        sampled: usize,
     },
     /// An iteration ended before it was at its minimum.
-    #[error("after {steps} steps the minimum is still {off:.2e} standard deviations away; at most {most} is accepted")]
+    #[error("after {steps} steps the minimum is still {off:.2e} standard deviations away; at most {max} is accepted")]
     Unconverged {
         /// Steps that were taken.
         steps: u64,
         /// How far the minimum still is (standard deviations of the pose).
         off: f64,
         /// The most accepted.
-        most: f64,
+        max: f64,
     },
 }
 
@@ -157,18 +159,18 @@ const CONVERGED: f64 = 0.01;
 
 /// Refuses a pose that is farther from its minimum than [`CONVERGED`], and a distance that is no number.
 pub(crate) fn converged(steps: u64, off: f64) -> Result<(), Degenerate> {
-    if off <= CONVERGED { Ok(()) } else { Err(Degenerate::Unconverged { steps, off, most: CONVERGED }) }
+    if off <= CONVERGED { Ok(()) } else { Err(Degenerate::Unconverged { steps, off, max: CONVERGED }) }
 }
 
 /// Refuses what determines no pose: fewer than three points, numbers that are not finite, points on a line and, seen by a
 /// rig, behind the camera or too far away.
 pub(crate) fn wide_enough(data: &Observations<'_>) -> Result<(), Degenerate> {
-    spread::check(data, 3, 1e-3)
+    degeneracy::check(data, 3, 1e-3)
 }
 
 /// Another pose that explains the same points nearly as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rival {
+pub struct AlternativePose {
     /// The pose.
     pub pose: Transform<Object, Camera>,
     /// By how much its χ² is larger; less than nought where it is smaller.
@@ -217,15 +219,15 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         (0..data.points.len()).collect()
     }
 
-    /// Other poses that are as likely as [`solve`](Self::solve)'s answer `at`, but for no more than `most` of χ², and that its
+    /// Other poses that are as likely as [`solve`](Self::solve)'s answer `at`, but for no more than `max` of χ², and that its
     /// covariance does not contain: minima in other valleys of the likelihood, as few points that are small for their distance
     /// have them. None of a solver whose cost has one minimum.
     ///
-    /// With `most` the quantile of χ²₁ at a confidence, that of two valleys the wrong one is answered alone has no more than
+    /// With `max` the quantile of χ²₁ at a confidence, that of two valleys the wrong one is answered alone has no more than
     /// half the probability that the confidence leaves, whatever the distance d of the valleys: the difference of their χ² is
-    /// normal with mean d² and variance 4d², and Q((d² + most) / 2d) is greatest where d² is `most`.
-    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
-        let _ = (data, at, most);
+    /// normal with mean d² and variance 4d², and Q((d² + most) / 2d) is greatest where d² is `max`.
+    fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
+        let _ = (data, at, max);
         Vec::new()
     }
 

@@ -23,12 +23,12 @@ pub(crate) struct NelderMead {
     /// Iterations of one simplex at most.
     pub(crate) iterations: u64,
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 impl Default for NelderMead {
     fn default() -> Self {
-        Self { iterations: 4000, least_ratio: 1e-3 }
+        Self { iterations: 4000, min_ratio: 1e-3 }
     }
 }
 
@@ -43,7 +43,7 @@ impl Component for NelderMead {
 }
 
 /// Simplices begun at most.
-const MOST_ROUNDS: usize = 20;
+const MAX_ROUNDS: usize = 20;
 /// Edges of the first simplex, and of the smallest that is begun (standard deviations of the pose).
 const EDGES: [f64; 2] = [5.0, 0.1];
 /// The standard deviation of the costs of the seven poses at which the first simplex ends, near the minimum, and every later
@@ -56,7 +56,7 @@ const STILL: f64 = 1e-4;
 
 impl Optimiser for NelderMead {
     fn limits(&self) -> (u64, f64) {
-        (self.iterations, self.least_ratio)
+        (self.iterations, self.min_ratio)
     }
 
     fn lower(
@@ -66,9 +66,9 @@ impl Optimiser for NelderMead {
         start: &Transform<Object, Camera>,
     ) -> Result<(Transform<Object, Camera>, u64), Degenerate> {
         let (mut pose, mut taken) = (*start, 0);
-        let [mut edge, least] = EDGES;
+        let [mut edge, min] = EDGES;
         let (mut level, mut still) = (LEVEL[0], 0);
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let best = Best::default();
             let cost = || PixelCost::of(data, rig, pose, &best);
             let corner = |i: usize| (1..7).map(|k| if k == i { edge } else { 0.0 }).collect();
@@ -85,7 +85,7 @@ impl Optimiser for NelderMead {
                 break;
             }
             // A simplex may collapse away from the minimum; one on the other side then does not.
-            edge = -f64::max(least, 0.1 * edge.abs()).copysign(edge);
+            edge = -f64::max(min, 0.1 * edge.abs()).copysign(edge);
             level = f64::max(LEVEL[1], lowest * DIGITS);
         }
         Ok((pose, taken))

@@ -108,8 +108,8 @@ pub(super) fn singular(information: &Matrix6<f64>) -> Degenerate {
     let root = information.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
     let scaled = information.component_mul(&(root * root.transpose()));
     // Eigenvalues of what is not finite are sought without end.
-    let share = if scaled.iter().all(|x| x.is_finite()) { scaled.symmetric_eigenvalues().min() } else { f64::NAN };
-    Degenerate::Singular { share, least: rounding(6) }
+    let fraction = if scaled.iter().all(|x| x.is_finite()) { scaled.symmetric_eigenvalues().min() } else { f64::NAN };
+    Degenerate::Singular { fraction, min: rounding(6) }
 }
 
 /// The least eigenvalue at which the factor of a matrix with so many rows and ones on its diagonal is sure to be found.
@@ -148,16 +148,18 @@ mod tests {
 
     /// Points on a line say nothing of the turn about it.
     #[test]
-    fn what_has_no_inverse_is_refused_with_its_least_eigenvalue() {
+    fn what_has_no_inverse_is_refused_with_its_smallest_eigenvalue() {
         let mut line = Normal::default();
         for k in 0..4 {
             line.add(&Vector3::new(f64::from(k), 0.0, 0.0), &(Matrix3::identity() * 1e6));
         }
         for bad in [line.matrix(), Matrix6::zeros()] {
-            let Err(Degenerate::Singular { share, least }) = inverse(&bad) else { panic!("it has none") };
-            assert!(share.abs() <= least && least < 1e-14, "{share} {least}");
+            let Err(Degenerate::Singular { fraction, min }) = inverse(&bad) else { panic!("it has none") };
+            assert!(fraction.abs() <= min && min < 1e-14, "{fraction} {min}");
         }
-        let Err(Degenerate::Singular { share, .. }) = inverse(&(line.matrix() * f64::INFINITY)) else { panic!("none") };
-        assert!(share.is_nan());
+        let Err(Degenerate::Singular { fraction, .. }) = inverse(&(line.matrix() * f64::INFINITY)) else {
+            panic!("none")
+        };
+        assert!(fraction.is_nan());
     }
 }

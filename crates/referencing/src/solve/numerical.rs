@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, Matrix6, SMatrix, SVector, Vector3, Vector4, Vector6};
 use seafix_geometry::{Camera, Covariance6, Object, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels};
 
-use super::{Degenerate, sightings::PIXEL_FLOOR};
+use super::{Degenerate, pixel_terms::PIXEL_FLOOR};
 use crate::{Observation, Observations};
 
 /// The longest step (m) of the differences: rounding (1e-15 of the coordinates over the step) and the
@@ -13,17 +13,17 @@ const STEP: f64 = 1e-5;
 const PIXEL_STEP: f64 = 1e-3;
 /// Where noise is less, a step is this share of it: what a solver does beyond its noise is no derivative of what it does
 /// within.
-const SHARE: f64 = 0.1;
+const FRACTION: f64 = 0.1;
 /// The shortest step, over the coordinates that it is added to: rounding then spoils no more than the fifth digit.
 const SHORTEST: f64 = 1e-10;
 
 /// The step for coordinates of this size and noise, at most `longest`.
 fn step(longest: f64, sigma: f64, coordinates: f64) -> f64 {
-    (SHARE * sigma).min(longest).max(SHORTEST * coordinates)
+    (FRACTION * sigma).min(longest).max(SHORTEST * coordinates)
 }
 
 /// The least standard deviation of a coordinate.
-fn least<const N: usize>(covariance: &SMatrix<f64, N, N>) -> f64 {
+fn min<const N: usize>(covariance: &SMatrix<f64, N, N>) -> f64 {
     (0..N).map(|i| covariance[(i, i)]).fold(f64::INFINITY, f64::min).max(0.0).sqrt()
 }
 
@@ -51,7 +51,7 @@ pub(super) fn covariance(
         };
         match (original.pixels, data.rig.and_then(|rig| by_pixels(rig, &original))) {
             (Some(pixels), Some(by_pixels)) => {
-                let size = step(PIXEL_STEP, least(&pixels.covariance), pixels.at.coordinates().amax());
+                let size = step(PIXEL_STEP, min(&pixels.covariance), pixels.at.coordinates().amax());
                 let j = jacobian(at, size, |step: Vector4<f64>| {
                     let mut point = original;
                     point.measured.at = original.measured.at + by_pixels * step;
@@ -62,7 +62,7 @@ pub(super) fn covariance(
                 sum += j * (pixels.covariance + floor) * j.transpose();
             }
             _ => {
-                let size = step(STEP, least(&original.measured.covariance).max(digits), reach);
+                let size = step(STEP, min(&original.measured.covariance).max(digits), reach);
                 let j = jacobian(at, size, |step: Vector3<f64>| {
                     let mut point = original;
                     point.measured.at = original.measured.at + step;

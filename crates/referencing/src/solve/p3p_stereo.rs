@@ -5,14 +5,13 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Rival, Solver,
+    AlternativePose, Degenerate, Solver,
+    degeneracy::{check, fraction},
     descent::{NEAR, descend, linearize, settle},
-    kabsch,
-    profile::widened,
+    initial_poses, kabsch,
+    pixel_terms::{PixelTerms, TermTarget},
+    profile::inflated,
     roots::{Roots, squares, widest},
-    sightings::{Sightings, Target},
-    spread::{check, share},
-    starts,
     stereo_reprojection::pixels_and_rig,
 };
 use crate::Observations;
@@ -27,15 +26,15 @@ use crate::Observations;
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct P3pStereo {
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 /// The roots of both cameras and the triangulated places.
-const MOST_STARTS: usize = 9;
+const MAX_STARTS: usize = 9;
 
 impl Default for P3pStereo {
     fn default() -> Self {
-        Self { least_ratio: 1e-3 }
+        Self { min_ratio: 1e-3 }
     }
 }
 
@@ -46,7 +45,7 @@ impl Component for P3pStereo {
         "Persson, Nordberg, Lambda Twist: an accurate fast robust perspective three point solver, 2018";
 
     fn check(&self) -> Result<(), String> {
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
@@ -56,29 +55,29 @@ impl Solver for P3pStereo {
     }
 
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         let rig = pixels_and_rig(data)?;
         let chosen = widest(data);
         let three = Observations { points: chosen.map(|i| data.points[i]).to_vec(), rig: data.rig };
-        check(&three, self.minimum(), self.least_ratio)?;
-        let mut sightings = Sightings::new(rig);
-        sightings.see(&three.points, Target::Pixels)?;
+        check(&three, self.minimum(), self.min_ratio)?;
+        let mut pixel_terms = PixelTerms::new(rig);
+        pixel_terms.see(&three.points, TermTarget::Pixels)?;
         let mut roots = Roots::default();
         for right in [false, true] {
             roots.of_camera(data, rig, chosen, right);
         }
         let starts = roots.as_slice().iter().copied().chain([kabsch::fit(&three.points)]);
         let found = starts.map(|start| {
-            let pose = refined(&three, &start, &sightings)?;
+            let pose = refined(&three, &start, &pixel_terms)?;
             Ok((squares(data, rig, &pose)?, pose))
         });
         // Where none leads anywhere, the first says why.
-        let least = found.reduce(|best, other| match (&best, &other) {
-            (Ok((least, _)), Ok((cost, _))) if cost < least => other,
+        let min = found.reduce(|best, other| match (&best, &other) {
+            (Ok((min, _)), Ok((cost, _))) if cost < min => other,
             (Err(_), Ok(_)) => other,
             _ => best,
         });
-        least.expect("the fit of the three is a start").map(|(_, pose)| pose)
+        min.expect("the fit of the three is a start").map(|(_, pose)| pose)
     }
 
     /// The three.
@@ -98,26 +97,29 @@ impl Solver for P3pStereo {
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let rig: &StereoRig = pixels_and_rig(data)?;
         let three = widest(data).map(|i| data.points[i]);
-        let mut sightings = Sightings::new(rig);
-        sightings.see(&three, Target::Pixels)?;
-        let live = |k: usize, place: &_| sightings.live(k, place);
+        let mut pixel_terms = PixelTerms::new(rig);
+        pixel_terms.see(&three, TermTarget::Pixels)?;
+        let live = |k: usize, place: &_| pixel_terms.live(k, place);
         let first = linearize(&three, at, &live)?.covariance()?;
-        Ok(Covariance6::new(widened(&three, at, first, &live)))
+        Ok(Covariance6::new(inflated(&three, at, first, &live)))
     }
 
     /// Those of the three that the pixels of all points leave as likely.
-    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
+    fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let Ok(rig) = pixels_and_rig(data) else { return Vec::new() };
         let three = Observations { points: widest(data).map(|i| data.points[i]).to_vec(), rig: data.rig };
-        let (mut few, mut all) = (Sightings::new(rig), Sightings::new(rig));
-        if few.see(&three.points, Target::Pixels).and_then(|()| all.see(&data.points, Target::Pixels)).is_err() {
+        let (mut few, mut all) = (PixelTerms::new(rig), PixelTerms::new(rig));
+        if few.see(&three.points, TermTarget::Pixels).and_then(|()| all.see(&data.points, TermTarget::Pixels)).is_err()
+        {
             return Vec::new();
         }
-        let others = starts::rivals(&three, rig, MOST_STARTS, &few, at, most);
+        let others = initial_poses::alternatives(&three, rig, MAX_STARTS, &few, at, max);
         let chi2 = |pose: &_| linearize(&data.points, pose, &|k, place: &_| all.live(k, place)).map(|all| all.cost);
         let Ok(own) = chi2(at) else { return Vec::new() };
-        let told = |rival: Rival| Some(Rival { worse: chi2(&rival.pose).ok()? - own, ..rival });
-        others.into_iter().filter_map(told).filter(|rival| rival.worse <= most).collect()
+        let reported = |alternative: AlternativePose| {
+            Some(AlternativePose { worse: chi2(&alternative.pose).ok()? - own, ..alternative })
+        };
+        others.into_iter().filter_map(reported).filter(|alternative| alternative.worse <= max).collect()
     }
 }
 
@@ -125,10 +127,10 @@ impl Solver for P3pStereo {
 fn refined(
     three: &Observations<'_>,
     start: &Transform<Object, Camera>,
-    sightings: &Sightings<'_>,
+    pixel_terms: &PixelTerms<'_>,
 ) -> Result<Transform<Object, Camera>, Degenerate> {
-    let live = |k: usize, at: &_| sightings.live(k, at);
-    let (near, here) = descend(&three.points, start, NEAR, &|k, at: &_| sightings.frozen(k, at))?;
-    let here = if sightings.weights_move { linearize(&three.points, &near, &live)? } else { here };
+    let live = |k: usize, at: &_| pixel_terms.live(k, at);
+    let (near, here) = descend(&three.points, start, NEAR, &|k, at: &_| pixel_terms.frozen(k, at))?;
+    let here = if pixel_terms.weights_move { linearize(&three.points, &near, &live)? } else { here };
     Ok(settle(&three.points, near, here, &live)?.0)
 }

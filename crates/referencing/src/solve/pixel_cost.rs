@@ -8,9 +8,10 @@ use seafix_component::in_range;
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
 use super::{
-    Degenerate, Solver, StereoReprojection, converged, kabsch,
+    Degenerate, Solver, StereoReprojection, converged,
+    degeneracy::{check, fraction},
+    kabsch,
     normal::{inverse, singular},
-    spread::{check, share},
     stereo_reprojection::pixels_and_rig,
 };
 use crate::{Observation, Observations};
@@ -30,9 +31,9 @@ pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
 
     /// What is wrong with the limits.
     fn check_limits(&self) -> Result<(), String> {
-        let (iterations, least_ratio) = self.limits();
+        let (iterations, min_ratio) = self.limits();
         in_range((1..=1_000_000).contains(&iterations), "iterations", iterations, "1 to 1000000")?;
-        share("least-ratio", least_ratio)
+        fraction("min-ratio", min_ratio)
     }
 }
 

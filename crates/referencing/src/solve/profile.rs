@@ -20,7 +20,7 @@ const FARTHEST: f64 = 1.0;
 /// A pose whose χ² is larger by this weighs nothing, and what lies beyond it is another valley.
 const NOTHING: f64 = 25.0;
 /// Nodes that are looked at to either side whatever lies between.
-const LEAST: i32 = 12;
+const MIN: i32 = 12;
 /// Steps in which the other five coordinates follow a turn.
 const FOLLOWS: usize = 3;
 
@@ -35,7 +35,7 @@ const FOLLOWS: usize = 3;
 /// the answer, so that its bias is in it.
 ///
 /// (Bates and Watts, *Nonlinear regression analysis and its applications*, 1988, chapter 6.)
-pub(super) fn widened(
+pub(super) fn inflated(
     points: &[Observation],
     at: &Transform<Object, Camera>,
     first: Matrix6<f64>,
@@ -47,7 +47,7 @@ pub(super) fn widened(
     }
     let Ok(here) = linearize(points, at, term) else { return first };
     let eigen = attitude.symmetric_eigen();
-    let mut most = (0.0, first);
+    let mut max = (0.0, first);
     for (axis, variance) in eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()) {
         if *variance <= STIFF * STIFF {
             continue;
@@ -56,11 +56,11 @@ pub(super) fn widened(
         about.fixed_rows_mut::<3>(0).copy_from(&axis);
         let along = first * about / variance.sqrt();
         let found = Trough::of(points, at, &here, &about, &along, variance.sqrt(), term);
-        if found.spread > most.0 {
-            most = (found.spread, first - along * along.transpose() + found.second);
+        if found.spread > max.0 {
+            max = (found.spread, first - along * along.transpose() + found.second);
         }
     }
-    most.1
+    max.1
 }
 
 /// The moments of the profile likelihood about one axis.
@@ -94,7 +94,7 @@ impl Trough {
                 mass += weight;
                 spread += t * t * weight;
                 second += xi * xi.transpose() * weight;
-                if worse > NOTHING && node > LEAST {
+                if worse > NOTHING && node > MIN {
                     break;
                 }
             }

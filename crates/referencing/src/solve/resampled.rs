@@ -9,8 +9,8 @@ use super::{
     Degenerate,
     irls::distance,
     normal::singular,
-    sightings::PIXEL_FLOOR,
-    signs::{Signs, rows},
+    pixel_terms::PIXEL_FLOOR,
+    sigma_directions::{SigmaDirections, rows},
 };
 use crate::{Observation, Observations};
 
@@ -18,7 +18,7 @@ use crate::{Observation, Observations};
 /// *An introduction to the bootstrap*, 1993): bias included, and whatever a loss with corners does with noise of its size,
 /// which no derivative at one draw of it tells.
 ///
-/// The draws are the rows of [`Signs`], as many as `answer` takes and the negative of each: of an answer that is linear in the noise they give the
+/// The draws are the rows of [`SigmaDirections`], as many as `answer` takes and the negative of each: of an answer that is linear in the noise they give the
 /// covariance to the last digit. A point that the noise does not explain is taken
 /// where it was measured, so that it is left out, or pulls, as it did; all others where the pose puts them.
 ///
@@ -37,7 +37,7 @@ pub(super) fn covariance(
     let mut answers: Vec<[Option<Vector6<f64>>; 2]> = Vec::with_capacity(size * blocks);
     let mut moved = data.clone();
     for block in 0..blocks {
-        for row in Signs::new(size, block as u64).rows() {
+        for row in SigmaDirections::new(size, block as u64).rows() {
             answers.push([1.0, -1.0].map(|sign| {
                 let mut noise = row.iter().map(|z| sign * z);
                 let shown = all.iter().zip(&mut moved.points).try_for_each(|(source, point)| {
@@ -49,9 +49,9 @@ pub(super) fn covariance(
         }
     }
     let answered = answers.iter().flatten().flatten().count();
-    let drawn = 2 * size * blocks;
-    if answered * 10 < drawn * 9 {
-        return Err(Degenerate::Scattered { answered, drawn });
+    let sampled = 2 * size * blocks;
+    if answered * 10 < sampled * 9 {
+        return Err(Degenerate::Scattered { answered, sampled });
     }
     let sum: Matrix6<f64> = answers.iter().flatten().flatten().map(|xi| xi * xi.transpose()).sum();
     let scale = match answer {
@@ -146,23 +146,23 @@ impl Source {
     /// The point as other noise would have shown it; `None` where no point can be triangulated.
     fn draw(&self, rig: Option<&StereoRig>, noise: &mut impl Iterator<Item = f64>) -> Option<Observation> {
         let mut next = || noise.next().unwrap_or(0.0);
-        let mut drawn = *self.point();
+        let mut sampled = *self.point();
         match self {
             Self::Seen { at, pixels, root, .. } => {
                 let [ul, vl, ur, vr] = (at + root * Vector4::from_fn(|_, _| next())).into();
                 let shown = StereoPixels { left: Pixel { u: ul, v: vl }, right: Pixel { u: ur, v: vr } };
                 let seen = UncertainPixels { at: shown, ..*pixels };
                 let found = rig?.triangulate(&seen).ok()?;
-                drawn.measured = UncertainPoint { at: found.point, covariance: found.covariance };
-                drawn.pixels = Some(seen);
+                sampled.measured = UncertainPoint { at: found.point, covariance: found.covariance };
+                sampled.pixels = Some(seen);
             }
             Self::Bare { at, root, .. } => {
-                drawn.measured.at = (at + root * Vector3::from_fn(|_, _| next())).into();
+                sampled.measured.at = (at + root * Vector3::from_fn(|_, _| next())).into();
             }
         }
-        if drawn.model_sigma > 0.0 {
-            drawn.model = drawn.model + Vector3::from_fn(|_, _| next()) * drawn.model_sigma;
+        if sampled.model_sigma > 0.0 {
+            sampled.model = sampled.model + Vector3::from_fn(|_, _| next()) * sampled.model_sigma;
         }
-        Some(drawn)
+        Some(sampled)
     }
 }

@@ -5,9 +5,9 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use super::{
     Degenerate,
-    eyes::Eyes,
     normal::{Normal, inverse},
     resampled,
+    stereo_cameras::StereoCameras,
 };
 use crate::{Observation, Observations};
 
@@ -25,12 +25,12 @@ pub(super) fn covariance(
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
     let (mut a, mut b) = (Normal::default(), Normal::default());
     let camera_from_object = at.inverse();
-    let eyes = data.rig.map(Eyes::of);
+    let cameras = data.rig.map(StereoCameras::of);
     for (k, point) in data.points.iter().enumerate() {
         let place = (camera_from_object * point.model).coords;
         let w = weight(k);
         a.add(&place, &(Matrix3::identity() * w));
-        b.add(&place, &(noise(eyes.as_ref(), point, &place) * (w * w)));
+        b.add(&place, &(noise(cameras.as_ref(), point, &place) * (w * w)));
     }
     let bread = inverse(&a.matrix())?;
     Ok(Covariance6::new(bread * b.matrix() * bread))
@@ -56,9 +56,9 @@ pub(super) fn or_resampled(
 }
 
 /// The covariance (m²) of a point's residual, seen from `place`.
-fn noise(eyes: Option<&Eyes<'_>>, point: &Observation, place: &Vector3<f64>) -> Matrix3<f64> {
+fn noise(cameras: Option<&StereoCameras<'_>>, point: &Observation, place: &Vector3<f64>) -> Matrix3<f64> {
     let refitted = || {
-        let (_, j) = eyes?.look(place)?;
+        let (_, j) = cameras?.project(place)?;
         (j.transpose() * point.pixels?.covariance.try_inverse()? * j).try_inverse()
     };
     let digits = point.digits();

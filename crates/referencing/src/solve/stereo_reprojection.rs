@@ -6,12 +6,12 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Rival, Solver,
+    AlternativePose, Degenerate, Solver,
+    degeneracy::{check, fraction},
     descent::{linearize, model_errors},
-    profile::widened,
-    sightings::{Sightings, Target},
-    spread::{check, share},
-    starts::{likeliest, rivals},
+    initial_poses::{alternatives, maximum_likelihood},
+    pixel_terms::{PixelTerms, TermTarget},
+    profile::inflated,
 };
 use crate::Observations;
 
@@ -23,19 +23,19 @@ use crate::Observations;
 /// Three or four points, or a small object far away, leave several minima. Where the answer from the unweighted
 /// fit of the triangulated points is in doubt, the poses that three points allow the left camera alone (P3P) and the mirror
 /// image of the answer are tried as well, and the least cost stands. What is hardly less likely is told by
-/// [`rivals`](Solver::rivals).
+/// [`alternatives`](Solver::alternatives).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StereoReprojection {
     /// How many starts at most, besides the first answer's mirror image: one is the unweighted fit alone.
     pub starts: usize,
     /// Second extent of the points over the first below which they count as a line.
-    pub least_ratio: f64,
+    pub min_ratio: f64,
 }
 
 impl Default for StereoReprojection {
     fn default() -> Self {
-        Self { starts: 5, least_ratio: 1e-3 }
+        Self { starts: 5, min_ratio: 1e-3 }
     }
 }
 
@@ -47,7 +47,7 @@ impl Component for StereoReprojection {
 
     fn check(&self) -> Result<(), String> {
         in_range((1..=5).contains(&self.starts), "starts", self.starts, "1 to 5")?;
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
@@ -57,18 +57,18 @@ impl Solver for StereoReprojection {
     }
 
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         let rig = pixels_and_rig(data)?;
-        let mut sightings = Sightings::new(rig);
-        sightings.see(&data.points, Target::Pixels)?;
-        likeliest(data, rig, self.starts, &sightings)
+        let mut pixel_terms = PixelTerms::new(rig);
+        pixel_terms.see(&data.points, TermTarget::Pixels)?;
+        maximum_likelihood(data, rig, self.starts, &pixel_terms)
     }
 
-    fn rivals(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, most: f64) -> Vec<Rival> {
+    fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let Ok(rig) = pixels_and_rig(data) else { return Vec::new() };
-        let mut sightings = Sightings::new(rig);
-        match sightings.see(&data.points, Target::Pixels) {
-            Ok(()) => rivals(data, rig, self.starts, &sightings, at, most),
+        let mut pixel_terms = PixelTerms::new(rig);
+        match pixel_terms.see(&data.points, TermTarget::Pixels) {
+            Ok(()) => alternatives(data, rig, self.starts, &pixel_terms, at, max),
             Err(_) => Vec::new(),
         }
     }
@@ -79,11 +79,11 @@ impl Solver for StereoReprojection {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let rig = pixels_and_rig(data)?;
-        let mut all = Sightings::new(rig);
-        all.see(&data.points, Target::Pixels)?;
+        let mut all = PixelTerms::new(rig);
+        all.see(&data.points, TermTarget::Pixels)?;
         let live = |k: usize, place: &_| all.live(k, place);
         let first = linearize(&data.points, at, &live)?.covariance()?;
-        Ok(Covariance6::new(widened(&data.points, at, first, &live)))
+        Ok(Covariance6::new(inflated(&data.points, at, first, &live)))
     }
 
     fn model_errors(
@@ -91,8 +91,8 @@ impl Solver for StereoReprojection {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
-        let mut all = Sightings::new(pixels_and_rig(data)?);
-        all.see(&data.points, Target::Pixels)?;
+        let mut all = PixelTerms::new(pixels_and_rig(data)?);
+        all.see(&data.points, TermTarget::Pixels)?;
         model_errors(&data.points, at, &|k, place: &_| all.live(k, place))
     }
 }

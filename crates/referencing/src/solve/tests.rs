@@ -65,7 +65,7 @@ fn a_reflection_is_never_the_answer() {
 }
 
 #[test]
-fn kabsch_has_the_least_residual_of_all_poses() {
+fn kabsch_has_the_smallest_residual_of_all_poses() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut data = seen(&SPREAD, 0.02);
     for point in &mut data.points {
@@ -94,7 +94,7 @@ fn what_determines_no_pose_is_refused_with_its_number() {
 }
 
 #[test]
-fn the_triad_says_which_three_it_took() {
+fn the_triad_states_which_three_it_took() {
     let data = seen(&[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [3.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.01);
     let used = |choose| Triad { choose, ..Triad::default() }.used(&data);
     assert_eq!(used(Choose::First), [0, 1, 2]);
@@ -307,11 +307,11 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
         let solver = SOLVERS.build(&seafix_component::Choice::named(name)).unwrap();
         assert!(solver.solve(&view(&good)).is_ok(), "{name}");
         match solver.solve(&view(&line)) {
-            Err(Degenerate::Collinear { ratio, least }) => assert!(ratio < least, "{name}: {ratio}"),
+            Err(Degenerate::Collinear { ratio, min }) => assert!(ratio < min, "{name}: {ratio}"),
             other => panic!("{name}: a line gives {other:?}"),
         }
         match solver.solve(&view(&far)) {
-            Err(Degenerate::Far { share, most }) => assert!(share > most && share < 10.0, "{name}: {share}"),
+            Err(Degenerate::Far { fraction, max }) => assert!(fraction > max && fraction < 10.0, "{name}: {fraction}"),
             other => panic!("{name}: all points far give {other:?}"),
         }
         let mut behind = view(&good);
@@ -334,7 +334,7 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
 fn derivatives_are_those_of_the_projections_at_random_poses() {
     use super::{
         descent::linearize,
-        sightings::{Sightings, Target},
+        pixel_terms::{PixelTerms, TermTarget},
     };
     let rig = rig();
     let mut rng = ChaCha8Rng::seed_from_u64(46);
@@ -348,12 +348,12 @@ fn derivatives_are_those_of_the_projections_at_random_poses() {
             pixels.at.right.v += rng.random_range(-0.5..0.5);
         }
         let pose = truth.perturbed(&Vector6::from_fn(|_, _| rng.random_range(-0.05..0.05)));
-        let mut sightings = Sightings::new(&rig);
-        sightings.see(&data.points, Target::Pixels).unwrap();
+        let mut pixel_terms = PixelTerms::new(&rig);
+        pixel_terms.see(&data.points, TermTarget::Pixels).unwrap();
         let at = |pose: &Transform<Object, Camera>, live: bool| {
             let term = |k: usize, place: &Vector3<f64>| match live {
-                true => sightings.live(k, place),
-                false => sightings.frozen(k, place),
+                true => pixel_terms.live(k, place),
+                false => pixel_terms.frozen(k, place),
             };
             linearize(&data.points, pose, &term).unwrap()
         };

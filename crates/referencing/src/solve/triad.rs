@@ -6,8 +6,9 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver, numerical, resampled,
-    spread::{seen, share},
+    Degenerate, Solver,
+    degeneracy::{fraction, seen},
+    numerical, resampled,
 };
 use crate::{Observation, Observations};
 
@@ -33,12 +34,12 @@ pub struct Triad {
     /// Which three points.
     pub choose: Choose,
     /// Sine of the smallest angle of a triangle below which it counts as a line.
-    pub least_sine: f64,
+    pub min_sine: f64,
 }
 
 impl Default for Triad {
     fn default() -> Self {
-        Self { choose: Choose::default(), least_sine: 0.05 }
+        Self { choose: Choose::default(), min_sine: 0.05 }
     }
 }
 
@@ -49,12 +50,12 @@ impl Component for Triad {
          underwater vehicles to man-made objects using stereo images, 2021";
 
     fn check(&self) -> Result<(), String> {
-        share("least-sine", self.least_sine)
+        fraction("min-sine", self.min_sine)
     }
 }
 
 /// More points than this are thinned before all triangles are weighed: 40 points have 9880.
-const MOST_WEIGHED: usize = 40;
+const MAX_WEIGHTED: usize = 40;
 
 impl Solver for Triad {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
@@ -82,11 +83,11 @@ impl Triad {
     /// The three points the pose rests on, ascending.
     fn three(&self, data: &Observations<'_>) -> Result<[usize; 3], Degenerate> {
         seen(data, 3)?;
-        let least = self.least_sine * self.least_sine;
-        let wide = |three: [usize; 3]| least_sine_squared(&three.map(|i| &data.points[i])) >= least;
+        let min = self.min_sine * self.min_sine;
+        let wide = |three: [usize; 3]| min_sine_squared(&three.map(|i| &data.points[i])) >= min;
         // What is nearly always the answer, without the walk over all triangles.
         let likely = match self.choose {
-            Choose::First => Some([0, 1, 2].map(|k| weighed(data.points.len(), k))),
+            Choose::First => Some([0, 1, 2].map(|k| weighted(data.points.len(), k))),
             Choose::LargestArea => largest(&data.points),
             Choose::SmallestCovariance => None,
         };
@@ -104,7 +105,7 @@ impl Triad {
                 },
             };
             // Ties are broken by the order of the model: strictly better replaces.
-            if best.is_none_or(|(_, most)| worth > most) {
+            if best.is_none_or(|(_, max)| worth > max) {
                 best = Some((three, worth));
             }
         }
@@ -113,20 +114,20 @@ impl Triad {
 
     /// That no triangle is wide enough, with the widest.
     fn line(&self, data: &Observations<'_>) -> Degenerate {
-        let sines = triangles(data.points.len()).map(|three| least_sine_squared(&three.map(|i| &data.points[i])));
-        Degenerate::Collinear { ratio: sines.fold(0.0, f64::max).sqrt(), least: self.least_sine }
+        let sines = triangles(data.points.len()).map(|three| min_sine_squared(&three.map(|i| &data.points[i])));
+        Degenerate::Collinear { ratio: sines.fold(0.0, f64::max).sqrt(), min: self.min_sine }
     }
 }
 
 /// The k-th of the points that are weighed, of `count`: all, or an even sample of many.
-fn weighed(count: usize, k: usize) -> usize {
-    if count <= MOST_WEIGHED { k } else { k * count / MOST_WEIGHED }
+fn weighted(count: usize, k: usize) -> usize {
+    if count <= MAX_WEIGHTED { k } else { k * count / MAX_WEIGHTED }
 }
 
 /// All triangles of `count` points, lexicographic; of many points, those of an even sample.
 fn triangles(count: usize) -> impl Iterator<Item = [usize; 3]> {
-    let kept = count.min(MOST_WEIGHED);
-    let at = move |i: usize| weighed(count, i);
+    let kept = count.min(MAX_WEIGHTED);
+    let at = move |i: usize| weighted(count, i);
     (0..kept).flat_map(move |i| (i + 1..kept).flat_map(move |j| (j + 1..kept).map(move |k| [at(i), at(j), at(k)])))
 }
 
@@ -135,10 +136,10 @@ fn triangles(count: usize) -> impl Iterator<Item = [usize; 3]> {
 /// Exact, though few triangles are looked at: on a longest side of length L none has more than √3/4 L², so that a
 /// side too short for the best area known needs no third point. A greedy triangle makes the first best one large.
 fn largest(points: &[Observation]) -> Option<[usize; 3]> {
-    let kept = points.len().min(MOST_WEIGHED);
-    let (mut x, mut y, mut z) = ([0.0; MOST_WEIGHED], [0.0; MOST_WEIGHED], [0.0; MOST_WEIGHED]);
+    let kept = points.len().min(MAX_WEIGHTED);
+    let (mut x, mut y, mut z) = ([0.0; MAX_WEIGHTED], [0.0; MAX_WEIGHTED], [0.0; MAX_WEIGHTED]);
     for k in 0..kept {
-        let at = &points[weighed(points.len(), k)].model.coords;
+        let at = &points[weighted(points.len(), k)].model.coords;
         (x[k], y[k], z[k]) = (at.x, at.y, at.z);
     }
     let (x, y, z) = (&x[..kept], &y[..kept], &z[..kept]);
@@ -150,7 +151,7 @@ fn largest(points: &[Observation]) -> Option<[usize; 3]> {
     // Four times the square of the area, over all third points: the greatest and its place.
     let third = |i: usize, j: usize| {
         let (a, b, c) = side(i, j);
-        let mut worth = [0.0; MOST_WEIGHED];
+        let mut worth = [0.0; MAX_WEIGHTED];
         for (k, worth) in worth[..kept].iter_mut().enumerate() {
             let (d, e, f) = (x[k] - x[i], y[k] - y[i], z[k] - z[i]);
             let (u, v, w) = (b * f - c * e, c * d - a * f, a * e - b * d);
@@ -159,28 +160,28 @@ fn largest(points: &[Observation]) -> Option<[usize; 3]> {
         first_greatest(&worth[..kept])
     };
     let farthest = |i: usize| {
-        let mut away = [0.0; MOST_WEIGHED];
+        let mut away = [0.0; MAX_WEIGHTED];
         away[..kept].iter_mut().enumerate().for_each(|(k, away)| *away = square(i, k));
         first_greatest(&away[..kept]).0
     };
     let one = farthest(0);
     let two = farthest(one);
-    let (three, mut most) = third(one, two);
+    let (three, mut max) = third(one, two);
     let mut best = [one, two, three];
     for i in 0..kept {
         for j in i + 1..kept {
             let length = square(i, j);
             // Strictly: what only equals the best is left.
-            if 0.75 * length * length > most {
+            if 0.75 * length * length > max {
                 let (k, worth) = third(i, j);
-                if worth > most {
-                    (best, most) = ([i, j, k], worth);
+                if worth > max {
+                    (best, max) = ([i, j, k], worth);
                 }
             }
         }
     }
     best.sort_unstable();
-    (most > 0.0).then(|| best.map(|k| weighed(points.len(), k)))
+    (max > 0.0).then(|| best.map(|k| weighted(points.len(), k)))
 }
 
 /// The greatest of some numbers and the first place where it stands.
@@ -204,14 +205,14 @@ fn pose(points: &[&Observation; 3]) -> Result<Transform<Object, Camera>, Degener
 
 /// The axes of [`seafix_geometry::triad`] as the columns of a matrix.
 fn axes(p1: &Vector3<f64>, p2: &Vector3<f64>, p3: &Vector3<f64>) -> Result<Matrix3<f64>, Degenerate> {
-    const LEAST_SINE: f64 = 1e-9;
+    const MIN_SINE: f64 = 1e-9;
     let (a, b) = (p2 - p1, p3 - p1);
     let normal = a.cross(&b);
     let (length, size, sides) = (b.norm_squared(), normal.norm_squared(), a.norm_squared() * b.norm_squared());
     // Written so that a NaN (coincident points) is refused too.
-    if !(size >= LEAST_SINE * LEAST_SINE * sides && size > 0.0) {
+    if !(size >= MIN_SINE * MIN_SINE * sides && size > 0.0) {
         let ratio = (size / sides).sqrt();
-        return Err(Degenerate::Collinear { ratio: if ratio.is_nan() { 0.0 } else { ratio }, least: LEAST_SINE });
+        return Err(Degenerate::Collinear { ratio: if ratio.is_nan() { 0.0 } else { ratio }, min: MIN_SINE });
     }
     let (x, z) = (b * (1.0 / length.sqrt()), normal * (1.0 / size.sqrt()));
     Ok(Matrix3::from_columns(&[x, z.cross(&x), z]))
@@ -233,7 +234,7 @@ fn of_three(data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degene
 }
 
 /// The square of the sine of the smallest angle, in the model or as measured, whichever is smaller.
-fn least_sine_squared(points: &[&Observation; 3]) -> f64 {
+fn min_sine_squared(points: &[&Observation; 3]) -> f64 {
     let of = |p: [Vector3<f64>; 3]| {
         let sides = [(p[1] - p[0]), (p[2] - p[1]), (p[0] - p[2])];
         let square = sides[0].cross(&sides[1]).norm_squared();
@@ -295,9 +296,9 @@ mod tests {
             let mut points = scattered(count, seed);
             points.iter_mut().for_each(|point| point.model.coords.component_mul_assign(&shape));
             let area = |three: [usize; 3]| square_area(&three.map(|i| &points[i]));
-            let most = triangles(count).map(area).fold(0.0, f64::max);
+            let max = triangles(count).map(area).fold(0.0, f64::max);
             let found = area(largest(&points).unwrap());
-            assert!((found / most - 1.0).abs() < 1e-9, "{count} points, seed {seed}: {found} of {most}");
+            assert!((found / max - 1.0).abs() < 1e-9, "{count} points, seed {seed}: {found} of {max}");
         }
         let mut one_place = scattered(5, 1);
         one_place.iter_mut().for_each(|point| point.model = Point::origin());
@@ -308,7 +309,7 @@ mod tests {
     fn settings_out_of_range_are_refused() {
         assert_eq!(Triad::default().check(), Ok(()));
         for bad in [-0.1, 1.0, f64::NAN] {
-            assert!(Triad { least_sine: bad, ..Triad::default() }.check().is_err(), "{bad}");
+            assert!(Triad { min_sine: bad, ..Triad::default() }.check().is_err(), "{bad}");
         }
     }
 
@@ -339,21 +340,21 @@ mod tests {
             let arranged = |corners: [[f64; 3]; 3]| order.map(|k| corners[k]);
             let of = |model, measured| {
                 let points = points(arranged(model), arranged(measured));
-                (least_sine_squared(&[0, 1, 2].map(|k| &points[k])), square_area(&[0, 1, 2].map(|k| &points[k])))
+                (min_sine_squared(&[0, 1, 2].map(|k| &points[k])), square_area(&[0, 1, 2].map(|k| &points[k])))
             };
             let (sine, area) = of(corners(3.0, 4.0), corners(3.0, 4.0));
             assert!((sine - 0.36).abs() < 1e-12 && (area - 144.0).abs() < 1e-9, "{order:?}: {sine} {area}");
             let (model, measured) =
                 (of(corners(3.0, 4.0), corners(5.0, 12.0)), of(corners(5.0, 12.0), corners(3.0, 4.0)));
-            let least = 25.0 / 169.0;
-            assert!((model.0 - least).abs() < 1e-12 && (measured.0 - least).abs() < 1e-12, "{order:?}");
+            let min = 25.0 / 169.0;
+            assert!((model.0 - min).abs() < 1e-12 && (measured.0 - min).abs() < 1e-12, "{order:?}");
             assert!((measured.1 - 3600.0).abs() < 1e-9);
         }
     }
 
     /// R = M_object M_cameraᵀ and P1 on C1: a quarter turn about z, and the first points on each other though the others are not.
     #[test]
-    fn the_pose_lays_the_first_points_on_each_other() {
+    fn the_pose_maps_the_first_points_on_each_other() {
         let mut points = seen(&[[1.0, 2.0, 3.0], [1.0, 4.0, 3.0], [0.0, 2.0, 3.0]], &Transform::identity());
         let measured = [[0.0, 0.0, 5.0], [2.5, 0.0, 5.0], [0.0, 1.5, 5.0]];
         points.iter_mut().zip(measured).for_each(|(point, at)| point.measured.at = at.into());
@@ -371,16 +372,16 @@ mod tests {
         let at = |sine: f64| axes(&a, &b, &Vector3::new(3.0, 3.0 * sine, 0.0));
         assert!(at(2e-9).is_ok());
         match at(5e-10) {
-            Err(Degenerate::Collinear { ratio, least }) => assert!((ratio / 5e-10 - 1.0).abs() < 1e-6 && least == 1e-9),
+            Err(Degenerate::Collinear { ratio, min }) => assert!((ratio / 5e-10 - 1.0).abs() < 1e-6 && min == 1e-9),
             other => panic!("{other:?}"),
         }
-        assert_eq!(axes(&a, &a, &a), Err(Degenerate::Collinear { ratio: 0.0, least: 1e-9 }));
+        assert_eq!(axes(&a, &a, &a), Err(Degenerate::Collinear { ratio: 0.0, min: 1e-9 }));
     }
 
     /// The setting is the sine of the smallest angle of the triangle; what is refused is told by the widest of the triangles.
     #[test]
     fn slender_triangles_are_passed_over() {
-        let solver = |choose, least_sine| Triad { choose, least_sine };
+        let solver = |choose, min_sine| Triad { choose, min_sine };
         // The smallest angles: sin = 0.1/√(4 + 0.01) of the first three, more with the fourth.
         let places = [[0.0, 0.0, 3.0], [1.0, 0.1, 3.0], [2.0, 0.0, 3.0], [1.0, 1.0, 3.0]];
         let points = seen(&places, &Transform::identity());
@@ -390,8 +391,8 @@ mod tests {
         assert_eq!(three(&solver(Choose::First, sine * 1.001), &points), Ok([0, 1, 3]));
         for choose in [Choose::First, Choose::LargestArea, Choose::SmallestCovariance] {
             match three(&solver(choose, sine * 1.001), &points[..3]) {
-                Err(Degenerate::Collinear { ratio, least }) => {
-                    assert!((ratio / sine - 1.0).abs() < 1e-9 && least == sine * 1.001, "{ratio}");
+                Err(Degenerate::Collinear { ratio, min }) => {
+                    assert!((ratio / sine - 1.0).abs() < 1e-9 && min == sine * 1.001, "{ratio}");
                 }
                 other => panic!("{other:?}"),
             }
@@ -400,7 +401,7 @@ mod tests {
         let places = [[0.0, 0.0, 3.0], [5.0, 0.6, 3.0], [10.0, 0.0, 3.0], [0.0, 1.0, 3.0], [1.0, 0.0, 3.0]];
         let points = seen(&places, &Transform::identity());
         let area = |three: [usize; 3]| square_area(&three.map(|k| &points[k]));
-        let sine = |three: [usize; 3]| least_sine_squared(&three.map(|k| &points[k])).sqrt();
+        let sine = |three: [usize; 3]| min_sine_squared(&three.map(|k| &points[k])).sqrt();
         let widest = triangles(5).filter(|&three| sine(three) >= 0.15).max_by(|&a, &b| area(a).total_cmp(&area(b)));
         assert!(sine(largest(&points).unwrap()) < 0.15);
         assert_eq!(three(&solver(Choose::LargestArea, 0.15), &points).ok(), widest);
@@ -448,7 +449,7 @@ mod tests {
     fn many_points_are_thinned_evenly() {
         assert_eq!(triangles(4).collect::<Vec<_>>(), [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]);
         assert_eq!((triangles(40).count(), triangles(41).count(), triangles(200).count()), (9880, 9880, 9880));
-        assert_eq!((weighed(40, 39), weighed(41, 39), weighed(80, 1), weighed(80, 39)), (39, 39, 2, 78));
+        assert_eq!((weighted(40, 39), weighted(41, 39), weighted(80, 1), weighted(80, 39)), (39, 39, 2, 78));
         assert_eq!(triangles(80).next(), Some([0, 2, 4]));
         assert_eq!(triangles(80).last(), Some([74, 76, 78]));
         let points = scattered(90, 4);

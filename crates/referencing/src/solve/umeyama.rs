@@ -6,8 +6,9 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Degenerate, Solver, sandwich,
-    spread::{centroid, check, share},
+    Degenerate, Solver,
+    degeneracy::{centroid, check, fraction},
+    sandwich,
 };
 use crate::Observations;
 
@@ -15,19 +16,19 @@ use crate::Observations;
 /// scale s = tr(S diag(…)) / Σ‖c_k‖² that a similarity would have.
 ///
 /// A fix is rigid, so the scale is not applied: the measured points' scale differs from one by noise, a wrong
-/// focal length, a wrong baseline or a model in other units, and beyond `most_scale_error` it is refused.
+/// focal length, a wrong baseline or a model in other units, and beyond `max_scale_error` it is refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Umeyama {
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
     /// Largest |s − 1| that is accepted; any where infinite.
-    pub(crate) most_scale_error: f64,
+    pub(crate) max_scale_error: f64,
 }
 
 impl Default for Umeyama {
     fn default() -> Self {
-        Self { least_ratio: 1e-3, most_scale_error: f64::INFINITY }
+        Self { min_ratio: 1e-3, max_scale_error: f64::INFINITY }
     }
 }
 
@@ -38,8 +39,8 @@ impl Component for Umeyama {
                                   patterns, 1991";
 
     fn check(&self) -> Result<(), String> {
-        share("least-ratio", self.least_ratio)?;
-        in_range(self.most_scale_error > 0.0, "most-scale-error", self.most_scale_error, "a positive number")
+        fraction("min-ratio", self.min_ratio)?;
+        in_range(self.max_scale_error > 0.0, "max-scale-error", self.max_scale_error, "a positive number")
     }
 }
 
@@ -49,17 +50,17 @@ impl Solver for Umeyama {
     }
 
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         let (pose, scale) = similarity(data);
-        if (scale - 1.0).abs() <= self.most_scale_error {
+        if (scale - 1.0).abs() <= self.max_scale_error {
             Ok(pose)
         } else {
-            Err(Degenerate::Scale { scale, most: self.most_scale_error })
+            Err(Degenerate::Scale { scale, max: self.max_scale_error })
         }
     }
 
     fn scale(&self, data: &Observations<'_>) -> Option<f64> {
-        check(data, self.minimum(), self.least_ratio).ok().map(|()| similarity(data).1)
+        check(data, self.minimum(), self.min_ratio).ok().map(|()| similarity(data).1)
     }
 
     fn covariance(
@@ -67,7 +68,7 @@ impl Solver for Umeyama {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        sandwich::or_resampled(data, at, |_| 1.0, |drawn| self.solve(drawn))
+        sandwich::or_resampled(data, at, |_| 1.0, |sampled| self.solve(sampled))
     }
 }
 
@@ -127,7 +128,7 @@ mod tests {
             model_sigma: 0.0,
         });
         let data = Observations { points: points.to_vec(), rig: None };
-        let careful = Umeyama { most_scale_error: 0.1, ..Umeyama::default() };
+        let careful = Umeyama { max_scale_error: 0.1, ..Umeyama::default() };
         let Err(Degenerate::Scale { scale, .. }) = careful.solve(&data) else { panic!("a thousandfold model") };
         assert!((scale - 1000.0).abs() < 1e-9);
         assert!(Umeyama::default().solve(&data).is_ok());

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Degenerate, Solver,
+    degeneracy::{check, fraction},
     kabsch::fit_weighted,
     sandwich,
-    spread::{check, share},
 };
 use crate::{Observation, Observations};
 
@@ -18,12 +18,12 @@ use crate::{Observation, Observations};
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct WeightedKabsch {
     /// Second extent of the points over the first below which they count as a line.
-    pub(crate) least_ratio: f64,
+    pub(crate) min_ratio: f64,
 }
 
 impl Default for WeightedKabsch {
     fn default() -> Self {
-        Self { least_ratio: 1e-3 }
+        Self { min_ratio: 1e-3 }
     }
 }
 
@@ -34,13 +34,13 @@ impl Component for WeightedKabsch {
                                   Sorkine-Hornung, Rabinovich, Least-squares rigid motion using SVD, 2017";
 
     fn check(&self) -> Result<(), String> {
-        share("least-ratio", self.least_ratio)
+        fraction("min-ratio", self.min_ratio)
     }
 }
 
 impl Solver for WeightedKabsch {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.least_ratio)?;
+        check(data, self.minimum(), self.min_ratio)?;
         Ok(fit_weighted(&data.points, |k| 1.0 / variance(&data.points[k])))
     }
 
@@ -50,7 +50,7 @@ impl Solver for WeightedKabsch {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let weight = |k: usize| 1.0 / variance(&data.points[k]);
-        sandwich::or_resampled(data, at, weight, |drawn| self.solve(drawn))
+        sandwich::or_resampled(data, at, weight, |sampled| self.solve(sampled))
     }
 }
 

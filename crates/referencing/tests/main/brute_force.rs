@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use seafix_component::Choice;
 use seafix_geometry::{MeasuredPoint, Point, Transform, UncertainPoint};
 use seafix_referencing::{
-    Candidates, Correspondence, Identification, MaximumClique, ModelPoint, Problem, SEARCHES, Samples, Search,
-    StructuralCoherence, Tolerance, Unidentified,
+    Candidates, Correspondence, Identification, MaximumClique, ModelPoint, Problem, Rejected, SEARCHES, Samples,
+    Search, StructuralCoherence, Tolerance,
 };
 
 /// A random problem and what was planted in it.
@@ -117,10 +117,10 @@ fn admissible(problem: &Problem<'_>, set: &[Correspondence], orientation: bool) 
             }
         }
     }
-    !orientation || fours(set).into_iter().all(|four| !opposed(problem, &four))
+    !orientation || quadruples(set).into_iter().all(|four| !opposed(problem, &four))
 }
 
-fn fours(set: &[Correspondence]) -> Vec<[Correspondence; 4]> {
+fn quadruples(set: &[Correspondence]) -> Vec<[Correspondence; 4]> {
     let mut all = Vec::new();
     for i in 0..set.len() {
         for j in 0..i {
@@ -188,7 +188,7 @@ fn brute_force(problem: &Problem<'_>, orientation: bool) -> (usize, Vec<Vec<Corr
 fn check_clique(case: &Case, orientation: bool, seed: u64) {
     let problem = case.problem();
     let (size, mut sets) = brute_force(&problem, orientation);
-    let clique = MaximumClique { orientation, rivals: 10_000, ..MaximumClique::default() };
+    let clique = MaximumClique { orientation, alternatives: 10_000, ..MaximumClique::default() };
     let backtracking = Choice::named("backtracking").with("orientation", orientation);
     let backtracking = SEARCHES.build(&backtracking).expect("a listed search");
     check_exact(case, &clique, orientation, (size, &mut sets), seed);
@@ -204,26 +204,26 @@ fn check_exact(
 ) {
     let problem = case.problem();
     match search.search(&problem, &mut ChaCha8Rng::seed_from_u64(0)) {
-        Ok(Identification { pairs, rivals, rivals_complete, optimal, size_bound, .. }) => {
+        Ok(Identification { pairs, alternatives, alternatives_complete, optimal, size_bound, .. }) => {
             assert!(admissible(&problem, &pairs, orientation), "case {seed}: {pairs:?} is not admissible");
             assert_eq!(pairs.len(), size, "case {seed}, orientation {orientation}");
-            assert!(optimal && rivals_complete && size_bound == size, "case {seed}: {optimal} {size_bound}");
-            let mut found = rivals;
+            assert!(optimal && alternatives_complete && size_bound == size, "case {seed}: {optimal} {size_bound}");
+            let mut found = alternatives;
             found.push(pairs);
             found.sort();
             sets.sort();
             assert_eq!(&found, sets, "case {seed}, orientation {orientation}");
         }
-        Err(Unidentified::TooFew { with_candidates, .. }) => {
+        Err(Rejected::TooFew { with_candidates, .. }) => {
             assert!(with_candidates < 3, "case {seed}");
         }
-        Err(Unidentified::NoConsensus { best, .. }) => assert!(best < 3 && best == size, "case {seed}"),
+        Err(Rejected::NoConsensus { best, .. }) => assert!(best < 3 && best == size, "case {seed}"),
         // Three points have no orientation; what was refused is a larger set of opposite sign.
-        Err(Unidentified::Mirrored { best, .. }) => {
+        Err(Rejected::Mirrored { best, .. }) => {
             assert!(orientation && size == 3, "case {seed}");
             let (coherent, larger) = brute_force(&problem, false);
             assert_eq!(coherent, best, "case {seed}");
-            assert!(larger.iter().any(|set| fours(set).iter().any(|four| opposed(&problem, four))), "case {seed}");
+            assert!(larger.iter().any(|set| quadruples(set).iter().any(|four| opposed(&problem, four))), "case {seed}");
         }
         Err(unproved) => panic!("case {seed}: {unproved}: seven points exhaust no budget"),
     }
@@ -262,10 +262,10 @@ fn the_papers_order_finds_the_same_size() {
                         assert!(admissible(&problem, &found.pairs, orientation), "case {seed}");
                         assert_eq!(found.pairs.len(), size, "case {seed} {samples:?}");
                     }
-                    Err(Unidentified::Budget { best, bound, .. }) => {
+                    Err(Rejected::Budget { best, bound, .. }) => {
                         assert!(bound >= size && best <= brute_force(&problem, false).0, "case {seed}");
                     }
-                    Err(Unidentified::Mirrored { .. }) => assert!(orientation && size == 3, "case {seed}"),
+                    Err(Rejected::Mirrored { .. }) => assert!(orientation && size == 3, "case {seed}"),
                     Err(_) => assert!(size < 3, "case {seed}"),
                 }
             }

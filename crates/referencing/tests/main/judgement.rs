@@ -7,9 +7,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint};
 use seafix_referencing::{
-    Acceptance, Attempt, Belief, Candidates, Correspondence, Explanation, Gate, Identification, Kabsch, Mahalanobis,
-    MaximumClique, ModelPoint, Outcome, Prior, PriorBound, Problem, Refusal, Search, StructuralCoherence, Tolerance,
-    Unidentified, candidates, judge, judge_named, reference,
+    Acceptance, Attempt, Candidates, Correspondence, Explanation, Gate, Identification, Kabsch, Mahalanobis,
+    MaximumClique, ModelPoint, Outcome, Posterior, Prior, PriorBound, Problem, Rejected, RejectionReason, Search,
+    StructuralCoherence, Tolerance, candidates, compute_fix, judge, judge_labelled,
 };
 
 const SIGMA: f64 = 0.005;
@@ -47,11 +47,11 @@ fn attempt(model: &[ModelPoint], cloud: &[MeasuredPoint], candidates: &Candidate
     let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Sigmas(4.0), prior };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let (search, solver) = (MaximumClique::default(), Kabsch::default());
-    reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng)
+    compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng)
 }
 
 #[test]
-fn a_model_in_view_is_referenced() {
+fn a_model_in_view_is_fixed() {
     let (model, mut rng) = (model_of(&MODEL), ChaCha8Rng::seed_from_u64(1));
     let mut cloud = cloud_of(&model, &mut rng);
     for _ in 0..20 {
@@ -59,10 +59,10 @@ fn a_model_in_view_is_referenced() {
         cloud.push(MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None });
     }
     let found = attempt(&model, &cloud, &Candidates::all(7, 27), None);
-    let Outcome::Referenced(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
+    let Outcome::Fix(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert_eq!(fix.pairs, (0..7).map(|i| Correspondence { model: i, cloud: i }).collect::<Vec<_>>());
     assert_eq!((found.optimal, found.size_bound, &found.identified), (true, Some(7), &fix.pairs));
-    assert!(found.expected_chance_sets.unwrap() < 1e-6);
+    assert!(found.nfa.unwrap() < 1e-6);
     let xi = fix.object_from_camera.error_to(&motion());
     assert!(xi.dot(&fix.covariance.matrix.cholesky().unwrap().solve(&xi)) < 22.5, "within its covariance");
     assert_eq!(found.outcome.reason(), None);
@@ -110,9 +110,9 @@ fn a_set_that_fits_no_rigid_motion_falls_at_the_residuals() {
     };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let (search, solver) = (MaximumClique::default(), Kabsch::default());
-    let found = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
-    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
-    assert_eq!((found.outcome.name(), found.outcome.reason()), ("unidentified", Some("gate")));
+    let found = compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
+    assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Residuals { .. })), "{:?}", found.outcome);
+    assert_eq!((found.outcome.name(), found.outcome.reason()), ("rejected", Some("gate")));
 }
 
 #[test]
@@ -129,8 +129,8 @@ fn a_pose_against_the_prior_falls() {
     ] {
         let prior = Prior { object_from_camera: elsewhere, bound };
         let found = attempt(&model, &cloud, &candidates, Some(&prior));
-        assert_eq!(matches!(found.outcome, Outcome::Referenced(_)), passes, "{:?}: {:?}", prior.bound, found.outcome);
-        assert!(passes || matches!(found.outcome, Outcome::Unidentified(Refusal::Prior { off }) if off > 1.0));
+        assert_eq!(matches!(found.outcome, Outcome::Fix(_)), passes, "{:?}: {:?}", prior.bound, found.outcome);
+        assert!(passes || matches!(found.outcome, Outcome::Rejected(RejectionReason::Prior { off }) if off > 1.0));
     }
 }
 
@@ -151,13 +151,13 @@ fn a_symmetric_object_is_ambiguous_until_the_prior_decides() {
     let model = model_of(&PYRAMID);
     let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(5));
     let found = attempt(&model, &cloud, &Candidates::all(8, 8), None);
-    let Outcome::Ambiguous(rivals) = &found.outcome else { panic!("{:?}", found.outcome) };
-    assert_eq!(rivals.len(), 4, "four quarter turns");
-    assert!(rivals.windows(2).all(|two| two[0].score >= two[1].score), "the likeliest first");
-    assert_eq!((found.outcome.reason(), found.margin().unwrap() >= 0.0), (Some("rivals"), true));
+    let Outcome::Ambiguous(alternatives) = &found.outcome else { panic!("{:?}", found.outcome) };
+    assert_eq!(alternatives.len(), 4, "four quarter turns");
+    assert!(alternatives.windows(2).all(|two| two[0].score >= two[1].score), "the likeliest first");
+    assert_eq!((found.outcome.reason(), found.margin().unwrap() >= 0.0), (Some("alternatives"), true));
     let bound = PriorBound::Gaussian(Covariance6::isotropic(0.1, 0.1));
     let found = attempt(&model, &cloud, &Candidates::all(8, 8), Some(&Prior { object_from_camera: motion(), bound }));
-    let Outcome::Referenced(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
+    let Outcome::Fix(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert!(fix.object_from_camera.error_to(&motion()).amax() < 0.02);
     let runner_up = found.runner_up.as_ref().expect("the other turns were looked at");
     assert!(runner_up.score < fix.score && found.margin().unwrap() > 10.0);
@@ -174,7 +174,7 @@ fn what_a_flat_part_of_a_mirror_image_leaves_is_refused() {
         let mut seen = cloud_of(&model, &mut rng);
         seen.iter_mut().for_each(|point| point.position.at.coords.x *= -1.0);
         let found = attempt(&model, &seen, &Candidates::all(n, n), None);
-        assert!(!matches!(found.outcome, Outcome::Referenced(_)), "draw {draw}: {:?}", found.outcome);
+        assert!(!matches!(found.outcome, Outcome::Fix(_)), "draw {draw}: {:?}", found.outcome);
     }
 }
 
@@ -187,8 +187,8 @@ fn a_mirror_image_is_refused_by_name() {
     }
     let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
     let found = attempt(&model, &cloud, &candidates, None);
-    let expected = Refusal::Search(Unidentified::Mirrored { best: 7, proved: true });
-    assert_eq!(found.outcome, Outcome::Unidentified(expected));
+    let expected = RejectionReason::Search(Rejected::Mirrored { best: 7, proved: true });
+    assert_eq!(found.outcome, Outcome::Rejected(expected));
     assert_eq!(found.outcome.reason(), Some("mirrored"));
     // The paper's distances alone accept it; no rigid motion then fits.
     let problem = Problem {
@@ -200,12 +200,12 @@ fn a_mirror_image_is_refused_by_name() {
     };
     let search = StructuralCoherence { orientation: false, ..StructuralCoherence::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let found = reference(&problem, &search, &Kabsch::default(), &Acceptance::default(), None, &mut rng);
-    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
+    let found = compute_fix(&problem, &search, &Kabsch::default(), &Acceptance::default(), None, &mut rng);
+    assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Residuals { .. })), "{:?}", found.outcome);
 }
 
 #[test]
-fn clutter_alone_is_chance_or_less() {
+fn clutter_alone_is_random_or_less() {
     let model = model_of(&MODEL);
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     for round in 0..200 {
@@ -216,7 +216,7 @@ fn clutter_alone_is_chance_or_less() {
             .map(|_| MeasuredPoint { position: UncertainPoint::isotropic(place(&mut rng), SIGMA), pixels: None })
             .collect();
         let found = attempt(&model, &cloud, &Candidates::all(7, 30), None);
-        assert!(!matches!(found.outcome, Outcome::Referenced(_)), "round {round}: {:?}", found.outcome);
+        assert!(!matches!(found.outcome, Outcome::Fix(_)), "round {round}: {:?}", found.outcome);
     }
 }
 
@@ -227,7 +227,7 @@ fn too_few_are_too_few() {
     for cloud in [&cloud[..0], &cloud[..2]] {
         let candidates = Candidates::from_pairs(7, (0..cloud.len()).map(|i| (i, i)));
         let found = attempt(&model, cloud, &candidates, None);
-        assert_eq!((found.outcome.name(), found.outcome.reason()), ("unidentified", Some("too-few")));
+        assert_eq!((found.outcome.name(), found.outcome.reason()), ("rejected", Some("too-few")));
     }
 }
 
@@ -250,15 +250,15 @@ fn a_blow_up_stops_at_the_budget_with_an_honest_bound() {
     };
     let search = StructuralCoherence { budget: 100_000, ..StructuralCoherence::default() };
     let solver = Kabsch::default();
-    let found = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
-    let Outcome::Unidentified(Refusal::Search(Unidentified::Budget { best, bound, .. })) = found.outcome else {
+    let found = compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
+    let Outcome::Rejected(RejectionReason::Search(Rejected::Budget { best, bound, .. })) = found.outcome else {
         panic!("{:?}", found.outcome)
     };
     assert!(best >= 1 && bound == 50 && !found.optimal, "{best} {bound}");
     let search = MaximumClique { budget: 10_000, ..MaximumClique::default() };
-    let found = reference(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
+    let found = compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
     assert!(!found.optimal && found.size_bound.unwrap() <= 50, "{found:?}");
-    assert!(!matches!(found.outcome, Outcome::Referenced(_)));
+    assert!(!matches!(found.outcome, Outcome::Fix(_)));
 }
 
 /// The model seen with one Δ of 20 σ, pairs i–i; point 4 is off in depth by 12 σ.
@@ -281,12 +281,12 @@ fn judged(
     (model, cloud, candidates): &(Vec<ModelPoint>, Vec<MeasuredPoint>, Candidates),
     prior: Option<&Prior>,
     acceptance: &Acceptance,
-    rivals: Vec<Vec<Correspondence>>,
+    alternatives: Vec<Vec<Correspondence>>,
 ) -> Attempt {
     let tolerance = Tolerance::Fixed(20.0 * SIGMA);
     let problem = Problem { model, cloud, candidates, tolerance, prior };
     let mut found = MaximumClique::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a set");
-    found.rivals.extend(rivals);
+    found.alternatives.extend(alternatives);
     judge(&problem, Ok(found), &Kabsch::default(), acceptance, None)
 }
 
@@ -294,7 +294,7 @@ fn judged(
 fn a_badly_measured_pair_is_left_out() {
     let scene = one_badly_measured(&MODEL);
     let found = judged(&scene, None, &Acceptance::default(), Vec::new());
-    let Outcome::Referenced(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
+    let Outcome::Fix(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert_eq!(fix.pairs.iter().map(|pair| pair.model).collect::<Vec<_>>(), [0, 1, 2, 3, 5, 6]);
     assert_eq!(found.identified.len(), 7);
     assert!(!found.optimal, "that seven are the most says nothing of the six");
@@ -307,7 +307,7 @@ fn a_badly_measured_pair_is_left_out() {
 ///
 /// Seen to fail where what stands elsewhere is only told.
 #[test]
-fn what_is_likelier_elsewhere_leaves_an_answer_ambiguous() {
+fn what_is_more_probable_elsewhere_leaves_an_answer_ambiguous() {
     let model = model_of(&MODEL);
     let of_copy = |count: usize| {
         let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(2));
@@ -322,16 +322,16 @@ fn what_is_likelier_elsewhere_leaves_an_answer_ambiguous() {
         let found = MaximumClique::default().search(&of_first, &mut ChaCha8Rng::seed_from_u64(0));
         judge(&problem, found, &Kabsch::default(), &Acceptance::default(), None)
     };
-    let whole = of_copy(7).outcome;
-    assert!(matches!(whole, Outcome::Ambiguous(_)), "{whole:?}");
+    let full = of_copy(7).outcome;
+    assert!(matches!(full, Outcome::Ambiguous(_)), "{full:?}");
     let part = of_copy(5);
-    let Outcome::Referenced(fix) = &part.outcome else { panic!("{:?}", part.outcome) };
+    let Outcome::Fix(fix) = &part.outcome else { panic!("{:?}", part.outcome) };
     let other = part.runner_up.expect("five points of a copy");
     assert!(other.pairs.len() == 5 && other.score < fix.score, "{other:?}, {}", fix.score);
 }
 
 #[test]
-fn a_rescued_set_against_a_rival_that_passes_is_ambiguous() {
+fn a_rescued_set_against_a_alternative_that_passes_is_ambiguous() {
     // The same object again, well measured, a metre to the side.
     let (model, mut cloud, mut candidates) = one_badly_measured(&MODEL);
     let first = cloud.len();
@@ -343,11 +343,11 @@ fn a_rescued_set_against_a_rival_that_passes_is_ambiguous() {
     for i in 0..7 {
         candidates.lists[i].push(first + i);
     }
-    let whole: Vec<Correspondence> = (0..7).map(|i| Correspondence { model: i, cloud: first + i }).collect();
+    let full: Vec<Correspondence> = (0..7).map(|i| Correspondence { model: i, cloud: first + i }).collect();
     let bad: Vec<Correspondence> = (0..7).map(|i| Correspondence { model: i, cloud: i }).collect();
-    let found = judged(&(model, cloud, candidates), None, &Acceptance::default(), vec![whole.clone(), bad]);
-    let Outcome::Ambiguous(rivals) = &found.outcome else { panic!("{:?}", found.outcome) };
-    assert_eq!((rivals.len(), rivals[0].pairs == whole, rivals[1].pairs.len()), (2, true, 6));
+    let found = judged(&(model, cloud, candidates), None, &Acceptance::default(), vec![full.clone(), bad]);
+    let Outcome::Ambiguous(alternatives) = &found.outcome else { panic!("{:?}", found.outcome) };
+    assert_eq!((alternatives.len(), alternatives[0].pairs == full, alternatives[1].pairs.len()), (2, true, 6));
     assert!(found.margin().expect("two poses") > 8.0, "the whole set is the likelier");
 }
 
@@ -359,13 +359,13 @@ fn leaving_pairs_out_helps_against_nothing_but_residuals() {
     let bound = PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05));
     let prior = Prior { object_from_camera: elsewhere, bound };
     let found = judged(&scene, Some(&prior), &Acceptance::default(), Vec::new());
-    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Residuals { .. })), "{:?}", found.outcome);
+    assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Residuals { .. })), "{:?}", found.outcome);
     // A set whose residuals pass and whose pose does not is refused as a whole.
     let model = model_of(&MODEL);
     let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(4));
     let scene = (model, cloud, Candidates::from_pairs(7, (0..7).map(|i| (i, i))));
     let found = judged(&scene, Some(&prior), &Acceptance::default(), Vec::new());
-    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Prior { .. })), "{:?}", found.outcome);
+    assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Prior { .. })), "{:?}", found.outcome);
 }
 
 /// A pipe: points near a line leave a turn about it free. The model points stay where they are, the vehicle does not. With a
@@ -379,16 +379,16 @@ fn an_attitude_that_points_near_a_line_leave_free_is_refused() {
     let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(4));
     let scene = (model, cloud, Candidates::from_pairs(7, (0..7).map(|i| (i, i))));
     let found = judged(&scene, None, &Acceptance::default(), Vec::new());
-    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Attitude { .. })), "{:?}", found.outcome);
+    assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Attitude { .. })), "{:?}", found.outcome);
     let wide = Acceptance { attitude_limit: 10.0, ..Acceptance::default() };
-    assert!(matches!(judged(&scene, None, &wide, Vec::new()).outcome, Outcome::Referenced(_)));
+    assert!(matches!(judged(&scene, None, &wide, Vec::new()).outcome, Outcome::Fix(_)));
 }
 
 /// A baseline one percent too long makes all that is measured one percent larger and farther off. Of points that are known to
 /// 5 mm at 3 m that is 3 cm: told, and no reason to refuse. Of points at 12 m it is more than the alert limit, while the set is
 /// still coherent and its residuals may be those of noise. Seen to fail without the test.
 #[test]
-fn a_rig_that_stretches_what_it_measures_is_told_and_refused_where_it_matters() {
+fn a_rig_that_stretches_what_it_measures_is_reported_and_refused_where_it_matters() {
     let model = model_of(&MODEL);
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
@@ -404,17 +404,17 @@ fn a_rig_that_stretches_what_it_measures_is_told_and_refused_where_it_matters() 
     };
     let mut squares = 0.0;
     for _ in 0..200 {
-        let Outcome::Referenced(fix) = attempt_at(12.0, 1.0) else { panic!("nothing is stretched") };
+        let Outcome::Fix(fix) = attempt_at(12.0, 1.0) else { panic!("nothing is stretched") };
         let stretch = fix.integrity.stretch.expect("seven points");
         squares += (stretch.value / stretch.sigma).powi(2) / 200.0;
     }
     // χ²₁ on average: 1 ± .1.
     assert!((0.6..1.4).contains(&squares), "{squares}");
-    let Outcome::Referenced(fix) = attempt_at(3.0, 1.015) else { panic!("4.5 cm off") };
+    let Outcome::Fix(fix) = attempt_at(3.0, 1.015) else { panic!("4.5 cm off") };
     let stretch = fix.integrity.stretch.expect("seven points");
     assert!((stretch.value - 0.015).abs() < 4.0 * stretch.sigma, "{stretch:?}");
     let outcome = attempt_at(12.0, 1.015);
-    let Outcome::Unidentified(refusal @ Refusal::Stretched { off, .. }) = outcome else { panic!("{outcome:?}") };
+    let Outcome::Rejected(refusal @ RejectionReason::Stretched { off, .. }) = outcome else { panic!("{outcome:?}") };
     assert!((0.14..0.32).contains(&off) && refusal.reason() == "gate", "{refusal}");
 }
 
@@ -429,20 +429,20 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     let cloud: Vec<_> = model.iter().map(|point| MeasuredPoint { position: exact(point), pixels: None }).collect();
     let seen = |count: usize| (model.clone(), cloud.clone(), Candidates::from_pairs(9, (0..count).map(|i| (i, i))));
     // Whether chance makes them is no matter here.
-    let acceptance = Acceptance { alert_limit: 0.065, chance_budget: 1e300, ..Acceptance::default() };
+    let acceptance = Acceptance { alert_limit: 0.065, max_nfa: 1e300, ..Acceptance::default() };
     let outcome = judged(&seen(7), None, &acceptance, Vec::new()).outcome;
-    let Outcome::Unidentified(refusal @ Refusal::Hinge { rms, .. }) = &outcome else { panic!("{outcome:?}") };
+    let Outcome::Rejected(refusal @ RejectionReason::Hinge { rms, .. }) = &outcome else { panic!("{outcome:?}") };
     assert!((rms - 0.036).abs() < 5e-4 && refusal.reason() == "imprecise", "{refusal}");
-    let told = "the pose hangs on model point `6`: should that be a wrong match, the model points are 0.036 m off";
-    assert!(refusal.to_string().starts_with(told), "{refusal}");
+    let reported = "the pose hangs on model point `6`: should that be a wrong match, the model points are 0.036 m off";
+    assert!(refusal.to_string().starts_with(reported), "{refusal}");
     let both = judged(&seen(8), None, &acceptance, Vec::new());
-    assert!(matches!(both.outcome, Outcome::Referenced(_)), "{:?}", both.outcome);
+    assert!(matches!(both.outcome, Outcome::Fix(_)), "{:?}", both.outcome);
     let (_, _, candidates) = seen(7);
     let tolerance = Tolerance::Sigmas(4.0);
     let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
     let pairs = (0..7).map(|i| Correspondence { model: i, cloud: i }).collect();
-    let said = judge_named(&problem, pairs, &Kabsch::default(), &acceptance, None);
-    assert!(matches!(said.outcome, Outcome::Referenced(_)), "{:?}", said.outcome);
+    let said = judge_labelled(&problem, pairs, &Kabsch::default(), &acceptance, None);
+    assert!(matches!(said.outcome, Outcome::Fix(_)), "{:?}", said.outcome);
 }
 
 /// Two like modules half a metre apart, one seen, and a box about the rough pose that excludes the other by one standard deviation of a
@@ -463,21 +463,21 @@ fn noise_at_the_edge_of_a_box_excludes_no_reading_but_enough_proposals_do() {
     let camera_from_object = Transform::<Camera, Object>::new(UnitQuaternion::identity(), Vector3::z() * 3.0);
     let seen = |at: &[f64; 3]| UncertainPoint::isotropic(camera_from_object * Point::from(*at), SIGMA);
     let cloud: Vec<_> = one.iter().map(|at| MeasuredPoint { position: seen(at), pixels: None }).collect();
-    let rough = Transform::<Camera, Object>::new(UnitQuaternion::identity(), Vector3::new(-0.2, 0.0, 3.0));
-    let prior = Prior { object_from_camera: rough.inverse(), bound: PriorBound::Box(0.3 - SIGMA) };
-    let acceptance = Acceptance { chance_budget: 1e300, alert_share: 1.0, ..Acceptance::default() };
+    let moved = Transform::<Camera, Object>::new(UnitQuaternion::identity(), Vector3::new(-0.2, 0.0, 3.0));
+    let prior = Prior { object_from_camera: moved.inverse(), bound: PriorBound::Box(0.3 - SIGMA) };
+    let acceptance = Acceptance { max_nfa: 1e300, alert_fraction: 1.0, ..Acceptance::default() };
     let outcome = |candidates: Candidates| {
         let scene = (model.clone(), cloud.clone(), candidates);
         judged(&scene, Some(&prior), &acceptance, Vec::new()).outcome
     };
-    let shells = candidates(&model, &cloud, Some(&prior), &Gate::default(), None);
-    assert!(shells.lists[7..].iter().enumerate().all(|(i, list)| !list.contains(&i)), "{shells:?}");
-    let both = outcome(shells);
+    let gates = candidates(&model, &cloud, Some(&prior), &Gate::default(), None);
+    assert!(gates.lists[7..].iter().enumerate().all(|(i, list)| !list.contains(&i)), "{gates:?}");
+    let both = outcome(gates);
     assert!(matches!(both, Outcome::Ambiguous(_)), "{both:?}");
     let proposed = |count| outcome(Candidates::from_pairs(14, (0..count).map(|i| (i, i)).chain([(13, 0)])));
     let (few, all) = (proposed(5), proposed(7));
     assert!(matches!(few, Outcome::Ambiguous(_)), "{few:?}");
-    assert!(matches!(all, Outcome::Referenced(_)), "{all:?}");
+    assert!(matches!(all, Outcome::Fix(_)), "{all:?}");
 }
 
 #[test]
@@ -487,12 +487,12 @@ fn a_pose_less_precise_than_the_alert_limit_is_refused() {
     let scene = (model, cloud, Candidates::from_pairs(7, (0..7).map(|i| (i, i))));
     let acceptance = Acceptance { alert_limit: 0.002, ..Acceptance::default() };
     let found = judged(&scene, None, &acceptance, Vec::new());
-    assert!(matches!(found.outcome, Outcome::Unidentified(Refusal::Imprecise { .. })), "{:?}", found.outcome);
+    assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Imprecise { .. })), "{:?}", found.outcome);
     assert_eq!(found.outcome.reason(), Some("imprecise"));
 }
 
 #[test]
-fn what_was_not_looked_at_is_not_believed() {
+fn what_was_not_examined_is_not_believed() {
     let (model, mut rng) = (model_of(&MODEL), ChaCha8Rng::seed_from_u64(1));
     let cloud = cloud_of(&model, &mut rng);
     let candidates = Candidates::all(7, 7);
@@ -505,10 +505,10 @@ fn what_was_not_looked_at_is_not_believed() {
     };
     let mut found = MaximumClique::default().search(&problem, &mut rng).expect("a set");
     assert_eq!(found.undecided, None);
-    let why = Unidentified::Budget { budget: 5, best: 7, bound: 7, tests: 9 };
+    let why = Rejected::Budget { budget: 5, best: 7, bound: 7, tests: 9 };
     found.undecided = Some(why.clone());
     let refused = judge(&problem, Ok(found), &Kabsch::default(), &Acceptance::default(), None);
-    assert_eq!(refused.outcome, Outcome::Unidentified(Refusal::Search(why.clone())));
+    assert_eq!(refused.outcome, Outcome::Rejected(RejectionReason::Search(why.clone())));
     assert_eq!((refused.outcome.reason(), refused.identified.len()), (Some("budget"), 7));
     let none = judge(&problem, Err(why), &Kabsch::default(), &Acceptance::default(), None);
     assert_eq!((none.tests, none.size_bound, none.optimal), (Some(9), Some(7), false));
@@ -528,7 +528,7 @@ fn named(places: &[[f64; 3]]) -> Outcome {
     let tolerance = Tolerance::Sigmas(4.0);
     let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
     let pairs: Vec<Correspondence> = (0..model.len()).map(|i| Correspondence { model: i, cloud: i }).collect();
-    judge_named(&problem, pairs, &Mahalanobis::default(), &Acceptance::default(), None).outcome
+    judge_labelled(&problem, pairs, &Mahalanobis::default(), &Acceptance::default(), None).outcome
 }
 
 /// Points that say which ones they are need no search and owe chance nothing, but the residuals are tested all the same:
@@ -539,7 +539,7 @@ fn named_points_are_tested_for_their_residuals_alone() {
     let (model, mut rng) = (model_of(&MODEL[..5]), ChaCha8Rng::seed_from_u64(4));
     let cloud = cloud_of(&model, &mut rng);
     let candidates = Candidates::all(5, 5);
-    let strict = Acceptance { chance_budget: 1e-300, ..Acceptance::default() };
+    let strict = Acceptance { max_nfa: 1e-300, ..Acceptance::default() };
     let problem = Problem {
         model: &model,
         cloud: &cloud,
@@ -550,12 +550,12 @@ fn named_points_are_tested_for_their_residuals_alone() {
     let said = |names: [usize; 5]| -> Vec<Correspondence> {
         (0..5).map(|i| Correspondence { model: i, cloud: names[i] }).collect()
     };
-    let found = judge_named(&problem, said([0, 1, 2, 3, 4]), &Kabsch::default(), &strict, None);
-    assert!(matches!(found.outcome, Outcome::Referenced(_)), "{:?}", found.outcome);
-    assert_eq!((found.expected_chance_sets, found.tests, found.optimal), (None, None, false));
-    let exchanged = judge_named(&problem, said([1, 0, 2, 3, 4]), &Kabsch::default(), &strict, None);
+    let found = judge_labelled(&problem, said([0, 1, 2, 3, 4]), &Kabsch::default(), &strict, None);
+    assert!(matches!(found.outcome, Outcome::Fix(_)), "{:?}", found.outcome);
+    assert_eq!((found.nfa, found.tests, found.optimal), (None, None, false));
+    let exchanged = judge_labelled(&problem, said([1, 0, 2, 3, 4]), &Kabsch::default(), &strict, None);
     assert_eq!(exchanged.outcome.reason(), Some("gate"), "{:?}", exchanged.outcome);
-    let few = judge_named(&problem, said([0, 1, 2, 3, 4])[..2].to_vec(), &Kabsch::default(), &strict, None);
+    let few = judge_labelled(&problem, said([0, 1, 2, 3, 4])[..2].to_vec(), &Kabsch::default(), &strict, None);
     assert_eq!(few.outcome.reason(), Some("too-few"));
 }
 
@@ -564,15 +564,15 @@ fn named_points_are_tested_for_their_residuals_alone() {
 #[test]
 fn one_disparity_is_refused_with_the_number_that_failed() {
     match named(&MODEL) {
-        Outcome::Unidentified(Refusal::Residuals { chi2, limit }) => assert!(chi2 > 10.0 * limit, "{chi2} {limit}"),
+        Outcome::Rejected(RejectionReason::Residuals { chi2, limit }) => assert!(chi2 > 10.0 * limit, "{chi2} {limit}"),
         other => panic!("{other:?}"),
     }
     let plate = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.25, 0.0], [0.28, 0.22, 0.0]];
     match named(&plate) {
-        Outcome::Unidentified(Refusal::Imprecise { rms, limit }) => assert!(2.0 * rms > limit, "{rms} {limit}"),
+        Outcome::Rejected(RejectionReason::Imprecise { rms, limit }) => assert!(2.0 * rms > limit, "{rms} {limit}"),
         other => panic!("{other:?}"),
     }
     // The same plate, ten times as large, is no worse than any object.
     let large = plate.map(|at| at.map(|x| x * 10.0));
-    assert!(matches!(named(&large), Outcome::Referenced(_)));
+    assert!(matches!(named(&large), Outcome::Fix(_)));
 }

@@ -1,14 +1,14 @@
 //! What each setting does by itself, all others pooled.
 
-use super::{distinct, tell};
+use super::{distinct, phrases};
 use crate::{
-    Key, Number, Row, Summary,
+    Key, Number, Row, RunSummary,
     document::{Block, Head, Section, Table, text},
     format::{decimals, headed},
     run::{Run, Trial},
 };
 
-pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let axes = &summary.rows.first()?.axes;
     let mut heads = vec![Head::words("Setting"), Head::words("value"), Head::numbers("trials"), Head::numbers("n")];
     heads.extend(
@@ -31,16 +31,16 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
             let own: Vec<usize> = (0..summary.rows.len()).filter(|&i| value(&summary.rows[i]) == *wanted).collect();
             let trials: Vec<&Trial> = own.iter().map(|&i| &run.trials[i]).collect();
             let total = |count: fn(&Row) -> usize| own.iter().map(|&i| count(&summary.rows[i])).sum::<usize>();
-            let over = |topic: &str, what: &str| -> Key { tell::over(&trials, topic, what.to_owned()) };
+            let over = |topic: &str, what: &str| -> Key { phrases::over(&trials, topic, what.to_owned()) };
             let n = total(|row| row.attempted);
-            let share = |group: &str, k: usize| {
+            let fraction = |group: &str, k: usize| {
                 let key = over("/metrics/evaluation", &format!("percent {group} of attempted"));
                 Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
             };
             let mut m2: Vec<f64> = own.iter().filter_map(|&i| summary.rows[i].m2_of_all).map(|m| m * 1e3).collect();
             let middle = (!m2.is_empty()).then(|| seafix_evaluation::median(&mut m2));
             let ends = m2.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
-            let [least, most] = ends.map(|end| (!m2.is_empty()).then_some(end));
+            let [min, max] = ends.map(|end| (!m2.is_empty()).then_some(end));
             let error = |which: &str, value| {
                 Number::new(
                     value,
@@ -59,11 +59,11 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
                     wanted.clone().into(),
                     own.len().to_string().into(),
                     Number::count(n, over("/metrics/evaluation", "count attempted")).into(),
-                    share("found", total(|row| row.found)).into(),
-                    share("wrong", total(|row| row.wrong)).into(),
-                    error("least", least).into(),
+                    fraction("found", total(|row| row.found)).into(),
+                    fraction("wrong", total(|row| row.wrong)).into(),
+                    error("least", min).into(),
                     error("middle", middle).into(),
-                    error("greatest", most).into(),
+                    error("greatest", max).into(),
                     Number::new(time, 1, over("/metrics/timing", "middle median total_ms of attempted")).into(),
                 ],
             );

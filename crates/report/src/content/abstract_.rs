@@ -1,8 +1,8 @@
 //! The abstract: the question's answer in numbers.
 
-use super::{answer, tell};
+use super::{answer, phrases};
 use crate::{
-    Number, PAPER_M1, Row, Summary,
+    Number, PAPER_M1, Row, RunSummary,
     document::{Text, bold, code, text},
     format::number,
     paired::Comparison,
@@ -10,11 +10,12 @@ use crate::{
     run::{Run, Trial},
 };
 
-pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Vec<Text> {
+pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
     let trials: Vec<&Trial> = run.trials.iter().collect();
     let total = |count: fn(&Row) -> usize| summary.rows.iter().map(count).sum::<usize>();
-    let pooled =
-        |group: &str, n: usize| Number::count(n, tell::over(&trials, "/metrics/evaluation", format!("count {group}")));
+    let pooled = |group: &str, n: usize| {
+        Number::count(n, phrases::over(&trials, "/metrics/evaluation", format!("count {group}")))
+    };
     let attempted = total(|row| row.attempted);
     let mut first = text![
         format!("In {} trial{} with ", trials.len(), if trials.len() == 1 { "" } else { "s" }),
@@ -26,12 +27,12 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
     let groups =
         [("found", total(|row| row.found)), ("refused", total(|row| row.refused)), ("wrong", total(|row| row.wrong))];
     for (index, (group, n)) in groups.into_iter().enumerate() {
-        let key = tell::over(&trials, "/metrics/evaluation", format!("percent {group} of attempted"));
-        let share = (attempted > 0).then(|| 100.0 * n as f64 / attempted as f64);
-        first.extend(text![pooled(group, n), format!(" {group} ("), Number::new(share, 1, key), " %"]);
+        let key = phrases::over(&trials, "/metrics/evaluation", format!("percent {group} of attempted"));
+        let fraction = (attempted > 0).then(|| 100.0 * n as f64 / attempted as f64);
+        first.extend(text![pooled(group, n), format!(" {group} ("), Number::new(fraction, 1, key), " %"]);
         // Trials may share their frames, and then they are no independent draws: pooled counts carry no interval.
         if let [trial] = trials[..] {
-            let [low, high] = tell::interval(trial, group, n, attempted);
+            let [low, high] = phrases::interval(trial, group, n, attempted);
             first.extend(text![", 95 % interval [", low, ", ", high, "]"]);
         }
         first.push(["), ", "), ", "). "][index].into());

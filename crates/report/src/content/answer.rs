@@ -1,11 +1,12 @@
 //! The answer to the question of an experiment: what was found along its axes, one sentence a quantity or a series.
 
 use super::{
-    figures, inspection, navigation, objects, significance,
-    tell::{self, Unit},
+    figures, inspection, navigation, objects,
+    phrases::{self, Unit},
+    significance,
 };
 use crate::{
-    Field, Number, Row, Spread, Summary,
+    Distribution, Field, Number, Row, RunSummary,
     document::{Span, Text, text},
     format,
     paired::Comparison,
@@ -13,12 +14,12 @@ use crate::{
 };
 
 /// So many trials are told one by one.
-const TOLD: usize = 9;
+const REPORTED: usize = 9;
 /// So many differences are told.
 const DIFFERENCES: usize = 3;
 
 /// The sentences.
-pub(super) fn sentences(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Vec<Text> {
+pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
     let labels = Labels::of(summary);
     let name = |index: usize| labels.of_trial(&summary.rows[index]);
     let mut said = navigation::sentences(run, &name);
@@ -31,7 +32,7 @@ pub(super) fn sentences(run: &Run, summary: &Summary, comparisons: &[Comparison]
     said = match super::limits::known(summary) {
         true => limits(run, summary),
         false if summary.rows.len() == 1 => errors(run, summary),
-        false if labels.told_singly(summary) => one_by_one(run, summary, &labels),
+        false if labels.reported_singly(summary) => one_by_one(run, summary, &labels),
         false => by_series(run, summary, &labels),
     };
     said.extend(objects::company(run, &name));
@@ -49,7 +50,7 @@ struct Labels {
 }
 
 impl Labels {
-    fn of(summary: &Summary) -> Self {
+    fn of(summary: &RunSummary) -> Self {
         let along = figures::numeric(summary);
         let axes = summary.rows.first().map(|row| row.axes.clone()).unwrap_or_default();
         let varies = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
@@ -88,13 +89,13 @@ impl Labels {
     }
 
     /// Whether each trial is worth a word: few, in one series or each a series of its own.
-    fn told_singly(&self, summary: &Summary) -> bool {
+    fn reported_singly(&self, summary: &RunSummary) -> bool {
         let series = self.series(summary).len();
-        summary.rows.len() <= TOLD && (series == 1 || series == summary.rows.len())
+        summary.rows.len() <= REPORTED && (series == 1 || series == summary.rows.len())
     }
 
     /// The rows of each series, in the order of the run.
-    fn series(&self, summary: &Summary) -> Vec<(String, Vec<usize>)> {
+    fn series(&self, summary: &RunSummary) -> Vec<(String, Vec<usize>)> {
         let mut series: Vec<(String, Vec<usize>)> = Vec::new();
         for (index, row) in summary.rows.iter().enumerate() {
             let name = self.of_series(row);
@@ -112,7 +113,7 @@ fn value(row: &Row, key: &str) -> String {
 }
 
 /// A quantity whose medians are told.
-type Metric = (&'static str, Field, fn(&Row) -> Option<Spread>);
+type Metric = (&'static str, Field, fn(&Row) -> Option<Distribution>);
 
 const METRICS: [Metric; 2] = [
     ("error of the model points (m2)", Field::M2, |row| row.m2),
@@ -120,26 +121,26 @@ const METRICS: [Metric; 2] = [
 ];
 
 /// One sentence a quantity, every trial in it: along the condition, or most first.
-fn one_by_one(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
+fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
     let mut order: Vec<usize> = (0..summary.rows.len()).collect();
     if labels.along.is_none() {
-        let share = |index: &usize| summary.rows[*index].found as f64 / summary.rows[*index].attempted.max(1) as f64;
-        order.sort_by(|a, b| share(b).total_cmp(&share(a)));
+        let fraction = |index: &usize| summary.rows[*index].found as f64 / summary.rows[*index].attempted.max(1) as f64;
+        order.sort_by(|a, b| fraction(b).total_cmp(&fraction(a)));
     }
     let found = order.iter().map(|&index| {
         let (row, trial) = (&summary.rows[index], &run.trials[index]);
-        let share = tell::percent(trial, "found", row.found, row.attempted);
-        let n = tell::count(trial, "attempted", row.attempted);
-        (share.value.is_some()).then(|| text![labels.of_trial(row), ": ", share, " % of ", n])
+        let fraction = phrases::percent(trial, "found", row.found, row.attempted);
+        let n = phrases::count(trial, "attempted", row.attempted);
+        (fraction.value.is_some()).then(|| text![labels.of_trial(row), ": ", fraction, " % of ", n])
     });
     let mut said = vec![list("Found of the attempts", found)];
     let m1: Metric = ("residual of the identified points (m1)", Field::M1, |row| row.m1);
     for (name, field, of) in METRICS.into_iter().chain([m1]) {
-        let digits = tell::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
+        let digits = phrases::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
         let medians = order.iter().map(|&index| {
             let (row, spread) = (&summary.rows[index], of(&summary.rows[index])?);
             let unit = (Unit::Millimetres, digits);
-            let median = tell::statistic(&run.trials[index], "median", field, "found", Some(spread.median), unit);
+            let median = phrases::statistic(&run.trials[index], "median", field, "found", Some(spread.median), unit);
             Some(text![labels.of_trial(row), ": ", median, " mm"])
         });
         said.push(list(&format!("Median {name}"), medians));
@@ -162,25 +163,25 @@ fn list(name: &str, items: impl Iterator<Item = Option<Text>>) -> Text {
 }
 
 /// One sentence a series: how many it found, and how its errors go.
-fn by_series(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
+fn by_series(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
     let series = labels.series(summary).into_iter();
     series
         .map(|(name, members)| {
             let trials: Vec<&Trial> = members.iter().map(|&index| &run.trials[index]).collect();
             let total = |of: fn(&Row) -> usize| members.iter().map(|&index| of(&summary.rows[index])).sum::<usize>();
             let pooled = |group: &str, n: usize| {
-                Number::count(n, tell::over(&trials, "/metrics/evaluation", format!("count {group}")))
+                Number::count(n, phrases::over(&trials, "/metrics/evaluation", format!("count {group}")))
             };
             let (found, attempted) = (total(|row| row.found), total(|row| row.attempted));
-            let key = tell::over(&trials, "/metrics/evaluation", "percent found of attempted".to_owned());
-            let share = (attempted > 0).then(|| 100.0 * found as f64 / attempted as f64);
+            let key = phrases::over(&trials, "/metrics/evaluation", "percent found of attempted".to_owned());
+            let fraction = (attempted > 0).then(|| 100.0 * found as f64 / attempted as f64);
             let mut said = text![
                 format!("{name}: "),
                 pooled("found", found),
                 " of ",
                 pooled("attempted", attempted),
                 " found (",
-                Number::new(share, 1, key),
+                Number::new(fraction, 1, key),
                 " %), ",
                 pooled("wrong", total(|row| row.wrong)),
                 " wrong"
@@ -196,7 +197,7 @@ fn by_series(run: &Run, summary: &Summary, labels: &Labels) -> Vec<Text> {
 }
 
 /// `, none at 4.5 and 5.5`: where along the condition a series that finds something finds nothing.
-fn nowhere(summary: &Summary, labels: &Labels, members: &[usize]) -> Option<String> {
+fn nowhere(summary: &RunSummary, labels: &Labels, members: &[usize]) -> Option<String> {
     let key = labels.along.as_ref()?;
     let found = |index: &usize| summary.rows[*index].found > 0;
     let places: Vec<String> =
@@ -205,13 +206,13 @@ fn nowhere(summary: &Summary, labels: &Labels, members: &[usize]) -> Option<Stri
 }
 
 /// `; the median error … goes from a mm at 2 to b mm at 5`, or between the least and the greatest.
-fn course(run: &Run, summary: &Summary, labels: &Labels, members: &[usize], (name, field, of): Metric) -> Text {
+fn course(run: &Run, summary: &RunSummary, labels: &Labels, members: &[usize], (name, field, of): Metric) -> Text {
     let known: Vec<(usize, f64)> =
         members.iter().filter_map(|&index| Some((index, of(&summary.rows[index])?.median))).collect();
-    let digits = tell::decimals(known.iter().map(|(_, median)| Some(*median)), Unit::Millimetres);
+    let digits = phrases::decimals(known.iter().map(|(_, median)| Some(*median)), Unit::Millimetres);
     let unit = (Unit::Millimetres, digits);
-    let told = |(index, median): (usize, f64)| {
-        tell::statistic(&run.trials[index], "median", field, "found", Some(median), unit)
+    let as_number = |(index, median): (usize, f64)| {
+        phrases::statistic(&run.trials[index], "median", field, "found", Some(median), unit)
     };
     let mut ends = match &labels.along {
         Some(key) => {
@@ -227,27 +228,29 @@ fn course(run: &Run, summary: &Summary, labels: &Labels, members: &[usize], (nam
         }
     };
     let (Some(last), Some(first)) = (ends.pop(), ends.first().copied()) else {
-        return ends.pop().map_or_else(Vec::new, |one| text![format!("; the median {name} is "), told(one), " mm"]);
+        return ends
+            .pop()
+            .map_or_else(Vec::new, |one| text![format!("; the median {name} is "), as_number(one), " mm"]);
     };
     match &labels.along {
         Some(key) => {
             let at = |index: usize| labels.place(&summary.rows[index], key);
             text![
                 format!("; the median {name} goes from "),
-                told(first),
+                as_number(first),
                 format!(" mm at {} to ", at(first.0)),
-                told(last),
+                as_number(last),
                 format!(" mm at {}", at(last.0))
             ]
         }
         None => {
-            text![format!("; the median {name} lies between "), told(first), " and ", told(last), " mm"]
+            text![format!("; the median {name} lies between "), as_number(first), " and ", as_number(last), " mm"]
         }
     }
 }
 
 /// Root mean squares beside their bounds, the closest and the farthest.
-fn limits(run: &Run, summary: &Summary) -> Vec<Text> {
+fn limits(run: &Run, summary: &RunSummary) -> Vec<Text> {
     let methods = super::distinct(summary.rows.iter().map(Row::method)).into_iter();
     methods
         .filter_map(|method| {
@@ -262,7 +265,7 @@ fn limits(run: &Run, summary: &Summary) -> Vec<Text> {
             let ends = |field: Field, ratios: &[f64]| {
                 [("least", f64::min as fn(f64, f64) -> f64), ("greatest", f64::max)].map(|(which, pick)| {
                     let what = format!("{which} ratio {} of judged", field.name());
-                    Number::new(ratios.iter().copied().reduce(pick), 3, tell::over(&trials, "/metrics/totals", what))
+                    Number::new(ratios.iter().copied().reduce(pick), 3, phrases::over(&trials, "/metrics/totals", what))
                 })
             };
             let [m2_low, m2_high] = ends(Field::M2, &ratios(|limits| limits.m2));
@@ -285,22 +288,22 @@ fn limits(run: &Run, summary: &Summary) -> Vec<Text> {
 }
 
 /// The medians of the only trial.
-fn errors(run: &Run, summary: &Summary) -> Vec<Text> {
+fn errors(run: &Run, summary: &RunSummary) -> Vec<Text> {
     let (trial, row) = (&run.trials[0], &summary.rows[0]);
-    let told = METRICS.into_iter().filter_map(|(name, field, of)| {
+    let as_number = METRICS.into_iter().filter_map(|(name, field, of)| {
         let median = of(row)?.median;
-        let unit = (Unit::Millimetres, tell::decimals([Some(median)].into_iter(), Unit::Millimetres));
+        let unit = (Unit::Millimetres, phrases::decimals([Some(median)].into_iter(), Unit::Millimetres));
         Some(text![
             format!("Median {name}: "),
-            tell::statistic(trial, "median", field, "found", Some(median), unit),
+            phrases::statistic(trial, "median", field, "found", Some(median), unit),
             " mm."
         ])
     });
-    told.collect()
+    as_number.collect()
 }
 
 /// How many fixes were wrong, and where most of them were.
-fn wrong(run: &Run, summary: &Summary, labels: &Labels) -> Option<Text> {
+fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
     let worst = (0..summary.rows.len()).rev().max_by_key(|&index| summary.rows[index].wrong)?;
     let (row, trial) = (&summary.rows[worst], &run.trials[worst]);
     if row.wrong == 0 || summary.rows.len() == 1 {
@@ -310,9 +313,9 @@ fn wrong(run: &Run, summary: &Summary, labels: &Labels) -> Option<Text> {
     let began = if alike == 1 { "Most wrong fixes were made with" } else { "No trial has more wrong fixes than" };
     Some(text![
         format!("{began} {}: ", labels.of_trial(row)),
-        tell::count(trial, "wrong", row.wrong),
+        phrases::count(trial, "wrong", row.wrong),
         " of ",
-        tell::count(trial, "attempted", row.attempted),
+        phrases::count(trial, "attempted", row.attempted),
         " attempts."
     ])
 }

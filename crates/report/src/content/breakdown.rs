@@ -1,8 +1,8 @@
 //! Up to where a method bears what makes its task harder.
 
-use super::{distinct, figures, tell};
+use super::{distinct, figures, phrases};
 use crate::{
-    Key, Number, Row, Summary,
+    Key, Number, Row, RunSummary,
     document::{Block, Cell, Head, Table, text},
     format::{harder, headed},
     run::{Run, Trial},
@@ -12,7 +12,7 @@ use crate::{
 pub(crate) const BORNE: f64 = 95.0;
 
 /// A line for every series along every axis of which a larger value makes the task harder; a sentence where nothing is borne.
-pub(super) fn block(run: &Run, summary: &Summary) -> Option<Block> {
+pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     let heads = vec![
         Head::words("series"),
         Head::words("along"),
@@ -63,18 +63,19 @@ pub(super) fn block(run: &Run, summary: &Summary) -> Option<Block> {
 /// One series; whether it bears anything.
 fn line(name: &str, key: &str, steps: &[(f64, &Row, &Trial)]) -> (Vec<Cell>, bool) {
     let trials: Vec<&Trial> = steps.iter().map(|step| step.2).collect();
-    let share = |end: &str, (_, row, trial): &(f64, &Row, &Trial)| {
-        tell::rate(trial, end, "found", (row.found, row.attempted), 1)
+    let fraction = |end: &str, (_, row, trial): &(f64, &Row, &Trial)| {
+        phrases::rate(trial, end, "found", (row.found, row.attempted), 1)
     };
     let digits = |(_, row, _): &(f64, &Row, &Trial)| {
         let axis = row.axes.iter().find(|axis| axis.key == key);
         axis.and_then(|axis| axis.value.split_once('.')).map_or(0, |(_, decimals)| decimals.len())
     };
     let borne = |end: &str| {
-        let borne = steps.iter().take_while(|step| share(end, step).value.is_some_and(|share| share >= BORNE)).count();
+        let borne =
+            steps.iter().take_while(|step| fraction(end, step).value.is_some_and(|fraction| fraction >= BORNE)).count();
         let last = borne.checked_sub(1).map(|last| &steps[last]);
         let what = if end == "low" { "surely-borne" } else { "borne" };
-        let what = tell::over(&trials, "/metrics/evaluation", format!("{what} found along {key}"));
+        let what = phrases::over(&trials, "/metrics/evaluation", format!("{what} found along {key}"));
         let number = Number::new(last.map(|step| step.0), last.map_or(0, digits), what);
         let open = if borne == steps.len() { "≥ " } else { "" };
         (
@@ -83,7 +84,7 @@ fn line(name: &str, key: &str, steps: &[(f64, &Row, &Trial)]) -> (Vec<Cell>, boo
         )
     };
     let axis = |step: &(f64, &Row, &Trial)| {
-        let Number { value, key, .. } = tell::axis(step.2, key, Some(step.0));
+        let Number { value, key, .. } = phrases::axis(step.2, key, Some(step.0));
         Cell::from(Number::new(value, digits(step), Key::clone(&key)))
     };
     let ((n, largest), (_, surely)) = (borne("percent"), borne("low"));
@@ -91,8 +92,8 @@ fn line(name: &str, key: &str, steps: &[(f64, &Row, &Trial)]) -> (Vec<Cell>, boo
     cells.push(largest);
     match n.checked_sub(1).map(|last| &steps[last]) {
         Some(step) => {
-            let [low, high] = tell::interval(step.2, "found", step.1.found, step.1.attempted);
-            cells.push(share("percent", step).into());
+            let [low, high] = phrases::interval(step.2, "found", step.1.found, step.1.attempted);
+            cells.push(fraction("percent", step).into());
             cells.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
         }
         None => cells.extend(["–", "–"].map(Cell::from)),

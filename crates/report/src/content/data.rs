@@ -5,15 +5,15 @@ use seafix_log::{CameraRecord, TrialHeader};
 
 use super::distinct;
 use crate::{
-    Number, Summary,
+    Number, RunSummary,
     document::{Block, Cell, Head, Section, Table, Text, code, text},
     format::{number, trimmed},
     run::Run,
 };
 
-use super::tell;
+use super::phrases;
 
-pub(super) fn section(run: &Run, summary: &Summary, small: bool) -> Section {
+pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
     let of = |say: fn(&TrialHeader) -> String| distinct(run.trials.iter().map(|trial| say(&trial.header))).join("; ");
     let mut table = Table::new(
         "data",
@@ -31,7 +31,7 @@ pub(super) fn section(run: &Run, summary: &Summary, small: bool) -> Section {
     line("Frames", text![format!("{frames} a trial, {} in all", counted(run.trials.len(), "trial", "trials"))]);
     if let Some(trial) = run.trials.iter().find(|trial| trial.every() > 1) {
         let mut said = text!["every "];
-        said.push(tell::header(trial, "every", Some(trial.every() as f64), 0).into());
+        said.push(phrases::header(trial, "every", Some(trial.every() as f64), 0).into());
         said.push(
             "th frame, and failures as long as there was room; medians and quantiles are over these, counts over all"
                 .into(),
@@ -99,7 +99,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn disparity(run: &Run, summary: &Summary) -> Text {
+fn disparity(run: &Run, summary: &RunSummary) -> Text {
     let with: Vec<usize> = (0..run.trials.len()).filter(|&i| summary.rows[i].disparity_sigma.is_some()).collect();
     let sigmas = || with.iter().filter_map(|&i| summary.rows[i].disparity_sigma);
     let [low, high] = sigmas().fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], s| [a.min(s), b.max(s)]);
@@ -108,7 +108,7 @@ fn disparity(run: &Run, summary: &Summary) -> Text {
     }
     let trials: Vec<_> = with.iter().map(|&i| &run.trials[i]).collect();
     let end = |which: &str, value: f64| {
-        Number::new(Some(value), 2, tell::over(&trials, "/referencing/frame", format!("{which} disparity")))
+        Number::new(Some(value), 2, phrases::over(&trials, "/referencing/frame", format!("{which} disparity")))
     };
     let mut said = text!["σ = ", end("least", low)];
     if number(Some(low), 2) != number(Some(high), 2) {
@@ -119,15 +119,15 @@ fn disparity(run: &Run, summary: &Summary) -> Text {
 }
 
 fn targets(header: &TrialHeader) -> String {
-    const NAMED: usize = 12;
+    const LABELLED: usize = 12;
     if header.targets.is_empty() {
         return "an object of its own in every frame, as the log has it".to_owned();
     }
     let sizes = || header.targets.iter().map(|target| target.points.len());
     let points: usize = sizes().sum();
     let who = match (sizes().min(), sizes().max()) {
-        (Some(least), Some(most)) if header.targets.len() > NAMED => {
-            format!("{} of {least} to {most} points", header.targets.len())
+        (Some(min), Some(max)) if header.targets.len() > LABELLED => {
+            format!("{} of {min} to {max} points", header.targets.len())
         }
         _ => {
             let each = header.targets.iter().map(|target| format!("{} ({})", target.id, target.points.len()));

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::tell::{self, Unit};
+use super::phrases::{self, Unit};
 use crate::{
     Field, Number, ReportError,
     document::{Block, Cell, Head, Picture, Section, Table, Text, code, text},
     figure::{Marked, draw_picture},
     format::{counted, decimals, short},
-    run::{Attempt, Frame, Run, Trial},
+    run::{AttemptRow, Frame, Run, Trial},
 };
 
 /// How many are listed.
@@ -21,7 +21,7 @@ const REFUSALS: usize = 5;
 const SEARCHED: usize = 200_000;
 
 /// One attempt in its trial.
-type Case<'a> = (usize, &'a Frame, &'a Attempt);
+type Case<'a> = (usize, &'a Frame, &'a AttemptRow);
 
 /// The picture of the best frame for the head of the report, and the section of the worst.
 pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section), ReportError> {
@@ -32,9 +32,9 @@ pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section)
         wanted.entry(trial).or_default().push(stamp);
     }
     wanted.retain(|trial, _| run.trials[*trial].pictures && run.trials[*trial].frames.len() <= SEARCHED);
-    let drawn = wanted.into_par_iter().map(|(trial, stamps)| Ok((trial, draw_picture(&run.trials[trial], &stamps)?)));
-    let drawn: Vec<(usize, Vec<Marked>)> = drawn.collect::<Result<_, ReportError>>()?;
-    let all = drawn.into_iter().flat_map(|(trial, drawn)| drawn.into_iter().map(move |marked| (trial, marked)));
+    let plotted = wanted.into_par_iter().map(|(trial, stamps)| Ok((trial, draw_picture(&run.trials[trial], &stamps)?)));
+    let plotted: Vec<(usize, Vec<Marked>)> = plotted.collect::<Result<_, ReportError>>()?;
+    let all = plotted.into_iter().flat_map(|(trial, plotted)| plotted.into_iter().map(move |marked| (trial, marked)));
     let pictures: BTreeMap<(usize, u64), Marked> =
         all.map(|(trial, marked)| ((trial, marked.stamp_ns), marked)).collect();
     let first = best.and_then(|best| pictures.get(&best).map(|marked| best_picture(run, best.0, marked, small)));
@@ -62,29 +62,29 @@ fn worst(run: &Run) -> Vec<Case<'_>> {
         let trials = run.trials.iter().enumerate();
         trials.flat_map(|(index, trial)| trial.attempts().map(move |(frame, row)| (index, frame, row)))
     };
-    let error = |row: &Attempt| {
+    let error = |row: &AttemptRow| {
         let errors = [Field::M2, Field::M1, Field::Residual].map(|field| row.get(field));
         errors.into_iter().flatten().next().unwrap_or(0.0)
     };
-    let most = |cases: Vec<Case<'_>>, n: usize| -> Vec<(usize, u64)> {
+    let max = |cases: Vec<Case<'_>>, n: usize| -> Vec<(usize, u64)> {
         let mut keyed: Vec<(f64, usize, u64)> = cases.iter().map(|(i, f, row)| (error(row), *i, f.number)).collect();
         keyed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         keyed.into_iter().take(n).map(|(_, index, frame)| (index, frame)).collect()
     };
-    let pick = |keys: &[(usize, u64)], of: &dyn Fn(&Attempt) -> bool| -> Vec<Case<'_>> {
+    let pick = |keys: &[(usize, u64)], of: &dyn Fn(&AttemptRow) -> bool| -> Vec<Case<'_>> {
         let chosen = |key: &(usize, u64)| all().find(|(i, frame, row)| (*i, frame.number) == *key && of(row));
         keys.iter().filter_map(chosen).collect()
     };
-    let wrong = |row: &Attempt| row.wrong();
-    let refused = |row: &Attempt| !row.wrong() && !row.found() && row.get(Field::Visible).unwrap_or(0.0) >= 3.0;
-    let found = |row: &Attempt| row.found();
-    let mut cases = pick(&most(all().filter(|(.., row)| wrong(row)).collect(), LISTED), &wrong);
+    let wrong = |row: &AttemptRow| row.wrong();
+    let refused = |row: &AttemptRow| !row.wrong() && !row.found() && row.get(Field::Visible).unwrap_or(0.0) >= 3.0;
+    let found = |row: &AttemptRow| row.found();
+    let mut cases = pick(&max(all().filter(|(.., row)| wrong(row)).collect(), LISTED), &wrong);
     let mut refusals: Vec<Case<'_>> = all().filter(|(.., row)| refused(row)).collect();
     // Most points in view first: those had the least cause.
-    let visible = |row: &Attempt| row.get(Field::Visible).unwrap_or(0.0);
+    let visible = |row: &AttemptRow| row.get(Field::Visible).unwrap_or(0.0);
     refusals.sort_by(|a, b| visible(b.2).total_cmp(&visible(a.2)));
     cases.extend(refusals.into_iter().take(REFUSALS.min(LISTED - cases.len())));
-    cases.extend(pick(&most(all().filter(|(.., row)| found(row)).collect(), LISTED - cases.len()), &found));
+    cases.extend(pick(&max(all().filter(|(.., row)| found(row)).collect(), LISTED - cases.len()), &found));
     cases
 }
 
@@ -94,7 +94,7 @@ fn best(run: &Run) -> Option<(usize, u64)> {
     for (index, trial) in run.trials.iter().enumerate().filter(|(_, trial)| trial.pictures) {
         for frame in &trial.frames {
             let points: u32 = trial.attempts_of(frame).filter(|row| row.found()).map(|row| row.points).sum();
-            let wrong = trial.attempts_of(frame).any(Attempt::wrong);
+            let wrong = trial.attempts_of(frame).any(AttemptRow::wrong);
             // The first of equals.
             if !wrong && points > best.map_or(0, |best| best.0) {
                 best = Some((points, index, frame.stamp_ns));
@@ -132,12 +132,13 @@ fn table(run: &Run, worst: &[Case<'_>]) -> Table {
             (_, true) => "found".to_owned(),
             _ => format!("refused: {}", trial.reason(row)),
         };
-        let told = |field, unit, digits| tell::value(trial, place, field, row.get(field), (unit, digits)).into();
+        let as_number =
+            |field, unit, digits| phrases::value(trial, place, field, row.get(field), (unit, digits)).into();
         let (number, stamp) = named(trial, frame);
         let mut line: Vec<Cell> = vec![code(trial.file()).into(), number.into(), stamp.into()];
         line.extend([object.to_owned().into(), judged.into()]);
-        line.extend([told(Field::Identified, Unit::Plain, 0), told(Field::Visible, Unit::Plain, 0)]);
-        line.extend(columns.iter().zip(digits).map(|((_, field, unit), digits)| told(*field, *unit, digits)));
+        line.extend([as_number(Field::Identified, Unit::Plain, 0), as_number(Field::Visible, Unit::Plain, 0)]);
+        line.extend(columns.iter().zip(digits).map(|((_, field, unit), digits)| as_number(*field, *unit, digits)));
         table.line(false, line);
     }
     table

@@ -76,6 +76,6 @@ fn said(axes: &[String]) -> String {
     match axes {
         [] => "the run is".to_owned(),
         [one] => format!("{one} is"),
-        [most @ .., last] => format!("{} and {last} are", most.join(", ")),
+        [max @ .., last] => format!("{} and {last} are", max.join(", ")),
     }
 }

@@ -1,13 +1,14 @@
 //! What the vehicle is there for: how far off it had the points of interest.
 
 use super::{
-    distinct, results,
-    tell::{self, Unit},
+    distinct,
+    phrases::{self, Unit},
+    results,
 };
 use crate::{
-    Key, Number, Summary,
+    Key, Number, RunSummary,
     document::{Block, Head, Section, Table, Text, text},
-    looked::Looked,
+    points_of_interest::PoiQuantity,
     run::{Run, Trial},
 };
 
@@ -15,7 +16,7 @@ use crate::{
 const TOPIC: &str = "/metrics/inspection";
 
 /// The section, where any point of interest came into view.
-pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let seen = |trial: &Trial| distinct(trial.views().map(|point| trial.point(point).to_owned()));
     if run.trials.iter().all(|trial| trial.views().next().is_none()) {
         return None;
@@ -47,12 +48,12 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
             let said = |statistic, quantity, unit, decimals| {
                 number(trial, name, statistic, quantity, all(quantity), (unit, decimals))
             };
-            line.push(said("sampled", Looked::Error, Unit::Plain, 0).into());
-            line.push(said("median", Looked::Range, Unit::Plain, 2).into());
+            line.push(said("sampled", PoiQuantity::Error, Unit::Plain, 0).into());
+            line.push(said("median", PoiQuantity::Range, Unit::Plain, 2).into());
             for statistic in ["median", "q95", "greatest"] {
-                line.push(said(statistic, Looked::Error, Unit::Millimetres, 1).into());
+                line.push(said(statistic, PoiQuantity::Error, Unit::Millimetres, 1).into());
             }
-            line.push(said("mean", Looked::Nees, Unit::Plain, 1).into());
+            line.push(said("mean", PoiQuantity::Nees, Unit::Plain, 1).into());
             table.line(place == 0 && results::breaks(summary, index), line);
         }
     }
@@ -67,7 +68,7 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     let sentence = |(index, trial): (usize, &Trial)| {
         let errors = |point: &str| -> Vec<f64> {
             let own = trial.views().filter(|seen| trial.point(seen) == point);
-            own.filter_map(|seen| seen.get(Looked::Error)).collect()
+            own.filter_map(|seen| seen.get(PoiQuantity::Error)).collect()
         };
         let points = distinct(trial.views().map(|point| trial.point(point).to_owned()));
         let median = |point: &String| {
@@ -76,16 +77,17 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
         };
         let mut known: Vec<(f64, &String)> = points.iter().filter_map(|point| Some((median(point)?, point))).collect();
         known.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
-        let told = |point: &str| {
-            let of = |statistic| number(trial, point, statistic, Looked::Error, errors(point), (Unit::Millimetres, 1));
-            let views = number(trial, point, "sampled", Looked::Error, errors(point), (Unit::Plain, 0));
+        let as_number = |point: &str| {
+            let of =
+                |statistic| number(trial, point, statistic, PoiQuantity::Error, errors(point), (Unit::Millimetres, 1));
+            let views = number(trial, point, "sampled", PoiQuantity::Error, errors(point), (Unit::Plain, 0));
             text![of("median"), " mm (median; ", of("q95"), " mm in 95 % of ", views, " views)"]
         };
         let [(_, best), .., (_, worst)] = known[..] else { return None };
         let mut said = text![format!("{}: of the points of interest {best} was known to ", name(index))];
-        said.extend(told(best));
+        said.extend(as_number(best));
         said.push(format!(", {worst} to ").into());
-        said.extend(told(worst));
+        said.extend(as_number(worst));
         said.push(".".into());
         Some(said)
     };
@@ -97,7 +99,7 @@ fn number(
     trial: &Trial,
     point: &str,
     statistic: &str,
-    quantity: Looked,
+    quantity: PoiQuantity,
     mut values: Vec<f64>,
     (unit, decimals): (Unit, usize),
 ) -> Number {
@@ -110,5 +112,5 @@ fn number(
         "median" => Some(seafix_evaluation::quantile(&mut values, 0.5)),
         _ => Some(seafix_evaluation::quantile(&mut values, 0.95)),
     };
-    tell::inspected(trial, statistic, (quantity, point), value, (unit, decimals))
+    phrases::inspected(trial, statistic, (quantity, point), value, (unit, decimals))
 }

@@ -3,15 +3,16 @@
 use seafix_log::{Outcome, Region};
 
 use super::{
-    distinct, figures, results,
-    tell::{self, Unit},
+    distinct, figures,
+    phrases::{self, Unit},
+    results,
 };
 use crate::{
-    Field, Number, Summary,
+    Field, Number, RunSummary,
     document::{Block, Cell, Figure, Head, Section, Table, Text, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::trimmed,
-    run::{Attempt, Frame, Run, Trial},
+    run::{AttemptRow, Frame, Run, Trial},
 };
 
 /// So many marks are drawn of fixes that keep their levels, and so many of those that do not: more hide each other.
@@ -20,7 +21,7 @@ const MARKS: usize = 1200;
 const SERIES: usize = 7;
 
 /// Rates and the diagram; `None` where truth or levels are unknown.
-pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let judged = |row: &crate::Row| row.regions.is_some_and(|regions| regions.iter().any(|count| *count > 0));
     if !summary.rows.iter().any(judged) {
         return None;
@@ -60,7 +61,7 @@ const COLUMNS: [(Region, &str); 6] = [
     (Region::Unprotected, "no level"),
 ];
 
-fn table(run: &Run, summary: &Summary) -> Table {
+fn table(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
         "Integrity: of n attempts, how many gave a fix that is available, that misleads and that misleads hazardously, in % with 95 % intervals; and, as counts, fixes whose level exceeds the alert limit, those of them that mislead, and fixes without a level. Attempts that were refused are the rest."
     ];
@@ -75,16 +76,16 @@ fn table(run: &Run, summary: &Summary) -> Table {
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let Some(regions) = row.regions else { continue };
         let mut line = results::cells(row);
-        line.push(tell::count(trial, "attempted", row.attempted).into());
+        line.push(phrases::count(trial, "attempted", row.attempted).into());
         for (place, (region, _)) in COLUMNS.into_iter().enumerate() {
             let (group, k) = (region.name(), regions[region as usize]);
-            line.push(tell::count(trial, group, k).into());
+            line.push(phrases::count(trial, group, k).into());
             if place < 3 {
                 let decimals = if region == Region::Available { 1 } else { 3 };
                 let of = (k, row.attempted);
-                let [share, low, high] =
-                    ["percent", "low", "high"].map(|what| tell::rate(trial, what, group, of, decimals));
-                line.push(share.into());
+                let [fraction, low, high] =
+                    ["percent", "low", "high"].map(|what| phrases::rate(trial, what, group, of, decimals));
+                line.push(fraction.into());
                 line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
             }
         }
@@ -98,7 +99,7 @@ struct Mark<'a> {
     series: usize,
     trial: &'a Trial,
     frame: &'a Frame,
-    row: &'a Attempt,
+    row: &'a AttemptRow,
     values: [f64; 3],
 }
 
@@ -110,14 +111,14 @@ impl Mark<'_> {
 }
 
 /// The protection level of the position over its error: the diagram of Stanford's integrity monitors, with its regions.
-fn stanford(run: &Run, summary: &Summary) -> Option<Figure> {
+fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let mut names = distinct(run.trials.iter().map(|trial| trial.method().join(" + ")));
     let apart = names.len() <= SERIES;
     let series = |trial: &Trial| if apart { figures::series(&names, &trial.method().join(" + ")) } else { 0 };
     let mut marks = Vec::new();
     for trial in &run.trials {
         let series = series(trial);
-        for (frame, row) in trial.attempts().filter(|(_, row)| row.outcome == Outcome::Referenced) {
+        for (frame, row) in trial.attempts().filter(|(_, row)| row.outcome == Outcome::Fix) {
             let values = [Field::Position, Field::Level, Field::Limit].map(|field| row.get(field).unwrap_or(f64::NAN));
             if values.iter().all(|value| *value > 0.0) {
                 marks.push(Mark { series, trial, frame, row, values });
@@ -134,16 +135,16 @@ fn stanford(run: &Run, summary: &Summary) -> Option<Figure> {
     let limits = distinct(marks.iter().map(|mark| mark.values[2].to_string()));
     // Where targets have limits of their own, errors and levels are shares of them.
     let one = limits.len() == 1;
-    let drawn_in = |mark: &Mark<'_>| {
+    let generated_in = |mark: &Mark<'_>| {
         let [error, level, limit] = mark.values;
         if one { [error * 1e3, level * 1e3] } else { [error / limit, level / limit] }
     };
     let limit = if one { marks[0].values[2] * 1e3 } else { 1.0 };
-    let of = |axis: usize| marks.iter().map(move |mark| drawn_in(mark)[axis]);
-    let least = [0, 1].map(|axis| 0.8 * of(axis).fold(limit / 20.0, f64::min));
-    let most = 1.25 * of(0).chain(of(1)).fold(limit * 6.0, f64::max);
-    let shares = Regions::of(summary);
-    let mut layers = shares.layers(least, most, limit);
+    let of = |axis: usize| marks.iter().map(move |mark| generated_in(mark)[axis]);
+    let min = [0, 1].map(|axis| 0.8 * of(axis).fold(limit / 20.0, f64::min));
+    let max = 1.25 * of(0).chain(of(1)).fold(limit * 6.0, f64::max);
+    let fractions = Regions::of(summary);
+    let mut layers = fractions.layers(min, max, limit);
 
     let misleads = |mark: &Mark<'_>| mark.values[0] > mark.values[1];
     let beyond = marks.iter().filter(|mark| misleads(mark)).count();
@@ -160,17 +161,17 @@ fn stanford(run: &Run, summary: &Summary) -> Option<Figure> {
         if !(seen[place] - 1).is_multiple_of([every, every_beyond][place]) {
             continue;
         }
-        points[mark.series].push(drawn_in(mark));
+        points[mark.series].push(generated_in(mark));
         let &Mark { trial, frame, row, .. } = mark;
         let place = (trial.object(row), frame.number, frame.stamp_ns);
-        let told = |field| tell::value(trial, place, field, row.get(field), (Unit::Millimetres, 3)).into();
+        let as_number = |field| phrases::value(trial, place, field, row.get(field), (Unit::Millimetres, 3)).into();
         let mut line: Vec<Cell> = vec![
             names[mark.series].clone().into(),
-            tell::frame(trial, frame.number, frame.stamp_ns).into(),
+            phrases::frame(trial, frame.number, frame.stamp_ns).into(),
             trial.object(row).to_owned().into(),
             mark.region().name().into(),
         ];
-        line.extend([Field::Position, Field::Level, Field::Limit].map(told));
+        line.extend([Field::Position, Field::Level, Field::Limit].map(as_number));
         data.line(false, line);
     }
     layers.extend(points.into_iter().enumerate().map(|(series, points)| Layer::Marks { series, points, radius: 1.3 }));
@@ -179,8 +180,8 @@ fn stanford(run: &Run, summary: &Summary) -> Option<Figure> {
         false => ["error of the position / alert limit", "protection level / alert limit"],
     };
     let panel = Panel {
-        x: Axis::logarithmic(labels[0]).within([least[0], most]),
-        y: Axis::logarithmic(labels[1]).within([least[1], most]),
+        x: Axis::logarithmic(labels[0]).within([min[0], max]),
+        y: Axis::logarithmic(labels[1]).within([min[1], max]),
         layers,
         ..Panel::default()
     };
@@ -191,7 +192,7 @@ fn stanford(run: &Run, summary: &Summary) -> Option<Figure> {
         "Stanford diagram: protection level over error of the camera’s position, with the alert limit {}. ",
         if one { format!("of {} mm", trimmed(limit)) } else { "of each target as the unit".to_owned() }
     )];
-    said.extend(shares.said(run));
+    said.extend(fractions.said(run));
     let thinned = match (every, every_beyond) {
         (1, 1) => "Every fix is a mark. ".to_owned(),
         (_, 1) => format!("A mark is one fix in {every} of those that keep their level, and every one that does not. "),
@@ -211,7 +212,7 @@ struct Regions {
 }
 
 impl Regions {
-    fn of(summary: &Summary) -> Self {
+    fn of(summary: &RunSummary) -> Self {
         let known: Option<Vec<_>> =
             summary.rows.iter().filter(|row| row.attempted > 0).map(|row| row.regions).collect();
         let sum =
@@ -220,14 +221,14 @@ impl Regions {
     }
 
     /// The share of a region among all fixes with a level, in words.
-    fn share(&self, region: Region) -> String {
+    fn fraction(&self, region: Region) -> String {
         let Some(counts) = &self.counts else { return String::new() };
         let all: usize = counts.iter().sum::<usize>() - counts[Region::Unprotected as usize];
-        let share = 100.0 * counts[region as usize] as f64 / all.max(1) as f64;
+        let fraction = 100.0 * counts[region as usize] as f64 / all.max(1) as f64;
         match counts[region as usize] {
             0 => "0 %".to_owned(),
-            _ if share < 0.05 => "< 0.1 %".to_owned(),
-            _ => format!("{share:.1} %"),
+            _ if fraction < 0.05 => "< 0.1 %".to_owned(),
+            _ => format!("{fraction:.1} %"),
         }
     }
 
@@ -254,7 +255,7 @@ impl Regions {
             at,
             end,
             up,
-            lines: [name.to_owned(), self.share(region)].into_iter().filter(|line| !line.is_empty()).collect(),
+            lines: [name.to_owned(), self.fraction(region)].into_iter().filter(|line| !line.is_empty()).collect(),
         };
         layers.extend([
             word([left, high], false, false, "not available", Region::Unavailable),
@@ -270,23 +271,23 @@ impl Regions {
     fn said(&self, run: &Run) -> Text {
         let Some(counts) = &self.counts else { return Text::new() };
         let trials: Vec<&Trial> = run.trials.iter().collect();
-        let told = |region: Region| {
-            let key = tell::over(&trials, "/metrics/evaluation", format!("count {}", region.name()));
+        let as_number = |region: Region| {
+            let key = phrases::over(&trials, "/metrics/evaluation", format!("count {}", region.name()));
             Number::count(counts[region as usize], key)
         };
         text![
             "Of all fixes with a level ",
-            told(Region::Available),
+            as_number(Region::Available),
             " are available, ",
-            told(Region::Misleading),
+            as_number(Region::Misleading),
             " misleading, ",
-            told(Region::Hazardous),
+            as_number(Region::Hazardous),
             " hazardously misleading; the level of ",
-            told(Region::Unavailable),
+            as_number(Region::Unavailable),
             " exceeds the limit, and that of ",
-            told(Region::UnavailableMisleading),
+            as_number(Region::UnavailableMisleading),
             " is beyond the limit and below the error. ",
-            told(Region::Unprotected),
+            as_number(Region::Unprotected),
             " fixes have no level. The shares in the drawing are of the fixes with one. "
         ]
     }

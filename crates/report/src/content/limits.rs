@@ -1,11 +1,12 @@
 //! Errors beside the Cramér–Rao bound, where every fix has one.
 
 use super::{
-    distinct, results,
-    tell::{self, Unit},
+    distinct,
+    phrases::{self, Unit},
+    results,
 };
 use crate::{
-    Field, Number, Row, Summary,
+    Field, Number, Row, RunSummary,
     document::{Block, Cell, Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::{headed, short, unit},
@@ -13,11 +14,11 @@ use crate::{
 };
 
 /// Whether the rows have bounds.
-pub(super) fn known(summary: &Summary) -> bool {
+pub(super) fn known(summary: &RunSummary) -> bool {
     summary.rows.iter().any(|row| row.limits.is_some())
 }
 
-pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
+pub(super) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
     over_noise(run, summary).into_iter().map(Block::Figure).chain([Block::Table(table(run, summary))]).collect()
 }
 
@@ -33,7 +34,7 @@ fn value(row: &Row, key: &str) -> Option<String> {
 }
 
 /// Root mean square m2 over the noise, a panel for each of all other conditions.
-fn over_noise(run: &Run, summary: &Summary) -> Option<Figure> {
+fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let on = |key: &str| distinct(summary.rows.iter().filter_map(|row| value(row, key)));
     let axes = summary.rows.first()?.axes.iter();
     let key = axes.map(|axis| axis.key.clone()).find(|key| unit(key) == Some("px") && on(key).len() > 1)?;
@@ -72,7 +73,7 @@ fn over_noise(run: &Run, summary: &Summary) -> Option<Figure> {
             for ([x, m2], index) in &points {
                 let what = if is_bound { "bound m2_bound of judged" } else { "rms m2_rms of judged" };
                 let number = total(&run.trials[*index], what, m2 / 1e3, Unit::Millimetres, 4);
-                let noise = tell::axis(&run.trials[*index], &key, Some(*x));
+                let noise = phrases::axis(&run.trials[*index], &key, Some(*x));
                 data.line(false, vec![place.clone().into(), method.into(), noise.into(), number.into()]);
             }
             let points: Vec<[f64; 2]> = points.into_iter().map(|(point, _)| point).collect();
@@ -90,7 +91,7 @@ fn over_noise(run: &Run, summary: &Summary) -> Option<Figure> {
             equal: false,
         });
     }
-    share_axes(&mut panels);
+    same_axes(&mut panels);
     let entries = methods.iter().enumerate().map(|(series, name)| Entry::both(name.clone(), series));
     let columns = columns(&places);
     let rows = panels.len().div_ceil(columns);
@@ -128,7 +129,7 @@ fn columns(titles: &[String]) -> usize {
 }
 
 /// The same ends for all panels.
-pub(super) fn share_axes(panels: &mut [Panel]) {
+pub(super) fn same_axes(panels: &mut [Panel]) {
     let values = |which: usize| {
         panels
             .iter()
@@ -147,7 +148,7 @@ pub(super) fn share_axes(panels: &mut [Panel]) {
     }
 }
 
-fn table(run: &Run, summary: &Summary) -> Table {
+fn table(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
         "Root mean squares beside the Cramér–Rao bound, over all n fixes, wrong ones included: m2, the position (m3), their ratio to the bound. NEES: mean of the normalised error squared, 6 for an honest covariance; below 95 %: share of the fixes within the χ² quantile of 95 %."
     ];
@@ -158,7 +159,7 @@ fn table(run: &Run, summary: &Summary) -> Table {
     below.extend((0..2).flat_map(|_| ["RMSE", "bound", "ratio"].map(Head::numbers)));
     below.extend(["NEES", "below 95 %"].map(Head::numbers));
     let limits = |which: fn(&crate::Limits) -> f64| summary.rows.iter().map(move |row| row.limits.map(|l| which(&l)));
-    let digits = [limits(|l| l.m2[1]), limits(|l| l.m3[1])].map(|of| tell::decimals(of, Unit::Millimetres));
+    let digits = [limits(|l| l.m2[1]), limits(|l| l.m3[1])].map(|of| phrases::decimals(of, Unit::Millimetres));
     let mut table = Table { id: "limits".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let Some(limits) = row.limits else { continue };

@@ -20,7 +20,7 @@ pub(super) fn section(run: &Run) -> Section {
             "The source gives no images, so nothing is detected, described or matched: the cloud comes from it as it is"
         }
     };
-    let named = run.trials.iter().all(|trial| trial.method()[0] == "named");
+    let named = run.trials.iter().all(|trial| trial.method()[0] == "labelled");
     let middle = match named {
         true => {
             "; every point says which one it is, so that nothing is searched, and for each target the solver computes the pose "

@@ -14,12 +14,12 @@ mod limits;
 mod method;
 mod navigation;
 mod objects;
+mod phrases;
 mod protocol;
 mod reach;
 mod reproduce;
 mod results;
 mod significance;
-mod tell;
 mod threats;
 mod time;
 
@@ -30,7 +30,7 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use crate::{
-    ReportError, Summary,
+    ReportError, RunSummary,
     document::{Document, Section},
     paired::{self, Comparison},
     run::Run,
@@ -38,7 +38,7 @@ use crate::{
 
 /// The report on a run; a `small` one has few and small pictures, and nothing that a later version would say otherwise of
 /// the same results.
-pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Document, ReportError> {
+pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<Document, ReportError> {
     let header = run.header();
     let title = if header.title.is_empty() { &header.run } else { &header.title };
     let (comparisons, failures) = rayon::join(|| paired::comparisons(run, summary), || failures::section(run, small));
@@ -76,7 +76,7 @@ pub(crate) fn document(run: &Run, summary: &Summary, small: bool) -> Result<Docu
 }
 
 /// The answer in numbers alone.
-pub(crate) fn findings(run: &Run, summary: &Summary) -> Vec<crate::document::Text> {
+pub(crate) fn findings(run: &Run, summary: &RunSummary) -> Vec<crate::document::Text> {
     abstract_::section(run, summary, &paired::comparisons(run, summary))
 }
 

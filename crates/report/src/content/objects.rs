@@ -2,31 +2,31 @@
 
 use std::collections::BTreeSet;
 
-use super::{results, tell::Unit};
+use super::{phrases::Unit, results};
 use crate::{
-    Field, Key, Number, Summary,
+    Field, Key, Number, RunSummary,
     document::{Block, Head, Section, Table, Text, text},
-    run::{Attempt, Run, Trial},
+    run::{AttemptRow, Run, Trial},
 };
 
 /// The topic that counts stand on.
 const TOPIC: &str = "/metrics/evaluation";
 
 /// An outcome that is counted.
-type Group = (&'static str, fn(&Attempt) -> bool);
+type Group = (&'static str, fn(&AttemptRow) -> bool);
 
 const GROUPS: [Group; 4] = [
     ("attempted", |_| true),
-    ("found", Attempt::found),
+    ("found", AttemptRow::found),
     ("refused", |row| !row.found() && !row.wrong()),
-    ("wrong", Attempt::wrong),
+    ("wrong", AttemptRow::wrong),
 ];
 
 /// The errors that are told, and what they are called in a head.
 const ERRORS: [(&str, Field); 2] = [("m2 (mm)", Field::M2), ("m3 (mm)", Field::Position)];
 
 /// The section, where any trial looked for several objects and logged all its frames.
-pub(super) fn section(run: &Run, summary: &Summary) -> Option<Section> {
+pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     if !run.trials.iter().any(|trial| objects(trial).len() > 1) {
         return None;
     }
@@ -91,7 +91,7 @@ pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
         said.push(format!("{}{}: ", if index > 0 { "; " } else { "" }, name(index)).into());
         for (place, size) in sizes(trial).into_iter().enumerate() {
             let own = || trial.sample().filter(|frame| trial.attempts_of(frame).count() == size);
-            let fixed = own().filter(|frame| trial.attempts_of(frame).any(Attempt::found)).count();
+            let fixed = own().filter(|frame| trial.attempts_of(frame).any(AttemptRow::found)).count();
             let key = |which: &str| Key::of(trial, TOPIC, format!("count {which} with {size} targets"));
             let (fixed, all) = (Number::count(fixed, key("fixed-frames")), Number::count(own().count(), key("frames")));
             said.extend(text![if place > 0 { ", " } else { "" }, fixed, " of ", all, format!(" with {size}")]);
@@ -113,7 +113,7 @@ fn objects(trial: &Trial) -> Vec<String> {
     names
 }
 
-fn own<'a>(trial: &'a Trial, object: &'a str) -> impl Iterator<Item = &'a Attempt> {
+fn own<'a>(trial: &'a Trial, object: &'a str) -> impl Iterator<Item = &'a AttemptRow> {
     trial.attempts().map(|(_, row)| row).filter(move |row| trial.object(row) == object)
 }
 
@@ -124,8 +124,8 @@ fn count(trial: &Trial, object: &str, (name, is): Group) -> Number {
 
 fn error(trial: &Trial, object: &str, name: &str, field: Field) -> Number {
     let mut values: Vec<f64> = own(trial, object).filter(|row| row.found()).filter_map(|row| row.get(field)).collect();
-    let share = if name == "median" { 0.5 } else { 0.95 };
-    let value = (!values.is_empty()).then(|| seafix_evaluation::quantile(&mut values, share));
+    let fraction = if name == "median" { 0.5 } else { 0.95 };
+    let value = (!values.is_empty()).then(|| seafix_evaluation::quantile(&mut values, fraction));
     let what = format!("{name} {} of found on the object {object} in mm", field.name());
     Number::new(value.map(|value| value * Unit::Millimetres.scale()), 1, Key::of(trial, field.topic(), what))
 }

@@ -5,13 +5,13 @@ use crate::{
     document::{Block, Section, italic, text},
     format::harder,
     paired::{ALPHA, Comparison, SEED},
+    proportion,
     run::Run,
-    share,
 };
 
 /// How sure a trial's rates are, and by what.
 fn intervals(run: &Run) -> String {
-    if !run.trials.iter().any(|trial| share::is_trajectory(&trial.header)) {
+    if !run.trials.iter().any(|trial| proportion::is_trajectory(&trial.header)) {
         return "Every frame is a draw by itself: the rates of a trial, and recall, carry exact (Clopper–Pearson) 95 % intervals.".to_owned();
     }
     let mut said = "Frames follow each other on one way, and neighbours are not independent: the 95 % intervals of a trial’s rates, and the bands of recall, are those of Clopper and Pearson for the effective number of attempts (Korn and Graubard, 1998): n over the design effect, by which sums of blocks of consecutive attempts, the cube root of n long, vary more than of independent ones, a standard error added. Where all attempts are alike (0 % or 100 %) every block is one trial. A band is widened where it would fall.".to_owned();
@@ -106,7 +106,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             ],
         ));
     }
-    let sails = |trial: &crate::run::Trial| trial.sample().any(|frame| frame.sailed.is_some());
+    let sails = |trial: &crate::run::Trial| trial.sample().any(|frame| frame.navigated.is_some());
     if run.trials.iter().any(sails) {
         terms.push((
             text![italic("amplitude, drift")],

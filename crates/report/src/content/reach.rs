@@ -3,28 +3,28 @@
 use seafix_evaluation::recall_area;
 
 use super::{
+    phrases::{self, Unit},
     results,
-    tell::{self, Unit},
 };
 use crate::{
-    Field, Key, Number, Spread, Summary,
+    Distribution, Field, Key, Number, RunSummary,
     document::{Block, Cell, Head, Table, Text, text},
     lever::ARMS,
-    run::{Attempt, Run, Trial},
+    run::{AttemptRow, Run, Trial},
 };
 
 /// Up to where recall is summed up: the error, the bound as it is printed, its unit.
 const AREAS: [(Field, f64, Unit); 2] = [(Field::M2, 50.0, Unit::Millimetres), (Field::Attitude, 5.0, Unit::Degrees)];
 
 /// The table; nothing where no truth tells an error.
-pub(super) fn table(run: &Run, summary: &Summary) -> Option<Block> {
+pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
     if !run.trials.iter().any(|trial| AREAS.iter().any(|area| found(trial).any(|row| row.get(area.0).is_some()))) {
         return None;
     }
-    let arms: Vec<[Option<Spread>; 3]> = run
+    let arms: Vec<[Option<Distribution>; 3]> = run
         .trials
         .iter()
-        .map(|trial| ARMS.map(|arm| Spread::of(found(trial).filter_map(|row| row.at_arm(arm)))))
+        .map(|trial| ARMS.map(|arm| Distribution::of(found(trial).filter_map(|row| row.at_arm(arm)))))
         .collect();
     let known = arms.iter().flatten().any(Option::is_some);
     let mut above = results::blank(summary, 1);
@@ -38,7 +38,7 @@ pub(super) fn table(run: &Run, summary: &Summary) -> Option<Block> {
         below.extend(ARMS.iter().flat_map(|_| ["median", "p95"].map(Head::numbers)));
     }
     let digits: Vec<usize> = (0..ARMS.len())
-        .map(|place| tell::decimals(arms.iter().map(|of| of[place].map(|s| s.median)), Unit::Millimetres))
+        .map(|place| phrases::decimals(arms.iter().map(|of| of[place].map(|s| s.median)), Unit::Millimetres))
         .collect();
     let mut table =
         Table { id: "reach".to_owned(), caption: caption(run, known), heads: vec![above, below], lines: Vec::new() };
@@ -48,17 +48,17 @@ pub(super) fn table(run: &Run, summary: &Summary) -> Option<Block> {
         line.push(Number::count(attempts, Key::of(trial, "/metrics/evaluation", "count logged")).into());
         line.extend(AREAS.map(|(field, bound, unit)| Cell::from(area(trial, field, bound, unit))));
         if known {
-            let told = |arm: f64, name: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
+            let as_number = |arm: f64, name: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
                 let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
                 let key = Key::of(trial, "/referencing/result", format!("{name} arm_{arm} of found{suffix}"));
                 Number::new(value.map(|value| value * unit.scale()), decimals, key)
             };
             let count = spreads[0].map_or(0, |spread| spread.count) as f64;
-            line.push(told(ARMS[0], "sampled", Some(count), (Unit::Plain, 0)).into());
+            line.push(as_number(ARMS[0], "sampled", Some(count), (Unit::Plain, 0)).into());
             for ((arm, spread), &digits) in ARMS.into_iter().zip(spreads).zip(&digits) {
                 let unit = (Unit::Millimetres, digits);
-                line.push(told(arm, "median", spread.map(|s| s.median), unit).into());
-                line.push(Cell::minor(told(arm, "q95", spread.map(|s| s.p95), unit)));
+                line.push(as_number(arm, "median", spread.map(|s| s.median), unit).into());
+                line.push(Cell::minor(as_number(arm, "q95", spread.map(|s| s.p95), unit)));
             }
         }
         table.line(results::breaks(summary, index), line);
@@ -79,7 +79,7 @@ fn caption(run: &Run, known: bool) -> Text {
     caption
 }
 
-fn found(trial: &Trial) -> impl Iterator<Item = &Attempt> {
+fn found(trial: &Trial) -> impl Iterator<Item = &AttemptRow> {
     trial.attempts().map(|(_, row)| row).filter(|row| row.found())
 }
 

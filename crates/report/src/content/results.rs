@@ -1,31 +1,32 @@
 //! The tables of results.
 
 use super::{
-    best, breakdown, figures, limits, reach,
-    tell::{self, Unit},
+    best, breakdown, figures, limits,
+    phrases::{self, Unit},
+    reach,
 };
 use crate::{
-    Field, PAPER_M1, Row, Spread, Summary,
+    Distribution, Field, PAPER_M1, Row, RunSummary,
     document::{Block, Cell, Head, Section, Span, Table, italic, text},
     format::{headed, number},
     paired::Comparison,
     run::Run,
 };
 
-pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Section {
+pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Section {
     let mut section = Section::new("Results");
     section.add(Block::Table(outcomes(run, summary)));
     section.add(Block::Table(errors(run, summary, comparisons)));
     if limits::known(summary) {
         section.blocks.extend(limits::blocks(run, summary));
     }
-    let mut drawn = figures::blocks(run, summary);
+    let mut plotted = figures::blocks(run, summary);
     // The areas stand beside their curves.
-    let recall = drawn.iter().position(|block| matches!(block, Block::Figure(figure) if figure.id == "recall"));
-    let place = recall.map_or(drawn.len(), |place| place + 1);
-    drawn.splice(place..place, reach::table(run, summary));
+    let recall = plotted.iter().position(|block| matches!(block, Block::Figure(figure) if figure.id == "recall"));
+    let place = recall.map_or(plotted.len(), |place| place + 1);
+    plotted.splice(place..place, reach::table(run, summary));
     section.blocks.extend(breakdown::block(run, summary));
-    section.blocks.extend(drawn);
+    section.blocks.extend(plotted);
     match refusals(run, summary) {
         Some(table) => section.add(Block::Table(table)),
         None => section.say(text!["No attempt was refused."]),
@@ -34,7 +35,7 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
 }
 
 /// Heads of the columns that say which trial a row is.
-pub(super) fn heads(summary: &Summary) -> Vec<Head> {
+pub(super) fn heads(summary: &RunSummary) -> Vec<Head> {
     let conditions = summary.rows.first().into_iter().flat_map(Row::conditions);
     let numeric = |key: &str| {
         summary
@@ -57,17 +58,17 @@ pub(super) fn cells(row: &Row) -> Vec<Cell> {
 }
 
 /// Whether a thin line goes above row `index`: where the first condition changes.
-pub(super) fn breaks(summary: &Summary, index: usize) -> bool {
+pub(super) fn breaks(summary: &RunSummary, index: usize) -> bool {
     let first = |index: usize| summary.rows[index].conditions().next().map(|axis| &axis.value);
     index > 0 && first(index) != first(index - 1)
 }
 
 /// Empty heads above the columns that say which trial a row is.
-pub(super) fn blank(summary: &Summary, more: usize) -> Vec<Head> {
+pub(super) fn blank(summary: &RunSummary, more: usize) -> Vec<Head> {
     vec![Head::words(""); heads(summary).len() + more]
 }
 
-fn outcomes(run: &Run, summary: &Summary) -> Table {
+fn outcomes(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
         "Outcomes. n: targets attempted, one a frame and target in view of the prior; rates in % of n with 95 % intervals. Frames: with at least one fix, and with a wrong one, of all frames. Points: median number identified."
     ];
@@ -81,17 +82,17 @@ fn outcomes(run: &Run, summary: &Summary) -> Table {
     let mut table = Table { id: "outcomes".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut line = cells(row);
-        line.push(tell::count(trial, "attempted", row.attempted).into());
+        line.push(phrases::count(trial, "attempted", row.attempted).into());
         for (group, k) in [("found", row.found), ("refused", row.refused), ("wrong", row.wrong)] {
-            let [low, high] = tell::interval(trial, group, k, row.attempted);
-            line.push(tell::percent(trial, group, k, row.attempted).into());
+            let [low, high] = phrases::interval(trial, group, k, row.attempted);
+            line.push(phrases::percent(trial, group, k, row.attempted).into());
             line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
         }
-        line.push(tell::count(trial, "fixed-frames", row.referenced_frames).into());
-        line.push(tell::count(trial, "wrong-frames", row.wrong_frames).into());
-        line.push(tell::count(trial, "frames", row.frames).into());
+        line.push(phrases::count(trial, "fixed-frames", row.referenced_frames).into());
+        line.push(phrases::count(trial, "wrong-frames", row.wrong_frames).into());
+        line.push(phrases::count(trial, "frames", row.frames).into());
         let points = row.identified.map(|spread| spread.median);
-        line.push(tell::statistic(trial, "median", Field::Identified, "found", points, (Unit::Plain, 0)).into());
+        line.push(phrases::statistic(trial, "median", Field::Identified, "found", points, (Unit::Plain, 0)).into());
         table.line(breaks(summary, index), line);
     }
     table
@@ -102,7 +103,7 @@ struct Column {
     name: &'static str,
     field: Field,
     unit: Unit,
-    value: fn(&Row) -> Option<Spread>,
+    value: fn(&Row) -> Option<Distribution>,
 }
 
 const COLUMNS: [Column; 5] = [
@@ -113,7 +114,7 @@ const COLUMNS: [Column; 5] = [
     Column { name: "m3 (°)", field: Field::Attitude, unit: Unit::Degrees, value: |row| row.m3_attitude },
 ];
 
-fn errors(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Table {
+fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table {
     let any_best = (0..summary.rows.len()).any(|index| best(comparisons, index));
     let mut caption = text![
         "Errors of the fixes found: median and 95 % quantile over n fixes. m3: position of the camera, and its attitude; unused: m1 without the points the solver used. ",
@@ -137,26 +138,26 @@ fn errors(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Table {
     below.extend(COLUMNS.iter().flat_map(|_| ["median", "p95"].map(Head::numbers)));
     below.extend([Head::numbers("m2 all (mm)"), Head::numbers("NEES mean")]);
     let digits = COLUMNS.each_ref().map(|column| {
-        tell::decimals(summary.rows.iter().map(|row| (column.value)(row).map(|s| s.median)), column.unit)
+        phrases::decimals(summary.rows.iter().map(|row| (column.value)(row).map(|s| s.median)), column.unit)
     });
-    let all_digits = tell::decimals(summary.rows.iter().map(|row| row.m2_of_all), Unit::Millimetres);
+    let all_digits = phrases::decimals(summary.rows.iter().map(|row| row.m2_of_all), Unit::Millimetres);
     let mut table = Table { id: "errors".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut line = cells(row);
-        line.push(tell::count(trial, "found", row.found).into());
+        line.push(phrases::count(trial, "found", row.found).into());
         for (column, &digits) in COLUMNS.iter().zip(&digits) {
             let spread = (column.value)(row);
-            let told = |name: &str, value: Option<f64>| {
-                tell::statistic(trial, name, column.field, "found", value, (column.unit, digits))
+            let as_number = |name: &str, value: Option<f64>| {
+                phrases::statistic(trial, name, column.field, "found", value, (column.unit, digits))
             };
-            let median = told("median", spread.map(|s| s.median));
+            let median = as_number("median", spread.map(|s| s.median));
             let marked = column.field == Field::M2 && best(comparisons, index);
             line.push(if marked { Span::Best(median).into() } else { median.into() });
-            line.push(Cell::minor(told("q95", spread.map(|s| s.p95))));
+            line.push(Cell::minor(as_number("q95", spread.map(|s| s.p95))));
         }
         let unit = (Unit::Millimetres, all_digits);
-        line.push(tell::statistic(trial, "all", Field::M2, "attempted", row.m2_of_all, unit).into());
-        line.push(tell::statistic(trial, "mean", Field::Nees, "found", row.nees_mean, (Unit::Plain, 2)).into());
+        line.push(phrases::statistic(trial, "all", Field::M2, "attempted", row.m2_of_all, unit).into());
+        line.push(phrases::statistic(trial, "mean", Field::Nees, "found", row.nees_mean, (Unit::Plain, 2)).into());
         table.line(breaks(summary, index), line);
     }
     let [low, high] = PAPER_M1.map(|m| number(Some(m * 1e3), 0));
@@ -169,7 +170,7 @@ fn errors(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Table {
     table
 }
 
-fn refusals(run: &Run, summary: &Summary) -> Option<Table> {
+fn refusals(run: &Run, summary: &RunSummary) -> Option<Table> {
     let mut reasons: Vec<String> = summary.rows.iter().flat_map(|row| row.reasons.keys().cloned()).collect();
     reasons.sort();
     reasons.dedup();
@@ -183,12 +184,12 @@ fn refusals(run: &Run, summary: &Summary) -> Option<Table> {
     let mut table = Table::new("refusals", text!["Refused attempts by reason, out of n."], below);
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut line = cells(row);
-        line.push(tell::count(trial, "attempted", row.attempted).into());
+        line.push(phrases::count(trial, "attempted", row.attempted).into());
         for reason in &reasons {
             let n = row.reasons.get(reason).copied().unwrap_or(0);
-            line.push(tell::count(trial, &format!("refused:{reason}"), n).into());
+            line.push(phrases::count(trial, &format!("refused:{reason}"), n).into());
         }
-        line.push(tell::count(trial, "refused", row.refused).into());
+        line.push(phrases::count(trial, "refused", row.refused).into());
         table.line(breaks(summary, index), line);
     }
     Some(table)

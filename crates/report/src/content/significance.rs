@@ -67,35 +67,36 @@ fn with_the_first_alone(comparisons: &[Comparison]) -> bool {
 }
 
 /// The surest differences in words, at most so many; that there is none, where some were tested.
-pub(super) fn sentences(run: &Run, comparisons: &[Comparison], most: usize) -> Vec<Text> {
+pub(super) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Vec<Text> {
     let mut sure: Vec<&Comparison> = comparisons.iter().filter(|c| c.better().is_some()).collect();
     sure.sort_by(|a, b| a.holm.total_cmp(&b.holm));
     if sure.is_empty() && !comparisons.is_empty() {
         let what = if comparisons[0].between_conditions { "Frame by frame" } else { "On the same attempts" };
         return vec![text![format!("{what} no difference of m2 is significant.")]];
     }
-    let told = |comparison: &Comparison| match comparison.difference.is_finite() && comparison.interval.0.is_finite() {
-        true if comparison.interval.1.is_finite() => sentence(run, comparison),
-        _ => sentence_of_failures(run, comparisons, comparison),
-    };
-    sure.into_iter().take(most).map(told).collect()
+    let as_number =
+        |comparison: &Comparison| match comparison.difference.is_finite() && comparison.interval.0.is_finite() {
+            true if comparison.interval.1.is_finite() => sentence(run, comparison),
+            _ => sentence_of_failures(run, comparisons, comparison),
+        };
+    sure.into_iter().take(max).map(as_number).collect()
 }
 
 /// The same where the one fails so often that the difference, or an end of its interval, is infinite.
 fn sentence_of_failures(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> Text {
     let [first, second] = &comparison.names;
     let (better, worse) = if comparison.better() == Some(comparison.first) { (first, second) } else { (second, first) };
-    let told = |what: &str, n: usize| Number::new(Some(n as f64), 0, key(run, comparison, what));
+    let as_number = |what: &str, n: usize| Number::new(Some(n as f64), 0, key(run, comparison, what));
     let [own, other] = comparison.alone;
     text![
         format!("{}, {better} errs less than {worse} (p ", begin(comparison)),
         holm(run, comparisons, comparison),
         format!(" after Holm), or fails less: {first} alone finds "),
-        told("alone-first", own),
+        as_number("alone-first", own),
         format!(" and {second} alone "),
-        told("alone-second", other),
+        as_number("alone-second", other),
         " of ",
-        told("pairs", comparison.n),
+        as_number("pairs", comparison.n),
         "."
     ]
 }
@@ -112,18 +113,18 @@ fn begin(comparison: &Comparison) -> String {
 fn sentence(run: &Run, comparison: &Comparison) -> Text {
     let over = comparison.over_conditions;
     let real = |value: f64| if over { value.exp() } else { value * 1e3 };
-    let told =
+    let as_number =
         |what: &str, value: f64| Number::new(Some(real(value)), if over { 3 } else { 2 }, key(run, comparison, what));
     let [first, second] = &comparison.names;
     let begin = begin(comparison);
     let what = if over { "the median ratio of m2" } else { "the median difference of m2" };
     text![
         format!("{begin}, {what} of {first} and {second} is "),
-        told("difference", comparison.difference),
+        as_number("difference", comparison.difference),
         if over { " [" } else { " mm [" },
-        told("difference-low", comparison.interval.0),
+        as_number("difference-low", comparison.interval.0),
         ", ",
-        told("difference-high", comparison.interval.1),
+        as_number("difference-high", comparison.interval.1),
         if over { "], 95 % bootstrap over conditions." } else { "], 95 % bootstrap over blocks of frames." }
     ]
 }
@@ -132,7 +133,7 @@ fn sentence(run: &Run, comparison: &Comparison) -> Text {
 fn key(run: &Run, comparison: &Comparison, what: &str) -> Key {
     let trials: Vec<&Trial> = comparison.logs.iter().map(|&index| &run.trials[index]).collect();
     let over = if comparison.over_conditions { " over conditions" } else { " over attempts" };
-    super::tell::over(&trials, "/metrics/evaluation", format!("{what} m2_rms{over}"))
+    super::phrases::over(&trials, "/metrics/evaluation", format!("{what} m2_rms{over}"))
 }
 
 fn table(run: &Run, comparisons: &[Comparison]) -> Table {
@@ -162,11 +163,12 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
     let mut table = Table::new("comparisons", caption, heads);
     let mut before = None;
     for comparison in comparisons {
-        let told = |what: &str, value: f64, decimals| Number::new(Some(value), decimals, key(run, comparison, what));
+        let as_number =
+            |what: &str, value: f64, decimals| Number::new(Some(value), decimals, key(run, comparison, what));
         let real = |value: f64| if over { value.exp() } else { value * scale };
-        let difference = told("difference", real(comparison.difference), digits);
+        let difference = as_number("difference", real(comparison.difference), digits);
         let (low, high) = comparison.interval;
-        let ends = [told("difference-low", real(low), digits), told("difference-high", real(high), digits)];
+        let ends = [as_number("difference-low", real(low), digits), as_number("difference-high", real(high), digits)];
         let [low, high] = ends;
         let first = before != Some(&comparison.condition);
         let mut line: Vec<Cell> = Vec::new();
@@ -174,21 +176,21 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
             line.push(if first { comparison.condition.clone() } else { String::new() }.into());
         }
         line.extend([comparison.names[0].clone().into(), comparison.names[1].clone().into()]);
-        line.push(told("pairs", comparison.n as f64, 0).into());
+        line.push(as_number("pairs", comparison.n as f64, 0).into());
         line.push(if comparison.better().is_some() { Span::Best(difference).into() } else { difference.into() });
         line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
-        line.push(told("effect", comparison.effect, 2).into());
+        line.push(as_number("effect", comparison.effect, 2).into());
         line.push(holm(run, comparisons, comparison).into());
         if !over {
             let alone = [("alone-first", comparison.alone[0]), ("alone-second", comparison.alone[1])];
-            let [a, b] = alone.map(|(what, n)| told(what, n as f64, 0));
+            let [a, b] = alone.map(|(what, n)| as_number(what, n as f64, 0));
             line.push(Cell { text: text![a, "/", b], ..Cell::default() });
             line.push(Number::probability(comparison.mcnemar, key(run, comparison, "mcnemar")).into());
         }
         line.push(match comparison.margin.zip(comparison.equivalent()) {
             None => "".into(),
             Some((margin, shown)) => {
-                let margin = told("margin", real(margin), if over { 3 } else { digits.max(2) });
+                let margin = as_number("margin", real(margin), if over { 3 } else { digits.max(2) });
                 Cell { text: text![if shown { "yes, " } else { "not shown, " }, margin], ..Cell::default() }
             }
         });
@@ -205,7 +207,7 @@ fn holm(run: &Run, comparisons: &[Comparison], own: &Comparison) -> Number {
     let trials: Vec<&Trial> = family.iter().map(|&index| &run.trials[index]).collect();
     let over = if own.over_conditions { "conditions" } else { "attempts" };
     let what = format!("holm m2_rms over {over} in families of {}", own.logs.len());
-    Number::probability(own.holm, super::tell::over(&trials, "/metrics/evaluation", what))
+    Number::probability(own.holm, super::phrases::over(&trials, "/metrics/evaluation", what))
 }
 
 /// The intervals side by side.
@@ -252,16 +254,16 @@ fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
     let heads = [Head::words("comparison"), Head::numbers("difference"), Head::numbers("low"), Head::numbers("high")];
     let mut data = Table::new("forest", text!["Every interval of the figure of comparisons."], heads.to_vec());
     for comparison in comparisons {
-        let told = |what: &str, value: f64| Number::new(Some(real(value)), 4, key(run, comparison, what)).into();
+        let as_number = |what: &str, value: f64| Number::new(Some(real(value)), 4, key(run, comparison, what)).into();
         let name = name(comparison);
         let (low, high) = comparison.interval;
         data.line(
             false,
             vec![
                 name.into(),
-                told("difference", comparison.difference),
-                told("difference-low", low),
-                told("difference-high", high),
+                as_number("difference", comparison.difference),
+                as_number("difference-low", low),
+                as_number("difference-high", high),
             ],
         );
     }

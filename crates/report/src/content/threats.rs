@@ -1,14 +1,14 @@
 //! What the numbers do not show; each point stands only where the logs give cause for it.
 
 use crate::{
-    Summary,
+    RunSummary,
     document::{Block, Section, Text, text},
     paired::Comparison,
+    proportion,
     run::Run,
-    share,
 };
 
-pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) -> Section {
+pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Section {
     let mut items: Vec<Text> = Vec::new();
     let headers = || run.trials.iter().map(|trial| &trial.header);
     let truth = run.trials.iter().any(|trial| trial.frames.iter().any(|frame| frame.truth.is_some()));
@@ -29,13 +29,13 @@ pub(super) fn section(run: &Run, summary: &Summary, comparisons: &[Comparison]) 
     if headers().any(|header| header.prior_position_sigma.is_some()) {
         items.push(text!["Internal: rough poses are drawn with the spread that the method is told. A vehicle whose navigation is worse than it says would be refused more often, or search where nothing is."]);
     }
-    let least = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
-    if least < 300 {
-        let trajectory = headers().any(share::is_trajectory);
-        let bound = 100.0 * share::interval_of_counts(trajectory, 0, least).1;
+    let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
+    if min < 300 {
+        let trajectory = headers().any(proportion::is_trajectory);
+        let bound = 100.0 * proportion::interval_of_counts(trajectory, 0, min).1;
         items.push(text![format!(
-            "Statistical: the smallest trial has {least} attempt{}. Where it shows no wrong fix, the rate may still be {bound:.1} % (the upper end of its 95 % interval).",
-            if least == 1 { "" } else { "s" }
+            "Statistical: the smallest trial has {min} attempt{}. Where it shows no wrong fix, the rate may still be {bound:.1} % (the upper end of its 95 % interval).",
+            if min == 1 { "" } else { "s" }
         )]);
     }
     if let Some(trial) = run.trials.iter().find(|trial| trial.every() > 1) {

@@ -1,16 +1,17 @@
 //! What it costs: time a stage, and the search over the size of its problem.
 
 use super::{
-    figures, results,
-    tell::{self, Unit},
+    figures,
+    phrases::{self, Unit},
+    results,
 };
 use crate::{
-    Key, Number, Summary,
+    Key, Number, RunSummary,
     document::{Block, Cell, Head, Section, Table, text},
     run::Run,
 };
 
-pub(super) fn section(run: &Run, summary: &Summary) -> Section {
+pub(super) fn section(run: &Run, summary: &RunSummary) -> Section {
     let caption = text![
         "Time (ms), medians: of the first seven stages a frame, of the others an attempted target; total is from the images, or the points where there are none, to the answer about one target; p95 is its 95 % quantile. Wall clock: it differs from run to run and from machine to machine."
     ];
@@ -47,8 +48,9 @@ pub(super) fn section(run: &Run, summary: &Summary) -> Section {
             let decimals = if time.is_some_and(|t| t < 1.0) { 3 } else { 1 };
             line.push(Number::new(time, decimals, Key::of(trial, "/metrics/timing", what)).into());
         }
-        let most = tell::statistic(trial, "q95", crate::Field::TotalTime, "attempted", row.total_p95, (Unit::Plain, 1));
-        line.push(Cell::minor(most));
+        let max =
+            phrases::statistic(trial, "q95", crate::Field::TotalTime, "attempted", row.total_p95, (Unit::Plain, 1));
+        line.push(Cell::minor(max));
         table.line(results::breaks(summary, index), line);
     }
     let mut section = Section::new("Run time");

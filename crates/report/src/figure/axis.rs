@@ -80,8 +80,8 @@ impl Scale {
     /// Where `value` is on the sheet; what lies beyond the ends stands on them.
     pub(crate) fn at(&self, value: f64) -> f64 {
         let value = if self.axis.logarithmic { if value > 0.0 { value.log10() } else { self.ends[0] } } else { value };
-        let share = ((value - self.ends[0]) / (self.ends[1] - self.ends[0])).clamp(0.0, 1.0);
-        self.place[0] + share * (self.place[1] - self.place[0])
+        let fraction = ((value - self.ends[0]) / (self.ends[1] - self.ends[0])).clamp(0.0, 1.0);
+        self.place[0] + fraction * (self.place[1] - self.place[0])
     }
 
     /// Where it begins and ends on the sheet.
@@ -97,7 +97,7 @@ impl Scale {
 
     /// The ticks in view.
     pub(crate) fn ticks(&self) -> Vec<f64> {
-        let most = (self.place[1] - self.place[0]).abs() / 32.0;
+        let max = (self.place[1] - self.place[0]).abs() / 32.0;
         let ticks = if !self.axis.names.is_empty() {
             (0..self.axis.names.len()).map(|i| i as f64).collect()
         } else if !self.axis.ticks.is_empty() {
@@ -106,9 +106,9 @@ impl Scale {
             let decades = decades(self.ends);
             // So narrow a view has no decades to speak of: it is read as a linear one.
             let few = decades.iter().filter(|tick| self.holds(**tick)).count() < 2;
-            if few { steps(self.ends.map(|end| 10_f64.powf(end)), most) } else { decades }
+            if few { steps(self.ends.map(|end| 10_f64.powf(end)), max) } else { decades }
         } else {
-            steps(self.ends, most)
+            steps(self.ends, max)
         };
         ticks.into_iter().filter(|tick| self.holds(*tick)).collect()
     }
@@ -137,9 +137,9 @@ fn decades([low, high]: [f64; 2]) -> Vec<f64> {
         .collect()
 }
 
-/// Round steps of 1, 2 or 5, at most `most` of them.
-fn steps([low, high]: [f64; 2], most: f64) -> Vec<f64> {
-    let wanted = (high - low) / most.max(2.0);
+/// Round steps of 1, 2 or 5, at most `max` of them.
+fn steps([low, high]: [f64; 2], max: f64) -> Vec<f64> {
+    let wanted = (high - low) / max.max(2.0);
     let power = 10_f64.powi(wanted.log10().floor() as i32);
     let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * power).into_iter().find(|s| *s >= wanted).unwrap_or(wanted);
     let first = (low / step).ceil() as i64;

@@ -202,7 +202,7 @@ impl Panel {
     /// How the labels of the horizontal axis stand so that none touches another: names wrapped to the room that each has, or
     /// upright where a word is too long for that; numbers in levels.
     fn below(&self, ends: [f64; 2], width: f64) -> Below {
-        const MOST: usize = 6;
+        const MAX: usize = 6;
         let scale = Scale::new(self.x.clone(), ends, [0.0, width]);
         let ticks = scale.ticks();
         if !self.x.names.is_empty() {
@@ -215,7 +215,7 @@ impl Panel {
         let half = |tick: f64| width_of(&scale.label(tick), FONT) / 2.0;
         let apart = |a: f64, b: f64| scale.at(b) - scale.at(a) >= half(a) + half(b) + 3.0;
         let free = |levels: usize| ticks.iter().zip(ticks.iter().skip(levels)).all(|(&a, &b)| apart(a, b));
-        Below::Levels((1..MOST).find(|&levels| free(levels)).unwrap_or(MOST))
+        Below::Levels((1..MAX).find(|&levels| free(levels)).unwrap_or(MAX))
     }
 }
 
@@ -235,8 +235,8 @@ impl Below {
         match self {
             Self::Levels(levels) => *levels as f64,
             Self::Wrapped(names) => {
-                let most = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
-                1.0 + LEADING * (most - 1) as f64
+                let max = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
+                1.0 + LEADING * (max - 1) as f64
             }
             Self::Upright(length) => length / FONT + 0.2,
         }
@@ -260,11 +260,11 @@ fn wrapped(name: &str, room: f64) -> Vec<String> {
 
 /// Widens the shorter of both ranges until a metre is as long in both directions.
 fn equalise(x: &mut [f64; 2], y: &mut [f64; 2], aspect: f64) {
-    let widen = |ends: &mut [f64; 2], to: f64| {
+    let extend = |ends: &mut [f64; 2], to: f64| {
         let more = (to - (ends[1] - ends[0])).max(0.0) / 2.0;
         *ends = [ends[0] - more, ends[1] + more];
     };
     let (width, height) = (x[1] - x[0], y[1] - y[0]);
-    widen(x, height * aspect);
-    widen(y, width / aspect);
+    extend(x, height * aspect);
+    extend(y, width / aspect);
 }

@@ -93,15 +93,15 @@ impl Ink {
             Self::Band => [236, 231, 217],
             Self::Series(index) => PALETTE[index % PALETTE.len()],
             Self::Light(index) => mix([255; 3], PALETTE[index % PALETTE.len()], 0.22),
-            Self::Heat(share) => mix([246, 246, 240], PALETTE[0], share.clamp(0.0, 1.0)),
+            Self::Heat(fraction) => mix([246, 246, 240], PALETTE[0], fraction.clamp(0.0, 1.0)),
             Self::Paper | Self::OnDark => [255; 3],
             Self::OnPale => [34, 34, 34],
         }
     }
 }
 
-pub(crate) fn mix(from: [u8; 3], to: [u8; 3], share: f64) -> [u8; 3] {
-    std::array::from_fn(|i| (f64::from(from[i]) * (1.0 - share) + f64::from(to[i]) * share).round() as u8)
+pub(crate) fn mix(from: [u8; 3], to: [u8; 3], fraction: f64) -> [u8; 3] {
+    std::array::from_fn(|i| (f64::from(from[i]) * (1.0 - fraction) + f64::from(to[i]) * fraction).round() as u8)
 }
 
 impl Stroke {

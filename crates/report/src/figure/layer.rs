@@ -133,10 +133,10 @@ impl Layer {
                 }
             }
             Self::Heat { values } => {
-                for ([a, b, share], words) in values {
+                for ([a, b, fraction], words) in values {
                     let ([left, top], [right, bottom]) = (place([a - 0.5, b + 0.5]), place([a + 0.5, b - 0.5]));
-                    drawing.rectangle([left, top], [right - left, bottom - top], Some(Ink::Heat(*share)), None);
-                    let ink = if *share > DARK { Ink::OnDark } else { Ink::OnPale };
+                    drawing.rectangle([left, top], [right - left, bottom - top], Some(Ink::Heat(*fraction)), None);
+                    let ink = if *fraction > DARK { Ink::OnDark } else { Ink::OnPale };
                     let [u, v] = place([*a, *b]);
                     drawing.shapes.push(Shape::Words {
                         at: [u, v + 2.6],

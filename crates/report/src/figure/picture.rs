@@ -14,7 +14,7 @@ use crate::{ReportError, place::matrix, run::Trial};
 /// Columns between the two images.
 const GAP: u32 = 8;
 /// A shell holds the truth with 99 %: χ² with three degrees of freedom is below 11.34.
-const SHELL: f64 = 3.368;
+const GATE: f64 = 3.368;
 
 /// The picture of one frame.
 #[derive(Debug)]
@@ -60,7 +60,7 @@ impl Marked {
             let pixels = frame.cloud.get(cloud as usize).and_then(|point| point.pixels);
             pixels.map(|pixels| [pixels.left, [pixels.right[0] + offset, pixels.right[1]]]).into_iter().flatten()
         };
-        for (centre, half) in shells(header, frame, offset) {
+        for (centre, half) in gates(header, frame, offset) {
             rectangle(&mut canvas, centre, half, 1.6 * scale, BLUE);
         }
         let matched = (0..frame.cloud.len() as u32).flat_map(places).filter(|at| at[0] >= offset - 1.0);
@@ -68,7 +68,7 @@ impl Marked {
             plus(&mut canvas, at, 5.5 * scale, 4.0 * scale, BLACK);
             plus(&mut canvas, at, 4.5 * scale, 2.0 * scale, WHITE);
         }
-        let fixes: Vec<&TargetRecord> = frame.targets.iter().filter(|row| row.outcome == Outcome::Referenced).collect();
+        let fixes: Vec<&TargetRecord> = frame.targets.iter().filter(|row| row.outcome == Outcome::Fix).collect();
         let candidates: BTreeSet<u32> = frame.targets.iter().flat_map(|target| target.candidates.concat()).collect();
         for at in candidates.iter().flat_map(|&cloud| places(cloud)) {
             ring(&mut canvas, at, 10.5 * scale, 3.0 * scale, BLUE);
@@ -120,12 +120,12 @@ impl Marked {
 
 /// The shells of the points that have candidates, as both images see them: where the rough pose expects each point, and
 /// how far off it may be (px).
-fn shells(header: &TrialHeader, frame: &FrameRecord, offset: f64) -> Vec<([f64; 2], [f64; 2])> {
+fn gates(header: &TrialHeader, frame: &FrameRecord, offset: f64) -> Vec<([f64; 2], [f64; 2])> {
     let (Some(prior), Some(position)) = (&frame.prior, header.prior_position_sigma) else { return Vec::new() };
     let attitude = header.prior_attitude_sigma.unwrap_or(0.0);
     let Some(camera_from_world) = matrix(&prior.world_from_camera).try_inverse() else { return Vec::new() };
     let right_from_left = matrix(&header.rig.right_from_left);
-    let mut shells = Vec::new();
+    let mut gates = Vec::new();
     for target in &frame.targets {
         let Some(model) = header.targets.iter().find(|model| model.id == target.object) else { continue };
         let (Some(site), Some(object)) = (header.world_from_site, model.site_from_object) else { continue };
@@ -135,14 +135,14 @@ fn shells(header: &TrialHeader, frame: &FrameRecord, offset: f64) -> Vec<([f64; 
                 continue;
             }
             let at = camera_from_object.transform_point(&Point3::from(point.at));
-            let half = SHELL * (position * position + (attitude * at.coords.norm()).powi(2)).sqrt();
+            let half = GATE * (position * position + (attitude * at.coords.norm()).powi(2)).sqrt();
             let sides = [(&header.rig.left, Matrix4::identity(), 0.0), (&header.rig.right, right_from_left, offset)];
             for (camera, motion, offset) in sides {
-                shells.extend(seen(camera, motion.transform_point(&at), half, offset));
+                gates.extend(seen(camera, motion.transform_point(&at), half, offset));
             }
         }
     }
-    shells
+    gates
 }
 
 /// Where a camera without distortion sees a cube of this half width.

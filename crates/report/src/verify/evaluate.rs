@@ -9,12 +9,12 @@ use super::logs::{Log, Logs, Row};
 use crate::{
     Field, Key, ReportError,
     content::BORNE,
+    fix_intervals::{FixInterval, fix_intervals},
     lever::ARMS,
-    looked::{self, Looked},
+    navigation_quantity::{Counted, NavigationQuantity},
     paired::Statistics,
-    sailed::{Counted, Sailed},
-    share,
-    teeth::{Tooth, teeth},
+    points_of_interest::{self, PoiQuantity},
+    proportion,
 };
 
 /// The value of a key, or why there is none.
@@ -82,8 +82,8 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let end = if first == "borne" { "percent" } else { "low" };
             let mut largest = None;
             for log in logs {
-                let share = share_of(end, "found of attempted", scale, span, &[log])?;
-                if share.is_none_or(|share| share < BORNE) {
+                let fraction = fraction_of(end, "found of attempted", scale, span, &[log])?;
+                if fraction.is_none_or(|fraction| fraction < BORNE) {
                     break;
                 }
                 largest = Some(log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok()?);
@@ -112,18 +112,18 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         }
         ("count", "logged") => Some(rows(log, span).count() as f64),
         ("count", group) => Some(pooled(logs, group, span)? as f64),
-        ("percent" | "low" | "high", group) => share_of(first, group, scale, span, logs)?,
+        ("percent" | "low" | "high", group) => fraction_of(first, group, scale, span, logs)?,
         ("sum", fields) => {
             // Only fixes have pairs that are known to be correct.
             let (above, below) = fields.split_once(" by ")?;
-            let (below, fixes) = below.strip_suffix(" of referenced").map_or((below, false), |below| (below, true));
+            let (below, fixes) = below.strip_suffix(" of fixes").map_or((below, false), |below| (below, true));
             let (above, below) = (Field::named(above)?, Field::named(below)?);
-            let own = || rows(log, span).filter(|row| !fixes || row.record.outcome == Outcome::Referenced);
+            let own = || rows(log, span).filter(|row| !fixes || row.record.outcome == Outcome::Fix);
             let sum = |field: Field| own().filter_map(|row| field.of(&row.record)).sum::<f64>();
             Some(sum(above) / sum(below))
         }
         ("rms", of) if of.ends_with(" of navigated") => {
-            let quantity = Sailed::named(of.strip_suffix(" of navigated")?)?;
+            let quantity = NavigationQuantity::named(of.strip_suffix(" of navigated")?)?;
             let values = log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?));
             let (n, sum) = values.fold((0, 0.0), |(n, sum), v| (n + 1, sum + v * v));
             (n > 0).then(|| (sum / f64::from(n)).sqrt() * scale)
@@ -137,7 +137,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
             area(rows(log, span).map(|row| &row.record), field, bound)
         }
-        ("teeth", of) => toothed(of.strip_suffix(" of navigated")?, span, log)?.map(|value| value * scale),
+        ("intervals", of) => toothed(of.strip_suffix(" of navigated")?, span, log)?.map(|value| value * scale),
         ("all", of) => {
             let field = Field::named(of.strip_suffix(" of attempted")?)?;
             let known = rows(log, span).any(|row| found(&row.record) && field.of(&row.record).is_some());
@@ -152,8 +152,8 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
                     let own = rows(log, span).filter(|row| group == "attempted" || found(&row.record));
                     own.filter_map(|row| value(row, field)).collect()
                 }
-                None if Sailed::named(field).is_some() => {
-                    let quantity = Sailed::named(field)?;
+                None if NavigationQuantity::named(field).is_some() => {
+                    let quantity = NavigationQuantity::named(field)?;
                     log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?)).collect()
                 }
                 None if field.starts_with("arm_") => {
@@ -171,11 +171,12 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
 
 /// `NAME QUANTITY at the point OBJECT/POINT`: over the frames that have the point in view.
 fn inspected(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
-    let own = log.sample(span).flat_map(|frame| &frame.inspected).filter(|seen| looked::name(seen) == point);
+    let own =
+        log.sample(span).flat_map(|frame| &frame.inspected).filter(|seen| points_of_interest::name(seen) == point);
     if (name, quantity) == ("count", "views") {
         return Some(Some(own.count() as f64));
     }
-    let quantity = Looked::named(quantity)?;
+    let quantity = PoiQuantity::named(quantity)?;
     statistic(name, own.filter_map(|seen| quantity.of(seen)).collect())
 }
 
@@ -184,8 +185,8 @@ fn on_object(name: &str, of: &str, object: &str, span: [u64; 2], log: &Log) -> O
     let own = || rows(log, span).filter(|row| row.record.object == object);
     let is: fn(&TargetRecord) -> bool = match of {
         "attempted" => |_| true,
-        "refused" => |row| row.outcome != Outcome::Referenced,
-        "wrong" => |row| row.outcome == Outcome::Referenced && !found(row),
+        "refused" => |row| row.outcome != Outcome::Fix,
+        "wrong" => |row| row.outcome == Outcome::Fix && !found(row),
         _ => found,
     };
     if name == "count" {
@@ -200,7 +201,7 @@ fn value(row: &Row, field: Field) -> Option<f64> {
 }
 
 fn found(row: &TargetRecord) -> bool {
-    row.outcome == Outcome::Referenced && row.evaluation.wrong != Some(true)
+    row.outcome == Outcome::Fix && row.evaluation.wrong != Some(true)
 }
 
 fn error(row: &TargetRecord, field: Field) -> f64 {
@@ -210,18 +211,20 @@ fn error(row: &TargetRecord, field: Field) -> f64 {
 /// Something about the teeth of the saw.
 fn toothed(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let steps = log.sample(span).filter(|frame| frame.navigation.is_some()).map(|frame| frame.step.as_ref());
-    let teeth = teeth(steps);
-    let sum = |what: fn(&Tooth) -> f64| teeth.iter().map(what).sum::<f64>();
-    let drift = sum(|tooth| tooth.drift);
+    let fix_intervals = fix_intervals(steps);
+    let sum = |what: fn(&FixInterval) -> f64| fix_intervals.iter().map(what).sum::<f64>();
+    let drift = sum(|fix_interval| fix_interval.drift);
     Some(match of {
-        "count" => Some(teeth.len() as f64),
-        "seconds" => Some(sum(|tooth| tooth.seconds)),
-        "way" => Some(sum(|tooth| tooth.way)),
-        "drift-per-metre" => Some(drift / sum(|tooth| tooth.way)).filter(|drift| drift.is_finite()),
-        "drift-per-second" => Some(drift / sum(|tooth| tooth.seconds)).filter(|drift| drift.is_finite()),
+        "count" => Some(fix_intervals.len() as f64),
+        "seconds" => Some(sum(|fix_interval| fix_interval.seconds)),
+        "path-length" => Some(sum(|fix_interval| fix_interval.path_length)),
+        "drift-per-metre" => {
+            Some(drift / sum(|fix_interval| fix_interval.path_length)).filter(|drift| drift.is_finite())
+        }
+        "drift-per-second" => Some(drift / sum(|fix_interval| fix_interval.seconds)).filter(|drift| drift.is_finite()),
         _ => {
             let name = of.strip_suffix(" amplitude")?;
-            statistic(name, teeth.iter().map(|tooth| tooth.amplitude).collect())?
+            statistic(name, fix_intervals.iter().map(|fix_interval| fix_interval.amplitude).collect())?
         }
     })
 }
@@ -302,8 +305,8 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
     let is = |of: fn(&TargetRecord) -> bool| rows(log, span).filter(|row| of(&row.record)).count();
     let frames =
         |of: fn(&TargetRecord) -> bool| log.sample(span).filter(|f| f.rows.iter().any(|row| of(&row.record))).count();
-    let fixed = |row: &TargetRecord| row.outcome == Outcome::Referenced;
-    let wrong = |row: &TargetRecord| row.outcome == Outcome::Referenced && row.evaluation.wrong == Some(true);
+    let fixed = |row: &TargetRecord| row.outcome == Outcome::Fix;
+    let wrong = |row: &TargetRecord| row.outcome == Outcome::Fix && row.evaluation.wrong == Some(true);
     Some(match group {
         "frames" => log.sample(span).count(),
         "fixed-frames" => frames(fixed),
@@ -312,7 +315,7 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
         "found" => is(found),
         "wrong" => is(wrong),
         "unjudged" => is(|row| found(row) && row.evaluation.wrong.is_none()),
-        "refused" => is(|row| row.outcome != Outcome::Referenced),
+        "refused" => is(|row| row.outcome != Outcome::Fix),
         _ => {
             let reason = group.strip_prefix("refused:")?;
             let of = |row: &Row| {
@@ -322,7 +325,7 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
                     row.record.reason == reason
                 }
             };
-            rows(log, span).filter(|row| row.record.outcome != Outcome::Referenced && of(row)).count()
+            rows(log, span).filter(|row| row.record.outcome != Outcome::Fix && of(row)).count()
         }
     })
 }
@@ -330,7 +333,7 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
 /// Whether a fix is in a region, by the region's definition.
 fn inside(region: Region, row: &TargetRecord) -> bool {
     let values = [Field::Position, Field::Level, Field::Limit].map(|field| field.of(row));
-    let [Some(e), p, Some(a)] = values.map(|value| value.filter(|_| row.outcome == Outcome::Referenced)) else {
+    let [Some(e), p, Some(a)] = values.map(|value| value.filter(|_| row.outcome == Outcome::Fix)) else {
         return false;
     };
     match (region, p) {
@@ -345,31 +348,31 @@ fn inside(region: Region, row: &TargetRecord) -> bool {
 }
 
 /// A share of attempts in percent, or an end of its interval.
-fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     let fixes = group.strip_suffix(" of fixes");
     let group = fixes.or_else(|| group.strip_suffix(" of attempted"))?;
     let all = || logs.iter().flat_map(|log| rows(log, span));
-    let trajectory = logs.iter().any(|log| share::is_trajectory(&log.header));
+    let trajectory = logs.iter().any(|log| proportion::is_trajectory(&log.header));
     let thinned = logs.iter().any(|log| log.totals.as_ref().is_some_and(|totals| totals.every > 1));
     let known = |events: Vec<bool>| {
         let percent = 100.0 * events.iter().filter(|event| **event).count() as f64 / events.len() as f64;
         (!events.is_empty()).then(|| match which {
             "percent" => percent,
-            "low" => 100.0 * share::interval(trajectory, &events).0,
-            _ => 100.0 * share::interval(trajectory, &events).1,
+            "low" => 100.0 * proportion::interval(trajectory, &events).0,
+            _ => 100.0 * proportion::interval(trajectory, &events).1,
         })
     };
     if let Some((field, bound)) = group.split_once("<=") {
         let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
         if fixes.is_some() {
-            let own = all().filter(|row| row.record.outcome == Outcome::Referenced);
+            let own = all().filter(|row| row.record.outcome == Outcome::Fix);
             return Some(known(own.filter_map(|row| field.of(&row.record)).map(|value| value <= bound).collect()));
         }
         let errors: Vec<f64> = all().map(|row| error(&row.record, field)).collect();
         if which != "percent" {
             // An end of a band follows from those of the other bounds.
-            let at = share::bounds().position(|(_, known)| known == bound)?;
-            let (low, high) = share::band(trajectory, &errors)[at];
+            let at = proportion::bounds().position(|(_, known)| known == bound)?;
+            let (low, high) = proportion::band(trajectory, &errors)[at];
             return Some((!errors.is_empty()).then_some(100.0 * if which == "low" { low } else { high }));
         }
         return Some(known(errors.into_iter().map(|error| error <= bound).collect()));
@@ -378,14 +381,14 @@ fn share_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log])
         let region = Region::ALL.into_iter().find(|region| region.name() == group);
         let is = |row: &TargetRecord| match (group, region) {
             ("found", _) => found(row),
-            ("refused", _) => row.outcome != Outcome::Referenced,
-            ("wrong", _) => row.outcome == Outcome::Referenced && !found(row),
+            ("refused", _) => row.outcome != Outcome::Fix,
+            ("wrong", _) => row.outcome == Outcome::Fix && !found(row),
             (_, region) => region.is_some_and(|region| inside(region, row)),
         };
         return Some(known(all().map(|row| is(&row.record)).collect()));
     }
     let (k, n) = (pooled(logs, group, span)?, pooled(logs, "attempted", span)?);
-    let (low, high) = share::interval_of_counts(trajectory, k, n);
+    let (low, high) = proportion::interval_of_counts(trajectory, k, n);
     let value = match which {
         "percent" => 100.0 * k as f64 / n as f64,
         "low" => 100.0 * low,
@@ -432,7 +435,7 @@ fn single(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let (object, number) = rest.rsplit_once(" at ")?;
     let number: u64 = number.parse().ok()?;
     let frame = log.at(span[0]).find(|frame| frame.number == number)?;
-    if let Some(quantity) = Sailed::named(field) {
+    if let Some(quantity) = NavigationQuantity::named(field) {
         return Some(quantity.of(frame.navigation.as_deref()?));
     }
     let field = Field::named(field)?;

@@ -12,10 +12,11 @@ use seafix_log::{
 };
 
 use crate::{
-    ReportError, disparity, lever,
+    ReportError, disparity,
+    fix_intervals::{self, Step},
+    lever,
     paired::Statistics,
     place,
-    teeth::{self, Step},
 };
 
 /// The logs of a run.
@@ -97,7 +98,7 @@ impl Log {
             for error in disparity::errors(&header, &frame) {
                 disparity = (disparity.0 + error * error, disparity.1 + 1);
             }
-            let fixes = || frame.targets.iter().filter(|row| row.outcome == Outcome::Referenced);
+            let fixes = || frame.targets.iter().filter(|row| row.outcome == Outcome::Fix);
             let mut candidates: Vec<u32> = frame.targets.iter().flat_map(|row| row.candidates.concat()).collect();
             candidates.sort_unstable();
             candidates.dedup();
@@ -122,7 +123,7 @@ impl Log {
             let step = frame.navigation.as_deref().and_then(|record| {
                 let object = &record.pose.as_ref()?.object;
                 let known = header.targets.iter().position(|target| target.id == *object)?;
-                teeth::step(frame.stamp_ns, frame.truth.as_ref(), record, known as u32)
+                fix_intervals::step(frame.stamp_ns, frame.truth.as_ref(), record, known as u32)
             });
             frames.push(Seen {
                 step,

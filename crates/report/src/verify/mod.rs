@@ -9,7 +9,7 @@ use std::{
 };
 
 use crate::{
-    Forms, Key, Number, ReportError, Summary, index,
+    Forms, Key, Number, ReportError, RunSummary, index,
     print::FORMS,
     run::Run,
     write::{files, strangers},
@@ -52,8 +52,8 @@ pub struct Mismatch {
 impl Verified {
     /// Whether the report says what the logs say.
     pub fn holds(&self) -> bool {
-        let whole = self.missing.is_empty() && self.changed.is_empty() && self.strays.is_empty();
-        whole && self.mismatches.is_empty()
+        let full = self.missing.is_empty() && self.changed.is_empty() && self.strays.is_empty();
+        full && self.mismatches.is_empty()
     }
 }
 
@@ -77,7 +77,7 @@ pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
         verified.check(name, &key, &printed, &mut logs)?;
     }
     let run = Run::read(run_dir)?;
-    let summary = Summary::of(&run);
+    let summary = RunSummary::of(&run);
     let made = files(&run, &summary, forms(&page))?;
     verified.files = made.len();
     verified.findings = index::section(&run, &summary, folder);
@@ -120,9 +120,9 @@ impl Verified {
 
 /// The forms with which a page says that it was written; all, where it does not say.
 fn forms(page: &str) -> Forms {
-    let told =
+    let as_number =
         page.split_once(&format!("<meta name=\"{FORMS}\" content=\"")).and_then(|(_, rest)| rest.split_once('"'));
-    told.map_or(Forms::ALL, |(words, _)| Forms::of_words(words))
+    as_number.map_or(Forms::ALL, |(words, _)| Forms::of_words(words))
 }
 
 /// A value as it would be printed.

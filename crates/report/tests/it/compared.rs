@@ -62,7 +62,7 @@ fn runs_of_other_data_are_refused() {
 ///
 /// Seen to fail where nothing is compared, and where all columns stand side by side.
 #[test]
-fn what_is_compared_of_a_shorter_run_is_said() {
+fn what_is_compared_of_a_shorter_run_is_stated() {
     let folder = tempfile::tempdir().unwrap();
     let runs = [run(folder.path(), "a", "triad", 1), long(folder.path(), "b", "kabsch", 1, 24)];
     assert!(matches!(compare(&runs, false, None, None), Err(ReportError::Incomparable { .. })));

@@ -26,7 +26,7 @@ fn write(folder: &Path, totals: bool, change: impl Fn(&mut FrameRecord)) {
         let mut frame = blind(&header, number, 3.0);
         let (error, level, _) = CASES[number as usize % 6];
         let row = &mut frame.targets[0];
-        row.outcome = Outcome::Referenced;
+        row.outcome = Outcome::Fix;
         row.reason.clear();
         row.object_from_camera.get_or_insert(frame.truth.as_ref().unwrap().world_from_camera);
         row.integrity = Some(Integrity { protection_position: level, ..Integrity::default() });
@@ -72,7 +72,7 @@ fn every_fix_is_counted_in_its_region_and_each_number_is_that_of_the_log() {
 }
 
 #[test]
-fn where_nothing_is_known_of_levels_nothing_is_said_of_them() {
+fn where_nothing_is_known_of_levels_nothing_is_stated_of_them() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), true, |frame| frame.targets[0].evaluation = Default::default());
     assert_eq!(summary(folder.path()).unwrap().rows[0].regions, None);

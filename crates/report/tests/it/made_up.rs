@@ -13,7 +13,8 @@ use seafix_log::{
     TrialHeader, TruthRecord, Writer,
 };
 
-const EYE: [[f64; 4]; 4] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+const IDENTITY: [[f64; 4]; 4] =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 pub(crate) const SIZE: [u32; 2] = [512, 384];
 const F: f64 = 250.0;
 pub(crate) const NAME: &str = "<script>alert('x')</script>&\" 50%_a \\input{x} =cmd|x \u{1b}[31m";
@@ -29,7 +30,7 @@ pub(crate) fn noise(seed: u64) -> f64 {
 pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
     let camera =
         CameraRecord { size: SIZE, matrix: [[F, 0.0, 255.5], [0.0, F, 191.5], [0.0, 0.0, 1.0]], distortion: vec![] };
-    let mut right_from_left = EYE;
+    let mut right_from_left = IDENTITY;
     right_from_left[0][3] = -0.25;
     let component = |stage: &str, name: &str, summary: &str, source: &str| Component {
         stage: stage.to_owned(),
@@ -63,11 +64,11 @@ pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
             rectified: true,
             right_from_left_rotation: None,
         },
-        body_from_camera: EYE,
-        world_from_site: Some(EYE),
+        body_from_camera: IDENTITY,
+        world_from_site: Some(IDENTITY),
         targets: vec![TargetModel {
             id: format!("manifold {NAME}"),
-            site_from_object: Some(EYE),
+            site_from_object: Some(IDENTITY),
             points: (0..9)
                 .map(|i| ModelPoint {
                     id: format!("M{i}"),
@@ -122,7 +123,7 @@ fn image(cloud: &[CloudPoint], side: usize, seed: u64) -> GreyImage {
 /// The frame without its images, which take the most time.
 pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
     let target = &header.targets[0];
-    let mut world_from_camera = EYE;
+    let mut world_from_camera = IDENTITY;
     world_from_camera[2][3] = -distance;
     let see = |p: [f64; 3], seed: u64| {
         let z = p[2] + distance;
@@ -151,7 +152,7 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         &target.id,
         "maximum-clique",
         solver,
-        if number % 12 == 5 { "chance" } else { "too-few" },
+        if number % 12 == 5 { "absent" } else { "too-few" },
     );
     row.candidates = (0..9).map(|i| vec![i, 9 + i, 20 + i]).collect();
     row.times = TargetTimes {
@@ -163,7 +164,7 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
     row.evaluation = Evaluation { wrong: Some(false), visible: Some(9), identified: Some(2), ..Evaluation::default() };
     if !refused {
         let scale = worse * 0.001 * distance * distance * (1.0 + noise(seed + 3));
-        row.outcome = Outcome::Referenced;
+        row.outcome = Outcome::Fix;
         row.reason.clear();
         let turn = 1.1 * scale;
         let mut turned = world_from_camera;
@@ -201,7 +202,7 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         prior: Some(PriorRecord { world_from_camera }),
         truth: Some(TruthRecord {
             world_from_camera,
-            world_from_object: vec![(target.id.clone(), EYE)],
+            world_from_object: vec![(target.id.clone(), IDENTITY)],
             visible: vec![],
         }),
         targets: vec![row],

@@ -62,7 +62,7 @@ fn each_object_has_its_own_attempts() {
     for frames in &trials {
         for object in OBJECTS {
             let own = || frames.iter().flat_map(|frame| &frame.targets).filter(|row| row.object == object);
-            let (fixes, n) = (own().filter(|row| row.outcome == Outcome::Referenced), own().count());
+            let (fixes, n) = (own().filter(|row| row.outcome == Outcome::Fix), own().count());
             let (wrong, found): (Vec<_>, Vec<_>) = fixes.partition(|row| row.evaluation.wrong == Some(true));
             let refused = n - found.len() - wrong.len();
             let errors = |take: fn(&seafix_log::Evaluation) -> Option<f64>| {
@@ -83,7 +83,7 @@ fn each_object_has_its_own_attempts() {
 
 /// Seen to fail where the best and the worst known point change places.
 #[test]
-fn of_points_of_interest_the_best_and_the_worst_known_are_told() {
+fn of_points_of_interest_the_best_and_the_worst_known_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let trials = write(folder.path());
     let out = folder.path().join("report");
@@ -103,8 +103,8 @@ fn of_points_of_interest_the_best_and_the_worst_known_are_told() {
         let words = format!("{} ", name.split(' ').next().unwrap());
         let begin = page.find("of the points of interest").unwrap();
         let sentence = &page[begin..begin + page[begin..].find(" views)").unwrap() + 300];
-        let told = format!("{error:.1} mm (median;");
-        (sentence.find(&words).unwrap(), sentence.find(&told).unwrap_or_else(|| panic!("{told} in {sentence}")))
+        let expected = format!("{error:.1} mm (median;");
+        (sentence.find(&words).unwrap(), sentence.find(&expected).unwrap_or_else(|| panic!("{expected} in {sentence}")))
     };
     let (best, worst) = (at(points[0]), at(points[1]));
     assert!(best.0 < worst.0 && best.1 < worst.1 && best.0 < best.1, "{best:?} {worst:?}");

@@ -35,7 +35,7 @@ fn the_report_is_the_same_twice_and_stands_alone() {
 }
 
 #[test]
-fn one_trial_is_drawn_over_its_frames() {
+fn one_trial_is_generated_over_its_frames() {
     let folder = tempfile::tempdir().unwrap();
     let mut header = header(1, 3.0, "kabsch");
     header.axes.clear();
@@ -64,7 +64,7 @@ fn numbers_are_those_of_the_log() {
         let log = read(&folder.path().join(format!("{}.mcap", row.trial))).unwrap();
         let fixes = log.frames.iter().flat_map(|frame| &frame.targets);
         let mut m2: Vec<f64> = fixes
-            .filter(|fix| fix.outcome == Outcome::Referenced && fix.evaluation.wrong == Some(false))
+            .filter(|fix| fix.outcome == Outcome::Fix && fix.evaluation.wrong == Some(false))
             .filter_map(|fix| fix.evaluation.m2_rms)
             .collect();
         m2.sort_by(f64::total_cmp);
@@ -90,7 +90,7 @@ static FRAMES: LazyLock<Vec<FrameRecord>> = LazyLock::new(|| {
 });
 
 /// Writes the run of one trial that `change` makes of frames at 3 m, and gives its report and summary.
-fn changed(change: impl Fn(&mut TrialHeader, &mut FrameRecord)) -> (String, seafix_report::Summary) {
+fn changed(change: impl Fn(&mut TrialHeader, &mut FrameRecord)) -> (String, seafix_report::RunSummary) {
     let folder = tempfile::tempdir().unwrap();
     let mut header = header(1, 3.0, "kabsch");
     let mut frames = FRAMES.clone();
@@ -114,7 +114,7 @@ fn only_single_trials_carry_intervals() {
 }
 
 #[test]
-fn what_saw_no_images_is_not_said_to_match_them() {
+fn what_saw_no_images_is_not_stated_to_match_them() {
     let (text, _) = changed(|_, _| {});
     assert!(text.contains("are described, matched and triangulated") && text.contains("harris"));
     let (text, _) = changed(|header, frame| {

@@ -51,7 +51,7 @@ fn a_changed_digit_is_found() {
 ///
 /// Seen to fail where strange files are passed over.
 #[test]
-fn every_file_is_missed_and_a_strange_one_told() {
+fn every_file_is_missed_and_a_strange_one_reported() {
     let folder = tempfile::tempdir().unwrap();
     write_run(folder.path(), &[2.0, 5.0]);
     for forms in [Forms::ALL, Forms { latex: false, ..Forms::ALL }, Forms::SMALL] {

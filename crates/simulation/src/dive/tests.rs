@@ -76,8 +76,8 @@ fn threads_change_nothing() {
 }
 
 #[test]
-fn rough_poses_err_as_stated() {
-    let settings = Dive { frames: 400, distance: 4.0, least_visible: 0, ..small() };
+fn prior_poses_err_as_stated() {
+    let settings = Dive { frames: 400, distance: 4.0, min_visible: 0, ..small() };
     let dive = settings.plan(2, 0).unwrap();
     let (mut position, mut attitude) = (0.0, 0.0);
     for frame in dive.frames() {
@@ -102,17 +102,17 @@ fn depth_is_what_a_ray_meets() {
     let dive = small().plan(9, 0).unwrap();
     let (mut same, mut all) = (0, 0);
     for frame in dive.frames().take(3) {
-        let eyes = frame.eyes();
-        let rendering = Rendering::new(&dive.scene, eyes.rig.left(), &eyes.world_from_camera);
-        let from = eyes.world_from_camera.translation();
+        let placed_rig = frame.placed_rig();
+        let rendering = Rendering::new(&dive.scene, placed_rig.rig.left(), &placed_rig.world_from_camera);
+        let from = placed_rig.world_from_camera.translation();
         for row in (0..192).step_by(3) {
             for column in (0..256).step_by(3) {
                 let pixel = Pixel { u: column as f64, v: row as f64 };
-                let ray = eyes.rig.left().normalize(&pixel).unwrap().push(1.0);
-                let cast = dive.scene.hit(&from, &(eyes.world_from_camera.rotation() * ray)).unwrap();
-                let drawn = rendering.depth(column, row).unwrap();
+                let ray = placed_rig.rig.left().normalize(&pixel).unwrap().push(1.0);
+                let cast = dive.scene.hit(&from, &(placed_rig.world_from_camera.rotation() * ray)).unwrap();
+                let generated = rendering.depth(column, row).unwrap();
                 all += 1;
-                same += usize::from((drawn / cast - 1.0).abs() < 1e-9);
+                same += usize::from((generated / cast - 1.0).abs() < 1e-9);
             }
         }
     }
@@ -124,8 +124,8 @@ fn depth_is_what_a_ray_meets() {
 fn rows_have_the_radiance_of_each_pixel() {
     let dive = small().plan(9, 0).unwrap();
     for frame in dive.frames().take(3) {
-        let eyes = frame.eyes();
-        let rendering = Rendering::new(&dive.scene, eyes.rig.left(), &eyes.world_from_camera);
+        let placed_rig = frame.placed_rig();
+        let rendering = Rendering::new(&dive.scene, placed_rig.rig.left(), &placed_rig.world_from_camera);
         for (place, value) in rendering.radiance().iter().enumerate() {
             let (column, row) = (place % 256, place / 256);
             assert_eq!(value.to_bits(), rendering.pixel(column, row).to_bits(), "{column}, {row}");
@@ -140,12 +140,12 @@ fn left_and_right_image_show_one_scene() {
     let dive = Dive { sensor: quiet, frames: 2, ..Dive::default() }.plan(9, 0).unwrap();
     for frame in dive.frames() {
         let (left, right) = frame.render();
-        let eyes = frame.eyes();
-        let rendering = Rendering::new(&dive.scene, eyes.rig.left(), &eyes.world_from_camera);
+        let placed_rig = frame.placed_rig();
+        let rendering = Rendering::new(&dive.scene, placed_rig.rig.left(), &placed_rig.world_from_camera);
         let other = Rendering::new(
             &dive.scene,
-            eyes.rig.right(),
-            &(eyes.world_from_camera * eyes.rig.right_from_left().inverse()),
+            placed_rig.rig.right(),
+            &(placed_rig.world_from_camera * placed_rig.rig.right_from_left().inverse()),
         );
         let mut differences = Vec::new();
         for row in (2..766).step_by(7) {
@@ -160,8 +160,8 @@ fn left_and_right_image_show_one_scene() {
                 if (other.depth(cell, row).unwrap() / z - 1.0).abs() > 0.01 {
                     continue; // hidden from the right camera
                 }
-                let share = (there - cell as f64) as f32;
-                let seen = right.row(row)[cell] * (1.0 - share) + right.row(row)[cell + 1] * share;
+                let fraction = (there - cell as f64) as f32;
+                let seen = right.row(row)[cell] * (1.0 - fraction) + right.row(row)[cell + 1] * fraction;
                 differences.push(f64::from((left.row(row)[column] - seen).abs()));
             }
         }
@@ -209,7 +209,7 @@ fn is_x_mark(plan: &crate::ObjectPlan, point: usize) -> bool {
 }
 
 #[test]
-fn marks_are_drawn_where_the_truth_says() {
+fn marks_are_generated_where_the_truth_states() {
     let quiet = Sensor { noise: 0.0, ..Sensor::default() };
     let blueprint = Blueprint::drill_centre();
     let dive = Dive { sensor: quiet, distance: 3.0, frames: 7, ..Dive::default() }.plan(4, 0).unwrap();
@@ -275,7 +275,7 @@ fn numbers_that_make_no_dive_are_refused() {
 }
 
 #[test]
-fn the_camera_looks_down_and_aft_is_below() {
+fn the_camera_appearance_down_and_aft_is_below() {
     let dive = small().plan(1, 0).unwrap();
     let place = Vector3::new(3.0, -2.0, 39.0);
     let north = dive.aim(&place, [0.0; 2], 0.0, 0.0, 0.0);

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use seafix_geometry::Point;
 
 use super::{
-    Drawn, DrawnParameters, DrawnProblem, DrawnTruth, Family, Part, Source,
-    clutter::{EDGE_JITTER, Scene, in_shells, on_edge, on_face},
-    prior::{ahead, rough},
+    Family, Generated, GeneratedParameters, GeneratedProblem, GeneratedTruth, Part, Source,
+    clutter::{EDGE_JITTER, Scene, in_gates, on_edge, on_face},
+    prior::{ahead, prior_pose},
     problem::{micrometres, round},
 };
 use crate::stream::Stream;
@@ -29,7 +29,7 @@ struct Cell {
     m: usize,
     visible: usize,
     /// Half-size of the shells (m); `None` without a prior.
-    shell: Option<f64>,
+    gate: Option<f64>,
     /// How far the scene goes beyond the object (m).
     margin: f64,
     sigma: f64,
@@ -52,7 +52,7 @@ impl Cell {
             n: 50,
             m: [500, 1000, 2000][k % 3],
             visible: 0,
-            shell: Some(0.5),
+            gate: Some(0.5),
             margin: 0.5,
             sigma: 0.01,
             depth: 1,
@@ -61,7 +61,7 @@ impl Cell {
         };
         match source.family {
             Family::A => {
-                let (n, shell) = (7 + stream.below(2), [0.2, 0.3, 0.5][k / 7 % 3]);
+                let (n, gate) = (7 + stream.below(2), [0.2, 0.3, 0.5][k / 7 % 3]);
                 Self {
                     half: SMALL,
                     distance: 4.0,
@@ -69,8 +69,8 @@ impl Cell {
                     n,
                     m: 89,
                     visible: (2 + k % 7).min(n),
-                    shell: Some(shell),
-                    margin: shell,
+                    gate: Some(gate),
+                    margin: gate,
                     dense: k / 63 % 2 == 1,
                     ..site
                 }
@@ -84,7 +84,7 @@ impl Cell {
             },
             Family::F => Self {
                 visible: 4 + k / 3 % 6,
-                shell: Some([0.3, 0.5][k % 2]),
+                gate: Some([0.3, 0.5][k % 2]),
                 sigma: [0.01, 0.02][k / 2 % 2],
                 clear: 0.18,
                 ..site
@@ -93,23 +93,23 @@ impl Cell {
             _ => {
                 let n = [20, 30, 50][k % 3];
                 let (m, visible) = ([100, 200, 300][k % 3], n * 3 / 5);
-                Self { half: MEDIUM, distance: 6.0, n, m, visible, shell: None, ..site }
+                Self { half: MEDIUM, distance: 6.0, n, m, visible, gate: None, ..site }
             }
         }
     }
 
-    fn parameters(&self, source: &Source, visible: usize) -> DrawnParameters {
+    fn parameters(&self, source: &Source, visible: usize) -> GeneratedParameters {
         let site = matches!(source.family, Family::B | Family::F | Family::G);
-        DrawnParameters {
+        GeneratedParameters {
             n: Some(self.n),
             m: Some(self.m),
             visible: Some(visible),
-            shell: self.shell,
+            gate: self.gate,
             dense: (source.family == Family::A).then_some(self.dense),
             sigma: site.then_some(self.sigma),
             aniso: (source.family == Family::B).then_some(self.depth),
             absent: source.absent().then_some(true),
-            ..DrawnParameters::default()
+            ..GeneratedParameters::default()
         }
     }
 }
@@ -137,7 +137,7 @@ pub(super) fn shuffled(n: usize, stream: &mut Stream) -> Vec<usize> {
     order
 }
 
-pub(super) fn draw(source: &Source) -> Drawn {
+pub(super) fn draw(source: &Source) -> Generated {
     let cell = Cell::of(source);
     let model = model(&cell, &mut source.stream(Part::Model));
     let pose = ahead(&mut source.stream(Part::Pose), cell.distance);
@@ -148,9 +148,9 @@ pub(super) fn draw(source: &Source) -> Drawn {
     let mut stream = source.stream(Part::Noise);
     let measured: Vec<(usize, Vector3<f64>)> =
         seen.iter().map(|&i| (i, placed[i] + stream.normal3(1.0).component_mul(&noise))).collect();
-    let prior = cell.shell.map(|shell| {
+    let prior = cell.gate.map(|gate| {
         let seen: Vec<_> = measured.iter().map(|&(i, at)| (model[i], at)).collect();
-        rough(&mut source.stream(Part::Prior), &pose, &model, &seen, shell, 0.6)
+        prior_pose(&mut source.stream(Part::Prior), &pose, &model, &seen, gate, 0.6)
     });
 
     let mut stream = source.stream(Part::Clutter);
@@ -158,11 +158,11 @@ pub(super) fn draw(source: &Source) -> Drawn {
     let predicted: Option<Vec<Vector3<f64>>> = prior
         .as_ref()
         .filter(|_| cell.dense)
-        .map(|(rough, _)| model.iter().map(|at| (*rough * Point::from(*at)).coords).collect());
+        .map(|(prior_pose, _)| model.iter().map(|at| (*prior_pose * Point::from(*at)).coords).collect());
     let mut points: Vec<Vector3<f64>> = measured.iter().map(|(_, at)| *at).collect();
     while points.len() < cell.m {
-        let at = match (&predicted, cell.shell) {
-            (Some(predicted), Some(half)) => in_shells(&mut stream, predicted, half),
+        let at = match (&predicted, cell.gate) {
+            (Some(predicted), Some(half)) => in_gates(&mut stream, predicted, half),
             _ => scene.clutter(&mut stream),
         };
         if hidden.iter().all(|&i| (placed[i] - at).norm() >= cell.clear) {
@@ -171,13 +171,13 @@ pub(super) fn draw(source: &Source) -> Drawn {
     }
 
     let order = shuffled(cell.m, &mut source.stream(Part::Order));
-    let mut problem = DrawnProblem::new(source, &model, cell.sigma);
+    let mut problem = GeneratedProblem::new(source, &model, cell.sigma);
     problem.cloud = order.iter().map(|&k| micrometres(&points[k])).collect();
     problem.prior = prior.map(|(_, prior)| prior);
     problem.sigma_xyz = (cell.depth > 1).then(|| vec![[round(noise.x), round(noise.y), round(noise.z)]; cell.m]);
     let pairs = order.iter().enumerate().filter_map(|(j, &k)| Some([*seen.get(k)?, j])).collect();
-    let truth = DrawnTruth::new(&problem, &pose, pairs, cell.parameters(source, seen.len()));
-    Drawn { problem, truth }
+    let truth = GeneratedTruth::new(&problem, &pose, pairs, cell.parameters(source, seen.len()));
+    Generated { problem, truth }
 }
 
 /// Standard deviations along the camera's axes (m), their root mean square the cell's σ.

@@ -46,7 +46,7 @@ pub(super) fn anywhere(stream: &mut Stream, placed: &[Vector3<f64>], margin: f64
 }
 
 /// Uniform in the shell of a model point, any of them as likely.
-pub(super) fn in_shells(stream: &mut Stream, predicted: &[Vector3<f64>], half: f64) -> Vector3<f64> {
+pub(super) fn in_gates(stream: &mut Stream, predicted: &[Vector3<f64>], half: f64) -> Vector3<f64> {
     predicted[stream.below(predicted.len())] + cube(stream, half)
 }
 

@@ -6,10 +6,10 @@ use nalgebra::Vector3;
 use seafix_geometry::Point;
 
 use super::{
-    Drawn, DrawnParameters, DrawnProblem, DrawnTruth, Part, Source,
+    Generated, GeneratedParameters, GeneratedProblem, GeneratedTruth, Part, Source,
     boxes::shuffled,
     clutter::anywhere,
-    prior::{ahead, direction, rough},
+    prior::{ahead, direction, prior_pose},
     problem::micrometres,
 };
 use crate::stream::Stream;
@@ -23,7 +23,7 @@ const OFF_JITTER: f64 = 0.02;
 /// How likely a site of the lattice, and a point off it, is visible.
 const VISIBLE: [f64; 2] = [0.7, 0.83];
 /// Least number of visible points off the lattice.
-const LEAST_OFF: usize = 3;
+const MIN_OFF: usize = 3;
 /// How far the surroundings continue the lattice (sites), and how likely a site of theirs is.
 const AROUND: i32 = 2;
 const CONTINUED: f64 = 0.43;
@@ -37,7 +37,7 @@ const ANYWHERE: usize = 30;
 const MARGIN: f64 = 0.3;
 const SIGMA: f64 = 0.01;
 const DISTANCE: f64 = 3.0;
-const SHELL: f64 = 0.4;
+const GATE: f64 = 0.4;
 /// How far the rough pose is moved along each axis, in shells.
 const SHIFT: f64 = 0.5;
 
@@ -68,7 +68,7 @@ impl Seen {
             let continued: Vec<(i32, i32)> = around.filter(outside).filter(|_| stream.unit() < CONTINUED).collect();
             let occupied = sites().enumerate().filter(|(i, _)| lattice.contains(i)).map(|(_, site)| site);
             let best_wrong = best_wrong(&occupied.chain(continued.iter().copied()).collect());
-            if off.len() >= LEAST_OFF && lattice.len() + off.len() >= best_wrong + LEAD {
+            if off.len() >= MIN_OFF && lattice.len() + off.len() >= best_wrong + LEAD {
                 let first = sites().count();
                 let model = lattice.into_iter().chain(off.into_iter().map(|i| first + i)).collect();
                 return Self { model, continued, best_wrong };
@@ -88,7 +88,7 @@ fn best_wrong(occupied: &HashSet<(i32, i32)>) -> usize {
     shifts().map(|by| covered(SITES, by).max(covered([SITES[1], SITES[0]], by))).max().unwrap_or(0)
 }
 
-pub(super) fn draw(source: &Source) -> Drawn {
+pub(super) fn draw(source: &Source) -> Generated {
     let mut stream = source.stream(Part::Model);
     let mut model: Vec<Vector3<f64>> = sites().map(|(i, k)| site(i, k)).collect();
     model.extend(OFF.map(|at| Vector3::from(at) + stream.normal3(OFF_JITTER)));
@@ -100,7 +100,7 @@ pub(super) fn draw(source: &Source) -> Drawn {
     if source.absent() {
         seen.model.clear();
     }
-    let mut problem = DrawnProblem::new(source, &model, SIGMA);
+    let mut problem = GeneratedProblem::new(source, &model, SIGMA);
 
     let mut noise = source.stream(Part::Noise);
     let measured: Vec<Vector3<f64>> = seen.model.iter().map(|&i| placed[i] + noise.normal3(SIGMA)).collect();
@@ -118,22 +118,22 @@ pub(super) fn draw(source: &Source) -> Drawn {
     let prior = source.number.is_multiple_of(2);
     if prior {
         let seen: Vec<_> = seen.model.iter().zip(&measured).map(|(&i, &at)| (model[i], at)).collect();
-        problem.prior = Some(rough(&mut source.stream(Part::Prior), &pose, &model, &seen, SHELL, SHIFT).1);
+        problem.prior = Some(prior_pose(&mut source.stream(Part::Prior), &pose, &model, &seen, GATE, SHIFT).1);
     }
     let order = shuffled(points.len(), &mut source.stream(Part::Order));
     problem.cloud = order.iter().map(|&k| micrometres(&points[k])).collect();
     let pairs = order.iter().enumerate().filter_map(|(j, &k)| Some([*seen.model.get(k)?, j])).collect();
-    let parameters = DrawnParameters {
+    let parameters = GeneratedParameters {
         n: Some(model.len()),
         m: Some(points.len()),
         visible: Some(seen.model.len()),
         best_wrong_symmetry: Some(seen.best_wrong),
         prior: Some(prior),
         absent: source.absent().then_some(true),
-        ..DrawnParameters::default()
+        ..GeneratedParameters::default()
     };
-    let truth = DrawnTruth::new(&problem, &pose, pairs, parameters);
-    Drawn { problem, truth }
+    let truth = GeneratedTruth::new(&problem, &pose, pairs, parameters);
+    Generated { problem, truth }
 }
 
 #[cfg(test)]

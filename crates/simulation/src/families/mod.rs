@@ -28,9 +28,9 @@ mod truth;
 
 use std::str::FromStr;
 
-pub use problem::{DrawnPrior, DrawnProblem};
+pub use problem::{GeneratedPrior, GeneratedProblem};
 pub use putative::PutativePairs;
-pub use truth::{DrawnParameters, DrawnTruth};
+pub use truth::{GeneratedParameters, GeneratedTruth};
 
 use crate::stream::{Purpose, Stream};
 
@@ -57,8 +57,13 @@ impl Family {
     /// All families, in order.
     pub const ALL: [Self; 7] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F, Self::G];
 
-    /// Its letter.
+    /// Its name.
     pub fn name(self) -> &'static str {
+        ["paper-scale", "site-scale", "no-prior", "putative", "lattice", "few-visible", "dense-clutter"][self as usize]
+    }
+
+    /// Its letter in `coherence-problem/1`.
+    pub fn letter(self) -> &'static str {
         ["a", "b", "c", "d", "e", "f", "g"][self as usize]
     }
 }
@@ -68,7 +73,10 @@ impl FromStr for Family {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|family| family.name() == name);
-        found.ok_or_else(|| format!("no family is called `{name}`; there are a, b, c, d, e, f and g"))
+        found.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("no family is called `{name}`; there are {names}")
+        })
     }
 }
 
@@ -84,14 +92,14 @@ pub enum Presence {
 
 /// A problem and its truth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drawn {
+pub struct Generated {
     /// What a method may see.
-    pub problem: DrawnProblem,
+    pub problem: GeneratedProblem,
     /// What only the judge may see.
-    pub truth: DrawnTruth,
+    pub truth: GeneratedTruth,
 }
 
-impl Drawn {
+impl Generated {
     /// The problem of this `number` in a family.
     pub fn new(family: Family, seed: u64, number: u64, presence: Presence) -> Self {
         let source = Source { family, seed, number, presence };
@@ -105,7 +113,7 @@ impl Drawn {
     /// The problem of this `number` among those of family d, with pairs of another kind: of one seed and number the object,
     /// its pose and the noise are the same whatever the share of wrong pairs.
     pub fn of_pairs(pairs: &PutativePairs, seed: u64, number: u64) -> Self {
-        putative::drawn(&Source { family: Family::D, seed, number, presence: Presence::Present }, pairs)
+        putative::generated(&Source { family: Family::D, seed, number, presence: Presence::Present }, pairs)
     }
 }
 

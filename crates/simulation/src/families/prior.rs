@@ -3,11 +3,11 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, Object, Point, Transform};
 
-use super::DrawnPrior;
+use super::GeneratedPrior;
 use crate::stream::Stream;
 
 /// Rough poses that are tried before the last is kept whatever it hides.
-const MOST_TRIES: usize = 1000;
+const MAX_TRIES: usize = 1000;
 
 /// A rotation uniform over all rotations. (Four normal numbers, normalised.)
 pub(super) fn rotation(stream: &mut Stream) -> UnitQuaternion<f64> {
@@ -36,28 +36,28 @@ pub(super) fn ahead(stream: &mut Stream, distance: f64) -> Transform<Camera, Obj
 /// A rough pose such that every point that was measured (`seen`: object frame, camera frame) lies in
 /// its shell: turned about the model's centre by up to 0.6 s over its radius, moved by up to `shift`·s
 /// along each camera axis, s the shell's half-size.
-pub(super) fn rough(
+pub(super) fn prior_pose(
     stream: &mut Stream,
     truth: &Transform<Camera, Object>,
     model: &[Vector3<f64>],
     seen: &[(Vector3<f64>, Vector3<f64>)],
-    shell: f64,
+    gate: f64,
     shift: f64,
-) -> (Transform<Camera, Object>, DrawnPrior) {
+) -> (Transform<Camera, Object>, GeneratedPrior) {
     let centre = model.iter().sum::<Vector3<f64>>() / model.len() as f64;
     let radius = model.iter().map(|at| (at - centre).norm()).fold(0.0, f64::max);
     let mut tries = 0;
     loop {
-        let turn = direction(stream) * stream.between(0.0, 0.6 * shell / radius);
+        let turn = direction(stream) * stream.between(0.0, 0.6 * gate / radius);
         let turned = UnitQuaternion::from_scaled_axis(turn) * truth.rotation();
-        let moved = (*truth * Point::from(centre)).coords + cube(stream, shift * shell);
-        let rough = Transform::new(turned, moved - turned * centre);
+        let moved = (*truth * Point::from(centre)).coords + cube(stream, shift * gate);
+        let prior_pose = Transform::new(turned, moved - turned * centre);
         tries += 1;
         let inside = |(at, measured): &(Vector3<f64>, Vector3<f64>)| {
-            ((rough * Point::from(*at)).coords - measured).amax() <= shell - 1e-6
+            ((prior_pose * Point::from(*at)).coords - measured).amax() <= gate - 1e-6
         };
-        if tries == MOST_TRIES || seen.iter().all(inside) {
-            return (rough, DrawnPrior { t_cam_obj: rough.rows(), shell_half_m: shell });
+        if tries == MAX_TRIES || seen.iter().all(inside) {
+            return (prior_pose, GeneratedPrior { t_cam_obj: prior_pose.rows(), shell_half_m: gate });
         }
     }
 }

@@ -9,7 +9,7 @@ use super::Source;
 
 /// A problem in the keys and the order of `coherence-problem/1`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DrawnProblem {
+pub struct GeneratedProblem {
     /// The format's name.
     pub format: &'static str,
     /// Family and number.
@@ -29,7 +29,7 @@ pub struct DrawnProblem {
     /// The distance tolerance Δ = 3√2 σ (m).
     pub delta: f64,
     /// What is known of the pose.
-    pub prior: Option<DrawnPrior>,
+    pub prior: Option<GeneratedPrior>,
     /// The only pairs to consider.
     pub putative: Option<Vec<[usize; 2]>>,
     /// Standard deviations along the camera's axes, where they differ (m).
@@ -39,7 +39,7 @@ pub struct DrawnProblem {
 
 /// The rough pose and how far it may be off.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DrawnPrior {
+pub struct GeneratedPrior {
     /// camera_from_object.
     #[serde(rename = "T_cam_obj")]
     pub t_cam_obj: [[f64; 4]; 4],
@@ -47,13 +47,13 @@ pub struct DrawnPrior {
     pub shell_half_m: f64,
 }
 
-impl DrawnProblem {
+impl GeneratedProblem {
     /// The frame of a problem: everything but model, cloud and what is known beforehand.
     pub(super) fn new(source: &Source, model: &[Vector3<f64>], sigma: f64) -> Self {
         Self {
             format: seafix_referencing::problem_file::FORMAT,
-            id: format!("{}{:03}", source.family.name(), source.number),
-            family: source.family.name(),
+            id: format!("{}{:03}", source.family.letter(), source.number),
+            family: source.family.letter(),
             seed_set: format!("seed-{}", source.seed),
             seed: source.number,
             model: model.iter().map(micrometres).collect(),
@@ -79,13 +79,13 @@ impl DrawnProblem {
             model: model.collect(),
             cloud: cloud.collect(),
             delta: self.delta,
-            prior: self.prior.as_ref().map(DrawnPrior::prior),
+            prior: self.prior.as_ref().map(GeneratedPrior::prior),
             putative: self.putative.as_ref().map(|pairs| pairs.iter().map(|&[i, j]| (i, j)).collect()),
         }
     }
 }
 
-impl DrawnPrior {
+impl GeneratedPrior {
     fn prior(&self) -> Prior {
         let matrix = Matrix4::from_fn(|row, column| self.t_cam_obj[row][column]);
         let camera_from_object =

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use seafix_geometry::{Point, Transform};
 
 use super::{
-    Drawn, DrawnParameters, DrawnProblem, DrawnTruth, Part, Source,
+    Generated, GeneratedParameters, GeneratedProblem, GeneratedTruth, Part, Source,
     boxes::shuffled,
     prior::{cube, direction, rotation},
     problem::micrometres,
@@ -42,13 +42,13 @@ pub struct PutativePairs {
     pub sigma: f64,
 }
 
-pub(super) fn draw(source: &Source) -> Drawn {
+pub(super) fn draw(source: &Source) -> Generated {
     let k = usize::try_from(source.number % 1_000_000).expect("it is below a million");
     let (pairs, outliers) = CELLS[k / A_CELL % CELLS.len()];
-    drawn(source, &PutativePairs { pairs, outliers, radius: [5.0, 1.0][k % 2], sigma: 0.01 })
+    generated(source, &PutativePairs { pairs, outliers, radius: [5.0, 1.0][k % 2], sigma: 0.01 })
 }
 
-pub(super) fn drawn(source: &Source, of: &PutativePairs) -> Drawn {
+pub(super) fn generated(source: &Source, of: &PutativePairs) -> Generated {
     let &PutativePairs { pairs: n, outliers: wrong, radius, sigma } = of;
     let mut stream = source.stream(Part::Model);
     let model: Vec<Vector3<f64>> = (0..n).map(|_| cube(&mut stream, 0.5)).collect();
@@ -64,16 +64,16 @@ pub(super) fn drawn(source: &Source, of: &PutativePairs) -> Drawn {
     for &i in &outliers {
         cloud[i] = pose.translation() + direction(&mut stream) * (radius * libm::cbrt(stream.unit()));
     }
-    let mut problem = DrawnProblem::new(source, &model, sigma);
+    let mut problem = GeneratedProblem::new(source, &model, sigma);
     problem.cloud = cloud.iter().map(micrometres).collect();
     problem.putative = Some((0..n).map(|i| [i, i]).collect());
-    let parameters = DrawnParameters {
+    let parameters = GeneratedParameters {
         pairs: Some(n),
         outliers: Some(wrong),
         radius: Some(radius),
         absent: source.absent().then_some(true),
-        ..DrawnParameters::default()
+        ..GeneratedParameters::default()
     };
-    let truth = DrawnTruth::new(&problem, &pose, order.iter().map(|&i| [i, i]).collect(), parameters);
-    Drawn { problem, truth }
+    let truth = GeneratedTruth::new(&problem, &pose, order.iter().map(|&i| [i, i]).collect(), parameters);
+    Generated { problem, truth }
 }

@@ -15,27 +15,27 @@ fn numbers(family: Family) -> Vec<u64> {
     }
 }
 
-fn all(presence: Presence) -> impl Iterator<Item = Drawn> {
+fn all(presence: Presence) -> impl Iterator<Item = Generated> {
     Family::ALL
         .into_iter()
-        .flat_map(move |family| numbers(family).into_iter().map(move |k| Drawn::new(family, 5, k, presence)))
+        .flat_map(move |family| numbers(family).into_iter().map(move |k| Generated::new(family, 5, k, presence)))
 }
 
 fn motion(rows: &[[f64; 4]; 4]) -> Transform<Camera, Object> {
     Transform::from_matrix(&Matrix4::from_fn(|i, k| rows[i][k])).unwrap()
 }
 
-fn placed(drawn: &Drawn, by: &[[f64; 4]; 4]) -> Vec<Vector3<f64>> {
+fn placed(generated: &Generated, by: &[[f64; 4]; 4]) -> Vec<Vector3<f64>> {
     let pose = motion(by);
-    drawn.problem.model.iter().map(|at| (pose * Point::from(*at)).coords).collect()
+    generated.problem.model.iter().map(|at| (pose * Point::from(*at)).coords).collect()
 }
 
 #[test]
 fn the_file_holds_the_problem() {
-    for drawn in all(Presence::Present).step_by(7).chain(all(Presence::Absent).step_by(11)) {
-        let text = serde_json::to_string(&drawn.problem).unwrap();
+    for generated in all(Presence::Present).step_by(7).chain(all(Presence::Absent).step_by(11)) {
+        let text = serde_json::to_string(&generated.problem).unwrap();
         let mut read = CoherenceProblem::parse(&text, Path::new("drawn.json")).unwrap();
-        let mut given = drawn.problem.problem();
+        let mut given = generated.problem.problem();
         // The reader may miss the last bit of seventeen digits.
         match (read.prior.take(), given.prior.take()) {
             (Some(read), Some(given)) => {
@@ -44,49 +44,49 @@ fn the_file_holds_the_problem() {
             }
             (read, given) => assert!(read.is_none() && given.is_none()),
         }
-        assert!(read == given, "{} is read as another problem", drawn.problem.id);
+        assert!(read == given, "{} is read as another problem", generated.problem.id);
     }
 }
 
 #[test]
 fn a_problem_is_a_function_of_seed_family_and_number() {
     for family in Family::ALL {
-        let drawn = |seed, number| Drawn::new(family, seed, number, Presence::Present);
-        assert_eq!(drawn(1, 2), drawn(1, 2));
-        assert_ne!(drawn(1, 2).problem.cloud, drawn(2, 2).problem.cloud);
-        assert_ne!(drawn(1, 2).problem.cloud, drawn(1, 3).problem.cloud);
+        let generated = |seed, number| Generated::new(family, seed, number, Presence::Present);
+        assert_eq!(generated(1, 2), generated(1, 2));
+        assert_ne!(generated(1, 2).problem.cloud, generated(2, 2).problem.cloud);
+        assert_ne!(generated(1, 2).problem.cloud, generated(1, 3).problem.cloud);
     }
 }
 
 #[test]
 fn true_pairs_are_where_the_pose_places_them_within_the_noise() {
     let (mut squares, mut terms) = (0.0, 0.0);
-    for drawn in all(Presence::Present) {
-        let at = placed(&drawn, &drawn.truth.t_cam_obj);
-        let problem = &drawn.problem;
-        for &[i, j] in &drawn.truth.pairs {
+    for generated in all(Presence::Present) {
+        let at = placed(&generated, &generated.truth.t_cam_obj);
+        let problem = &generated.problem;
+        for &[i, j] in &generated.truth.pairs {
             let sigma = problem.sigma_xyz.as_ref().map_or([problem.sigma; 3], |rows| rows[j]);
             let off: Vector3<f64> = (Vector3::from(problem.cloud[j]) - at[i]).component_div(&Vector3::from(sigma));
             assert!(off.amax() < 5.5, "{}: {off}", problem.id);
             squares += off.norm_squared();
             terms += 3.0;
         }
-        assert_eq!(drawn.truth.pose_defined, drawn.truth.pairs.len() >= 3, "{}", problem.id);
-        assert!(drawn.truth.max_coherent_true.is_none_or(|most| most <= drawn.truth.pairs.len()));
+        assert_eq!(generated.truth.pose_defined, generated.truth.pairs.len() >= 3, "{}", problem.id);
+        assert!(generated.truth.max_coherent_true.is_none_or(|max| max <= generated.truth.pairs.len()));
     }
     let ratio: f64 = squares / terms;
     assert!((ratio - 1.0).abs() < 0.03, "noise of {ratio} times the stated variance in {terms} terms");
 }
 
 #[test]
-fn visible_points_lie_in_their_shells() {
+fn visible_points_lie_in_their_gates() {
     let mut nearest_edge = 0f64;
-    for drawn in all(Presence::Present) {
-        let Some(prior) = &drawn.problem.prior else { continue };
-        let at = placed(&drawn, &prior.t_cam_obj);
-        for &[i, j] in &drawn.truth.pairs {
-            let off = (Vector3::from(drawn.problem.cloud[j]) - at[i]).amax() / prior.shell_half_m;
-            assert!(off <= 1.0, "{}: {off}", drawn.problem.id);
+    for generated in all(Presence::Present) {
+        let Some(prior) = &generated.problem.prior else { continue };
+        let at = placed(&generated, &prior.t_cam_obj);
+        for &[i, j] in &generated.truth.pairs {
+            let off = (Vector3::from(generated.problem.cloud[j]) - at[i]).amax() / prior.shell_half_m;
+            assert!(off <= 1.0, "{}: {off}", generated.problem.id);
             nearest_edge = nearest_edge.max(off);
         }
     }
@@ -94,9 +94,9 @@ fn visible_points_lie_in_their_shells() {
 }
 
 #[test]
-fn dense_clutter_lies_in_shells_and_other_clutter_keeps_off_hidden_points() {
-    for drawn in all(Presence::Present) {
-        let (problem, truth) = (&drawn.problem, &drawn.truth);
+fn dense_clutter_lies_in_gates_and_other_clutter_keeps_off_hidden_points() {
+    for generated in all(Presence::Present) {
+        let (problem, truth) = (&generated.problem, &generated.truth);
         let true_points: Vec<usize> = truth.pairs.iter().map(|pair| pair[1]).collect();
         let clutter = || {
             let clutter = problem.cloud.iter().enumerate().filter(|(j, _)| !true_points.contains(j));
@@ -104,7 +104,7 @@ fn dense_clutter_lies_in_shells_and_other_clutter_keeps_off_hidden_points() {
         };
         if problem.family == "g" || truth.params.dense == Some(true) {
             let prior = problem.prior.as_ref().unwrap();
-            let centres = placed(&drawn, &prior.t_cam_obj);
+            let centres = placed(&generated, &prior.t_cam_obj);
             let inside = |at: Vector3<f64>| centres.iter().any(|c| (at - c).amax() <= prior.shell_half_m + 1e-6);
             assert!(clutter().all(inside), "{}", problem.id);
         }
@@ -113,7 +113,7 @@ fn dense_clutter_lies_in_shells_and_other_clutter_keeps_off_hidden_points() {
             "f" => 0.18,
             _ => continue,
         };
-        let at = placed(&drawn, &truth.t_cam_obj);
+        let at = placed(&generated, &truth.t_cam_obj);
         let hidden: Vec<_> = (0..at.len()).filter(|i| truth.pairs.iter().all(|pair| pair[0] != *i)).collect();
         assert!(clutter().all(|c| hidden.iter().all(|&i| (c - at[i]).norm() >= clear - 1e-5)), "{}", problem.id);
     }

@@ -4,14 +4,14 @@ use seafix_geometry::{Camera, Object, Transform};
 use seafix_referencing::{Correspondence, Kabsch, Observations, Solver, problem_file::CoherenceProblem, rms_apart};
 use serde::Serialize;
 
-use super::DrawnProblem;
+use super::GeneratedProblem;
 
 /// From this many true pairs on, the largest coherent set among them is not computed.
 const MANY_PAIRS: usize = 100;
 
 /// The truth of a problem, for its judge alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DrawnTruth {
+pub struct GeneratedTruth {
     /// Family and number.
     pub id: String,
     /// camera_from_object; of an absent object, where the clutter about it stands.
@@ -29,12 +29,12 @@ pub struct DrawnTruth {
     /// The largest coherent set among the true pairs; `None` of 100 pairs or more.
     pub max_coherent_true: Option<usize>,
     /// What the family fixed or drew.
-    pub params: DrawnParameters,
+    pub params: GeneratedParameters,
 }
 
 /// What a family fixed or drew; a family has some of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct DrawnParameters {
+pub struct GeneratedParameters {
     /// Model points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub n: Option<usize>,
@@ -45,8 +45,8 @@ pub struct DrawnParameters {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub visible: Option<usize>,
     /// Half-size of the shells (m).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shell: Option<f64>,
+    #[serde(rename = "shell", skip_serializing_if = "Option::is_none")]
+    pub gate: Option<f64>,
     /// Whether all clutter lies in shells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dense: Option<bool>,
@@ -76,27 +76,27 @@ pub struct DrawnParameters {
     pub absent: Option<bool>,
 }
 
-impl DrawnTruth {
+impl GeneratedTruth {
     pub(super) fn new(
-        drawn: &DrawnProblem,
+        generated: &GeneratedProblem,
         camera_from_object: &Transform<Camera, Object>,
         mut pairs: Vec<[usize; 2]>,
-        params: DrawnParameters,
+        params: GeneratedParameters,
     ) -> Self {
         pairs.sort_unstable();
-        let problem = drawn.problem();
+        let problem = generated.problem();
         let correspondences: Vec<Correspondence> =
             pairs.iter().map(|&[model, cloud]| Correspondence { model, cloud }).collect();
         let data = Observations::of(&correspondences, &problem.model, &problem.cloud, None);
         let ideal = Kabsch::default().solve(&data).ok();
         let off = |ideal: &Transform<Object, Camera>| rms_apart(&problem.model, ideal, &camera_from_object.inverse());
         Self {
-            id: drawn.id.clone(),
+            id: generated.id.clone(),
             t_cam_obj: camera_from_object.rows(),
             pose_defined: ideal.is_some(),
             ideal_t_cam_obj: ideal.map(|pose| pose.inverse().rows()),
             ideal_tre_rms: ideal.as_ref().map(off),
-            max_coherent_true: (pairs.len() < MANY_PAIRS).then(|| most_coherent(&problem, &correspondences)),
+            max_coherent_true: (pairs.len() < MANY_PAIRS).then(|| max_coherent(&problem, &correspondences)),
             pairs,
             params,
         }
@@ -104,7 +104,7 @@ impl DrawnTruth {
 }
 
 /// The size of the largest coherent set among one-to-one pairs nearly all of which agree.
-fn most_coherent(problem: &CoherenceProblem, pairs: &[Correspondence]) -> usize {
+fn max_coherent(problem: &CoherenceProblem, pairs: &[Correspondence]) -> usize {
     let agree = |a: Correspondence, b: Correspondence| {
         let model = problem.model[a.model].at.distance(&problem.model[b.model].at);
         let cloud = problem.cloud[a.cloud].position.at.distance(&problem.cloud[b.cloud].position.at);

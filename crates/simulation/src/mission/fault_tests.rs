@@ -3,7 +3,7 @@
 use seafix_vision::{Image, Threads};
 
 use super::{Mission, PlannedMission, RigPlan};
-use crate::sensors::{Device, DeviceFault, FaultKind};
+use crate::sensors::{DeviceFault, FaultKind, FaultyDevice};
 
 /// Twelve frames a fifth of a second apart; the fault acts from the fifth to the tenth.
 fn planned(faults: Vec<DeviceFault>) -> PlannedMission {
@@ -20,11 +20,11 @@ fn images(plan: &PlannedMission) -> Vec<(Image, Image)> {
 }
 
 fn failing(kind: FaultKind, amount: f64) -> Vec<(Image, Image)> {
-    images(&planned(vec![DeviceFault { device: Device::Images, kind, from: 3.95, to: 4.95, amount }]))
+    images(&planned(vec![DeviceFault { device: FaultyDevice::Images, kind, from: 3.95, to: 4.95, amount }]))
 }
 
 #[test]
-fn cameras_fail_as_told() {
+fn cameras_fail_as_reported() {
     let sound = images(&planned(Vec::new()));
     let black = |image: &Image| image.pixels().iter().all(|grey| *grey == 0.0);
     for (kind, amount) in [
@@ -76,7 +76,8 @@ fn cameras_fail_as_told() {
 #[test]
 fn the_truth_does_not_fail() {
     // Stamps, poses and what is visible stay those of the instant: a judge must not fail with the device.
-    let fault = DeviceFault { device: Device::Images, kind: FaultKind::Delayed, from: 0.0, to: 99.0, amount: 0.4 };
+    let fault =
+        DeviceFault { device: FaultyDevice::Images, kind: FaultKind::Delayed, from: 0.0, to: 99.0, amount: 0.4 };
     let (sound, failed) = (planned(Vec::new()), planned(vec![fault]));
     for index in 0..12 {
         let (a, b) = (sound.instant(index), failed.instant(index));
@@ -87,7 +88,7 @@ fn the_truth_does_not_fail() {
 #[test]
 fn points_fail_as_images_do() {
     let points = |kind, amount| {
-        let faults = vec![DeviceFault { device: Device::Images, kind, from: 3.95, to: 4.95, amount }];
+        let faults = vec![DeviceFault { device: FaultyDevice::Images, kind, from: 3.95, to: 4.95, amount }];
         let plan = planned(faults);
         (0..12).map(|k| plan.instant(k).points()).collect::<Vec<_>>()
     };

@@ -7,12 +7,12 @@ use seafix_geometry::{
 };
 use seafix_vision::{Image, Threads};
 
-use super::{PlannedMission, PriorKind, glance::Glance};
+use super::{PlannedMission, PriorKind, capture::CaptureState};
 use crate::{
     dive::VisiblePoint,
-    draw::{Exposure, Rolling, Shot},
-    field::FieldPoint,
-    sensors::Rough,
+    render::{Exposure, Rolling, Shot},
+    scene::ScenePoint,
+    sensors::SensorPrior,
     stream::{Purpose, Stream},
 };
 
@@ -43,8 +43,8 @@ impl<'a> Instant<'a> {
     pub(super) fn new(mission: &'a PlannedMission, index: usize, time: f64) -> Self {
         let world_from_camera = mission.camera(time);
         let prior = match mission.settings.prior {
-            PriorKind::Drawn => Some(rough(mission, index, &world_from_camera)),
-            PriorKind::Sensors => mission.reckoned(time).map(|rough| from_sensors(mission, &rough)),
+            PriorKind::Sampled => Some(prior_pose(mission, index, &world_from_camera)),
+            PriorKind::Sensors => mission.integrated(time).map(|prior_pose| from_sensors(mission, &prior_pose)),
         };
         let stamp_ns = mission.stamp(time);
         let empty = InstantTruth { world_from_camera, visible: Vec::new() };
@@ -60,22 +60,22 @@ impl<'a> Instant<'a> {
 
     /// The left and the right image: a plain function of the instant, whoever works.
     pub fn render(&self, threads: Threads) -> (Image, Image, Exposure) {
-        match self.glance() {
-            Glance::Here => self.sound(threads),
-            Glance::Earlier(then) => then.sound(threads),
-            Glance::Swapped => {
+        match self.capture() {
+            CaptureState::Current => self.sound(threads),
+            CaptureState::Earlier(then) => then.sound(threads),
+            CaptureState::Swapped => {
                 let (left, right, exposure) = self.sound(threads);
                 (right, left, exposure)
             }
-            Glance::Dark => self.without_light(&mut || 0.0),
-            Glance::Garbage(mut stream) => self.without_light(&mut || (stream.bits() >> 56) as f32),
+            CaptureState::Dark => self.without_light(&mut || 0.0),
+            CaptureState::Garbage(mut stream) => self.without_light(&mut || (stream.bits() >> 56) as f32),
         }
     }
 
     /// The images of cameras that work.
     fn sound(&self, threads: Threads) -> (Image, Image, Exposure) {
         let shot = self.shot();
-        self.mission.with_memory(threads, |work| self.mission.studio.render(&self.mission.field, &shot, work))
+        self.mission.with_memory(threads, |work| self.mission.studio.render(&self.mission.scene, &shot, work))
     }
 
     /// Images of these levels.
@@ -109,15 +109,15 @@ impl<'a> Instant<'a> {
     }
 
     /// The pixels of a feature point that both cameras see in their images.
-    fn see(&self, shot: &Shot, point: &FieldPoint) -> Option<StereoPixels> {
-        let pixels = self.look(shot, &Point::from(point.at))?;
-        let field = &self.mission.field;
+    fn see(&self, shot: &Shot, point: &ScenePoint) -> Option<StereoPixels> {
+        let pixels = self.project_visible(shot, &Point::from(point.at))?;
+        let scene = &self.mission.scene;
         let seen = [shot.world_from_left.translation(), shot.world_from_right.translation()];
-        seen.iter().all(|from| field.sees(from, point)).then_some(pixels)
+        seen.iter().all(|from| scene.sees(from, point)).then_some(pixels)
     }
 
     /// Where both cameras would see a place, within their images.
-    fn look(&self, shot: &Shot, place: &Point<World>) -> Option<StereoPixels> {
+    fn project_visible(&self, shot: &Shot, place: &Point<World>) -> Option<StereoPixels> {
         let studio = &self.mission.studio;
         let camera = self.mission.cameras.lens.camera();
         let readout = self.mission.settings.imager.readout_ms * 1e-3;
@@ -133,7 +133,7 @@ impl<'a> Instant<'a> {
     fn visible(&self) -> Vec<VisiblePoint> {
         let shot = self.shot();
         let mut all = Vec::new();
-        for (object, known) in self.mission.field.objects.iter().enumerate() {
+        for (object, known) in self.mission.scene.objects.iter().enumerate() {
             for (point, place) in known.points.iter().enumerate() {
                 all.extend(self.see(&shot, place).map(|pixels| VisiblePoint { object, point, pixels }));
             }
@@ -144,12 +144,12 @@ impl<'a> Instant<'a> {
     /// The same view as measured points, without an image: visible feature points with the noise of the
     /// settings, and clutter, triangulated with the told rig, in an order that tells nothing.
     pub fn points(&self) -> Vec<MeasuredPoint> {
-        match self.glance() {
-            Glance::Here => self.sound_points(),
-            Glance::Earlier(then) => then.sound_points(),
+        match self.capture() {
+            CaptureState::Current => self.sound_points(),
+            CaptureState::Earlier(then) => then.sound_points(),
             // Nothing before the cameras has a point to the right in the right image.
-            Glance::Dark | Glance::Swapped => Vec::new(),
-            Glance::Garbage(stream) => self.any_points(stream),
+            CaptureState::Dark | CaptureState::Swapped => Vec::new(),
+            CaptureState::Garbage(stream) => self.any_points(stream),
         }
     }
 
@@ -170,7 +170,7 @@ impl<'a> Instant<'a> {
     fn triangulated(&self, seen: StereoPixels) -> Option<MeasuredPoint> {
         // A covariance of zero would claim what no camera can know.
         let pixels = UncertainPixels::independent(seen, self.mission.settings.points.sigma_px.max(1e-3));
-        let found = self.mission.cameras.told.triangulate(&pixels).ok()?;
+        let found = self.mission.cameras.nominal.triangulate(&pixels).ok()?;
         let position = UncertainPoint { at: found.point, covariance: found.covariance };
         Some(MeasuredPoint { position, pixels: Some(pixels) })
     }
@@ -192,11 +192,11 @@ impl<'a> Instant<'a> {
             let pixel = Pixel { u: stream.between(0.0, width), v: stream.between(0.0, height) };
             let Some(ray) = mission.cameras.lens.ray(&pixel) else { continue };
             let from = (shot.world_from_left * Point::<Camera>::from(ray.from)).coords;
-            let Some(place) = mission.field.seen(&from, &(shot.world_from_left.rotation() * ray.along)) else {
+            let Some(place) = mission.scene.seen(&from, &(shot.world_from_left.rotation() * ray.along)) else {
                 continue;
             };
-            if mission.field.clear(&shot.world_from_right.translation(), &place.coords) {
-                pixels.extend(self.look(&shot, &place));
+            if mission.scene.clear(&shot.world_from_right.translation(), &place.coords) {
+                pixels.extend(self.project_visible(&shot, &place));
             }
         }
         for k in (1..pixels.len()).rev() {
@@ -216,7 +216,7 @@ impl<'a> Instant<'a> {
 
 /// A drawn rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the position's
 /// along the world's.
-fn rough(
+fn prior_pose(
     mission: &PlannedMission,
     index: usize,
     truth: &Transform<World, Camera>,
@@ -232,11 +232,14 @@ fn rough(
 }
 
 /// The rough pose of the camera from that of the vehicle.
-fn from_sensors(mission: &PlannedMission, rough: &Rough) -> (Transform<World, Camera>, Covariance6<World, Camera>) {
-    let world_from_camera = rough.world_from_body * mission.body_from_camera;
+fn from_sensors(
+    mission: &PlannedMission,
+    prior_pose: &SensorPrior,
+) -> (Transform<World, Camera>, Covariance6<World, Camera>) {
+    let world_from_camera = prior_pose.world_from_body * mission.body_from_camera;
     // ρ lives in the camera's frame.
     let turn = world_from_camera.rotation_matrix();
-    let mut covariance = Matrix6::from_diagonal_element(rough.attitude * rough.attitude);
-    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&(turn.transpose() * rough.position * turn));
+    let mut covariance = Matrix6::from_diagonal_element(prior_pose.attitude * prior_pose.attitude);
+    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&(turn.transpose() * prior_pose.position * turn));
     (world_from_camera, Covariance6::new(covariance))
 }

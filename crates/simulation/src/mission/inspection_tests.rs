@@ -4,11 +4,11 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use seafix_geometry::{Point, World};
-use seafix_referencing::Shell;
+use seafix_referencing::BoundingBox;
 
 use super::*;
 use crate::{
-    field::BUILT_IN,
+    scene::BUILT_IN,
     vehicle::{Route, RouteKind, Vehicle, VehicleKind},
 };
 
@@ -37,7 +37,7 @@ fn planned(mission: &Mission) -> PlannedMission {
 struct Written(std::path::PathBuf);
 
 impl Written {
-    fn new(name: &str, points: &[[f64; 3]], interest: [f64; 3], bed: f64, bodies: &str) -> Self {
+    fn new(name: &str, points: &[[f64; 3]], interest: [f64; 3], seabed: f64, bodies: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("seafix-inspection-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let base = [points[0], points[1], points[2]];
@@ -51,7 +51,7 @@ impl Written {
         site += &format!("[[object.interest]]\nid = \"gauge\"\nat = {interest:?}\nnormal = [0.0, 0.0, -1.0]\n");
         let geometry = format!(
             "format = \"seafix-geometry/1\"\nname = \"{name}\"\n\
-             [bed]\ndepth = {bed:?}\nrelief = 0.0\nalbedo = 0.25\ntexture = \"concrete\"\nrocks = 0\n\
+             [bed]\ndepth = {seabed:?}\nrelief = 0.0\nalbedo = 0.25\ntexture = \"concrete\"\nrocks = 0\n\
              [[material]]\nname = \"steel\"\nalbedo = 0.5\ntexture = \"paint\"\n[[object]]\nid = \"{name}\"\n{bodies}"
         );
         std::fs::write(folder.join(format!("{name}.site.toml")), site).unwrap();
@@ -76,11 +76,11 @@ fn looked_at(mission: &Mission) -> usize {
     let (site, route) = (&mission.site, &mission.route);
     let plan = planned(mission);
     let last = plan.times[plan.times.len() - 1];
-    let shells: Vec<_> = plan
-        .field
+    let gates: Vec<_> = plan
+        .scene
         .objects
         .iter()
-        .map(|object| Shell::<World>::around(object.points.iter().map(|point| Point::from(point.at))).unwrap())
+        .map(|object| BoundingBox::<World>::around(object.points.iter().map(|point| Point::from(point.at))).unwrap())
         .collect();
     // The planner looks every 0.1 m: between two such places a straight way comes nearer by the sagitta at most.
     let clearance = route.clearance - 0.1 * 0.1 / 8.0 / route.clearance;
@@ -89,9 +89,9 @@ fn looked_at(mission: &Mission) -> usize {
     for k in 0..=(last / 0.05) as usize {
         let time = k as f64 * 0.05;
         let camera = plan.camera(time);
-        for eye in [Vector3::zeros(), right] {
-            let at = Point::from(camera.rotation() * eye + camera.translation());
-            assert!(!shells.iter().any(|s| s.grown_contains(&at, clearance)), "{site} {time}: {at:?}");
+        for origin in [Vector3::zeros(), right] {
+            let at = Point::from(camera.rotation() * origin + camera.translation());
+            assert!(!gates.iter().any(|s| s.grown_contains(&at, clearance)), "{site} {time}: {at:?}");
         }
         cameras.push(camera);
     }
@@ -105,7 +105,7 @@ fn looked_at(mission: &Mission) -> usize {
                 let to = at.coords + (camera.translation() - at.coords).normalize() * 0.02;
                 (seen.coords.norm() - route.stand_off).abs() < 1e-9
                     && plan.rig().sees(&seen, 0.0).is_some()
-                    && plan.field.clear(&camera.translation(), &to)
+                    && plan.scene.clear(&camera.translation(), &to)
             });
             // Looks are 0.05 s apart: one at either end may be missing.
             let seen = seen.count() as f64 * 0.05;
@@ -121,7 +121,7 @@ fn looked_at(mission: &Mission) -> usize {
 /// Seen to fail when views out of the images count, when a corner of a leg is not rested at, and, under the roof, when
 /// views count that something hides.
 #[test]
-fn every_point_is_looked_at_and_no_shell_is_touched() {
+fn every_point_is_examined_and_no_gate_is_touched() {
     for (site, _) in BUILT_IN {
         let route = Route { altitude: if site == "karmin2" { 2.5 } else { 3.5 }, ..Route::default() };
         let points = looked_at(&mission(site, route));
@@ -147,7 +147,7 @@ fn every_point_is_looked_at_and_no_shell_is_touched() {
 ///
 /// Seen to fail when only bodies are kept clear of.
 #[test]
-fn a_shell_is_not_entered_where_it_is_empty() {
+fn a_gate_is_not_entered_where_it_is_empty() {
     let mut points = vec![[0.0, 0.0, 0.0], [0.0, -0.4, 0.0], [0.4, 0.0, 0.0]];
     let mut bodies =
         "[[object.box]]\ncentre = [0.2, -0.2, 0.05]\nsize = [0.4, 0.4, 0.1]\nmaterial = \"steel\"\n".to_owned();
@@ -166,7 +166,7 @@ fn a_shell_is_not_entered_where_it_is_empty() {
 
 /// What cannot be looked at is refused with its place and a remedy; so is a site or an object without points of interest.
 #[test]
-fn what_cannot_be_looked_at_is_refused() {
+fn what_cannot_be_examined_is_refused() {
     let said = |mission: &Mission| mission.plan(3, 0, Path::new("")).unwrap_err()[0].to_string();
     let far = said(&mission("drill-centre", Route { clearance: 3.0, ..Route::default() }));
     assert!(far.contains("no clear view of `tree-a/valve-1` at north "), "{far}");
@@ -179,7 +179,7 @@ fn what_cannot_be_looked_at_is_refused() {
     let unknown = said(&mission("drill-centre", Route { object: "tree-z".into(), ..Route::default() }));
     assert!(unknown.contains("route.object = `tree-z`; give one of "), "{unknown}");
     // One object alone is a shorter way.
-    let whole = planned(&mission("drill-centre", Route::default()));
+    let full = planned(&mission("drill-centre", Route::default()));
     let one = planned(&mission("drill-centre", Route { object: "plet".into(), ..Route::default() }));
-    assert!(one.times.last() < whole.times.last());
+    assert!(one.times.last() < full.times.last());
 }

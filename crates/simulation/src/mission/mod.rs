@@ -1,7 +1,7 @@
 //! A mission: one vehicle's passage over one site, with everything that may go wrong as a number.
 
+mod capture;
 mod frame;
-mod glance;
 mod plan;
 mod rig;
 mod settings;

@@ -9,13 +9,13 @@ use seafix_vision::{Threads, Workspace};
 
 use super::{Instant, Mission, rig::Cameras};
 use crate::{
-    draw::{Eye, Looks, Studio},
-    field::{Changes, Field, SitePlan},
     optics::Lamp,
-    sensors::{Navigation, Readings, Rough},
+    render::{RenderCamera, Studio, SurfaceTextures},
+    scene::{Changes, Scene, SitePlan},
+    sensors::{Readings, SensorNavigation, SensorPrior},
     stream::{Purpose, Stream},
     survey::SurveyErrors,
-    vehicle::{Looker, RouteKind, Track, Way},
+    vehicle::{Looker, PlannedRoute, RouteKind, Track},
 };
 
 /// The first stamp: some time in 2023, so that stamps look like those of a real log.
@@ -31,7 +31,7 @@ pub struct PlannedMission {
     pub(super) settings: Mission,
     pub(super) seed: u64,
     pub(super) dive: u64,
-    pub(super) field: Field,
+    pub(super) scene: Scene,
     pub(super) cameras: Cameras,
     pub(super) studio: Studio,
     pub(super) track: Track,
@@ -39,8 +39,8 @@ pub struct PlannedMission {
     drifts: Vec<Vector3<f64>>,
     pub(super) body_from_camera: Transform<Body, Camera>,
     /// What the sensors say, and where the route leads.
-    navigation: Navigation,
-    way: Way,
+    navigation: SensorNavigation,
+    route: PlannedRoute,
     pub(super) times: Vec<f64>,
     /// Memories of rendering, one for each that renders at once.
     memories: Mutex<Vec<Workspace>>,
@@ -49,26 +49,26 @@ pub struct PlannedMission {
 impl PlannedMission {
     pub(super) fn new(settings: &Mission, plan: &SitePlan, seed: u64, dive: u64) -> Result<Self, String> {
         let errors = SurveyErrors { model: settings.model_sigma, survey: settings.survey_sigma };
-        let field = Field::new(plan, &settings.changes, errors, seed);
+        let scene = Scene::new(plan, &settings.changes, errors, seed);
         let cameras = settings.rig.build()?;
         let body_from_camera = mount(settings.rig.ahead_deg, settings.rig.at);
         let studio = build_studio(settings, &cameras, seed, dive);
         let looker = Looker {
-            rig: &cameras.told,
+            rig: &cameras.nominal,
             body_from_camera,
             parts: parts(&cameras, &studio).into_iter().map(|(_, at)| at).collect(),
         };
         // An inspection is planned by the site as it was built, which the changes of the field are not known to.
         let built = (settings.route.kind == RouteKind::Inspection).then(|| {
             let exact = SurveyErrors { model: 0.0, survey: 0.0 };
-            Field::new(plan, &Changes::default(), exact, seed)
+            Scene::new(plan, &Changes::default(), exact, seed)
         });
-        let way = Way::new(&settings.route, built.as_ref().unwrap_or(&field), &looker)?;
+        let route = PlannedRoute::new(&settings.route, built.as_ref().unwrap_or(&scene), &looker)?;
         let last = settings.start
             + if settings.rate > 0.0 {
                 (settings.frames - 1) as f64 / settings.rate
             } else {
-                way.length() / settings.route.speed
+                route.length() / settings.route.speed
             };
         if last > 7200.0 {
             return Err(format!(
@@ -86,21 +86,22 @@ impl PlannedMission {
             .collect();
         let place = body_from_camera.translation();
         let (track, drifts) =
-            settings.vehicle.travel(&way, last + 0.2, &place, &field.bed, &settings.current, (seed, dive));
+            settings.vehicle.travel(&route, last + 0.2, &place, &scene.seabed, &settings.current, (seed, dive));
         let until = last + 0.1;
-        let navigation = Navigation::new(&settings.sensors, &settings.faults, &track, &field, until, (seed, dive));
+        let navigation =
+            SensorNavigation::new(&settings.sensors, &settings.faults, &track, &scene, until, (seed, dive));
         let planned = Self {
             settings: settings.clone(),
             seed,
             dive,
-            field,
+            scene,
             cameras,
             studio,
             track,
             drifts,
             body_from_camera,
             navigation,
-            way,
+            route,
             times,
             memories: Mutex::new(Vec::new()),
         };
@@ -110,12 +111,12 @@ impl PlannedMission {
 
     /// The site as a method knows it.
     pub fn site(&self) -> &Site {
-        &self.field.told
+        &self.scene.nominal
     }
 
     /// The rig that a method is told.
     pub fn rig(&self) -> &StereoRig {
-        &self.cameras.told
+        &self.cameras.nominal
     }
 
     /// The settings it was planned with.
@@ -125,7 +126,7 @@ impl PlannedMission {
 
     /// Truth: where each object of the told site is.
     pub fn world_from_object(&self) -> &[Transform<World, Object>] {
-        &self.field.world_from_object
+        &self.scene.world_from_object
     }
 
     /// Where the left camera sits in the vehicle.
@@ -139,7 +140,7 @@ impl PlannedMission {
     }
 
     /// The rough pose of the vehicle that the sensors give at a time (s).
-    pub(super) fn reckoned(&self, time: f64) -> Option<Rough> {
+    pub(super) fn integrated(&self, time: f64) -> Option<SensorPrior> {
         self.navigation.at(time)
     }
 
@@ -151,18 +152,18 @@ impl PlannedMission {
     /// The places that the route leads through: north, east, height above the mean bed (m), as
     /// [`Route::waypoints`](crate::vehicle::Route::waypoints) has them.
     pub fn waypoints(&self) -> Vec<[f64; 3]> {
-        let depth = self.field.bed.depth();
-        self.way.places().iter().map(|p| [p.x, p.y, depth - p.z]).collect()
+        let depth = self.scene.seabed.depth();
+        self.route.places().iter().map(|p| [p.x, p.y, depth - p.z]).collect()
     }
 
     /// Where the feature points truly are, in the order of the site: object, point, place in the world (m).
     ///
     /// The site has them as they were surveyed, in the frames of their objects.
     pub fn true_points(&self) -> impl Iterator<Item = (&str, &str, [f64; 3])> {
-        let objects = self.field.told.objects.iter().zip(&self.field.objects);
-        objects.flat_map(|(told, object)| {
-            let points = told.points.iter().zip(&object.points);
-            points.map(|(point, truth)| (&told.id[..], &point.id[..], truth.at.into()))
+        let objects = self.scene.nominal.objects.iter().zip(&self.scene.objects);
+        objects.flat_map(|(nominal, object)| {
+            let points = nominal.points.iter().zip(&object.points);
+            points.map(|(point, truth)| (&nominal.id[..], &point.id[..], truth.at.into()))
         })
     }
 
@@ -226,8 +227,8 @@ impl PlannedMission {
     }
 
     /// Whether the vehicle is near the place where its route has it: thrusters too weak for the current or for the speed let it go.
-    fn on_its_way(&self, time: f64) -> Result<(), String> {
-        let (camera, goal) = (self.camera(time).translation(), self.way.at(time).at);
+    fn in_transit(&self, time: f64) -> Result<(), String> {
+        let (camera, goal) = (self.camera(time).translation(), self.route.at(time).at);
         let off = (camera - goal).norm();
         // Written so that a NaN is refused too.
         if off <= STRAY {
@@ -253,27 +254,27 @@ impl PlannedMission {
         for k in 0..=(last / LOOK).ceil() as usize {
             let time = k as f64 * LOOK;
             let now = places(time);
-            self.on_its_way(time)?;
+            self.in_transit(time)?;
             for (i, place) in now.iter().enumerate() {
                 // In the middle of a large body no surface is near.
                 let near =
-                    self.field.distance(place, clearance.max(1e-6)).is_some() || (k == 0 && self.field.encloses(place));
+                    self.scene.distance(place, clearance.max(1e-6)).is_some() || (k == 0 && self.scene.encloses(place));
                 // Below the bed, or through a thin body between two looks.
                 let along = before.as_ref().map(|all| place - all[i]);
                 let through = along.zip(before.as_ref()).is_some_and(|(along, all)| {
-                    along.norm() > 0.0 && self.field.bvh.hit(&self.field.mesh.triangles, &all[i], &along, 1.0).is_some()
+                    along.norm() > 0.0 && self.scene.bvh.hit(&self.scene.mesh.triangles, &all[i], &along, 1.0).is_some()
                 });
                 if near || through {
                     let nearest = self
-                        .field
+                        .scene
                         .objects
                         .iter()
-                        .zip(&self.field.told.objects)
+                        .zip(&self.scene.nominal.objects)
                         .min_by(|a, b| {
-                            let to = |o: &crate::field::FieldObject| (o.centroid() - place).norm();
+                            let to = |o: &crate::scene::SceneObject| (o.centroid() - place).norm();
                             to(a.0).total_cmp(&to(b.0))
                         })
-                        .map_or("nothing", |(_, told)| told.id.as_str());
+                        .map_or("nothing", |(_, nominal)| nominal.id.as_str());
                     return Err(format!(
                         "route: {} comes within {clearance} m of something near `{nearest}` after {time:.1} s, at \
                          north {:.2}, east {:.2}, depth {:.2} m; raise route.altitude or lower clearance",
@@ -312,19 +313,19 @@ fn build_studio(settings: &Mission, cameras: &Cameras, seed: u64, dive: u64) -> 
     };
     let there = lamps.iter().map(|l| Lamp { at: place(l.at), aim: place(l.aim), ..l.clone() }).collect();
     let water = settings.water.clone();
-    let left = Eye::new(cameras.lens.clone(), lamps, &water);
-    let right = Eye::new(cameras.lens.clone(), there, &water);
+    let left = RenderCamera::new(cameras.lens.clone(), lamps, &water);
+    let right = RenderCamera::new(cameras.lens.clone(), there, &water);
     let bits = |purpose| Stream::new(seed, dive, 0, purpose).bits() as u32;
     let texture = Stream::new(seed, 0, 0, Purpose::Texture).bits() as u32;
-    let looks = Looks::shared(texture);
+    let textures = SurfaceTextures::shared(texture);
     Studio::new(
         left,
         right,
         water,
         settings.imager.clone(),
-        looks,
+        textures,
         settings.shadows,
-        bits(Purpose::Device),
+        bits(Purpose::FaultyDevice),
         bits(Purpose::Snow),
     )
 }

@@ -80,7 +80,7 @@ pub struct CalibrationError {
 pub(crate) struct Cameras {
     pub(crate) lens: Lens,
     pub(crate) right_from_left: Transform<RightCamera, Camera>,
-    pub(crate) told: StereoRig,
+    pub(crate) nominal: StereoRig,
 }
 
 impl RigPlan {
@@ -137,11 +137,11 @@ impl RigPlan {
         let angle = lens.half_diagonal().to_degrees();
         in_range(!flat || angle < 80.0, "rig.focal", format!("{focal} ({angle:.1} degrees)"), "less than 80 degrees")?;
         let right_from_left = Transform::new(UnitQuaternion::identity(), Vector3::new(-self.baseline, 0.0, 0.0));
-        let told = self.told(&lens, &right_from_left)?;
-        Ok(Cameras { lens, right_from_left, told })
+        let nominal = self.nominal(&lens, &right_from_left)?;
+        Ok(Cameras { lens, right_from_left, nominal })
     }
 
-    fn told(&self, lens: &Lens, right_from_left: &Transform<RightCamera, Camera>) -> Result<StereoRig, String> {
+    fn nominal(&self, lens: &Lens, right_from_left: &Transform<RightCamera, Camera>) -> Result<StereoRig, String> {
         let bad = |error: &dyn std::fmt::Display| format!("rig: {error}");
         let exact = lens.calibrated(CALIBRATION_RANGE).map_err(|error| bad(&error))?;
         let error = &self.error;
@@ -164,25 +164,25 @@ mod tests {
     use seafix_geometry::Point;
 
     #[test]
-    fn without_errors_the_told_rig_is_the_true_one() {
+    fn without_errors_the_reported_rig_is_the_true_one() {
         let cameras = RigPlan { distortion: vec![-0.1, 0.02, 0.0, 0.0], ..RigPlan::default() }.build().unwrap();
-        assert_eq!(cameras.told.left(), cameras.lens.camera());
-        assert_eq!(cameras.told.right_from_left(), &cameras.right_from_left);
-        assert_eq!(cameras.told.baseline(), 0.25);
+        assert_eq!(cameras.nominal.left(), cameras.lens.camera());
+        assert_eq!(cameras.nominal.right_from_left(), &cameras.right_from_left);
+        assert_eq!(cameras.nominal.baseline(), 0.25);
     }
 
     #[test]
-    fn calibration_errors_show_as_the_geometry_says() {
-        let told = |error| RigPlan { error, ..RigPlan::default() }.build().unwrap().told;
-        let truth = told(CalibrationError::default());
+    fn calibration_errors_show_as_the_geometry_states() {
+        let nominal = |error| RigPlan { error, ..RigPlan::default() }.build().unwrap().nominal;
+        let truth = nominal(CalibrationError::default());
         let place = Point::<Camera>::new(0.125, 0.0, 3.0);
         let v = |rig: &StereoRig| rig.project(&place).unwrap().right;
         // A pitch of 0.01° is 0.087 px of vertical disparity in the middle; a vergence is as much of disparity.
-        let pitched = told(CalibrationError { turn_deg: [0.01, 0.0, 0.0], ..CalibrationError::default() });
+        let pitched = nominal(CalibrationError { turn_deg: [0.01, 0.0, 0.0], ..CalibrationError::default() });
         assert!(((v(&pitched).v - v(&truth).v).abs() - 0.0873).abs() < 1e-3);
-        let verged = told(CalibrationError { turn_deg: [0.0, 0.01, 0.0], ..CalibrationError::default() });
+        let verged = nominal(CalibrationError { turn_deg: [0.0, 0.01, 0.0], ..CalibrationError::default() });
         assert!(((v(&verged).u - v(&truth).u).abs() - 0.0873).abs() < 1e-3);
-        assert_eq!(told(CalibrationError { baseline: 0.001, ..CalibrationError::default() }).baseline(), 0.251);
+        assert_eq!(nominal(CalibrationError { baseline: 0.001, ..CalibrationError::default() }).baseline(), 0.251);
     }
 
     #[test]

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{PlannedMission, RigPlan};
 use crate::{
-    draw::Imager,
-    field::{BUILT_IN, Changes, RandomSite, SitePlan, built_in},
     optics::{Lamp, Water},
     points::PointNoise,
+    render::Imager,
+    scene::{BUILT_IN, Changes, RandomSite, SitePlan, built_in},
     sensors::{DeviceFault, Sensors},
     vehicle::{Current, Route, Vehicle},
 };
@@ -24,7 +24,7 @@ const LONGEST: f64 = 7200.0;
 pub enum PriorKind {
     /// The truth with an error of the given standard deviations.
     #[default]
-    Drawn,
+    Sampled,
     /// The navigation sensors: acoustic fixes, Doppler log, attitude, depth.
     Sensors,
 }
@@ -91,7 +91,7 @@ impl Default for Mission {
             frames: 70,
             rate: 10.0,
             start: 0.0,
-            prior: PriorKind::Drawn,
+            prior: PriorKind::Sampled,
             prior_position: 0.1,
             prior_attitude_deg: 0.5,
             model_sigma: 0.001,

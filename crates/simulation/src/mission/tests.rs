@@ -6,9 +6,9 @@ use seafix_vision::Threads;
 
 use super::*;
 use crate::{
-    field::Changes,
     optics::{Port, PortKind, Water},
-    sensors::{Acoustic, Device, DeviceFault, FaultKind, Sensors},
+    scene::Changes,
+    sensors::{Acoustic, DeviceFault, FaultKind, FaultyDevice, Sensors},
     vehicle::{Current, Route, RouteKind, Vehicle, VehicleKind},
 };
 
@@ -36,7 +36,7 @@ fn epipolar_geometry_is_exact_in_the_ideal_rig() {
         let instant = plan.instant(index);
         let truth = instant.truth();
         for v in &truth.visible {
-            let at = truth.world_from_camera.inverse() * Point::from(plan.field.objects[v.object].points[v.point].at);
+            let at = truth.world_from_camera.inverse() * Point::from(plan.scene.objects[v.object].points[v.point].at);
             assert!((v.pixels.left.v - v.pixels.right.v).abs() < 1e-9);
             let disparity = v.pixels.left.u - v.pixels.right.u;
             assert!((disparity - 125.0 * 0.25 / at.coords.z).abs() < 1e-9);
@@ -65,7 +65,7 @@ fn what_is_switched_on_at_nothing_changes_nothing() {
     let plain = planned(&small());
     let base = plain.instant(3);
     let expected = (base.render(Threads::One), base.points());
-    let fault = |kind, amount, to| DeviceFault { device: Device::Images, kind, from: 1.0, to, amount };
+    let fault = |kind, amount, to| DeviceFault { device: FaultyDevice::Images, kind, from: 1.0, to, amount };
     let mission = Mission {
         changes: Changes { objects: vec!["plet".into()], ..Changes::default() },
         current: Current { speed: 0.0, towards_deg: 10.0, ..Current::default() },
@@ -104,7 +104,7 @@ fn a_right_image_taken_late_shifts_by_speed_times_delay() {
         assert_eq!(seen.pixels.left, other.pixels.left);
         // The vehicle flies north, ahead in the image is up: what is seen later lies lower.
         let at = a.truth().world_from_camera.inverse()
-            * Point::from(on_time.field.objects[seen.object].points[seen.point].at);
+            * Point::from(on_time.scene.objects[seen.object].points[seen.point].at);
         let expected = 125.0 * 0.5 * 0.02 / at.coords.z;
         assert!((other.pixels.right.v - seen.pixels.right.v - expected).abs() < 0.3 * expected);
         n += 1;
@@ -113,7 +113,7 @@ fn a_right_image_taken_late_shifts_by_speed_times_delay() {
 }
 
 #[test]
-fn rough_poses_come_from_the_sensors_when_asked() {
+fn prior_poses_come_from_the_sensors_when_asked() {
     let quiet = Acoustic { outliers: 0.0, dropouts: 0.0, ..Acoustic::default() };
     let sensors = Sensors { acoustic: quiet, ..Sensors::default() };
     let mission = Mission { prior: PriorKind::Sensors, sensors, start: 4.0, ..small() };
@@ -125,12 +125,12 @@ fn rough_poses_come_from_the_sensors_when_asked() {
         assert!(miss < 4.0 * covariance.position_sigma(), "{miss} of {}", covariance.position_sigma());
         assert!((0.05..1.0).contains(&covariance.position_sigma()));
     }
-    let deaf = DeviceFault { device: Device::Acoustic, kind: FaultKind::Off, from: 0.0, to: 1e6, amount: 0.0 };
+    let deaf = DeviceFault { device: FaultyDevice::Acoustic, kind: FaultKind::Off, from: 0.0, to: 1e6, amount: 0.0 };
     assert!(planned(&Mission { faults: vec![deaf], ..mission }).instant(0).prior.is_none());
 }
 
 #[test]
-fn a_way_through_an_object_is_refused_with_place_and_time() {
+fn a_path_through_an_object_is_refused_with_place_and_time() {
     let low = Route { kind: RouteKind::Orbit, altitude: 0.6, radius: 0.8, ..Route::default() };
     let faults = Mission { route: low, vehicle: Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() }, ..small() }
         .plan(1, 0, Path::new(""))
@@ -163,7 +163,7 @@ fn frames_of_points() {
 #[test]
 fn a_lamp_in_the_middle_of_a_large_body_is_refused() {
     // A block of 4 m around the first lamp: no surface within 1.5 m of it.
-    let mut plan = crate::field::built_in("drill-centre").unwrap();
+    let mut plan = crate::scene::built_in("drill-centre").unwrap();
     let rail = Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() };
     let free = Mission { vehicle: rail, clearance: 0.0, frames: 1, ..small() };
     let camera = planned(&free).instant(0).truth().world_from_camera;
@@ -174,7 +174,7 @@ fn a_lamp_in_the_middle_of_a_large_body_is_refused() {
     let index = plan.geometry.objects.iter().position(|o| &o.id == object).unwrap();
     let world = planned(&mission).world_from_object()[0];
     let centre = (world.inverse() * place).coords.into();
-    plan.geometry.objects[index].boxes.push(crate::field::BoxBody {
+    plan.geometry.objects[index].boxes.push(crate::scene::BoxBody {
         centre,
         size: [4.0; 3],
         turn_deg: [0.0; 3],
@@ -209,10 +209,10 @@ fn routes_are_waypoints() {
 }
 
 #[test]
-fn a_sensor_away_from_the_centre_says_what_its_place_does() {
+fn a_sensor_away_from_the_centre_states_what_its_place_does() {
     let quiet = || {
         let mut sensors = Sensors {
-            acoustic: Acoustic { sigma: 0.0, share: 0.0, outliers: 0.0, dropouts: 0.0, ..Acoustic::default() },
+            acoustic: Acoustic { sigma: 0.0, range_fraction: 0.0, outliers: 0.0, dropouts: 0.0, ..Acoustic::default() },
             ..Sensors::default()
         };
         (sensors.doppler.sigma, sensors.doppler.scale, sensors.depth.sigma, sensors.depth.bias) = (0.0, 0.0, 0.0, 0.0);

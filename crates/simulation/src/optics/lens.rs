@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_whose_side_sees_nothing_is_told() {
+    fn an_image_whose_side_sees_nothing_is_reported() {
         let blind = |distortion: &[f64], port: Port| Lens::new(camera(500.0, distortion), port).blind();
         assert_eq!(blind(&[-0.1, 0.02, 1e-3, -5e-4], Port::default()), None);
         assert_eq!(blind(&[], Port { kind: PortKind::Flat, ..Port::default() }), None);
@@ -140,12 +140,12 @@ mod tests {
 
     /// The errors (px) of the calibrated camera for points at this distance.
     fn errors(lens: &Lens, depth: f64) -> Vec<f64> {
-        let told = lens.calibrated(3.0).unwrap();
+        let nominal = lens.calibrated(3.0).unwrap();
         pixels()
             .filter_map(|pixel| {
                 let ray = lens.ray(&pixel)?;
                 let at = ray.from + ray.along * (depth - ray.from.z);
-                Some(told.project(&Point::<Camera>::from(at))?.distance(&pixel))
+                Some(nominal.project(&Point::<Camera>::from(at))?.distance(&pixel))
             })
             .collect()
     }
@@ -153,22 +153,22 @@ mod tests {
     #[test]
     fn a_flat_port_is_good_at_its_calibration_distance_and_bad_near() {
         let lens = Lens::new(camera(500.0, &[]), Port { kind: PortKind::Flat, ..Port::default() });
-        let told = lens.calibrated(3.0).unwrap();
+        let nominal = lens.calibrated(3.0).unwrap();
         // The effective focal length in the water is about n times that in the air.
-        assert!((told.focal()[0] - 668.0).abs() < 4.0, "{:?}", told.focal());
-        let most = |depth| errors(&lens, depth).into_iter().fold(0.0, f64::max);
-        assert!(most(3.0) < 0.2, "{}", most(3.0));
-        assert!(most(1.0) > 5.0, "{}", most(1.0));
+        assert!((nominal.focal()[0] - 668.0).abs() < 4.0, "{:?}", nominal.focal());
+        let max = |depth| errors(&lens, depth).into_iter().fold(0.0, f64::max);
+        assert!(max(3.0) < 0.2, "{}", max(3.0));
+        assert!(max(1.0) > 5.0, "{}", max(1.0));
     }
 
     #[test]
     fn a_decentred_dome_is_absorbed_by_the_calibration() {
         let port = Port { kind: PortKind::Dome, thickness: 0.005, offset: [0.0, 0.0, 0.005], ..Port::default() };
         let lens = Lens::new(camera(500.0, &[]), port);
-        let most = |depth| errors(&lens, depth).into_iter().fold(0.0, f64::max);
-        assert!(most(3.0) < 0.05 && most(2.0) < 0.3 && most(1.0) > most(2.0), "{} {}", most(3.0), most(1.0));
+        let max = |depth| errors(&lens, depth).into_iter().fold(0.0, f64::max);
+        assert!(max(3.0) < 0.05 && max(2.0) < 0.3 && max(1.0) > max(2.0), "{} {}", max(3.0), max(1.0));
         let centred = Lens::new(camera(500.0, &[]), Port { kind: PortKind::Dome, ..Port::default() });
-        let told = centred.calibrated(3.0).unwrap();
-        assert!((told.focal()[0] - 500.0).abs() < 1e-6);
+        let nominal = centred.calibrated(3.0).unwrap();
+        assert!((nominal.focal()[0] - 500.0).abs() < 1e-6);
     }
 }

@@ -1,12 +1,12 @@
 //! Light on its way: lamps, water, ports, lenses.
 
-mod haze;
+mod backscatter;
 mod lamp;
 mod lens;
 mod port;
 mod water;
 
-pub(crate) use haze::Haze;
+pub(crate) use backscatter::Backscatter;
 pub use lamp::Lamp;
 pub use lens::Lens;
 pub use port::{Port, PortKind, Ray};

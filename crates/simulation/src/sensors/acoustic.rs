@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Reading, SOUND, within};
+use super::{SOUND, TimedReading, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
@@ -12,7 +12,7 @@ use crate::{
 /// Outliers err by up to this share of the slant range.
 const OUTLIER: f64 = 0.1;
 
-/// Acoustic positions: each world axis errs by σ = `sigma` + `share`·(slant range). USBL has a share (0.5 %
+/// Acoustic positions: each world axis errs by σ = `sigma` + `range_fraction`·(slant range). USBL has a share (0.5 %
 /// is usual, 0.1 to 2 % are found); a sigma (0.1 to 0.3 m) and no share stand for an LBL that is not looked into.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
@@ -22,7 +22,7 @@ pub struct Acoustic {
     /// Where its transponder sits in the vehicle: body frame (m).
     pub at: [f64; 3],
     /// Part of σ that grows with the slant range.
-    pub share: f64,
+    pub range_fraction: f64,
     /// Part of σ that does not (m).
     pub sigma: f64,
     /// Fixes a second.
@@ -38,7 +38,7 @@ impl Default for Acoustic {
         Self {
             from: [30.0, 20.0, 2.0],
             at: [0.0; 3],
-            share: 0.005,
+            range_fraction: 0.005,
             sigma: 0.0,
             rate: 0.5,
             outliers: 0.05,
@@ -52,7 +52,7 @@ impl Acoustic {
         let within = |name, x, low, high| within("acoustic", name, x, low, high);
         self.from.iter().try_for_each(|x| within("from", *x, -1e5, 1e5))?;
         self.at.iter().try_for_each(|x| within("at", *x, -10.0, 10.0))?;
-        within("share", self.share, 0.0, 0.2)?;
+        within("range-fraction", self.range_fraction, 0.0, 0.2)?;
         within("sigma", self.sigma, 0.0, 100.0)?;
         within("rate", self.rate, 1e-3, 100.0)?;
         within("outliers", self.outliers, 0.0, 1.0)?;
@@ -61,11 +61,11 @@ impl Acoustic {
 
     /// The standard deviation of each axis at a slant range (m).
     pub(crate) fn spread(&self, range: f64) -> f64 {
-        self.sigma + self.share * range
+        self.sigma + self.range_fraction * range
     }
 
     /// The fixes up to `until` (s): north, east, down (m).
-    pub(crate) fn fixes(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<Reading<Vector3<f64>>> {
+    pub(crate) fn fixes(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<TimedReading<Vector3<f64>>> {
         let fix = |k: u64| {
             let time = k as f64 / self.rate;
             let mut stream = Stream::new(seeds.0, seeds.1, k, Purpose::Acoustics);
@@ -76,7 +76,7 @@ impl Acoustic {
             let far = Vector3::from_fn(|_, _| stream.between(-1.0, 1.0)) * (OUTLIER * range);
             let (lost, off) = (stream.unit() < self.dropouts, stream.unit() < self.outliers);
             let value = at + error + if off { far } else { Vector3::zeros() };
-            (!lost).then_some(Reading { time, arrival: time + 2.0 * range / SOUND, value })
+            (!lost).then_some(TimedReading { time, arrival: time + 2.0 * range / SOUND, value })
         };
         (0..=(until * self.rate) as u64).filter_map(fix).collect()
     }

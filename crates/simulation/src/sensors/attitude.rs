@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::so3;
 use serde::{Deserialize, Serialize};
 
-use super::{Reading, Value, within};
+use super::{TimedReading, Value, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
@@ -94,7 +94,7 @@ impl AttitudeSensor {
     }
 
     /// The readings up to `until` (s).
-    pub(crate) fn readings(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<Reading<AttitudeReading>> {
+    pub(crate) fn readings(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<TimedReading<AttitudeReading>> {
         let mut dive = Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Gyro);
         let level = self.level_deg.to_radians();
         let offset =
@@ -114,7 +114,7 @@ impl AttitudeSensor {
             let lost = stream.unit() < self.dropouts;
             let world_from_body = so3::exp(&offset) * state.world_from_body.rotation() * so3::exp(&noise);
             let value = AttitudeReading { rate, world_from_body };
-            (!lost).then_some(Reading { time, arrival: time + self.latency, value })
+            (!lost).then_some(TimedReading { time, arrival: time + self.latency, value })
         };
         (0..=(until * self.rate) as u64).filter_map(reading).collect()
     }

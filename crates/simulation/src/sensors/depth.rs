@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Reading, within};
+use super::{TimedReading, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
@@ -45,7 +45,7 @@ impl DepthGauge {
     }
 
     /// The readings up to `until` (s): depth (m).
-    pub(crate) fn readings(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<Reading<f64>> {
+    pub(crate) fn readings(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<TimedReading<f64>> {
         let bias = self.bias * Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Depth).normal();
         let reading = |k: u64| {
             let time = k as f64 / self.rate;
@@ -54,7 +54,7 @@ impl DepthGauge {
             let world_from_body = track.at(time).world_from_body;
             let below = (world_from_body.rotation() * Vector3::from(self.at)).z;
             let value = world_from_body.translation().z + below + bias + noise;
-            (!lost).then_some(Reading { time, arrival: time + self.latency, value })
+            (!lost).then_some(TimedReading { time, arrival: time + self.latency, value })
         };
         (0..=(until * self.rate) as u64).filter_map(reading).collect()
     }

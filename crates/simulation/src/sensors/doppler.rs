@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Reading, within};
+use super::{TimedReading, within};
 use crate::{
-    field::Field,
+    scene::Scene,
     stream::{Purpose, Stream},
     vehicle::Track,
 };
@@ -59,10 +59,10 @@ impl Doppler {
     pub(crate) fn readings(
         &self,
         track: &Track,
-        field: &Field,
+        scene: &Scene,
         until: f64,
         seeds: (u64, u64),
-    ) -> Vec<Reading<Vector3<f64>>> {
+    ) -> Vec<TimedReading<Vector3<f64>>> {
         let scale = 1.0 + self.scale * Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Doppler).normal();
         let reading = |k: u64| {
             let time = k as f64 / self.rate;
@@ -76,15 +76,15 @@ impl Doppler {
                 let slant = sine * std::f64::consts::FRAC_1_SQRT_2;
                 let along = state.world_from_body.rotation() * Vector3::new(x * slant, y * slant, cosine);
                 let luck = stream.unit() < ON_STRUCTURE;
-                let Some(length) = field.hit(&from, &along) else { return false };
-                let on_bed = field.bed.hit(&from, &along).is_some_and(|t| t <= length);
-                length >= self.reach[0] && length <= self.reach[1] && (on_bed || luck)
+                let Some(length) = scene.hit(&from, &along) else { return false };
+                let on_seabed = scene.seabed.hit(&from, &along).is_some_and(|t| t <= length);
+                length >= self.reach[0] && length <= self.reach[1] && (on_seabed || luck)
             });
             let locked = beams.iter().filter(|b| **b).count() >= 3;
             let lost = stream.unit() < self.dropouts;
             let turning = state.motion.fixed_rows::<3>(0).into_owned();
             let value = (state.motion.fixed_rows::<3>(3) + turning.cross(&at)) * scale + noise;
-            (locked && !lost).then_some(Reading { time, arrival: time + self.latency, value })
+            (locked && !lost).then_some(TimedReading { time, arrival: time + self.latency, value })
         };
         (0..=(until * self.rate) as u64).filter_map(reading).collect()
     }

@@ -3,7 +3,7 @@
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
-use super::{Reading, Value};
+use super::{TimedReading, Value};
 use crate::stream::{Purpose, Stream};
 
 /// Of slow devices only every so many-th reading comes.
@@ -12,7 +12,7 @@ const SLOW: usize = 5;
 /// The devices that can fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Device {
+pub enum FaultyDevice {
     /// Both cameras.
     Images,
     /// The acoustic positions.
@@ -52,7 +52,7 @@ pub enum FaultKind {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DeviceFault {
     /// The device.
-    pub device: Device,
+    pub device: FaultyDevice,
     /// How it fails.
     pub kind: FaultKind,
     /// When it begins (s).
@@ -77,9 +77,9 @@ impl FaultKind {
         let name = |key: &str| format!("faults[{index}].{key}");
         in_range(from >= 0.0 && from.is_finite(), &name("from"), from, "seconds, zero or more")?;
         in_range(to >= from && to.is_finite(), &name("to"), to, "seconds, not before `from`")?;
-        let most = if self == FaultKind::Intermittent { 1.0 } else { 1e3 };
-        let range = format!("a number from 0 to {most}");
-        in_range(amount >= 0.0 && amount <= most, &name("amount"), amount, &range)
+        let max = if self == FaultKind::Intermittent { 1.0 } else { 1e3 };
+        let range = format!("a number from 0 to {max}");
+        in_range(amount >= 0.0 && amount <= max, &name("amount"), amount, &range)
     }
 }
 
@@ -96,11 +96,11 @@ impl DeviceFault {
 
 /// Readings of a device, failed as `faults` say.
 pub(super) fn failed<V: Value>(
-    readings: Vec<Reading<V>>,
-    device: Device,
+    readings: Vec<TimedReading<V>>,
+    device: FaultyDevice,
     faults: &[DeviceFault],
     seeds: (u64, u64),
-) -> Vec<Reading<V>> {
+) -> Vec<TimedReading<V>> {
     faults.iter().filter(|fault| fault.device == device).enumerate().fold(readings, |readings, (n, fault)| {
         let mut last = None;
         let mut out = Vec::with_capacity(readings.len());
@@ -111,14 +111,14 @@ pub(super) fn failed<V: Value>(
                 continue;
             }
             let mut stream = Stream::new(seeds.0, seeds.1 ^ ((n as u64 + 1) << 48), k as u64, Purpose::Faults);
-            let with = |value| Some(Reading { value, ..reading });
+            let with = |value| Some(TimedReading { value, ..reading });
             out.extend(match fault.kind {
                 FaultKind::Off => None,
                 FaultKind::Stuck => with(*last.get_or_insert(reading.value)),
                 FaultKind::Garbage => with(V::garbage(&mut stream)),
                 FaultKind::Wrong => with(reading.value.wrong()),
                 FaultKind::Slow => (k % SLOW == 0).then_some(reading),
-                FaultKind::Delayed => Some(Reading { arrival: reading.arrival + fault.amount, ..reading }),
+                FaultKind::Delayed => Some(TimedReading { arrival: reading.arrival + fault.amount, ..reading }),
                 FaultKind::Intermittent => (stream.unit() >= fault.amount).then_some(reading),
             });
         }
@@ -130,17 +130,17 @@ pub(super) fn failed<V: Value>(
 mod tests {
     use super::*;
 
-    fn readings() -> Vec<Reading<f64>> {
-        (0..100).map(|k| Reading { time: f64::from(k), arrival: f64::from(k), value: f64::from(k) }).collect()
+    fn readings() -> Vec<TimedReading<f64>> {
+        (0..100).map(|k| TimedReading { time: f64::from(k), arrival: f64::from(k), value: f64::from(k) }).collect()
     }
 
-    fn fails(kind: FaultKind, amount: f64) -> Vec<Reading<f64>> {
-        let fault = DeviceFault { device: Device::Depth, kind, from: 20.0, to: 60.0, amount };
-        failed(readings(), Device::Depth, &[fault], (1, 0))
+    fn fails(kind: FaultKind, amount: f64) -> Vec<TimedReading<f64>> {
+        let fault = DeviceFault { device: FaultyDevice::Depth, kind, from: 20.0, to: 60.0, amount };
+        failed(readings(), FaultyDevice::Depth, &[fault], (1, 0))
     }
 
     #[test]
-    fn devices_fail_as_told() {
+    fn devices_fail_as_reported() {
         assert_eq!(fails(FaultKind::Off, 0.0).len(), 60);
         assert!(fails(FaultKind::Stuck, 0.0)[20..60].iter().all(|r| r.value == 19.0));
         assert!(fails(FaultKind::Garbage, 0.0)[20..60].iter().all(|r| r.value.fract() != 0.0));
@@ -154,8 +154,8 @@ mod tests {
     fn a_fault_of_no_amount_or_no_time_is_none() {
         assert_eq!(fails(FaultKind::Delayed, 0.0), readings());
         assert_eq!(fails(FaultKind::Intermittent, 0.0), readings());
-        let never = DeviceFault { device: Device::Depth, kind: FaultKind::Off, from: 5.0, to: 5.0, amount: 1.0 };
-        assert_eq!(failed(readings(), Device::Depth, std::slice::from_ref(&never), (1, 0)), readings());
-        assert_eq!(failed(readings(), Device::Doppler, &[never], (1, 0)), readings());
+        let never = DeviceFault { device: FaultyDevice::Depth, kind: FaultKind::Off, from: 5.0, to: 5.0, amount: 1.0 };
+        assert_eq!(failed(readings(), FaultyDevice::Depth, std::slice::from_ref(&never), (1, 0)), readings());
+        assert_eq!(failed(readings(), FaultyDevice::Doppler, &[never], (1, 0)), readings());
     }
 }

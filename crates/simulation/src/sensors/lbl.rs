@@ -4,14 +4,14 @@ use nalgebra::Vector3;
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
-use super::{Reading, SOUND, Value, within};
+use super::{SOUND, TimedReading, Value, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
 };
 
 /// The most transponders.
-const MOST: usize = 8;
+const MAX: usize = 8;
 /// An echo lengthens a range by up to this share.
 const ECHO: f64 = 0.1;
 
@@ -58,11 +58,11 @@ impl Default for Lbl {
 
 /// The ranges of one question (m), in the order of the transponders; none where no answer came.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Ranges(pub [Option<f64>; MOST]);
+pub struct Ranges(pub [Option<f64>; MAX]);
 
 impl Value for Ranges {
     fn garbage(stream: &mut Stream) -> Self {
-        Self([(); MOST].map(|()| Some((1e3 * stream.normal()).abs())))
+        Self([(); MAX].map(|()| Some((1e3 * stream.normal()).abs())))
     }
 
     fn wrong(self) -> Self {
@@ -74,7 +74,7 @@ impl Lbl {
     pub(super) fn check(&self) -> Result<(), String> {
         let within = |name, x, low, high| within("lbl", name, x, low, high);
         let n = self.transponders.len();
-        in_range(n == 0 || (3..=MOST).contains(&n), "sensors.lbl.transponders", n, "3 to 8 places, or none")?;
+        in_range(n == 0 || (3..=MAX).contains(&n), "sensors.lbl.transponders", n, "3 to 8 places, or none")?;
         self.transponders.iter().flatten().try_for_each(|x| within("transponders", *x, -1e4, 1e4))?;
         let distinct = |k: usize| {
             let away = |j: &[f64; 3]| (Vector3::from(*j) - Vector3::from(self.transponders[k])).norm();
@@ -94,7 +94,7 @@ impl Lbl {
     }
 
     /// What came of the questions up to `until` (s).
-    pub(crate) fn answers(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<Reading<Ranges>> {
+    pub(crate) fn answers(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<TimedReading<Ranges>> {
         if self.transponders.is_empty() {
             return Vec::new();
         }
@@ -115,7 +115,7 @@ impl Lbl {
                 let longer = if echo { 1.0 + ECHO * stream.unit() } else { 1.0 };
                 *range = (!lost).then_some((true_range * sound * longer + noise).max(0.0));
             }
-            Reading { time, arrival: time + 2.0 * longest / SOUND, value: ranges }
+            TimedReading { time, arrival: time + 2.0 * longest / SOUND, value: ranges }
         };
         (0..=(until * self.rate) as u64).map(ask).collect()
     }

@@ -20,16 +20,16 @@ pub use acoustic::Acoustic;
 pub use attitude::{AttitudeReading, AttitudeSensor};
 pub use depth::DepthGauge;
 pub use doppler::Doppler;
-pub use fault::{Device, DeviceFault, FaultKind};
+pub use fault::{DeviceFault, FaultKind, FaultyDevice};
 pub use lbl::{Lbl, Ranges};
-pub(crate) use prior::{Navigation, Rough};
+pub(crate) use prior::{SensorNavigation, SensorPrior};
 
 /// The speed of sound (m/s).
 const SOUND: f64 = 1500.0;
 
 /// A reading of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading<V> {
+pub struct TimedReading<V> {
     /// The time of what it measures (s).
     pub time: f64,
     /// When it is there to be used (s).
@@ -61,15 +61,15 @@ pub struct LblFix {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Readings {
     /// Position from USBL.
-    pub acoustic: Vec<Reading<AcousticFix>>,
+    pub acoustic: Vec<TimedReading<AcousticFix>>,
     /// Ranges to transponders, and the position that they give with the depth.
-    pub lbl: Vec<Reading<(Ranges, Option<LblFix>)>>,
+    pub lbl: Vec<TimedReading<(Ranges, Option<LblFix>)>>,
     /// Velocity over ground of the log's place, body frame (m/s).
-    pub doppler: Vec<Reading<Vector3<f64>>>,
+    pub doppler: Vec<TimedReading<Vector3<f64>>>,
     /// Rate of turn (rad/s, body frame) and attitude.
-    pub attitude: Vec<Reading<AttitudeReading>>,
+    pub attitude: Vec<TimedReading<AttitudeReading>>,
     /// Depth of the gauge (m).
-    pub depth: Vec<Reading<f64>>,
+    pub depth: Vec<TimedReading<f64>>,
 }
 
 /// The navigation sensors.

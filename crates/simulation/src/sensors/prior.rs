@@ -4,26 +4,26 @@ use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Body, Transform, World};
 
 use super::{
-    AcousticFix, AttitudeReading, LblFix, Ranges, Reading, Readings, Sensors,
-    fault::{Device, DeviceFault, failed},
+    AcousticFix, AttitudeReading, LblFix, Ranges, Readings, Sensors, TimedReading,
+    fault::{DeviceFault, FaultyDevice, failed},
     trilateration::{Found, Length, trilaterate},
 };
-use crate::{field::Field, vehicle::Track};
+use crate::{scene::Scene, vehicle::Track};
 
 /// Fixes farther from the dead-reckoned place than this many standard deviations are not believed.
 const GATE: f64 = 4.0;
 
 /// All readings of a dive, and the poses they give.
 #[derive(Debug, Clone)]
-pub(crate) struct Navigation {
+pub(crate) struct SensorNavigation {
     sensors: Sensors,
-    fixes: Vec<Reading<Vector3<f64>>>,
-    answers: Vec<Reading<Ranges>>,
+    fixes: Vec<TimedReading<Vector3<f64>>>,
+    answers: Vec<TimedReading<Ranges>>,
     /// All positions, in order of their times.
-    positions: Vec<Reading<Position>>,
-    velocities: Vec<Reading<Vector3<f64>>>,
-    attitudes: Vec<Reading<AttitudeReading>>,
-    depths: Vec<Reading<f64>>,
+    positions: Vec<TimedReading<Position>>,
+    velocities: Vec<TimedReading<Vector3<f64>>>,
+    attitudes: Vec<TimedReading<AttitudeReading>>,
+    depths: Vec<TimedReading<f64>>,
 }
 
 /// The place of one part of the vehicle.
@@ -39,51 +39,56 @@ struct Position {
 
 /// A pose with standard deviations: position covariance in the world (m²), attitude each axis (rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Rough {
+pub(crate) struct SensorPrior {
     pub(crate) world_from_body: Transform<World, Body>,
     pub(crate) position: Matrix3<f64>,
     pub(crate) attitude: f64,
 }
 
 /// The last reading that is there at a time.
-fn latest<V>(readings: &[Reading<V>], now: f64) -> Option<&Reading<V>> {
+fn latest<V>(readings: &[TimedReading<V>], now: f64) -> Option<&TimedReading<V>> {
     readings.iter().rev().find(|r| r.arrival <= now && r.time <= now)
 }
 
-impl Navigation {
+impl SensorNavigation {
     pub(crate) fn new(
         sensors: &Sensors,
         faults: &[DeviceFault],
         track: &Track,
-        field: &Field,
+        scene: &Scene,
         until: f64,
         seeds: (u64, u64),
     ) -> Self {
         let mut all = Self {
             sensors: sensors.clone(),
-            fixes: failed(sensors.acoustic.fixes(track, until, seeds), Device::Acoustic, faults, seeds),
-            answers: failed(sensors.lbl.answers(track, until, seeds), Device::Lbl, faults, seeds),
+            fixes: failed(sensors.acoustic.fixes(track, until, seeds), FaultyDevice::Acoustic, faults, seeds),
+            answers: failed(sensors.lbl.answers(track, until, seeds), FaultyDevice::Lbl, faults, seeds),
             positions: Vec::new(),
-            velocities: failed(sensors.doppler.readings(track, field, until, seeds), Device::Doppler, faults, seeds),
-            attitudes: failed(sensors.attitude.readings(track, until, seeds), Device::Attitude, faults, seeds),
-            depths: failed(sensors.depth.readings(track, until, seeds), Device::Depth, faults, seeds),
+            velocities: failed(
+                sensors.doppler.readings(track, scene, until, seeds),
+                FaultyDevice::Doppler,
+                faults,
+                seeds,
+            ),
+            attitudes: failed(sensors.attitude.readings(track, until, seeds), FaultyDevice::Attitude, faults, seeds),
+            depths: failed(sensors.depth.readings(track, until, seeds), FaultyDevice::Depth, faults, seeds),
         };
         all.positions = all.positions();
         all
     }
 
-    fn positions(&self) -> Vec<Reading<Position>> {
+    fn positions(&self) -> Vec<TimedReading<Position>> {
         let usbl = self.fixes.iter().map(|fix| {
             let noise = Vector3::repeat(self.spread(&fix.value).powi(2));
             let lever = Vector3::from(self.sensors.acoustic.at);
             let value = Position { at: fix.value, lever, noise, common: Matrix3::zeros() };
-            Reading { time: fix.time, arrival: fix.arrival, value }
+            TimedReading { time: fix.time, arrival: fix.arrival, value }
         });
         let lbl = self.answers.iter().filter_map(|answer| {
             let Found { at, noise, common } = self.among_transponders(answer)?;
             let lever = Vector3::from(self.sensors.lbl.at);
             let value = Position { at, lever, noise: noise.diagonal(), common };
-            Some(Reading { time: answer.time, arrival: answer.arrival, value })
+            Some(TimedReading { time: answer.time, arrival: answer.arrival, value })
         });
         let mut all: Vec<_> = usbl.chain(lbl).collect();
         all.sort_by(|a, b| a.time.total_cmp(&b.time));
@@ -91,7 +96,7 @@ impl Navigation {
     }
 
     /// The place that asked the transponders, by their answers and the depth gauge.
-    fn among_transponders(&self, answer: &Reading<Ranges>) -> Option<Found> {
+    fn among_transponders(&self, answer: &TimedReading<Ranges>) -> Option<Found> {
         let lbl = &self.sensors.lbl;
         let length =
             |range: f64| Length { value: range, noise: lbl.sigma, common: lbl.survey.hypot(lbl.sound * range) };
@@ -115,15 +120,15 @@ impl Navigation {
 
     /// Everything that was said.
     pub(crate) fn readings(&self) -> Readings {
-        let fix = |fix: &Reading<Vector3<f64>>| Reading {
+        let fix = |fix: &TimedReading<Vector3<f64>>| TimedReading {
             time: fix.time,
             arrival: fix.arrival,
             value: AcousticFix { at: fix.value, sigma: self.spread(&fix.value) },
         };
-        let lbl = |answer: &Reading<Ranges>| {
+        let lbl = |answer: &TimedReading<Ranges>| {
             let fix = self.among_transponders(answer);
             let fix = fix.map(|f| LblFix { at: f.at, sigma: (f.noise + f.common).diagonal().map(f64::sqrt) });
-            Reading { time: answer.time, arrival: answer.arrival, value: (answer.value, fix) }
+            TimedReading { time: answer.time, arrival: answer.arrival, value: (answer.value, fix) }
         };
         Readings {
             acoustic: self.fixes.iter().map(fix).collect(),
@@ -146,7 +151,7 @@ impl Navigation {
     }
 
     /// The vehicle's place when one of its parts was at a position.
-    fn place(&self, position: &Reading<Position>) -> Vector3<f64> {
+    fn place(&self, position: &TimedReading<Position>) -> Vector3<f64> {
         let turn = self.turned(position.time).map(|said| said.world_from_body).unwrap_or_default();
         position.value.at - turn * position.value.lever
     }
@@ -157,7 +162,7 @@ impl Navigation {
     /// A Kalman filter of the position and of the drift for each metre travelled, each axis for itself:
     /// heading and scale err alike all the way, which noise of the steps would not say. What errs alike in all
     /// positions is no noise either, and is added in the end.
-    pub(crate) fn at(&self, now: f64) -> Option<Rough> {
+    pub(crate) fn at(&self, now: f64) -> Option<SensorPrior> {
         let attitude = latest(&self.attitudes, now)?;
         let mut positions = self.positions.iter().filter(|position| position.arrival <= now);
         let first = positions.next()?;
@@ -217,7 +222,7 @@ impl Navigation {
         let squares = sensor.heading_deg.powi(2) + 2.0 * sensor.level_deg.powi(2);
         let attitude_sigma = (squares / 3.0 + sensor.sigma_deg.powi(2)).sqrt().to_radians();
         let world_from_body = Transform::new(attitude.value.world_from_body, at);
-        Some(Rough { world_from_body, position, attitude: attitude_sigma.max(1e-5) })
+        Some(SensorPrior { world_from_body, position, attitude: attitude_sigma.max(1e-5) })
     }
 
     /// How far the vehicle went between two times by Doppler and attitude (m): the step, and the length.

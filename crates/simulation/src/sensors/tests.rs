@@ -3,34 +3,34 @@ use seafix_geometry::Transform;
 
 use super::*;
 use crate::{
-    field::{Changes, Field, built_in},
+    scene::{Changes, Scene, built_in},
     survey::SurveyErrors,
-    vehicle::{State, Track},
+    vehicle::{Track, VehicleState},
 };
 
 /// Straight ahead at half a metre a second, 4 m above the bed.
 fn track(seconds: usize) -> Track {
-    let state = |k: usize| State {
+    let state = |k: usize| VehicleState {
         world_from_body: Transform::new(UnitQuaternion::identity(), Vector3::new(0.005 * k as f64, 0.0, 36.0)),
         motion: Vector6::new(0.0, 0.0, 0.0, 0.5, 0.0, 0.0),
     };
     Track { states: (0..=seconds * 100).map(state).collect() }
 }
 
-fn field() -> Field {
+fn scene() -> Scene {
     let none = SurveyErrors { model: 0.0, survey: 0.0 };
-    Field::new(&built_in("drill-centre").unwrap(), &Changes::default(), none, 1)
+    Scene::new(&built_in("drill-centre").unwrap(), &Changes::default(), none, 1)
 }
 
 #[test]
-fn acoustic_errors_grow_with_the_range_as_said() {
+fn acoustic_errors_grow_with_the_range_as_stated() {
     // Seen to fail with errors 1.2 times as large as said.
     for distance in [100.0, 1000.0] {
         let usbl =
             Acoustic { from: [-distance, 0.0, 36.0], outliers: 0.0, dropouts: 0.0, rate: 50.0, ..Acoustic::default() };
         let track = track(60);
         let fixes = usbl.fixes(&track, 60.0, (1, 0));
-        let error = |fix: &Reading<Vector3<f64>>| {
+        let error = |fix: &TimedReading<Vector3<f64>>| {
             let at = track.at(fix.time).world_from_body.translation();
             let expected = 0.005 * (at - Vector3::from(usbl.from)).norm();
             assert!((fix.arrival - fix.time - 2.0 * (at.x + distance) / 1500.0).abs() < 1e-9);
@@ -43,11 +43,11 @@ fn acoustic_errors_grow_with_the_range_as_said() {
 
 #[test]
 fn the_scale_of_the_doppler_log_is_one_number_a_dive() {
-    let (track, field) = (track(60), field());
+    let (track, scene) = (track(60), scene());
     let quiet = Doppler { sigma: 0.0, scale: 0.01, ..Doppler::default() };
     let mut squares = 0.0;
     for dive in 0..40 {
-        let readings = quiet.readings(&track, &field, 3.0, (1, dive));
+        let readings = quiet.readings(&track, &scene, 3.0, (1, dive));
         let scale = readings[0].value.x / 0.5;
         assert!(readings.iter().all(|r| (r.value.x / 0.5 - scale).abs() < 1e-12));
         squares += (scale - 1.0).powi(2);
@@ -55,7 +55,7 @@ fn the_scale_of_the_doppler_log_is_one_number_a_dive() {
     let spread: f64 = squares / 40.0;
     assert!((spread.sqrt() / 0.01 - 1.0).abs() < 0.3, "{spread}");
     let deaf = Doppler { reach: [0.4, 2.0], ..Doppler::default() };
-    assert!(deaf.readings(&track, &field, 3.0, (1, 0)).is_empty());
+    assert!(deaf.readings(&track, &scene, 3.0, (1, 0)).is_empty());
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn the_bias_of_the_gyro_has_the_allan_deviation_of_its_process() {
             for dive in 0..12 {
                 let readings = sensor.readings(&track(600), 600.0, (3, dive));
                 for axis in 0..3 {
-                    let mean = |c: &[Reading<AttitudeReading>]| {
+                    let mean = |c: &[TimedReading<AttitudeReading>]| {
                         c.iter().map(|r| r.value.rate[axis]).sum::<f64>() / span as f64
                     };
                     let means: Vec<f64> = readings.chunks_exact(span).map(mean).collect();
@@ -109,20 +109,20 @@ fn the_bias_of_the_gyro_has_the_allan_deviation_of_its_process() {
 }
 
 #[test]
-fn what_sensors_say_errs_by_what_is_set() {
+fn what_sensors_state_has_an_error_by_what_is_set() {
     // Normalised squared errors of every sensor over 150 dives: the mean is the number of axes, within four standard
     // errors. Errors that stay for a dive count once a dive, noise once a reading.
-    let (track, field) = (track(12), field());
+    let (track, scene) = (track(12), scene());
     let (mut scale, mut heading, mut depth) = (Vec::new(), Vec::new(), Vec::new());
     let (mut doppler, mut gauge) = (Vec::new(), Vec::new());
     let sensors = Sensors::default();
     let quiet = Doppler { sigma: 0.0, ..Doppler::default() };
     for dive in 0..150 {
         let seeds = (8, dive);
-        scale.push((quiet.readings(&track, &field, 0.1, seeds)[0].value.x / 0.5 - 1.0) / quiet.scale);
+        scale.push((quiet.readings(&track, &scene, 0.1, seeds)[0].value.x / 0.5 - 1.0) / quiet.scale);
         let noisy = Doppler { scale: 0.0, ..sensors.doppler.clone() };
-        let errors = noisy.readings(&track, &field, 10.0, seeds);
-        let error = |r: &Reading<Vector3<f64>>| (r.value - Vector3::new(0.5, 0.0, 0.0)) / noisy.sigma;
+        let errors = noisy.readings(&track, &scene, 10.0, seeds);
+        let error = |r: &TimedReading<Vector3<f64>>| (r.value - Vector3::new(0.5, 0.0, 0.0)) / noisy.sigma;
         doppler.extend(errors.iter().map(error).flat_map(|e| [e.x, e.y, e.z]));
         let steady = AttitudeSensor { sigma_deg: 0.0, level_deg: 0.0, ..sensors.attitude.clone() };
         let said = steady.readings(&track, 0.1, seeds)[0].value.world_from_body;
@@ -131,8 +131,8 @@ fn what_sensors_say_errs_by_what_is_set() {
         let mean = readings.iter().map(|r| r.value - 36.0).sum::<f64>() / readings.len() as f64;
         depth.push(mean / sensors.depth.bias.hypot(sensors.depth.sigma / (readings.len() as f64).sqrt()));
         gauge.extend(readings.iter().map(|r| {
-            let share = 1.0 - 1.0 / readings.len() as f64;
-            (r.value - 36.0 - mean) / (sensors.depth.sigma * share.sqrt())
+            let fraction = 1.0 - 1.0 / readings.len() as f64;
+            (r.value - 36.0 - mean) / (sensors.depth.sigma * fraction.sqrt())
         }));
     }
     for (name, errors) in
@@ -145,18 +145,18 @@ fn what_sensors_say_errs_by_what_is_set() {
 }
 
 #[test]
-fn the_rough_pose_errs_as_its_covariance_says() {
-    let (track, field) = (track(60), field());
+fn the_prior_pose_has_an_error_as_its_covariance_states() {
+    let (track, scene) = (track(60), scene());
     let sensors = Sensors { acoustic: Acoustic { outliers: 0.0, ..Acoustic::default() }, ..Sensors::default() };
     let (mut nees, mut n) = (0.0, 0.0);
     for dive in 0..120 {
-        let navigation = Navigation::new(&sensors, &[], &track, &field, 40.0, (9, dive));
-        let rough = navigation.at(37.3).unwrap();
+        let navigation = SensorNavigation::new(&sensors, &[], &track, &scene, 40.0, (9, dive));
+        let prior_pose = navigation.at(37.3).unwrap();
         let truth = track.at(37.3).world_from_body;
-        let miss = truth.translation() - rough.world_from_body.translation();
-        nees += (rough.position.try_inverse().unwrap() * miss).dot(&miss);
+        let miss = truth.translation() - prior_pose.world_from_body.translation();
+        nees += (prior_pose.position.try_inverse().unwrap() * miss).dot(&miss);
         n += 1.0;
-        assert!(Navigation::at(&navigation, -1.0).is_none());
+        assert!(SensorNavigation::at(&navigation, -1.0).is_none());
     }
     // χ² of three degrees of freedom over 120 dives: 3 ± 0.67 at three standard deviations.
     let mean: f64 = nees / n;
@@ -175,15 +175,15 @@ fn among_five() -> Sensors {
 }
 
 #[test]
-fn positions_among_transponders_err_as_their_covariance_says() {
-    let (track, field) = (track(60), field());
+fn positions_among_transponders_err_as_their_covariance_states() {
+    let (track, scene) = (track(60), scene());
     let sensors = among_five();
     let (mut nees, mut n, mut fixes, mut good) = (0.0, 0.0, 0, 0);
     for dive in 0..120 {
-        let navigation = Navigation::new(&sensors, &[], &track, &field, 40.0, (4, dive));
-        let rough = navigation.at(37.3).unwrap();
-        let miss = track.at(37.3).world_from_body.translation() - rough.world_from_body.translation();
-        nees += (rough.position.try_inverse().unwrap() * miss).dot(&miss);
+        let navigation = SensorNavigation::new(&sensors, &[], &track, &scene, 40.0, (4, dive));
+        let prior_pose = navigation.at(37.3).unwrap();
+        let miss = track.at(37.3).world_from_body.translation() - prior_pose.world_from_body.translation();
+        nees += (prior_pose.position.try_inverse().unwrap() * miss).dot(&miss);
         n += 1.0;
         for reading in navigation.readings().lbl {
             // Now and then too few answers come, or they contradict each other.
@@ -200,13 +200,13 @@ fn positions_among_transponders_err_as_their_covariance_says() {
 }
 
 #[test]
-fn exact_ranges_tell_the_place_that_asks() {
-    let (track, field) = (track(60), field());
+fn exact_ranges_report_the_place_that_asks() {
+    let (track, scene) = (track(60), scene());
     let mut sensors = among_five();
     sensors.lbl = Lbl { sigma: 0.0, sound: 0.0, survey: 0.0, dropouts: 0.0, ..sensors.lbl };
     (sensors.depth.sigma, sensors.depth.bias) = (0.0, 0.0);
     (sensors.attitude.heading_deg, sensors.attitude.level_deg, sensors.attitude.sigma_deg) = (0.0, 0.0, 0.0);
-    for reading in Navigation::new(&sensors, &[], &track, &field, 20.0, (4, 0)).readings().lbl {
+    for reading in SensorNavigation::new(&sensors, &[], &track, &scene, 20.0, (4, 0)).readings().lbl {
         let at = track.at(reading.time).world_from_body * seafix_geometry::Point::new(0.3, 0.0, -0.5);
         assert!((reading.value.1.unwrap().at - at.coords).norm() < 1e-6);
         // The last answer comes from the farthest transponder.
@@ -215,7 +215,7 @@ fn exact_ranges_tell_the_place_that_asks() {
     }
     // Without transponders there is no LBL, whatever else is set.
     let none = Sensors { lbl: Lbl { transponders: Vec::new(), sigma: 9.0, ..sensors.lbl }, ..Sensors::default() };
-    let said = |sensors: &Sensors| Navigation::new(sensors, &[], &track, &field, 20.0, (4, 0));
+    let said = |sensors: &Sensors| SensorNavigation::new(sensors, &[], &track, &scene, 20.0, (4, 0));
     assert_eq!(said(&none).readings(), said(&Sensors::default()).readings());
     assert_eq!(said(&none).at(15.0), said(&Sensors::default()).at(15.0));
 }

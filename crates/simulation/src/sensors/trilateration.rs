@@ -70,9 +70,9 @@ fn fit(ranges: &[(Vector3<f64>, Length)], depth: Option<Length>, start: Vector3<
     // (direction, what is missing, σ, its common part) of each measurement at a place.
     let rows = |at: &Vector3<f64>| -> Vec<(Vector3<f64>, f64, Length)> {
         let range = |(place, range): &(Vector3<f64>, Length)| {
-            let way = at - place;
-            let length = way.norm().max(1e-6);
-            (way / length, range.value - length, *range)
+            let offset = at - place;
+            let length = offset.norm().max(1e-6);
+            (offset / length, range.value - length, *range)
         };
         let down = depth.map(|depth| (Vector3::z(), depth.value - at.z, depth));
         ranges.iter().map(range).chain(down).collect()
@@ -100,14 +100,14 @@ fn fit(ranges: &[(Vector3<f64>, Length)], depth: Option<Length>, start: Vector3<
         }
     }
     let (h, _) = normal(&at);
-    let whole = h.cholesky()?.inverse();
-    if !(whole.symmetric_eigenvalues().max() < UNKNOWN * UNKNOWN) {
+    let full = h.cholesky()?.inverse();
+    if !(full.symmetric_eigenvalues().max() < UNKNOWN * UNKNOWN) {
         return None;
     }
-    let spread = |share: fn(&Length) -> f64| {
+    let spread = |fraction: fn(&Length) -> f64| {
         let sum = rows(&at).iter().fold(Matrix3::zeros(), |sum, (along, _, length)| {
-            let gain = whole * along * length.sigma().powi(-2);
-            sum + gain * gain.transpose() * share(length).powi(2)
+            let gain = full * along * length.sigma().powi(-2);
+            sum + gain * gain.transpose() * fraction(length).powi(2)
         });
         0.5 * (sum + sum.transpose())
     };
@@ -123,7 +123,7 @@ mod tests {
             .map(Vector3::from)
     }
 
-    fn heard(at: &Vector3<f64>, n: usize) -> Vec<(Vector3<f64>, Length)> {
+    fn received(at: &Vector3<f64>, n: usize) -> Vec<(Vector3<f64>, Length)> {
         let range = |t: &Vector3<f64>| (*t, Length { value: (at - t).norm(), noise: 0.1, common: 0.05 });
         around()[..n].iter().map(range).collect()
     }
@@ -134,26 +134,26 @@ mod tests {
         let depth = Some(Length { value: at.z, noise: 0.02, common: 0.1 });
         for (n, depth) in [(3, depth), (4, None), (5, depth)] {
             let start = Vector3::new(0.0, -1.0, 20.0);
-            let found = trilaterate(&heard(&at, n), depth, start).unwrap();
+            let found = trilaterate(&received(&at, n), depth, start).unwrap();
             assert!((found.at - at).norm() < 1e-6, "{n}: {}", found.at);
         }
-        assert_eq!(trilaterate(&heard(&at, 1), depth, Vector3::zeros()), None);
+        assert_eq!(trilaterate(&received(&at, 1), depth, Vector3::zeros()), None);
         // Seen to give the place on the wrong side where two were enough.
-        assert_eq!(trilaterate(&heard(&at, 2), depth, Vector3::zeros()), None);
+        assert_eq!(trilaterate(&received(&at, 2), depth, Vector3::zeros()), None);
     }
 
     #[test]
-    fn an_echo_is_left_out_where_it_can_be_told() {
+    fn an_echo_is_left_out_where_it_can_be_reported() {
         let at = Vector3::new(12.0, -7.0, 34.5);
         let depth = Some(Length { value: at.z, noise: 0.02, common: 0.1 });
         for echo in 0..5 {
-            let mut ranges = heard(&at, 5);
+            let mut ranges = received(&at, 5);
             ranges[echo].1.value += 4.0;
             let found = trilaterate(&ranges, depth, Vector3::new(0.0, 0.0, 20.0)).unwrap();
             assert!((found.at - at).norm() < 1e-6, "{echo}: {}", found.at);
         }
         // Of three ranges and a depth one is too many, and nothing says which: no position instead of a false one.
-        let mut ranges = heard(&at, 3);
+        let mut ranges = received(&at, 3);
         ranges[1].1.value += 4.0;
         assert_eq!(trilaterate(&ranges, depth, Vector3::zeros()), None);
     }

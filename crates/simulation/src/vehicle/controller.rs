@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use super::{
     current::{Current, Fluctuation},
     model::{Model, Motion},
-    route::{Goal, Way},
-    track::{RATE, State, Track},
+    route::{Goal, PlannedRoute},
+    track::{RATE, Track, VehicleState},
 };
-use crate::bed::Bed;
+use crate::seabed::Seabed;
 
 /// The vehicles there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -60,15 +60,15 @@ impl Vehicle {
     /// Where it goes, and how far the water has carried what floats in it, both at the states' times.
     pub(crate) fn travel(
         &self,
-        way: &Way,
+        route: &PlannedRoute,
         duration: f64,
         body_from_camera: &Vector3<f64>,
-        bed: &Bed,
+        seabed: &Seabed,
         current: &Current,
         seeds: (u64, u64),
     ) -> (Track, Vec<Vector3<f64>>) {
         let count = (duration * RATE).ceil() as usize + 2;
-        let goals: Vec<Goal> = (0..count).map(|k| way.at(k as f64 / RATE)).collect();
+        let goals: Vec<Goal> = (0..count).map(|k| route.at(k as f64 / RATE)).collect();
         let mut fluctuation = Fluctuation::new(current, seeds.0, seeds.1);
         let dt = 1.0 / RATE;
         let model = match self.kind {
@@ -81,7 +81,7 @@ impl Vehicle {
         let (mut states, mut drifts) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for k in 0..count {
             let goal = &goals[k];
-            let height = bed.depth() - goal.at.z;
+            let height = seabed.depth() - goal.at.z;
             let flow = current.velocity(height, &fluctuation.now);
             drifts.push(drift);
             match &mut pilot {
@@ -104,7 +104,7 @@ fn upright(heading: f64) -> UnitQuaternion<f64> {
 }
 
 /// Exactly on the way, level.
-fn on_rails(goals: &[Goal], k: usize, camera: &Vector3<f64>) -> State {
+fn on_rails(goals: &[Goal], k: usize, camera: &Vector3<f64>) -> VehicleState {
     let goal = &goals[k];
     let turn = upright(goal.heading);
     let (first, last) = (k.saturating_sub(1), (k + 1).min(goals.len() - 1));
@@ -112,7 +112,7 @@ fn on_rails(goals: &[Goal], k: usize, camera: &Vector3<f64>) -> State {
     let rate = libm::remainder(goals[last].heading - goals[first].heading, std::f64::consts::TAU) / span;
     let v = turn.inverse() * goal.velocity;
     let world_from_body = Transform::new(turn, goal.at - turn * camera);
-    State { world_from_body, motion: Vector6::new(0.0, 0.0, rate, v.x, v.y, v.z) }
+    VehicleState { world_from_body, motion: Vector6::new(0.0, 0.0, rate, v.x, v.y, v.z) }
 }
 
 /// The vehicle with what its controller remembers.
@@ -150,11 +150,11 @@ impl Pilot {
     }
 
     /// The state over ground; (ω, v) in the order of this crate.
-    fn state(&self, flow: &Vector3<f64>) -> State {
+    fn state(&self, flow: &Vector3<f64>) -> VehicleState {
         let Motion { at, turn, nu, .. } = &self.motion;
         let v = nu.fixed_rows::<3>(0).into_owned() + turn.inverse() * flow;
         let motion = Vector6::new(nu[3], nu[4], nu[5], v.x, v.y, v.z);
-        State { world_from_body: Transform::<_, Body>::new(*turn, *at), motion }
+        VehicleState { world_from_body: Transform::<_, Body>::new(*turn, *at), motion }
     }
 
     fn step(&mut self, before: &Goal, goal: &Goal, flow: &Vector3<f64>, dt: f64) {
@@ -168,16 +168,16 @@ impl Pilot {
         if error.norm() < 1.0 {
             self.sum += error * dt;
         }
-        let astray = libm::remainder(goal.heading - heading, std::f64::consts::TAU);
+        let max_deviation = libm::remainder(goal.heading - heading, std::f64::consts::TAU);
         let rate = libm::remainder(goal.heading - before.heading, std::f64::consts::TAU) / dt;
-        self.turned += if astray.abs() < 0.5 { astray * dt } else { 0.0 };
+        self.turned += if max_deviation.abs() < 0.5 { max_deviation * dt } else { 0.0 };
         let m = self.model.inertia_matrix().diagonal();
         let along = turn.inverse() * (error * p + slip * d + self.sum * i);
         // What the drag of the wanted speed takes is given in advance.
         let through = turn.inverse() * (goal.velocity - flow);
         let ahead = |k: usize| (self.model.linear[k] + self.model.quadratic[k] * through[k].abs()) * through[k];
         let force = |k: usize| m[k] * along[k] + ahead(k);
-        let yaw = m[5] * (2.0 * p * astray + 1.6 * d * (rate - now.motion[2]) + i * self.turned);
+        let yaw = m[5] * (2.0 * p * max_deviation + 1.6 * d * (rate - now.motion[2]) + i * self.turned);
         // Pitch is held at zero; roll rights itself.
         let pitch = libm::asin((-(turn * Vector3::x()).z).clamp(-1.0, 1.0));
         let level = m[4] * (-2.0 * p * pitch - 1.6 * d * now.motion[1]);
@@ -191,34 +191,35 @@ impl Pilot {
 mod tests {
     use super::*;
 
-    fn travel(kind: VehicleKind, current: &Current, speed: f64) -> (Track, Way) {
+    fn travel(kind: VehicleKind, current: &Current, speed: f64) -> (Track, PlannedRoute) {
         let places = vec![Vector3::new(0.0, 0.0, 36.0), Vector3::new(8.0, 0.0, 36.0), Vector3::new(8.0, 6.0, 36.0)];
-        let way = Way::through(places, None, speed);
-        let bed = Bed::with_relief(40.0, 0.0, 1);
+        let route = PlannedRoute::through(places, None, speed);
+        let seabed = Seabed::with_relief(40.0, 0.0, 1);
         let vehicle = Vehicle { kind, ..Vehicle::default() };
-        let duration = way.length() / speed + 5.0;
-        (vehicle.travel(&way, duration, &Vector3::zeros(), &bed, current, (1, 0)).0, way)
+        let duration = route.length() / speed + 5.0;
+        (vehicle.travel(&route, duration, &Vector3::zeros(), &seabed, current, (1, 0)).0, route)
     }
 
-    fn astray(track: &Track, way: &Way) -> f64 {
+    fn max_deviation(track: &Track, route: &PlannedRoute) -> f64 {
         let after = (3.0 * RATE) as usize;
-        let error = |(k, s): (usize, &State)| (s.world_from_body.translation() - way.at(k as f64 / RATE).at).norm();
+        let error =
+            |(k, s): (usize, &VehicleState)| (s.world_from_body.translation() - route.at(k as f64 / RATE).at).norm();
         track.states.iter().enumerate().skip(after).map(error).fold(0.0, f64::max)
     }
 
     #[test]
-    fn vehicles_keep_to_their_way_also_in_a_current() {
+    fn vehicles_keep_to_their_path_also_in_a_current() {
         let calm = Current::default();
         let flow = Current { speed: 0.2, sigma: 0.03, ..Current::default() };
         for (kind, speed) in [(VehicleKind::Hover200, 0.5), (VehicleKind::Bluerov2Heavy, 0.3)] {
             for current in [&calm, &flow] {
-                let (track, way) = travel(kind, current, speed);
-                let most = astray(&track, &way);
-                assert!(most < 0.35, "{kind:?} {current:?}: {most}");
+                let (track, route) = travel(kind, current, speed);
+                let max = max_deviation(&track, &route);
+                assert!(max < 0.35, "{kind:?} {current:?}: {max}");
             }
         }
-        let (track, way) = travel(VehicleKind::Rail, &flow, 0.5);
-        assert!(astray(&track, &way) < 1e-12);
+        let (track, route) = travel(VehicleKind::Rail, &flow, 0.5);
+        assert!(max_deviation(&track, &route) < 1e-12);
     }
 
     #[test]

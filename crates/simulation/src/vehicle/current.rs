@@ -50,14 +50,14 @@ impl Current {
 
     /// The velocity (north, east, down) this high above the bed, with the fluctuation as it is.
     pub(crate) fn velocity(&self, height: f64, fluctuation: &Vector3<f64>) -> Vector3<f64> {
-        let share = if self.roughness > 0.0 {
+        let fraction = if self.roughness > 0.0 {
             let log = |z: f64| libm::log(z.max(self.roughness * 1.001) / self.roughness) / KARMAN;
             log(height) / log(REFERENCE)
         } else {
             1.0
         };
         let (sine, cosine) = libm::sincos(self.towards_deg.to_radians());
-        Vector3::new(cosine, sine, 0.0) * (self.speed * share) + fluctuation
+        Vector3::new(cosine, sine, 0.0) * (self.speed * fraction) + fluctuation
     }
 }
 
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn the_current_is_slower_near_the_bed() {
+    fn the_current_is_slower_near_the_seabed() {
         let current = Current { speed: 0.4, towards_deg: 90.0, ..Current::default() };
         let at = |height| current.velocity(height, &Vector3::zeros()).y;
         assert!((at(3.0) - 0.4).abs() < 1e-12 && at(0.5) < at(1.0) && at(1.0) < 0.4);

@@ -3,10 +3,10 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Body, Camera, Point, StereoRig, Transform, World, so3};
-use seafix_referencing::Shell;
+use seafix_referencing::BoundingBox;
 
-use super::route::{Goal, ROUNDING, Route, Way};
-use crate::field::Field;
+use super::route::{Goal, PlannedRoute, ROUNDING, Route};
+use crate::scene::Scene;
 
 /// No view is farther from a point's normal than this (degrees).
 const OBLIQUE_DEG: i32 = 60;
@@ -57,16 +57,21 @@ struct Refused {
     under: usize,
 }
 
-/// The way along the points of interest of all objects, or of one. `field` is the site as it was built: what a vehicle knows
+/// The way along the points of interest of all objects, or of one. `scene` is the site as it was built: what a vehicle knows
 /// of it when it plans.
 ///
 /// The views are gone in the order that is short, by nearest neighbours and exchanges; from one to the next straight where
 /// that keeps clear, else up to the altitude of the route, over, and down again.
-pub(super) fn way(route: &Route, only: Option<usize>, field: &Field, looker: &Looker<'_>) -> Result<Way, String> {
-    let ground = Ground::new(route, field, looker);
-    let wanted = wanted(only, field);
+pub(super) fn planned(
+    route: &Route,
+    only: Option<usize>,
+    scene: &Scene,
+    looker: &Looker<'_>,
+) -> Result<PlannedRoute, String> {
+    let ground = Ground::new(route, scene, looker);
+    let wanted = wanted(only, scene);
     if wanted.is_empty() {
-        let whose = only.map_or_else(|| "the site".to_owned(), |o| format!("`{}`", field.told.objects[o].id));
+        let whose = only.map_or_else(|| "the site".to_owned(), |o| format!("`{}`", scene.nominal.objects[o].id));
         return Err(format!(
             "route.kind = `inspection`; {whose} has no point to inspect: give it an [[object.interest]] in the site file"
         ));
@@ -74,23 +79,23 @@ pub(super) fn way(route: &Route, only: Option<usize>, field: &Field, looker: &Lo
     let views: Vec<Stand> = wanted.iter().map(|point| ground.view(point)).collect::<Result<_, _>>()?;
     let order = short(&views);
     let rest = 2.0 * ROUNDING + route.hold * route.speed;
-    let mut way = Along::new(views[order[0]], rest);
+    let mut planned = Along::new(views[order[0]], rest);
     for pair in order.windows(2) {
         let (a, b) = (&views[pair[0]], &views[pair[1]]);
         let names = [pair[0], pair[1]].map(|k| &wanted[k].name);
-        for corner in ground.leg(a, b, names)? {
-            way.go(corner);
+        for corner in ground.segment(a, b, names)? {
+            planned.go(corner);
             // At rest a corner is not cut.
-            way.rest(2.0 * ROUNDING);
+            planned.rest(2.0 * ROUNDING);
         }
-        way.rest(route.hold * route.speed);
+        planned.rest(route.hold * route.speed);
     }
-    Ok(way.finish(route.speed))
+    Ok(planned.finish(route.speed))
 }
 
 /// The points of interest, in the world as it was built; one without a normal is looked at from above.
-fn wanted(only: Option<usize>, field: &Field) -> Vec<Wanted> {
-    let objects = field.told.objects.iter().zip(&field.world_from_object).enumerate();
+fn wanted(only: Option<usize>, scene: &Scene) -> Vec<Wanted> {
+    let objects = scene.nominal.objects.iter().zip(&scene.world_from_object).enumerate();
     let chosen = objects.filter(|(o, _)| only.is_none_or(|one| one == *o));
     let points = chosen.flat_map(|(_, (object, pose))| object.interest.iter().map(move |point| (object, pose, point)));
     let of = |(object, pose, point): (&seafix_referencing::SiteObject, &Transform<World, _>, _)| {
@@ -107,21 +112,21 @@ fn wanted(only: Option<usize>, field: &Field) -> Vec<Wanted> {
 /// What stands there, and how near one may come.
 struct Ground<'a> {
     route: &'a Route,
-    field: &'a Field,
+    scene: &'a Scene,
     looker: &'a Looker<'a>,
-    shells: Vec<Shell<World>>,
+    gates: Vec<BoundingBox<World>>,
     /// The depth of the altitude (m).
     cruise: f64,
 }
 
 impl<'a> Ground<'a> {
-    fn new(route: &'a Route, field: &'a Field, looker: &'a Looker<'a>) -> Self {
-        let shells = field
+    fn new(route: &'a Route, scene: &'a Scene, looker: &'a Looker<'a>) -> Self {
+        let gates = scene
             .objects
             .iter()
-            .filter_map(|object| Shell::around(object.points.iter().map(|point| Point::from(point.at))))
+            .filter_map(|object| BoundingBox::around(object.points.iter().map(|point| Point::from(point.at))))
             .collect();
-        Self { route, field, looker, shells, cruise: field.bed.depth() - route.altitude }
+        Self { route, scene, looker, gates, cruise: scene.seabed.depth() - route.altitude }
     }
 
     /// world_from_camera of a stand, its turn.
@@ -135,20 +140,20 @@ impl<'a> Ground<'a> {
         self.looker.parts.iter().all(|part| {
             let at = stand.at + turn * part;
             let place = Point::from(at);
-            !self.shells.iter().any(|shell| shell.grown_contains(&place, clearance))
-                && self.field.distance(&at, clearance.max(1e-6)).is_none()
+            !self.gates.iter().any(|gate| gate.grown_contains(&place, clearance))
+                && self.scene.distance(&at, clearance.max(1e-6)).is_none()
         })
     }
 
     /// Whether all of a straight leg from rest to rest is clear, the vehicle turning as it will.
     fn clear_along(&self, a: &Stand, b: &Stand) -> bool {
-        let mut leg = Along::new(*a, 2.0 * ROUNDING);
-        leg.go(*b);
-        leg.rest(2.0 * ROUNDING);
-        let leg = leg.finish(1.0);
-        let steps = (leg.length() / STEP).ceil() as i32;
+        let mut segment = Along::new(*a, 2.0 * ROUNDING);
+        segment.go(*b);
+        segment.rest(2.0 * ROUNDING);
+        let segment = segment.finish(1.0);
+        let steps = (segment.length() / STEP).ceil() as i32;
         (0..=steps).all(|k| {
-            let Goal { at, heading, .. } = leg.at(leg.length() * f64::from(k) / f64::from(steps));
+            let Goal { at, heading, .. } = segment.at(segment.length() * f64::from(k) / f64::from(steps));
             self.clear(&Stand { at, heading })
         })
     }
@@ -165,7 +170,7 @@ impl<'a> Ground<'a> {
                 let (y, x) = libm::sincos(std::f64::consts::TAU * f64::from(place) / f64::from(PLACES));
                 let from = point.normal * cosine + (across * x + other * y) * sine;
                 if let Some((off, stand)) = self.stand(point, &from, &mut refused)
-                    && best.is_none_or(|(least, _)| off < least - 1e-9)
+                    && best.is_none_or(|(min, _)| off < min - 1e-9)
                 {
                     best = Some((off, stand));
                 }
@@ -211,9 +216,9 @@ impl<'a> Ground<'a> {
         seeing.retain(|(_, stand)| {
             // The first two parts are the cameras.
             self.looker.parts.iter().take(2).all(|camera| {
-                let eye = stand.at + self.turned(stand) * camera;
-                let to = point.at + (eye - point.at).normalize() * RELIEF;
-                self.field.clear(&eye, &to)
+                let viewpoint = stand.at + self.turned(stand) * camera;
+                let to = point.at + (viewpoint - point.at).normalize() * RELIEF;
+                self.scene.clear(&viewpoint, &to)
             })
         });
         if seeing.is_empty() {
@@ -233,7 +238,7 @@ impl<'a> Ground<'a> {
     }
 
     /// The places from one view to the next, the last included.
-    fn leg(&self, a: &Stand, b: &Stand, names: [&String; 2]) -> Result<Vec<Stand>, String> {
+    fn segment(&self, a: &Stand, b: &Stand, names: [&String; 2]) -> Result<Vec<Stand>, String> {
         if self.clear_along(a, b) {
             return Ok(vec![*b]);
         }
@@ -279,9 +284,9 @@ fn short(views: &[Stand]) -> Vec<usize> {
                 let before = |i: usize| i.checked_sub(1).map(|before| order[before]);
                 let after = order.get(k + 1).copied();
                 let (first, last) = (order[i], order[k]);
-                let leg = |a: Option<usize>, b: usize| a.map_or(0.0, |a| far(a, b));
-                let was = leg(before(i), first) + leg(after, last);
-                let would = leg(before(i), last) + leg(after, first);
+                let segment = |a: Option<usize>, b: usize| a.map_or(0.0, |a| far(a, b));
+                let was = segment(before(i), first) + segment(after, last);
+                let would = segment(before(i), last) + segment(after, first);
                 if would < was - 1e-9 {
                     order[i..=k].reverse();
                     better = true;
@@ -304,9 +309,9 @@ struct Along {
 impl Along {
     /// From a view, with a rest there.
     fn new(start: Stand, rest: f64) -> Self {
-        let mut way = Self { places: vec![start.at], headings: vec![start.heading], lengths: vec![0.0] };
-        way.rest(rest);
-        way
+        let mut planned = Self { places: vec![start.at], headings: vec![start.heading], lengths: vec![0.0] };
+        planned.rest(rest);
+        planned
     }
 
     fn push(&mut self, at: Vector3<f64>, heading: f64, length: f64) {
@@ -326,8 +331,8 @@ impl Along {
         self.push(self.places[self.places.len() - 1], self.headings[self.headings.len() - 1], length);
     }
 
-    fn finish(self, speed: f64) -> Way {
-        Way { places: self.places, lengths: self.lengths, headings: self.headings, look_at: None, speed }
+    fn finish(self, speed: f64) -> PlannedRoute {
+        PlannedRoute { places: self.places, lengths: self.lengths, headings: self.headings, look_at: None, speed }
     }
 }
 
@@ -341,10 +346,10 @@ mod tests {
         let stand = |x: f64| Stand { at: Vector3::new(x, 0.0, 0.0), heading: 0.0 };
         let places = [3.0, 0.0, 5.0, 1.0, 4.0, 2.0];
         let order = short(&places.map(stand));
-        let mut way: Vec<f64> = order.iter().map(|&k| places[k]).collect();
-        if way[0] > way[5] {
-            way.reverse();
+        let mut planned: Vec<f64> = order.iter().map(|&k| places[k]).collect();
+        if planned[0] > planned[5] {
+            planned.reverse();
         }
-        assert_eq!(way, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(planned, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
     }
 }

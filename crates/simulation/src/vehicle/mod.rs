@@ -10,8 +10,8 @@ mod track;
 pub use controller::{Vehicle, VehicleKind};
 pub use current::Current;
 pub(crate) use inspection::Looker;
-pub(crate) use route::Way;
+pub(crate) use route::PlannedRoute;
 pub use route::{Route, RouteKind};
-#[cfg(test)]
-pub(crate) use track::State;
 pub(crate) use track::Track;
+#[cfg(test)]
+pub(crate) use track::VehicleState;

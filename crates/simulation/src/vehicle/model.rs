@@ -11,7 +11,7 @@ const GRAVITY: f64 = 9.81;
 pub(crate) struct Thruster {
     pub(crate) at: Vector3<f64>,
     pub(crate) along: Vector3<f64>,
-    pub(crate) most: f64,
+    pub(crate) max: f64,
 }
 
 /// A rigid vehicle, neutrally buoyant, its centre of buoyancy above that of gravity, which is the origin
@@ -54,7 +54,7 @@ impl Model {
     /// A hovering vehicle of 200 kg with five thrusters: two of surge, one of sway, two of heave, which also
     /// turn it about yaw and pitch; roll rights itself. (Scaled after Girona500.)
     pub(crate) fn hover_200() -> Self {
-        let thruster = |at: [f64; 3], along: [f64; 3], most| Thruster { at: at.into(), along: along.into(), most };
+        let thruster = |at: [f64; 3], along: [f64; 3], max| Thruster { at: at.into(), along: along.into(), max };
         Self {
             mass: 200.0,
             inertia: Vector3::new(20.0, 45.0, 50.0),
@@ -80,9 +80,9 @@ impl Model {
         let flat = |x: f64, y: f64, dx: f64, dy: f64| Thruster {
             at: Vector3::new(x, y, 0.085),
             along: Vector3::new(dx * half, dy * half, 0.0),
-            most: 30.0,
+            max: 30.0,
         };
-        let upright = |x: f64, y: f64| Thruster { at: Vector3::new(x, y, 0.0), along: Vector3::z(), most: 30.0 };
+        let upright = |x: f64, y: f64| Thruster { at: Vector3::new(x, y, 0.0), along: Vector3::z(), max: 30.0 };
         Self {
             mass: 13.5,
             inertia: Vector3::new(0.26, 0.23, 0.37),
@@ -161,7 +161,7 @@ impl Model {
 
     /// Thrusts as commanded, no more than each can; all scaled alike, so that the direction stays.
     pub(crate) fn saturated(&self, wanted: &DVector<f64>) -> Vec<f64> {
-        let worst = wanted.iter().zip(&self.thrusters).map(|(w, t)| w.abs() / t.most).fold(1.0, f64::max);
+        let worst = wanted.iter().zip(&self.thrusters).map(|(w, t)| w.abs() / t.max).fold(1.0, f64::max);
         wanted.iter().map(|w| w / worst).collect()
     }
 

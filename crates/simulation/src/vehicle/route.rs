@@ -5,7 +5,7 @@ use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
 use super::{Looker, inspection};
-use crate::field::Field;
+use crate::scene::Scene;
 
 /// Half of the stretch over which corners of the way are rounded (m).
 pub(super) const ROUNDING: f64 = 0.8;
@@ -102,7 +102,7 @@ impl Route {
 
 /// A way in the world: a line through places, with a place to look at or the way ahead as the heading.
 #[derive(Debug, Clone)]
-pub(crate) struct Way {
+pub(crate) struct PlannedRoute {
     pub(super) places: Vec<Vector3<f64>>,
     /// Length of the way up to each place; between two that are one, of a rest.
     pub(super) lengths: Vec<f64>,
@@ -120,21 +120,21 @@ pub(crate) struct Goal {
     pub(crate) heading: f64,
 }
 
-impl Way {
+impl PlannedRoute {
     /// The way over a field, by the cameras and lamps of `looker`.
-    pub(crate) fn new(route: &Route, field: &Field, looker: &Looker<'_>) -> Result<Self, String> {
-        let depth = field.bed.depth();
+    pub(crate) fn new(route: &Route, scene: &Scene, looker: &Looker<'_>) -> Result<Self, String> {
+        let depth = scene.seabed.depth();
         let over = |p: Vector2<f64>, height: f64| Vector3::new(p.x, p.y, depth - height);
-        let centres: Vec<Vector2<f64>> = field.objects.iter().map(|o| o.centroid().xy()).collect();
-        let named = field.told.objects.iter().position(|o| o.id == route.object);
+        let centres: Vec<Vector2<f64>> = scene.objects.iter().map(|o| o.centroid().xy()).collect();
+        let named = scene.nominal.objects.iter().position(|o| o.id == route.object);
         if named.is_none() && !route.object.is_empty() {
-            let names: Vec<&str> = field.told.objects.iter().map(|o| o.id.as_str()).collect();
+            let names: Vec<&str> = scene.nominal.objects.iter().map(|o| o.id.as_str()).collect();
             return Err(format!("route.object = `{}`; give one of {}", route.object, names.join(", ")));
         }
-        let (centre, altitude) = (centres[named.unwrap_or(field.told.frame)], route.altitude);
+        let (centre, altitude) = (centres[named.unwrap_or(scene.nominal.frame)], route.altitude);
         let mut look_at = None;
         let places = match route.kind {
-            RouteKind::Inspection => return inspection::way(route, named, field, looker),
+            RouteKind::Inspection => return inspection::planned(route, named, scene, looker),
             RouteKind::Waypoints => route.waypoints.iter().map(|w| over(Vector2::new(w[0], w[1]), w[2])).collect(),
             RouteKind::Tour => tour(&centres, route.length).into_iter().map(|p| over(p, altitude)).collect(),
             RouteKind::Lawnmower => {
@@ -216,8 +216,8 @@ impl Way {
         }
         // The way ahead, seen from a little farther, so that the heading stays defined at both ends.
         let far = self.place((s + 1.5).min(self.length())) - self.place((s - 1.5).max(0.0).min(self.length() - 1e-3));
-        let look = self.look_at.map_or(far.xy(), |p| p - at.xy());
-        let heading = if look.norm() > 1e-6 { libm::atan2(look.y, look.x) } else { 0.0 };
+        let towards = self.look_at.map_or(far.xy(), |p| p - at.xy());
+        let heading = if towards.norm() > 1e-6 { libm::atan2(towards.y, towards.x) } else { 0.0 };
         Goal { at, velocity: ahead * self.speed, heading }
     }
 
@@ -240,19 +240,19 @@ fn tour(centres: &[Vector2<f64>], length: f64) -> Vec<Vector2<f64>> {
         let arm = |k: usize| centres[0] + [Vector2::x(), Vector2::y(), -Vector2::x(), -Vector2::y()][k % 4] * 0.8;
         return (0..4 + (length / 1.6) as usize).map(arm).collect();
     }
-    let mut way = vec![centres[0]];
+    let mut planned = vec![centres[0]];
     let mut sum = 0.0;
     for k in 1.. {
         let (turn, step) = (k / (n - 1), k % (n - 1));
         let index = if turn % 2 == 0 { step } else { n - 1 - step };
         let next = centres[index];
-        sum += (next - way[way.len() - 1]).norm();
-        way.push(next);
+        sum += (next - planned[planned.len() - 1]).norm();
+        planned.push(next);
         if sum >= length {
             break;
         }
     }
-    way
+    planned
 }
 
 #[cfg(test)]
@@ -262,20 +262,24 @@ mod tests {
     #[test]
     fn a_tour_goes_there_and_back_to_its_length() {
         let centres = [Vector2::new(0.0, 0.0), Vector2::new(10.0, 0.0), Vector2::new(10.0, 10.0)];
-        let way = tour(&centres, 50.0);
-        assert_eq!(way[..5], [centres[0], centres[1], centres[2], centres[1], centres[0]]);
-        assert_eq!(way.len(), 6);
+        let planned = tour(&centres, 50.0);
+        assert_eq!(planned[..5], [centres[0], centres[1], centres[2], centres[1], centres[0]]);
+        assert_eq!(planned.len(), 6);
     }
 
     #[test]
     fn corners_are_round_and_straights_straight() {
-        let way = Way::through(vec![Vector3::zeros(), Vector3::x() * 10.0, Vector3::new(10.0, 10.0, 0.0)], None, 0.5);
-        let goal = way.at(10.0);
+        let planned = PlannedRoute::through(
+            vec![Vector3::zeros(), Vector3::x() * 10.0, Vector3::new(10.0, 10.0, 0.0)],
+            None,
+            0.5,
+        );
+        let goal = planned.at(10.0);
         assert!((goal.at - Vector3::x() * 5.0).norm() < 1e-12 && (goal.velocity - Vector3::x() * 0.5).norm() < 1e-9);
         assert!(goal.heading.abs() < 1e-12);
-        let corner = way.at(20.0);
+        let corner = planned.at(20.0);
         assert!((corner.heading - std::f64::consts::FRAC_PI_4).abs() < 1e-9 && corner.at.x < 10.0);
-        let end = way.at(1000.0);
+        let end = planned.at(1000.0);
         assert!((end.at - Vector3::new(10.0, 10.0, 0.0)).norm() < 1e-12 && end.velocity.norm() < 1e-12);
         assert!((end.heading - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
     }

@@ -8,7 +8,7 @@ pub(super) const RATE: f64 = 100.0;
 
 /// The vehicle at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct State {
+pub(crate) struct VehicleState {
     pub(crate) world_from_body: Transform<World, Body>,
     /// Rotation (rad/s) and velocity (m/s) over ground, body frame.
     pub(crate) motion: Vector6<f64>,
@@ -17,7 +17,7 @@ pub(crate) struct State {
 /// States at even steps of time.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Track {
-    pub(crate) states: Vec<State>,
+    pub(crate) states: Vec<VehicleState>,
 }
 
 impl Track {
@@ -26,13 +26,14 @@ impl Track {
 
     /// The state at a time (s): a cubic through the neighbouring states' places and velocities, the turn
     /// between their attitudes at an even rate.
-    pub(crate) fn at(&self, time: f64) -> State {
+    pub(crate) fn at(&self, time: f64) -> VehicleState {
         let x = (time * RATE).clamp(0.0, (self.states.len() - 1) as f64);
         let k = (x as usize).min(self.states.len().saturating_sub(2));
         let (a, b) = (&self.states[k], &self.states[(k + 1).min(self.states.len() - 1)]);
         let t = x - k as f64;
         let (p, q) = (a.world_from_body, b.world_from_body);
-        let velocity = |s: &State| s.world_from_body.rotation() * s.motion.fixed_rows::<3>(3).into_owned() / RATE;
+        let velocity =
+            |s: &VehicleState| s.world_from_body.rotation() * s.motion.fixed_rows::<3>(3).into_owned() / RATE;
         let (u, v): (Vector3<f64>, Vector3<f64>) = (velocity(a), velocity(b));
         let (t2, t3) = (t * t, t * t * t);
         let at = p.translation() * (2.0 * t3 - 3.0 * t2 + 1.0)
@@ -41,7 +42,7 @@ impl Track {
             + v * (t3 - t2);
         let turn = so3::log(&(p.rotation().inverse() * q.rotation()));
         let rotation = p.rotation() * so3::exp(&(turn * t));
-        State { world_from_body: Transform::new(rotation, at), motion: a.motion + (b.motion - a.motion) * t }
+        VehicleState { world_from_body: Transform::new(rotation, at), motion: a.motion + (b.motion - a.motion) * t }
     }
 }
 
@@ -55,7 +56,7 @@ mod tests {
         let state = |k: usize| {
             let angle = 0.02 * k as f64;
             let turn = so3::exp(&(Vector3::z() * angle));
-            State {
+            VehicleState {
                 world_from_body: Transform::new(turn, turn * -Vector3::y() * 3.0),
                 motion: Vector6::new(0.0, 0.0, 0.02 * RATE, 3.0 * 0.02 * RATE, 0.0, 0.0),
             }

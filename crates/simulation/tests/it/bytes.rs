@@ -4,8 +4,8 @@ use std::path::Path;
 
 use seafix_simulation::{
     Mission, PlannedMission, RigPlan,
-    field::Changes,
     optics::{Port, PortKind, Water},
+    scene::Changes,
     vehicle::Current,
 };
 use seafix_vision::Threads;

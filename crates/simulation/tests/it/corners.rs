@@ -4,8 +4,8 @@ use std::{fmt::Write, fs, path::Path, process::Command};
 
 use seafix_simulation::{
     Blueprint, Imager, Mission, ObjectPlan,
-    field::{Texture, built_in},
     optics::Water,
+    scene::{Texture, built_in},
 };
 use seafix_vision::{Image, Threads};
 
@@ -106,7 +106,7 @@ fn opencv_finds_corners_where_the_truth_has_them() {
     fs::create_dir_all(&folder).unwrap();
     // The same site with smooth paint and plates.
     let mut smooth = built_in("drill-centre").unwrap();
-    smooth.geometry.bed.texture = Texture::Plain;
+    smooth.geometry.seabed.texture = Texture::Plain;
     smooth.geometry.materials.iter_mut().for_each(|material| material.texture = Texture::Plain);
     fs::write(folder.join("smooth.site.toml"), smooth.site.to_toml()).unwrap();
     fs::write(folder.join("smooth.geometry.toml"), smooth.geometry.to_toml()).unwrap();

@@ -31,7 +31,7 @@ pub(crate) struct Seen {
     pub(crate) points: Vec<Vec<MeasuredPoint>>,
     pub(crate) poses: Vec<String>,
     pub(crate) readings: Readings,
-    pub(crate) told: String,
+    pub(crate) nominal: String,
 }
 
 fn plan(mission: &Mission) -> PlannedMission {
@@ -56,6 +56,6 @@ pub(crate) fn seen(mission: &Mission, images: bool) -> Seen {
         points: instants.iter().map(|i| i.points()).collect(),
         poses: instants.iter().map(|i| format!("{:?} {:?}", i.prior, i.truth())).collect(),
         readings: plan.readings(),
-        told: format!("{} {:?} {:?}", plan.site().to_toml(), plan.rig(), plan.world_from_object()),
+        nominal: format!("{} {:?} {:?}", plan.site().to_toml(), plan.rig(), plan.world_from_object()),
     }
 }

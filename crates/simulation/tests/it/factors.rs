@@ -2,9 +2,9 @@
 
 use seafix_simulation::{
     Imager, Mission,
-    field::Changes,
     optics::{Lamp, Port, PortKind, Water},
-    sensors::{Device, DeviceFault, FaultKind},
+    scene::Changes,
+    sensors::{DeviceFault, FaultKind, FaultyDevice},
     vehicle::{Current, Route, RouteKind, Vehicle, VehicleKind},
 };
 
@@ -13,12 +13,18 @@ use crate::dives::{base, seen};
 /// A factor: its name, how it is switched on with magnitude 0, and with one that shows.
 type Factor = (&'static str, fn(&mut Mission), fn(&mut Mission));
 
-fn fault(device: Device, kind: FaultKind, to: f64, amount: f64) -> DeviceFault {
+fn fault(device: FaultyDevice, kind: FaultKind, to: f64, amount: f64) -> DeviceFault {
     DeviceFault { device, kind, from: 1.0, to, amount }
 }
 
-const DEVICES: [Device; 6] =
-    [Device::Images, Device::Acoustic, Device::Lbl, Device::Doppler, Device::Attitude, Device::Depth];
+const DEVICES: [FaultyDevice; 6] = [
+    FaultyDevice::Images,
+    FaultyDevice::Acoustic,
+    FaultyDevice::Lbl,
+    FaultyDevice::Doppler,
+    FaultyDevice::Attitude,
+    FaultyDevice::Depth,
+];
 
 /// Four transponders about the site.
 fn transponders() -> Vec<[f64; 3]> {

@@ -34,9 +34,9 @@ const SETTINGS: &[Setting] = &[
     ("rate", "0.7", "", None),
     ("start", "4.0", "", None),
     ("frames", "3", "", None),
-    ("prior", r#""drawn""#, "", None),
-    ("prior-position", "0.2", r#"prior="drawn""#, GIVEN),
-    ("prior-attitude-deg", "0.2", r#"prior="drawn""#, GIVEN),
+    ("prior", r#""sampled""#, "", None),
+    ("prior-position", "0.2", r#"prior="sampled""#, GIVEN),
+    ("prior-attitude-deg", "0.2", r#"prior="sampled""#, GIVEN),
     ("model-sigma", "0.002", "", None),
     ("survey-sigma", "0.02", "", None),
     ("shadows", "false", "", None),
@@ -118,7 +118,7 @@ const SETTINGS: &[Setting] = &[
     ("current.tau", "20.0", "current.sigma=0.05", STILL_WATER),
     ("sensors.acoustic.from", "[20.0, 0.0, 0.0]", "", None),
     ("sensors.acoustic.at", "[0.0, 0.0, -0.5]", "", None),
-    ("sensors.acoustic.share", "0.01", "", None),
+    ("sensors.acoustic.range-fraction", "0.01", "", None),
     ("sensors.acoustic.sigma", "0.2", "", None),
     ("sensors.acoustic.rate", "1.0", "", None),
     ("sensors.acoustic.outliers", "1.0", "", None),
@@ -176,7 +176,7 @@ fn with(table: &Table, settings: &str) -> Table {
     table
 }
 
-fn look(table: &Table, images: bool) -> Seen {
+fn observe(table: &Table, images: bool) -> Seen {
     seen(&table.clone().try_into::<Mission>().expect("these are settings"), images)
 }
 
@@ -209,8 +209,8 @@ fn every_setting_does_something_and_nothing_where_its_factor_is_off() {
     let mut shows = |settings: String, change: &str| {
         let images = !["sensors.", "points.", "prior"].iter().any(|key| change.starts_with(key));
         let table = with(&table, &settings);
-        let changed = look(&with(&table, change), images);
-        *before.entry((settings, images)).or_insert_with(|| look(&table, images)) != changed
+        let changed = observe(&with(&table, change), images);
+        *before.entry((settings, images)).or_insert_with(|| observe(&table, images)) != changed
     };
     for (key, value, on, off) in SETTINGS {
         let change = format!("{key}={value}");

@@ -95,10 +95,11 @@ pub(crate) fn rig(size: [usize; 2]) -> StereoRig {
     let [width, height] = size.map(|n| n as f64);
     let focal = 0.8 * width;
     let size = size.map(|n| n as u32);
-    let eye = Pinhole::new(size, [focal, focal], [0.5 * (width - 1.0), 0.5 * (height - 1.0)], &[]).expect("a camera");
+    let camera =
+        Pinhole::new(size, [focal, focal], [0.5 * (width - 1.0), 0.5 * (height - 1.0)], &[]).expect("a camera");
     let mut right_from_left = nalgebra::Matrix4::identity();
     right_from_left[(0, 3)] = -0.25;
-    StereoRig::new(eye, eye, Transform::from_matrix(&right_from_left).expect("a shift")).expect("a rig")
+    StereoRig::new(camera, camera, Transform::from_matrix(&right_from_left).expect("a shift")).expect("a rig")
 }
 
 /// Where the right camera of [`rig`] sees what the left one sees of a plane 4 m away, tilted by 25° about an

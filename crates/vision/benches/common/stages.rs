@@ -3,8 +3,8 @@
 use seafix_component::{Choice, Registry};
 use seafix_geometry::{Pixel, StereoRig};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptors, Direct, FrontEnd, Image, Keypoint, LOCATORS, Look, MATCHERS, Match, Matcher,
-    Optimal, Pair, Place, Refinement, Table, Threads, View, Warp, Workspace,
+    DESCRIPTORS, DETECTORS, Descriptors, Direct, FrontEnd, FrontEndOutput, Image, Keypoint, LOCATORS, MATCHERS, Match,
+    Matcher, Optimal, Pair, Refinement, Table, Threads, UncertainPixel, View, Warp, Workspace,
 };
 use serde_json::{Value, json};
 
@@ -24,9 +24,9 @@ pub(crate) struct Stage<'a> {
     /// What it is asked; null: it has nothing like it.
     pub(crate) request: Value,
     /// Our time over the peer's, at most.
-    pub(crate) at_most: Option<f64>,
+    pub(crate) max_ratio: Option<f64>,
     /// Our time at most (ms).
-    pub(crate) at_most_ms: Option<f64>,
+    pub(crate) max_ms: Option<f64>,
     /// Ours.
     pub(crate) ours: Box<dyn FnMut(Threads) + Send + 'a>,
 }
@@ -42,10 +42,10 @@ pub(crate) struct Scene {
     /// Pairs a few tenths of a pixel beside the truth.
     matches: Vec<Match>,
     /// Descriptors of many more points: made, since their values do not matter to the time.
-    crowds: [[Descriptors; 2]; 2],
+    large_sets: [[Descriptors; 2]; 2],
 }
 
-const CROWDS: [usize; 2] = [1000, 3000];
+const LARGE: [usize; 2] = [1000, 3000];
 
 /// The component, if it is listed with these settings.
 fn listed<T: ?Sized>(registry: &'static Registry<T>, choice: &Choice) -> Option<Box<T>> {
@@ -86,18 +86,18 @@ impl Scene {
         let there = keypoints[0].iter().map(|keypoint| scene::map(&right_from_left, keypoint.at));
         let right = there.enumerate().map(|(i, p)| Pixel { u: p.u + aside(i), v: p.v + aside(i + 2) });
         let matches = right.enumerate().map(|(left, right)| Match { left, right, distance: 0.0 }).collect();
-        let values = CROWDS.map(|count| [1, 2].map(|seed| unit_vectors(count, seed)));
+        let values = LARGE.map(|count| [1, 2].map(|seed| unit_vectors(count, seed)));
         for peer in peers.into_iter().flatten() {
             peer.keep("left", &images[0]);
             peer.keep("right", &images[1]);
-            for (count, pair) in CROWDS.iter().zip(&values) {
+            for (count, pair) in LARGE.iter().zip(&values) {
                 for (side, values) in ["a", "b"].iter().zip(pair) {
                     peer.keep_table(&format!("{side}{count}"), *count, values);
                 }
             }
         }
-        let crowds = values.map(|pair| pair.map(|values| Descriptors::Numbers(Table::new(64, values))));
-        Self { images, rig, keypoints, matches, crowds }
+        let large_sets = values.map(|pair| pair.map(|values| Descriptors::Numbers(Table::new(64, values))));
+        Self { images, rig, keypoints, matches, large_sets }
     }
 
     /// All stages for which we have a component.
@@ -130,11 +130,11 @@ impl Scene {
                 None,
             ),
         ];
-        let stages = list.into_iter().filter_map(|(name, choice, request, at_most)| {
+        let stages = list.into_iter().filter_map(|(name, choice, request, max_ratio)| {
             let detector = listed(&DETECTORS, &choice)?;
             let mut found = Vec::new();
             let ours = with_memory(move |work| detector.detect_into(&self.images[0], work, &mut found));
-            Some(Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours })
+            Some(Stage { name, asks: OPENCV, request, max_ratio, max_ms: None, ours })
         });
         stages.collect()
     }
@@ -162,14 +162,14 @@ impl Scene {
             ),
             ("ORB, detect and describe", OPENCV, features("orb"), "fast", Choice::named("orb"), None),
         ];
-        let stages = list.into_iter().filter_map(|(name, asks, request, detects, describes, at_most)| {
+        let stages = list.into_iter().filter_map(|(name, asks, request, detects, describes, max_ratio)| {
             let (detector, descriptor) = (listed(&DETECTORS, &detect(detects))?, listed(&DESCRIPTORS, &describes)?);
             let (mut found, mut described) = (Vec::new(), Descriptors::default());
             let ours = with_memory(move |work| {
                 detector.detect_into(&self.images[0], work, &mut found);
                 descriptor.describe_into(&self.images[0], &found, work, &mut described);
             });
-            Some(Stage { name, asks, request, at_most, at_most_ms: None, ours })
+            Some(Stage { name, asks, request, max_ratio, max_ms: None, ours })
         });
         stages.collect()
     }
@@ -186,13 +186,13 @@ impl Scene {
             ("SURF upright at 1000 corners", Choice::named("surf"), request(true), Some(0.5)),
             ("SURF rotated at 1000 corners", Choice::named("surf").with("upright", false), request(false), None),
         ];
-        let stages = list.into_iter().filter_map(|(name, choice, request, at_most)| {
+        let stages = list.into_iter().filter_map(|(name, choice, request, max_ratio)| {
             let descriptor = listed(&DESCRIPTORS, &choice)?;
             let mut described = Descriptors::default();
             let ours = with_memory(move |work| {
                 descriptor.describe_into(&self.images[0], &self.keypoints[0], work, &mut described);
             });
-            Some(Stage { name, asks: SURF, request, at_most, at_most_ms: None, ours })
+            Some(Stage { name, asks: SURF, request, max_ratio, max_ms: None, ours })
         });
         stages.collect()
     }
@@ -203,19 +203,19 @@ impl Scene {
         let stages = names.into_iter().enumerate().map(|(i, name)| {
             let choice = Choice::named("mutual-ratio");
             let matcher: Box<dyn Matcher> = MATCHERS.build(&choice).expect("a matcher");
-            let count = CROWDS[i];
+            let count = LARGE[i];
             let keypoints = [vec![self.keypoints[0][0]; count], vec![self.keypoints[1][0]; count]];
             let mut found = Vec::new();
             let ours = with_memory(move |work| {
                 let view = |side: usize| View {
                     image: &self.images[side],
                     keypoints: &keypoints[side],
-                    descriptors: &self.crowds[i][side],
+                    descriptors: &self.large_sets[i][side],
                 };
                 matcher.match_into(&view(0), &view(1), &self.rig, work, &mut found);
             });
             let request = json!({"do": "nearest_two", "a": format!("a{count}"), "b": format!("b{count}")});
-            Stage { name, asks: OPENCV, request, at_most: Some(1.0 / 3.0), at_most_ms: None, ours }
+            Stage { name, asks: OPENCV, request, max_ratio: Some(1.0 / 3.0), max_ms: None, ours }
         });
         stages.collect()
     }
@@ -241,17 +241,17 @@ impl Scene {
                 None,
             ),
         ];
-        let stages = list.into_iter().map(|(name, refine, request, at_most)| {
+        let stages = list.into_iter().map(|(name, refinement, request, max_ratio)| {
             let mut pixels = Vec::new();
             let pair = |found: &Match| Pair {
-                left: Place::independent(self.keypoints[0][found.left].at, 0.15),
-                right: Place::independent(found.right, 0.15),
+                left: UncertainPixel::independent(self.keypoints[0][found.left].at, 0.15),
+                right: UncertainPixel::independent(found.right, 0.15),
             };
             let pairs: Vec<Pair> = self.matches.iter().map(pair).collect();
             let ours = with_memory(move |work| {
-                refine.refine_into(&pairs, &self.images[0], &self.images[1], &self.rig, work, &mut pixels);
+                refinement.refine_into(&pairs, &self.images[0], &self.images[1], &self.rig, work, &mut pixels);
             });
-            Stage { name, asks: OPENCV, request, at_most, at_most_ms: None, ours }
+            Stage { name, asks: OPENCV, request, max_ratio, max_ms: None, ours }
         });
         stages.collect()
     }
@@ -278,16 +278,16 @@ impl Scene {
                 refinement: Box::new(Direct::default()),
                 triangulator: Box::new(Optimal::default()),
             };
-            let mut looks = [Threads::One, Threads::Pool].map(Look::new);
+            let mut outputs = [Threads::One, Threads::Pool].map(FrontEndOutput::new);
             Stage {
                 name,
                 asks: SURF,
                 request: json!({"do": "pair", "count": COUNT, "projections": projections}),
-                at_most: None,
-                at_most_ms: Some(limit),
+                max_ratio: None,
+                max_ms: Some(limit),
                 ours: Box::new(move |threads| {
-                    let look = &mut looks[usize::from(threads == Threads::Pool)];
-                    front_end.look(&self.images[0], &self.images[1], &self.rig, look);
+                    let output = &mut outputs[usize::from(threads == Threads::Pool)];
+                    front_end.run(&self.images[0], &self.images[1], &self.rig, output);
                 }),
             }
         });

@@ -64,7 +64,7 @@ impl Slant {
     }
 
     /// The share of it that is no noise: without a slant the score is 2 in the mean.
-    pub(super) fn share(&self) -> f64 {
+    pub(super) fn fraction(&self) -> f64 {
         (1.0 - 2.0 / self.score).max(0.0).sqrt()
     }
 }
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn interpolation_keeps_the_share_of_noise_that_the_cardinal_spline_does() {
+    fn interpolation_keeps_the_fraction_of_noise_that_the_cardinal_spline_does() {
         for t in [0.0, 0.1, 0.25, 0.5, 0.9] {
             let sum: f64 = (-25..=25).map(|k| cardinal(t, k).powi(2)).sum();
             assert!((kept(t) - sum).abs() < 1e-6, "{t}: {} not {sum}", kept(t));

@@ -40,7 +40,7 @@ pub struct Direct {
     /// How far the alignment may move the right place (px).
     pub reach: f64,
     /// The least zero-normalised cross correlation of the aligned windows.
-    pub least_correlation: f64,
+    pub min_correlation: f64,
     /// The greatest number of iterations.
     pub iterations: usize,
     /// What becomes of a pair that could not be aligned.
@@ -55,7 +55,7 @@ impl Default for Direct {
             weight: Weight::Gaussian,
             warp: Warp::AsSeen,
             reach: 1.5,
-            least_correlation: 0.8,
+            min_correlation: 0.8,
             iterations: 20,
             unaligned: Unaligned::Drop,
         }
@@ -69,12 +69,12 @@ impl Component for Direct {
     const SOURCE: &'static str = "Baker and Matthews, Lucas–Kanade 20 years on, IJCV 2004";
 
     fn check(&self) -> Result<(), String> {
-        let Self { refine: _, window, weight: _, warp: _, reach, least_correlation, iterations, unaligned: _ } = *self;
+        let Self { refine: _, window, weight: _, warp: _, reach, min_correlation, iterations, unaligned: _ } = *self;
         let odd = window % 2 == 1 && (3..=201).contains(&window);
         in_range(odd, "window", window, "an odd number of pixels from 3 to 201")?;
         in_range(reach > 0.0 && reach <= 100.0, "reach", reach, "more than 0, at most 100 (px)")?;
-        let correlated = (-1.0..=1.0).contains(&least_correlation);
-        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
+        let correlated = (-1.0..=1.0).contains(&min_correlation);
+        in_range(correlated, "min-correlation", min_correlation, "a number from -1 to 1")?;
         in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
     }
 }
@@ -120,7 +120,7 @@ impl Direct {
     ) -> Option<Aligned> {
         let Local { shape, epipolar } = Local::new(rig, pair, self.window as f64 / 2.0);
         let expected = Expected { place: pair.left, start: pair.right, shape, along: epipolar };
-        self.lay_over(left, right, &expected, aligner)
+        self.overlay(left, right, &expected, aligner)
     }
 }
 
@@ -139,7 +139,7 @@ mod tests {
     use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
     use seafix_geometry::{Pinhole, Pixel, Transform};
 
-    use crate::Place;
+    use crate::UncertainPixel;
 
     /// Waves, seen `shift` px further to the right and half of that down, with other light and contrast.
     fn waves(shift: f64, contrast: f64, light: f64) -> Image {
@@ -158,7 +158,8 @@ mod tests {
     }
 
     fn pairs([left, right]: &[Image; 2], at: Pixel, start: Pixel, refine: &Direct) -> UncertainPixels {
-        let pair = Pair { left: Place::independent(at, 0.15), right: Place::independent(start, 0.15) };
+        let pair =
+            Pair { left: UncertainPixel::independent(at, 0.15), right: UncertainPixel::independent(start, 0.15) };
         refine.refine(&[pair], left, right, &rig())[0]
     }
 
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn the_right_place_errs_with_the_left_one_and_a_little_more() {
+    fn the_right_place_has_an_error_with_the_left_one_and_a_little_more() {
         let moving = Direct { warp: Warp::Translation, ..Direct::default() };
         let images = [waves(0.0, 30.0, 120.0), waves(0.62, 20.0, 80.0)];
         let pair = pairs(&images, Pixel { u: 30.3, v: 28.8 }, Pixel { u: 30.0, v: 29.5 }, &moving);
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_as_great_as_the_covariance_says() {
+    fn errors_are_as_great_as_the_covariance_states() {
         let mut state = 7_u64;
         let mut random = || {
             // Twelve uniform numbers make a normal one.
@@ -251,7 +252,8 @@ mod tests {
         ] {
             let keep = Direct { unaligned: Unaligned::Keep, ..Direct::default() };
             assert_eq!(aligned(image, at, start, &keep).right, start, "{why}");
-            let pair = Pair { left: Place::independent(at, 0.15), right: Place::independent(start, 0.15) };
+            let pair =
+                Pair { left: UncertainPixel::independent(at, 0.15), right: UncertainPixel::independent(start, 0.15) };
             let left = waves(0.0, 30.0, 120.0);
             assert_eq!(Direct::default().refine(&[pair], &left, image, &rig()), [], "{why}");
         }

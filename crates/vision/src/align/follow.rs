@@ -57,20 +57,19 @@ impl Direct {
     }
 
     fn follow(&self, from: &Image, to: &Image, expected: &Expected, aligner: &mut Aligner) -> Option<Track> {
-        self.lay_over(from, to, expected, aligner).map(Track::from)
+        self.overlay(from, to, expected, aligner).map(Track::from)
     }
 
     /// The window around the place, laid over the second image as these settings say.
-    pub(super) fn lay_over(
+    pub(super) fn overlay(
         &self,
         from: &Image,
         to: &Image,
         expected: &Expected,
         aligner: &mut Aligner,
     ) -> Option<Aligned> {
-        let Self { window, weight, warp, reach, least_correlation, iterations, .. } = *self;
-        let rules =
-            Rules { window, weight, reach, least_correlation, iterations, precision: Rules::FINE, beyond: false };
+        let Self { window, weight, warp, reach, min_correlation, iterations, .. } = *self;
+        let rules = Rules { window, weight, reach, min_correlation, iterations, precision: Rules::FINE, beyond: false };
         let vector = |pixel: &Pixel| Vector2::new(pixel.u, pixel.v);
         let (place, start) = (vector(&expected.place), vector(&expected.start));
         let begin = (&start, &expected.shape);

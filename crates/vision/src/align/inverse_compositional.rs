@@ -8,9 +8,9 @@ use super::{
     lanes::{dot, dot3},
     spline::Spline,
     warp::{Model, Slanted, Translation},
-    window::{Grid, LEAST_VARIANCE, Normal, Template, Weight},
+    window::{Grid, MIN_VARIANCE, Normal, Template, Weight},
 };
-use crate::{Image, Place};
+use crate::{Image, UncertainPixel};
 
 /// When an alignment is believed.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +22,7 @@ pub(crate) struct Rules {
     /// How far the place may move (px).
     pub(crate) reach: f64,
     /// The least correlation of the windows.
-    pub(crate) least_correlation: f64,
+    pub(crate) min_correlation: f64,
     /// The greatest number of steps.
     pub(crate) iterations: usize,
     /// A step shorter than this (px) is the last.
@@ -32,7 +32,7 @@ pub(crate) struct Rules {
 }
 
 /// Pixels of the greatest spline that is made for many places.
-const MOST_AT_ONCE: f64 = 20_000.0;
+const MAX_AT_ONCE: f64 = 20_000.0;
 
 impl Rules {
     /// Far below what any window tells.
@@ -56,8 +56,8 @@ pub(crate) struct Aligned {
 
 impl Aligned {
     /// The place with its covariance, given the left one.
-    pub(super) fn place(&self) -> Place {
-        Place { at: Pixel { u: self.at.x, v: self.at.y }, covariance: self.covariance }
+    pub(super) fn place(&self) -> UncertainPixel {
+        UncertainPixel { at: Pixel { u: self.at.x, v: self.at.y }, covariance: self.covariance }
     }
 }
 
@@ -121,7 +121,7 @@ impl Aligner {
         let stays = |aligner: &Self| {
             let last = moving.information.cholesky()?.solve(&plain.gradient);
             let moved = aligner.judge(&(at - shape * last), &shape, &moving, &plain, rules)?;
-            let off = shape * slant.off * slant.share();
+            let off = shape * slant.off * slant.fraction();
             Some(Aligned { covariance: moved.covariance + off * off.transpose(), ..moved })
         };
         if !slant.is_seen() {
@@ -221,7 +221,7 @@ impl Aligner {
         let inside = |at: &&Vector2<f64>| (0..2).all(|i| at[i] >= 0.0 && at[i] < size[i]);
         let corners = places.iter().filter(inside).map(|at| self.extent(at, &here));
         let corners = corners.reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])]);
-        if let Some([first, last]) = corners.filter(|[first, last]| (last - first).product() < MOST_AT_ONCE) {
+        if let Some([first, last]) = corners.filter(|[first, last]| (last - first).product() < MAX_AT_ONCE) {
             self.load_between(right, &first, &last);
         }
         for (at, correlation) in places.iter().zip(correlations).filter(|(at, _)| inside(at)) {
@@ -238,7 +238,7 @@ impl Aligner {
         found: &Found<P>,
         rules: &Rules,
     ) -> Option<Aligned> {
-        if !(found.correlation >= rules.least_correlation) {
+        if !(found.correlation >= rules.min_correlation) {
             return None;
         }
         let own = covariance(normal, &self.residual(at, shape, found))?;
@@ -268,8 +268,8 @@ impl Aligner {
     /// Makes the spline cover these corners of windows and a little more.
     fn load_between(&mut self, image: &Image, first: &Vector2<f64>, last: &Vector2<f64>) {
         let fill = (self.grid.columns - self.grid.side) as f64;
-        let whole = |x: f64| x.floor() as isize;
-        let (start, end) = ([whole(first.x) - 2, whole(first.y) - 2], [whole(last.x + fill) + 5, whole(last.y) + 5]);
+        let full = |x: f64| x.floor() as isize;
+        let (start, end) = ([full(first.x) - 2, full(first.y) - 2], [full(last.x + fill) + 5, full(last.y) + 5]);
         self.rounding = image.rounding();
         self.spline.load(image, start, end);
     }
@@ -330,12 +330,12 @@ impl Aligner {
 
     /// What is left between the windows.
     fn residual<const P: usize>(&self, at: &Vector2<f64>, shape: &Matrix2<f64>, found: &Found<P>) -> Residual {
-        let whole = *shape == Matrix2::identity();
+        let full = *shape == Matrix2::identity();
         let squares: f32 = self.grid.weights.iter().map(|w| w * w).sum();
         Residual {
             energy: 2.0 * (1.0 - found.correlation),
             variance: found.variance,
-            fractions: whole.then(|| [0, 1].map(|i| (at[i] + self.grid.first[i]).rem_euclid(1.0))),
+            fractions: full.then(|| [0, 1].map(|i| (at[i] + self.grid.first[i]).rem_euclid(1.0))),
             squared_weights: f64::from(squares),
             rounding: self.rounding,
         }
@@ -372,7 +372,7 @@ fn sums(
     let mean = dot(patch, weights);
     patch.iter_mut().for_each(|p| *p -= mean);
     let variance = dot3(patch, patch, weights);
-    if !(f64::from(variance) > LEAST_VARIANCE && variance.is_finite()) {
+    if !(f64::from(variance) > MIN_VARIANCE && variance.is_finite()) {
         return None;
     }
     for (sum, column) in gradient.iter_mut().zip(jacobian.chunks_exact(patch.len())) {

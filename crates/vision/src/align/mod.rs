@@ -17,7 +17,7 @@ use seafix_component::{Choice, Component, Registry, entry};
 use seafix_geometry::{StereoPixels, StereoRig, UncertainPixels};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::{Image, Pair, Place, Workspace};
+use crate::{Image, Pair, UncertainPixel, Workspace};
 pub use direct::Direct;
 pub use follow::Expected;
 pub(crate) use inverse_compositional::{Aligned, Aligner, Rules};
@@ -84,7 +84,7 @@ fn apart(pair: &Pair) -> UncertainPixels {
 
 /// A place found in the left image and aligned to the right one, which errs with it: `right` is known so well relative to
 /// the left place, and moves by `shape` when that does.
-fn together(left: &Place, right: &Place, shape: &Matrix2<f64>) -> UncertainPixels {
+fn together(left: &UncertainPixel, right: &UncertainPixel, shape: &Matrix2<f64>) -> UncertainPixels {
     let place = left.covariance;
     let across = place * shape.transpose();
     let mut covariance = Matrix4::zeros();

@@ -121,8 +121,8 @@ impl Spline {
 
 /// A coordinate inside the rectangle as a whole and a fraction.
 fn split(at: f64) -> (usize, f32) {
-    let whole = at.floor();
-    (whole as usize, (at - whole) as f32)
+    let full = at.floor();
+    (full as usize, (at - full) as f32)
 }
 
 /// The four values β(t + 1), β(t), β(t − 1), β(t − 2).
@@ -225,7 +225,7 @@ fn shear(
 ) {
     const LANES: usize = 8;
     let width = across.len();
-    let most = (width - 3) as f32;
+    let max = (width - 3) as f32;
     for (j, out) in out.chunks_exact_mut(columns).enumerate() {
         let row = |k: usize| &coefficients[(j + k) * width..][..width];
         let (a, b, c, d) = (row(0), row(1), row(2), row(3));
@@ -234,11 +234,11 @@ fn shear(
         }
         let begin = begin + drift * j as f32;
         for (block, out) in out.chunks_exact_mut(LANES).enumerate() {
-            let (mut whole, mut part) = ([0_i32; LANES], [0.0_f32; LANES]);
+            let (mut full, mut part) = ([0_i32; LANES], [0.0_f32; LANES]);
             for i in 0..LANES {
-                let x = (begin + step * (block * LANES + i) as f32).clamp(1.0, most);
-                whole[i] = x as i32;
-                part[i] = x - whole[i] as f32;
+                let x = (begin + step * (block * LANES + i) as f32).clamp(1.0, max);
+                full[i] = x as i32;
+                part[i] = x - full[i] as f32;
             }
             let mut w = [[0.0_f32; LANES]; 4];
             for i in 0..LANES {
@@ -248,7 +248,7 @@ fn shear(
                 }
             }
             for i in 0..LANES {
-                let c = &across[whole[i] as usize - 1..][..4];
+                let c = &across[full[i] as usize - 1..][..4];
                 out[i] = w[0][i] * c[0] + w[1][i] * c[1] + (w[2][i] * c[2] + w[3][i] * c[3]);
             }
         }

@@ -125,7 +125,7 @@ impl Normal<4> {
 }
 
 /// Below a hundredth of a grey level there is nothing to align.
-pub(super) const LEAST_VARIANCE: f64 = 1e-4;
+pub(super) const MIN_VARIANCE: f64 = 1e-4;
 
 impl Template {
     /// Takes the window on `grid`; `None` where the image ends or is flat.
@@ -214,7 +214,7 @@ fn derive<const P: usize, M: Model<P>>(
     let mean = dot(values, weights);
     values.iter_mut().for_each(|v| *v -= mean);
     let variance = dot3(values, values, weights);
-    if !(f64::from(variance) > LEAST_VARIANCE && variance.is_finite()) {
+    if !(f64::from(variance) > MIN_VARIANCE && variance.is_finite()) {
         return None;
     }
     let scale = 1.0 / variance.sqrt();

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Refinement, Unaligned, apart, together};
 use crate::{
-    Image, Pair, Place, Workspace,
+    Image, Pair, UncertainPixel, Workspace,
     detect::vertex,
     matching::correlate::{Template, WIDEST},
 };
@@ -20,7 +20,7 @@ use crate::{
 /// `floor-px`² besides: correlations are no paraboloid, which pulls the vertex towards whole pixels, and windows are
 /// not deformed, whatever the rig. That error is the same in every frame, so that no number of pixels averages it.
 ///
-/// Where the best is at the edge of the search, or less than `least-correlation`, the pair is most often a false match.
+/// Where the best is at the edge of the search, or less than `min-correlation`, the pair is most often a false match.
 ///
 /// Source: Tian and Huhns, *Algorithms for subpixel registration*, CVGIP 1986; its bias: Shimizu and Okutomi,
 /// *Precise sub-pixel estimation on area-based matching*, ICCV 2001.
@@ -32,7 +32,7 @@ pub struct ZnccParabola {
     /// How far around the right place is searched (whole px along each axis), 1 to 7.
     pub reach: usize,
     /// The least zero-normalised cross correlation.
-    pub least_correlation: f64,
+    pub min_correlation: f64,
     /// Standard deviation of what the paraboloid is off by where surfaces slant as those of boxes and walls do (px).
     pub floor_px: f64,
     /// What becomes of a pair that could not be aligned.
@@ -41,7 +41,7 @@ pub struct ZnccParabola {
 
 impl Default for ZnccParabola {
     fn default() -> Self {
-        Self { window: 11, reach: 2, least_correlation: 0.8, floor_px: 0.05, unaligned: Unaligned::Drop }
+        Self { window: 11, reach: 2, min_correlation: 0.8, floor_px: 0.05, unaligned: Unaligned::Drop }
     }
 }
 
@@ -51,18 +51,18 @@ impl Component for ZnccParabola {
     const SOURCE: &'static str = "Tian and Huhns, Algorithms for subpixel registration, CVGIP 1986";
 
     fn check(&self) -> Result<(), String> {
-        let Self { window, reach, least_correlation, floor_px, unaligned: _ } = *self;
+        let Self { window, reach, min_correlation, floor_px, unaligned: _ } = *self;
         let odd = window % 2 == 1 && (3..=WIDEST).contains(&window);
         in_range(odd, "window", window, "an odd number of pixels from 3 to 51")?;
-        in_range((1..=MOST_REACH).contains(&reach), "reach", reach, "a number from 1 to 7 (px)")?;
-        let correlated = (-1.0..=1.0).contains(&least_correlation);
-        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
+        in_range((1..=MAX_REACH).contains(&reach), "reach", reach, "a number from 1 to 7 (px)")?;
+        let correlated = (-1.0..=1.0).contains(&min_correlation);
+        in_range(correlated, "min-correlation", min_correlation, "a number from -1 to 1")?;
         in_range((0.0..=10.0).contains(&floor_px), "floor-px", floor_px, "a number from 0 to 10 (px)")
     }
 }
 
 /// A row of the search and one pixel beyond either end are compared at once.
-const MOST_REACH: usize = 7;
+const MAX_REACH: usize = 7;
 /// Matches that are refined one after the other.
 const PIECE: usize = 64;
 
@@ -100,17 +100,17 @@ impl Refinement for ZnccParabola {
 
 impl ZnccParabola {
     /// Where the right image shows the left place, given that.
-    fn place(&self, left: &Image, right: &Image, pair: &Pair, template: &mut Template) -> Option<Place> {
-        let whole = |at: f64| (0.0..1e9).contains(&at.round()).then(|| at.round() as usize);
-        let begin = [whole(pair.left.at.u)?, whole(pair.left.at.v)?];
+    fn place(&self, left: &Image, right: &Image, pair: &Pair, template: &mut Template) -> Option<UncertainPixel> {
+        let full = |at: f64| (0.0..1e9).contains(&at.round()).then(|| at.round() as usize);
+        let begin = [full(pair.left.at.u)?, full(pair.left.at.v)?];
         // The left place lies beside its pixel; the right one lies beside another by as much.
         let beside = [pair.left.at.u - begin[0] as f64, pair.left.at.v - begin[1] as f64];
-        let around = [whole(pair.right.at.u - beside[0])?, whole(pair.right.at.v - beside[1])?];
+        let around = [full(pair.right.at.u - beside[0])?, full(pair.right.at.v - beside[1])?];
         template.take(left, begin, self.window / 2)?;
         // Nine are needed around the best: one pixel more than the search.
         let (wide, side) = (self.reach + 1, 2 * self.reach + 3);
         let corner = [around[0].checked_sub(wide)?, around[1].checked_sub(wide)?];
-        let mut rows = [[-1.0_f32; 2 * MOST_REACH + 3]; 2 * MOST_REACH + 3];
+        let mut rows = [[-1.0_f32; 2 * MAX_REACH + 3]; 2 * MAX_REACH + 3];
         for (y, row) in rows[..side].iter_mut().enumerate() {
             // Sixteen at once, and perhaps one more.
             let mut compare = |x: usize| template.compare(right, [corner[0] + x, corner[1] + y]);
@@ -126,12 +126,12 @@ impl ZnccParabola {
         let nine = [y - 1, y, y + 1].map(|y| [rows[y][x - 1], rows[y][x], rows[y][x + 1]]);
         let correlation = f64::from(nine[1][1]);
         let peaks = nine.iter().flatten().all(|c| *c > -1.0 && f64::from(*c) <= correlation);
-        if !peaks || correlation < self.least_correlation {
+        if !peaks || correlation < self.min_correlation {
             return None;
         }
         let [dx, dy] = vertex(nine);
         let at = |i: usize, step: f64| (corner[i] + [x, y][i]) as f64 + step + beside[i];
-        Some(Place { at: Pixel { u: at(0, dx), v: at(1, dy) }, covariance: self.covariance(nine)? })
+        Some(UncertainPixel { at: Pixel { u: at(0, dx), v: at(1, dy) }, covariance: self.covariance(nine)? })
     }
 
     fn covariance(&self, nine: [[f32; 3]; 3]) -> Option<Matrix2<f64>> {

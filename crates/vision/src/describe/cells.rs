@@ -50,25 +50,25 @@ impl Grid {
         line: &mut Vec<f32>,
         cells: &mut Cells<N, LANES>,
     ) {
-        let samples = (libm::ceil(self.step / 2.0) as usize).clamp(if self.step > 1.0 { 2 } else { 1 }, MOST_SAMPLES);
+        let samples = (libm::ceil(self.step / 2.0) as usize).clamp(if self.step > 1.0 { 2 } else { 1 }, MAX_SAMPLES);
         line.resize((N * samples).next_multiple_of(BLOCK), 0.0);
         *cells = [[0.0; LANES]; N];
         let pitch = self.step / samples as f64;
         // Offsets from a whole pixel keep their precision in single precision.
-        let whole = [libm::floor(self.at.u), libm::floor(self.at.v)];
+        let full = [libm::floor(self.at.u), libm::floor(self.at.v)];
         let offset = |i: usize| (i as f64 - 0.5 * (N * samples - 1) as f64) * pitch;
         let grey = self.grey(pixels, width);
-        let share = 1.0 / (samples * samples) as f32;
+        let fraction = 1.0 / (samples * samples) as f32;
         for y in 0..N * samples {
             let start = [
-                (self.at.u - whole[0] + offset(0) * cos - offset(y) * sin) as f32,
-                (self.at.v - whole[1] + offset(0) * sin + offset(y) * cos) as f32,
+                (self.at.u - full[0] + offset(0) * cos - offset(y) * sin) as f32,
+                (self.at.v - full[1] + offset(0) * sin + offset(y) * cos) as f32,
             ];
             let pace = [(pitch * cos) as f32, (pitch * sin) as f32];
-            sample(pixels, width, [whole[0] as i32, whole[1] as i32], start, pace, line);
+            sample(pixels, width, [full[0] as i32, full[1] as i32], start, pace, line);
             let row = y / samples;
             for (cell, samples) in cells.iter_mut().zip(line.chunks_exact(samples)) {
-                cell[row] += samples.iter().fold(0.0, |sum, sample| sum + (sample - grey)) * share;
+                cell[row] += samples.iter().fold(0.0, |sum, sample| sum + (sample - grey)) * fraction;
             }
         }
     }
@@ -111,7 +111,7 @@ struct Span {
 const BLOCK: usize = 16;
 
 /// At most so many samples along a cell's side, however large it is.
-const MOST_SAMPLES: usize = 64;
+const MAX_SAMPLES: usize = 64;
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn upright<const N: usize, const LANES: usize>(
@@ -159,7 +159,7 @@ fn upright<const N: usize, const LANES: usize>(
 
 /// Bilinear samples along a line, `pace` apart, beginning at `start` from a whole pixel.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn sample(pixels: &[f32], width: usize, whole: [i32; 2], start: [f32; 2], pace: [f32; 2], line: &mut [f32]) {
+fn sample(pixels: &[f32], width: usize, full: [i32; 2], start: [f32; 2], pace: [f32; 2], line: &mut [f32]) {
     let last = [width as i32 - 1, (pixels.len() / width) as i32 - 1];
     for (block, samples) in line.chunks_exact_mut(BLOCK).enumerate() {
         let mut weight = [[0.0_f32; BLOCK]; 2];
@@ -172,7 +172,7 @@ fn sample(pixels: &[f32], width: usize, whole: [i32; 2], start: [f32; 2], pace: 
                 let cut = place as i32;
                 let floor = cut.saturating_sub(i32::from(cut as f32 > place));
                 weight[axis][i] = place - floor as f32;
-                let pixel = whole[axis].saturating_add(floor);
+                let pixel = full[axis].saturating_add(floor);
                 near[axis][i] = pixel.clamp(0, last[axis]);
                 far[axis][i] = pixel.saturating_add(1).clamp(0, last[axis]);
             }

@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bit_says_which_place_is_the_darker() {
+    fn a_bit_states_which_place_is_the_darker() {
         let ramp = bits(&Brief::default(), &image(|x, _| 2.0 * x));
         for (bit, &[a, b]) in ramp.iter().zip(pattern()) {
             if place(a)[0] != place(b)[0] {

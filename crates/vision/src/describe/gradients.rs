@@ -46,7 +46,7 @@ impl Window {
 }
 
 /// Where a key point lies in its level.
-pub(super) struct Place<'a> {
+pub(super) struct LevelPosition<'a> {
     pixels: &'a [f32],
     width: usize,
     at: [f32; 2],
@@ -54,7 +54,7 @@ pub(super) struct Place<'a> {
     sigma: f64,
 }
 
-impl<'a> Place<'a> {
+impl<'a> LevelPosition<'a> {
     /// The levels begin at row `first` of the octave.
     pub(super) fn new(
         levels: &'a Octave,

@@ -17,11 +17,11 @@ pub(super) struct Halves {
 /// Cells of at least twice this width (px) are taken from the next smaller image.
 const FINEST: f64 = 3.0;
 /// No more images are made.
-const MOST: usize = 16;
+const MAX: usize = 16;
 
 /// How often to halve for cells of this width.
 fn halvings(step: f64) -> usize {
-    (0..MOST).take_while(|&level| step >= 2.0 * FINEST * (1_u64 << level) as f64).count()
+    (0..MAX).take_while(|&level| step >= 2.0 * FINEST * (1_u64 << level) as f64).count()
 }
 
 impl Halves {
@@ -99,6 +99,6 @@ mod tests {
             assert!((mean - (2.0 * 120.3 + 130.6)).abs() < 1e-3, "{step}: {mean}");
         }
         assert_eq!(halvings(f64::NAN), 0);
-        assert_eq!(halvings(f64::INFINITY), MOST);
+        assert_eq!(halvings(f64::INFINITY), MAX);
     }
 }

@@ -102,11 +102,11 @@ fn longest(cells: &Cells<SIDE, SIDE>, weights: &[f32; PLACES], centres: &[[f32; 
         gy[i] = gradients[x][1][y];
     }
     // A gradient g is in the sector around c when g·c > |g| cos 30°.
-    let mut least = [0.0; PLACES];
+    let mut min = [0.0; PLACES];
     for i in 0..PLACES {
         gx[i] *= weights[i];
         gy[i] *= weights[i];
-        least[i] = COS_30 * (gx[i] * gx[i] + gy[i] * gy[i]).sqrt();
+        min[i] = COS_30 * (gx[i] * gx[i] + gy[i] * gy[i]).sqrt();
     }
     let mut best = [0.0_f32; 3];
     for &[cos, sin] in centres {
@@ -114,7 +114,7 @@ fn longest(cells: &Cells<SIDE, SIDE>, weights: &[f32; PLACES], centres: &[[f32; 
         for block in 0..PLACES / 16 {
             for (lane, (sum_x, sum_y)) in sum_x.iter_mut().zip(&mut sum_y).enumerate() {
                 let i = 16 * block + lane;
-                let inside = gx[i] * cos + gy[i] * sin > least[i];
+                let inside = gx[i] * cos + gy[i] * sin > min[i];
                 *sum_x += if inside { gx[i] } else { 0.0 };
                 *sum_y += if inside { gy[i] } else { 0.0 };
             }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Descriptor, Descriptors,
-    gradients::{CELLS, DIRECTIONS, Place, SIDE, STEP, Window, gradients},
+    gradients::{CELLS, DIRECTIONS, LevelPosition, SIDE, STEP, Window, gradients},
 };
 use crate::{
     Image, Keypoint, Workspace,
@@ -56,7 +56,7 @@ impl Component for Sift {
 /// Numbers in the descriptor.
 const LENGTH: usize = CELLS * CELLS * DIRECTIONS;
 /// The greatest number before the second normalisation.
-const MOST: f64 = 0.2;
+const MAX: f64 = 0.2;
 
 /// Key points that one thread describes at a time.
 const PIECE: usize = 16;
@@ -96,7 +96,7 @@ impl Descriptor for Sift {
                         if own != octave || !rows.contains(&row) {
                             continue;
                         }
-                        let place = Place::new(levels, (octave, first), level, keypoint, scale(keypoint));
+                        let place = LevelPosition::new(levels, (octave, first), level, keypoint, scale(keypoint));
                         let direction = if self.upright { [1.0, 0.0] } else { place.direction(&window) };
                         let numbers: &mut [f32; LENGTH] = numbers.try_into().expect("a row has this length");
                         histograms(&place, direction, &window, numbers);
@@ -122,7 +122,7 @@ fn level(scale: f64, coarsest: i32) -> (i32, usize) {
 
 /// The histograms of all cells, row by row.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn histograms(place: &Place<'_>, direction: [f32; 2], window: &Window, numbers: &mut [f32; LENGTH]) {
+fn histograms(place: &LevelPosition<'_>, direction: [f32; 2], window: &Window, numbers: &mut [f32; LENGTH]) {
     let corners: [[f32; SIDE + 1]; SIDE + 1] = place.grid(STEP, direction);
     let mut cells = [[0.0_f32; DIRECTIONS]; CELLS * CELLS];
     for (pair, down) in corners.windows(2).zip(&window.cells) {
@@ -130,17 +130,17 @@ fn histograms(place: &Place<'_>, direction: [f32; 2], window: &Window, numbers: 
         let mut row = [[0.0_f32; DIRECTIONS]; CELLS];
         for i in 0..SIDE {
             let direction = turn[i] * DIRECTIONS as f32;
-            let mut shares = [0.0; DIRECTIONS];
-            for (k, share) in shares.iter_mut().enumerate() {
+            let mut fractions = [0.0; DIRECTIONS];
+            for (k, fraction) in fractions.iter_mut().enumerate() {
                 // How far the direction is from this one, the shorter way round.
                 let away = (direction - k as f32).abs();
                 let away = if away > 4.0 { 8.0 - away } else { away };
                 let near = 1.0 - away;
-                *share = if near > 0.0 { near * magnitude[i] } else { 0.0 };
+                *fraction = if near > 0.0 { near * magnitude[i] } else { 0.0 };
             }
             for (cell, &across) in row.iter_mut().zip(&window.cells[i]) {
-                for (sum, share) in cell.iter_mut().zip(&shares) {
-                    *sum += across * share;
+                for (sum, fraction) in cell.iter_mut().zip(&fractions) {
+                    *sum += across * fraction;
                 }
             }
         }
@@ -163,7 +163,7 @@ fn normalise(numbers: &mut [f32; LENGTH], root: bool) {
         numbers.fill(0.0);
         return;
     }
-    numbers.iter_mut().for_each(|x| *x = (f64::from(*x) / norm).min(MOST) as f32);
+    numbers.iter_mut().for_each(|x| *x = (f64::from(*x) / norm).min(MAX) as f32);
     if root {
         let total = sum(numbers, |x| x);
         numbers.iter_mut().for_each(|x| *x = (f64::from(*x) / total).sqrt() as f32);
@@ -216,8 +216,8 @@ mod tests {
         *work.get() = ScaleSpace::keeping(3000);
         let mut found = Descriptors::default();
         sift.describe_into(&image, &keypoints, &mut work, &mut found);
-        let whole = sift.describe(&image, &keypoints);
-        let worst = (0..keypoints.len()).map(|i| distance(&found, i, &whole, i)).fold(0.0, f32::max);
+        let full = sift.describe(&image, &keypoints);
+        let worst = (0..keypoints.len()).map(|i| distance(&found, i, &full, i)).fold(0.0, f32::max);
         // Places are counted from the strip on: another rounding.
         assert!(keypoints.len() > 30 && worst < 1e-3, "{}: {worst}", keypoints.len());
     }

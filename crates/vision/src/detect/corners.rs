@@ -47,7 +47,7 @@ struct Band {
 /// A window narrower than a pixel's neighbours holds one gradient, which is no corner's.
 pub(super) const SIGMAS: RangeInclusive<f64> = 0.3..=100.0;
 /// Corners this far apart are a handful in an image; the disc around each takes memory and time.
-pub(super) const MOST_RADIUS: usize = 1000;
+pub(super) const MAX_RADIUS: usize = 1000;
 /// Rows whose corners are sought at a time.
 const ROWS: usize = 32;
 
@@ -56,7 +56,7 @@ impl Corners {
     pub(super) fn check(&self) -> Result<(), String> {
         let Self { tensor: Tensor { sigma, .. }, quality, radius, budget: Budget { features, cells, .. } } = *self;
         in_range(SIGMAS.contains(&sigma), "sigma", sigma, "a number from 0.3 to 100 (px)")?;
-        in_range(radius <= MOST_RADIUS, "radius", radius, "at most 1000 (px)")?;
+        in_range(radius <= MAX_RADIUS, "radius", radius, "at most 1000 (px)")?;
         in_range((0.0..=1.0).contains(&quality), "quality", quality, "a number from 0 to 1")?;
         in_range(features > 0, "features", features, "at least 1")?;
         in_range(cells > 0, "cells", cells, "at least 1")
@@ -84,9 +84,9 @@ impl Corners {
         });
         let bands = &bands[..count];
         let strongest = bands.iter().map(|band| band.stream.strongest).fold(0.0, f32::max);
-        let least = self.least(strongest);
+        let min = self.min(strongest);
         let all = || bands.iter().flat_map(|band| &band.found);
-        found.extend(all().map(|(corner, _)| *corner).filter(|corner| corner.response >= least));
+        found.extend(all().map(|(corner, _)| *corner).filter(|corner| corner.response >= min));
         self.budget.keep(found, [width, height], selection);
         for corner in found {
             // Bands follow each other, and in each the corners are in order.
@@ -101,7 +101,7 @@ impl Corners {
     }
 
     /// The weakest response worth keeping where this is the strongest.
-    fn least(&self, strongest: f32) -> f32 {
+    fn min(&self, strongest: f32) -> f32 {
         (f64::from(strongest) * self.quality) as f32
     }
 }
@@ -134,9 +134,9 @@ impl Band {
             response.resize(needed.len() * width, 0.0);
             stream.fill(image, &corners.tensor, weights, kept.end, &mut response[kept.len() * width..]);
             held = needed;
-            let least = corners.least(stream.strongest);
+            let min = corners.min(stream.strongest);
             let (response, rows) = (&**response, first - held.start..last - held.start);
-            in_rows(response, width, rows, least, disc, marks, |x, y| {
+            in_rows(response, width, rows, min, disc, marks, |x, y| {
                 let at = Pixel { u: x as f64, v: (held.start + y) as f64 };
                 let corner = Keypoint { at, response: response[y * width + x], scale: 0.0 };
                 found.push((corner, to_vertex(response, width, [x, y])));

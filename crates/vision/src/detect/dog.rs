@@ -132,8 +132,8 @@ impl Dog {
         samples.clear();
         found.clear();
         // The quadratic moves |D| by little: what is far below the threshold need not be refined.
-        let least = 0.5 * self.contrast as f32;
-        extrema::extrema(octave, rows, BORDER, least, scratch, samples);
+        let min = 0.5 * self.contrast as f32;
+        extrema::extrema(octave, rows, BORDER, min, scratch, samples);
         found.extend(samples.iter().filter_map(|&at| self.refine(octave, number, first, at)));
     }
 
@@ -221,8 +221,8 @@ mod tests {
         *work.get() = ScaleSpace::keeping(3000);
         let (dog, mut found) = (Dog::default(), Vec::new());
         dog.detect_into(&image, &mut work, &mut found);
-        let whole = dog.detect(&image);
-        assert!(whole.len() > 100 && found == whole, "{} and {}", found.len(), whole.len());
+        let full = dog.detect(&image);
+        assert!(full.len() > 100 && found == full, "{} and {}", found.len(), full.len());
     }
 
     #[test]

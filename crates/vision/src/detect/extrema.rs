@@ -12,7 +12,7 @@ const DIFFERENCES: usize = LEVELS - 1;
 const LANES: usize = 16;
 
 /// Adds to `found` the (level, x, y), row by row, of the samples of these rows whose difference
-/// D = level + 1 − level exceeds `least` and their 26 neighbours', or lies as far below; of equal ones
+/// D = level + 1 − level exceeds `min` and their 26 neighbours', or lies as far below; of equal ones
 /// the first. `border` columns on either side and as many rows are not looked at.
 ///
 /// `ring` is scratch: the differences of three rows.
@@ -20,7 +20,7 @@ pub(super) fn extrema(
     octave: &Octave,
     rows: Range<usize>,
     border: usize,
-    least: f32,
+    min: f32,
     ring: &mut Vec<f32>,
     found: &mut Vec<[usize; 3]>,
 ) {
@@ -37,8 +37,8 @@ pub(super) fn extrema(
             let row = |y: usize, level: usize| &ring[y % 3 * slot + level * width..][..width];
             let around = |level: usize| [row(here - 1, level), row(here, level), row(here + 1, level)];
             let [below, same, above] = [around(level - 1), around(level), around(level + 1)];
-            in_row(&same, border, least, |x| {
-                if beyond([&below, &same, &above], least, x) {
+            in_row(&same, border, min, |x| {
+                if beyond([&below, &same, &above], min, x) {
                     found.push([level, x, here]);
                 }
             });
@@ -47,7 +47,7 @@ pub(super) fn extrema(
 }
 
 /// Calls `maybe` for the columns whose value in the middle row is an extremum of its nine.
-fn in_row(rows: &[&[f32]; 3], border: usize, least: f32, mut maybe: impl FnMut(usize)) {
+fn in_row(rows: &[&[f32]; 3], border: usize, min: f32, mut maybe: impl FnMut(usize)) {
     let width = rows[1].len();
     for x in (border..width - border).step_by(LANES) {
         // The last samples are looked at with some of those before them.
@@ -57,7 +57,7 @@ fn in_row(rows: &[&[f32]; 3], border: usize, least: f32, mut maybe: impl FnMut(u
             continue;
         }
         let first = first.clamp(1, width - LANES - 1);
-        let mut flags = extremal(rows, first, least);
+        let mut flags = extremal(rows, first, min);
         while flags != 0 {
             let at = first + flags.trailing_zeros() as usize;
             flags &= flags - 1;
@@ -70,13 +70,13 @@ fn in_row(rows: &[&[f32]; 3], border: usize, least: f32, mut maybe: impl FnMut(u
 
 /// Which of the samples from `first` on are extrema among the nine of their level.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn extremal(rows: &[&[f32]; 3], first: usize, least: f32) -> u32 {
+fn extremal(rows: &[&[f32]; 3], first: usize, min: f32) -> u32 {
     let [above, here, below] = rows.map(|row| &row[first - 1..first + LANES + 1]);
-    let (mut most, mut fewest) = ([0.0; LANES], [0.0; LANES]);
+    let (mut max, mut fewest) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         let upper = greater(greater(above[i], above[i + 1]), above[i + 2]);
         let lower = greater(greater(below[i], below[i + 1]), below[i + 2]);
-        most[i] = greater(greater(upper, lower), greater(here[i], here[i + 2]));
+        max[i] = greater(greater(upper, lower), greater(here[i], here[i + 2]));
     }
     for i in 0..LANES {
         let upper = less(less(above[i], above[i + 1]), above[i + 2]);
@@ -86,7 +86,7 @@ fn extremal(rows: &[&[f32]; 3], first: usize, least: f32) -> u32 {
     let mut flags = 0;
     for i in 0..LANES {
         let value = here[i + 1];
-        let extremal = (value >= least) & (value >= most[i]) | (value <= -least) & (value <= fewest[i]);
+        let extremal = (value >= min) & (value >= max[i]) | (value <= -min) & (value <= fewest[i]);
         flags |= u32::from(extremal) << i;
     }
     flags
@@ -102,8 +102,8 @@ fn less(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Whether a sample exceeds `least` and its 26 neighbours, either sign, and equals none before it.
-fn beyond(levels: [&[&[f32]; 3]; 3], least: f32, x: usize) -> bool {
+/// Whether a sample exceeds `min` and its 26 neighbours, either sign, and equals none before it.
+fn beyond(levels: [&[&[f32]; 3]; 3], min: f32, x: usize) -> bool {
     let value = levels[1][1][x];
     let sign = if value < 0.0 { -1.0 } else { 1.0 };
     let value = sign * value;
@@ -113,7 +113,7 @@ fn beyond(levels: [&[&[f32]; 3]; 3], least: f32, x: usize) -> bool {
         Ordering::Equal => true,
         Ordering::Greater => sign * other <= value,
     };
-    value >= least && neighbours.enumerate().all(holds)
+    value >= min && neighbours.enumerate().all(holds)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Detector, Keypoint, Selection,
-    corners::MOST_RADIUS,
+    corners::MAX_RADIUS,
     peaks::{self, Peaks},
     select::{self, Budget},
 };
@@ -54,7 +54,7 @@ impl Component for Fast {
     fn check(&self) -> Result<(), String> {
         let Self { threshold, subpixel: _, radius, features, selection: _, cells } = *self;
         in_range((0.0..=65535.0).contains(&threshold), "threshold", threshold, "0 to 65535 (grey levels)")?;
-        in_range(radius <= MOST_RADIUS, "radius", radius, "at most 1000 (px)")?;
+        in_range(radius <= MAX_RADIUS, "radius", radius, "at most 1000 (px)")?;
         in_range(features > 0, "features", features, "at least 1")?;
         in_range(cells > 0, "cells", cells, "at least 1")
     }
@@ -104,18 +104,18 @@ impl Detector for Fast {
             return;
         }
         response.resize(width * height, 0.0);
-        let least = self.threshold as f32;
+        let min = self.threshold as f32;
         let rows = threads.rows_a_band(height);
         threads.pieces(response, rows * width, unused, |index, band, ()| {
             for (y, out) in (index * rows..).zip(band.chunks_exact_mut(width)) {
                 out.fill(0.0);
                 if y >= MARGIN && y < height - MARGIN {
                     let rows = std::array::from_fn(|i| image.row(y + i - 3));
-                    row_response(&rows, least, out);
+                    row_response(&rows, min, out);
                 }
             }
         });
-        Peaks { least: 0.0, radius: self.radius }.find(response, width, threads, peaks, found);
+        Peaks { min: 0.0, radius: self.radius }.find(response, width, threads, peaks, found);
         let budget = Budget { features: self.features, selection: self.selection, cells: self.cells };
         budget.keep(found, [width, height], selection);
         for corner in found {
@@ -157,11 +157,11 @@ fn response(d: [f32; 16]) -> f32 {
         let four: [f32; 8] = std::array::from_fn(|i| pick(two[i], two[(i + 1) % 8]));
         std::array::from_fn(|i| pick(four[i], four[(i + 2) % 8]))
     };
-    let (least, greatest) = (shared(less), shared(more));
+    let (min, greatest) = (shared(less), shared(more));
     let (mut bright, mut dark) = (f32::NEG_INFINITY, f32::INFINITY);
     for i in 0..8 {
         let (before, after) = (d[2 * i], d[(2 * i + 9) % 16]);
-        bright = more(bright, less(least[i], more(before, after)));
+        bright = more(bright, less(min[i], more(before, after)));
         dark = less(dark, more(greatest[i], less(before, after)));
     }
     more(bright, -dark)
@@ -171,19 +171,19 @@ fn response(d: [f32; 16]) -> f32 {
 const BLOCK: usize = 32;
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn row_response(rows: &[&[f32]; 7], least: f32, out: &mut [f32]) {
-    row_response_in_any_lanes(rows, least, out);
+fn row_response(rows: &[&[f32]; 7], min: f32, out: &mut [f32]) {
+    row_response_in_any_lanes(rows, min, out);
 }
 
-/// The responses above `least` of a row, of which the three above and below are given; others stay.
+/// The responses above `min` of a row, of which the three above and below are given; others stay.
 #[inline(always)]
-fn row_response_in_any_lanes(rows: &[&[f32]; 7], least: f32, out: &mut [f32]) {
+fn row_response_in_any_lanes(rows: &[&[f32]; 7], min: f32, out: &mut [f32]) {
     let end = out.len() - MARGIN;
     let from = |left: usize, (dx, dy): (isize, isize)| &rows[(dy + 3) as usize][left.wrapping_add_signed(dx)..];
     if end - MARGIN < BLOCK {
         for x in MARGIN..end {
             let r = response(CIRCLE.map(|step| from(x, step)[0] - rows[3][x]));
-            out[x] = if r > least { r } else { 0.0 };
+            out[x] = if r > min { r } else { 0.0 };
         }
         return;
     }
@@ -191,11 +191,11 @@ fn row_response_in_any_lanes(rows: &[&[f32]; 7], least: f32, out: &mut [f32]) {
     for left in (MARGIN..end).step_by(BLOCK).map(|left| left.min(end - BLOCK)) {
         let block = |step| -> &[f32; BLOCK] { from(left, step).first_chunk().expect("within the row") };
         let centre = block((0, 0));
-        if passes(centre, [0, 4, 8, 12].map(|i| block(CIRCLE[i])), least) {
+        if passes(centre, [0, 4, 8, 12].map(|i| block(CIRCLE[i])), min) {
             let circle = CIRCLE.map(block);
             for (x, out) in out[left..left + BLOCK].iter_mut().enumerate() {
                 let r = response(circle.map(|pixels| pixels[x] - centre[x]));
-                *out = if r > least { r } else { 0.0 };
+                *out = if r > min { r } else { 0.0 };
             }
         }
     }
@@ -203,7 +203,7 @@ fn row_response_in_any_lanes(rows: &[&[f32]; 7], least: f32, out: &mut [f32]) {
 
 /// Whether any pixel may pass the test: an arc of nine holds two neighbours of the four compass points.
 #[inline(always)]
-fn passes(centre: &[f32; BLOCK], [n, e, s, w]: [&[f32; BLOCK]; 4], least: f32) -> bool {
+fn passes(centre: &[f32; BLOCK], [n, e, s, w]: [&[f32; BLOCK]; 4], min: f32) -> bool {
     let mut any = [0_u32; BLOCK];
     for x in 0..BLOCK {
         let c = centre[x];
@@ -211,7 +211,7 @@ fn passes(centre: &[f32; BLOCK], [n, e, s, w]: [&[f32; BLOCK]; 4], least: f32) -
         // Two neighbours: one of north and south, one of east and west.
         let bright = less(more(n, s), more(e, w));
         let dark = more(less(n, s), less(e, w));
-        any[x] = u32::from((bright > least) | (-dark > least));
+        any[x] = u32::from((bright > min) | (-dark > min));
     }
     any.iter().fold(0, |all, one| all | one) != 0
 }
@@ -220,7 +220,7 @@ fn passes(centre: &[f32; BLOCK], [n, e, s, w]: [&[f32; BLOCK]; 4], least: f32) -
 mod tests {
     use super::*;
 
-    fn rough(n: usize) -> Vec<f32> {
+    fn random_values(n: usize) -> Vec<f32> {
         let value = |i: usize| {
             let h = (i as u32).wrapping_mul(0x9E37_79B1);
             ((h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 24) as f32
@@ -246,7 +246,7 @@ mod tests {
             let arc: [f32; 16] = std::array::from_fn(|i| if (i + start) % 16 < 9 { 10.0 } else { 0.0 });
             assert_eq!(response(arc), 10.0, "nine from anywhere are");
         }
-        for d in rough(16 * 500).as_chunks::<16>().0 {
+        for d in random_values(16 * 500).as_chunks::<16>().0 {
             let d = d.map(|d| d - 128.0);
             let r = response(d);
             assert!(!is_corner(&d, r.max(0.0)));
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn every_instruction_set_and_block_gives_the_response_of_the_pixel() {
         for width in [9, 20, 39, 40, 41, 150] {
-            let image = Image::new(width, 7, rough(7 * width)).unwrap();
+            let image = Image::new(width, 7, random_values(7 * width)).unwrap();
             let rows = std::array::from_fn(|y| image.row(y));
             let (mut any, mut plain) = (vec![0.0; width], vec![0.0; width]);
             row_response(&rows, 12.0, &mut any);

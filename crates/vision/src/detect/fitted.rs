@@ -10,7 +10,7 @@ use super::{
     tensor::{Measure, Tensor},
 };
 use crate::{
-    CornerFit, Image, Place, Workspace,
+    CornerFit, Image, UncertainPixel, Workspace,
     locate::{FITTED, Shape, fit_into},
 };
 
@@ -63,7 +63,7 @@ const SAME: f64 = 1.0;
 #[derive(Debug, Default)]
 struct Scratch {
     candidates: Vec<Keypoint>,
-    places: Vec<Option<Place>>,
+    places: Vec<Option<UncertainPixel>>,
     selection: select::Scratch,
 }
 
@@ -91,7 +91,7 @@ impl FittedCorners {
         fit_into(&self.fit, &[shape], image, &candidates, work, &mut places);
         found.clear();
         found.extend(candidates.iter().zip(&places).filter_map(|(candidate, place)| {
-            let Place { at, covariance } = (*place)?;
+            let UncertainPixel { at, covariance } = (*place)?;
             let (mean, half) = (0.5 * covariance.trace(), 0.5 * (covariance[(0, 0)] - covariance[(1, 1)]));
             let greatest = mean + libm::hypot(half, covariance[(0, 1)]);
             Some(Keypoint { at, response: (1.0 / greatest) as f32, ..*candidate })

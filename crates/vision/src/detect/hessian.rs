@@ -17,7 +17,7 @@ pub(super) struct Octave<'a> {
     /// Scales in which maxima are sought; one more below and one above to compare with.
     pub(super) layers: usize,
     /// The least determinant (grey levels²).
-    pub(super) least: f32,
+    pub(super) min: f32,
 }
 
 /// The third of the side of a layer's filter: the width of its lobes.
@@ -66,7 +66,7 @@ impl Octave<'_> {
                 let near: [[&[f32]; 3]; 3] = std::array::from_fn(|dl| {
                     std::array::from_fn(|dy| &memory[slot(layer + dl - 1, centre + dy - 1)..][..width])
                 });
-                candidates(&near, self.least, margin, hits);
+                candidates(&near, self.min, margin, hits);
                 found.extend(hits.iter().filter_map(|&x| self.peak(&near, layer, x, centre)));
             }
         }
@@ -189,7 +189,7 @@ fn determinants(xx: &[u32], yy: &[u32], xy: &[u32], lobe: usize, [mean, mixed]: 
 
 /// Columns of at least this value that no direct neighbour exceeds, beyond a margin at either end.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn candidates(near: &[[&[f32]; 3]; 3], least: f32, margin: usize, hits: &mut Vec<usize>) {
+fn candidates(near: &[[&[f32]; 3]; 3], min: f32, margin: usize, hits: &mut Vec<usize>) {
     hits.clear();
     let n = near[1][1].len() - 2 * margin;
     let here = &near[1][1][margin..][..n];
@@ -201,7 +201,7 @@ fn candidates(near: &[[&[f32]; 3]; 3], least: f32, margin: usize, hits: &mut Vec
         let end = (block + BLOCK).min(n);
         let mut any = 0;
         for i in block..end {
-            let greatest = (here[i] > least)
+            let greatest = (here[i] > min)
                 & (here[i] > left[i])
                 & (here[i] >= right[i])
                 & (here[i] > above[i])
@@ -239,7 +239,7 @@ mod tests {
             half.fill_half(&integral);
             integral = half;
         }
-        let octave = Octave { integral: &integral, number, unit, layers: 1, least: 0.0 };
+        let octave = Octave { integral: &integral, number, unit, layers: 1, min: 0.0 };
         let size = 64 >> number;
         let mut out = vec![0.0; size];
         octave.determinants(layer, size / 2, &mut Default::default(), &mut out);

@@ -23,8 +23,8 @@ impl Integral {
     pub(super) fn fill(&mut self, image: &Image, area: f64) -> f32 {
         let [darkest, brightest] = range(image.pixels());
         // As many units as fit a grey level; bounded so that the scaling itself stays finite.
-        let most = (1_u32 << 30) as f64 / area - 1.0;
-        let units = power_below(most / (f64::from(brightest) - f64::from(darkest))).clamp(UNITS[0], UNITS[1]) as f32;
+        let max = (1_u32 << 30) as f64 / area - 1.0;
+        let units = power_below(max / (f64::from(brightest) - f64::from(darkest))).clamp(UNITS[0], UNITS[1]) as f32;
         self.reset(image.width(), image.height());
         let columns = self.width + 1;
         let mut above_and_below = self.sums.as_mut_slice();
@@ -75,16 +75,16 @@ fn power_below(x: f64) -> f64 {
 /// The least and the greatest.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn range(pixels: &[f32]) -> [f32; 2] {
-    let (mut least, mut greatest) = ([pixels[0]; 16], [pixels[0]; 16]);
+    let (mut min, mut greatest) = ([pixels[0]; 16], [pixels[0]; 16]);
     let mut blocks = pixels.chunks_exact(16);
     for block in &mut blocks {
         for (i, &pixel) in block.iter().enumerate() {
-            least[i] = if pixel < least[i] { pixel } else { least[i] };
+            min[i] = if pixel < min[i] { pixel } else { min[i] };
             greatest[i] = if pixel > greatest[i] { pixel } else { greatest[i] };
         }
     }
     let mut both = [pixels[0]; 2];
-    for &pixel in least.iter().chain(&greatest).chain(blocks.remainder()) {
+    for &pixel in min.iter().chain(&greatest).chain(blocks.remainder()) {
         both = [both[0].min(pixel), both[1].max(pixel)];
     }
     both

@@ -10,7 +10,7 @@ use crate::Threads;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peaks {
     /// The least response.
-    pub(super) least: f32,
+    pub(super) min: f32,
     /// No other within this distance is greater (px).
     pub(super) radius: usize,
 }
@@ -40,7 +40,7 @@ impl Disc {
 }
 
 impl Peaks {
-    /// Replaces `found` by the pixels with a positive response of at least `least` that none within the
+    /// Replaces `found` by the pixels with a positive response of at least `min` that none within the
     /// radius exceeds, row by row; of equal ones within the radius the first counts. Never at the border
     /// of the image.
     pub(super) fn find(
@@ -65,7 +65,7 @@ impl Peaks {
             let Band { marks, found } = &mut band[0];
             found.clear();
             let rows = 1 + index * rows..(1 + (index + 1) * rows).min(height - 1);
-            in_rows(response, width, rows, self.least, disc, marks, |x, y| {
+            in_rows(response, width, rows, self.min, disc, marks, |x, y| {
                 let at = Pixel { u: x as f64, v: y as f64 };
                 found.push(Keypoint { at, response: response[y * width + x], scale: 0.0 });
             });
@@ -80,17 +80,17 @@ pub(super) fn in_rows(
     response: &[f32],
     width: usize,
     rows: std::ops::Range<usize>,
-    least: f32,
+    min: f32,
     disc: &Disc,
     marks: &mut Vec<u8>,
     mut visit: impl FnMut(usize, usize),
 ) {
     marks.clear();
     marks.resize(width, 0);
-    let least = least.max(f32::from_bits(1));
+    let min = min.max(f32::from_bits(1));
     for y in rows {
         let row = |y: usize| &response[y * width..][..width];
-        mark(row(y - 1), row(y), row(y + 1), least, &mut marks[1..width - 1]);
+        mark(row(y - 1), row(y), row(y + 1), min, &mut marks[1..width - 1]);
         each(marks, |x| {
             if is_greatest(response, width, [x, y], &disc.0) {
                 visit(x, y);
@@ -99,15 +99,15 @@ pub(super) fn in_rows(
     }
 }
 
-/// Marks by 1 the inner pixels of a row that are at least `least` and greatest of their nine; of equals
+/// Marks by 1 the inner pixels of a row that are at least `min` and greatest of their nine; of equals
 /// the first.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn mark(above: &[f32], here: &[f32], below: &[f32], least: f32, marks: &mut [u8]) {
-    mark_in_any_lanes(above, here, below, least, marks);
+fn mark(above: &[f32], here: &[f32], below: &[f32], min: f32, marks: &mut [u8]) {
+    mark_in_any_lanes(above, here, below, min, marks);
 }
 
 #[inline(always)]
-fn mark_in_any_lanes(above: &[f32], here: &[f32], below: &[f32], least: f32, marks: &mut [u8]) {
+fn mark_in_any_lanes(above: &[f32], here: &[f32], below: &[f32], min: f32, marks: &mut [u8]) {
     let n = marks.len();
     let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..n + 2]];
     let [h0, h1, h2] = [&here[..n], &here[1..=n], &here[2..n + 2]];
@@ -118,7 +118,7 @@ fn mark_in_any_lanes(above: &[f32], here: &[f32], below: &[f32], least: f32, mar
         let r = h1[x];
         let before = max(max(a0[x], a1[x]), max(a2[x], h0[x]));
         let after = max(max(b0[x], b1[x]), max(b2[x], h2[x]));
-        marks[x] = u8::from((r >= least) & (r > before) & (r >= after));
+        marks[x] = u8::from((r >= min) & (r > before) & (r >= after));
     }
 }
 
@@ -145,17 +145,17 @@ fn is_greatest(response: &[f32], width: usize, [x, y]: [usize; 2], chords: &[usi
         (&row[x.saturating_sub(chord)..x], &row[x..(x + chord + 1).min(width)])
     };
     let below = |others: &[f32]| others.iter().all(|&other| other < r);
-    let at_most = |others: &[f32]| others.iter().all(|&other| other <= r);
+    let no_larger = |others: &[f32]| others.iter().all(|&other| other <= r);
     // The nearest rows first: they are the likeliest to hold a greater one.
     chords.iter().enumerate().all(|(dy, &chord)| {
         if dy == 0 {
             let (left, right) = row(y, chord);
-            return below(left) && at_most(right);
+            return below(left) && no_larger(right);
         }
         let up = y.checked_sub(dy).map(|y| row(y, chord));
         let down = Some(y + dy).filter(|&y| y < height).map(|y| row(y, chord));
         up.is_none_or(|(left, right)| below(left) && below(right))
-            && down.is_none_or(|(left, right)| at_most(left) && at_most(right))
+            && down.is_none_or(|(left, right)| no_larger(left) && no_larger(right))
     })
 }
 
@@ -191,14 +191,14 @@ pub(super) fn to_vertex(response: &[f32], width: usize, [x, y]: [usize; 2]) -> [
 mod tests {
     use super::*;
 
-    fn maxima(response: &[f32], width: usize, least: f32, radius: usize, threads: Threads) -> Vec<Keypoint> {
+    fn maxima(response: &[f32], width: usize, min: f32, radius: usize, threads: Threads) -> Vec<Keypoint> {
         let mut found = Vec::new();
-        Peaks { least, radius }.find(response, width, threads, &mut Scratch::default(), &mut found);
+        Peaks { min, radius }.find(response, width, threads, &mut Scratch::default(), &mut found);
         found
     }
 
     /// Plateaus and noise, reproducible.
-    fn rough(n: usize, levels: u32) -> Vec<f32> {
+    fn random_values(n: usize, levels: u32) -> Vec<f32> {
         let hash = |i: usize| {
             let h = (i as u32).wrapping_mul(0x9E37_79B1);
             (h ^ (h >> 15)).wrapping_mul(0x85EB_CA77) >> 8
@@ -236,7 +236,7 @@ mod tests {
         for (width, height, radius, levels) in
             [(67, 41, 4, 1000), (50, 33, 1, 9), (40, 40, 7, 30), (3, 3, 2, 50), (90, 5, 0, 5)]
         {
-            let response = rough(width * height, levels);
+            let response = random_values(width * height, levels);
             let greatest = |x: usize, y: usize| {
                 let r = response[y * width + x];
                 let mut others = (0..width * height).map(|i| (i % width, i / width));
@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn every_instruction_set_marks_the_same() {
-        let rows = rough(3 * 133, 20);
+        let rows = random_values(3 * 133, 20);
         let (mut any, mut plain) = (vec![0; 131], vec![0; 131]);
         let [above, here, below] = [0, 1, 2].map(|y| &rows[133 * y..][..133]);
         mark(above, here, below, 1.0, &mut any);

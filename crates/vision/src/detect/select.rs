@@ -158,8 +158,8 @@ impl Near {
         for ring in 0..columns.max(rows) {
             let (top, bottom) = (row.saturating_sub(ring), (row + ring).min(rows - 1));
             for y in top..=bottom {
-                let whole = y.abs_diff(row) == ring;
-                let step = if whole || ring == 0 { 1 } else { 2 * ring };
+                let full = y.abs_diff(row) == ring;
+                let step = if full || ring == 0 { 1 } else { 2 * ring };
                 let sides = (0..=2 * ring).step_by(step).filter_map(|x| (column + x).checked_sub(ring));
                 for x in sides.filter(|&x| x < columns) {
                     best = best.min(self.squared_in(at, y * columns + x));
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_share_the_budget() {
+    fn cells_fraction_the_budget() {
         let all = [point(5.0, 0.0, 7.5), point(1.0, 0.0, 9.0), point(60.0, 0.0, 1.0), point(3.0, 0.0, 8.0)];
         let columns = |selection, cells| kept(&all, 3, selection, cells).iter().map(|p| p.at.u).collect::<Vec<_>>();
         assert_eq!(columns(Selection::Strongest, 2), [1.0, 3.0, 5.0]);

@@ -68,7 +68,7 @@ impl Component for ShiTomasi {
 impl ShiTomasi {
     fn corners(&self) -> Corners {
         let Self { window, sigma, quality, radius, features, selection, cells } = *self;
-        let tensor = Tensor { window, sigma, measure: Measure::LeastEigenvalue };
+        let tensor = Tensor { window, sigma, measure: Measure::SmallestEigenvalue };
         Corners { tensor, quality, radius, budget: Budget { features, selection, cells } }
     }
 }

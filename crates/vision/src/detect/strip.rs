@@ -94,7 +94,7 @@ fn respond(measure: Measure, tensor: &Planes, scale: f32) -> [f32; STRIP] {
                 *r = (xx * yy - xy * xy) - k * (trace * trace);
             }
         }
-        Measure::LeastEigenvalue => {
+        Measure::SmallestEigenvalue => {
             for (x, r) in response.iter_mut().enumerate() {
                 let [xx, xy, yy] = [planes[0][x] * scale, planes[1][x] * scale, planes[2][x] * scale];
                 let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
@@ -165,13 +165,13 @@ fn smooth_symmetric<'a, const N: usize>(
 mod tests {
     use super::super::tensor::Window;
     use super::*;
-    use crate::image::rough;
+    use crate::image::random_image;
 
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        let image = rough(150, 40);
+        let image = random_image(150, 40);
         for (measure, window) in
-            [Measure::Harris { k: 0.04 }, Measure::LeastEigenvalue].into_iter().zip([Window::Gaussian, Window::Box])
+            [Measure::Harris { k: 0.04 }, Measure::SmallestEigenvalue].into_iter().zip([Window::Gaussian, Window::Box])
         {
             let weights = Weights::new(window, 1.5);
             let run = |strip: fn(&Part<'_>, &mut [f32], Band<'_>)| {

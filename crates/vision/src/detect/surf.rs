@@ -92,7 +92,7 @@ impl Detector for FastHessian {
                     number: *octave,
                     unit,
                     layers: self.layers,
-                    least: self.threshold as f32,
+                    min: self.threshold as f32,
                 };
                 found.clear();
                 octave.search(rows.clone(), scratch, found);
@@ -178,11 +178,11 @@ mod tests {
     #[test]
     fn light_changes_nothing_and_contrast_only_the_response() {
         let image = blobs(220, 200, &BLOBS);
-        let whole = Image::new(220, 200, image.pixels().iter().map(|p| p.round()).collect()).unwrap();
-        let found = FastHessian::default().detect(&whole);
-        let lit = Image::new(220, 200, whole.pixels().iter().map(|p| p + 40.0).collect()).unwrap();
+        let full = Image::new(220, 200, image.pixels().iter().map(|p| p.round()).collect()).unwrap();
+        let found = FastHessian::default().detect(&full);
+        let lit = Image::new(220, 200, full.pixels().iter().map(|p| p + 40.0).collect()).unwrap();
         assert_eq!(FastHessian::default().detect(&lit), found);
-        let twice = Image::new(220, 200, whole.pixels().iter().map(|p| 2.0 * p).collect()).unwrap();
+        let twice = Image::new(220, 200, full.pixels().iter().map(|p| 2.0 * p).collect()).unwrap();
         let twice = FastHessian { threshold: 80.0, ..FastHessian::default() }.detect(&twice);
         assert_eq!(twice.len(), found.len());
         for (a, b) in found.iter().zip(&twice) {

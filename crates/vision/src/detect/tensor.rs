@@ -23,7 +23,7 @@ pub(super) enum Measure {
     /// det A − k (tr A)², Harris and Stephens (grey levels⁴/px⁴).
     Harris { k: f32 },
     /// The smaller eigenvalue, Shi and Tomasi (grey levels²/px²).
-    LeastEigenvalue,
+    SmallestEigenvalue,
 }
 
 /// A = w ∗ g gᵀ, the gradient g by Sobel's operator (grey levels/px).
@@ -137,7 +137,7 @@ impl Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::rough;
+    use crate::image::random_image;
 
     /// The response at every pixel, so many rows at a time.
     fn response(tensor: &Tensor, image: &Image, rows: usize) -> (Vec<f32>, f32) {
@@ -170,11 +170,11 @@ mod tests {
         }
         match tensor.measure {
             Measure::Harris { k } => (xx * yy - xy * xy) - f64::from(k) * (xx + yy) * (xx + yy),
-            Measure::LeastEigenvalue => 0.5 * (xx + yy) - (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt(),
+            Measure::SmallestEigenvalue => 0.5 * (xx + yy) - (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt(),
         }
     }
 
-    const MEASURES: [Measure; 2] = [Measure::Harris { k: 0.04 }, Measure::LeastEigenvalue];
+    const MEASURES: [Measure; 2] = [Measure::Harris { k: 0.04 }, Measure::SmallestEigenvalue];
 
     #[test]
     fn it_is_the_definition_at_every_pixel_however_many_rows_at_a_time() {
@@ -186,7 +186,7 @@ mod tests {
             (Window::Box, 2.0, 3),
         ] {
             for (measure, (width, height)) in MEASURES.into_iter().zip([(163, 33), (31, 60)]) {
-                let (tensor, image) = (Tensor { window, sigma, measure }, rough(width, height));
+                let (tensor, image) = (Tensor { window, sigma, measure }, random_image(width, height));
                 let (found, strongest) = response(&tensor, &image, height);
                 let margin = reach + 1;
                 let inner = |at: usize, n: usize| at >= margin && at + margin < n;
@@ -194,7 +194,7 @@ mod tests {
                     let (x, y) = (i % width, i / width);
                     if inner(x, width) && inner(y, height) {
                         let expected = by_definition(&tensor, &image, x, y);
-                        let size = if measure == Measure::LeastEigenvalue { 5e3 } else { 2.5e7 };
+                        let size = if measure == Measure::SmallestEigenvalue { 5e3 } else { 2.5e7 };
                         assert!((f64::from(r) - expected).abs() < 2e-6 * size, "{tensor:?} {x} {y}: {r} {expected}");
                     } else {
                         assert_eq!(r, 0.0);

@@ -117,13 +117,13 @@ impl Clahe {
                 image.row(y)[across.clone()].iter().for_each(|&value| histogram[self.bin(value).0] += 1);
             }
             let pixels = (across.len() * down.len()) as f64;
-            let most = self.clip * pixels / self.bins as f64;
-            let kept: f64 = histogram.iter().map(|&count| f64::from(count).min(most)).sum();
-            let share = (pixels - kept) / self.bins as f64;
+            let max = self.clip * pixels / self.bins as f64;
+            let kept: f64 = histogram.iter().map(|&count| f64::from(count).min(max)).sum();
+            let fraction = (pixels - kept) / self.bins as f64;
             let mut sum = 0.0;
             mapping[0] = 0.0;
             for (edge, &count) in mapping[1..].iter_mut().zip(&*histogram) {
-                sum += f64::from(count).min(most) + share;
+                sum += f64::from(count).min(max) + fraction;
                 *edge = (255.0 * sum / pixels) as f32;
             }
         });

@@ -112,7 +112,7 @@ mod tests {
         let mean = |x: usize, y: usize| (0..64).map(|i| image.row(y + i / 8)[x + i % 8]).sum::<f32>() / 64.0;
         let means =
             (40..136).step_by(8).flat_map(|y| (40..192).step_by(8).map(move |x| (x, y))).map(|(x, y)| mean(x, y));
-        means.fold((f32::INFINITY, 0.0), |(least, most), mean| (least.min(mean), most.max(mean)))
+        means.fold((f32::INFINITY, 0.0), |(min, max), mean| (min.min(mean), max.max(mean)))
     }
 
     #[test]
@@ -121,13 +121,13 @@ mod tests {
         let lamp = |x: f32, y: f32| 1.2 - ((x - 120.0).powi(2) + (y - 90.0).powi(2)) / 20000.0;
         let filter = Illumination { sigma: 10.0, ..Illumination::default() };
         let before = image(|x, y| checks(x, y) * lamp(x, y));
-        let (least, most) = spread(&before);
-        assert!(most / least > 1.4);
-        let (least, most) = spread(&filter.filtered(&before));
-        assert!(most / least < 1.03, "{least} to {most}");
+        let (min, max) = spread(&before);
+        assert!(max / min > 1.4);
+        let (min, max) = spread(&filter.filtered(&before));
+        assert!(max / min < 1.03, "{min} to {max}");
         let filter = Illumination { operation: Operation::Subtract, ..filter };
-        let (least, most) = spread(&filter.filtered(&image(|x, y| checks(x, y) + 60.0 * lamp(x, y))));
-        assert!(most - least < 1.5, "{least} to {most}");
+        let (min, max) = spread(&filter.filtered(&image(|x, y| checks(x, y) + 60.0 * lamp(x, y))));
+        assert!(max - min < 1.5, "{min} to {max}");
     }
 
     #[test]

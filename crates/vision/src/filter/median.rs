@@ -74,13 +74,13 @@ impl Filter for Median {
 /// values to the wire in the middle: Batcher's odd-even merge sort without what does not lead there.
 fn median_network(wires: usize, network: &mut Vec<[u8; 2]>) {
     network.clear();
-    let whole = wires.next_power_of_two();
+    let full = wires.next_power_of_two();
     let mut sorted = 1;
-    while sorted < whole {
+    while sorted < full {
         let mut apart = sorted;
         while apart >= 1 {
-            for start in (apart % sorted..whole - apart).step_by(2 * apart) {
-                for low in start..start + apart.min(whole - start - apart) {
+            for start in (apart % sorted..full - apart).step_by(2 * apart) {
+                for low in start..start + apart.min(full - start - apart) {
                     let high = low + apart;
                     // Wires beyond the last carry +∞: they never move.
                     if low / (2 * sorted) == high / (2 * sorted) && high < wires {

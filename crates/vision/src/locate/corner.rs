@@ -4,7 +4,7 @@ use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Locator, Place,
+    Locator, UncertainPixel,
     fit::{CornerFit, Fitter},
     model::Shape,
 };
@@ -37,7 +37,7 @@ macro_rules! locator {
                 image: &Image,
                 keypoints: &[Keypoint],
                 work: &mut Workspace,
-                places: &mut Vec<Option<Place>>,
+                places: &mut Vec<Option<UncertainPixel>>,
             ) {
                 fit_into(&self.0, &$shapes, image, keypoints, work, places);
             }
@@ -83,7 +83,7 @@ pub(crate) fn fit_into(
     image: &Image,
     keypoints: &[Keypoint],
     work: &mut Workspace,
-    places: &mut Vec<Option<Place>>,
+    places: &mut Vec<Option<UncertainPixel>>,
 ) {
     /// Key points in a piece of the work.
     const PIECE: usize = 64;

@@ -6,7 +6,7 @@ use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Place,
+    UncertainPixel,
     model::{Model, Normal, PARAMETERS, Pixels, Shape},
     start::{Guess, Start},
 };
@@ -90,32 +90,38 @@ impl Fitter {
         shapes: &[Shape],
         image: &Image,
         keypoint: &Keypoint,
-    ) -> Option<Place> {
+    ) -> Option<UncertainPixel> {
         let half = settings.window / 2;
         let near = [keypoint.at.u, keypoint.at.v].map(libm::round);
-        let [x, y] = whole(near, half + 1, image)?;
+        let [x, y] = full(near, half + 1, image)?;
         let start = Start::of(image, x, y, half).filter(|start| start.at.norm() <= settings.reach)?;
         let mut guesses = [Guess::NONE; 2];
         guesses.iter_mut().zip(shapes).for_each(|(guess, &shape)| *guess = start.guess(shape));
         let guesses = &mut guesses[..shapes.len()];
         guesses.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-        let least = (1.0 - SHARP * (1.0 - settings.explained)).max(WORSE * guesses[0].explained);
+        let min = (1.0 - SHARP * (1.0 - settings.explained)).max(WORSE * guesses[0].explained);
         let at = [start.at.x + near[0], start.at.y + near[1]];
-        let likely = |guess: &&Guess| guess.explained >= least && guess.contrast() >= PALE * settings.contrast;
+        let likely = |guess: &&Guess| guess.explained >= min && guess.contrast() >= PALE * settings.contrast;
         guesses.iter().filter(likely).find_map(|guess| self.fit(settings, image, keypoint, guess.model(at)))
     }
 
     /// Gauss and Newton's iteration, damped by Levenberg and Marquardt's rule where a step does not help; the
     /// window follows the corner. The centre of `model` counts from the image's first pixel.
-    fn fit(&mut self, settings: &CornerFit, image: &Image, keypoint: &Keypoint, mut model: Model) -> Option<Place> {
+    fn fit(
+        &mut self,
+        settings: &CornerFit,
+        image: &Image,
+        keypoint: &Keypoint,
+        mut model: Model,
+    ) -> Option<UncertainPixel> {
         let half = settings.window / 2;
         let mut middle = [0.0; 2];
-        let mut best = self.look(image, &mut middle, half, &mut model)?;
-        let (mut damping, mut moved, mut most) = (0.0, 0, FIRST);
+        let mut best = self.evaluate(image, &mut middle, half, &mut model)?;
+        let (mut damping, mut moved, mut max) = (0.0, 0, FIRST);
         for _ in 0..STEPS {
             let step = solve(&best, damping)?;
             let promised = best.squares - step.dot(&SVector::from(best.gradient));
-            if promised > most * (1.0 - settings.explained) * self.variation {
+            if promised > max * (1.0 - settings.explained) * self.variation {
                 return None;
             }
             let mut trial = model;
@@ -137,7 +143,7 @@ impl Fitter {
                 }
                 continue;
             };
-            (model, best, damping, most) = (trial, next, damping * 0.2, LATER);
+            (model, best, damping, max) = (trial, next, damping * 0.2, LATER);
             if damping < 1e-3 {
                 damping = 0.0;
             }
@@ -146,14 +152,14 @@ impl Fitter {
                 model.at[0] += middle[0];
                 model.at[1] += middle[1];
                 model.at[5] += self.mean;
-                best = self.look(image, &mut middle, half, &mut model)?;
+                best = self.evaluate(image, &mut middle, half, &mut model)?;
             }
         }
         None
     }
 
     /// Takes the window around the centre of `model`, which from then on counts from the window's middle and mean.
-    fn look(&mut self, image: &Image, middle: &mut [f64; 2], half: usize, model: &mut Model) -> Option<Normal> {
+    fn evaluate(&mut self, image: &Image, middle: &mut [f64; 2], half: usize, model: &mut Model) -> Option<Normal> {
         *middle = [model.at[0], model.at[1]].map(libm::round);
         self.take(image, *middle, half)?;
         model.at[0] -= middle[0];
@@ -170,7 +176,7 @@ impl Fitter {
         rounding: f64,
         model: &Model,
         normal: &Normal,
-    ) -> Option<Place> {
+    ) -> Option<UncertainPixel> {
         let [x, y] = self.middle.map(|x| x as f64);
         let at = Pixel { u: x + model.at[0], v: y + model.at[1] };
         let difference = model.at[6].abs() * if model.shape == Shape::Crossing { 2.0 } else { 1.0 };
@@ -183,12 +189,12 @@ impl Fitter {
         // No residual is believed to be less than rounding.
         let covariance = inverse.fixed_view::<2, 2>(0, 0) * (normal.squares / freedom).max(rounding);
         let covariance = Matrix2::new(covariance[(0, 0)], covariance[(0, 1)], covariance[(0, 1)], covariance[(1, 1)]);
-        (believed && covariance.trace() < 0.25).then_some(Place { at, covariance })
+        (believed && covariance.trace() < 0.25).then_some(UncertainPixel { at, covariance })
     }
 
     /// Takes the values of the window around `middle`, less their mean.
     fn take(&mut self, image: &Image, middle: [f64; 2], half: usize) -> Option<()> {
-        let [x, y] = whole(middle, half, image)?;
+        let [x, y] = full(middle, half, image)?;
         let side = 2 * half + 1;
         self.pixels.shape(half);
         let values = &mut self.pixels.values_mut()[..side * side];
@@ -208,7 +214,7 @@ impl Fitter {
 }
 
 /// The pixel, if the square of `half` around it lies in the image.
-pub(super) fn whole(at: [f64; 2], half: usize, image: &Image) -> Option<[usize; 2]> {
+pub(super) fn full(at: [f64; 2], half: usize, image: &Image) -> Option<[usize; 2]> {
     let inside = |x: f64, n: usize| x >= half as f64 && x + half as f64 <= (n - 1) as f64;
     (inside(at[0], image.width()) && inside(at[1], image.height())).then(|| at.map(|x| x as usize))
 }

@@ -5,7 +5,7 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
-use super::{Locator, Place, fit::whole};
+use super::{Locator, UncertainPixel, fit::full};
 use crate::{Image, Keypoint, Workspace};
 
 /// Places corners where the edges around them meet: the point p to whose surroundings' gradients
@@ -52,7 +52,7 @@ impl Locator for Junction {
         image: &Image,
         keypoints: &[Keypoint],
         work: &mut Workspace,
-        places: &mut Vec<Option<Place>>,
+        places: &mut Vec<Option<UncertainPixel>>,
     ) {
         let window = Window::new(self.sigma);
         let gradients: &mut Gradients = work.get();
@@ -91,9 +91,9 @@ impl Window {
 
     /// The junction near `start`; `None` when there is none within reach, when the edges are parallel,
     /// or when the window leaves the image.
-    fn near(&self, image: &Image, start: &Pixel, gradients: &mut Gradients) -> Option<Place> {
+    fn near(&self, image: &Image, start: &Pixel, gradients: &mut Gradients) -> Option<UncertainPixel> {
         let reach = self.half + SLACK;
-        let [x0, y0] = whole([start.u, start.v].map(libm::round), reach + 1, image)?;
+        let [x0, y0] = full([start.u, start.v].map(libm::round), reach + 1, image)?;
         let (left, top) = (x0 - reach, y0 - reach);
         gradients.take(image, left, top, 2 * reach + 1);
         let origin = Vector2::new(left as f64, top as f64);
@@ -110,7 +110,7 @@ impl Window {
             if step.norm_squared() < 1e-6 {
                 let place = at + origin;
                 let covariance = inverse * self.sums(gradients, &at).spread * inverse;
-                return Some(Place { at: Pixel { u: place.x, v: place.y }, covariance });
+                return Some(UncertainPixel { at: Pixel { u: place.x, v: place.y }, covariance });
             }
         }
         None

@@ -27,14 +27,14 @@ use crate::{Image, Keypoint, Workspace};
 
 /// A place in an image and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct UncertainPixel {
     /// Where.
     pub at: Pixel,
     /// The covariance of (u, v) (px²).
     pub covariance: Matrix2<f64>,
 }
 
-impl Place {
+impl UncertainPixel {
     /// A place whose two coordinates err independently by `sigma` (px).
     pub fn independent(at: Pixel, sigma: f64) -> Self {
         Self { at, covariance: Matrix2::identity() * (sigma * sigma) }
@@ -45,19 +45,25 @@ impl Place {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// In the left image.
-    pub left: Place,
+    pub left: UncertainPixel,
     /// In the right image.
-    pub right: Place,
+    pub right: UncertainPixel,
 }
 
 /// Finds the exact place of corners that a detector found roughly.
 pub trait Locator: Send + Sync + std::fmt::Debug {
     /// Replaces `places` by the corner at each key point, in their order; `None` where the image shows no
     /// corner of the kind that this locator knows, or not well enough to say better where it is.
-    fn locate_into(&self, image: &Image, keypoints: &[Keypoint], work: &mut Workspace, places: &mut Vec<Option<Place>>);
+    fn locate_into(
+        &self,
+        image: &Image,
+        keypoints: &[Keypoint],
+        work: &mut Workspace,
+        places: &mut Vec<Option<UncertainPixel>>,
+    );
 
     /// The corner at each key point.
-    fn locate(&self, image: &Image, keypoints: &[Keypoint]) -> Vec<Option<Place>> {
+    fn locate(&self, image: &Image, keypoints: &[Keypoint]) -> Vec<Option<UncertainPixel>> {
         let mut places = Vec::new();
         self.locate_into(image, keypoints, &mut Workspace::default(), &mut places);
         places

@@ -3,7 +3,7 @@
 use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
-use super::{Locator, Place};
+use super::{Locator, UncertainPixel};
 use crate::{Image, Keypoint, Workspace};
 
 /// Leaves every key point at the peak of the detector's response: right for texture, 1 to 2 px inside
@@ -19,7 +19,13 @@ impl Component for Peak {
 }
 
 impl Locator for Peak {
-    fn locate_into(&self, _: &Image, keypoints: &[Keypoint], _: &mut Workspace, places: &mut Vec<Option<Place>>) {
+    fn locate_into(
+        &self,
+        _: &Image,
+        keypoints: &[Keypoint],
+        _: &mut Workspace,
+        places: &mut Vec<Option<UncertainPixel>>,
+    ) {
         places.clear();
         places.resize(keypoints.len(), None);
     }

@@ -27,7 +27,7 @@ struct Sector {
 }
 
 impl Start {
-    /// The edges in the square of side 2·`half` + 1, at most [`MOST`], around the pixel (x, y), which with one pixel
+    /// The edges in the square of side 2·`half` + 1, at most [`MAX`], around the pixel (x, y), which with one pixel
     /// more must lie in the image; `None` where there are not two.
     ///
     /// They meet where the gradients' lines do, Σ g gᵀ(x − p) = 0. Their directions are those of two edges
@@ -116,7 +116,7 @@ impl Guess {
 }
 
 /// The greatest side of a square.
-pub(super) const MOST: usize = 31;
+pub(super) const MAX: usize = 31;
 const LANES: usize = 16;
 /// A row of a square with one pixel more on either side, and what lanes reach beyond.
 type Row = [f32; 2 * LANES + 2];
@@ -125,13 +125,13 @@ type Row = [f32; 2 * LANES + 2];
 struct Square {
     half: usize,
     middle: f32,
-    rows: [Row; MOST + 2],
+    rows: [Row; MAX + 2],
 }
 
 impl Square {
     fn cut(image: &Image, x: usize, y: usize, half: usize) -> Self {
         let (wide, middle) = (2 * half + 3, image.row(y)[x]);
-        let mut square = Self { half, middle, rows: [[0.0; 2 * LANES + 2]; MOST + 2] };
+        let mut square = Self { half, middle, rows: [[0.0; 2 * LANES + 2]; MAX + 2] };
         for (row, y) in square.rows[..wide].iter_mut().zip(y - half - 1..) {
             row[..wide].copy_from_slice(&image.row(y)[x - half - 1..][..wide]);
             row[..wide].iter_mut().for_each(|value| *value -= middle);

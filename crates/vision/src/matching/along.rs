@@ -1,13 +1,13 @@
 //! Matching within a band: the nearest descriptors there, with the support of their neighbours.
 
-use super::{nearest::Nearest, support::Candidates};
+use super::{nearest::Nearest, support::MatchCandidates};
 use crate::Keypoint;
 
 /// The memory of the search.
 #[derive(Debug, Default)]
 pub(super) struct Along {
     nearest: Nearest,
-    candidates: Candidates,
+    candidates: MatchCandidates,
     pairs: Vec<(usize, usize)>,
     ambiguous: Vec<bool>,
 }

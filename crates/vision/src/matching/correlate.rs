@@ -104,11 +104,11 @@ fn sums(template: &[f32], patch: &[[f32; LANES + WIDEST - 1]]) -> [[f32; LANES];
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::rough;
+    use crate::image::random_image;
 
     #[test]
     fn it_is_the_definition() {
-        let (one, other, half) = (rough(40, 30), rough(37, 31), 3);
+        let (one, other, half) = (random_image(40, 30), random_image(37, 31), 3);
         let window = |image: &Image, x: usize, y: usize| -> Vec<f64> {
             let rows = (y - half..=y + half).flat_map(|row| image.row(row)[x - half..=x + half].to_vec());
             let values: Vec<f64> = rows.map(f64::from).collect();

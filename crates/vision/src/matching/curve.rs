@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use seafix_geometry::{Pixel, Point, StereoRig};
 
 /// Replaces `curve` by the places of the right image that show the ray of left pixel `place` between two depths (m),
-/// about `step` px apart, at most `most` of them; those beyond the image are among them. Where the lens model has no
+/// about `step` px apart, at most `max` of them; those beyond the image are among them. Where the lens model has no
 /// direction there is none.
 ///
 /// They are spaced evenly in inverse depth, which for cameras beside each other is evenly in the image.
@@ -13,7 +13,7 @@ pub(super) fn epipolar_curve(
     place: &Pixel,
     [nearest, furthest]: [f64; 2],
     step: f64,
-    most: f64,
+    max: f64,
     curve: &mut Vec<Vector2<f64>>,
 ) {
     curve.clear();
@@ -31,7 +31,7 @@ pub(super) fn epipolar_curve(
         begin = seen(near);
     }
     let Some(begin) = begin else { return };
-    let count = ((begin - end).norm() / step).ceil().min(most);
+    let count = ((begin - end).norm() / step).ceil().min(max);
     let places = (0..=count as usize).map(|i| far + (near - far) * i as f64 / count.max(1.0));
     curve.extend(places.filter_map(seen));
 }

@@ -86,7 +86,7 @@ impl Component for EpipolarBand {
 
 impl EpipolarBand {
     /// The greatest squared distance that a pair may have.
-    pub(super) fn most(&self, metric: &Metric<'_>) -> f32 {
+    pub(super) fn max(&self, metric: &Metric<'_>) -> f32 {
         match metric {
             Metric::Euclid(_) => (self.max_distance * self.max_distance) as f32,
             Metric::Hamming(_) => 4.0 * self.max_hamming as f32,
@@ -114,7 +114,7 @@ impl EpipolarBand {
             |i, visit| band.visit(i, visit),
             |i, j| metric.squared(i, j),
             |i, j, squared| {
-                if squared <= self.most(&metric) {
+                if squared <= self.max(&metric) {
                     let (right, distance) = (right.keypoints[j].at, metric.distance(squared));
                     found.push(Match { left: i, right, distance });
                 }
@@ -178,7 +178,8 @@ mod tests {
         for i in 0..left.0.len() {
             for j in 0..right.0.len() {
                 let d = distance(i, j);
-                let clear = |rivals: Vec<f32>| rivals.into_iter().all(|rival| d <= m.ratio as f32 * rival);
+                let clear =
+                    |competitors: Vec<f32>| competitors.into_iter().all(|competitor| d <= m.ratio as f32 * competitor);
                 if allowed(i, j)
                     && d <= m.max_distance as f32
                     && clear((0..right.0.len()).filter(|&k| k != j && allowed(i, k)).map(|k| distance(i, k)).collect())
@@ -228,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn alike_points_are_told_apart_by_the_band_alone() {
+    fn alike_points_are_distinguished_by_the_band_alone() {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
         // A column of points that all look the same.
         let seen: Vec<_> =
@@ -251,8 +252,8 @@ mod tests {
         // One look for all, a little of each point's own, and noise in each image: so little that neighbours together
         // tell a place from the next by the six standard errors that are asked of patterns.
         let mut next = numbers(11);
-        let look: Vec<f32> = (0..48 * 16).map(|i| (i % 16) as f32 / 16.0 + 0.2 * next()).collect();
-        let mut noisy = || unit(look.iter().map(|x| x + 0.15 * next()).collect(), 16);
+        let descriptor: Vec<f32> = (0..48 * 16).map(|i| (i % 16) as f32 / 16.0 + 0.2 * next()).collect();
+        let mut noisy = || unit(descriptor.iter().map(|x| x + 0.15 * next()).collect(), 16);
         let (a, b) = (noisy(), noisy());
         let right = |neighbours| {
             let found = matched(&EpipolarBand { neighbours, ..EpipolarBand::default() }, (&l, &a), (&r, &b), &rig);
@@ -264,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lattice_of_points_that_nothing_tells_apart_has_no_match() {
+    fn a_lattice_of_points_that_nothing_reports_apart_has_no_match() {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
         let mut next = numbers(3);
         let (mut found, mut wrong) = (0, 0);
@@ -275,8 +276,8 @@ mod tests {
                     .map(|point| rig.project(&point).unwrap())
                     .collect();
                 let (l, r): (Vec<_>, Vec<_>) = seen.iter().map(|s| (s.left, s.right)).unzip();
-                let mut look = || unit((0..l.len() * 16).map(|_| 0.5 + noise * (next() - 0.5)).collect(), 16);
-                let (a, b) = (look(), look());
+                let mut descriptor = || unit((0..l.len() * 16).map(|_| 0.5 + noise * (next() - 0.5)).collect(), 16);
+                let (a, b) = (descriptor(), descriptor());
                 let pairs = matched(&EpipolarBand::default(), (&l, &a), (&r, &b), &rig);
                 found += pairs.len();
                 wrong += pairs.iter().filter(|m| index(&r, m) != m.left).count();

@@ -3,7 +3,7 @@
 mod blocks;
 mod keys;
 
-use blocks::{MOST, Piece, squared_length};
+use blocks::{MAX, Piece, squared_length};
 use keys::Three;
 
 use super::{
@@ -45,8 +45,8 @@ impl Exhaustive {
         right.resize(m, Three::NONE);
         // The answer does not depend on it: few pieces, for each goes through all left descriptors.
         let size = match threads {
-            Threads::One => MOST,
-            Threads::Pool => m.div_ceil(2 * rayon::current_num_threads()).clamp(64, MOST),
+            Threads::One => MAX,
+            Threads::Pool => m.div_ceil(2 * rayon::current_num_threads()).clamp(64, MAX),
         };
         let margin = match *metric {
             Metric::Euclid([a, b]) => {
@@ -56,11 +56,11 @@ impl Exhaustive {
                     piece.euclid([a, b], lengths, index * size, of_right);
                 });
                 let longest = |lengths: &mut dyn Iterator<Item = f32>| lengths.fold(0.0, f32::max);
-                let (a_most, b_most) =
+                let (a_max, b_max) =
                     (longest(&mut lengths.iter().copied()), longest(&mut (0..m).map(|j| squared_length(b.row(j)))));
                 // Of n numbers the products err by at most n + 4 roundings of |a|² + |b|², ε/2 each, the differences
                 // by n/4 + 12, for there are eight sums; both, for the second and for the third.
-                (1.25 * a.length() as f32 + 20.0) * f32::EPSILON * (a_most + b_most)
+                (1.25 * a.length() as f32 + 20.0) * f32::EPSILON * (a_max + b_max)
             }
             Metric::Hamming(tables) => {
                 threads.pieces(right, size, pieces, |index, of_right, piece| {

@@ -64,15 +64,15 @@ impl Grid {
         let spread = |k: f64, low: f64, high: f64| (f64::min(k * low, k * high), f64::max(k * low, k * high));
         let [width, height] = self.extent();
         // a x takes all values between these in the box, and b y must make up for them.
-        let (least, most) = spread(a, self.low[0], self.low[0] + width);
-        let (top, bottom) = interval(b, -half - c - most, half - c - least);
+        let (min, max) = spread(a, self.low[0], self.low[0] + width);
+        let (top, bottom) = interval(b, -half - c - max, half - c - min);
         if !(top <= self.low[1] + height * (1.0 + SLACK) && bottom >= self.low[1] - height * SLACK) {
             return;
         }
         for row in self.index(1, top)..=self.index(1, bottom) {
             let y = self.low[1] + row as f64 * self.cell[1];
-            let (least, most) = spread(b, y - SLACK * self.cell[1], y + (1.0 + SLACK) * self.cell[1]);
-            let (first, last) = interval(a, -half - c - most, half - c - least);
+            let (min, max) = spread(b, y - SLACK * self.cell[1], y + (1.0 + SLACK) * self.cell[1]);
+            let (first, last) = interval(a, -half - c - max, half - c - min);
             if first <= self.low[0] + width * (1.0 + SLACK) && last >= self.low[0] - width * SLACK {
                 self.run(row, first, last).iter().for_each(|&index| visit(index as usize));
             }

@@ -63,7 +63,7 @@ impl Component for LucasKanade {
 /// The level on which the epipolar curve is searched, at most.
 const SEARCHED: usize = 3;
 /// Places on a curve, at most.
-const MOST: f64 = 512.0;
+const MAX: f64 = 512.0;
 /// Places on a curve that correlate worse than the best by this are not followed.
 const MUCH_WORSE: f64 = 0.3;
 
@@ -130,7 +130,7 @@ impl LucasKanade {
         let Seeker { aligner, curve, correlations, best } = seeker;
         let levels = [levels[0].get(..=level)?, levels[1].get(..=level)?];
         let scale = (1_u32 << level) as f64;
-        epipolar_curve(rig, place, [self.min_depth, self.max_depth], scale, MOST, curve);
+        epipolar_curve(rig, place, [self.min_depth, self.max_depth], scale, MAX, curve);
         curve.iter_mut().for_each(|place| *place /= scale);
         let at = Vector2::new(place.u, place.v) / scale;
         aligner.survey(&levels[0][level], &levels[1][level], &at, curve, &self.tracker.rules(), correlations);
@@ -142,8 +142,8 @@ impl LucasKanade {
             }
         }
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let least = best.first()?.0 - MUCH_WORSE;
-        let likely = best.iter().take(self.places).filter(|(correlation, _)| *correlation >= least);
+        let min = best.first()?.0 - MUCH_WORSE;
+        let likely = best.iter().take(self.places).filter(|(correlation, _)| *correlation >= min);
         let tracks = likely.filter_map(|(_, start)| {
             let start = Pixel { u: start.x, v: start.y };
             let track = self.tracker.there(levels, place, &start, aligner)?;

@@ -68,8 +68,8 @@ impl Matcher for MutualRatio {
         let threads = work.threads();
         let (memory, nearest) = work.get::<(Exhaustive, Nearest)>();
         memory.compare(&metric, threads, nearest);
-        let (ratio, most) = (metric.squared_ratio(self.ratio), self.alike().most(&metric));
-        let pairs = nearest.mutual().filter(|pair| pair.squared <= most && pair.clear(ratio));
+        let (ratio, max) = (metric.squared_ratio(self.ratio), self.alike().max(&metric));
+        let pairs = nearest.mutual().filter(|pair| pair.squared <= max && pair.clear(ratio));
         found.extend(pairs.map(|pair| Match {
             left: pair.left,
             right: right.keypoints[pair.right].at,

@@ -5,7 +5,7 @@ use crate::Keypoint;
 
 /// A right key point that a left one may be.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Candidate {
+pub(super) struct MatchCandidate {
     /// Index among the left key points.
     left: usize,
     /// Index among the right key points.
@@ -15,15 +15,15 @@ pub(super) struct Candidate {
     /// The belief in it: inverse squared distance times all support.
     pub(super) weight: f32,
     /// The weight as a share of all candidates' weights at either key point of the pair.
-    share: f32,
+    fraction: f32,
     /// From the left key point to the right one (px).
     displacement: [f32; 2],
 }
 
 /// The candidates of every left key point, the nearest descriptors first, and what supports them.
 #[derive(Debug, Default)]
-pub(super) struct Candidates {
-    all: Vec<Candidate>,
+pub(super) struct MatchCandidates {
+    all: Vec<MatchCandidate>,
     /// Where each left key point's candidates begin, and where the last one's end.
     starts: Vec<usize>,
     links: Vec<Link>,
@@ -50,7 +50,7 @@ struct Link {
 }
 
 /// No left key point has more candidates than this.
-const MOST: usize = 8;
+const MAX: usize = 8;
 /// No candidate's descriptor is further than this many times the nearest one's. In a pattern that repeats itself
 /// another place often looks a few times more alike than the right one: it is for the neighbours to decide.
 const FURTHEST: f32 = 4.0;
@@ -65,7 +65,7 @@ const SLACK: f32 = 1.0;
 /// The support that every pair has.
 const FLOOR: f32 = 0.05;
 /// A rival that so great a share of the neighbours agrees with as well is one to be told from.
-const RIVAL: f32 = 0.5;
+const ALTERNATIVE: f32 = 0.5;
 /// Standard errors by which the neighbourhood's descriptors must prefer a pair to its rival: three, twice as long as if
 /// they were independent: the windows of neighbours overlap, and what the pixel grid does to one it does to those a period
 /// off.
@@ -77,7 +77,7 @@ const FEW: usize = 4;
 /// themselves and of whole chessboards it was one in sixty at most, in patterns without end two in three and more.
 const PATTERN: usize = 5;
 
-impl Candidates {
+impl MatchCandidates {
     /// Replaces them by the pairs that `visit(i, ..)` names for each left key point, so far apart.
     pub(super) fn fill(
         &mut self,
@@ -94,19 +94,19 @@ impl Candidates {
                 let (to, squared) = (&right[j].at, squared(i, j));
                 let displacement = [(to.u - from.at.u) as f32, (to.v - from.at.v) as f32];
                 let weight = 1.0 / squared.max(NEAREST);
-                self.all.push(Candidate { left: i, right: j, squared, weight, share: 0.0, displacement });
+                self.all.push(MatchCandidate { left: i, right: j, squared, weight, fraction: 0.0, displacement });
             });
             let mine = &mut self.all[first..];
             mine.sort_unstable_by(|a, b| a.squared.total_cmp(&b.squared).then(a.right.cmp(&b.right)));
-            let most = mine.first().map_or(0.0, |nearest| FURTHEST * FURTHEST * nearest.squared.max(NEAREST));
-            let kept = mine.iter().take(MOST).take_while(|c| c.squared <= most).count();
+            let max = mine.first().map_or(0.0, |nearest| FURTHEST * FURTHEST * nearest.squared.max(NEAREST));
+            let kept = mine.iter().take(MAX).take_while(|c| c.squared <= max).count();
             self.all.truncate(first + kept);
             self.starts.push(self.all.len());
         }
     }
 
     /// The candidates of left key point `i`.
-    pub(super) fn of(&self, i: usize) -> &[Candidate] {
+    pub(super) fn of(&self, i: usize) -> &[MatchCandidate] {
         &self.all[self.starts[i]..self.starts[i + 1]]
     }
 
@@ -123,10 +123,10 @@ impl Candidates {
     pub(super) fn support(&mut self, left: &[Keypoint], right: usize, neighbours: usize) {
         self.link(left, neighbours);
         for _ in 0..ROUNDS {
-            self.share(right);
+            self.fraction(right);
             for c in 0..self.all.len() {
-                let share = |link: &Link| self.all[link.candidate as usize].share * link.agreement;
-                let greatest = |same: &[Link]| same.iter().map(share).fold(0.0, f32::max);
+                let fraction = |link: &Link| self.all[link.candidate as usize].fraction * link.agreement;
+                let greatest = |same: &[Link]| same.iter().map(fraction).fold(0.0, f32::max);
                 let sum: f32 = self.neighbours_of(c).map(greatest).sum();
                 self.all[c].weight *= FLOOR + sum / neighbours as f32;
             }
@@ -151,7 +151,7 @@ impl Candidates {
         verdicts.resize(self.all.len(), None);
         for &pair in pairs {
             let (chosen, all) = (place(self, pair), self.starts[pair.0]..self.starts[pair.0 + 1]);
-            let rivalled = all.into_iter().any(|c| c != chosen && self.rivals(chosen, c, squared_ratio));
+            let rivalled = all.into_iter().any(|c| c != chosen && self.competitors(chosen, c, squared_ratio));
             verdicts[chosen] = Some(rivalled);
         }
         ambiguous.clear();
@@ -196,32 +196,34 @@ impl Candidates {
         ambiguous.iter_mut().zip(spread).for_each(|(own, around)| *own |= *around);
     }
 
-    /// Whether `rival` is as good a candidate as `chosen`, of the same left key point.
-    fn rivals(&self, chosen: usize, rival: usize, squared_ratio: f32) -> bool {
+    /// Whether `competitor` is as good a candidate as `chosen`, of the same left key point.
+    fn competitors(&self, chosen: usize, competitor: usize, squared_ratio: f32) -> bool {
         let preference = |a: usize, b: usize| {
             let squared = |c: usize| self.all[c].squared.max(NEAREST);
             libm::logf(squared(b) / squared(a))
         };
-        let own = preference(chosen, rival);
-        let (mut agree, mut agree_with_rival, mut compared) = (0.0, 0.0, 1);
+        let own = preference(chosen, competitor);
+        let (mut agree, mut agree_with_alternative, mut compared) = (0.0, 0.0, 1);
         let (mut sum, mut squares) = (own, own * own);
-        let mut others = self.neighbours_of(rival).peekable();
+        let mut others = self.neighbours_of(competitor).peekable();
         for same in self.neighbours_of(chosen) {
-            let belief = |link: &&Link| self.all[link.candidate as usize].share * link.agreement;
-            let Some(here) = same.iter().max_by(|a, b| belief(a).total_cmp(&belief(b))) else { continue };
+            let agreement_weight = |link: &&Link| self.all[link.candidate as usize].fraction * link.agreement;
+            let Some(here) = same.iter().max_by(|a, b| agreement_weight(a).total_cmp(&agreement_weight(b))) else {
+                continue;
+            };
             agree += here.agreement;
             while others.next_if(|other| other[0].rank < here.rank).is_some() {}
             let Some(other) = others.next_if(|other| other[0].rank == here.rank) else { continue };
             let Some(there) = other.iter().max_by(|a, b| a.agreement.total_cmp(&b.agreement)) else { continue };
             if there.candidate != here.candidate {
-                agree_with_rival += there.agreement;
+                agree_with_alternative += there.agreement;
                 compared += 1;
                 let preference = preference(here.candidate as usize, there.candidate as usize);
                 sum += preference;
                 squares += preference * preference;
             }
         }
-        if compared == 1 || agree_with_rival < RIVAL * agree {
+        if compared == 1 || agree_with_alternative < ALTERNATIVE * agree {
             return false;
         }
         if compared <= FEW {
@@ -240,13 +242,13 @@ impl Candidates {
     }
 
     /// The shares that belong to the weights.
-    fn share(&mut self, right: usize) {
+    fn fraction(&mut self, right: usize) {
         self.columns.clear();
         self.columns.resize(right, 0.0);
         self.all.iter().for_each(|c| self.columns[c.right] += c.weight);
         for candidates in self.all.chunk_by_mut(|a, b| a.left == b.left) {
             let row: f32 = candidates.iter().map(|c| c.weight).sum();
-            candidates.iter_mut().for_each(|c| c.share = c.weight / (row + self.columns[c.right] - c.weight));
+            candidates.iter_mut().for_each(|c| c.fraction = c.weight / (row + self.columns[c.right] - c.weight));
         }
     }
 
@@ -338,8 +340,8 @@ mod tests {
     }
 
     /// Left point `i` may be every right point of its row, and all look alike: so far apart are they.
-    fn of_rows(views: [&[Keypoint]; 2], squared: impl Fn(usize, usize) -> f32) -> Candidates {
-        let mut candidates = Candidates::default();
+    fn of_rows(views: [&[Keypoint]; 2], squared: impl Fn(usize, usize) -> f32) -> MatchCandidates {
+        let mut candidates = MatchCandidates::default();
         let row = |i: usize, visit: &mut dyn FnMut(usize)| {
             (0..COLUMNS).for_each(|column| visit(i / COLUMNS * COLUMNS + column));
         };
@@ -355,13 +357,13 @@ mod tests {
 
     /// The right point that each left one believes in most, and whether clearly: the second has less than
     /// half the belief.
-    fn believed(candidates: &Candidates) -> Vec<(usize, bool)> {
-        let most = |i: usize| {
+    fn believed(candidates: &MatchCandidates) -> Vec<(usize, bool)> {
+        let max = |i: usize| {
             let mut sorted = candidates.of(i).to_vec();
             sorted.sort_by(|a, b| b.weight.total_cmp(&a.weight));
             (sorted[0].right, sorted[1].weight < 0.5 * sorted[0].weight)
         };
-        (0..COUNT).map(most).collect()
+        (0..COUNT).map(max).collect()
     }
 
     #[test]
@@ -386,7 +388,7 @@ mod tests {
             .map(|(i, point)| Keypoint { at: Pixel { u: 1e4 * i as f64, v: point.at.v }, ..*point })
             .collect();
         let mut candidates = of_rows([&left, &scattered], alike);
-        let ratios = |candidates: &Candidates| -> Vec<f32> {
+        let ratios = |candidates: &MatchCandidates| -> Vec<f32> {
             (0..COUNT)
                 .flat_map(|i| candidates.of(i).iter().map(move |c| c.weight / candidates.of(i)[0].weight))
                 .collect()

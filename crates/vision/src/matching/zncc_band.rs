@@ -34,7 +34,7 @@ pub struct ZnccBand {
     /// Side of the window (px), odd, 3 to 51.
     pub window: usize,
     /// The least correlation.
-    pub least_correlation: f64,
+    pub min_correlation: f64,
     /// The greatest distance, as a share of the distance to the second best place; 1 switches the test off.
     pub ratio: f64,
     /// Half width of the epipolar band (px).
@@ -47,7 +47,7 @@ pub struct ZnccBand {
 
 impl Default for ZnccBand {
     fn default() -> Self {
-        Self { window: 11, least_correlation: 0.8, ratio: 0.85, epipolar_px: 1.0, min_depth: 0.1, max_depth: 50.0 }
+        Self { window: 11, min_correlation: 0.8, ratio: 0.85, epipolar_px: 1.0, min_depth: 0.1, max_depth: 50.0 }
     }
 }
 
@@ -58,11 +58,11 @@ impl Component for ZnccBand {
         "Fua, A parallel stereo algorithm that produces dense depth maps and preserves image features, 1993";
 
     fn check(&self) -> Result<(), String> {
-        let Self { window, least_correlation, ratio, epipolar_px, min_depth, max_depth } = *self;
+        let Self { window, min_correlation, ratio, epipolar_px, min_depth, max_depth } = *self;
         let odd = window % 2 == 1 && (3..=WIDEST).contains(&window);
         in_range(odd, "window", window, "an odd number of pixels from 3 to 51")?;
-        let correlated = (-1.0..=1.0).contains(&least_correlation);
-        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
+        let correlated = (-1.0..=1.0).contains(&min_correlation);
+        in_range(correlated, "min-correlation", min_correlation, "a number from -1 to 1")?;
         in_range(ratio > 0.0 && ratio <= 1.0, "ratio", ratio, "more than 0, at most 1")?;
         let band = epipolar_px > 0.0 && epipolar_px <= 100.0;
         in_range(band, "epipolar-px", epipolar_px, "more than 0, at most 100 (px)")?;
@@ -73,7 +73,7 @@ impl Component for ZnccBand {
 }
 
 /// Places on a curve, at most.
-const MOST: f64 = 8192.0;
+const MAX: f64 = 8192.0;
 /// The way back ends where the way there began if it ends within this (px, along either axis).
 const RETURN: usize = 1;
 
@@ -124,12 +124,12 @@ impl ZnccBand {
         place: &Pixel,
         seeker: &mut Seeker,
     ) -> Option<(Pixel, f32)> {
-        let begin = whole(place)?;
+        let begin = full(place)?;
         let depths = [self.min_depth, self.max_depth];
         let best = self.seek([left, right], rig, begin, depths, seeker)?;
         let (own, other) = (1.0 - best.correlation, 1.0 - best.second);
         let clear = self.ratio >= 1.0 || own < (self.ratio * self.ratio) as f32 * other;
-        if f64::from(best.correlation) < self.least_correlation || !clear {
+        if f64::from(best.correlation) < self.min_correlation || !clear {
             return None;
         }
         let [x, y] = best.at;
@@ -159,7 +159,7 @@ impl ZnccBand {
         let half = self.window / 2;
         template.take(from, begin, half)?;
         let [u, v] = begin.map(|x| x as f64);
-        epipolar_curve(rig, &Pixel { u, v }, depths, 1.0, MOST, curve);
+        epipolar_curve(rig, &Pixel { u, v }, depths, 1.0, MAX, curve);
         let top = band(curve, self.epipolar_px, [to.width(), to.height()], rows)?;
         seen.clear();
         for (y, &[first, last]) in (top..).zip(&*rows) {
@@ -176,7 +176,7 @@ impl ZnccBand {
 }
 
 /// The pixel around a place; none for what is no place.
-fn whole(place: &Pixel) -> Option<[usize; 2]> {
+fn full(place: &Pixel) -> Option<[usize; 2]> {
     let at = [place.u, place.v].map(libm::round);
     at.iter().all(|x| (0.0..1e9).contains(x)).then(|| at.map(|x| x as usize))
 }

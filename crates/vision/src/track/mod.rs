@@ -33,7 +33,7 @@ pub struct Tracker {
     /// How far a place may move on one level (px of that level).
     pub reach: f64,
     /// The least zero-normalised cross correlation of the windows on the finest level.
-    pub least_correlation: f64,
+    pub min_correlation: f64,
     /// The greatest distance between the beginning and the end of the way there and back (px); 0: no way back.
     pub return_px: f64,
     /// The greatest number of iterations on a level.
@@ -65,7 +65,7 @@ impl Default for Tracker {
             weight: Weight::Gaussian,
             levels: 5,
             reach: 8.0,
-            least_correlation: 0.8,
+            min_correlation: 0.8,
             return_px: 0.5,
             iterations: 20,
         }
@@ -85,13 +85,13 @@ impl Tracker {
     /// # Errors
     /// The setting that is out of its range, its value, and the range.
     pub fn check(&self) -> Result<(), String> {
-        let Self { window, weight: _, levels, reach, least_correlation, return_px, iterations } = *self;
+        let Self { window, weight: _, levels, reach, min_correlation, return_px, iterations } = *self;
         let odd = window % 2 == 1 && (3..=201).contains(&window);
         in_range(odd, "window", window, "an odd number of pixels from 3 to 201")?;
         in_range((1..=12).contains(&levels), "levels", levels, "a number from 1 to 12")?;
         in_range(reach > 0.0 && reach <= 100.0, "reach", reach, "more than 0, at most 100 (px)")?;
-        let correlated = (-1.0..=1.0).contains(&least_correlation);
-        in_range(correlated, "least-correlation", least_correlation, "a number from -1 to 1")?;
+        let correlated = (-1.0..=1.0).contains(&min_correlation);
+        in_range(correlated, "min-correlation", min_correlation, "a number from -1 to 1")?;
         in_range((0.0..=100.0).contains(&return_px), "return-px", return_px, "a number from 0 to 100 (px)")?;
         in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
     }
@@ -127,8 +127,8 @@ impl Tracker {
 
     /// When an alignment on the finest level is believed.
     pub(crate) fn rules(&self) -> Rules {
-        let Self { window, weight, reach, least_correlation, iterations, .. } = *self;
-        Rules { window, weight, reach, least_correlation, iterations, precision: Rules::FINE, beyond: false }
+        let Self { window, weight, reach, min_correlation, iterations, .. } = *self;
+        Rules { window, weight, reach, min_correlation, iterations, precision: Rules::FINE, beyond: false }
     }
 
     /// One place, there and back.
@@ -178,7 +178,7 @@ impl Tracker {
         aligner: &mut Aligner,
     ) -> Option<Aligned> {
         let fine = self.rules();
-        let coarse = Rules { least_correlation: ALIKE, precision: COARSE, beyond: true, ..fine };
+        let coarse = Rules { min_correlation: ALIKE, precision: COARSE, beyond: true, ..fine };
         let mut at = *start;
         let levels = from.iter().zip(to).enumerate();
         for (level, (from, to)) in levels.skip(1).rev() {
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_back_must_end_where_it_began() {
+    fn the_path_back_must_end_where_it_began() {
         let images = [[0.0; 2], SHIFT].map(|shift| Pyramid::new(&stones(480, shift), 5));
         let levels = [images[0].levels(), images[1].levels()];
         let (tracker, aligner) = (Tracker::default(), &mut Aligner::default());

@@ -46,8 +46,8 @@ impl PointRules {
         in_range(calibrated, "calibration-px", calibration_px, "a number from 0 to 100 (px)")?;
         let band = epipolar_px > 0.0 && epipolar_px <= 1000.0;
         in_range(band, "epipolar-px", epipolar_px, "more than 0, at most 1000 (px)")?;
-        let share = confidence > 0.0 && confidence <= 1.0;
-        in_range(share, "confidence", confidence, "more than 0, at most 1 (no test)")?;
+        let fraction = confidence > 0.0 && confidence <= 1.0;
+        in_range(fraction, "confidence", confidence, "more than 0, at most 1 (no test)")?;
         in_range(max_depth > 0.0 && max_depth.is_finite(), "max-depth", max_depth, "a positive depth (m)")
     }
 }

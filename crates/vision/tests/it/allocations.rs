@@ -3,7 +3,9 @@
 use std::{alloc::System, env, process::Command};
 
 use seafix_component::Choice;
-use seafix_vision::{DESCRIPTORS, DETECTORS, FrontEnd, LOCATORS, Look, MATCHERS, REFINEMENTS, TRIANGULATORS, Threads};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, FrontEnd, FrontEndOutput, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, Threads,
+};
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
 use crate::scenes;
@@ -65,14 +67,14 @@ fn a_warm_pair_allocates_nothing() {
             refinement: REFINEMENTS.build(&refinement).expect("a refinement"),
             triangulator: TRIANGULATORS.build(&triangulator).expect("a triangulator"),
         };
-        let mut look = Look::new(Threads::One);
-        (0..2).for_each(|_| front_end.look(&left, &right, &rig, &mut look));
+        let mut front_end_output = FrontEndOutput::new(Threads::One);
+        (0..2).for_each(|_| front_end.run(&left, &right, &rig, &mut front_end_output));
         let region = Region::new(ALLOCATIONS);
-        front_end.look(&left, &right, &rig, &mut look);
+        front_end.run(&left, &right, &rig, &mut front_end_output);
         let change = region.change();
         assert_eq!((change.allocations, change.reallocations), (0, 0), "{pipeline:?}");
         // Nothing here is a corner of a board or a box.
         let made = ["l-corner", "x-corner"].contains(&pipeline[0]);
-        assert!(made || look.cloud.len() > 20, "{pipeline:?}: {}", look.cloud.len());
+        assert!(made || front_end_output.cloud.len() > 20, "{pipeline:?}: {}", front_end_output.cloud.len());
     }
 }

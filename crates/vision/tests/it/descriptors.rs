@@ -83,9 +83,9 @@ fn light_and_contrast_drop_out() {
     for (name, descriptor) in all() {
         let (a, b) = (descriptor.describe(&plain, &points), descriptor.describe(&lit, &points));
         assert_eq!(a.len(), points.len(), "{name}");
-        let least = if a.numbers().is_some() { 1e-5 } else { 2.0 / 256.0 };
+        let min = if a.numbers().is_some() { 1e-5 } else { 2.0 / 256.0 };
         for (i, point) in points.iter().enumerate() {
-            assert!(apart(&a, &b, i) <= least, "{name}, {:?}: {}", point, apart(&a, &b, i));
+            assert!(apart(&a, &b, i) <= min, "{name}, {:?}: {}", point, apart(&a, &b, i));
         }
     }
 }
@@ -168,9 +168,9 @@ fn what_turns_with_its_surroundings_follows_a_quarter_turn() {
     for choice in choices {
         let descriptor = DESCRIPTORS.build(&choice).expect("these are settings");
         let (a, b) = (descriptor.describe(&before, &points), descriptor.describe(&after, &turned));
-        let least = if a.numbers().is_some() { 1e-4 } else { 2.0 / 256.0 };
+        let min = if a.numbers().is_some() { 1e-4 } else { 2.0 / 256.0 };
         for (i, point) in points.iter().enumerate() {
-            assert!(apart(&a, &b, i) <= least, "{choice:?}, {:?}: {}", point, apart(&a, &b, i));
+            assert!(apart(&a, &b, i) <= min, "{choice:?}, {:?}: {}", point, apart(&a, &b, i));
         }
     }
 }

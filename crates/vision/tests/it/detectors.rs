@@ -130,7 +130,7 @@ fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
 ///
 /// Seen to fail when rows of the response that are kept for the next ones are moved by one.
 #[test]
-fn a_shift_by_whole_pixels_shifts_the_points() {
+fn a_shift_by_integer_pixels_shifts_the_points() {
     // Down by another number than that of the rows which are worked on at a time.
     let (size, shift) = ([193, 177], [32, 16]);
     every("gaussian", |name, detector| {

@@ -2,7 +2,7 @@
 
 use seafix_component::Choice;
 use seafix_geometry::Pixel;
-use seafix_vision::{DETECTORS, Image, Keypoint, LOCATORS, Locator, Place, Threads, Workspace};
+use seafix_vision::{DETECTORS, Image, Keypoint, LOCATORS, Locator, Threads, UncertainPixel, Workspace};
 
 const SIDE: usize = 151;
 
@@ -40,7 +40,7 @@ fn every(law: impl Fn(&str, &dyn Locator)) {
 }
 
 /// The same key points are located, at the same places to this many pixels.
-fn same(name: &str, found: &[Option<Place>], expected: &[Option<Place>], tolerance: f64) {
+fn same(name: &str, found: &[Option<UncertainPixel>], expected: &[Option<UncertainPixel>], tolerance: f64) {
     let located = expected.iter().flatten().count();
     assert!(name == "peak" || located > 15, "{name}: {located}");
     for (found, expected) in found.iter().zip(expected) {
@@ -73,7 +73,7 @@ fn light_and_contrast_move_nothing() {
 ///
 /// Seen to fail when a fit's place depends on where its window lies in the image.
 #[test]
-fn a_shift_by_whole_pixels_shifts_the_places() {
+fn a_shift_by_integer_pixels_shifts_the_places() {
     let image = board(SIDE, SIDE);
     let (across, down) = (5, 9);
     let shifted = made(SIDE - across, SIDE - down, |x, y| image.row(y + down)[x + across]);
@@ -83,7 +83,7 @@ fn a_shift_by_whole_pixels_shifts_the_places() {
     let moved: Vec<_> = points.iter().map(|k| Keypoint { at: back(k.at), ..*k }).collect();
     every(|name, locator| {
         let expected = locator.locate(&image, &points);
-        let expected: Vec<_> = expected.iter().map(|p| p.map(|p| Place { at: back(p.at), ..p })).collect();
+        let expected: Vec<_> = expected.iter().map(|p| p.map(|p| UncertainPixel { at: back(p.at), ..p })).collect();
         same(name, &locator.locate(&shifted, &moved), &expected, ROUNDING);
     });
 }
@@ -100,7 +100,7 @@ fn a_quarter_turn_turns_the_places() {
     let there: Vec<_> = points.iter().map(|k| Keypoint { at: turn(k.at), ..*k }).collect();
     every(|name, locator| {
         let (expected, found) = (locator.locate(&image, &points), locator.locate(&turned, &there));
-        let at: Vec<_> = expected.iter().map(|p| p.map(|p| Place { at: turn(p.at), ..p })).collect();
+        let at: Vec<_> = expected.iter().map(|p| p.map(|p| UncertainPixel { at: turn(p.at), ..p })).collect();
         same(name, &found, &at, ROUNDING);
         for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
             let (a, b) = (found.covariance, expected.covariance);
@@ -133,7 +133,7 @@ fn a_place_is_near_its_key_point() {
 ///
 /// Seen to fail when windows may leave the image.
 #[test]
-fn any_key_point_of_any_image_is_looked_at() {
+fn any_key_point_of_any_image_is_examined() {
     let mut points = Vec::new();
     for wild in [f64::NAN, f64::INFINITY, -1e300, 1e300, -5.0, 0.0, 0.5, 7.0, 39.0, 40.0] {
         for other in [3.0, 20.5, wild] {

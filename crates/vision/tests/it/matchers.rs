@@ -33,12 +33,12 @@ fn rigs() -> [StereoRig; 3] {
 struct Seen {
     image: Image,
     keypoints: Vec<Keypoint>,
-    looks: [Descriptors; 2],
+    patterns: [Descriptors; 2],
 }
 
 impl Seen {
     fn view(&self, kind: usize) -> View<'_> {
-        View { image: &self.image, keypoints: &self.keypoints, descriptors: &self.looks[kind] }
+        View { image: &self.image, keypoints: &self.keypoints, descriptors: &self.patterns[kind] }
     }
 }
 
@@ -56,7 +56,7 @@ fn scene(rig: &StereoRig, n: usize) -> [Seen; 2] {
         }
     }
     let spots: Vec<Vec<f32>> = seen.iter().map(|_| (0..16).map(|_| 100.0 * (next() - 0.5)).collect()).collect();
-    let looks: Vec<Vec<f32>> = seen.iter().map(|_| (0..24).map(|_| next() - 0.5).collect()).collect();
+    let patterns: Vec<Vec<f32>> = seen.iter().map(|_| (0..24).map(|_| next() - 0.5).collect()).collect();
     let mut side = |right: bool| {
         let at = |i: usize| if right { seen[i].right } else { seen[i].left };
         let order: Vec<usize> = if right { (0..seen.len()).rev().collect() } else { (0..seen.len()).collect() };
@@ -72,14 +72,14 @@ fn scene(rig: &StereoRig, n: usize) -> [Seen; 2] {
         let noisy: Vec<f32> = order
             .iter()
             .flat_map(|&i| {
-                let look: Vec<f32> = looks[i].iter().map(|x| x + 0.15 * (next() - 0.5)).collect();
-                let length = look.iter().map(|x| x * x).sum::<f32>().sqrt();
-                look.into_iter().map(move |x| x / length)
+                let descriptor: Vec<f32> = patterns[i].iter().map(|x| x + 0.15 * (next() - 0.5)).collect();
+                let length = descriptor.iter().map(|x| x * x).sum::<f32>().sqrt();
+                descriptor.into_iter().map(move |x| x / length)
             })
             .collect();
         let bits = noisy.iter().map(|x| if *x > 0.0 { 0xFFFF_FFFF_u64 << 16 } else { 0 }).collect();
-        let looks = [Descriptors::Numbers(Table::new(24, noisy)), Descriptors::Bits(Table::new(24, bits))];
-        Seen { image: Image::new(SIZE, SIZE, values).expect("an image"), keypoints, looks }
+        let patterns = [Descriptors::Numbers(Table::new(24, noisy)), Descriptors::Bits(Table::new(24, bits))];
+        Seen { image: Image::new(SIZE, SIZE, values).expect("an image"), keypoints, patterns }
     };
     [side(false), side(true)]
 }
@@ -146,7 +146,7 @@ fn left_to_right_to_left_returns_the_same_pairs() {
             let matcher = MATCHERS.build(&alone).or_else(|_| MATCHERS.build(&Choice::named(listing.name))).unwrap();
             for kind in 0..2 {
                 // Descriptors of other points: every left one has a nearest, few are each other's.
-                let shuffled = View { descriptors: &l.looks[kind], ..r.view(kind) };
+                let shuffled = View { descriptors: &l.patterns[kind], ..r.view(kind) };
                 let there = matcher.matches(&l.view(kind), &shuffled, &rig);
                 let there: Vec<_> = there.iter().map(|m| (m.left, index(&r.keypoints, m.right).unwrap())).collect();
                 let again = matcher.matches(&shuffled, &l.view(kind), &back);

@@ -61,12 +61,12 @@ pub(crate) fn tiled(rig: &StereoRig, side: f64) -> [Image; 2] {
 
 fn painted(rig: &StereoRig, contrast: f64, grain: f64, paint: impl Fn(f64, f64) -> f64) -> [Image; 2] {
     let back = rig.right_from_left().inverse();
-    let eyes = [
+    let cameras = [
         (rig.left(), Vector3::zeros(), UnitQuaternion::identity()),
         (rig.right(), back.translation(), back.rotation()),
     ];
     let mut side = 0;
-    eyes.map(|(camera, origin, rotation)| {
+    cameras.map(|(camera, origin, rotation)| {
         side += 1;
         let pixel = |i: usize| {
             let at = Pixel { u: (i % SIZE[0]) as f64, v: (i / SIZE[0]) as f64 };

@@ -108,11 +108,11 @@ fn filters_refuse_what_they_cannot_do() {
     range(&FILTERS, "guided", "sigma", &[0.01, 255.0], &[0.0, -5.0, 256.0]);
     range(&FILTERS, "illumination", "sigma", &[1.0, 1000.0], &[0.5, 1001.0]);
     range(&FILTERS, "illumination", "gain", &[1.0, 1000.0], &[0.5, 1001.0]);
-    let says = |name: &str, key: &str, value: i64| refusal(&FILTERS, &Choice::named(name).with(key, value)).unwrap();
-    assert_eq!(says("median", "radius", 3), "filter `median`: radius = 3; give 1 (3×3) or 2 (5×5)");
-    assert_eq!(says("clahe", "tiles", 0), "filter `clahe`: tiles = 0; give a number from 1 to 64");
-    assert_eq!(says("clahe", "bins", 15), "filter `clahe`: bins = 15; give a number from 16 to 4096");
-    assert_eq!(says("guided", "radius", 1001), "filter `guided`: radius = 1001; give a number from 1 to 1000 (px)");
+    let states = |name: &str, key: &str, value: i64| refusal(&FILTERS, &Choice::named(name).with(key, value)).unwrap();
+    assert_eq!(states("median", "radius", 3), "filter `median`: radius = 3; give 1 (3×3) or 2 (5×5)");
+    assert_eq!(states("clahe", "tiles", 0), "filter `clahe`: tiles = 0; give a number from 1 to 64");
+    assert_eq!(states("clahe", "bins", 15), "filter `clahe`: bins = 15; give a number from 16 to 4096");
+    assert_eq!(states("guided", "radius", 1001), "filter `guided`: radius = 1001; give a number from 1 to 1000 (px)");
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn epipolar_band_needs_a_band() {
 fn zncc_band_refuses_what_matches_nothing() {
     range(&MATCHERS, "zncc-band", "epipolar-px", &[0.1, 100.0], &[0.0, -1.0, 101.0]);
     range(&MATCHERS, "zncc-band", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
-    range(&MATCHERS, "zncc-band", "least-correlation", &[-1.0, 1.0], &[-1.1, 1.1]);
+    range(&MATCHERS, "zncc-band", "min-correlation", &[-1.0, 1.0], &[-1.1, 1.1]);
     range(&MATCHERS, "zncc-band", "min-depth", &[0.1, 49.0], &[0.0, -0.1]);
     for window in [1, 10, 53] {
         let said = refusal(&MATCHERS, &Choice::named("zncc-band").with("window", window)).unwrap();
@@ -190,7 +190,7 @@ fn lucas_kanade_refuses_what_follows_nothing() {
         (Tracker { window: 4, ..Tracker::default() }, "window"),
         (Tracker { levels: 0, ..Tracker::default() }, "levels"),
         (Tracker { reach: f64::NAN, ..Tracker::default() }, "reach"),
-        (Tracker { least_correlation: 1.5, ..Tracker::default() }, "least-correlation"),
+        (Tracker { min_correlation: 1.5, ..Tracker::default() }, "min-correlation"),
         (Tracker { return_px: -1.0, ..Tracker::default() }, "return-px"),
         (Tracker { iterations: 0, ..Tracker::default() }, "iterations"),
     ] {
@@ -203,25 +203,25 @@ fn lucas_kanade_refuses_what_follows_nothing() {
 fn refinements_refuse_what_refines_nothing() {
     range(&REFINEMENTS, "direct", "reach", &[0.1, 100.0], &[0.0, -2.0, 101.0]);
     range(&REFINEMENTS, "zncc-parabola", "floor-px", &[0.0, 10.0], &[-0.1, 11.0]);
-    let says = |name: &str, key: &str, value: i64| refusal(&REFINEMENTS, &Choice::named(name).with(key, value));
-    for (name, most) in [("direct", 201), ("zncc-parabola", 51)] {
-        range(&REFINEMENTS, name, "least-correlation", &[-1.0, 1.0], &[-2.0, 101.0]);
-        for window in [0, 1, 10, most + 2] {
-            let said = says(name, "window", window).unwrap_or_default();
+    let states = |name: &str, key: &str, value: i64| refusal(&REFINEMENTS, &Choice::named(name).with(key, value));
+    for (name, max) in [("direct", 201), ("zncc-parabola", 51)] {
+        range(&REFINEMENTS, name, "min-correlation", &[-1.0, 1.0], &[-2.0, 101.0]);
+        for window in [0, 1, 10, max + 2] {
+            let said = states(name, "window", window).unwrap_or_default();
             assert!(said.contains(&format!("`{name}`: window = {window}; give an odd number of pixels")), "{said:?}");
         }
-        for window in [3, most] {
-            assert_eq!(says(name, "window", window), None);
+        for window in [3, max] {
+            assert_eq!(states(name, "window", window), None);
         }
         let choice = Choice::named(name).with("unaligned", "keep");
         assert_eq!(refusal(&REFINEMENTS, &choice), None);
     }
-    assert!(says("direct", "iterations", 0).unwrap_or_default().contains("iterations = 0; give "));
+    assert!(states("direct", "iterations", 0).unwrap_or_default().contains("iterations = 0; give "));
     for reach in [0, 8] {
-        let said = says("zncc-parabola", "reach", reach).unwrap_or_default();
+        let said = states("zncc-parabola", "reach", reach).unwrap_or_default();
         assert!(said.contains(&format!("reach = {reach}; give a number from 1 to 7 (px)")), "{said:?}");
     }
-    assert!(says("none", "window", 11).is_some());
+    assert!(states("none", "window", 11).is_some());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix_data::trajectory::{Trajectory, Way};
+use seafix_data::trajectory::{LoggedTrajectory, Trajectory};
 use seafix_evaluation::trajectory::{Alignment, Pose, align, associate};
 
 use super::Eval;
@@ -23,14 +23,14 @@ pub(super) struct Matched {
 
 impl Matched {
     /// The share of the shorter trajectory that found its partner.
-    pub(super) fn share(&self) -> f64 {
+    pub(super) fn fraction(&self) -> f64 {
         self.reference.len() as f64 / self.of.0.min(self.of.1).max(1) as f64
     }
 
     /// How far apart two ways end that begin in one pose (m); of a way that is broken none knows.
     pub(super) fn end(&self) -> Option<f64> {
-        let way = |poses: &[Pose]| poses[0].to(&poses[poses.len() - 1]).position;
-        (self.stretches.len() == 1).then(|| (way(&self.reference) - way(&self.estimate)).norm())
+        let trajectory = |poses: &[Pose]| poses[0].to(&poses[poses.len() - 1]).position;
+        (self.stretches.len() == 1).then(|| (trajectory(&self.reference) - trajectory(&self.estimate)).norm())
     }
 
     /// The stretches without a break, as places from and up to.
@@ -44,9 +44,9 @@ fn is_log(file: &Path) -> bool {
     file.extension().is_some_and(|ending| ending == "mcap")
 }
 
-fn read(file: &Path, way: Way, repair: bool) -> Result<Trajectory, Failure> {
-    let read = match repair {
-        _ if is_log(file) => Trajectory::of_log(file, way),
+fn read(file: &Path, trajectory: LoggedTrajectory, sort_stamps: bool) -> Result<Trajectory, Failure> {
+    let read = match sort_stamps {
+        _ if is_log(file) => Trajectory::of_log(file, trajectory),
         true => Trajectory::read_repaired(file),
         false => Trajectory::read(file),
     };
@@ -69,8 +69,10 @@ impl Eval {
         if self.estimate.is_none() && !is_log(&self.reference) {
             return Err(Failure::new(USAGE, "no trajectory to judge; give ESTIMATE, or a log for both"));
         }
-        let (reference, estimate) =
-            (read(&self.reference, Way::True, self.repair)?, read(self.estimate(), self.way.into(), self.repair)?);
+        let (reference, estimate) = (
+            read(&self.reference, LoggedTrajectory::True, self.sort_stamps)?,
+            read(self.estimate(), self.trajectory.into(), self.sort_stamps)?,
+        );
         let of = (reference.poses.len(), estimate.poses.len());
         let refuse = |what: String| {
             let (a, b) = (self.reference.display(), self.estimate().display());

@@ -1,18 +1,20 @@
 //! `seafix eval`.
 
 mod matched;
-mod told;
+mod output;
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use seafix_data::trajectory::{Format, Trajectory, Way};
-use seafix_evaluation::trajectory::{Alignment, Delta, Leg, Relation, Summary, ape, drift, pairs, path_lengths, rpe};
+use seafix_data::trajectory::{Format, LoggedTrajectory, Trajectory};
+use seafix_evaluation::trajectory::{
+    Alignment, Delta, DriftSegment, Relation, Summary, ape, drift, pairs, path_lengths, rpe,
+};
 
 use crate::{
+    atomic_file,
     exit::{DONE, Ended, Failure, USAGE},
-    terminal::{print, tell},
-    whole,
+    terminal::{notify, print},
 };
 
 /// Below this share of matched poses the statistics come with a warning.
@@ -26,7 +28,7 @@ pub(crate) struct Eval {
     estimate: Option<PathBuf>,
     /// Which way of a log is judged.
     #[arg(long, value_enum, default_value = "odometry")]
-    way: LoggedWay,
+    trajectory: TrajectoryArgument,
     /// Lay the estimate on the reference first (Umeyama).
     #[arg(short, long)]
     align: bool,
@@ -56,13 +58,13 @@ pub(crate) struct Eval {
     all_pairs: bool,
     /// Choose the pairs along the reference instead of the estimate.
     #[arg(long)]
-    pairs_from_reference: bool,
+    pairs_from_fix: bool,
     /// Poses further apart in time (s) do not belong together.
     #[arg(long, default_value_t = 0.01)]
     t_max_diff: f64,
     /// Sort lines that are out of order by time, and keep the first of each stamp; otherwise such a file is refused.
     #[arg(long)]
-    repair: bool,
+    sort_stamps: bool,
     /// Added to the estimate's stamps (s).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     t_offset: f64,
@@ -114,27 +116,27 @@ enum Unit {
 
 /// A way that a log holds.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum LoggedWay {
+enum TrajectoryArgument {
     /// By odometry alone.
     Odometry,
     /// By the navigated pose and the survey.
     Navigated,
 }
 
-impl From<LoggedWay> for Way {
-    fn from(way: LoggedWay) -> Self {
-        match way {
-            LoggedWay::Odometry => Self::Odometry,
-            LoggedWay::Navigated => Self::Navigated,
+impl From<TrajectoryArgument> for LoggedTrajectory {
+    fn from(trajectory: TrajectoryArgument) -> Self {
+        match trajectory {
+            TrajectoryArgument::Odometry => Self::Odometry,
+            TrajectoryArgument::Navigated => Self::Navigated,
         }
     }
 }
 
 /// What the errors come to.
-struct Found {
+struct Errors {
     ape: Option<Summary>,
     rpe: Summary,
-    legs: Vec<Leg>,
+    segments: Vec<DriftSegment>,
     path: f64,
     /// The distance of the last poses (m), the first laid on each other, where the way between is known.
     end: Option<f64>,
@@ -156,27 +158,31 @@ impl Eval {
         }
         let Name(relation) = self.relation;
         let absolute = relation.is_absolute().then(|| ape(&matched.reference, &matched.estimate, relation));
-        let along = if self.pairs_from_reference { &matched.reference } else { &matched.estimate };
+        let along = if self.pairs_from_fix { &matched.reference } else { &matched.estimate };
         // Across a break nothing is known, so nothing is judged.
-        let (mut both, mut legs) = (Vec::new(), Vec::new());
+        let (mut both, mut segments) = (Vec::new(), Vec::new());
         for stretch in matched.stretches() {
             let from = stretch.start;
             let own = pairs(&along[stretch.clone()], delta, self.all_pairs, self.delta_tol);
             both.extend(own.into_iter().map(|(i, j)| (from + i, from + j)));
             let (reference, estimate) = (&matched.reference[stretch.clone()], &matched.estimate[stretch]);
             let own = drift(reference, estimate, &self.segments);
-            legs.extend(own.into_iter().map(|leg| Leg { from: from + leg.from, to: from + leg.to, ..leg }));
+            segments.extend(own.into_iter().map(|segment| DriftSegment {
+                from: from + segment.from,
+                to: from + segment.to,
+                ..segment
+            }));
         }
-        let found = Found {
+        let found = Errors {
             ape: absolute.map(|errors| Summary::of(&errors)),
             rpe: Summary::of(&rpe(&matched.reference, &matched.estimate, &both, relation)),
-            legs,
+            segments,
             path: path_lengths(&matched.reference).last().copied().unwrap_or(0.0),
             end: matched.end(),
             alignment,
         };
         if matched.stretches.len() > 1 {
-            tell(&format!(
+            notify(&format!(
                 "warning: the way is broken {}; RPE and drift are taken between the breaks, APE speaks for the whole only if \
                  nothing moved in them",
                 times(matched.stretches.len() - 1)
@@ -185,13 +191,13 @@ impl Eval {
         if matched.covered < MOSTLY {
             let (reference, estimate) = (self.reference.display(), self.estimate().display());
             let covered = 100.0 * matched.covered;
-            tell(&format!(
+            notify(&format!(
                 "warning: {estimate} covers {covered:.1} % of the time of {reference}; errors speak for that part"
             ));
         }
-        if matched.share() < MOSTLY {
+        if matched.fraction() < MOSTLY {
             let (n, (a, b)) = (matched.reference.len(), matched.of);
-            tell(&format!(
+            notify(&format!(
                 "warning: only {n} poses matched, of {a} in {} and {b} in {}; check --t-offset and --t-max-diff",
                 self.reference.display(),
                 self.estimate().display()
@@ -199,8 +205,8 @@ impl Eval {
         }
         if let Some(file) = &self.out {
             let breaks = matched.stretches[1..].to_vec();
-            let way = Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone(), breaks };
-            whole::write(file, way.print(Format::of_name(file)))?;
+            let trajectory = Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone(), breaks };
+            atomic_file::write(file, trajectory.print(Format::of_name(file)))?;
         }
         print(&if self.json { self.machine(&matched, &found) } else { self.people(&matched, &found) })?;
         Ok(DONE)

@@ -65,9 +65,9 @@ fn brute_force(graph: &Association) -> Vec<Vec<usize>> {
     let clique =
         |set: usize| members(set).all(|a| members(set).all(|b| a == b || graph.adjacency.ones(a).any(|c| c == b)));
     let cliques: Vec<usize> = (1..1 << count).filter(|&set| clique(set)).collect();
-    let most = cliques.iter().map(|set| set.count_ones()).max().unwrap_or(0);
+    let max = cliques.iter().map(|set| set.count_ones()).max().unwrap_or(0);
     let mut largest: Vec<Vec<usize>> =
-        cliques.into_iter().filter(|set| set.count_ones() == most).map(|set| members(set).collect()).collect();
+        cliques.into_iter().filter(|set| set.count_ones() == max).map(|set| members(set).collect()).collect();
     largest.sort();
     largest
 }
@@ -132,7 +132,7 @@ fn vertices_of_one_point_exclude_each_other() {
         partitions = partitions
             .into_iter()
             .flat_map(|known: Vec<usize>| {
-                let next = known.iter().max().map_or(0, |most| most + 1);
+                let next = known.iter().max().map_or(0, |max| max + 1);
                 (0..=next).map(move |cloud| [&known[..], &[cloud]].concat())
             })
             .collect();
@@ -154,7 +154,7 @@ fn vertices_of_one_point_exclude_each_other() {
 #[test]
 fn a_budget_ends_with_a_bound_that_holds() {
     let (points, own) = (Points::scattered(5), [0, 1, 2, 3, 4]);
-    let (problem, mut ended, mut most) = (points.problem(), 0, 0);
+    let (problem, mut ended, mut max) = (points.problem(), 0, 0);
     for number in 0..1024 {
         let graph = graph(&own, &own, bit(number));
         let largest = brute_force(&graph);
@@ -167,15 +167,15 @@ fn a_budget_ends_with_a_bound_that_holds() {
                 true => assert!(largest.contains(&found.found[0]), "{number}, {budget}: {found:?}"),
                 false => assert!(!found.all, "{number}, {budget}: {found:?}"),
             }
-            (ended, most) = (ended + usize::from(!found.complete), most.max(found.bound));
+            (ended, max) = (ended + usize::from(!found.complete), max.max(found.bound));
         }
     }
-    assert!(ended > 1000 && most == 5, "{ended} {most}");
+    assert!(ended > 1000 && max == 5, "{ended} {max}");
 }
 
 /// Vertices of three model points and two cloud points: no clique has three members. A star of three rays: no three have two neighbours.
 #[test]
-fn bounds_of_the_whole_graph() {
+fn bounds_of_the_full_graph() {
     let points = Points::scattered(4);
     let problem = points.problem();
     let shared = graph(&[0, 0, 1, 2], &[0, 1, 0, 1], |_, _| true);
@@ -183,20 +183,20 @@ fn bounds_of_the_whole_graph() {
     assert_eq!((search.partite(), &search.models_from[..]), (2, &[3, 3, 2, 1][..]));
     let star = graph(&[0, 1, 2, 3], &[0, 1, 2, 3], |i, _| i == 0);
     let mut search = Search::new(&problem, &star, Sense::Any, 100);
-    assert_eq!((search.degree.clone(), search.most_possible(), search.partite()), (vec![3, 1, 1, 1], 2, 4));
+    assert_eq!((search.degree.clone(), search.max_possible(), search.partite()), (vec![3, 1, 1, 1], 2, 4));
     // A triangle with a tail of two: of three members, only those of the triangle are left.
     let points = Points::scattered(5);
     let problem = points.problem();
     let own = [0, 1, 2, 3, 4];
     let tail = graph(&own, &own, |i, j| j < 3 || (i, j) == (2, 3) || (i, j) == (3, 4));
     search = Search::new(&problem, &tail, Sense::Any, 100);
-    search.least = 3;
+    search.min = 3;
     search.peel();
     assert_eq!(search.alive.iter().collect::<Vec<_>>(), [0, 1, 2]);
-    search.least = 2;
+    search.min = 2;
     search.peel();
     assert_eq!(search.alive.len(), 5);
-    search.least = 4;
+    search.min = 4;
     search.peel();
     assert!(search.alive.is_empty());
     assert_eq!(search.tie(), 4);

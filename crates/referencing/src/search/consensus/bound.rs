@@ -2,9 +2,9 @@
 
 use super::{
     bits::{Held, each_held, groups, shared},
-    graph::Graph,
+    graph::ConsistencyGraph,
     likelihood::Terms,
-    rough::Rough,
+    prior_terms::PriorTerms,
 };
 
 /// What the information of a set may fall short of that of as many average points (nats).
@@ -13,7 +13,7 @@ const SLACK: f64 = 3.0;
 /// from each other than the tolerance, which a bound by common neighbours does not see: with all that they cost, the pose of 26
 /// pairs is lost to another of 23 in one of 252 frames of a self-similar model, and already with six nats one pair of twelve is
 /// lost in one of 252 frames of fifty points.
-const MISFIT: f64 = 4.0;
+const DISTORTION: f64 = 4.0;
 /// What rounding may cost a sum, as a share of it.
 const ROUNDING: f64 = 1e-12;
 
@@ -37,7 +37,7 @@ impl After {
 /// a volume of the posterior about that of k average points, less what the residuals of k true pairs cost. Its bound
 /// grows with every model point that may join it.
 pub(in crate::search) struct Bounds<'a> {
-    graph: &'a Graph,
+    graph: &'a ConsistencyGraph,
     terms: &'a Terms,
     /// Greatest gain of each model point by rank, at least `grows`.
     top: Vec<f64>,
@@ -50,20 +50,27 @@ pub(in crate::search) struct Bounds<'a> {
     /// What is added to the gains of k pairs.
     of_number: Vec<f64>,
     /// Smaller sets are of no interest.
-    pub(in crate::search) least: usize,
+    pub(in crate::search) min: usize,
 }
 
 impl<'a> Bounds<'a> {
     /// Bounds that prune, taken from what sets are on average.
-    pub(in crate::search) fn of((terms, rough, graph): (&'a Terms, &Rough, &'a Graph), least: usize) -> Self {
-        let of_number = |k: usize| terms.ln_share[k] + rough.ln_peak + terms.ln_volume[k] + SLACK - misfit(k);
-        Self::with((terms, graph), least, of_number)
+    pub(in crate::search) fn of(
+        (terms, prior_terms, graph): (&'a Terms, &PriorTerms, &'a ConsistencyGraph),
+        min: usize,
+    ) -> Self {
+        let of_number =
+            |k: usize| terms.ln_fraction[k] + prior_terms.ln_peak + terms.ln_volume[k] + SLACK - distortion(k);
+        Self::with((terms, graph), min, of_number)
     }
 
-    /// Bounds that hold: whatever fits, `ln_filled` (k) being no less than ln of the share of the prior that the posterior of k pairs
+    /// Bounds that hold: whatever fits, `ln_posterior_volume` (k) being no less than ln of the share of the prior that the posterior of k pairs
     /// fills.
-    pub(in crate::search) fn proved((terms, graph): (&'a Terms, &'a Graph), ln_filled: &[f64]) -> Self {
-        let mut bounds = Self::with((terms, graph), 0, |k| terms.ln_share[k] + ln_filled[k]);
+    pub(in crate::search) fn proved(
+        (terms, graph): (&'a Terms, &'a ConsistencyGraph),
+        ln_posterior_volume: &[f64],
+    ) -> Self {
+        let mut bounds = Self::with((terms, graph), 0, |k| terms.ln_fraction[k] + ln_posterior_volume[k]);
         // A smaller set may be worth more by its volume than a larger one that holds it: no bound is less than that.
         for k in 1..bounds.of_number.len() {
             bounds.of_number[k] = bounds.of_number[k].max(bounds.of_number[k - 1] - bounds.grows);
@@ -71,9 +78,9 @@ impl<'a> Bounds<'a> {
         bounds
     }
 
-    fn with((terms, graph): (&'a Terms, &'a Graph), least: usize, of_number: impl Fn(usize) -> f64) -> Self {
+    fn with((terms, graph): (&'a Terms, &'a ConsistencyGraph), min: usize, of_number: impl Fn(usize) -> f64) -> Self {
         let ranks = graph.starts.len() - 1;
-        let grows = libm::log(terms.ln_share.len() as f64) + 1.0;
+        let grows = libm::log(terms.ln_fraction.len() as f64) + 1.0;
         let of_rank = |i: usize| &terms.pairs[graph.starts[i]..graph.starts[i + 1]];
         let top: Vec<f64> = (0..ranks).map(|i| of_rank(i).iter().map(|pair| pair.gain).fold(grows, f64::max)).collect();
         Self {
@@ -83,7 +90,7 @@ impl<'a> Bounds<'a> {
             greatest: top.iter().copied().fold(grows, f64::max),
             single: graph.vertices.len() == ranks,
             top,
-            least,
+            min,
             of_number: (0..=ranks).map(of_number).collect(),
         }
     }
@@ -115,7 +122,7 @@ impl<'a> Bounds<'a> {
 
     /// By how much these are above others of the same problem at most (nats), where they are `enough`.
     pub(in crate::search) fn above(&self, other: &Self, enough: f64) -> f64 {
-        let reaching = (other.least..self.of_number.len()).filter(|&k| self.reach(0, 0.0, k) > enough);
+        let reaching = (other.min..self.of_number.len()).filter(|&k| self.reach(0, 0.0, k) > enough);
         reaching.map(|k| self.of_number[k] - other.of_number[k]).fold(0.0, f64::max)
     }
 
@@ -130,25 +137,25 @@ impl<'a> Bounds<'a> {
     }
 
     /// How many pairs `own` ones that bring `gains` may come to with those of `common` from rank `from` on, of no more than
-    /// `count` model points, and the bound of these, if they come to `least`; where even rough ones fall short, the rough ones.
+    /// `count` model points, and the bound of these, if they come to `min`; where even rough ones fall short, the rough ones.
     pub(in crate::search) fn with_common(
         &self,
         (own, gains): (usize, f64),
         (common, count): (&[u64], usize),
         from: usize,
-        (least, enough): (usize, f64),
+        (min, enough): (usize, f64),
     ) -> (usize, f64) {
         let starts = &self.graph.starts;
-        let most = count.min(starts.len() - 1 - from);
-        if own + most < least {
-            return (own + most, f64::NEG_INFINITY);
+        let max = count.min(starts.len() - 1 - from);
+        if own + max < min {
+            return (own + max, f64::NEG_INFINITY);
         }
-        let reach = self.reach(own, gains, most);
+        let reach = self.reach(own, gains, max);
         if self.single || reach < enough {
-            return (own + most, reach);
+            return (own + max, reach);
         }
         let (k, sum) = self.joined((own, gains), common, from);
-        (k, if k < least { f64::NEG_INFINITY } else { self.of_set(k, sum) })
+        (k, if k < min { f64::NEG_INFINITY } else { self.of_set(k, sum) })
     }
 
     /// `own` pairs that bring `gains` and the best of each model point of `common` from rank `from` on: how many, and what they bring.
@@ -183,12 +190,12 @@ impl<'a> Bounds<'a> {
     ) -> bool {
         if self.single {
             let count = shared(common, row, from);
-            return own + count >= self.least && self.reach(own, gains, count) >= enough;
+            return own + count >= self.min && self.reach(own, gains, count) >= enough;
         }
         let joining =
             held.iter().map(|word| (word.begin(), groups(word.and(row, from), self.graph.lasts[word.place()])));
         let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
-        if k >= self.least && self.of_set(k, sum) >= enough {
+        if k >= self.min && self.of_set(k, sum) >= enough {
             return true;
         }
         for (begin, mut rest) in joining {
@@ -197,7 +204,7 @@ impl<'a> Bounds<'a> {
                 rest &= rest - 1;
                 if rank != last {
                     (k, sum, last) = (k + 1, sum + self.top[rank as usize], rank);
-                    if k >= self.least && self.of_set(k, sum) >= enough {
+                    if k >= self.min && self.of_set(k, sum) >= enough {
                         return true;
                     }
                 }
@@ -234,18 +241,18 @@ impl<'a> Bounds<'a> {
         &self,
         (own, gains): (usize, f64),
         after: After,
-        (least, enough): (usize, f64),
+        (min, enough): (usize, f64),
     ) -> bool {
         let (k, sum) = after.with((own, gains));
         // Summed in another order than the bounds that decide.
-        k < least || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
+        k < min || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
     }
 }
 
 /// What the residuals of `k` true pairs cost under their own pose (nats): ½χ² of 3k − 6 degrees of freedom on average, but no more
-/// than [`MISFIT`].
-fn misfit(k: usize) -> f64 {
-    (1.5 * k as f64 - 3.0).clamp(0.0, MISFIT)
+/// than [`DISTORTION`].
+fn distortion(k: usize) -> f64 {
+    (1.5 * k as f64 - 3.0).clamp(0.0, DISTORTION)
 }
 
 #[cfg(test)]
@@ -268,7 +275,7 @@ mod tests {
         let mut ranks: Vec<usize> =
             joining.map(|v| bounds.graph.rank[v] as usize).filter(|&rank| rank >= from).collect();
         ranks.dedup();
-        if own.len() + ranks.len() < bounds.least {
+        if own.len() + ranks.len() < bounds.min {
             return f64::NEG_INFINITY;
         }
         bounds.of_set(own.len() + ranks.len(), ranks.iter().fold(gains, |sum, &rank| sum + bounds.gain_of_rank(rank)))
@@ -290,10 +297,10 @@ mod tests {
         let candidates = Candidates::from_pairs(model.len(), pairs);
         let tolerance = Tolerance::Fixed(0.5);
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
-        let rough = Rough::of(&problem).expect("a box");
-        let graph = Graph::of(&problem, &rough);
-        let terms = Terms::of(&problem, &rough, &graph);
-        let bounds = Bounds::of((&terms, &rough, &graph), 3);
+        let prior_terms = PriorTerms::of(&problem).expect("a box");
+        let graph = ConsistencyGraph::of(&problem, &prior_terms);
+        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let bounds = Bounds::of((&terms, &prior_terms, &graph), 3);
         let (mut common, mut held, mut after) = (vec![0; graph.lasts.len()], Vec::new(), Vec::new());
         let (mut threes, mut spans) = (0, 0);
         for a in (0..graph.vertices.len()).step_by(7) {
@@ -302,7 +309,7 @@ mod tests {
                 let count = intersect(graph.row(a), graph.row(b), &graph.lasts, graph.starts[next], &mut common);
                 let gains = bounds.gain(a) + bounds.gain(b);
                 let known = one_by_one(&bounds, &[a, b], &common, next);
-                let all = (bounds.least, f64::NEG_INFINITY);
+                let all = (bounds.min, f64::NEG_INFINITY);
                 assert_eq!(bounds.with_common((2, gains), (&common, count), next, all).1, known);
                 Held::list(&common, graph.starts[next], &mut held);
                 bounds.list(&held, &mut after);
@@ -317,7 +324,7 @@ mod tests {
                             reached
                         );
                         assert!(
-                            !(reached && bounds.falls_short((3, gains), after[rank], (bounds.least, enough))),
+                            !(reached && bounds.falls_short((3, gains), after[rank], (bounds.min, enough))),
                             "{known}"
                         );
                     }

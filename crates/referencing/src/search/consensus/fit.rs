@@ -5,8 +5,8 @@ use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3, Vector6};
 use super::{
     Motion,
     likelihood::{HALF_LN_2PI, Terms},
-    rough::Rough,
-    six::{factor as factor_of, solve},
+    prior_terms::PriorTerms,
+    solve6::{factor as factor_of, solve},
 };
 
 /// A fit whose step is shorter than this (squared, in standard deviations) has converged.
@@ -30,8 +30,13 @@ pub(in crate::search) struct Linear {
 
 impl Linear {
     /// `None` where the pairs and the prior leave the motion open.
-    pub(in crate::search) fn at(terms: &Terms, rough: &Rough, members: &[usize], motion: &Motion) -> Option<Self> {
-        let about = motion.apply(&rough.centroid);
+    pub(in crate::search) fn at(
+        terms: &Terms,
+        prior_terms: &PriorTerms,
+        members: &[usize],
+        motion: &Motion,
+    ) -> Option<Self> {
+        let about = motion.apply(&prior_terms.centroid);
         // The lower triangle of H = Σ Jᵀ W J, J = (−[lever]×, I), by blocks of three.
         let (mut turn, mut mixed, mut shift) = ([0.0; 6], [[0.0; 3]; 3], Matrix3::zeros());
         let (mut torque, mut force) = (Vector3::zeros(), Vector3::zeros());
@@ -67,8 +72,8 @@ impl Linear {
             }
         }
         let mut g = Vector6::new(torque.x, torque.y, torque.z, force.x, force.y, force.z);
-        let eta = rough.known.as_ref().map(|known| {
-            let eta = rough.step_to(known, motion);
+        let eta = prior_terms.known.as_ref().map(|known| {
+            let eta = prior_terms.step_to(known, motion);
             h += known.information;
             g -= known.information * eta;
             eta
@@ -84,8 +89,8 @@ impl Linear {
     }
 
     /// The motion after so much of the step.
-    pub(in crate::search) fn moved_by(&self, share: f64) -> Motion {
-        let step = self.step * share;
+    pub(in crate::search) fn moved_by(&self, fraction: f64) -> Motion {
+        let step = self.step * fraction;
         self.motion.moved(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into(), &self.about)
     }
 
@@ -113,10 +118,10 @@ impl Linear {
     }
 
     /// ln of the prior density after the step, if turns were small.
-    pub(in crate::search) fn ln_density(&self, rough: &Rough) -> f64 {
-        match (&rough.known, &self.eta) {
-            (Some(known), Some(eta)) => rough.ln_density_of(known, &(eta + self.step)),
-            _ => rough.ln_peak,
+    pub(in crate::search) fn ln_density(&self, prior_terms: &PriorTerms) -> f64 {
+        match (&prior_terms.known, &self.eta) {
+            (Some(known), Some(eta)) => prior_terms.ln_density_of(known, &(eta + self.step)),
+            _ => prior_terms.ln_peak,
         }
     }
 
@@ -129,20 +134,20 @@ impl Linear {
 /// The most likely motion of these pairs near one, and the factor of its information.
 pub(in crate::search) fn fit(
     terms: &Terms,
-    rough: &Rough,
+    prior_terms: &PriorTerms,
     members: &[usize],
     start: &Motion,
     rounds: usize,
 ) -> Option<(Motion, Cholesky<f64, U6>)> {
-    let first = Linear::at(terms, rough, members, start)?;
-    fit_on(first, terms, rough, members, rounds)
+    let first = Linear::at(terms, prior_terms, members, start)?;
+    fit_on(first, terms, prior_terms, members, rounds)
 }
 
 /// The same, the first of the rounds being made.
 pub(in crate::search) fn fit_on(
     first: Linear,
     terms: &Terms,
-    rough: &Rough,
+    prior_terms: &PriorTerms,
     members: &[usize],
     rounds: usize,
 ) -> Option<(Motion, Cholesky<f64, U6>)> {
@@ -152,7 +157,7 @@ pub(in crate::search) fn fit_on(
         if linear.converged() {
             break;
         }
-        linear = Linear::at(terms, rough, members, &motion)?;
+        linear = Linear::at(terms, prior_terms, members, &motion)?;
         motion = linear.moved();
     }
     Some((motion, linear.factor))

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{super::association::reach, rough::Rough};
+use super::{super::association::reach, prior_terms::PriorTerms};
 use crate::{
     Correspondence, Problem, Tolerance,
     lanes::{LANES, packed},
@@ -20,7 +20,7 @@ const FARTHEST: f64 = 1e15;
 /// Stands in an order that depends on coordinates alone: model points with few candidates first, of equals those farthest from their
 /// centroid, so that a search from the front meets each set at points that are ambiguous least and far apart: three in a row, as along
 /// an edge or a line of a grid, fix no pose.
-pub(in crate::search) struct Graph {
+pub(in crate::search) struct ConsistencyGraph {
     pub(in crate::search) vertices: Vec<Correspondence>,
     /// Where the pairs of each model point begin; one more than there are.
     pub(in crate::search) starts: Vec<usize>,
@@ -47,18 +47,18 @@ struct Columns {
     reach: Vec<f32>,
 }
 
-impl Graph {
-    pub(in crate::search) fn of(problem: &Problem<'_>, rough: &Rough) -> Self {
+impl ConsistencyGraph {
+    pub(in crate::search) fn of(problem: &Problem<'_>, prior_terms: &PriorTerms) -> Self {
         let (vertices, starts) = vertices(problem);
         let count = vertices.len();
         let rank = (0..starts.len() - 1).flat_map(|i| vec![i as u32; starts[i + 1] - starts[i]]).collect();
-        let columns = Columns::of(problem, rough, &vertices);
+        let columns = Columns::of(problem, prior_terms, &vertices);
         let words = count.div_ceil(64);
         let clouds = vertices.iter().map(|pair| pair.cloud + 1).max().unwrap_or(0);
         let mut lasts = vec![1 << 63; words];
         starts[1..].iter().for_each(|end| lasts[(end - 1) / 64] |= 1 << ((end - 1) % 64));
         let mut graph = Self { vertices, starts, lasts, clouds, rank, words, bits: vec![0; words * count], tests: 0 };
-        let turn = rough.known.as_ref().map(|known| {
+        let turn = prior_terms.known.as_ref().map(|known| {
             // Beyond the first order a turn by ω moves a point by ω²/2 of its lever.
             let turn = TURN_SIGMAS * known.attitude;
             (turn + 0.5 * turn * turn) as f32
@@ -66,7 +66,7 @@ impl Graph {
         // A turn moves nothing by more than twice its lever.
         let turn = turn.filter(|turn| *turn < 2.0);
         let mut row = vec![0; words];
-        let twins = Twins::of(&graph.vertices, clouds);
+        let by_cloud = VerticesByCloud::of(&graph.vertices, clouds);
         for a in 0..count {
             let from = graph.starts[graph.rank[a] as usize + 1];
             match turn {
@@ -74,7 +74,7 @@ impl Graph {
                 Some(turn) => compatible(&columns, a, from / 64, turn, &mut row),
             }
             graph.tests += (count - from) as u64;
-            graph.fill(problem, a, from, &row, &twins);
+            graph.fill(problem, a, from, &row, &by_cloud);
         }
         graph
     }
@@ -85,7 +85,7 @@ impl Graph {
     }
 
     /// Takes over what passed the gate, less what shares a cloud point or fails the exact test.
-    fn fill(&mut self, problem: &Problem<'_>, a: usize, from: usize, near: &[u64], twins: &Twins) {
+    fn fill(&mut self, problem: &Problem<'_>, a: usize, from: usize, near: &[u64], by_cloud: &VerticesByCloud) {
         let (pair, words) = (self.vertices[a], self.words);
         let row = &mut self.bits[a * words..(a + 1) * words];
         let Some(first) = row.get_mut(from / 64..) else { return };
@@ -93,7 +93,7 @@ impl Graph {
         if let Some(word) = first.first_mut() {
             *word &= !0 << (from % 64);
         }
-        for &other in twins.of_cloud(pair.cloud) {
+        for &other in by_cloud.of_cloud(pair.cloud) {
             row[other as usize / 64] &= !(1 << (other % 64));
         }
         if matches!(problem.tolerance, Tolerance::Sigmas(_)) {
@@ -112,12 +112,12 @@ impl Graph {
 }
 
 /// The vertices of each cloud point.
-struct Twins {
+struct VerticesByCloud {
     begins: Vec<u32>,
     vertices: Vec<u32>,
 }
 
-impl Twins {
+impl VerticesByCloud {
     fn of(vertices: &[Correspondence], clouds: usize) -> Self {
         let mut begins = vec![0; clouds + 1];
         vertices.iter().for_each(|pair| begins[pair.cloud] += 1);
@@ -166,8 +166,8 @@ fn mark<const TURNED: bool>(columns: &Columns, a: usize, from: usize, turn: f32,
             let mut one = agree(known, measured, tolerance);
             if TURNED {
                 let moved = square([ox[k] - here[6], oy[k] - here[7], oz[k] - here[8]]);
-                let most = turn * known.sqrt() + 2.0 * tolerance;
-                one &= moved <= most * most;
+                let max = turn * known.sqrt() + 2.0 * tolerance;
+                one &= moved <= max * max;
             }
             near[k] = u8::from(one);
         }
@@ -189,11 +189,11 @@ fn agree(known: f32, measured: f32, tolerance: f32) -> bool {
 }
 
 impl Columns {
-    fn of(problem: &Problem<'_>, rough: &Rough, vertices: &[Correspondence]) -> Self {
+    fn of(problem: &Problem<'_>, prior_terms: &PriorTerms, vertices: &[Correspondence]) -> Self {
         let mut columns = Self::default();
         let cloud = |pair: &Correspondence| problem.cloud[pair.cloud].position.at.coords;
         // What lies far outside moves the centre of the others no further than they are.
-        let middle = rough.parts.as_ref().and_then(|parts| Some((parts, parts.in_largest()?)));
+        let middle = prior_terms.parts.as_ref().and_then(|parts| Some((parts, parts.in_largest()?)));
         let inside = |pair: &&Correspondence| middle.is_none_or(|(parts, middle)| parts.together(pair.cloud, middle));
         let (mut sum, mut used) = (Vector3::zeros(), 0.0);
         for pair in vertices.iter().filter(inside) {
@@ -202,21 +202,21 @@ impl Columns {
         let centre = sum / f64::max(used, 1.0);
         for pair in vertices {
             let (at, model) = (cloud(pair), problem.model[pair.model].at.coords);
-            let offset = rough.known.as_ref().map_or(Vector3::zeros(), |known| at - known.places[pair.model].0);
+            let offset = prior_terms.known.as_ref().map_or(Vector3::zeros(), |known| at - known.places[pair.model].0);
             for axis in 0..3 {
                 columns.at[axis].push((at[axis] - centre[axis]) as f32);
-                columns.at[3 + axis].push((model[axis] - rough.centroid[axis]) as f32);
+                columns.at[3 + axis].push((model[axis] - prior_terms.centroid[axis]) as f32);
                 columns.at[6 + axis].push(offset[axis] as f32);
             }
-            let (seen, known) = ((at - centre).amax(), (model - rough.centroid).amax());
+            let (seen, known) = ((at - centre).amax(), (model - prior_terms.centroid).amax());
             // No number at all where it is too far.
             let reach = if seen <= FARTHEST { reach(problem, *pair).0 as f32 } else { f32::NAN };
             columns.reach.push(reach + 0.5 * ROUNDING * seen.max(known) as f32);
         }
         // Nothing is compatible with what fills up the last word.
-        let whole = vertices.len().next_multiple_of(LANES);
-        columns.at.iter_mut().for_each(|column| column.resize(whole, f32::NAN));
-        columns.reach.resize(whole, f32::NAN);
+        let full = vertices.len().next_multiple_of(LANES);
+        columns.at.iter_mut().for_each(|column| column.resize(full, f32::NAN));
+        columns.reach.resize(full, f32::NAN);
         columns
     }
 }

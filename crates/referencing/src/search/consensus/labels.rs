@@ -1,13 +1,13 @@
 //! Putative pairs that mistake model points for their like.
 
 use super::{
-    graph::Graph,
-    imitation::{Imitation, Occupied},
-    likelihood::{Mode, Terms, ln_share},
+    graph::ConsistencyGraph,
+    likelihood::{Mode, Terms, ln_fraction},
+    structured_clutter::{Occupied, StructuredClutter},
 };
 use crate::{
     Problem,
-    chance::{Shuffled, shuffled},
+    a_contrario::{Shuffled, shuffled},
 };
 
 /// Fewer mistakes than this at one pose are no pattern.
@@ -15,9 +15,9 @@ const FEW: usize = 4;
 /// Places that are not further apart than this many variances (three standard deviations) are one.
 const APART: f64 = 9.0;
 /// Chance is never sure.
-const MOST_LIKELY: f64 = 0.99;
+const MAX_PROBABILITY: f64 = 0.99;
 /// So many poses are looked at, the likeliest.
-const MOST: usize = 24;
+const MAX: usize = 24;
 
 impl Occupied<'_> {
     /// What poses that put the model onto the same places in another order say of the pairs.
@@ -36,17 +36,17 @@ impl Occupied<'_> {
     pub(in crate::search) fn mistaken(
         &self,
         problem: &Problem<'_>,
-        (terms, graph): (&Terms, &Graph),
+        (terms, graph): (&Terms, &ConsistencyGraph),
         others: &[Mode],
-    ) -> Option<Imitation> {
+    ) -> Option<StructuredClutter> {
         if !shuffled(problem) {
             return None;
         }
         // Seldom is there a pose to ask.
-        let mut chance = None;
+        let mut nfa = None;
         let variance = terms.pairs.iter().map(|pair| pair.variance).fold(0.0, f64::max);
-        let (mut met, mut places, mut ln_chance, mut poses) = (0, 0, 0.0, 0);
-        for other in others.iter().take(MOST) {
+        let (mut met, mut places, mut ln_nfa, mut poses) = (0, 0, 0.0, 0);
+        for other in others.iter().take(MAX) {
             let mistakes = |v: &&usize| !self.best.holds(**v) && self.holds_place(problem, terms, graph, **v);
             let mistaken: Vec<usize> =
                 other.members.iter().filter(mistakes).map(|&v| graph.vertices[v].model).collect();
@@ -54,24 +54,24 @@ impl Occupied<'_> {
                 continue;
             }
             poses += 1;
-            let chance = chance.get_or_insert_with(|| Shuffled::of(problem));
+            let nfa = nfa.get_or_insert_with(|| Shuffled::of(problem));
             for (i, point) in problem.model.iter().enumerate() {
                 let (place, of_best) = (other.motion.apply(&point.at.coords), self.best.motion.apply(&point.at.coords));
-                let met_by_chance = chance.meets(i, place).min(MOST_LIKELY);
+                let met_at_random = nfa.meets(i, place).min(MAX_PROBABILITY);
                 // Where both put the point, nothing is told of mistakes.
-                if met_by_chance <= 0.0 || (place - of_best).norm_squared() <= APART * variance {
+                if met_at_random <= 0.0 || (place - of_best).norm_squared() <= APART * variance {
                     continue;
                 }
                 places += 1;
                 let is_met = mistaken.contains(&i);
                 met += usize::from(is_met);
-                ln_chance += libm::log(if is_met { met_by_chance } else { 1.0 - met_by_chance });
+                ln_nfa += libm::log(if is_met { met_at_random } else { 1.0 - met_at_random });
             }
         }
         let (k, n) = (self.best.members.len(), problem.candidates.with_candidates());
-        (poses > 0 && met > 0).then(|| Imitation {
-            ln_evidence: ln_share(met, places) - ln_chance,
-            ln_alone: ln_share(k + met, n + places) - ln_share(k, n) - ln_share(met, places)
+        (poses > 0 && met > 0).then(|| StructuredClutter {
+            ln_evidence: ln_fraction(met, places) - ln_nfa,
+            ln_alone: ln_fraction(k + met, n + places) - ln_fraction(k, n) - ln_fraction(met, places)
                 + libm::log((poses + 1) as f64),
         })
     }

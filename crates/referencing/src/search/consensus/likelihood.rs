@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3};
 use seafix_geometry::{Camera, UncertainPoint, so3::skew};
 
-use super::{Motion, fit::fit, graph::Graph, rough::Rough, six::factor as factor_of};
+use super::{Motion, fit::fit, graph::ConsistencyGraph, prior_terms::PriorTerms, solve6::factor as factor_of};
 use crate::{Correspondence, Problem, Tolerance, parts::Parts};
 
 /// ½ ln 2π: a Gaussian of d dimensions is exp(−d·½ ln 2π − ½ ln det Σ) at its maximum, and a maximum of a density with the
@@ -63,21 +63,21 @@ pub(in crate::search) struct Terms {
     /// average.
     pub(in crate::search) ln_volume: Vec<f64>,
     /// ln B(k), k = 0…n.
-    pub(in crate::search) ln_share: Vec<f64>,
+    pub(in crate::search) ln_fraction: Vec<f64>,
 }
 
 impl Terms {
-    pub(in crate::search) fn of(problem: &Problem<'_>, rough: &Rough, graph: &Graph) -> Self {
+    pub(in crate::search) fn of(problem: &Problem<'_>, prior_terms: &PriorTerms, graph: &ConsistencyGraph) -> Self {
         let n = problem.candidates.lists.len();
-        let ln_density = densities(problem, rough);
+        let ln_density = densities(problem, prior_terms);
         let count = graph.vertices.len();
         let of_parts = |parts: &Parts| graph.vertices.iter().map(|pair| parts.ln_excess(pair.cloud)).collect();
-        let excess = rough.parts.as_ref().map_or_else(Vec::new, of_parts);
+        let excess = prior_terms.parts.as_ref().map_or_else(Vec::new, of_parts);
         let pairs = Vec::with_capacity(count);
-        let mut terms = Self { pairs, ln_density, excess, ln_volume: Vec::new(), ln_share: shares(n) };
-        let turned = rough.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
+        let mut terms = Self { pairs, ln_density, excess, ln_volume: Vec::new(), ln_fraction: fractions(n) };
+        let turned = prior_terms.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
         // Points that are called exact are taken to be as good as a twenty-fifth of what the tolerance allows each.
-        let least = match problem.tolerance {
+        let min = match problem.tolerance {
             Tolerance::Fixed(delta) => (0.02 * delta).powi(2),
             Tolerance::Sigmas(_) => (ROUNDING * extent(problem)).powi(2),
         };
@@ -87,7 +87,7 @@ impl Terms {
         let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64, f64)> = None;
         for (v, pair) in graph.vertices.iter().enumerate() {
             let (seen, known) = (&problem.cloud[pair.cloud].position, &problem.model[pair.model]);
-            let own = known.sigma * known.sigma + least;
+            let own = known.sigma * known.sigma + min;
             let noise = seen.covariance + Matrix3::identity() * own;
             let (weight, ln_peak, variance) = match last {
                 Some((of, weight, ln_peak, variance)) if of == noise => (weight, ln_peak, variance),
@@ -99,10 +99,10 @@ impl Terms {
             last = Some((noise, weight, ln_peak, variance));
             let gain = ln_peak - terms.ln_density_about(v, pair.model);
             terms.pairs.push(Term { cloud: seen.at.coords, model: known.at.coords, weight, variance, gain });
-            average += information(&(turned * (known.at.coords - rough.centroid)), &weight);
+            average += information(&(turned * (known.at.coords - prior_terms.centroid)), &weight);
         }
         average /= count.max(1) as f64;
-        terms.ln_volume = volumes(&average, rough, graph.starts.len() - 1);
+        terms.ln_volume = volumes(&average, prior_terms, graph.starts.len() - 1);
         terms
     }
 
@@ -125,9 +125,9 @@ impl Terms {
 }
 
 /// 3 ln 2π − ½ ln det (P + k H₁) for k = 0…n, H₁ what one pair says on average.
-fn volumes(average: &Matrix6<f64>, rough: &Rough, n: usize) -> Vec<f64> {
+fn volumes(average: &Matrix6<f64>, prior_terms: &PriorTerms, n: usize) -> Vec<f64> {
     let of = |h: Matrix6<f64>| factor_of(&h).map_or(f64::INFINITY, |chol| ln_volume(&chol));
-    match &rough.known {
+    match &prior_terms.known {
         Some(known) => (0..=n).map(|k| of(known.information + average * k as f64)).collect(),
         None => {
             let one = of(*average);
@@ -153,10 +153,10 @@ fn peak(noise: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
 }
 
 /// ln ρ about each model point.
-fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
+fn densities(problem: &Problem<'_>, prior_terms: &PriorTerms) -> Vec<f64> {
     let lists = &problem.candidates.lists;
-    let Some(known) = &rough.known else {
-        let ln_volume = rough.parts.as_ref().map_or(f64::INFINITY, Parts::ln_whole);
+    let Some(known) = &prior_terms.known else {
+        let ln_volume = prior_terms.parts.as_ref().map_or(f64::INFINITY, Parts::ln_full);
         return lists.iter().map(|list| libm::log(list.len().max(1) as f64) - ln_volume).collect();
     };
     let column = |axis: usize| problem.cloud.iter().map(|point| point.position.at.coords[axis]).collect::<Vec<f64>>();
@@ -165,7 +165,7 @@ fn densities(problem: &Problem<'_>, rough: &Rough) -> Vec<f64> {
         .places
         .iter()
         .map(|(place, spread)| {
-            let half = spread * super::rough::BOUND_SIGMAS;
+            let half = spread * super::prior_terms::BOUND_SIGMAS;
             let count = inside((&x, &y, &z), place, &half);
             libm::log(count.max(1) as f64)
                 - (half * 2.0).iter().map(|side| libm::log(side.max(f64::MIN_POSITIVE))).sum::<f64>()
@@ -185,18 +185,18 @@ fn inside((x, y, z): (&[f64], &[f64], &[f64]), place: &Vector3<f64>, half: &Vect
     count
 }
 
-fn shares(n: usize) -> Vec<f64> {
+fn fractions(n: usize) -> Vec<f64> {
     // B(0) = 1/(n + 1); B(k) = B(k − 1) · k/(n − k + 1).
-    let mut shares = vec![-libm::log((n + 1) as f64)];
+    let mut fractions = vec![-libm::log((n + 1) as f64)];
     for k in 1..=n {
-        let last = shares[k - 1];
-        shares.push(last + libm::log(k as f64 / (n - k + 1) as f64));
+        let last = fractions[k - 1];
+        fractions.push(last + libm::log(k as f64 / (n - k + 1) as f64));
     }
-    shares
+    fractions
 }
 
 /// ln B(k) of n points.
-pub(in crate::search) fn ln_share(k: usize, n: usize) -> f64 {
+pub(in crate::search) fn ln_fraction(k: usize, n: usize) -> f64 {
     let ln_factorial = |k: usize| libm::lgamma(k as f64 + 1.0);
     ln_factorial(k) + ln_factorial(n - k) - ln_factorial(n + 1)
 }
@@ -223,19 +223,19 @@ pub(in crate::search) struct Mode {
     /// The same where clutter is spread evenly.
     pub(in crate::search) ln_even: f64,
     /// What of it crowded clutter took (nats).
-    pub(in crate::search) ln_crowd: f64,
+    pub(in crate::search) ln_clutter_density: f64,
 }
 
 impl Mode {
     /// The pairs, in the order of the model points.
-    pub(in crate::search) fn pairs(&self, graph: &Graph) -> Vec<Correspondence> {
+    pub(in crate::search) fn pairs(&self, graph: &ConsistencyGraph) -> Vec<Correspondence> {
         let mut pairs: Vec<Correspondence> = self.members.iter().map(|&v| graph.vertices[v]).collect();
         pairs.sort_unstable();
         pairs
     }
 
     /// The pairs, those that fit the motion best first.
-    pub(in crate::search) fn closest_first(&self, terms: &Terms, graph: &Graph) -> Vec<Correspondence> {
+    pub(in crate::search) fn closest_first(&self, terms: &Terms, graph: &ConsistencyGraph) -> Vec<Correspondence> {
         let mut members: Vec<(f64, usize)> =
             self.members.iter().map(|&v| (terms.pairs[v].gain - terms.residual_gain(v, &self.motion), v)).collect();
         members.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -243,13 +243,13 @@ impl Mode {
     }
 
     /// ln of the evidence of some of the members alone, which of the points are visible left aside; nothing where they fix no pose.
-    pub(in crate::search) fn ln_evidence_of(&self, terms: &Terms, rough: &Rough, members: &[usize]) -> f64 {
-        if members.len() < 3 && rough.known.is_none() {
+    pub(in crate::search) fn ln_evidence_of(&self, terms: &Terms, prior_terms: &PriorTerms, members: &[usize]) -> f64 {
+        if members.len() < 3 && prior_terms.known.is_none() {
             return 0.0;
         }
-        let Some((motion, factor)) = fit(terms, rough, members, &self.motion, 4) else { return 0.0 };
+        let Some((motion, factor)) = fit(terms, prior_terms, members, &self.motion, 4) else { return 0.0 };
         let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
-        gains + rough.ln_density(&motion) + ln_volume(&factor)
+        gains + prior_terms.ln_density(&motion) + ln_volume(&factor)
     }
 
     /// Whether a vertex belongs to it.

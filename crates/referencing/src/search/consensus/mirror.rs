@@ -7,10 +7,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::{
     Motion,
     bits::ones,
-    graph::Graph,
+    graph::ConsistencyGraph,
     likelihood::{Mode, Term, Terms},
-    modes::Climb,
-    rough::Rough,
+    local_maxima::Climb,
+    prior_terms::PriorTerms,
 };
 use crate::{
     ModelPoint,
@@ -22,7 +22,7 @@ const MARGIN: f64 = 3.0;
 /// Threes of so many members, spread evenly over all, are reflected: at most so many threes, and one to so many pairs where
 /// there are few.
 const SPREAD: usize = 10;
-const MOST_THREES: usize = 64;
+const MAX_THREES: usize = 64;
 const PAIRS_A_THREE: usize = 8;
 /// What fits roughly what three noisy points say (χ²₃).
 const LOOSE: f64 = 50.0;
@@ -35,12 +35,13 @@ const LOOSE: f64 = 50.0;
 /// prior says nothing of images: both are weighed without.
 pub(in crate::search) fn mirror_image(
     model: &[ModelPoint],
-    (terms, rough, graph): (&Terms, &Rough, &Graph),
+    (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
     mode: &Mode,
 ) -> Option<Mode> {
-    let rough = Rough { known: None, centroid: rough.centroid, ln_peak: rough.ln_peak, parts: None };
+    let prior_terms =
+        PriorTerms { known: None, centroid: prior_terms.centroid, ln_peak: prior_terms.ln_peak, parts: None };
     let taken = BTreeSet::new();
-    let climb = Climb { model, terms, rough: &rough, graph, taken: &taken, compared: Cell::new(0) };
+    let climb = Climb { model, terms, prior_terms: &prior_terms, graph, taken: &taken, compared: Cell::new(0) };
     let count = mode.members.len() as f64;
     let centre = mode.members.iter().map(|&v| terms.pairs[v].model).sum::<Vector3<f64>>() / count;
     let step = |v: &usize| terms.pairs[*v].model - centre;
@@ -54,10 +55,10 @@ pub(in crate::search) fn mirror_image(
     };
     let of_all = reflected(&mode.motion, &centre, &normal);
     image(&mode.members, &of_all).or_else(|| {
-        let most = (graph.vertices.len() / PAIRS_A_THREE).clamp(1, MOST_THREES);
+        let max = (graph.vertices.len() / PAIRS_A_THREE).clamp(1, MAX_THREES);
         let places = Places::of(terms);
         let mut largest: Option<(Vec<usize>, Motion)> = None;
-        for three in threes(&mode.members, most) {
+        for three in threes(&mode.members, max) {
             let model = three.map(|v| &terms.pairs[v].model);
             let normal = (model[1] - model[0]).cross(&(model[2] - model[0]));
             let motion = Motion::of_three(model, three.map(|v| &terms.pairs[v].cloud)).zip(normal.try_normalize(0.0));
@@ -76,17 +77,23 @@ fn reflected(motion: &Motion, through: &Vector3<f64>, normal: &Vector3<f64>) -> 
 }
 
 /// At most so many threes of the members, evenly spread.
-fn threes(members: &[usize], most: usize) -> impl Iterator<Item = [usize; 3]> {
+fn threes(members: &[usize], max: usize) -> impl Iterator<Item = [usize; 3]> {
     let some: Vec<usize> = members.iter().copied().step_by(members.len().div_ceil(SPREAD).max(1)).collect();
     let k = some.len();
     let of = |a: usize| (a + 1..k).flat_map(move |b| (b + 1..k).map(move |c| [a, b, c]));
     let all: Vec<[usize; 3]> = (0..k).flat_map(of).map(|three| three.map(|i| some[i])).collect();
-    let step = all.len().div_ceil(most).max(1);
+    let step = all.len().div_ceil(max).max(1);
     all.into_iter().step_by(step)
 }
 
 /// Of each model point the pair that fits a motion best, if it fits it roughly; `None` where these are not `more_than` so many.
-fn near(terms: &Terms, graph: &Graph, places: &Places, motion: &Motion, more_than: usize) -> Option<Vec<usize>> {
+fn near(
+    terms: &Terms,
+    graph: &ConsistencyGraph,
+    places: &Places,
+    motion: &Motion,
+    more_than: usize,
+) -> Option<Vec<usize>> {
     let mut within = Vec::new();
     within_reach(places, motion, &mut within);
     if within.iter().map(|word| word.count_ones() as usize).sum::<usize>() <= more_than {
@@ -120,10 +127,10 @@ struct Places {
 
 impl Places {
     fn of(terms: &Terms) -> Self {
-        let whole = terms.pairs.len().next_multiple_of(LANES);
+        let full = terms.pairs.len().next_multiple_of(LANES);
         let filled = |value: &dyn Fn(&Term) -> f64| {
             let mut column: Vec<f64> = terms.pairs.iter().map(value).collect();
-            column.resize(whole, f64::NAN);
+            column.resize(full, f64::NAN);
             column
         };
         // χ² is no less than that of the greatest variance.
@@ -161,7 +168,7 @@ mod tests {
 
     #[test]
     fn threes_are_spread_over_the_members() {
-        let of = |k: usize, most: usize| threes(&(0..k).map(|v| 2 * v).collect::<Vec<_>>(), most).collect::<Vec<_>>();
+        let of = |k: usize, max: usize| threes(&(0..k).map(|v| 2 * v).collect::<Vec<_>>(), max).collect::<Vec<_>>();
         assert!(of(2, 64).is_empty());
         assert_eq!(of(4, 64), [[0, 2, 4], [0, 2, 6], [0, 4, 6], [2, 4, 6]]);
         assert_eq!(of(4, 2), [[0, 2, 4], [0, 4, 6]]);

@@ -8,15 +8,15 @@ use super::{
     Motion,
     bits::{Held, intersect},
     bound::{After, Bounds},
-    filled::ln_filled,
+    distance_residual::residual_of_two,
     fit::fit,
-    graph::Graph,
-    least::{Fits, Posterior, ROUNDS},
+    graph::ConsistencyGraph,
     likelihood::{Mode, Terms},
-    modes::Climb,
-    rough::{Rough, spread},
+    local_maxima::Climb,
+    lower_bound::{Fits, LaplacePosterior, ROUNDS},
+    posterior_volume::ln_posterior_volume,
+    prior_terms::{PriorTerms, spread},
     seeds::Swept,
-    strain::strain_of_two,
 };
 use crate::{ModelPoint, lanes::ones_of};
 
@@ -25,7 +25,7 @@ const EQUAL: f64 = 1e-3;
 /// What second order may add to a variance, as a share of it.
 const CURVED: f64 = 0.2;
 /// The least set that a pose can come from.
-const LEAST: usize = 3;
+const MIN: usize = 3;
 /// What a fit and each of its members cost, and each pair that is compared with a pose, in words read.
 const COST_OF_A_FIT: u64 = 512;
 const COST_OF_A_MEMBER: u64 = 64;
@@ -47,7 +47,7 @@ pub(in crate::search) struct Proved {
 ///
 /// over its pairs and the best of each model point among their later common neighbours: c what the residuals of the pairs cost under
 /// their own pose, and more than that under any other; v the volume of the posterior of these pairs against that of the
-/// prior, of which more pairs leave less, where the pose is known well; v(k) that of any k pairs ([`ln_filled`]). What a neighbour's residual costs in
+/// prior, of which more pairs leave less, where the pose is known well; v(k) that of any k pairs ([`ln_posterior_volume`]). What a neighbour's residual costs in
 /// addition is at least what it costs by itself: those with which the bound falls short join no set of interest.
 ///
 /// Where the pose of the pairs is fitted, the maximum that the fit comes to is taken for the greatest, and volumes for equal under
@@ -76,7 +76,7 @@ struct Begun {
     /// What their residuals cost at least.
     cost: f64,
     /// The pose that they give; `None` where they leave it open.
-    known: Option<Posterior>,
+    known: Option<LaplacePosterior>,
 }
 
 /// What is left to choose from at one depth.
@@ -98,14 +98,14 @@ struct Level {
 /// no pose.
 pub(in crate::search) fn prove(
     model: &[ModelPoint],
-    (terms, rough, graph): (&Terms, &Rough, &Graph),
+    (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
     swept: &mut Swept,
     budget: u64,
 ) -> Option<Proved> {
     let none = BTreeSet::new();
-    let mut prover = Prover::of(model, (terms, rough, graph), &none, swept.modes.first()?, budget);
+    let mut prover = Prover::of(model, (terms, prior_terms, graph), &none, swept.modes.first()?, budget);
     // By how much the bounds that prune may be below those that prove.
-    let below = prover.bounds.above(&Bounds::of((terms, rough, graph), LEAST), prover.best.ln_evidence);
+    let below = prover.bounds.above(&Bounds::of((terms, prior_terms, graph), MIN), prover.best.ln_evidence);
     let listed = swept.complete && swept.looked_for <= prover.best.ln_evidence - below;
     let open = if listed { prover.of_pairs(swept, below) } else { prover.of_each() };
     swept.insert(prover.better);
@@ -115,14 +115,14 @@ pub(in crate::search) fn prove(
 impl<'a> Prover<'a> {
     fn of(
         model: &'a [ModelPoint],
-        (terms, rough, graph): (&'a Terms, &'a Rough, &'a Graph),
+        (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
         taken: &'a BTreeSet<usize>,
         best: &Mode,
         budget: u64,
     ) -> Self {
         Self {
-            climb: Climb { model, terms, rough, graph, taken, compared: Cell::new(0) },
-            bounds: Bounds::proved((terms, graph), &ln_filled(model, (terms, rough, graph))),
+            climb: Climb { model, terms, prior_terms, graph, taken, compared: Cell::new(0) },
+            bounds: Bounds::proved((terms, graph), &ln_posterior_volume(model, (terms, prior_terms, graph))),
             best: best.clone(),
             better: Vec::new(),
             unsettled: false,
@@ -193,10 +193,10 @@ impl<'a> Prover<'a> {
 
     /// No pairs, and what the prior says.
     fn start(&self) -> Begun {
-        let known = self.climb.rough.known.as_ref().map(|known| Posterior {
+        let known = self.climb.prior_terms.known.as_ref().map(|known| LaplacePosterior {
             motion: known.motion,
             covariance: Matrix6::identity(),
-            ln_filled: 0.0,
+            ln_posterior_volume: 0.0,
         });
         Begun { known, ..Begun::default() }
     }
@@ -206,16 +206,16 @@ impl<'a> Prover<'a> {
         let terms = self.climb.terms;
         let of = |v: usize| &terms.pairs[v];
         // Of three the distances hang together, but by the first order alone.
-        let strain = match self.members[..] {
-            [a] => strain_of_two(of(a), of(v)),
-            [a, b] => strain_of_two(of(a), of(v)).max(strain_of_two(of(b), of(v))),
+        let distance_residual = match self.members[..] {
+            [a] => residual_of_two(of(a), of(v)),
+            [a, b] => residual_of_two(of(a), of(v)).max(residual_of_two(of(b), of(v))),
             _ => 0.0,
         };
         self.members.push(v);
         Begun {
             gains: begun.gains + terms.pairs[v].gain,
             bring: begun.bring + self.bounds.gain(v),
-            cost: begun.cost.max(strain),
+            cost: begun.cost.max(distance_residual),
             known: begun.known,
         }
     }
@@ -225,8 +225,8 @@ impl<'a> Prover<'a> {
         // How much a pose leaves open depends on its attitude, where the noise does.
         let of_begun = begun
             .known
-            .filter(Posterior::is_of_first_order)
-            .map_or(f64::INFINITY, |known| self.climb.terms.ln_share[k] + known.ln_filled);
+            .filter(LaplacePosterior::is_of_first_order)
+            .map_or(f64::INFINITY, |known| self.climb.terms.ln_fraction[k] + known.ln_posterior_volume);
         bring - begun.cost + self.bounds.of_number(k).min(of_begun)
     }
 
@@ -297,22 +297,22 @@ impl<'a> Prover<'a> {
     fn fitted(&mut self, begun: &Begun) -> Begun {
         let Climb { terms, .. } = self.climb;
         let count = self.members.len();
-        if count < LEAST {
+        if count < MIN {
             return *begun;
         }
         self.spent += COST_OF_A_FIT + COST_OF_A_MEMBER * count as u64;
         let fitted = match &begun.known {
-            Some(known) if count > LEAST && known.is_of_first_order() => self.fits().refined(&known.motion),
-            known => self.fits().least_cost(known.map(|known| known.motion)),
+            Some(known) if count > MIN && known.is_of_first_order() => self.fits().refined(&known.motion),
+            known => self.fits().min_cost(known.map(|known| known.motion)),
         };
         // Pairs that leave the pose open are no set of interest by themselves.
         let Some((cost, known)) = fitted else { return *begun };
-        self.meet(begun.gains - cost + terms.ln_share[count] + known.ln_filled, &known.motion);
+        self.meet(begun.gains - cost + terms.ln_fraction[count] + known.ln_posterior_volume, &known.motion);
         Begun { cost, known: Some(known), ..*begun }
     }
 
     fn fits(&self) -> Fits<'_> {
-        Fits { terms: self.climb.terms, rough: self.climb.rough, members: &self.members }
+        Fits { terms: self.climb.terms, prior_terms: self.climb.prior_terms, members: &self.members }
     }
 
     /// Leaves out of the later ones from a rank on those with which the bound of all falls short. How many may be in reach of those that
@@ -327,10 +327,10 @@ impl<'a> Prover<'a> {
         next: usize,
         level: &mut Level,
     ) -> Option<(usize, f64)> {
-        let known = begun.known.filter(Posterior::is_of_first_order)?;
+        let known = begun.known.filter(LaplacePosterior::is_of_first_order)?;
         let Level { common, costs, top, .. } = level;
-        let Climb { graph, terms, rough, .. } = self.climb;
-        let about = known.motion.apply(&rough.centroid);
+        let Climb { graph, terms, prior_terms, .. } = self.climb;
+        let about = known.motion.apply(&prior_terms.centroid);
         let (enough, all, first) = (self.enough(), self.bound(begun, reach), graph.starts[next]);
         let more = (reach.0 - self.members.len()) as f64;
         let covariance = known.covariance * (1.0 + CURVED);
@@ -375,18 +375,19 @@ impl<'a> Prover<'a> {
         if ln_evidence <= self.enough() {
             return;
         }
-        let Climb { terms, rough, .. } = self.climb;
+        let Climb { terms, prior_terms, .. } = self.climb;
         let mut members = self.members.clone();
         members.sort_unstable();
-        let Some((motion, factor)) = fit(terms, rough, &members, motion, ROUNDS) else {
+        let Some((motion, factor)) = fit(terms, prior_terms, &members, motion, ROUNDS) else {
             self.unsettled = true;
             return;
         };
         let led = self.climb.from(&members, &motion, f64::NEG_INFINITY, |_| false);
         let allowed = self.climb.allows(&members, &motion);
         let own = allowed.then(|| self.climb.mode(members, motion, &factor)).flatten();
-        let likelier = |mode: &Mode| mode.ln_evidence > self.enough();
-        let found = led.into_iter().chain(own).filter(likelier).max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
+        let more_probable = |mode: &Mode| mode.ln_evidence > self.enough();
+        let found =
+            led.into_iter().chain(own).filter(more_probable).max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
         if let Some(mode) = found {
             self.best = mode.clone();
             self.better.push(mode);
@@ -441,7 +442,7 @@ mod tests {
 
     /// The evidence of some pairs under their own pose; `None` where they have none.
     fn evidence(prover: &Prover<'_>, members: &[usize]) -> Option<f64> {
-        let Climb { terms, rough, .. } = prover.climb;
+        let Climb { terms, prior_terms, .. } = prover.climb;
         let three = |i: usize, j: usize, k: usize| {
             let [a, b, c] = [members[i], members[j], members[k]].map(|v| &terms.pairs[v]);
             Motion::of_three([&a.model, &b.model, &c.model], [&a.cloud, &b.cloud, &c.cloud])
@@ -449,22 +450,24 @@ mod tests {
         let count = members.len();
         let threes = (2..count).flat_map(|k| (1..k).flat_map(move |j| (0..j).map(move |i| (i, j, k))));
         let starts =
-            threes.filter_map(|(i, j, k)| three(i, j, k)).chain(rough.known.as_ref().map(|known| known.motion));
+            threes.filter_map(|(i, j, k)| three(i, j, k)).chain(prior_terms.known.as_ref().map(|known| known.motion));
         let at = |start: Motion| {
             // From a bad start a fit is slow; away from its end a pose is not that of the pairs, and leaves more open.
-            let (motion, factor) = fit(terms, rough, members, &start, 60)?;
+            let (motion, factor) = fit(terms, prior_terms, members, &start, 60)?;
             let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
-            let filled = (rough.ln_peak + ln_volume(&factor)).min(0.0);
-            let ln_evidence = gains + terms.ln_share[count] + rough.ln_density(&motion) - rough.ln_peak + filled;
-            let allowed = prover.climb.allows(members, &motion) && rough.holds(prover.climb.model, &motion, &factor);
+            let filled = (prior_terms.ln_peak + ln_volume(&factor)).min(0.0);
+            let ln_evidence =
+                gains + terms.ln_fraction[count] + prior_terms.ln_density(&motion) - prior_terms.ln_peak + filled;
+            let allowed =
+                prover.climb.allows(members, &motion) && prior_terms.holds(prover.climb.model, &motion, &factor);
             allowed.then_some(ln_evidence)
         };
-        starts.filter_map(at).fold(None, |most: Option<f64>, one| Some(most.map_or(one, |most| most.max(one))))
+        starts.filter_map(at).fold(None, |max: Option<f64>, one| Some(max.map_or(one, |max| max.max(one))))
     }
 
     /// Calls `each` with every coherent set of three pairs or more that begins with some.
-    fn coherent(graph: &Graph, begun: &mut Vec<usize>, each: &mut impl FnMut(&[usize])) {
-        if begun.len() >= LEAST {
+    fn coherent(graph: &ConsistencyGraph, begun: &mut Vec<usize>, each: &mut impl FnMut(&[usize])) {
+        if begun.len() >= MIN {
             each(begun);
         }
         let from = begun.last().map_or(0, |&v| graph.starts[graph.rank[v] as usize + 1]);
@@ -481,7 +484,7 @@ mod tests {
     ///
     /// Seen to fail where each share is what a pair costs by itself: all pay for the pose of the four.
     #[test]
-    fn shares_are_no_more_than_what_all_cost() {
+    fn fractions_are_no_more_than_what_all_cost() {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
         let mut greatest: f64 = 0.0;
         for _ in 0..300 {
@@ -495,25 +498,25 @@ mod tests {
             let candidates = Candidates::from_pairs(10, (0..10).map(|i| (i, i)));
             let tolerance = Tolerance::Fixed(0.1);
             let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
-            let rough = Rough::of(&problem).expect("a box");
-            let graph = Graph::of(&problem, &rough);
-            let terms = Terms::of(&problem, &rough, &graph);
+            let prior_terms = PriorTerms::of(&problem).expect("a box");
+            let graph = ConsistencyGraph::of(&problem, &prior_terms);
+            let terms = Terms::of(&problem, &prior_terms, &graph);
             let none = BTreeSet::new();
             let motion = Motion { rotation: Matrix3::identity(), translation: ahead };
             // Whatever is looked at is less likely: nothing is met.
-            let other = Mode { members: Vec::new(), motion, ln_evidence: 1e9, ln_even: 1e9, ln_crowd: 0.0 };
-            let mut prover = Prover::of(&model, (&terms, &rough, &graph), &none, &other, 0);
+            let other = Mode { members: Vec::new(), motion, ln_evidence: 1e9, ln_even: 1e9, ln_clutter_density: 0.0 };
+            let mut prover = Prover::of(&model, (&terms, &prior_terms, &graph), &none, &other, 0);
             let begun = (0..4).fold(Begun::default(), |begun, v| prover.join(&begun, v));
             let begun = prover.fitted(&begun);
             prover.best.ln_evidence = -1e9;
             let mut level = Level { common: vec![!0 << 4 & ((1 << 10) - 1)], ..Level::default() };
             prover.leave_out(&begun, (10, 0.0), 4, &mut level).expect("four points fix a pose");
-            let shares: f64 = level.costs.iter().map(|(_, share)| share).sum();
+            let fractions: f64 = level.costs.iter().map(|(_, fraction)| fraction).sum();
             prover.members.extend(4..10);
-            let (motion, _) = fit(&terms, &rough, &prover.members, &motion, 8).expect("ten points");
-            let most = prover.fits().cost(&motion) - begun.cost;
-            assert!(level.costs.len() == 6 && shares <= most + 0.01, "{shares} of {most}");
-            greatest = greatest.max(shares / most);
+            let (motion, _) = fit(&terms, &prior_terms, &prover.members, &motion, 8).expect("ten points");
+            let max = prover.fits().cost(&motion) - begun.cost;
+            assert!(level.costs.len() == 6 && fractions <= max + 0.01, "{fractions} of {max}");
+            greatest = greatest.max(fractions / max);
         }
         assert!(greatest > 0.5, "{greatest}");
     }
@@ -539,31 +542,39 @@ mod tests {
             let prior = bound.map(|bound| Prior { object_from_camera: at, bound });
             let (tolerance, prior) = (Tolerance::Fixed(0.3), prior.as_ref());
             let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
-            let rough = Rough::of(&problem).expect("a box");
-            let graph = Graph::of(&problem, &rough);
-            let terms = Terms::of(&problem, &rough, &graph);
-            let (parts, none) = ((&terms, &rough, &graph), BTreeSet::new());
+            let prior_terms = PriorTerms::of(&problem).expect("a box");
+            let graph = ConsistencyGraph::of(&problem, &prior_terms);
+            let terms = Terms::of(&problem, &prior_terms, &graph);
+            let (parts, none) = ((&terms, &prior_terms, &graph), BTreeSet::new());
             for (missed, budget) in [(false, 200 * (round % 5)), (false, FREE), (true, 200 * (round % 5)), (true, FREE)]
             {
-                let mut swept = Seeds::new(&model, parts, &none, (LEAST, -3.0), FREE).sweep();
+                let mut swept = Seeds::new(&model, parts, &none, (MIN, -3.0), FREE).sweep();
                 if missed {
                     swept.modes.drain(..swept.modes.len().saturating_sub(1));
                 }
                 let before = swept.modes.first().map(|mode| mode.ln_evidence);
-                let Some(told) = prove(&model, parts, &mut swept, budget) else { continue };
+                let Some(reported) = prove(&model, parts, &mut swept, budget) else { continue };
                 let best = swept.modes[0].ln_evidence;
-                proved += u64::from(told.bound == best);
-                open += u64::from(told.bound > best);
+                proved += u64::from(reported.bound == best);
+                open += u64::from(reported.bound > best);
                 found_again += u64::from(missed && before < Some(best));
-                assert!(budget < FREE || told.bound == best, "round {round}: {} above {best} is left open", told.bound);
+                assert!(
+                    budget < FREE || reported.bound == best,
+                    "round {round}: {} above {best} is left open",
+                    reported.bound
+                );
                 let prover = Prover::of(&model, parts, &none, &swept.modes[0], 0);
                 coherent(&graph, &mut Vec::new(), &mut |set| {
                     sets += 1;
                     // Whatever its pose.
                     let gains: f64 = set.iter().map(|&v| terms.pairs[v].gain).sum();
-                    if gains + terms.ln_share[set.len()] > told.bound {
-                        let most = evidence(&prover, set).unwrap_or(f64::NEG_INFINITY);
-                        assert!(most <= told.bound + 0.01, "round {round}: {set:?} has {most}, bound {}", told.bound);
+                    if gains + terms.ln_fraction[set.len()] > reported.bound {
+                        let max = evidence(&prover, set).unwrap_or(f64::NEG_INFINITY);
+                        assert!(
+                            max <= reported.bound + 0.01,
+                            "round {round}: {set:?} has {max}, bound {}",
+                            reported.bound
+                        );
                     }
                 });
             }
@@ -575,19 +586,19 @@ mod tests {
     /// Seen to fail where members cost twice what they do, where what another costs is not spread by what their pose leaves open, where
     /// their posterior fills less, and where bounds that prune are taken for bounds that hold.
     #[test]
-    fn no_coherent_set_is_likelier_than_the_bound() {
+    fn no_coherent_set_is_more_probable_than_the_bound() {
         // Each problem takes 0.1 s: forty, or as many as `PROPTEST_CASES` asks for beyond them.
         let asked = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok());
         compare(asked.unwrap_or(0).max(40));
     }
 
-    /// The long form: `cargo test --release -p seafix-referencing --lib -- --ignored likelier`.
+    /// The long form: `cargo test --release -p seafix-referencing --lib -- --ignored more_probable`.
     ///
     /// Seen to fail where what one step foretells is taken for the end of a fit (its 7435th problem), and where a set whose fit is slow
     /// is passed over (the 13 623rd).
     #[test]
     #[ignore = "20 000 problems; some minutes"]
-    fn no_coherent_set_of_many_problems_is_likelier_than_the_bound() {
+    fn no_coherent_set_of_many_problems_is_more_probable_than_the_bound() {
         compare(20_000);
     }
 }

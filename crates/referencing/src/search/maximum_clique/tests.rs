@@ -13,7 +13,7 @@ fn settings_out_of_range_are_refused() {
     assert_eq!(good.check(), Ok(()));
     let message = MaximumClique { budget: 0, ..good.clone() }.check().unwrap_err();
     assert_eq!(message, "budget = 0; give 1 or more pair tests");
-    assert!(MaximumClique { most_pairs: 2, ..good }.check().is_err());
+    assert!(MaximumClique { max_pairs: 2, ..good }.check().is_err());
 }
 
 /// A model, a cloud, and lists of candidates.
@@ -51,7 +51,7 @@ impl Scene {
         }
     }
 
-    fn search(&self, search: &MaximumClique) -> Result<Identification, Unidentified> {
+    fn search(&self, search: &MaximumClique) -> Result<Identification, Rejected> {
         search.search(&self.problem(), &mut ChaCha8Rng::seed_from_u64(0))
     }
 }
@@ -83,97 +83,98 @@ const PYRAMID: [[f64; 3]; 8] = [
 /// A stump of a square pyramid is itself after every quarter turn: three other sets of eight, each of which shares no pair with the best.
 /// They do not place the object where the best does, so that all are told however few are asked for.
 #[test]
-fn the_other_sets_of_a_symmetric_object_are_told() {
+fn the_other_sets_of_a_symmetric_object_are_reported() {
     let scene = Scene::of(&PYRAMID, &PYRAMID);
-    for rivals in [64, 3, 2, 0] {
-        let found = scene.search(&MaximumClique { rivals, ..MaximumClique::default() }).unwrap();
-        assert_eq!((found.pairs.len(), found.rivals.len(), found.size_bound), (8, 3, 8), "{rivals}");
-        assert!(found.optimal && found.rivals_complete && found.undecided.is_none(), "{rivals}: {found:?}");
-        assert!(found.rivals.iter().flatten().all(|pair| !found.pairs.contains(pair)));
+    for alternatives in [64, 3, 2, 0] {
+        let found = scene.search(&MaximumClique { alternatives, ..MaximumClique::default() }).unwrap();
+        assert_eq!((found.pairs.len(), found.alternatives.len(), found.size_bound), (8, 3, 8), "{alternatives}");
+        assert!(found.optimal && found.alternatives_complete && found.undecided.is_none(), "{alternatives}: {found:?}");
+        assert!(found.alternatives.iter().flatten().all(|pair| !found.pairs.contains(pair)));
     }
 }
 
 /// Nine points, each measured twice within 2 mm: 512 sets, all alike. As many as are asked for are told, those first that share least.
 #[test]
-fn sets_that_are_alike_are_told_as_far_as_asked_for() {
+fn sets_that_are_alike_are_reported_as_far_as_asked_for() {
     let places = scattered(9);
     let scene = Scene::of(&places, &[&places[..], &moved(&places, [0.002, 0.0, 0.0])].concat()).named();
-    let found = scene.search(&MaximumClique { rivals: 5, ..MaximumClique::default() }).unwrap();
-    assert_eq!((found.pairs.len(), found.rivals.len(), found.rivals_complete), (9, 5, false));
+    let found = scene.search(&MaximumClique { alternatives: 5, ..MaximumClique::default() }).unwrap();
+    assert_eq!((found.pairs.len(), found.alternatives.len(), found.alternatives_complete), (9, 5, false));
     assert!(found.optimal && found.undecided.is_none());
-    let shared = |rival: &Vec<Correspondence>| rival.iter().filter(|pair| found.pairs.contains(pair)).count();
-    assert_eq!(found.rivals.iter().map(shared).collect::<Vec<_>>(), [0, 1, 1, 1, 1]);
-    let all = scene.search(&MaximumClique { rivals: 511, ..MaximumClique::default() }).unwrap();
-    assert_eq!((all.rivals.len(), all.rivals_complete), (511, true));
+    let shared =
+        |alternative: &Vec<Correspondence>| alternative.iter().filter(|pair| found.pairs.contains(pair)).count();
+    assert_eq!(found.alternatives.iter().map(shared).collect::<Vec<_>>(), [0, 1, 1, 1, 1]);
+    let all = scene.search(&MaximumClique { alternatives: 511, ..MaximumClique::default() }).unwrap();
+    assert_eq!((all.alternatives.len(), all.alternatives_complete), (511, true));
     // Whether sets are alike costs tests, and is asked only where there are more rivals than are to be told.
     let apart = Scene::of(&places, &[&places[..], &moved(&places, [9.0, 0.0, 0.0])].concat()).named();
-    let tests = |rivals| apart.search(&MaximumClique { rivals, ..MaximumClique::default() }).unwrap().tests;
+    let tests = |alternatives| apart.search(&MaximumClique { alternatives, ..MaximumClique::default() }).unwrap().tests;
     assert!(tests(1) == tests(64) && tests(0) > tests(1), "{} {} {}", tests(0), tests(1), tests(64));
     // Thirteen points have more such sets than are looked at: that they are alike decides, and they are not complete.
     let places = scattered(13);
     let scene = Scene::of(&places, &[&places[..], &moved(&places, [0.002, 0.0, 0.0])].concat()).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
-    assert_eq!((found.pairs.len(), found.rivals.len(), found.rivals_complete), (13, 64, false));
+    assert_eq!((found.pairs.len(), found.alternatives.len(), found.alternatives_complete), (13, 64, false));
     assert!(found.optimal && found.undecided.is_none());
     // All that were looked at are told where so many are asked for: they are decided by being alike.
-    let found = scene.search(&MaximumClique { rivals: 10_000, ..MaximumClique::default() }).unwrap();
-    assert_eq!((found.rivals.len(), found.rivals_complete, found.undecided), (MOST_TIES, false, None));
+    let found = scene.search(&MaximumClique { alternatives: 10_000, ..MaximumClique::default() }).unwrap();
+    assert_eq!((found.alternatives.len(), found.alternatives_complete, found.undecided), (MAX_TIES, false, None));
     // With a whole second object a metre away as well they are not alike, and what is undecided is told with the numbers.
     let doubled = [&places[..], &moved(&places, [0.002, 0.0, 0.0])].concat();
     let scene = Scene::of(&places, &[&doubled[..], &moved(&doubled, [9.0, 0.0, 0.0])].concat()).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
-    assert!(!found.rivals_complete && found.rivals.len() == MOST_TIES, "{}", found.rivals.len());
+    assert!(!found.alternatives_complete && found.alternatives.len() == MAX_TIES, "{}", found.alternatives.len());
     match found.undecided {
-        Some(Unidentified::Budget { budget: BUDGET, best: 13, bound: 13, tests }) => assert_eq!(tests, found.tests),
+        Some(Rejected::Budget { budget: BUDGET, best: 13, bound: 13, tests }) => assert_eq!(tests, found.tests),
         other => panic!("{other:?}"),
     }
 }
 
 /// The set with the least residual, and of equals, but for rounding, the first.
 #[test]
-fn the_least_residual_decides_between_sets_of_one_size() {
+fn the_smallest_residual_decides_between_sets_of_one_size() {
     let places = scattered(5);
     let mut second = moved(&places, [5.0, 0.0, 0.0]);
     second[0][1] += 0.004;
     let scene = Scene::of(&places, &[&second[..], &places].concat()).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
     assert!(found.pairs.iter().all(|pair| pair.cloud == pair.model + 5), "{:?}", found.pairs);
-    assert_eq!((found.rivals.len(), found.rivals[0].clone()), (1, named(5)));
+    assert_eq!((found.alternatives.len(), found.alternatives[0].clone()), (1, named(5)));
     let vertices: Vec<Correspondence> = [0, 5]
         .iter()
         .flat_map(|&j| named(5).into_iter().map(move |p| Correspondence { cloud: p.cloud + j, ..p }))
         .collect();
     let (first, other) = ((0..5).collect::<Vec<_>>(), (5..10).collect::<Vec<_>>());
-    let of = |cliques: &[Vec<usize>]| least_residual(&scene.problem(), &vertices, cliques);
+    let of = |cliques: &[Vec<usize>]| min_residual(&scene.problem(), &vertices, cliques);
     assert_eq!((of(&[first.clone(), other.clone()]), of(&[other.clone(), first.clone()])), (1, 0));
     assert_eq!((of(&[other.clone(), other.clone()]), of(&[first.clone(), first, other])), (0, 2));
 }
 
 #[test]
-fn rivals_that_share_least_stand_first() {
+fn alternatives_that_fraction_smallest_stand_first() {
     let best = named(4);
     let other = |clouds: [usize; 4]| (0..4).map(|i| Correspondence { model: i, cloud: clouds[i] }).collect::<Vec<_>>();
-    let mut rivals = vec![other([0, 1, 2, 9]), other([9, 8, 7, 6]), other([0, 1, 8, 7]), other([7, 8, 2, 3])];
-    MaximumClique::least_alike_first(&best, &mut rivals);
-    assert_eq!(rivals, [other([9, 8, 7, 6]), other([0, 1, 8, 7]), other([7, 8, 2, 3]), other([0, 1, 2, 9])]);
+    let mut alternatives = vec![other([0, 1, 2, 9]), other([9, 8, 7, 6]), other([0, 1, 8, 7]), other([7, 8, 2, 3])];
+    MaximumClique::different_first(&best, &mut alternatives);
+    assert_eq!(alternatives, [other([9, 8, 7, 6]), other([0, 1, 8, 7]), other([7, 8, 2, 3]), other([0, 1, 2, 9])]);
 }
 
 /// A mirror image of four points that are not flat is refused; distances alone accept it. One of six points leaves its four flat ones,
 /// undecided.
 #[test]
-fn mirror_images_are_told() {
+fn mirror_images_are_reported() {
     let mirrored = |places: &[[f64; 3]]| places.iter().map(|[x, y, z]| [*x, *y, -z]).collect::<Vec<_>>();
     let four = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1.5, 0.0], [3.0, 0.4, 1.1]];
     let scene = Scene::of(&four, &mirrored(&four)).named();
     let refused = scene.search(&MaximumClique::default()).unwrap_err();
-    assert_eq!(refused, Unidentified::Mirrored { best: 4, proved: true });
+    assert_eq!(refused, Rejected::Mirrored { best: 4, proved: true });
     let distances = MaximumClique { orientation: false, ..MaximumClique::default() };
     let found = scene.search(&distances).unwrap();
     assert_eq!((found.pairs.len(), found.undecided, found.optimal), (4, None, true));
     let six = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [1.7, 1.5, 0.0], [0.2, 1.1, 0.0], [0.4, 0.3, 1.0], [0.9, 0.8, 1.4]];
     let scene = Scene::of(&six, &mirrored(&six)).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
-    assert_eq!((found.pairs.len(), found.undecided), (4, Some(Unidentified::Mirrored { best: 6, proved: false })));
+    assert_eq!((found.pairs.len(), found.undecided), (4, Some(Rejected::Mirrored { best: 6, proved: false })));
     assert_eq!(scene.search(&distances).unwrap().undecided, None);
     // Three true points beside a fourth that agrees with two of them are three, and no image.
     let mut cloud = four;
@@ -192,24 +193,24 @@ fn an_image_no_larger_than_the_set_contradicts_nothing() {
     let found =
         Scene::of(&five, &[&five[..4], &[[50.0; 3]], &image].concat()).named().search(&MaximumClique::default());
     let found = found.unwrap();
-    assert_eq!(found.undecided, Some(Unidentified::Mirrored { best: 5, proved: false }));
+    assert_eq!(found.undecided, Some(Rejected::Mirrored { best: 5, proved: false }));
 }
 
 /// Too small sets are told with their size and the tests that they took; too many pairs are not searched.
 #[test]
-fn what_is_too_small_or_too_large_is_told() {
+fn what_is_too_small_or_too_large_is_reported() {
     let four = scattered(4);
     let mut cloud = four.clone();
     (cloud[2], cloud[3]) = ([30.0, 0.0, 0.0], [0.0, 60.0, 0.0]);
     let scene = Scene::of(&four, &cloud).named();
-    assert_eq!(scene.search(&MaximumClique::default()), Err(Unidentified::NoConsensus { best: 2, needed: 3 }));
+    assert_eq!(scene.search(&MaximumClique::default()), Err(Rejected::NoConsensus { best: 2, needed: 3 }));
     // The budget ends before two are found to agree: the graph, and one test more.
     let ended = scene.search(&MaximumClique { budget: 1, ..MaximumClique::default() });
-    assert_eq!(ended, Err(Unidentified::Budget { budget: 1, best: 1, bound: 2, tests: 6 + 1 }));
+    assert_eq!(ended, Err(Rejected::Budget { budget: 1, best: 1, bound: 2, tests: 6 + 1 }));
     let scene = Scene::of(&four, &four);
-    let large = scene.search(&MaximumClique { most_pairs: 15, ..MaximumClique::default() }).unwrap_err();
-    assert!(matches!(large, Unidentified::TooLarge { size: 16, most: 15, .. }), "{large}");
-    assert!(scene.search(&MaximumClique { most_pairs: 16, ..MaximumClique::default() }).is_ok());
+    let large = scene.search(&MaximumClique { max_pairs: 15, ..MaximumClique::default() }).unwrap_err();
+    assert!(matches!(large, Rejected::TooLarge { size: 16, max: 15, .. }), "{large}");
+    assert!(scene.search(&MaximumClique { max_pairs: 16, ..MaximumClique::default() }).is_ok());
 }
 
 /// Four named points have six pair tests; what the proof spends is added. A budget of one leaves the proof out.
@@ -220,9 +221,9 @@ fn tests_are_those_of_the_graph_and_of_the_proof() {
     assert_eq!(found.tests, 6 + 8);
     let ended = Scene::of(&four, &four).named().search(&MaximumClique { budget: 1, ..MaximumClique::default() });
     let ended = ended.unwrap();
-    assert!(!ended.optimal && !ended.rivals_complete, "{ended:?}");
+    assert!(!ended.optimal && !ended.alternatives_complete, "{ended:?}");
     match ended.undecided {
-        Some(Unidentified::Budget { budget: 1, best, bound: 4, tests }) => assert!(best >= 3 && tests >= 6, "{tests}"),
+        Some(Rejected::Budget { budget: 1, best, bound: 4, tests }) => assert!(best >= 3 && tests >= 6, "{tests}"),
         other => panic!("{other:?}"),
     }
 }
@@ -230,11 +231,11 @@ fn tests_are_those_of_the_graph_and_of_the_proof() {
 /// Forty-five points are tested by the first sixteen while the set grows, and as a whole in the end: five on the wrong side of a
 /// plane go, and with them the proof.
 #[test]
-fn large_sets_are_tested_for_mirror_images_as_a_whole() {
+fn large_sets_are_tested_for_mirror_images_as_a_full() {
     let mut places: Vec<[f64; 3]> = scattered(45).iter().map(|[x, y, z]| [*x, *y, z - 1.0]).collect();
     let scene = Scene::of(&places, &places).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
-    assert!(found.pairs == named(45) && found.optimal && found.rivals_complete, "{found:?}");
+    assert!(found.pairs == named(45) && found.optimal && found.alternatives_complete, "{found:?}");
     // The pairs of the graph, and all fours of 45 points in the end.
     let grown = 237_170;
     assert_eq!(found.tests, 990 + grown + 148_995);

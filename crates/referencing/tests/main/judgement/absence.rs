@@ -1,6 +1,6 @@
 //! Whether an object is believed to be there, by the clutter about it.
 
-use seafix_referencing::LookAlike;
+use seafix_referencing::RepeatedPattern;
 
 use super::*;
 
@@ -29,11 +29,11 @@ fn with_evidence(
         prior: None,
     };
     let pairs: Vec<Correspondence> = (0..6).map(|i| Correspondence { model: i, cloud: i }).collect();
-    let best = Explanation { pairs: pairs.clone(), object_from_camera: motion(), ln_evidence, ln_crowd: 0.0 };
-    let look_alike = alone.map(|alone| LookAlike { alone, around: f64::NEG_INFINITY });
-    let belief = Some(Belief { explanations: vec![best], look_alike, ..Belief::default() });
+    let best = Explanation { pairs: pairs.clone(), object_from_camera: motion(), ln_evidence, ln_clutter_density: 0.0 };
+    let repeated_pattern = alone.map(|alone| RepeatedPattern { alone, around: f64::NEG_INFINITY });
+    let posterior = Some(Posterior { explanations: vec![best], repeated_pattern, ..Posterior::default() });
     let found = MaximumClique::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a set");
-    let found = Identification { pairs, belief, undecided: None, ..found };
+    let found = Identification { pairs, posterior, undecided: None, ..found };
     judge(&problem, Ok(found), &Kabsch::default(), &acceptance, None).outcome
 }
 
@@ -44,7 +44,7 @@ fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
     let surface = |[u, v, _]: [f64; 3]| Point::new(4.0 * u - 2.0, 4.0 * v - 2.0, 4.0 + 0.3 * u);
     let line = |[u, v, _]: [f64; 3]| Point::new(4.0 * u - 2.0, (4.0 * v).floor() - 2.0, 4.0);
     let limit = |outcome: Outcome| match outcome {
-        Outcome::Unidentified(Refusal::Absent { limit, .. }) => limit,
+        Outcome::Rejected(RejectionReason::Absent { limit, .. }) => limit,
         other => panic!("{other:?}"),
     };
     // Twice as large as what the limit of 2e-5 is stated for: twice it, or 2^-2.5 of it.
@@ -52,15 +52,15 @@ fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
     for clutter in [&surface as &dyn Fn([f64; 3]) -> Point<Camera>, &line] {
         assert!((limit(with_evidence(2e-5, 9.0, None, clutter)) - 3.5355e-6).abs() < 1e-9);
         assert!((limit(with_evidence(2e-5, 11.0, None, clutter)) - 3.5355e-6).abs() < 1e-9);
-        assert!(matches!(with_evidence(2e-5, 13.5, None, clutter), Outcome::Referenced(_)));
+        assert!(matches!(with_evidence(2e-5, 13.5, None, clutter), Outcome::Fix(_)));
     }
-    assert!(matches!(with_evidence(2e-5, 11.0, None, space), Outcome::Referenced(_)));
+    assert!(matches!(with_evidence(2e-5, 11.0, None, space), Outcome::Fix(_)));
     // Who asks for nothing is refused nothing.
-    assert!(matches!(with_evidence(0.999_999, 0.0, None, line), Outcome::Referenced(_)));
+    assert!(matches!(with_evidence(0.999_999, 0.0, None, line), Outcome::Fix(_)));
     // A pattern that looks like it is held to the same limit wherever clutter lies.
-    for (clutter, chance) in [(&space as &dyn Fn([f64; 3]) -> Point<Camera>, 4e-5), (&line, 3.5355e-6)] {
-        assert!(matches!(with_evidence(2e-5, 40.0, Some(29.5), clutter), Outcome::Referenced(_)));
+    for (clutter, nfa) in [(&space as &dyn Fn([f64; 3]) -> Point<Camera>, 4e-5), (&line, 3.5355e-6)] {
+        assert!(matches!(with_evidence(2e-5, 40.0, Some(29.5), clutter), Outcome::Fix(_)));
         assert!((limit(with_evidence(2e-5, 40.0, Some(30.5), clutter)) - 4e-5).abs() < 1e-12);
-        assert!((limit(with_evidence(2e-5, 10.0, Some(0.0), clutter)) - chance).abs() < 1e-9);
+        assert!((limit(with_evidence(2e-5, 10.0, Some(0.0), clutter)) - nfa).abs() < 1e-9);
     }
 }

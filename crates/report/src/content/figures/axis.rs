@@ -2,8 +2,8 @@
 
 use super::{caption, distinct, figure, panels, series};
 use crate::{
-    Field, Number, PAPER_M1, Row, Spread, Summary,
-    content::tell::{self, Unit},
+    Distribution, Field, Number, PAPER_M1, Row, RunSummary,
+    content::phrases::{self, Unit},
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::{headed, short},
@@ -11,12 +11,12 @@ use crate::{
 };
 
 /// The first condition with numbers that vary.
-pub(in crate::content) fn numeric(summary: &Summary) -> Option<String> {
+pub(in crate::content) fn numeric(summary: &RunSummary) -> Option<String> {
     keys(summary).into_iter().next()
 }
 
 /// All conditions with numbers that vary.
-pub(in crate::content) fn keys(summary: &Summary) -> Vec<String> {
+pub(in crate::content) fn keys(summary: &RunSummary) -> Vec<String> {
     let axes = summary.rows.first().into_iter().flat_map(Row::conditions);
     let varies = |key: &String| {
         let values: Vec<Option<f64>> = summary.rows.iter().map(|row| on(row, key)).collect();
@@ -37,10 +37,10 @@ pub(in crate::content) fn name(row: &Row, key: &str) -> String {
 }
 
 /// A quantity, its spread in a row, and its name and unit.
-type Metric = (Field, fn(&Row) -> Option<Spread>, &'static str);
+type Metric = (Field, fn(&Row) -> Option<Distribution>, &'static str);
 
 /// m1 and m2 over the condition, with the paper's range and, over the distance, both laws.
-pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
+pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let key = numeric(summary)?;
     let names = distinct(summary.rows.iter().map(|row| name(row, &key)));
     if names.len() > 14 {
@@ -59,23 +59,24 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
         Table::new("error-over-condition", text!["Every point of the figure of error over the condition."], heads);
     let metrics: [Metric; 2] =
         [(Field::M1, |row| row.m1, "m1, residual (mm)"), (Field::M2, |row| row.m2, "m2, model points (mm)")];
-    let mut drawn = Vec::new();
+    let mut plotted = Vec::new();
     for (field, value, label) in metrics {
         let mut layers = Vec::new();
         let (mut lines, mut all) = (Vec::new(), Vec::new());
         for (index, series_name) in names.iter().enumerate() {
-            let mut points: Vec<(f64, Spread, &Trial)> = Vec::new();
+            let mut points: Vec<(f64, Distribution, &Trial)> = Vec::new();
             for (row, trial) in summary.rows.iter().zip(&run.trials).filter(|(row, _)| name(row, &key) == *series_name)
             {
                 points.extend(value(row).zip(on(row, &key)).map(|(spread, x)| (x, spread, trial)));
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             for (x, spread, trial) in &points {
-                let told = |name: &str, value| {
-                    tell::statistic(trial, name, field, "found", Some(value), (Unit::Millimetres, 3)).into()
+                let as_number = |name: &str, value| {
+                    phrases::statistic(trial, name, field, "found", Some(value), (Unit::Millimetres, 3)).into()
                 };
-                let place = tell::axis(trial, &key, Some(*x));
-                let ends = [told("q5", spread.p5), told("median", spread.median), told("q95", spread.p95)];
+                let place = phrases::axis(trial, &key, Some(*x));
+                let ends =
+                    [as_number("q5", spread.p5), as_number("median", spread.median), as_number("q95", spread.p95)];
                 data.line(
                     false,
                     [series_name.clone().into(), place.into(), field.name().into()].into_iter().chain(ends).collect(),
@@ -103,10 +104,10 @@ pub(super) fn errors(run: &Run, summary: &Summary) -> Option<Figure> {
         }
         let x = Axis { logarithmic: wide, ..Axis::linear(headed(&key)) }.at(ticks.clone());
         let y = Axis::logarithmic(label);
-        drawn.push(Panel { title: String::new(), x, y, layers, equal: false });
+        plotted.push(Panel { title: String::new(), x, y, layers, equal: false });
     }
     let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
-    let chart = Chart { panels: drawn, columns: 2, page: true, shape: 0.78, legend };
+    let chart = Chart { panels: plotted, columns: 2, page: true, shape: 0.78, legend };
     let laws = if ranges(&key) { " Thin grey lines: growth with the distance z and with its square." } else { "" };
     let said = format!(
         "Error over {}: medians of the fixes found, bars from the 5 % to the 95 % quantile, moved apart a little; the shaded range is the m1 that the paper reports for its virtual scene at 2–5 m.{laws}",
@@ -143,7 +144,7 @@ type Distributed = (Field, Unit, &'static str);
 
 /// How the errors of the fixes found are distributed, a box a trial: m2, and over a share of outliers what the literature on
 /// robust methods shows, attitude, position and time.
-pub(super) fn boxes(run: &Run, summary: &Summary) -> Option<Figure> {
+pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let groups = panels(run, 12);
     let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
     if names.len() > 7 || run.trials.len() < 2 {
@@ -163,7 +164,7 @@ pub(super) fn boxes(run: &Run, summary: &Summary) -> Option<Figure> {
     let heads = heads.chain(["n", "p5", "p25", "median", "p75", "p95"].map(Head::numbers));
     let mut data = Table::new("distribution", text!["The boxes of the figure of distributions."], heads.collect());
     let conditions: Vec<String> = groups.iter().map(|(condition, _)| condition.clone()).collect();
-    let mut drawn = Vec::new();
+    let mut plotted = Vec::new();
     for &(field, unit, label) in shown {
         let mut layers: Vec<Layer> =
             (0..names.len()).map(|series| Layer::Boxes { series, values: Vec::new() }).collect();
@@ -181,24 +182,24 @@ pub(super) fn boxes(run: &Run, summary: &Summary) -> Option<Figure> {
                 if let Layer::Boxes { values, .. } = &mut layers[index] {
                     values.push(([x, 0.36 * width], quantiles.map(|q| q * unit.scale())));
                 }
-                let told = |(what, value): (&str, f64)| {
-                    tell::statistic(trial, what, field, "found", Some(value), (unit, 3)).into()
+                let as_number = |(what, value): (&str, f64)| {
+                    phrases::statistic(trial, what, field, "found", Some(value), (unit, 3)).into()
                 };
                 let mut line = vec![condition.clone().into(), name.clone().into(), label.into()];
                 line.push(n(trial, field, values.len()).into());
-                line.extend(["q5", "q25", "median", "q75", "q95"].into_iter().zip(quantiles).map(told));
+                line.extend(["q5", "q25", "median", "q75", "q95"].into_iter().zip(quantiles).map(as_number));
                 data.line(false, line);
             }
         }
         // Runs without durations have none.
         if layers.iter().any(|layer| matches!(layer, Layer::Boxes { values, .. } if !values.is_empty())) {
             let (x, y) = (Axis::named("", conditions.clone()), Axis::logarithmic(label));
-            drawn.push(Panel { x, y, layers, ..Panel::default() });
+            plotted.push(Panel { x, y, layers, ..Panel::default() });
         }
     }
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
     let page = groups.len() * names.len() > 6;
-    let chart = Chart { panels: drawn, columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
+    let chart = Chart { panels: plotted, columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
     let said = "Distribution over the fixes found: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
     figure("distribution", caption(said, run), &chart, data)
 }

@@ -2,12 +2,12 @@
 
 use super::{caption, distinct, figure};
 use crate::{
-    Field, Number, Summary,
-    content::tell,
+    Field, Number, RunSummary,
+    content::phrases,
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
+    proportion,
     run::{Run, Trial},
-    share,
 };
 
 /// Width of a column of the histogram, and where it ends.
@@ -40,7 +40,7 @@ pub(super) fn histogram(run: &Run) -> Option<Figure> {
         columns.push([from, to, height]);
         let last = if index == COLUMNS - 1 { f64::INFINITY } else { to };
         let what = |name: &str| {
-            tell::over(&trials, "/metrics/evaluation", format!("{name} nees from {from} to {last} of found"))
+            phrases::over(&trials, "/metrics/evaluation", format!("{name} nees from {from} to {last} of found"))
         };
         data.line(
             false,
@@ -81,7 +81,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
     if run.trials.iter().any(|trial| trial.every() > 1) {
         return None;
     }
-    let mut names = distinct(run.trials.iter().map(|trial| Summary::name(run, trial)));
+    let mut names = distinct(run.trials.iter().map(|trial| RunSummary::name(run, trial)));
     let apart = names.len() <= LINES;
     if !apart {
         names = vec!["all trials".to_owned()];
@@ -91,7 +91,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
     let mut data = Table::new("coverage", text!["Every point of the curve of coverage."], heads.collect());
     let (mut bands, mut lines, mut n) = (Vec::new(), Vec::new(), 0);
     for (series, name) in names.iter().enumerate() {
-        let own = |trial: &&Trial| !apart || Summary::name(run, trial) == *name;
+        let own = |trial: &&Trial| !apart || RunSummary::name(run, trial) == *name;
         let trials: Vec<&Trial> = run.trials.iter().filter(own).collect();
         let rows = trials.iter().flat_map(|trial| trial.attempts()).filter(|(_, row)| row.found() || row.wrong());
         let nees: Vec<f64> = rows.filter_map(|(_, row)| row.get(Field::Nees)).collect();
@@ -99,23 +99,23 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
             continue;
         }
         n += nees.len();
-        let trajectory = trials.iter().any(|trial| share::is_trajectory(&trial.header));
+        let trajectory = trials.iter().any(|trial| proportion::is_trajectory(&trial.header));
         let (mut line, mut band) = (Vec::new(), Vec::new());
         for level in LEVELS {
             // As printed: the key is computed again from it.
             let bound = (quantile(level / 100.0) * 1e4).round() / 1e4;
             let events: Vec<bool> = nees.iter().map(|nees| *nees <= bound).collect();
             let within = 100.0 * events.iter().filter(|event| **event).count() as f64 / events.len() as f64;
-            let (low, high) = share::interval(trajectory, &events);
-            let [low, high] = [low, high].map(|share| 100.0 * share);
+            let (low, high) = proportion::interval(trajectory, &events);
+            let [low, high] = [low, high].map(|fraction| 100.0 * fraction);
             line.push([level, within]);
             band.push([level, low, high]);
-            let told = |(what, value): (&str, f64)| {
+            let as_number = |(what, value): (&str, f64)| {
                 let what = format!("{what} nees<={bound} of fixes");
-                Number::new(Some(value), 2, tell::over(&trials, "/metrics/evaluation", what)).into()
+                Number::new(Some(value), 2, phrases::over(&trials, "/metrics/evaluation", what)).into()
             };
             let mut cells = vec![name.clone().into(), level.to_string().into(), bound.to_string().into()];
-            cells.extend([("percent", within), ("low", low), ("high", high)].map(told));
+            cells.extend([("percent", within), ("low", low), ("high", high)].map(as_number));
             data.line(false, cells);
         }
         bands.push((series, band));
@@ -140,7 +140,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index));
     let legend = if names.len() > 1 { legend.collect() } else { Vec::new() };
     let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.8, legend };
-    let called = share::called(run.trials.iter().map(|trial| &trial.header));
+    let called = proportion::called(run.trials.iter().map(|trial| &trial.header));
     let said = format!(
         "Coverage: of {n} fixes, wrong ones among them, the share whose error is within the bound of each confidence by their own covariance{}. On the dashed diagonal the covariance is honest, above it too large, below it too small.",
         if banded {

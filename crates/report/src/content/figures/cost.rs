@@ -5,22 +5,22 @@ use std::collections::BTreeMap;
 use super::{caption, distinct, figure, series};
 use crate::{
     Field, Key, Number,
-    content::tell,
+    content::phrases,
     document::{Cell, Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     run::{Run, Trial},
 };
 
 /// So many searches are told apart by colour, mark and line.
-const MOST: usize = 10;
+const MAX: usize = 10;
 /// A median of fewer attempts is not drawn.
-const LEAST: usize = 3;
+const MIN: usize = 3;
 
 /// Pair tests and time of the search over how many candidates there were, both axes logarithmic; time where durations were
 /// logged.
 pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     let names = distinct(run.trials.iter().map(|trial| trial.method()[0].clone()));
-    if names.len() > MOST {
+    if names.len() > MAX {
         return None;
     }
     let heads = [Head::words("search"), Head::words("cost"), Head::numbers("candidates"), Head::numbers("n")];
@@ -41,12 +41,12 @@ pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
                 bars.push([size, low, high]);
                 let key = |what: &str| -> Key {
                     let what = format!("{what} {} at {half_octaves} half octaves of candidates", field.name());
-                    tell::over(&trials, field.topic(), what)
+                    phrases::over(&trials, field.topic(), what)
                 };
                 let mut cells: Vec<Cell> = vec![name.clone().into(), label.into(), format!("{size:.1}").into()];
                 cells.push(Number::count(costs.len(), key("sampled")).into());
-                let told = |(what, value)| Number::new(Some(value), decimals, key(what)).into();
-                cells.extend([("q5", low), ("median", middle), ("q95", high)].map(told));
+                let as_number = |(what, value)| Number::new(Some(value), decimals, key(what)).into();
+                cells.extend([("q5", low), ("median", middle), ("q95", high)].map(as_number));
                 data.line(false, cells);
             }
             let series = series(&names, name);
@@ -63,7 +63,7 @@ pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     let both = panels.len() > 1;
     let chart = Chart { panels, columns: 2, page: both, shape: 0.8, legend };
     let said = format!(
-        "What a search costs over the size of its problem, the number of candidates: tests of pairs{}; medians of half octaves with {LEAST} attempts or more, bars from the 5 % to the 95 % quantile. Searches that count no tests have no line.",
+        "What a search costs over the size of its problem, the number of candidates: tests of pairs{}; medians of half octaves with {MIN} attempts or more, bars from the 5 % to the 95 % quantile. Searches that count no tests have no line.",
         if both { " and time" } else { "" }
     );
     figure("search-cost", caption(&said, run), &chart, data)
@@ -80,6 +80,6 @@ fn bins(trials: &[&Trial], field: Field) -> BTreeMap<i32, Vec<f64>> {
             bins.entry((2.0 * size.log2()).round() as i32).or_default().push(cost);
         }
     }
-    bins.retain(|_, costs| costs.len() >= LEAST);
+    bins.retain(|_, costs| costs.len() >= MIN);
     bins
 }

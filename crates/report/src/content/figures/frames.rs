@@ -2,21 +2,21 @@
 
 use super::{caption, distinct, figure, series};
 use crate::{
-    Field, PAPER_M1, Summary,
-    content::tell::{self, Unit},
+    Field, PAPER_M1, RunSummary,
+    content::phrases::{self, Unit},
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     run::Run,
 };
 
 /// Marks of more fixes than this hide each other.
-const MOST: usize = 4000;
+const MAX: usize = 4000;
 
 /// m1 and m2 of every fix.
 pub(super) fn errors(run: &Run) -> Option<Figure> {
-    let names = distinct(run.trials.iter().map(|trial| Summary::name(run, trial)));
+    let names = distinct(run.trials.iter().map(|trial| RunSummary::name(run, trial)));
     let fixes: usize = run.trials.iter().map(|trial| trial.attempts().count()).sum();
-    if names.len() > 7 || fixes > MOST {
+    if names.len() > 7 || fixes > MAX {
         return None;
     }
     let heads = [
@@ -33,15 +33,15 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
     // What errs alike in a frame stands side by side.
     let aside = |index: usize| 0.6 * ((index as f64 + 0.5) / names.len() as f64 - 0.5);
     for trial in &run.trials {
-        let index = series(&names, &Summary::name(run, trial));
+        let index = series(&names, &RunSummary::name(run, trial));
         for (frame, row) in trial.attempts() {
             let place = (trial.object(row), frame.number, frame.stamp_ns);
-            let told = |field| tell::value(trial, place, field, row.get(field), (Unit::Millimetres, 3));
+            let as_number = |field| phrases::value(trial, place, field, row.get(field), (Unit::Millimetres, 3));
             for (of, (field, _)) in metrics.iter().enumerate() {
                 points[of][index]
                     .extend(row.get(*field).map(|value| [frame.number as f64 + aside(index), value * 1e3]));
             }
-            let at = tell::frame(trial, frame.number, frame.stamp_ns);
+            let at = phrases::frame(trial, frame.number, frame.stamp_ns);
             let object = trial.object(row).to_owned();
             data.line(
                 false,
@@ -49,8 +49,8 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
                     names[index].clone().into(),
                     at.into(),
                     object.into(),
-                    told(Field::M1).into(),
-                    told(Field::M2).into(),
+                    as_number(Field::M1).into(),
+                    as_number(Field::M2).into(),
                 ],
             );
         }

@@ -2,8 +2,8 @@
 
 use super::{axis, caption, distinct};
 use crate::{
-    Row, Summary,
-    content::tell,
+    Row, RunSummary,
+    content::phrases,
     document::{Cell, Figure, Head, Table, text},
     figure::{Axis, Chart, Layer, Panel},
     format::headed,
@@ -12,7 +12,7 @@ use crate::{
 
 /// A heat map a method over the first two conditions with numbers, or else over the only two axes, where every cell is
 /// one trial.
-pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
+pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let numeric = axis::keys(summary);
     let keys = if numeric.len() < 2 { varying(summary) } else { numeric };
     let [first, second] = keys.get(..2)? else { return None };
@@ -39,11 +39,11 @@ pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
         for (index, row) in summary.rows.iter().enumerate().filter(|(index, _)| others(*index) == *name) {
             let at = |key: &str, ticks: &[String]| ticks.iter().position(|tick| *tick == value(row, key));
             let (x, y) = (at(first, &columns)? as f64, at(second, &lines)? as f64);
-            let share = row.found as f64 / row.attempted.max(1) as f64;
-            let number = tell::percent(&run.trials[index], "found", row.found, row.attempted);
-            values.push(([x, y, share], format!("{:.0}", 100.0 * share)));
+            let fraction = row.found as f64 / row.attempted.max(1) as f64;
+            let number = phrases::percent(&run.trials[index], "found", row.found, row.attempted);
+            values.push(([x, y, fraction], format!("{:.0}", 100.0 * fraction)));
             let place = |key: &str| match axis::on(row, key) {
-                Some(number) => Cell::from(tell::axis(&run.trials[index], key, Some(number))),
+                Some(number) => Cell::from(phrases::axis(&run.trials[index], key, Some(number))),
                 None => value(row, key).into(),
             };
             data.line(false, vec![name.clone().into(), place(first), place(second), number.into()]);
@@ -64,7 +64,7 @@ pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
 }
 
 /// The axes along which trials differ, where these are two.
-fn varying(summary: &Summary) -> Vec<String> {
+fn varying(summary: &RunSummary) -> Vec<String> {
     let axes = summary.rows.first().map(|row| row.axes.clone()).unwrap_or_default();
     let differs = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
     let keys: Vec<String> = axes.into_iter().map(|axis| axis.key).filter(differs).collect();
@@ -76,7 +76,7 @@ fn value(row: &Row, key: &str) -> String {
 }
 
 /// The values of an axis: numbers by size, words as they come.
-fn ticks(summary: &Summary, key: &str) -> Vec<String> {
+fn ticks(summary: &RunSummary, key: &str) -> Vec<String> {
     let mut values = distinct(summary.rows.iter().map(|row| value(row, key)));
     if summary.rows.iter().all(|row| axis::on(row, key).is_some()) {
         let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);

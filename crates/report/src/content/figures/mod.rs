@@ -9,12 +9,12 @@ mod rates;
 mod recall;
 mod sawtooth;
 mod tolerance;
-mod way;
+mod trajectory;
 
 use rayon::prelude::*;
 
 use crate::{
-    Summary,
+    RunSummary,
     document::{Block, Figure, Text, text},
     paired,
     run::{Run, Trial},
@@ -27,7 +27,7 @@ pub(super) use cost::search_cost;
 pub(super) use sawtooth::figure as sawtooth;
 
 /// Those that show results.
-pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
+pub(super) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
     let main = || {
         if super::limits::known(summary) { None } else { axis::errors(run, summary).or_else(|| frames::errors(run)) }
     };
@@ -38,12 +38,12 @@ pub(super) fn blocks(run: &Run, summary: &Summary) -> Vec<Block> {
         &|| recall::figure(run),
         &|| tolerance::precision_recall(run, summary),
         &|| grid::figure(run, summary),
-        &|| way::figure(run),
+        &|| trajectory::figure(run),
         &|| consistency::histogram(run),
         &|| consistency::coverage(run),
     ];
-    let drawn: Vec<Option<Figure>> = all.par_iter().map(|figure| figure()).collect();
-    drawn.into_iter().flatten().map(Block::Figure).collect()
+    let plotted: Vec<Option<Figure>> = all.par_iter().map(|figure| figure()).collect();
+    plotted.into_iter().flatten().map(Block::Figure).collect()
 }
 
 /// Camera, noise and source of what all trials share, in one sentence.
@@ -70,11 +70,11 @@ pub(super) fn figure(
     Some(Figure { id: id.to_owned(), caption, drawing: chart.draw()?, data })
 }
 
-/// The groups of trials on the same frames, at most `most` of them, with what their members are called.
-fn panels(run: &Run, most: usize) -> Vec<(String, Vec<(String, &Trial)>)> {
+/// The groups of trials on the same frames, at most `max` of them, with what their members are called.
+fn panels(run: &Run, max: usize) -> Vec<(String, Vec<(String, &Trial)>)> {
     let groups = paired::groups(run);
     // Of many conditions the first, the last, and some between.
-    let step = groups.len().div_ceil(most).max(1);
+    let step = groups.len().div_ceil(max).max(1);
     let chosen = groups.iter().step_by(step);
     chosen
         .map(|members| {

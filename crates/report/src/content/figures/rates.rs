@@ -2,21 +2,21 @@
 
 use super::caption;
 use crate::{
-    Summary,
-    content::tell,
+    RunSummary,
+    content::phrases,
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
+    proportion,
     run::Run,
-    share,
 };
 
 /// More lines are no picture.
-const MOST: usize = 36;
+const MAX: usize = 36;
 
 /// The shares of the attempts with their 95 % intervals.
-pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
+pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let n = summary.rows.len();
-    if !(2..=MOST).contains(&n) {
+    if !(2..=MAX).contains(&n) {
         return None;
     }
     let heads =
@@ -27,20 +27,20 @@ pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
         let (mut spans, mut marks) = (Vec::new(), Vec::new());
         for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
             let k = if series == 0 { row.found } else { row.wrong };
-            let share = tell::percent(trial, group, k, row.attempted);
-            let [low, high] = tell::interval(trial, group, k, row.attempted);
+            let fraction = phrases::percent(trial, group, k, row.attempted);
+            let [low, high] = phrases::interval(trial, group, k, row.attempted);
             let at = (n - 1 - index) as f64 + if series == 0 { 0.14 } else { -0.14 };
-            if let (Some(share), Some(low), Some(high)) = (share.value, low.value, high.value) {
+            if let (Some(fraction), Some(low), Some(high)) = (fraction.value, low.value, high.value) {
                 spans.push([at, low, high]);
-                marks.push([share, at]);
+                marks.push([fraction, at]);
             }
-            let name = Summary::name(run, trial);
-            data.line(false, vec![name.into(), group.into(), share.into(), low.into(), high.into()]);
+            let name = RunSummary::name(run, trial);
+            data.line(false, vec![name.into(), group.into(), fraction.into(), low.into(), high.into()]);
         }
         layers.push(Layer::Spans { series, values: spans });
         layers.push(Layer::Marks { series, points: marks, radius: 2.2 });
     }
-    let names = run.trials.iter().rev().map(|trial| Summary::name(run, trial)).collect();
+    let names = run.trials.iter().rev().map(|trial| RunSummary::name(run, trial)).collect();
     let panel = Panel {
         x: Axis::linear("share of the attempts (%)").within([-1.0, 101.0]),
         y: Axis::named("", names),
@@ -50,7 +50,7 @@ pub(super) fn figure(run: &Run, summary: &Summary) -> Option<Figure> {
     let shape = ((n as f64 * 15.0 + 34.0) / 482.0).clamp(0.16, 1.2);
     let legend = vec![Entry::mark("found", 0), Entry::mark("wrong", 1)];
     let chart = Chart { panels: vec![panel], columns: 1, page: true, shape, legend };
-    let intervals = share::called(run.trials.iter().map(|trial| &trial.header));
+    let intervals = proportion::called(run.trials.iter().map(|trial| &trial.header));
     let said = format!(
         "Share of the attempts that were found, and of those that gave a wrong fix, with {intervals}; what is missing to 100 % was refused."
     );

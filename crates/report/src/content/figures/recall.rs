@@ -3,11 +3,11 @@
 use super::{caption, distinct, panels, series};
 use crate::{
     Field, Key, Number,
-    content::limits::share_axes,
+    content::limits::same_axes,
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
+    proportion,
     run::Run,
-    share,
 };
 
 /// So many lines between their bands can be told apart.
@@ -29,7 +29,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     let heads = [Head::words("condition"), Head::words("series"), Head::numbers("m2 below (mm)")];
     let heads = heads.into_iter().chain(["recall (%)", "low (%)", "high (%)"].map(Head::numbers));
     let mut data = Table::new("recall", text!["Every point of the figure of recall."], heads.collect());
-    let mut drawn = Vec::new();
+    let mut plotted = Vec::new();
     for (condition, members) in &groups {
         let (mut bands, mut lines) = (Vec::new(), Vec::new());
         for (name, trial) in members {
@@ -38,21 +38,21 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             if errors.iter().all(|error| error.is_infinite()) {
                 continue;
             }
-            let trajectory = share::is_trajectory(&trial.header);
+            let trajectory = proportion::is_trajectory(&trial.header);
             let (mut line, mut band) = (Vec::new(), Vec::new());
-            for ((threshold, bound), (low, high)) in share::bounds().zip(share::band(trajectory, &errors)) {
+            for ((threshold, bound), (low, high)) in proportion::bounds().zip(proportion::band(trajectory, &errors)) {
                 let k = errors.iter().filter(|error| **error <= bound).count();
                 // One rounding: of a tie another order of the two would print another last digit.
-                let share = 100.0 * k as f64 / n as f64;
-                let [low, high] = [low, high].map(|share| 100.0 * share);
-                line.push([threshold, share]);
+                let fraction = 100.0 * k as f64 / n as f64;
+                let [low, high] = [low, high].map(|fraction| 100.0 * fraction);
+                line.push([threshold, fraction]);
                 band.push([threshold, low, high]);
-                let told = |(what, value): (&str, f64)| {
+                let as_number = |(what, value): (&str, f64)| {
                     let what = format!("{what} m2_rms<={threshold} of attempted in mm");
                     Number::new(Some(value), 2, Key::of(trial, "/metrics/evaluation", what)).into()
                 };
                 let mut cells = vec![condition.clone().into(), name.clone().into(), threshold.to_string().into()];
-                cells.extend([("percent", share), ("low", low), ("high", high)].map(told));
+                cells.extend([("percent", fraction), ("low", low), ("high", high)].map(as_number));
                 data.line(false, cells);
             }
             // Areas of several would hide each other.
@@ -64,7 +64,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             lines.push(Layer::Line { series, points: line });
         }
         bands.extend(lines);
-        drawn.push(Panel {
+        plotted.push(Panel {
             title: condition.clone(),
             x: Axis::logarithmic("m2 below (mm)").at(vec![1.0, 2.0, 5.0, 10.0, 20.0, 50.0]),
             y: Axis::linear("recall (%)").within([0.0, 104.0]),
@@ -72,12 +72,12 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             equal: false,
         });
     }
-    share_axes(&mut drawn);
-    let columns = drawn.len().clamp(1, 3).min(if drawn.len() == 4 { 2 } else { 3 });
-    let page = drawn.len() > 1;
+    same_axes(&mut plotted);
+    let columns = plotted.len().clamp(1, 3).min(if plotted.len() == 4 { 2 } else { 3 });
+    let page = plotted.len() > 1;
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
-    let chart = Chart { panels: drawn, columns, page, shape: if columns == 2 { 0.6 } else { 0.75 }, legend };
-    let bands = share::called(run.trials.iter().map(|trial| &trial.header)).replace("intervals", "bands");
+    let chart = Chart { panels: plotted, columns, page, shape: if columns == 2 { 0.6 } else { 0.75 }, legend };
+    let bands = proportion::called(run.trials.iter().map(|trial| &trial.header)).replace("intervals", "bands");
     let said = format!(
         "Recall: the share of all attempts whose m2 is below a bound, with {bands}; refused and wrong attempts are below none."
     );

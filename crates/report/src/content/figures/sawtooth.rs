@@ -2,12 +2,12 @@
 
 use super::{caption, figure as finish};
 use crate::{
-    content::tell::{self, Unit},
+    content::phrases::{self, Unit},
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::condition,
+    navigation_quantity::{Counted, NavigationQuantity},
     run::{Run, Trial},
-    sailed::{Counted, Sailed},
 };
 
 /// At most so many trials, one above the other.
@@ -17,7 +17,7 @@ const PANELS: usize = 4;
 /// The gaps are stretches without a pose.
 pub(crate) fn figure(run: &Run) -> Option<Figure> {
     let trials: Vec<&Trial> =
-        run.trials.iter().filter(|trial| trial.sample().any(|frame| frame.sailed.is_some())).take(PANELS).collect();
+        run.trials.iter().filter(|trial| trial.sample().any(|frame| frame.navigated.is_some())).take(PANELS).collect();
     let heads = [
         Head::words("trial"),
         Head::numbers("frame"),
@@ -31,29 +31,31 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         let start = trial.span()[0];
         let (mut runs, mut alone, mut fixes) = (vec![Vec::new()], vec![Vec::new()], Vec::new());
         for frame in trial.sample() {
-            let Some(sailed) = &frame.sailed else { continue };
+            let Some(navigated) = &frame.navigated else { continue };
             let seconds = (frame.stamp_ns - start) as f64 * 1e-9;
-            let value = |quantity| sailed.get(quantity).map(|metres| [seconds, metres * 1e3]);
-            for (quantity, lines) in [(Sailed::Position, &mut runs), (Sailed::AlonePosition, &mut alone)] {
+            let value = |quantity| navigated.get(quantity).map(|metres| [seconds, metres * 1e3]);
+            for (quantity, lines) in
+                [(NavigationQuantity::Position, &mut runs), (NavigationQuantity::AlonePosition, &mut alone)]
+            {
                 match (value(quantity), lines.last_mut()) {
                     (Some(point), Some(line)) => line.push(point),
                     (None, Some(line)) if !line.is_empty() => lines.push(Vec::new()),
                     _ => {}
                 }
             }
-            let fixed = sailed.is(Counted::Referenced);
-            fixes.extend(value(Sailed::Position).filter(|_| fixed));
-            let told = |quantity| {
+            let fixed = navigated.is(Counted::Fix);
+            fixes.extend(value(NavigationQuantity::Position).filter(|_| fixed));
+            let as_number = |quantity| {
                 let place = (frame.number, frame.stamp_ns);
-                tell::sailed_at(trial, place, quantity, sailed.get(quantity), (Unit::Millimetres, 3)).into()
+                phrases::navigated_at(trial, place, quantity, navigated.get(quantity), (Unit::Millimetres, 3)).into()
             };
             data.line(
                 false,
                 vec![
                     trial.header.trial.clone().into(),
-                    tell::frame(trial, frame.number, frame.stamp_ns).into(),
-                    told(Sailed::Position),
-                    told(Sailed::AlonePosition),
+                    phrases::frame(trial, frame.number, frame.stamp_ns).into(),
+                    as_number(NavigationQuantity::Position),
+                    as_number(NavigationQuantity::AlonePosition),
                     (if fixed { "yes" } else { "" }).into(),
                 ],
             );

@@ -4,20 +4,20 @@ use seafix_log::Outcome;
 
 use super::{axis, caption, distinct, figure, series};
 use crate::{
-    Field, Key, Number, Row, Summary,
-    content::tell,
+    Field, Key, Number, Row, RunSummary,
+    content::phrases,
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::{headed, short, trimmed},
-    run::{Attempt, Run},
+    run::{AttemptRow, Run},
 };
 
 /// More methods, or more conditions, are no picture.
-const MOST: usize = 7;
+const MAX: usize = 7;
 
 /// Precision over recall of the identified points along the tolerance Δ, a line a method, a panel a condition. The tolerance
 /// with the greatest harmonic mean of both has a ring.
-pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
+pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let key = axis::keys(summary).into_iter().find(|key| key.contains("tolerance"))?;
     let condition = |row: &Row| {
         let others = row.conditions().filter(|axis| axis.key != key);
@@ -25,7 +25,7 @@ pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
     };
     let conditions = distinct(summary.rows.iter().map(condition));
     let names = distinct(summary.rows.iter().map(Row::method));
-    if names.len() > MOST || conditions.len() > MOST {
+    if names.len() > MAX || conditions.len() > MAX {
         return None;
     }
     let heads = [Head::words("condition"), Head::words("method"), Head::numbers(headed(&key))].into_iter();
@@ -39,10 +39,10 @@ pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
             let rows = summary.rows.iter().zip(&run.trials);
             for (row, trial) in rows.filter(|(row, _)| condition(row) == *title && row.method() == *name) {
                 // What a refused attempt had in hand is no answer; what it could have seen counts.
-                let sum = |field: Field, of: fn(&Attempt) -> bool| -> f64 {
+                let sum = |field: Field, of: fn(&AttemptRow) -> bool| -> f64 {
                     trial.attempts().filter(|(_, row)| of(row)).filter_map(|(_, row)| row.get(field)).sum()
                 };
-                let fixed = |row: &Attempt| row.outcome == Outcome::Referenced;
+                let fixed = |row: &AttemptRow| row.outcome == Outcome::Fix;
                 let (correct, identified) = (sum(Field::Correct, fixed), sum(Field::Identified, fixed));
                 let visible = sum(Field::Visible, |_| true);
                 let tolerance = axis::on(row, &key)?;
@@ -52,12 +52,12 @@ pub(super) fn precision_recall(run: &Run, summary: &Summary) -> Option<Figure> {
                 }
                 let [recall, precision] = [correct / visible, correct / identified];
                 points.push((tolerance, [recall, precision]));
-                let told = |over: &str, value| {
+                let as_number = |over: &str, value| {
                     let what = format!("sum correct_pairs by {over}");
                     Number::new(Some(value), 4, Key::of(trial, "/metrics/evaluation", what)).into()
                 };
-                let at = tell::axis(trial, &key, Some(tolerance)).into();
-                let ends = [told("visible", recall), told("identified of referenced", precision)];
+                let at = phrases::axis(trial, &key, Some(tolerance)).into();
+                let ends = [as_number("visible", recall), as_number("identified of fixes", precision)];
                 data.line(false, [title.clone().into(), name.clone().into(), at].into_iter().chain(ends).collect());
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -132,8 +132,8 @@ fn broken(words: Vec<Word>, style: Style, hanging: f64) -> Vec<Vec<Word>> {
 }
 
 /// A word too long for a line, in parts that fit.
-fn fitting(word: Word, most: f64) -> Vec<Word> {
-    if width(&word) <= most {
+fn fitting(word: Word, max: f64) -> Vec<Word> {
+    if width(&word) <= max {
         return vec![word];
     }
     let (mut parts, mut part, mut used): (Vec<Word>, Word, f64) = (Vec::new(), Vec::new(), 0.0);
@@ -141,7 +141,7 @@ fn fitting(word: Word, most: f64) -> Vec<Word> {
         let mut text = String::new();
         for c in piece.text.chars() {
             let more = piece.font.width(c.encode_utf8(&mut [0; 4]), piece.size);
-            if used + more > most && used > 0.0 {
+            if used + more > max && used > 0.0 {
                 part.push(Piece { text: std::mem::take(&mut text), ..piece.clone() });
                 parts.push(std::mem::take(&mut part));
                 used = 0.0;

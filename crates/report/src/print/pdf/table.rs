@@ -77,13 +77,13 @@ impl Grid {
             let all: f64 = widths.iter().sum::<f64>() + gaps;
             let prose: Vec<bool> = (0..table.columns()).map(|place| prose(table, place)).collect();
             if all <= WIDTH || prose.contains(&true) || size <= 4.6 {
-                return Self::laid(table, size, widths, &prose, all);
+                return Self::arranged(table, size, widths, &prose, all);
             }
             size -= 0.2;
         }
     }
 
-    fn laid(table: &Table, size: f64, mut widths: Vec<f64>, prose: &[bool], all: f64) -> Self {
+    fn arranged(table: &Table, size: f64, mut widths: Vec<f64>, prose: &[bool], all: f64) -> Self {
         let over = all - WIDTH;
         if over > 0.0 {
             let long: f64 = widths.iter().zip(prose).filter(|(_, prose)| **prose).map(|(width, _)| width).sum();
@@ -131,14 +131,14 @@ impl Grid {
 
     fn height(&self, table: &Table, line: &Line) -> f64 {
         let mut place = 0;
-        let mut most = 1;
+        let mut max = 1;
         for cell in &line.cells {
             if cell.prose {
-                most = most.max(paragraph::lines(&cell.text, self.of_cell(table, place, cell)));
+                max = max.max(paragraph::lines(&cell.text, self.of_cell(table, place, cell)));
             }
             place += cell.width();
         }
-        most as f64 * self.size * LEADING
+        max as f64 * self.size * LEADING
     }
 
     fn line(&self, sheets: &mut Sheets, table: &Table, line: &Line, top: f64) {
@@ -219,15 +219,15 @@ fn prose(table: &Table, place: usize) -> bool {
 fn needed(table: &Table, place: usize, size: f64) -> f64 {
     let style = Style { size, align: Align::Left, left: 0.0, width: f64::INFINITY, font: Font::Regular };
     let head = table.heads.last().and_then(|heads| heads.get(place)).map_or("", |head| &head.text[..]);
-    let mut most = natural(&[Span::Italic(head.to_owned())], style);
+    let mut max = natural(&[Span::Italic(head.to_owned())], style);
     for line in &table.lines {
         let mut at = 0;
         for cell in &line.cells {
             if at == place && cell.width() == 1 {
-                most = most.max(natural(&cell.text, style));
+                max = max.max(natural(&cell.text, style));
             }
             at += cell.width();
         }
     }
-    most + 0.01
+    max + 0.01
 }

@@ -10,7 +10,7 @@ const ROWS: usize = 6;
 /// Left descriptors in a block: what a key's place can say, whole groups of [`ROWS`].
 const BLOCK: usize = 252;
 /// Right descriptors in one piece of work, at most: as many panels as a key's place can say.
-pub(super) const MOST: usize = COLUMNS * super::keys::PLACES;
+pub(super) const MAX: usize = COLUMNS * super::keys::PLACES;
 
 /// What one piece of the right descriptors makes of all left ones.
 #[derive(Debug, Default)]

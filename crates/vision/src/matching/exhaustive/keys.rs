@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_least_three_of_a_lane_are_read_back() {
+    fn the_smallest_three_of_a_lane_are_read_back() {
         let mut keys = Keys::NONE;
         for (place, value) in [5.0_f32, 2.0, 7.0, 2.0, 3.0].into_iter().enumerate() {
             keys.offer(&std::array::from_fn(|lane| key_of_number(value + lane as f32, place as i32)));

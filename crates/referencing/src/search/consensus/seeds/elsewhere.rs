@@ -3,10 +3,10 @@
 use super::{
     super::{
         bits::{intersect, is_set, ones},
-        graph::Graph,
+        graph::ConsistencyGraph,
         likelihood::{Mode, Terms},
     },
-    LEAST, Seeds,
+    MIN, Seeds,
 };
 
 /// Beginnings of a pose that is sought whatever it is worth, and vertices compared for each.
@@ -36,7 +36,7 @@ impl Seeds<'_> {
             self.of_three = ones(&common, graph.starts[after]).filter(|&v| is_set(graph.row(c), v)).collect();
             self.follow([a, b, c], 0.0);
             let shared = |mode: &Mode| mode.members.iter().filter(|&&v| than.holds(v)).count();
-            self.modes.retain(|mode| shared(mode) < LEAST);
+            self.modes.retain(|mode| shared(mode) < MIN);
             if !self.modes.is_empty() {
                 break;
             }
@@ -45,7 +45,7 @@ impl Seeds<'_> {
     }
 
     /// Of some vertices, taken evenly where they are many, those with the most later neighbours among others.
-    fn best_connected(&self, of: &[u64], among: &[u64], most: usize) -> Vec<usize> {
+    fn best_connected(&self, of: &[u64], among: &[u64], max: usize) -> Vec<usize> {
         let graph = self.climb.graph;
         let all: Vec<usize> = ones(of, 0).collect();
         let neighbours =
@@ -53,12 +53,12 @@ impl Seeds<'_> {
         let some = all.iter().step_by(all.len().div_ceil(COMPARED_BEGINNINGS).max(1));
         let mut counted: Vec<(u32, usize)> = some.map(|&v| (neighbours(v), v)).collect();
         counted.sort_unstable_by_key(|&(count, v)| (std::cmp::Reverse(count), v));
-        counted.into_iter().take(most).map(|(_, v)| v).collect()
+        counted.into_iter().take(max).map(|(_, v)| v).collect()
     }
 }
 
 /// The pairs that a pose does not explain, one bit each; `free` ones only, if their cloud point is in none of its pairs either.
-fn contradicting(terms: &Terms, graph: &Graph, pose: &Mode, free: bool) -> Vec<u64> {
+fn contradicting(terms: &Terms, graph: &ConsistencyGraph, pose: &Mode, free: bool) -> Vec<u64> {
     let mut taken: Vec<usize> = pose.members.iter().map(|&v| graph.vertices[v].cloud).collect();
     taken.sort_unstable();
     let mut bits = vec![0; graph.vertices.len().div_ceil(64)];

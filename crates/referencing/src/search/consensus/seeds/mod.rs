@@ -13,11 +13,11 @@ use super::{
     Motion,
     bits::{Held, intersect, is_set, ones, shared},
     bound::{After, Bounds},
-    graph::Graph,
+    distance_residual::{Edge, lost_to, residual_of_three},
+    graph::ConsistencyGraph,
     likelihood::{Mode, Terms},
-    modes::Climb,
-    rough::Rough,
-    strain::{Edge, lost_to, strain_of_three},
+    local_maxima::Climb,
+    prior_terms::PriorTerms,
 };
 use crate::{ModelPoint, lanes::ones_of};
 pub(in crate::search) use queue::Pair;
@@ -32,12 +32,12 @@ const COMPARED: usize = 16;
 /// Pairs are counted at so many vertices or a few more.
 const COUNTED: usize = 256;
 /// The least set that a pose can come from.
-const LEAST: usize = 3;
+const MIN: usize = 3;
 /// Modes kept.
 const KEPT: usize = 256;
 /// Pairs kept to be followed, and parts of sets besides: 12 bytes each.
-const MOST_PAIRS: usize = 8_000_000;
-const MOST_PARTS: usize = 2_000_000;
+const MAX_PAIRS: usize = 8_000_000;
+const MAX_PARTS: usize = 2_000_000;
 /// What a pose from three points, the climb to its mode and each pair compared with a motion on the way cost, in
 /// words read.
 const COST_OF_A_POSE: u64 = 16;
@@ -87,7 +87,7 @@ fn insert(modes: &mut Vec<Mode>, mode: Mode) {
 /// Sets of fewer pairs than the whole, and how far they are looked for.
 struct Parts {
     /// Sets of so many pairs are no parts.
-    whole: usize,
+    full: usize,
     /// Of so many pairs that lead to no more than parts one is looked at.
     every: usize,
     /// What parts may cost once all pairs are known, and what is spent in all when that is spent.
@@ -99,8 +99,8 @@ struct Parts {
 
 impl Parts {
     /// No limits: there are none.
-    fn none(least: usize) -> Self {
-        Self { whole: least, every: 1, follow: u64::MAX, until: u64::MAX, dropped: false }
+    fn none(min: usize) -> Self {
+        Self { full: min, every: 1, follow: u64::MAX, until: u64::MAX, dropped: false }
     }
 }
 
@@ -143,9 +143,9 @@ impl<'a> Seeds<'a> {
     /// least.
     pub(in crate::search) fn new(
         model: &'a [ModelPoint],
-        (terms, rough, graph): (&'a Terms, &'a Rough, &'a Graph),
+        (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
         taken: &'a BTreeSet<usize>,
-        (least, floor): (usize, f64),
+        (min, floor): (usize, f64),
         budget: u64,
     ) -> Self {
         let words = graph.vertices.len().div_ceil(64);
@@ -153,10 +153,10 @@ impl<'a> Seeds<'a> {
         let untaken = |v: &usize| !taken.contains(&graph.vertices[*v].cloud);
         (0..graph.vertices.len()).filter(untaken).for_each(|v| free[v / 64] |= 1 << (v % 64));
         Self {
-            climb: Climb { model, terms, rough, graph, taken, compared: Cell::new(0) },
-            bounds: Bounds::of((terms, rough, graph), least),
+            climb: Climb { model, terms, prior_terms, graph, taken, compared: Cell::new(0) },
+            bounds: Bounds::of((terms, prior_terms, graph), min),
             budget,
-            parts: Parts::none(least),
+            parts: Parts::none(min),
             spent: 0,
             modes: Vec::new(),
             floor,
@@ -180,11 +180,11 @@ impl<'a> Seeds<'a> {
     }
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
-        let (wholes, parts, complete) = self.pairs();
+        let (full_sets, parts, complete) = self.pairs();
         let until = self.spent.saturating_add(self.parts.follow);
         self.parts.until = until;
         let looked_for = self.threshold();
-        let (pairs, followed) = self.follow_all(wholes, self.budget);
+        let (pairs, followed) = self.follow_all(full_sets, self.budget);
         let complete = followed && complete;
         let followed = self.follow_all(parts, until).1 && self.spent <= until;
         let parts = followed && self.parts.every == 1 && !self.parts.dropped;
@@ -192,18 +192,18 @@ impl<'a> Seeds<'a> {
     }
 
     /// Follows the pairs whose bound is of interest, the greatest first, until so much is spent; these pairs, and whether that was enough.
-    fn follow_all(&mut self, mut pairs: Vec<Pair>, most: u64) -> (Vec<Pair>, bool) {
+    fn follow_all(&mut self, mut pairs: Vec<Pair>, max: u64) -> (Vec<Pair>, bool) {
         pairs.retain(|(bound, ..)| f64::from(*bound) >= self.threshold());
         let mut queue = Queue::of(pairs);
         while let Some((bound, a, b)) = queue.next() {
             if f64::from(bound) < self.threshold() {
                 break;
             }
-            if self.spent > most {
+            if self.spent > max {
                 return (queue.into_pairs(), false);
             }
             if self.spent > self.parts.until {
-                self.bounds.least = self.parts.whole;
+                self.bounds.min = self.parts.full;
             }
             self.follow_pair(a as usize, b as usize);
         }
@@ -213,15 +213,15 @@ impl<'a> Seeds<'a> {
     /// Sets of fewer than so many pairs are parts. Of the pairs that lead to no more than parts as many are looked at, evenly, as can
     /// be with so much work, so that what many of them lead to is found all the same; and once all are known they are followed
     /// with no more than so much, what leads to the others first. Both come on top of the budget.
-    pub(in crate::search) fn with_parts(mut self, whole: usize, look: u64, follow: u64) -> Self {
+    pub(in crate::search) fn with_parts(mut self, full: usize, limit: u64, follow: u64) -> Self {
         let graph = self.climb.graph;
         let some = (graph.vertices.len() / COUNTED).max(1);
         let edges: usize = ones(&self.free, 0).step_by(some).map(|a| some * shared(graph.row(a), &self.free, a)).sum();
         // Rows are read from the second of a pair on: a third of them on average.
         let cost = edges as u64 * self.row.len() as u64 / 3;
-        let every = cost.div_ceil(look.max(1)).max(1) as usize;
+        let every = cost.div_ceil(limit.max(1)).max(1) as usize;
         self.budget = self.budget.saturating_add(cost / every as u64).saturating_add(follow);
-        self.parts = Parts { whole, every, follow, ..self.parts };
+        self.parts = Parts { full, every, follow, ..self.parts };
         self
     }
 
@@ -244,45 +244,45 @@ impl<'a> Seeds<'a> {
             self.spent += self.row.len() as u64;
             let count = intersect(graph.row(a), &self.free, &graph.lasts, 0, &mut self.row);
             let threshold = self.threshold();
-            let asked = (self.bounds.least, threshold);
-            let (most, bound) = self.bounds.with_common((1, own), (&self.row, count), rank + 1, asked);
+            let asked = (self.bounds.min, threshold);
+            let (max, bound) = self.bounds.with_common((1, own), (&self.row, count), rank + 1, asked);
             if bound < threshold {
                 continue;
             }
-            let leads_to_whole = most >= self.parts.whole;
+            let leads_to_full = max >= self.parts.full;
             Held::list(&self.row, graph.starts[rank + 1], &mut self.held);
             self.bounds.list(&self.held, &mut self.after);
             for b in self.held.iter().flat_map(Held::ones) {
                 let chosen = (a + b).is_multiple_of(self.parts.every);
-                if !chosen && !leads_to_whole {
+                if !chosen && !leads_to_full {
                     continue;
                 }
-                let least = if chosen { self.bounds.least } else { self.parts.whole };
+                let min = if chosen { self.bounds.min } else { self.parts.full };
                 let gains = own + self.bounds.gain(b);
                 let next = graph.rank[b] as usize + 1;
                 if self.bounds.reach(2, gains, ranks - next) < threshold {
                     continue;
                 }
-                let asked = (least, threshold);
+                let asked = (min, threshold);
                 self.spent += words_from(graph, next);
                 if self.bounds.falls_short((2, gains), self.after[next - 1], asked) {
                     continue;
                 }
                 let count = intersect(&self.row, graph.row(b), &graph.lasts, graph.starts[next], &mut self.common);
-                let (most, bound) = self.bounds.with_common((2, gains), (&self.common, count), next, asked);
+                let (max, bound) = self.bounds.with_common((2, gains), (&self.common, count), next, asked);
                 if bound >= threshold {
                     // Rounded up, so that it stays a bound.
                     let pair = ((bound as f32).next_up(), a as u32, b as u32);
-                    if most >= self.parts.whole { pairs.push(pair) } else { parts.push(pair) }
+                    if max >= self.parts.full { pairs.push(pair) } else { parts.push(pair) }
                 }
             }
-            if parts.len() > MOST_PARTS {
+            if parts.len() > MAX_PARTS {
                 // Those that lead to the least would hardly be followed.
-                parts.select_nth_unstable_by_key(MOST_PARTS / 2, order);
-                parts.truncate(MOST_PARTS / 2);
+                parts.select_nth_unstable_by_key(MAX_PARTS / 2, order);
+                parts.truncate(MAX_PARTS / 2);
                 self.parts.dropped = true;
             }
-            if self.spent > self.budget || pairs.len() > MOST_PAIRS {
+            if self.spent > self.budget || pairs.len() > MAX_PAIRS {
                 complete = false;
                 break;
             }
@@ -324,7 +324,7 @@ impl<'a> Seeds<'a> {
                 let gains = gains + self.bounds.gain(c);
                 self.spent += words_from(graph, rank + 1);
                 let threshold = self.threshold();
-                if self.bounds.falls_short((3, gains), later[rank], (self.bounds.least, threshold)) {
+                if self.bounds.falls_short((3, gains), later[rank], (self.bounds.min, threshold)) {
                     continue;
                 }
                 // Its own model point's pairs may go on in words to come.
@@ -336,7 +336,7 @@ impl<'a> Seeds<'a> {
                 }
                 let third = &terms.pairs[c];
                 let sides = [&side, &Edge::of(first, third), &Edge::of(second, third)];
-                let lost = lost_to(strain_of_three([first, second, third], sides));
+                let lost = lost_to(residual_of_three([first, second, third], sides));
                 if (lost == 0.0 || enough(gains - lost)) && !self.known([a, b, c]) {
                     self.of_three.clear();
                     self.of_three.extend(after.iter().flat_map(|held| ones_of(held.begin(), held.and(row, from))));
@@ -398,14 +398,14 @@ impl<'a> Seeds<'a> {
     }
 
     fn keep(&mut self, mode: Mode) {
-        if mode.members.len() >= self.bounds.least && mode.ln_evidence >= self.threshold() {
+        if mode.members.len() >= self.bounds.min && mode.ln_evidence >= self.threshold() {
             insert(&mut self.modes, mode);
         }
     }
 }
 
 /// Words of a row from a rank on.
-fn words_from(graph: &Graph, rank: usize) -> u64 {
+fn words_from(graph: &ConsistencyGraph, rank: usize) -> u64 {
     (graph.lasts.len().saturating_sub(graph.starts[rank] / 64) + 1) as u64
 }
 

@@ -31,31 +31,31 @@ fn scene(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>) {
 ///
 /// Seen to fail where the pairs of parts are not followed, and where it is not told that they were not.
 #[test]
-fn a_part_is_found_where_there_are_no_limits_and_a_whole_in_any_case() {
+fn a_part_is_found_where_there_are_no_limits_and_a_full_in_any_case() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     for _ in 0..10 {
         let (model, cloud) = scene(&mut rng);
         let candidates = Candidates::all(POINTS, cloud.len());
         let tolerance = Tolerance::Fixed(0.06);
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
-        let rough = Rough::of(&problem).expect("a box");
-        let graph = Graph::of(&problem, &rough);
-        let terms = Terms::of(&problem, &rough, &graph);
-        let seeds = |taken, least| Seeds::new(&model, (&terms, &rough, &graph), taken, (least, 3.0), u64::MAX / 4);
+        let prior_terms = PriorTerms::of(&problem).expect("a box");
+        let graph = ConsistencyGraph::of(&problem, &prior_terms);
+        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let seeds = |taken, min| Seeds::new(&model, (&terms, &prior_terms, &graph), taken, (min, 3.0), u64::MAX / 4);
         let clouds = |swept: &Swept| -> Vec<usize> {
             let best = swept.modes.first().map(|mode| mode.pairs(&graph)).unwrap_or_default();
             best.iter().map(|pair| pair.cloud).collect()
         };
-        let (none, whole): (_, BTreeSet<usize>) = (BTreeSet::new(), (0..POINTS).collect());
+        let (none, full): (_, BTreeSet<usize>) = (BTreeSet::new(), (0..POINTS).collect());
         let part: Vec<usize> = (POINTS..POINTS + SEEN).collect();
-        let plain = seeds(&whole, LEAST).sweep();
-        let unlimited = seeds(&whole, LEAST).with_parts(SEEN + 2, u64::MAX, u64::MAX / 4).sweep();
+        let plain = seeds(&full, MIN).sweep();
+        let unlimited = seeds(&full, MIN).with_parts(SEEN + 2, u64::MAX, u64::MAX / 4).sweep();
         assert_eq!((clouds(&plain), clouds(&unlimited)), (part.clone(), part));
         assert!(plain.complete && unlimited.complete && unlimited.parts);
-        let wholes = seeds(&whole, LEAST).with_parts(SEEN + 2, 1, 0).sweep();
-        assert!(wholes.complete && !wholes.parts);
-        let all = seeds(&none, LEAST).with_parts(SEEN + 2, 1, 0).sweep();
+        let full_sets = seeds(&full, MIN).with_parts(SEEN + 2, 1, 0).sweep();
+        assert!(full_sets.complete && !full_sets.parts);
+        let all = seeds(&none, MIN).with_parts(SEEN + 2, 1, 0).sweep();
         assert_eq!(clouds(&all), (0..POINTS).collect::<Vec<_>>());
-        assert!(all.complete && all.tests < seeds(&none, LEAST).sweep().tests);
+        assert!(all.complete && all.tests < seeds(&none, MIN).sweep().tests);
     }
 }

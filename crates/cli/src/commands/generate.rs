@@ -1,0 +1,57 @@
+//! `seafix generate`.
+
+use std::{fs, path::PathBuf};
+
+use clap::Args;
+use seafix_simulation::families::{Family, Generated, Presence};
+
+use crate::{
+    atomic_file,
+    exit::{DONE, Ended, Failure, OUTPUT},
+    terminal::print,
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct Generate {
+    /// The family: paper-scale, site-scale, no-prior, putative, lattice, few-visible or dense-clutter.
+    family: Family,
+    /// The seed; equal seeds give equal problems.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How many problems.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    count: u64,
+    /// The number of the first in its family; what is varied cycles with the number.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
+    first: u64,
+    /// Leave the object away: the cloud is clutter.
+    #[arg(long)]
+    absent: bool,
+    /// The folder of the problems; it must not exist, or be empty.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl Generate {
+    pub(crate) fn execute(&self) -> Ended {
+        let failed = |error: &dyn std::fmt::Display| Failure::new(OUTPUT, format!("{}: {error}", self.out.display()));
+        fs::create_dir_all(&self.out).map_err(|error| failed(&error))?;
+        if fs::read_dir(&self.out).map_err(|error| failed(&error))?.next().is_some() {
+            return Err(failed(&"the folder is not empty; name another with --out"));
+        }
+        let presence = if self.absent { Presence::Absent } else { Presence::Present };
+        for number in self.first..self.first + self.count {
+            let generated = Generated::new(self.family, self.seed, number, presence);
+            let file = |end: &str| self.out.join(format!("{}{end}", generated.problem.id));
+            atomic_file::write(&file(".json"), text(serde_json::to_string(&generated.problem)))?;
+            atomic_file::write(&file(".truth.json"), text(serde_json::to_string(&generated.truth)))?;
+        }
+        let problems = if self.count == 1 { "problem" } else { "problems" };
+        print(&format!("{} {problems} and their truth in {}\n", self.count, self.out.display()))?;
+        Ok(DONE)
+    }
+}
+
+fn text(content: serde_json::Result<String>) -> String {
+    content.expect("a problem is plain data")
+}

@@ -1,0 +1,85 @@
+//! Which frames of a trial are logged when all of them would be too many.
+
+use seafix_log::{FrameRecord, Outcome, Totals};
+
+/// Every k-th frame and every failure, as long as they stay within a budget; and what all frames add up to.
+#[derive(Debug)]
+pub(crate) struct Thinned {
+    pub(crate) totals: Totals,
+    failures: u64,
+}
+
+impl Thinned {
+    /// Logs frames whose number `every` divides, and so many failures besides.
+    pub(crate) fn new(every: u64, failures: u64) -> Self {
+        Self { totals: Totals { every, ..Totals::default() }, failures }
+    }
+
+    /// Counts a frame; whether it is logged.
+    pub(crate) fn keeps(&mut self, frame: &FrameRecord) -> bool {
+        self.totals.add(frame);
+        if frame.frame.is_multiple_of(self.totals.every) {
+            return true;
+        }
+        if !failed(frame) {
+            return false;
+        }
+        let room = self.failures > 0;
+        if room {
+            self.failures -= 1;
+        } else {
+            self.totals.failures_left_out += 1;
+        }
+        room
+    }
+}
+
+/// Whether something was refused in a frame, or is wrong.
+pub(crate) fn failed(frame: &FrameRecord) -> bool {
+    let failed =
+        |target: &seafix_log::TargetRecord| target.outcome != Outcome::Fix || target.evaluation.wrong == Some(true);
+    frame.targets.iter().any(failed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use seafix_log::{Evaluation, TargetRecord};
+
+    fn frame(number: u64, wrong: bool) -> FrameRecord {
+        let mut target = TargetRecord::refused("object", "search", "solver", "");
+        target.outcome = Outcome::Fix;
+        target.evaluation = Evaluation {
+            wrong: Some(wrong),
+            m2_rms: Some(2.0),
+            m3_position: Some(3.0),
+            m2_bound: Some(1.0),
+            m3_bound: Some(1.0),
+            nees: Some(6.0),
+            ..Evaluation::default()
+        };
+        FrameRecord { frame: number, targets: vec![target], ..FrameRecord::default() }
+    }
+
+    #[test]
+    fn few_frames_are_all_kept() {
+        let mut thinned = Thinned::new(1, 0);
+        assert!((0..5).all(|number| thinned.keeps(&frame(number, number == 3))));
+        assert_eq!((thinned.totals.frames, thinned.totals.wrong, thinned.totals.every), (5, 1, 1));
+    }
+
+    #[test]
+    fn of_many_every_kth_is_kept_and_failures_within_the_budget() {
+        let mut thinned = Thinned::new(20, 5);
+        // Frames 0, 20, 40, 60, 80, and the first five of the wrong ones besides.
+        let kept: Vec<u64> = (0..100).filter(|&number| thinned.keeps(&frame(number, number % 10 == 1))).collect();
+        assert_eq!(kept, [0, 1, 11, 20, 21, 31, 40, 41, 60, 80]);
+        let totals = &thinned.totals;
+        assert_eq!((totals.frames, totals.wrong, totals.found, totals.failures_left_out), (100, 10, 90, 5));
+        assert_eq!((totals.judged, totals.m2_squares, totals.m3_squares), (100, 400.0, 900.0));
+        assert_eq!(
+            (totals.bounded, totals.m2_bound_squares, totals.nees_sum, totals.nees_within),
+            (100, 100.0, 600.0, 100)
+        );
+    }
+}

@@ -1,0 +1,367 @@
+//! Reading an experiment file, all its faults at once, and the file it is based on.
+
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+use seafix_component::{Fault, Part, place_of, read_text};
+use serde::Deserialize;
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue, Deserializer},
+};
+
+use crate::Experiment;
+
+/// The texts that an experiment is read from: its own, then that of its base.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Texts {
+    files: Vec<(PathBuf, String)>,
+}
+
+impl Texts {
+    /// One file.
+    pub(crate) fn of(file: &Path, text: &str) -> Self {
+        Self { files: vec![(file.to_owned(), text.to_owned())] }
+    }
+
+    /// The fault `what` of this part of the setting at `path`, in the file that says it.
+    pub(crate) fn fault(&self, path: &[&str], part: Part, what: &str) -> Fault {
+        let places = self.files.iter().map(|(file, text)| (file, place_of(text, path, part)));
+        // Where both say as much, the later word is that of the experiment's own file, which is first.
+        let best = places.reduce(|best, next| match (&best.1, &next.1) {
+            (Some((depth, _)), Some((deeper, _))) if deeper > depth => next,
+            (None, Some(_)) => next,
+            _ => best,
+        });
+        match best {
+            Some((file, place)) => Fault::new(what, file).at(place.map(|(_, place)| place)),
+            None => Fault::new(what, Path::new("the experiment")),
+        }
+    }
+}
+
+/// An experiment as far as it can be read.
+pub(crate) struct Read {
+    /// It without what is at fault; `None` where nothing is left.
+    pub(crate) experiment: Option<Experiment>,
+    /// What is at fault.
+    pub(crate) faults: Vec<Fault>,
+    /// Where it stands.
+    pub(crate) texts: Texts,
+}
+
+/// The experiment that `file`, whose text is `text`, holds. `base = "other.toml"` names a file whose settings hold where
+/// this one has none of its own.
+pub(crate) fn experiment(file: &Path, text: &str) -> Read {
+    let mut texts = Texts::of(file, text);
+    let Below { table: mut full, mut faults, all, files } = below(file, text);
+    texts.files.extend(files);
+    let (mut own, mut reported) = sifted(file, text, &full);
+    if !all {
+        reported.retain(|fault| !may_stand_below(fault));
+    }
+    own.remove("base");
+    faults.splice(0..0, reported);
+    overlay(&mut full, own);
+    for (key, stand_in, remedy) in [
+        ("question", "why?", "say in one sentence what the experiment asks"),
+        (
+            "source",
+            "virtual-points",
+            "say where the frames come from: source = \"NAME\"; `seafix list sources` names them",
+        ),
+    ] {
+        if !full.contains_key(key) {
+            // What was at fault has been told already, and what cannot be read may say it.
+            let named = |(_, text): &(PathBuf, String)| place_of(text, &[key], Part::Key).is_some();
+            if all && !texts.files.iter().any(named) {
+                faults.push(Fault::new(format!("no `{key}`"), file).remedy(remedy));
+            }
+            full.insert(key.to_owned(), stand_in.into());
+        }
+    }
+    let experiment = full.try_into().map_err(|error| faults.push(Fault::in_toml(file, "", &error))).ok();
+    Read { experiment, faults, texts }
+}
+
+/// What lies below an experiment's own settings.
+#[derive(Default)]
+struct Below {
+    /// The settings of the base.
+    table: toml::Table,
+    /// What is at fault in it, or with it.
+    faults: Vec<Fault>,
+    /// Whether nothing else stands below.
+    all: bool,
+    /// The base, its text, and the text of its own base.
+    files: Vec<(PathBuf, String)>,
+}
+
+/// What lies below the experiment that `file` holds. A base of a base is a fault, but read as well: what it says is not missing.
+fn below(file: &Path, text: &str) -> Below {
+    let Some(base) = written_base(text) else { return Below { all: true, ..Below::default() } };
+    let (path, own) = match base_of(file, base.as_deref()) {
+        Ok(found) => found,
+        Err((what, remedy)) => {
+            let value = base.map(|base| format!("\"{base}\"")).unwrap_or_default();
+            let fault = Texts::of(file, text).fault(&["base"], Part::Value, &what).value(value).remedy(remedy);
+            return Below { faults: vec![fault], ..Below::default() };
+        }
+    };
+    let (mut faults, mut lowest, mut all) = (Vec::new(), toml::Table::new(), true);
+    let mut files = vec![(path.clone(), own.clone())];
+    if let Some(second) = written_base(&own) {
+        let fault = Texts::of(&path, &own).fault(&["base"], Part::Value, "a base that has a base of its own");
+        faults.push(fault.remedy("an experiment has at most one"));
+        let below = base_of(&path, second.as_deref()).ok();
+        all = below.as_ref().is_some_and(|(_, text)| written_base(text).is_none());
+        if let Some((path, text)) = below {
+            lowest = sifted(&path, &text, &toml::Table::new()).0;
+            lowest.remove("base");
+            files.push((path, text));
+        }
+    }
+    let (mut table, mut reported) = sifted(&path, &own, &lowest);
+    if !all {
+        reported.retain(|fault| !may_stand_below(fault));
+    }
+    faults.extend(reported);
+    table.remove("base");
+    overlay(&mut lowest, table);
+    Below { table: lowest, faults, all, files }
+}
+
+/// What a text says its base is, if it says one: `None` of something that is no text.
+fn written_base(text: &str) -> Option<Option<String>> {
+    let document = DeTable::parse_recoverable(text).0;
+    document.get_ref().get("base").map(|base| base.get_ref().as_str().map(str::to_owned))
+}
+
+/// Whether this is no fault where something below could be read.
+fn may_stand_below(fault: &Fault) -> bool {
+    fault.what.contains("needs a `name`")
+}
+
+/// The file that `base` names, and its text.
+fn base_of(file: &Path, base: Option<&str>) -> Result<(PathBuf, String), (String, &'static str)> {
+    let name = base.ok_or_else(|| ("a base that is no file".to_owned(), "write base = \"FILE.toml\""))?;
+    let path = file.parent().unwrap_or(Path::new("")).join(name);
+    match read_text(&path) {
+        Ok(text) => Ok((path, text)),
+        Err(error) => Err((format!("no base ({error})"), "a base is a file, relative to the experiment's")),
+    }
+}
+
+/// The settings of `over` in place of those of `full`; tables one by one, all else as a whole.
+fn overlay(full: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (full.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) if same_component(below, &above) => {
+                overlay(below, above);
+            }
+            (_, value) => {
+                full.insert(key, value);
+            }
+        }
+    }
+}
+
+/// Whether the settings of `above` can belong to what `below` names: another component has settings of its own.
+fn same_component(below: &toml::Table, above: &toml::Table) -> bool {
+    above.get("name").is_none_or(|name| below.get("name").is_none_or(|known| known == name))
+}
+
+/// The settings of a file that can be read, and what is at fault: that is taken out, and the rest read again. Tables that lie over
+/// ones in `below` may leave their component's name to them.
+fn sifted(file: &Path, text: &str, below: &toml::Table) -> (toml::Table, Vec<Fault>) {
+    let (mut document, errors) = DeTable::parse_recoverable(text);
+    let mut faults: Vec<Fault> = errors.iter().map(|error| Fault::in_toml(file, text, error)).collect();
+    let broken: Vec<Option<usize>> = faults.iter().map(|fault| fault.line).collect();
+    loop {
+        let mut settings = document.clone();
+        settings.get_mut().remove("base");
+        name(settings.get_mut(), below);
+        for (key, value) in stand_ins().into_inner() {
+            if settings.get_ref().get(&**key.get_ref()).is_none() {
+                settings.get_mut().insert(key, value);
+            }
+        }
+        let Err(error) = Experiment::deserialize(Deserializer::from(settings)) else { break };
+        let fault = Fault::in_toml(file, text, &error);
+        let path = error.span().and_then(|span| smallest(document.get_ref(), &span));
+        // What follows from a fault of the writing itself is none of its own.
+        if !broken.contains(&fault.line) || broken.is_empty() {
+            faults.push(fault);
+        }
+        let Some(path) = path else { break };
+        if !without(&mut document, &path) {
+            break;
+        }
+    }
+    let table = toml::Table::deserialize(Deserializer::from(document)).unwrap_or_default();
+    (table, faults)
+}
+
+/// Names the components whose names only the tables below have.
+fn name(settings: &mut DeTable<'_>, below: &toml::Table) {
+    for (key, value) in settings.iter_mut() {
+        let (DeValue::Table(own), Some(toml::Value::Table(below))) = (value.get_mut(), below.get(&**key.get_ref()))
+        else {
+            continue;
+        };
+        if let (Some(known), None) = (below.get("name").and_then(toml::Value::as_str), own.get("name")) {
+            let known = DeValue::String(known.to_owned().into());
+            own.insert(Spanned::new(0..0, "name".into()), Spanned::new(0..0, known));
+        }
+        name(own, below);
+    }
+}
+
+/// What every experiment has, for a file that leaves it to its base.
+fn stand_ins() -> Spanned<DeTable<'static>> {
+    DeTable::parse("question = 'why?'\nsource = 'virtual-points'\n").expect("two settings")
+}
+
+/// The path to the smallest setting that `span` lies in.
+fn smallest(table: &DeTable<'_>, span: &Range<usize>) -> Option<Vec<String>> {
+    fn visit(
+        path: &mut Vec<String>,
+        (at, value): (Range<usize>, &Spanned<DeValue<'_>>),
+        span: &Range<usize>,
+        best: &mut Option<(usize, Vec<String>)>,
+    ) {
+        for place in [at, value.span()] {
+            let holds = place.start <= span.start && span.end <= place.end;
+            if holds && best.as_ref().is_none_or(|(length, _)| place.len() <= *length) {
+                *best = Some((place.len(), path.clone()));
+            }
+        }
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                for (key, value) in table {
+                    path.push(key.get_ref().to_string());
+                    visit(path, (key.span(), value), span, best);
+                    path.pop();
+                }
+            }
+            DeValue::Array(list) => {
+                for (k, value) in list.iter().enumerate() {
+                    path.push(k.to_string());
+                    visit(path, (value.span(), value), span, best);
+                    path.pop();
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut best = None;
+    for (key, value) in table {
+        visit(&mut vec![key.get_ref().to_string()], (key.span(), value), span, &mut best);
+    }
+    best.map(|(_, path)| path)
+}
+
+/// Takes the setting at `path` out of the document; `false` where it is not there.
+fn without(document: &mut Spanned<DeTable<'_>>, path: &[String]) -> bool {
+    fn out(value: &mut DeValue<'_>, path: &[String]) -> bool {
+        match (value, path) {
+            (DeValue::Table(table), path) => out_of(table, path),
+            (DeValue::Array(list), [step]) => {
+                let Ok(k) = step.parse::<usize>() else { return false };
+                let rest = list.clone().into_iter().enumerate().filter(|(i, _)| *i != k);
+                *list = rest.map(|(_, value)| value).collect();
+                true
+            }
+            (DeValue::Array(list), [step, rest @ ..]) => {
+                let place = step.parse::<usize>().ok().and_then(|k| list.get_mut(k));
+                place.is_some_and(|value| out(value.get_mut(), rest))
+            }
+            _ => false,
+        }
+    }
+    fn out_of(table: &mut DeTable<'_>, path: &[String]) -> bool {
+        let Some((step, rest)) = path.split_first() else { return false };
+        if rest.is_empty() {
+            return table.remove(step.as_str()).is_some();
+        }
+        let mut entries = table.iter_mut();
+        entries.find(|(key, _)| key.get_ref() == step.as_str()).is_some_and(|(_, value)| out(value.get_mut(), rest))
+    }
+    out_of(document.get_mut(), path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn said(file: &Path, text: &str) -> Vec<String> {
+        experiment(file, text).faults.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn all_faults_are_reported_at_once() {
+        let text =
+            "question = 'why'\nsorce = 'dive'\nsource = 'dive'\n[pipeline]\nsolvr = 'kabsch'\n  window = 'two'\n";
+        let said = said(Path::new("e.toml"), text);
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert!(said[0].contains("e.toml:2:1: `sorce`; did you mean `source`?"));
+        assert!(said[1].contains("e.toml:5:1: `solvr`; did you mean `solver`?"));
+        assert!(said[2].contains("e.toml:6:12"));
+        assert!(said[2].starts_with("not a whole number of at least 0: string \"two\""), "{said:?}");
+    }
+
+    #[test]
+    fn several_faults_may_stand_on_one_line_and_in_one_list() {
+        let text = "source = { nam = 'dive' }\nseed = -1\nseed = 2\nrepetitions = 'x\n[[vary]]\nvalues = [1]\n\
+                    [[vary]]\nkey = 'seed'\nvalus = 3\nvalues = [1]\n[log]\nimages = 'al'\nx = 1\n";
+        let said = said(Path::new("e.toml"), text);
+        let parts = [
+            "no `question`",
+            "e.toml:1:10",
+            "e.toml:2:8",
+            "e.toml:3:1",
+            "e.toml:4:",
+            "e.toml:5:1: ",
+            "`key` is missing",
+            "e.toml:9:1: `valus`; did you mean `values`?",
+            "did you mean `all`?",
+            "e.toml:13:1",
+        ];
+        for part in parts {
+            assert!(said.iter().any(|line| line.contains(part)), "no {part} in {said:#?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_stated_is_as_in_the_base() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let base = "question = 'how far?'\nseed = 3\nsource = { name = 'dive', frames = 9 }\n";
+        fs::write(at("base.toml"), base).unwrap();
+        let own = "base = 'base.toml'\nquestion = 'how near?'\n[source]\nrate = 2.0\n";
+        let read = experiment(&at("e.toml"), own).experiment.unwrap();
+        assert_eq!((read.question.as_str(), read.seed), ("how near?", 3));
+        assert_eq!((&read.source.settings["frames"], &read.source.settings["rate"]), (&9.into(), &2.0.into()));
+        // Another component keeps nothing of the base's.
+        let other = experiment(&at("e.toml"), "base = 'base.toml'\nsource = { name = 'virtual-points' }\n");
+        let other = other.experiment.unwrap();
+        assert!(other.source.settings.is_empty());
+
+        let missing = said(&at("e.toml"), "base = 'bse.toml'\n[source]\nframes = 2\n");
+        assert!(missing.len() == 1 && missing[0].contains("e.toml:1:8: \"bse.toml\""), "{missing:?}");
+        assert!(said(&at("e.toml"), "base = 'base.toml'\nseeds = 4\n")[0].contains("e.toml:2"));
+        fs::write(at("base.toml"), "base = 'more.toml'\n").unwrap();
+        let own = "base = 'base.toml'\nsource.frames = 2\n";
+        fs::write(at("more.toml"), base).unwrap();
+        for lowest in ["more.toml", "base.toml", "none.toml"] {
+            fs::write(at("base.toml"), format!("base = '{lowest}'\nsource = {{ rate = 2.0 }}\nsede = 2\n")).unwrap();
+            let said = said(&at("e.toml"), own);
+            assert!(said.len() == 2, "{said:?}");
+            assert!(said[0].contains("a base of its own in") && said[0].contains("base.toml:1:8"), "{said:?}");
+            assert!(said[1].contains("base.toml:3:1: `sede`; did you mean `seed`?"), "{said:?}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Stages that several trials of a group share: each is computed once a frame.
+
+use std::sync::{
+    OnceLock,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use seafix::{Cloud, FrameResult, Pipeline, Sought};
+use seafix_log::SharedStages;
+
+use crate::Trial;
+
+/// The trials of a group that have a stage in common: for each trial the place of the first that has the same.
+#[derive(Debug)]
+pub(super) struct Sharing {
+    front_end: Vec<usize>,
+    search: Vec<usize>,
+    odometry: Vec<usize>,
+}
+
+impl Sharing {
+    /// Stages with equal resolved settings are shared; if trials are measured `separate`ly, none is.
+    pub(super) fn of(trials: &[&Trial], separate: bool) -> Self {
+        let first_alike = |alike: fn(&Trial, &Trial) -> bool| -> Vec<usize> {
+            let first = |place: usize| {
+                let same = |other: &usize| !separate && alike(trials[*other], trials[place]);
+                (0..place).find(same).unwrap_or(place)
+            };
+            (0..trials.len()).map(first).collect()
+        };
+        Self {
+            front_end: first_alike(same_front_end),
+            search: first_alike(same_search),
+            odometry: first_alike(same_odometry),
+        }
+    }
+
+    /// The trial that computes the odometry of this one.
+    pub(super) fn odometry_of(&self, trial: usize) -> usize {
+        self.odometry[trial]
+    }
+
+    /// The stages of `frame_result` that this trial shares in a frame.
+    pub(super) fn shared(&self, trial: usize, frame: &SharedFrame, frame_result: &FrameResult) -> SharedStages {
+        let observed = frame_result.times.detect_ms.is_some();
+        let searched = frame_result.attempts.iter().any(|attempt| attempt.times.search_ms.is_some());
+        SharedStages {
+            front_end: observed && frame.clouds[self.front_end[trial]].is_shared(),
+            search: searched && frame.sought[self.search[trial]].is_shared(),
+            odometry: self.odometry.iter().filter(|first| **first == self.odometry[trial]).count() > 1,
+        }
+    }
+}
+
+fn same_front_end(a: &Trial, b: &Trial) -> bool {
+    let stages = |trial: &Trial| {
+        let Pipeline { filters, detector, locator, descriptor, matcher, refinement, triangulator, .. } =
+            trial.resolved.pipeline.clone();
+        (filters, detector, locator, descriptor, matcher, refinement, triangulator)
+    };
+    stages(a) == stages(b)
+}
+
+/// The search starts from the priors of a frame only where no trial navigates. Where shells grow, what is drawn for one
+/// target depends on what the solver made of the one before.
+fn same_search(a: &Trial, b: &Trial) -> bool {
+    let searched = |trial: &Trial| {
+        let Pipeline { target, gate, tolerance, search, .. } = trial.resolved.pipeline.clone();
+        (target, gate, tolerance, search)
+    };
+    let alone = |trial: &Trial| trial.navigation_stack.is_none() && !trial.resolved.pipeline.expand_gates;
+    alone(a) && alone(b) && same_front_end(a, b) && searched(a) == searched(b)
+}
+
+fn same_odometry(a: &Trial, b: &Trial) -> bool {
+    let odometry = |trial: &Trial| trial.resolved.navigation.as_ref().map(|navigation| navigation.odometry.clone());
+    odometry(a).is_some() && odometry(a) == odometry(b)
+}
+
+/// What is shared in one frame; it goes with the frame.
+#[derive(Debug)]
+pub(super) struct SharedFrame {
+    clouds: Vec<Shared<Cloud>>,
+    sought: Vec<Shared<Vec<Option<Sought>>>>,
+}
+
+impl SharedFrame {
+    pub(super) fn new(trials: usize) -> Self {
+        let one_each = 0..trials;
+        Self {
+            clouds: one_each.clone().map(|_| Shared::default()).collect(),
+            sought: one_each.map(|_| Shared::default()).collect(),
+        }
+    }
+
+    /// The cloud of a trial.
+    pub(super) fn cloud(&self, sharing: &Sharing, trial: usize, make: impl FnOnce() -> Cloud) -> &Cloud {
+        self.clouds[sharing.front_end[trial]].get(make)
+    }
+
+    /// The answers of a trial's search to every target; `None` where its search is its own.
+    pub(super) fn sought(
+        &self,
+        sharing: &Sharing,
+        trial: usize,
+        make: impl FnOnce() -> Vec<Option<Sought>>,
+    ) -> Option<&[Option<Sought>]> {
+        let first = sharing.search[trial];
+        let others = sharing.search.iter().filter(|other| **other == first).count() > 1;
+        others.then(|| &**self.sought[first].get(make))
+    }
+}
+
+/// A result that the first who needs it computes.
+#[derive(Debug)]
+struct Shared<T> {
+    result: OnceLock<T>,
+    users: AtomicUsize,
+}
+
+impl<T> Default for Shared<T> {
+    fn default() -> Self {
+        Self { result: OnceLock::new(), users: AtomicUsize::new(0) }
+    }
+}
+
+impl<T> Shared<T> {
+    fn get(&self, make: impl FnOnce() -> T) -> &T {
+        self.users.fetch_add(1, Ordering::Relaxed);
+        self.result.get_or_init(make)
+    }
+
+    /// Whether several trials used it.
+    fn is_shared(&self) -> bool {
+        self.users.load(Ordering::Relaxed) > 1
+    }
+}

@@ -1,0 +1,744 @@
+//! The pose graph: poses that are known by what was measured between them.
+
+use faer::{
+    Mat, Side,
+    linalg::solvers::Solve,
+    sparse::{SparseColMat, Triplet, linalg::solvers::Llt},
+};
+use nalgebra::{Matrix6, SMatrix, Vector6};
+use seafix_geometry::{Camera, Covariance6, Transform, World, right_jacobian_inverse};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::drift::{self, Drift, Numbers, SIDES, Square, Units};
+use crate::{
+    RelativeMotion,
+    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
+};
+
+/// A pose of the graph. Objects stand in it as cameras do; their frames are renamed where they come in.
+type Pose = Transform<World, Camera>;
+
+/// Poses as nodes, measurements as factors:
+///
+/// - `between`: r = log(Z⁻¹ A⁻¹ B), Z the measured motion from A to B;
+/// - `prior`: r = log(Z⁻¹ A), Z the pose itself as something else measured it.
+///
+/// Errors that [last](crate::CorrelatedError) are nodes too, and a motion that has them is a factor of four nodes, the poses and the
+/// errors at both ends of it (`drifting`).
+///
+/// The estimate has the least Σ ρ(rᵀ Σ⁻¹ r). ρ is the identity, and for factors that may be wrong that of a switch:
+/// ρ(x) = s² x + (1 − s)² Φ with s = min(1, 2Φ/(Φ + x)), which gives up what contradicts everything else. Φ is the 99 %
+/// quantile of χ²₆: what is right keeps its whole weight.
+///
+/// A right loop after a long way contradicts the drifted start as much as a wrong one does. So the switch begins wide,
+/// with every factor believed, and narrows to Φ by halves (graduated non-convexity).
+///
+/// Source: Grisetti et al., *A tutorial on graph-based SLAM*, 2010; the switch: Agarwal et al., *Robust map optimization
+/// using dynamic covariance scaling*, ICRA 2013; its narrowing: Yang, Antonante, Tzoumas and Carlone, *Graduated
+/// non-convexity for robust spatial perception*, 2020.
+#[derive(Debug, Clone, Default)]
+pub struct FactorGraph {
+    nodes: Vec<Node>,
+    correlated: Vec<Lasts>,
+    factors: Vec<Factor>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    pose: Pose,
+    held: bool,
+}
+
+/// Errors that last, as they are at one time.
+#[derive(Debug, Clone)]
+struct Lasts {
+    numbers: Numbers,
+    units: Units,
+    /// What is known of them before anything is measured.
+    prior: Option<Square>,
+}
+
+#[derive(Debug, Clone)]
+struct Factor {
+    /// The node it begins at; absent for a prior.
+    from: Option<usize>,
+    to: usize,
+    measured: Pose,
+    weight: Weight,
+    doubtful: bool,
+}
+
+/// How a factor counts.
+#[derive(Debug, Clone)]
+enum Weight {
+    /// By the information of its own error.
+    Own(Box<Matrix6<f64>>),
+    /// Together with the errors that last at its beginning and at its end.
+    Drifting(Box<Drift>, [usize; 2]),
+}
+
+/// A covariance that is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the covariance is not positive definite")]
+pub struct NoCovariance;
+
+/// Steps at most, those not taken among them.
+const STEPS: usize = 200;
+/// A step whose square in standard deviations is smaller is the last.
+const LAST: f64 = 1e-18;
+/// The same while the switch still narrows.
+const ROUGHLY: f64 = 1e-4;
+
+/// Φ of the switch.
+fn max() -> f64 {
+    ChiSquared::new(6.0).expect("six degrees of freedom").inverse_cdf(0.99)
+}
+
+impl FactorGraph {
+    /// A new node, near this pose; its number.
+    pub fn node(&mut self, near: Pose) -> usize {
+        self.nodes.push(Node { pose: near, held: false });
+        self.nodes.len() - 1
+    }
+
+    /// Takes a node as exact.
+    pub fn hold(&mut self, node: usize) {
+        self.nodes[node].held = true;
+    }
+
+    /// The pose of a node, as it is known by now.
+    pub fn pose(&self, node: usize) -> &Pose {
+        &self.nodes[node].pose
+    }
+
+    /// What measured a node's pose by itself; the number of the factor.
+    ///
+    /// # Errors
+    /// [`NoCovariance`].
+    pub fn prior(&mut self, node: usize, at: Pose, covariance: &Matrix6<f64>) -> Result<usize, NoCovariance> {
+        let information = covariance.cholesky().ok_or(NoCovariance)?.inverse();
+        let weight = Weight::Own(Box::new(information));
+        self.factors.push(Factor { from: None, to: node, measured: at, weight, doubtful: false });
+        Ok(self.factors.len() - 1)
+    }
+
+    /// What measured the motion from one node to another, `from_from_to`; `doubtful`: it may be wrong altogether. The
+    /// number of the factor.
+    ///
+    /// # Errors
+    /// [`NoCovariance`].
+    pub fn between(
+        &mut self,
+        from: usize,
+        to: usize,
+        motion: &RelativeMotion,
+        doubtful: bool,
+    ) -> Result<usize, NoCovariance> {
+        let information = motion.covariance.matrix.cholesky().ok_or(NoCovariance)?.inverse();
+        let measured = motion.motion.relabel();
+        self.factors.push(Factor {
+            from: Some(from),
+            to,
+            measured,
+            weight: Weight::Own(Box::new(information)),
+            doubtful,
+        });
+        Ok(self.factors.len() - 1)
+    }
+
+    /// Errors that last, where a way begins: a node of them; its number.
+    ///
+    /// # Errors
+    /// [`NoCovariance`].
+    pub(super) fn begin_correlated(&mut self, spread: &CorrelatedCovariance) -> Result<usize, NoCovariance> {
+        let (units, prior) = drift::prior(spread)?;
+        self.correlated.push(Lasts { numbers: Numbers::zeros(), units, prior: Some(prior) });
+        Ok(self.correlated.len() - 1)
+    }
+
+    /// What measured the motion from one node to another, with errors that last through it, those at its beginning the node
+    /// `before`: the node of those at its end. A motion without such errors is a factor of its own, and they end with it.
+    ///
+    /// # Errors
+    /// [`NoCovariance`].
+    pub(super) fn drifting(
+        &mut self,
+        from: usize,
+        to: usize,
+        motion: &RelativeMotion,
+        before: Option<usize>,
+    ) -> Result<Option<usize>, NoCovariance> {
+        let Some(correlated) = &motion.correlated else { return self.between(from, to, motion, false).map(|_| None) };
+        let before = before.map_or_else(|| self.begin_correlated(&correlated.before), Ok)?;
+        let (drift, units) = Drift::of(motion, correlated)?;
+        self.correlated.push(Lasts { numbers: Numbers::zeros(), units, prior: None });
+        let after = self.correlated.len() - 1;
+        let (measured, weight) = (motion.motion.relabel(), Weight::Drifting(Box::new(drift), [before, after]));
+        self.factors.push(Factor { from: Some(from), to, measured, weight, doubtful: false });
+        Ok(Some(after))
+    }
+
+    /// The most likely poses, by Levenberg's and Marquardt's steps on the sparse normal equations. A part of the graph
+    /// that nothing places has its first node held where it is.
+    ///
+    /// `None` where the equations have no solution.
+    pub fn solve(mut self) -> Option<GraphSolution> {
+        let parts = self.parts();
+        let held = self.gauge(&parts);
+        let places: Vec<Option<usize>> = held
+            .iter()
+            .scan(0, |free, held| {
+                let place = (!held).then_some(*free);
+                *free += usize::from(!held);
+                Some(place)
+            })
+            .collect();
+        let free = places.iter().flatten().count();
+        if free == 0 {
+            return Some(GraphSolution { graph: self, parts, places, factor: None, free });
+        }
+        let doubted = self.factors.iter().any(|factor| factor.doubtful);
+        if doubted {
+            self.descend(&places, free, f64::INFINITY, ROUGHLY)?;
+            let worst = self.factors.iter().filter(|factor| factor.doubtful).map(|factor| self.disagreement(factor));
+            let mut wide = 0.5 * worst.fold(0.0, f64::max);
+            while wide > max() {
+                self.descend(&places, free, wide, ROUGHLY)?;
+                wide *= 0.5;
+            }
+        }
+        self.descend(&places, free, max(), LAST)?;
+        let (normal, _) = self.equations(&places, free, 0.0, max())?;
+        let factor = normal.sp_cholesky(Side::Lower).ok()?;
+        Some(GraphSolution { graph: self, parts, places, factor: Some(factor), free })
+    }
+
+    /// Steps to the least cost with the switch this wide, until one is shorter than `last`. `None` where the equations have
+    /// no solution.
+    fn descend(&mut self, places: &[Option<usize>], free: usize, wide: f64, last: f64) -> Option<()> {
+        let mut damping = 0.0;
+        let mut cost = self.cost(wide);
+        for _ in 0..STEPS {
+            let (normal, pull) = self.equations(places, free, damping, wide)?;
+            let Ok(factor) = normal.sp_cholesky(Side::Lower) else {
+                damping = f64::max(10.0 * damping, 1e-6);
+                if damping > 1e6 {
+                    return None;
+                }
+                continue;
+            };
+            let step = factor.solve(&pull);
+            let size: f64 = (0..self.unknowns(free)).map(|k| step[(k, 0)] * pull[(k, 0)]).sum();
+            if !size.is_finite() {
+                return None;
+            }
+            let before = (self.nodes.clone(), self.correlated.clone());
+            for (node, place) in self.nodes.iter_mut().zip(places) {
+                let Some(place) = place else { continue };
+                let xi = Vector6::from_fn(|row, _| step[(6 * place + row, 0)]);
+                node.pose = node.pose.perturbed(&xi).renormalized();
+            }
+            for (index, lasts) in self.correlated.iter_mut().enumerate() {
+                lasts.numbers += Numbers::from_fn(|row, _| step[(6 * free + CORRELATED * index + row, 0)]);
+            }
+            let next = self.cost(wide);
+            if size < last {
+                break;
+            }
+            if next <= cost {
+                damping *= 0.1;
+                if damping < 1e-12 {
+                    damping = 0.0;
+                }
+                // What is left is rounding.
+                let still = cost - next <= 1e-14 * cost && size < 1e-9;
+                cost = next;
+                if still {
+                    break;
+                }
+            } else {
+                (self.nodes, self.correlated) = before;
+                if size < 1e-12 {
+                    break;
+                }
+                damping = f64::max(10.0 * damping, 1e-6);
+                if damping > 1e9 {
+                    break;
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// For each node the first node that it is connected to.
+    fn parts(&self) -> Vec<usize> {
+        let mut parent: Vec<usize> = (0..self.nodes.len()).collect();
+        fn root(parent: &mut [usize], mut node: usize) -> usize {
+            while parent[node] != node {
+                parent[node] = parent[parent[node]];
+                node = parent[node];
+            }
+            node
+        }
+        for factor in &self.factors {
+            let Some(from) = factor.from else { continue };
+            let (a, b) = (root(&mut parent, from), root(&mut parent, factor.to));
+            parent[a.max(b)] = a.min(b);
+        }
+        (0..self.nodes.len()).map(|node| root(&mut parent, node)).collect()
+    }
+
+    /// Which nodes stand still.
+    fn gauge(&self, parts: &[usize]) -> Vec<bool> {
+        let mut placed = vec![false; self.nodes.len()];
+        for factor in self.factors.iter().filter(|factor| factor.from.is_none()) {
+            placed[parts[factor.to]] = true;
+        }
+        for (node, part) in self.nodes.iter().zip(parts) {
+            placed[*part] |= node.held;
+        }
+        let still = |(index, node): (usize, &Node)| node.held || (parts[index] == index && !placed[index]);
+        self.nodes.iter().enumerate().map(still).collect()
+    }
+
+    fn residual(&self, factor: &Factor) -> Vector6<f64> {
+        let to = self.nodes[factor.to].pose;
+        match factor.from {
+            None => factor.measured.error_to(&to),
+            Some(from) => factor.measured.error_to(&(self.nodes[from].pose.inverse() * to).relabel()),
+        }
+    }
+
+    /// rᵀ Σ⁻¹ r.
+    fn disagreement(&self, factor: &Factor) -> f64 {
+        let r = self.residual(factor);
+        match &factor.weight {
+            Weight::Own(information) => r.dot(&(**information * r)),
+            Weight::Drifting(drift, [before, after]) => {
+                drift.disagreement(&r, &self.correlated[*before].numbers, &self.correlated[*after].numbers)
+            }
+        }
+    }
+
+    /// How many numbers are sought where so many poses move.
+    fn unknowns(&self, free: usize) -> usize {
+        6 * free + CORRELATED * self.correlated.len()
+    }
+
+    fn cost(&self, wide: f64) -> f64 {
+        let each = self.factors.iter().map(|factor| {
+            let chi = self.disagreement(factor);
+            let s = factor.switch(chi, wide);
+            if s < 1.0 { s * s * chi + (1.0 - s) * (1.0 - s) * wide } else { chi }
+        });
+        let known = self.correlated.iter().filter_map(|lasts| Some(lasts.numbers.dot(&(lasts.prior? * lasts.numbers))));
+        each.chain(known).sum()
+    }
+
+    /// The normal equations for all that move: the lower half of the matrix, and the right side.
+    fn equations(
+        &self,
+        places: &[Option<usize>],
+        free: usize,
+        damping: f64,
+        wide: f64,
+    ) -> Option<(SparseColMat<usize, f64>, Mat<f64>)> {
+        let unknowns = self.unknowns(free);
+        let mut pull = Mat::zeros(unknowns, 1);
+        let mut own = vec![Matrix6::zeros(); free];
+        let mut correlated = vec![Square::zeros(); self.correlated.len()];
+        let mut entries = Vec::new();
+        for factor in &self.factors {
+            let r = self.residual(factor);
+            let slope = right_jacobian_inverse(&r);
+            // Z⁻¹ A⁻¹ B under A Exp(α), B Exp(β): r + J_r(r)⁻¹ (β − Ad(B⁻¹ A) α).
+            let mut sides: [Option<(usize, Matrix6<f64>)>; 2] = [None, None];
+            sides[0] = places[factor.to].map(|place| (place, slope));
+            if let Some(from) = factor.from {
+                let to_from_from = self.nodes[factor.to].pose.inverse() * self.nodes[from].pose;
+                sides[1] = places[from].map(|place| (place, -slope * to_from_from.adjoint()));
+            }
+            let information = match &factor.weight {
+                Weight::Own(information) => information.as_ref(),
+                Weight::Drifting(drift, [before, after]) => {
+                    let zero = Matrix6::zeros();
+                    let by = [1, 0].map(|side| sides[side].as_ref().map_or(&zero, |(_, by)| by));
+                    let [n, m] = [*before, *after].map(|lasts| &self.correlated[lasts].numbers);
+                    let (square, gradient) = drift.equations(&r, by, n, m);
+                    let first = |lasts: &usize| 6 * free + CORRELATED * lasts;
+                    let place = |side: usize| sides[side].as_ref().map(|(place, _)| 6 * place);
+                    let parts = [
+                        (0, 6, place(1)),
+                        (6, 6, place(0)),
+                        (12, CORRELATED, Some(first(before))),
+                        (12 + CORRELATED, CORRELATED, Some(first(after))),
+                    ];
+                    scatter(&parts, &square, &gradient, &mut entries, &mut pull);
+                    for (part, start) in [(1, 0), (0, 6)] {
+                        if let Some((place, _)) = sides[part] {
+                            own[place] += square.fixed_view::<6, 6>(start, start);
+                        }
+                    }
+                    correlated[*before] += square.fixed_view::<CORRELATED, CORRELATED>(12, 12);
+                    correlated[*after] += square.fixed_view::<CORRELATED, CORRELATED>(12 + CORRELATED, 12 + CORRELATED);
+                    continue;
+                }
+            };
+            let chi = r.dot(&(information * r));
+            let s = factor.switch(chi, wide);
+            let weight = information * (s * s);
+            for (place, by) in sides.iter().flatten() {
+                own[*place] += by.transpose() * weight * by;
+                let gradient = by.transpose() * (weight * r);
+                (0..6).for_each(|row| pull[(6 * place + row, 0)] -= gradient[row]);
+            }
+            if let [Some((a, by_a)), Some((b, by_b))] = &sides {
+                let across = by_a.transpose() * weight * by_b;
+                let (low, high, block) = if a > b { (*b, *a, across) } else { (*a, *b, across.transpose()) };
+                push(&mut entries, high, low, &block);
+            }
+        }
+        for (place, block) in own.iter_mut().enumerate() {
+            (0..6).for_each(|k| block[(k, k)] *= 1.0 + damping);
+            push(&mut entries, place, place, block);
+        }
+        for (index, (lasts, square)) in self.correlated.iter().zip(&mut correlated).enumerate() {
+            let first = 6 * free + CORRELATED * index;
+            if let Some(prior) = &lasts.prior {
+                *square += prior;
+                let gradient = prior * lasts.numbers;
+                (0..CORRELATED).for_each(|row| pull[(first + row, 0)] -= gradient[row]);
+            }
+            (0..CORRELATED).for_each(|k| square[(k, k)] *= 1.0 + damping);
+            let lower = (0..CORRELATED).flat_map(|j| (j..CORRELATED).map(move |i| (i, j)));
+            entries.extend(lower.map(|(i, j)| Triplet::new(first + i, first + j, square[(i, j)])));
+        }
+        Some((SparseColMat::try_new_from_triplets(unknowns, unknowns, &entries).ok()?, pull))
+    }
+}
+
+impl Factor {
+    fn switch(&self, chi: f64, wide: f64) -> f64 {
+        if self.doubtful && chi > wide { 2.0 * wide / (wide + chi) } else { 1.0 }
+    }
+}
+
+/// Adds a block of 6×6 to the lower half.
+fn push(entries: &mut Vec<Triplet<usize, usize, f64>>, row: usize, column: usize, block: &Matrix6<f64>) {
+    for j in 0..6 {
+        let first = if row == column { j } else { 0 };
+        for i in first..6 {
+            entries.push(Triplet::new(6 * row + i, 6 * column + j, block[(i, j)]));
+        }
+    }
+}
+
+/// Adds the gradient of a factor with these parts, (its first column, how many, the first of its unknowns), and the blocks
+/// of its square between two of them, to the lower half; those on the diagonal are left out.
+fn scatter(
+    parts: &[(usize, usize, Option<usize>)],
+    square: &SMatrix<f64, SIDES, SIDES>,
+    gradient: &nalgebra::SVector<f64, SIDES>,
+    entries: &mut Vec<Triplet<usize, usize, f64>>,
+    pull: &mut Mat<f64>,
+) {
+    for (own, count, first) in parts {
+        let Some(first) = first else { continue };
+        (0..*count).for_each(|k| pull[(first + k, 0)] -= gradient[own + k]);
+        for (other, others, low) in parts {
+            let Some(low) = low.filter(|low| low < first) else { continue };
+            let all = (0..*others).flat_map(|j| (0..*count).map(move |i| (i, j)));
+            entries.extend(all.map(|(i, j)| Triplet::new(first + i, low + j, square[(own + i, other + j)])));
+        }
+    }
+}
+
+/// A graph at its most likely poses, and how well they are known.
+#[derive(Debug, Clone)]
+pub struct GraphSolution {
+    graph: FactorGraph,
+    parts: Vec<usize>,
+    places: Vec<Option<usize>>,
+    factor: Option<Llt<usize, f64>>,
+    free: usize,
+}
+
+impl GraphSolution {
+    /// The pose of a node.
+    pub fn pose(&self, node: usize) -> &Pose {
+        self.graph.pose(node)
+    }
+
+    /// How well a node's pose is known, all else estimated too; nothing is as exact as what is held.
+    pub fn covariance(&self, node: usize) -> Covariance6<World, Camera> {
+        Covariance6::new(self.joint(&[self.block(node)]).fixed_view::<6, 6>(0, 0).into_owned())
+    }
+
+    /// The motion from one node to another as the graph knows it, with what both errors have in common taken into
+    /// account: ξ = β − Ad(B⁻¹ A) α. `None` where nothing connects them.
+    pub fn relative(&self, from: usize, to: usize) -> Option<RelativeMotion> {
+        let placed = |node: usize| self.places[node].is_none() || self.graph.placed(&self.parts, self.parts[node]);
+        if self.parts[from] != self.parts[to] && !(placed(from) && placed(to)) {
+            return None;
+        }
+        let motion = self.pose(from).inverse() * *self.pose(to);
+        if from == to {
+            return Some(RelativeMotion::new(motion, Covariance6::new(Matrix6::zeros())));
+        }
+        let joint = self.joint(&[self.block(from), self.block(to)]);
+        let by = between(&motion);
+        let joint = joint.fixed_view::<12, 12>(0, 0).into_owned();
+        Some(RelativeMotion::new(motion, Covariance6::new(by * joint * by.transpose())))
+    }
+
+    /// What the error of the motion from one node to another shares with errors that last, E\[ξ mᵀ\].
+    pub(super) fn sensitivities(&self, from: usize, to: usize, correlated: usize) -> CorrelatedSensitivities {
+        let first = 6 * self.free + CORRELATED * correlated;
+        let joint = self.joint(&[self.block(from), self.block(to), (Some(first), CORRELATED)]);
+        let motion = self.pose(from).inverse() * *self.pose(to);
+        let in_units: CorrelatedSensitivities = between(&motion) * joint.fixed_view::<12, CORRELATED>(0, 12);
+        self.graph.correlated[correlated].units.own(&in_units)
+    }
+
+    /// The first unknown of a node, where it moves, and how many it has.
+    fn block(&self, node: usize) -> (Option<usize>, usize) {
+        (self.places[node].map(|place| 6 * place), 6)
+    }
+
+    /// rᵀ Σ⁻¹ r of a factor, six degrees of freedom.
+    pub fn disagreement(&self, factor: usize) -> f64 {
+        self.graph.disagreement(&self.graph.factors[factor])
+    }
+
+    /// Whether a doubtful factor was given up: it keeps less than half of its weight.
+    pub fn given_up(&self, factor: usize) -> bool {
+        let s = self.graph.factors[factor].switch(self.disagreement(factor), max());
+        s * s < 0.5
+    }
+
+    /// The joint covariance of some blocks of unknowns, one below the other.
+    fn joint(&self, blocks: &[(Option<usize>, usize)]) -> nalgebra::DMatrix<f64> {
+        let size = blocks.iter().map(|(_, count)| count).sum();
+        let mut all = nalgebra::DMatrix::zeros(size, size);
+        let Some(factor) = &self.factor else { return all };
+        // (row of the answer, unknown).
+        let mut rows = Vec::with_capacity(size);
+        let mut row = 0;
+        for (first, count) in blocks {
+            rows.extend((0..*count).filter_map(|k| Some((row + k, (*first)? + k))));
+            row += count;
+        }
+        let mut units = Mat::<f64>::zeros(self.graph.unknowns(self.free), rows.len());
+        rows.iter().enumerate().for_each(|(column, (_, unknown))| units[(*unknown, column)] = 1.0);
+        let columns = factor.solve(&units);
+        for (column, (b, _)) in rows.iter().enumerate() {
+            rows.iter().for_each(|(a, unknown)| all[(*a, *b)] = columns[(*unknown, column)]);
+        }
+        all
+    }
+}
+
+/// ξ = β − Ad(B⁻¹ A) α of the motion from A to B.
+fn between(motion: &Transform<Camera, Camera>) -> SMatrix<f64, 6, 12> {
+    let mut by = SMatrix::<f64, 6, 12>::zeros();
+    by.fixed_view_mut::<6, 6>(0, 0).copy_from(&-motion.inverse().adjoint());
+    by.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
+    by
+}
+
+impl FactorGraph {
+    /// Whether something places this part of the graph in the world.
+    fn placed(&self, parts: &[usize], part: usize) -> bool {
+        let prior = self.factors.iter().any(|factor| factor.from.is_none() && parts[factor.to] == part);
+        prior || self.nodes.iter().zip(parts).any(|(node, own)| *own == part && node.held)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::{
+        ChaCha8Rng,
+        rand_core::{Rng, SeedableRng},
+    };
+
+    use super::*;
+
+    /// A normal number from the sum of twelve even ones.
+    fn normal(rng: &mut ChaCha8Rng) -> f64 {
+        (0..12).map(|_| rng.next_u32() as f64 / u32::MAX as f64).sum::<f64>() - 6.0
+    }
+
+    fn noise(rng: &mut ChaCha8Rng, sigma: &[f64; 6]) -> Vector6<f64> {
+        Vector6::from_fn(|k, _| sigma[k] * normal(rng))
+    }
+
+    const EDGE_STEPS: [f64; 6] = [1e-3, 2e-3, 3e-3, 0.01, 0.02, 0.01];
+    const LOOP: [f64; 6] = [2e-3, 2e-3, 2e-3, 0.01, 0.01, 0.02];
+    const FIX: [f64; 6] = [3e-3, 3e-3, 3e-3, 0.02, 0.02, 0.02];
+
+    fn covariance(sigma: &[f64; 6]) -> Matrix6<f64> {
+        Matrix6::from_diagonal(&Vector6::from_fn(|k, _| sigma[k] * sigma[k]))
+    }
+
+    fn local(motion: Pose, sigma: &[f64; 6]) -> RelativeMotion {
+        RelativeMotion::new(motion.relabel(), Covariance6::new(covariance(sigma)))
+    }
+
+    /// Two rounds of a way of twelve legs that turns by thirty degrees in each.
+    fn rounds() -> Vec<Pose> {
+        let odometry_edge = Pose::exp(&[0.02, 0.01, std::f64::consts::TAU / 12.0, 1.0, 0.0, 0.05].into());
+        let mut path = vec![Pose::exp(&[0.1, -0.2, 0.3, 5.0, 6.0, 7.0].into())];
+        for k in 0..24 {
+            let step = if k % 6 == 5 { Pose::exp(&(odometry_edge.log() * 0.9)) } else { odometry_edge };
+            let here = *path.last().unwrap() * step.relabel();
+            path.push(here);
+        }
+        path
+    }
+
+    struct Simulated {
+        graph: FactorGraph,
+        truth: Vec<Pose>,
+        loops: Vec<usize>,
+    }
+
+    /// The rounds measured with noise times `scale`: a fix of the first pose, odometry, and so many loops.
+    fn sampled(seed: u64, scale: f64, loops: usize) -> Simulated {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let truth = rounds();
+        let mut graph = FactorGraph::default();
+        let mut measured =
+            |motion: Pose, sigma: &[f64; 6]| local(motion.perturbed(&(noise(&mut rng, sigma) * -scale)), sigma);
+        let start = measured(truth[0], &FIX);
+        let mut here: Pose = start.motion.relabel();
+        graph.node(here);
+        graph.prior(0, here, &covariance(&FIX)).unwrap();
+        for k in 1..truth.len() {
+            let odometry_edge = measured((truth[k - 1].inverse() * truth[k]).relabel(), &EDGE_STEPS);
+            here = here * odometry_edge.motion.relabel();
+            graph.node(here);
+            graph.between(k - 1, k, &odometry_edge, false).unwrap();
+        }
+        let mut numbers = Vec::new();
+        for k in 0..loops {
+            let (a, b) = (k * 3 % 12, 12 + k * 3 % 12);
+            let found = measured((truth[a].inverse() * truth[b]).relabel(), &LOOP);
+            numbers.push(graph.between(a, b, &found, true).unwrap());
+        }
+        Simulated { graph, truth, loops: numbers }
+    }
+
+    #[test]
+    fn exact_measurements_give_the_exact_poses_from_a_disturbed_start() {
+        let Simulated { mut graph, truth, .. } = sampled(1, 0.0, 4);
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for node in &mut graph.nodes {
+            node.pose = node.pose.perturbed(&noise(&mut rng, &[0.05, 0.05, 0.05, 0.3, 0.3, 0.3]));
+        }
+        let solved = graph.solve().unwrap();
+        for (k, truth) in truth.iter().enumerate() {
+            assert!(solved.pose(k).error_to(truth).norm() < 1e-9, "{k}: {}", solved.pose(k).error_to(truth).norm());
+        }
+    }
+
+    #[test]
+    fn jacobians_are_those_of_small_steps() {
+        let Simulated { graph, .. } = sampled(3, 3.0, 2);
+        let factor = &graph.factors[graph.factors.len() - 1];
+        let from = factor.from.unwrap();
+        let r = graph.residual(factor);
+        let slope = right_jacobian_inverse(&r);
+        let to_from_from = graph.nodes[factor.to].pose.inverse() * graph.nodes[from].pose;
+        for (node, by) in [(factor.to, slope), (from, -slope * to_from_from.adjoint())] {
+            for k in 0..6 {
+                let moved = |step: f64| {
+                    let mut graph = graph.clone();
+                    let mut xi = Vector6::zeros();
+                    xi[k] = step;
+                    graph.nodes[node].pose = graph.nodes[node].pose.perturbed(&xi);
+                    graph.residual(factor)
+                };
+                let measured = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!((measured - by.column(k)).norm() < 1e-7, "{node} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn poses_err_as_much_as_the_graph_states() {
+        let draws = 400;
+        let (mut sums, mut relative) = ([0.0; 25], 0.0);
+        for seed in 0..draws {
+            let Simulated { graph, truth, .. } = sampled(100 + seed, 1.0, 4);
+            let solved = graph.solve().unwrap();
+            for (k, sum) in sums.iter_mut().enumerate() {
+                let error = solved.pose(k).error_to(&truth[k]);
+                *sum += error.dot(&(solved.covariance(k).matrix.try_inverse().unwrap() * error));
+            }
+            let local = solved.relative(3, 21).unwrap();
+            let error = local.motion.error_to(&(truth[3].inverse() * truth[21]));
+            relative += error.dot(&(local.covariance.matrix.try_inverse().unwrap() * error));
+        }
+        // A mean of 400 draws of six degrees of freedom: √(12/400).
+        let bound = 4.0 * (12.0 / draws as f64).sqrt();
+        for (k, sum) in sums.iter().enumerate() {
+            assert!((sum / draws as f64 - 6.0).abs() < bound, "{k}: {}", sum / draws as f64);
+        }
+        assert!((relative / draws as f64 - 6.0).abs() < bound, "relative: {}", relative / draws as f64);
+    }
+
+    #[test]
+    fn a_loop_never_makes_a_pose_less_certain() {
+        for seed in 0..20 {
+            let before = sampled(500 + seed, 1.0, 0).graph.solve().unwrap();
+            let after = sampled(500 + seed, 1.0, 4).graph.solve().unwrap();
+            for k in 0..25 {
+                // In the frame of the first estimate, which the second has moved a little.
+                let gain = before.covariance(k).matrix - after.covariance(k).matrix;
+                let size = before.covariance(k).matrix.norm();
+                assert!(gain.symmetric_eigenvalues().min() > -1e-2 * size, "{seed} {k}");
+                assert!(after.covariance(k).position_sigma() <= before.covariance(k).position_sigma() * 1.001);
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_loop_is_given_up_and_moves_nothing() {
+        let mut wrong = 0;
+        for seed in 0..1000 {
+            let Simulated { mut graph, truth, loops } = sampled(2000 + seed, 1.0, 3);
+            let right = graph.clone().solve().unwrap();
+            let mut rng = ChaCha8Rng::seed_from_u64(9000 + seed);
+            // From anywhere: half a metre to two metres off.
+            let mut off = noise(&mut rng, &[0.1, 0.1, 0.3, 1.0, 1.0, 0.3]);
+            let length = off.fixed_rows::<3>(3).norm();
+            off.fixed_rows_mut::<3>(3).scale_mut(length.clamp(0.5, 2.0) / length);
+            let between: Pose = (truth[9].inverse() * truth[21]).relabel();
+            let injected = graph.between(9, 21, &local(between.perturbed(&off), &LOOP), true).unwrap();
+            let solved = graph.solve().unwrap();
+            let kept = loops.iter().all(|one| !solved.given_up(*one));
+            let moved = solved.pose(21).error_to(right.pose(21));
+            let still = moved.fixed_rows::<3>(3).norm() < right.covariance(21).position_sigma();
+            wrong += usize::from(!(solved.given_up(injected) && kept && still));
+        }
+        assert!(wrong <= 1, "{wrong} of 1000");
+    }
+
+    #[test]
+    fn parts_without_a_place_are_known_relative_to_their_first() {
+        let mut graph = FactorGraph::default();
+        let step = Pose::exp(&[0.0, 0.0, 0.1, 1.0, 0.0, 0.0].into());
+        for _ in 0..4 {
+            graph.node(Pose::identity());
+        }
+        graph.between(0, 1, &local(step, &EDGE_STEPS), false).unwrap();
+        graph.between(2, 3, &local(step, &EDGE_STEPS), false).unwrap();
+        let solved = graph.solve().unwrap();
+        let found = solved.relative(2, 3).unwrap();
+        assert!((found.motion.matrix() - step.matrix()).amax() < 1e-12);
+        assert!((found.covariance.matrix - covariance(&EDGE_STEPS)).amax() < 1e-12);
+        assert_eq!(solved.relative(0, 3), None);
+        assert!(FactorGraph::default().solve().is_some());
+        assert_eq!(FactorGraph::default().clone().prior(0, step, &Matrix6::zeros()), Err(NoCovariance));
+    }
+}

@@ -1,0 +1,424 @@
+//! The odometry at work.
+
+use std::time::Instant;
+
+use nalgebra::{Matrix4, Vector4};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use seafix_geometry::{Camera, Covariance6, StereoRig, Transform, World};
+use seafix_referencing::Observations;
+use seafix_vision::{FrontEndOutput, Threads, Workspace};
+
+use super::{
+    Stereo, StereoStages,
+    consensus::{Rules, competitor, consensus, is_still, seen_again},
+    follow::{Followed, WindowKeyFrame, follow},
+    front_end::Seen,
+    landmark::{Landmark, LandmarkObservation},
+    pose::refine,
+    taken::Taken,
+    window::adjust,
+};
+use crate::{
+    Lost, NotAfter, OdometryOutcome, OdometrySession, OdometryTrajectory, RelativeMotion, Segment, StereoPair,
+    Waypoint, odometry::Stamps, times::Times, unusable::RawImages,
+};
+
+/// The memory of one journey.
+pub(super) struct StereoTracker<'a> {
+    settings: &'a Stereo,
+    stages: StereoStages,
+    rig: &'a StereoRig,
+    output: FrontEndOutput,
+    work: Workspace,
+    stamps: Stamps,
+    raw: RawImages,
+    /// The last pair that was followed.
+    last: Option<Last>,
+    /// A pair that could not be followed, its place among the outcomes, and why.
+    pending: Option<(Seen, usize, Lost)>,
+    /// Why the way ended, while no pair was good enough to begin the next segment.
+    broken: Option<Lost>,
+    /// How many points moved beside what stood still when that was doubted last; zero once the vehicle was seen to move.
+    doubted: usize,
+    frames: Vec<WindowKeyFrame>,
+    /// The first key frame of the segment.
+    first: usize,
+    /// How many landmarks the last key frame saw.
+    seen_by_keyframe: usize,
+    landmarks: Vec<Landmark>,
+    segments: Vec<OpenSegment>,
+    outcomes: Vec<OdometryOutcome>,
+    times: Times,
+}
+
+/// The last pair that was followed.
+struct Last {
+    seen: Seen,
+    world_from_camera: Transform<World, Camera>,
+    /// The motion to it and how long that took (s).
+    motion: Option<(Transform<Camera, Camera>, f64)>,
+}
+
+/// A segment in the making.
+struct OpenSegment {
+    broken: Option<Lost>,
+    poses: Vec<Relative>,
+}
+
+/// A pose relative to a key frame, which may still move.
+struct Relative {
+    stamp_ns: u64,
+    frame: usize,
+    frame_from_camera: Transform<Camera, Camera>,
+    local: Option<RelativeMotion>,
+}
+
+/// The way from the last pair to a new one.
+struct Step {
+    world_from_camera: Transform<World, Camera>,
+    local: RelativeMotion,
+    seconds: f64,
+    sought: Vec<usize>,
+    /// Landmarks that agree, and where they are.
+    observations: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
+    /// Whether other points moved while these stood still.
+    passed_by: bool,
+}
+
+impl OdometrySession for StereoTracker<'_> {
+    fn advance(&mut self, pair: &StereoPair<'_>) -> Result<OdometryOutcome, NotAfter> {
+        self.stamps.take(self.outcomes.len(), pair.stamp_ns)?;
+        let start = Instant::now();
+        if let Some(lost) = self.raw.take([pair.left, pair.right]) {
+            self.outcomes.push(OdometryOutcome::Skipped(lost.clone()));
+            return Ok(OdometryOutcome::Skipped(lost));
+        }
+        self.times.since("check", start);
+        let start = Instant::now();
+        let seen = Seen::new(pair, &self.stages, self.rig, &mut self.output, &mut self.work);
+        let stages = self.output.times.stages();
+        let known: f64 = stages.iter().map(|(_, ms)| ms).sum();
+        stages.into_iter().for_each(|(stage, ms)| self.times.add(stage, ms));
+        self.times.add("keep", start.elapsed().as_secs_f64() * 1e3 - known);
+        self.take(seen);
+        Ok(self.outcomes.last().cloned().expect("every pair has an outcome"))
+    }
+
+    fn latest(&self) -> Option<(usize, Waypoint)> {
+        let number = self.segments.len().checked_sub(1)?;
+        Some((number, self.waypoint(self.segments[number].poses.last()?)))
+    }
+
+    fn trajectory(&self) -> OdometryTrajectory {
+        let segments = self.segments.iter().map(|stretch| {
+            let poses = stretch.poses.iter().map(|pose| self.waypoint(pose));
+            Segment { broken: stretch.broken.clone(), poses: poses.collect() }
+        });
+        OdometryTrajectory {
+            segments: segments.collect(),
+            outcomes: self.outcomes.clone(),
+            times: self.times.0.clone(),
+        }
+    }
+}
+
+impl<'a> StereoTracker<'a> {
+    pub(super) fn new(settings: &'a Stereo, stages: StereoStages, rig: &'a StereoRig, threads: Threads) -> Self {
+        Self {
+            settings,
+            stages,
+            rig,
+            output: FrontEndOutput::new(threads),
+            work: Workspace::new(threads),
+            stamps: Stamps::default(),
+            raw: RawImages::default(),
+            last: None,
+            pending: None,
+            broken: None,
+            doubted: 0,
+            frames: Vec::new(),
+            first: 0,
+            seen_by_keyframe: 0,
+            landmarks: Vec::new(),
+            segments: Vec::new(),
+            outcomes: Vec::new(),
+            times: Times::default(),
+        }
+    }
+
+    /// Follows what was seen, or begins with it.
+    fn take(&mut self, seen: Seen) {
+        let Some(last) = self.last.take() else {
+            let outcome = self.begin(seen, None);
+            return self.outcomes.push(outcome);
+        };
+        match self.follow(&seen, &last) {
+            Ok(step) => {
+                // A pair between that could not be followed was the exception.
+                self.pending = None;
+                self.outcomes
+                    .push(OdometryOutcome::Followed { sought: step.sought.len(), found: step.observations.len() });
+                self.accept(seen, step);
+            }
+            // Where it stands may still be told by how it goes on from the last pair.
+            Err(lost @ Lost::Still { .. }) => {
+                self.outcomes.push(OdometryOutcome::Skipped(lost));
+                self.last = Some(last);
+            }
+            Err(lost) => match (self.pending.take(), lost) {
+                // Two pairs say that there is no way on: a segment begins with the first of them.
+                (Some((first, index, why)), _) => {
+                    self.outcomes[index] = self.begin(first, Some(why));
+                    self.take(seen);
+                }
+                (None, lost @ Lost::Gap { .. }) => {
+                    let outcome = self.begin(seen, Some(lost));
+                    self.outcomes.push(outcome);
+                }
+                (None, lost) => {
+                    self.pending = Some((seen, self.outcomes.len(), lost.clone()));
+                    self.outcomes.push(OdometryOutcome::Skipped(lost));
+                    self.last = Some(last);
+                }
+            },
+        }
+    }
+
+    /// Begins a segment where the one before ended.
+    fn begin(&mut self, seen: Seen, broken: Option<Lost>) -> OdometryOutcome {
+        let broken = self.broken.take().or(broken);
+        let (found, needed) = (seen.cloud.len(), self.settings.min_points);
+        if found < needed {
+            // The reason waits for the pair that does begin.
+            self.broken = broken;
+            return OdometryOutcome::Skipped(Lost::FewPoints { found, needed });
+        }
+        let world_from_camera = self.world_from_last();
+        self.landmarks.clear();
+        self.frames.iter_mut().for_each(|frame| frame.image = None);
+        self.first = self.frames.len();
+        self.keyframe(&seen, world_from_camera, &[]);
+        let pose = Relative {
+            stamp_ns: seen.stamp_ns,
+            frame: self.first,
+            frame_from_camera: Transform::identity(),
+            local: None,
+        };
+        self.segments.push(OpenSegment { broken, poses: vec![pose] });
+        self.last = Some(Last { seen, world_from_camera, motion: None });
+        OdometryOutcome::Began
+    }
+
+    fn waypoint(&self, pose: &Relative) -> Waypoint {
+        Waypoint {
+            stamp_ns: pose.stamp_ns,
+            world_from_camera: self.frames[pose.frame].world_from_camera * pose.frame_from_camera,
+            local: pose.local,
+        }
+    }
+
+    /// Where the last waypoint is; the first is where the world begins.
+    fn world_from_last(&self) -> Transform<World, Camera> {
+        self.latest().map_or_else(Transform::identity, |(_, waypoint)| waypoint.world_from_camera)
+    }
+
+    /// The way from `last` to `seen`.
+    fn follow(&mut self, seen: &Seen, last: &Last) -> Result<Step, Lost> {
+        let settings = self.settings;
+        let seconds = (seen.stamp_ns - last.seen.stamp_ns) as f64 * 1e-9;
+        if seconds > settings.max_gap {
+            return Err(Lost::Gap { seconds, max: settings.max_gap });
+        }
+        let (predicted, moving) = self.predicted(seen, last, seconds)?;
+        let start = Instant::now();
+        let mut guess = last.world_from_camera * predicted;
+        let calibration = self.stages.front_end.triangulator.rules().calibration_px;
+        let images = [&seen.images[0], &seen.images[1]];
+        let followed = follow(
+            &settings.follow,
+            self.rig,
+            &self.frames,
+            &self.landmarks,
+            images,
+            &guess,
+            (settings.landmarks, calibration),
+            &mut self.work,
+        );
+        self.times.since("follow", start);
+        let start = Instant::now();
+        let needed = settings.min_points;
+        let few = |found| Lost::NoConsensus { found, matches: followed.sought.len(), needed };
+        let found = followed.for_pose(&self.frames, &self.landmarks);
+        let pose = refine(self.rig, &found, &guess).ok_or(few(0))?;
+        self.times.since("pose", start);
+        guess = pose.world_from_camera;
+        let Followed { sought, found } = followed;
+        let observations: Vec<_> =
+            found.into_iter().zip(&pose.agrees).filter_map(|(one, agrees)| agrees.then_some(one)).collect();
+        if observations.len() < needed {
+            return Err(Lost::NoConsensus { found: observations.len(), matches: sought.len(), needed });
+        }
+        // What was doubted is doubted until something tells: the others may be out of view meanwhile.
+        let beside = moving.map_or(0, |moving| if moving > 0 { moving } else { self.doubted });
+        if beside > 0 && !self.were_elsewhere(&observations, needed) {
+            self.doubted = beside;
+            return Err(Lost::Still { still: observations.len(), moving: beside });
+        }
+        self.doubted = 0;
+        let covariance = Covariance6::new(pose.covariance);
+        if covariance.position_sigma() > settings.max_sigma {
+            return Err(Lost::Weak(covariance.position_sigma()));
+        }
+        let motion = last.world_from_camera.inverse() * guess;
+        let speed = motion.translation().norm() / seconds;
+        if speed > settings.max_speed {
+            return Err(Lost::Jump { speed, seconds, max: settings.max_speed });
+        }
+        let local = RelativeMotion::new(motion, covariance);
+        Ok(Step { world_from_camera: guess, local, seconds, sought, observations, passed_by: beside > 0 })
+    }
+
+    /// Whether enough landmarks have been at another place of the image before. What is fixed to the vehicle never has, however
+    /// sharp it is and however often it is found again.
+    fn were_elsewhere(&self, observations: &[(usize, Vector4<f64>, Matrix4<f64>)], needed: usize) -> bool {
+        let far = self.rules().elsewhere();
+        let moved = |(index, pixels, _): &&(usize, Vector4<f64>, Matrix4<f64>)| {
+            let first = self.landmarks[*index].place;
+            libm::hypot(pixels[0] - first.u, pixels[1] - first.v) > far
+        };
+        observations.iter().filter(moved).count() >= needed
+    }
+
+    fn rules(&self) -> Rules {
+        let Stereo { consensus_px: px, confidence, draws, .. } = *self.settings;
+        Rules { px, confidence, draws }
+    }
+
+    /// The motion that the points in common agree on, `earlier_from_later`; and where nothing moves by it, how many of the others
+    /// agree on a motion, zero where they are so few that chance may agree as well.
+    fn predicted(
+        &mut self,
+        seen: &Seen,
+        last: &Last,
+        seconds: f64,
+    ) -> Result<(Transform<Camera, Camera>, Option<usize>), Lost> {
+        let settings = self.settings;
+        let start = Instant::now();
+        let pairs = seen.in_common(&last.seen, &self.stages, self.rig, &mut self.work);
+        self.times.since("between", start);
+        let needed = settings.min_points;
+        if pairs.len() < needed {
+            return Err(Lost::FewMatches { found: pairs.len(), needed });
+        }
+        let start = Instant::now();
+        let points =
+            pairs.iter().map(|&(earlier, later)| seen_again(&last.seen.cloud[earlier].position, &seen.cloud[later]));
+        let data = Observations { points: points.collect(), rig: Some(self.rig) };
+        let rules = self.rules();
+        let mut guesses = vec![Transform::identity()];
+        if let Some((motion, before)) = &last.motion {
+            guesses.push(Transform::exp(&(motion.log() * (seconds / before))));
+        }
+        // The stamp tells one pair from another, however many were left out before.
+        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed ^ seen.stamp_ns);
+        let solvers = (&*self.stages.minimal, &*self.stages.solver);
+        let best = consensus(&data, self.rig, &rules, solvers, &guesses, &mut rng);
+        let found = best.as_ref().map_or(0, |best| best.inliers.len());
+        let answer = match best {
+            Some(best) if found >= needed => {
+                // Three points always agree on a motion; as many again do not.
+                let enough = |count: &usize| *count >= 2 * self.stages.minimal.minimum();
+                let mut moving = || Some(competitor(&best, &data, self.rig, &rules, solvers, &mut rng)).filter(enough);
+                let beside = is_still(&best, &data, self.rig, &rules).then(|| moving().unwrap_or(0));
+                Ok((best.motion.relabel(), beside))
+            }
+            _ => Err(Lost::NoConsensus { found, matches: pairs.len(), needed }),
+        };
+        self.times.since("consensus", start);
+        answer
+    }
+
+    /// Makes `seen` part of the journey.
+    fn accept(&mut self, seen: Seen, step: Step) {
+        let Step { world_from_camera, local, seconds, sought, observations, passed_by } = step;
+        for index in sought {
+            self.landmarks[index].misses += 1;
+        }
+        for (index, ..) in &observations {
+            self.landmarks[*index].misses = 0;
+        }
+        let fraction = observations.len() as f64 / self.seen_by_keyframe.max(1) as f64;
+        // What passes by hides landmarks; those of other places of the image are what vouches for the ground, and are kept.
+        let own = fraction < self.settings.keyframe_fraction && !passed_by;
+        if own {
+            self.keyframe(&seen, world_from_camera, &observations);
+            let start = Instant::now();
+            self.adjust();
+            self.times.since("adjust", start);
+        }
+        let frame = self.frames.len() - 1;
+        // A key frame is its own reference, wherever the adjustment moved it.
+        let frame_from_camera = match own {
+            true => Transform::identity(),
+            false => self.frames[frame].world_from_camera.inverse() * world_from_camera,
+        };
+        let pose = Relative { stamp_ns: seen.stamp_ns, frame, frame_from_camera, local: Some(local) };
+        self.segments.last_mut().expect("a segment was begun").poses.push(pose);
+        let motion = Some((local.motion, seconds));
+        self.last = Some(Last { seen, world_from_camera: self.world_from_last(), motion });
+    }
+
+    /// Makes `seen` a key frame: what it saw of the landmarks, and new ones where it saw none.
+    fn keyframe(
+        &mut self,
+        seen: &Seen,
+        world_from_camera: Transform<World, Camera>,
+        observations: &[(usize, Vector4<f64>, Matrix4<f64>)],
+    ) {
+        let start = Instant::now();
+        let settings = self.settings;
+        let id = self.frames.len();
+        self.frames.push(WindowKeyFrame { world_from_camera, image: Some(seen.images[0].clone()) });
+        let mut taken = Taken::new(settings.apart_px);
+        for (index, pixels, noise) in observations {
+            taken.insert([pixels[0], pixels[1]]);
+            if let Some(factor) = noise.cholesky() {
+                let view = LandmarkObservation { frame: id, pixels: *pixels, information: factor.inverse() };
+                self.landmarks[*index].views.push(view);
+            }
+        }
+        let mut count = observations.len();
+        for point in &seen.cloud {
+            let Some(pixels) = point.pixels else { continue };
+            let left = pixels.at.left;
+            if count >= settings.landmarks || !taken.free([left.u, left.v]) {
+                continue;
+            }
+            if let Some(landmark) =
+                Landmark::begin(id, &pixels, self.stages.front_end.triangulator.rules().calibration_px, self.rig)
+            {
+                taken.insert([left.u, left.v]);
+                self.landmarks.push(landmark);
+                count += 1;
+            }
+        }
+        self.seen_by_keyframe = count;
+        self.times.since("key frame", start);
+    }
+
+    /// Adjusts the window and forgets what has left it.
+    fn adjust(&mut self) {
+        let end = self.frames.len();
+        let window = self.settings.window;
+        let oldest = end.saturating_sub(window.max(1)).max(self.first);
+        if window > 1 {
+            adjust(self.rig, &mut self.frames, &mut self.landmarks, oldest + 1);
+        }
+        self.frames[..oldest].iter_mut().for_each(|frame| frame.image = None);
+        let frames = &self.frames;
+        self.landmarks.retain(|landmark| {
+            let linked = landmark.views.len() > 1 && landmark.views.last().is_some_and(|view| view.frame > oldest);
+            landmark.at.z > 0.0 && (frames[landmark.anchor].image.is_some() || linked)
+        });
+    }
+}

@@ -1,0 +1,400 @@
+//! The tests that a set and its rivals must pass.
+
+use nalgebra::Vector3;
+use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
+
+use super::{
+    Acceptance, Alternative, Fix, Outcome, RejectionReason,
+    hypothesis::{Fallen, Hypothesis, by_score},
+    integrity::{Integrity, Protection, Redundancy, protection, semi_axes},
+    rms_apart,
+    transfer::Transfer,
+};
+use crate::{
+    Correspondence, Degenerate, Identification, ModelPoint, Observations, Prior, PriorBound, Problem, Solver,
+    a_contrario::expected_sets,
+    candidates::chi_square,
+    search::elsewhere,
+    solve::{
+        AlternativePose,
+        likelihood::{self, Likelihood},
+    },
+};
+
+/// What a set is judged by.
+pub(super) struct Judge<'a> {
+    pub(super) problem: &'a Problem<'a>,
+    pub(super) solver: &'a dyn Solver,
+    pub(super) acceptance: &'a Acceptance,
+    /// Poses further apart (m) are different answers.
+    pub(super) alert_limit: f64,
+    /// Pairs of the largest set that is judged.
+    pub(super) largest: usize,
+    /// Whether a search found the sets, so that chance may have made them.
+    pub(super) searched: bool,
+    pub(super) rig: Option<&'a StereoRig>,
+}
+
+impl Judge<'_> {
+    pub(super) fn size(&self, pairs: &[Correspondence]) -> Result<(), RejectionReason> {
+        let needed = self.acceptance.min_points.max(self.solver.minimum());
+        match pairs.len() {
+            enough if enough >= needed => Ok(()),
+            few => Err(RejectionReason::TooFew { found: few, needed }),
+        }
+    }
+
+    pub(super) fn a_contrario(&self, pairs: &[Correspondence]) -> Result<(), RejectionReason> {
+        if !self.searched {
+            return Ok(());
+        }
+        self.rare(pairs.len(), expected_sets(self.problem, pairs))
+    }
+
+    /// Whether chance is expected to give few enough sets of this size.
+    pub(super) fn rare(&self, size: usize, expected: f64) -> Result<(), RejectionReason> {
+        let budget = self.acceptance.max_nfa;
+        // Written so that a NaN is refused too.
+        if expected <= budget { Ok(()) } else { Err(RejectionReason::AContrario { size, expected, budget }) }
+    }
+
+    /// The pose of the set and of its rivals: the only one that passes, several, or none; `misidentified` as [`Integrity`] has it.
+    pub(super) fn poses(&self, found: &Identification, misidentified: Option<f64>) -> (Outcome, Option<Alternative>) {
+        let mut stand = Stand::default();
+        // Of what fell, the set that the search prefers gives the reason.
+        let mut first_fall: Option<(usize, Fallen)> = None;
+        let mut fell = |place: usize, fall: Fallen| {
+            if first_fall.as_ref().is_none_or(|(first, _)| place < *first) {
+                first_fall = Some((place, fall));
+            }
+        };
+        let mut full: Vec<(usize, Hypothesis)> = Vec::new();
+        for (place, pairs) in std::iter::once(&found.pairs).chain(&found.alternatives).enumerate() {
+            match self.hypothesis(pairs) {
+                Ok(hypothesis) => full.push((place, hypothesis)),
+                Err(degenerate) => fell(place, Fallen::Degenerate(degenerate)),
+            }
+        }
+        full.sort_by(|(_, a), (_, b)| by_score(a, b));
+        let mut rejected = Vec::new();
+        for (place, hypothesis) in full {
+            match self.residuals(&hypothesis) {
+                Ok(()) => {
+                    if let Some(fall) = self.admit(hypothesis, &mut stand) {
+                        fell(place, fall);
+                    }
+                }
+                Err(refusal) => {
+                    fell(place, Fallen::Refused(refusal));
+                    rejected.push(hypothesis);
+                }
+            }
+        }
+        for hypothesis in self.thinned(&rejected) {
+            self.admit(hypothesis, &mut stand);
+        }
+        stand.passed.sort_by(by_score);
+        stand.refused.append(&mut rejected);
+        stand.refused.sort_by(by_score);
+        let mut different: Vec<Hypothesis> = Vec::new();
+        for hypothesis in stand.passed {
+            if different.iter().all(|known| self.apart(&known.pose, &hypothesis.pose)) {
+                different.push(hypothesis);
+            }
+        }
+        if different.len() > 1 {
+            return (Outcome::Ambiguous(different.into_iter().map(Hypothesis::alternative).collect()), None);
+        }
+        match (different.pop(), first_fall) {
+            (Some(mut best), _) if !best.alternatives.is_empty() => {
+                let alternatives = std::mem::take(&mut best.alternatives);
+                (Outcome::Ambiguous(std::iter::once(best.alternative()).chain(alternatives).collect()), None)
+            }
+            (Some(best), _) => {
+                let runner_up = stand.refused.into_iter().find(|other| self.apart(&best.pose, &other.pose));
+                (self.fix(best, misidentified), runner_up.map(Hypothesis::alternative))
+            }
+            (None, Some((_, Fallen::Degenerate(why)))) => (Outcome::Degenerate(why), None),
+            (None, Some((_, Fallen::Refused(why)))) => (Outcome::Rejected(why), None),
+            (None, None) => unreachable!("every set either passed or fell"),
+        }
+    }
+
+    /// Puts a hypothesis whose residuals pass to those that stand or to those refused, and then says why.
+    /// One that only repeats a likelier pose is not looked at: it could change nothing.
+    fn admit(&self, mut hypothesis: Hypothesis, stand: &mut Stand) -> Option<Fallen> {
+        let repeats =
+            |known: &Hypothesis| known.score >= hypothesis.score && !self.apart(&known.pose, &hypothesis.pose);
+        if stand.passed.iter().any(repeats) {
+            return None;
+        }
+        match self.precise_and_near(&mut hypothesis).and_then(|()| self.seen_from_the_front(&hypothesis)) {
+            Ok(()) => {
+                stand.passed.push(hypothesis);
+                None
+            }
+            Err(fall) => {
+                stand.refused.push(hypothesis);
+                Some(fall)
+            }
+        }
+    }
+
+    /// A fix held against a pose elsewhere, the likeliest of pairs that contradict it, where the search named none: what stands as well
+    /// as the fix, and is no less likely, leaves it ambiguous.
+    pub(super) fn against_elsewhere(&self, fix: Box<Fix>) -> (Outcome, Option<Alternative>) {
+        let sets = elsewhere(self.problem, &fix.object_from_camera);
+        let others = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok());
+        let apart = others.filter(|other| self.apart(&fix.object_from_camera, &other.pose));
+        let Some(mut other) = apart.min_by(by_score) else { return (Outcome::Fix(fix), None) };
+        let stands = other.score >= fix.score
+            && self.residuals(&other).is_ok()
+            && self.precise_and_near(&mut other).is_ok()
+            && self.faces(&other);
+        let other = other.alternative();
+        if stands {
+            return (Outcome::Ambiguous(vec![other, (*fix).alternative()]), None);
+        }
+        (Outcome::Fix(fix), Some(other))
+    }
+
+    fn observations(&self, pairs: &[Correspondence]) -> Observations<'_> {
+        Observations::of(pairs, self.problem.model, self.problem.cloud, self.rig)
+    }
+
+    /// The pose of the pairs: of all that the solver finds as likely, and that residuals, prior and visible sides leave
+    /// possible, the likeliest, with the others beside it.
+    pub(super) fn hypothesis(&self, pairs: &[Correspondence]) -> Result<Hypothesis, Degenerate> {
+        let data = self.observations(pairs);
+        let pose = self.solver.solve(&data)?;
+        let likelihood = likelihood::maximum(&data, &pose);
+        let fewer = self.largest.saturating_sub(pairs.len()) as f64 * chi_square(3, self.acceptance.confidence);
+        let of = |pose, likelihood: Likelihood| {
+            let score = -0.5 * (likelihood.cost + fewer + self.off_prior(&likelihood.pose));
+            Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score, covariance: None, alternatives: Vec::new() }
+        };
+        let own = of(pose, likelihood);
+        let others = self.solver.alternatives(&data, &pose, chi_square(1, self.acceptance.confidence));
+        if others.is_empty() {
+            return Ok(own);
+        }
+        let other = |alternative: AlternativePose| {
+            of(alternative.pose, Likelihood { pose: alternative.pose, cost: own.likelihood.cost + alternative.worse })
+        };
+        let mut possible: Vec<Hypothesis> = others.into_iter().map(other).chain([own.clone()]).collect();
+        possible.retain_mut(|one| self.residuals(one).is_ok() && self.near(one).is_ok() && self.faces(one));
+        possible.sort_by(by_score);
+        let mut possible = possible.into_iter();
+        let Some(map_estimate) = possible.next() else { return Ok(own) };
+        Ok(Hypothesis { alternatives: possible.map(Hypothesis::alternative).collect(), ..map_estimate })
+    }
+
+    /// χ² of the prior at a pose; nought without one and of a shell.
+    fn off_prior(&self, pose: &Transform<Object, Camera>) -> f64 {
+        match self.problem.prior {
+            Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) }) => {
+                let xi = object_from_camera.error_to(pose);
+                covariance.matrix.cholesky().map_or(0.0, |c| xi.dot(&c.solve(&xi)))
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Whether a rigid motion explains the set within its noise.
+    pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
+        let freedom = 3 * hypothesis.pairs.len() - 6;
+        let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(freedom, self.acceptance.confidence));
+        // Written so that a NaN is refused too.
+        if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
+    }
+
+    /// Whether precision and prior let the pose pass.
+    pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
+        let covariance = self.covariance(hypothesis)?;
+        let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
+        let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
+        // Written so that a NaN is refused too.
+        if !(2.0 * rms <= limit) {
+            return Err(Fallen::Refused(RejectionReason::Imprecise { rms, limit }));
+        }
+        let ((_, sigma), limit) = (semi_axes(&covariance), self.acceptance.attitude_limit);
+        if !(2.0 * sigma <= limit) {
+            return Err(Fallen::Refused(RejectionReason::Attitude { sigma, limit }));
+        }
+        self.near(hypothesis)
+    }
+
+    /// The covariance of the pose, asked for once.
+    fn covariance(&self, hypothesis: &mut Hypothesis) -> Result<Covariance6<Object, Camera>, Fallen> {
+        if let Some(known) = hypothesis.covariance {
+            return Ok(known);
+        }
+        let data = self.observations(&hypothesis.pairs);
+        let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
+        hypothesis.covariance = Some(covariance);
+        Ok(covariance)
+    }
+
+    /// Whether the prior lets the pose pass.
+    fn near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
+        let covariance = self.covariance(hypothesis)?;
+        let Some(prior) = self.problem.prior else { return Ok(()) };
+        let off = match &prior.bound {
+            PriorBound::Gaussian(of_prior) => {
+                let xi = prior.object_from_camera.error_to(&hypothesis.pose);
+                let sum = (of_prior.matrix + covariance.matrix).cholesky();
+                let chi2 = sum.map_or(f64::INFINITY, |c| xi.dot(&c.solve(&xi)));
+                (chi2 / chi_square(6, self.acceptance.confidence)).sqrt()
+            }
+            PriorBound::Box(half) => self.off_box(hypothesis, &covariance, &prior.object_from_camera, *half),
+        };
+        if off <= 1.0 { Ok(()) } else { Err(Fallen::Refused(RejectionReason::Prior { off })) }
+    }
+
+    /// Whether the camera of the pose sees the identified points from the sides from which they can be seen.
+    fn seen_from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
+        if self.faces(hypothesis) {
+            return Ok(());
+        }
+        let camera = hypothesis.pose.translation();
+        let angle = |point: &ModelPoint| point.incidence_angle(&camera).unwrap_or(0.0);
+        let points = hypothesis.pairs.iter().map(|pair| &self.problem.model[pair.model]);
+        let worst = points.max_by(|a, b| angle(a).total_cmp(&angle(b))).expect("a set that falls has points");
+        let (point, max) = (worst.id.clone(), ModelPoint::max_incidence_angle());
+        Err(Fallen::Refused(RejectionReason::Behind { point, angle: angle(worst), max }))
+    }
+
+    /// How far the identified model points, placed by the pose, are from where the prior places them:
+    /// the largest step along a camera axis over the half-size and the noise allowed with it.
+    fn off_box(
+        &self,
+        hypothesis: &Hypothesis,
+        covariance: &Covariance6<Object, Camera>,
+        prior: &Transform<Object, Camera>,
+        half: f64,
+    ) -> f64 {
+        let sigmas = chi_square(1, self.acceptance.confidence).sqrt();
+        let (by_pose, by_prior) = (hypothesis.pose.inverse(), prior.inverse());
+        let offs = hypothesis.pairs.iter().flat_map(|pair| {
+            let at = self.problem.model[pair.model].at;
+            let placed = by_pose * at;
+            let (step, noise) = (placed - by_prior * at, covariance.of_point(&placed));
+            (0..3).map(move |axis| step[axis].abs() / (half + sigmas * noise[(axis, axis)].max(0.0).sqrt()))
+        });
+        offs.fold(0.0, f64::max)
+    }
+
+    /// Whether two poses are different answers.
+    pub(super) fn apart(&self, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> bool {
+        !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
+    }
+
+    /// Whether the pose is as precise as is asked for whichever of its points is a wrong match, where a search found them.
+    ///
+    /// Where what is seen of a large model is small or in a row, the pose of these points alone has many others drift far: one of
+    /// them is then near some clutter, and that makes the pose look precise and puts it wrong. Three points need each other.
+    fn without_any_one(&self, hypothesis: &Hypothesis, hinge: Option<(usize, f64)>) -> Result<(), RejectionReason> {
+        let Some((place, rms)) = hinge.filter(|_| self.searched) else { return Ok(()) };
+        // Written so that a NaN is refused too.
+        if 2.0 * rms <= self.alert_limit {
+            return Ok(());
+        }
+        let point = self.problem.model[hypothesis.pairs[place].model].id.clone();
+        Err(RejectionReason::Hinge { point, rms, limit: self.alert_limit })
+    }
+
+    /// Whether the points are measured as large as the model says, by a test of the confidence of the others, or so nearly that what
+    /// follows for the pose is within the alert limit: a rig that stretches all it measures by ε has the object nearer or farther by
+    /// ε of its distance.
+    fn as_large_as_modelled(&self, hypothesis: &Hypothesis, integrity: &Integrity) -> Result<(), RejectionReason> {
+        let Some(stretch) = integrity.stretch else { return Ok(()) };
+        // Where the residuals that it leaves are larger than their noise, so is the error of the scale.
+        let sigmas = stretch.value / stretch.sigma;
+        let left = (integrity.chi2 - sigmas * sigmas).max(0.0) / (integrity.freedom - 1) as f64;
+        let sure = sigmas * sigmas > chi_square(1, self.acceptance.confidence) * left.max(1.0);
+        let count = hypothesis.pairs.len() as f64;
+        let centre: Vector3<f64> =
+            hypothesis.pairs.iter().map(|pair| self.problem.model[pair.model].at.coords).sum::<Vector3<f64>>() / count;
+        // Points that a stretch moved farthest are those that were not identified: what is left shows less of it.
+        let max = stretch.value.abs() + UNDERSTATED * stretch.sigma;
+        let off = max * (hypothesis.pose.inverse() * Point::from(centre)).coords.norm();
+        match sure && off > self.alert_limit {
+            true => Err(RejectionReason::Stretched { stretch, off, limit: self.alert_limit }),
+            false => Ok(()),
+        }
+    }
+
+    /// Raises the levels of a fix so that they hold of other poses within the alert limit too: of all that are not less likely than
+    /// the fix by [`COVERED`] of the risk.
+    pub(super) fn cover<'p>(&self, fix: &mut Fix, others: impl Iterator<Item = (f64, &'p Transform<Object, Camera>)>) {
+        let quiet = Protection::quiet(&fix.covariance, 0.5 * self.acceptance.risk);
+        let Some(level) = &mut fix.integrity.protection else { return };
+        let likely = others.filter(|(fraction, _)| !(*fraction < COVERED * self.acceptance.risk));
+        likely.for_each(|(_, other)| level.cover(&quiet, &fix.object_from_camera, other));
+    }
+
+    /// Raises the levels of a fix to where its points are mistaken with this probability; they may have been raised for others.
+    pub(super) fn protected(&self, fix: &mut Fix, misidentified: f64) {
+        let data = self.observations(&fix.pairs);
+        let pose = &fix.object_from_camera;
+        let transfer = Transfer::of(self.problem.model, pose);
+        let level = protection(&data, pose, &fix.covariance, self.acceptance, &transfer, misidentified).protection;
+        let known = fix.integrity.protection.take();
+        fix.integrity.protection = known.zip(level).map(|(known, level)| known.max(&level));
+        fix.integrity.misidentified = Some(misidentified);
+    }
+
+    fn fix(&self, hypothesis: Hypothesis, misidentified: Option<f64>) -> Outcome {
+        let data = self.observations(&hypothesis.pairs);
+        let known = hypothesis.covariance.map_or_else(|| self.solver.covariance(&data, &hypothesis.pose), Ok);
+        let covariance = match known {
+            Ok(covariance) => covariance,
+            Err(why) => return Outcome::Degenerate(why),
+        };
+        let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
+        let mistaken = misidentified.unwrap_or(0.0);
+        let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, mistaken);
+        let freedom = 3 * hypothesis.pairs.len() - 6;
+        let integrity = Integrity {
+            redundancy: Redundancy::of(hypothesis.pairs.len()),
+            chi2: hypothesis.likelihood.cost,
+            freedom,
+            chi2_limit: chi_square(freedom, self.acceptance.confidence),
+            separation: left_out.one,
+            separation_two: left_out.two,
+            misidentified,
+            protection: left_out.protection,
+            stretch: left_out.stretch,
+        };
+        let stands = self.without_any_one(&hypothesis, left_out.hinge);
+        if let Err(refusal) = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity)) {
+            return Outcome::Rejected(refusal);
+        }
+        Outcome::Fix(Box::new(Fix {
+            object_from_camera: hypothesis.pose,
+            covariance,
+            used: self.solver.used(&data),
+            residuals: data.residuals(&hypothesis.pose),
+            residual_rms: data.residual_rms(&hypothesis.pose),
+            score: hypothesis.score,
+            integrity,
+            pairs: hypothesis.pairs,
+        }))
+    }
+}
+
+/// Poses near a fix whose probability, over that of the fix, is no more than this share of the risk need not be within its levels.
+const COVERED: f64 = 0.01;
+
+/// A stretch may be greater than it seems by so many of its standard deviations.
+const UNDERSTATED: f64 = 2.0;
+
+/// The hypotheses that passed every test, and those that did not.
+#[derive(Default)]
+struct Stand {
+    passed: Vec<Hypothesis>,
+    refused: Vec<Hypothesis>,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,463 @@
+//! Every test of a set, at its limit, in absolute numbers.
+
+use super::*;
+use crate::{Candidates, Kabsch, ScaleError, Tolerance};
+use nalgebra::{UnitQuaternion, Vector6};
+use seafix_geometry::{MeasuredPoint, UncertainPoint};
+
+const SIGMA: f64 = 0.002;
+
+/// The six vertices of an octahedron of one metre about this place, each seen from everywhere.
+fn octahedron(centre: [f64; 3]) -> Vec<ModelPoint> {
+    let vertex = |k: usize| Vector3::from(centre) + Vector3::ith(k / 2, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
+    (0..6).map(|k| ModelPoint::exact(format!("V{k}"), vertex(k).into())).collect()
+}
+
+/// A camera at this place of the object, its axes those of the object.
+fn camera_at(x: f64, y: f64, z: f64) -> Transform<Object, Camera> {
+    Transform::new(UnitQuaternion::identity(), Vector3::new(x, y, z))
+}
+
+/// A solver with one answer.
+#[derive(Debug, Clone)]
+struct Fixed {
+    pose: Transform<Object, Camera>,
+    covariance: Covariance6<Object, Camera>,
+    alternatives: Vec<AlternativePose>,
+    minimum: usize,
+}
+
+impl Fixed {
+    fn at(pose: Transform<Object, Camera>, attitude: f64, position: f64) -> Self {
+        Self { pose, covariance: Covariance6::isotropic(attitude, position), alternatives: Vec::new(), minimum: 3 }
+    }
+}
+
+impl Solver for Fixed {
+    fn minimum(&self) -> usize {
+        self.minimum
+    }
+
+    fn solve(&self, _: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        Ok(self.pose)
+    }
+
+    /// Those that are worse by no more than χ²₁ at 99.9 %, 10.83.
+    fn alternatives(&self, _: &Observations<'_>, _: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
+        assert!((max - 10.827_566_170_662_733).abs() < 1e-6, "{max}");
+        self.alternatives.clone()
+    }
+
+    fn covariance(
+        &self,
+        _: &Observations<'_>,
+        _: &Transform<Object, Camera>,
+    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        Ok(self.covariance)
+    }
+}
+
+/// What a judge needs: the octahedron seen from a pose, each of its points named.
+struct Scene {
+    model: Vec<ModelPoint>,
+    cloud: Vec<MeasuredPoint>,
+    candidates: Candidates,
+    prior: Option<Prior>,
+    acceptance: Acceptance,
+    searched: bool,
+    largest: usize,
+}
+
+impl Scene {
+    fn of(model: Vec<ModelPoint>, from: &Transform<Object, Camera>) -> Self {
+        let seen = |point: &ModelPoint| UncertainPoint::isotropic(from.inverse() * point.at, SIGMA);
+        let cloud = model.iter().map(|point| MeasuredPoint { position: seen(point), pixels: None }).collect();
+        let candidates = Candidates::from_pairs(model.len(), (0..model.len()).map(|i| (i, i)));
+        let largest = model.len();
+        Self { model, cloud, candidates, prior: None, acceptance: Acceptance::default(), searched: true, largest }
+    }
+
+    fn judge<R>(&self, solver: &dyn Solver, work: impl FnOnce(&Judge<'_>) -> R) -> R {
+        let problem = Problem {
+            model: &self.model,
+            cloud: &self.cloud,
+            candidates: &self.candidates,
+            tolerance: Tolerance::Sigmas(4.0),
+            prior: self.prior.as_ref(),
+        };
+        let (acceptance, searched, largest) = (&self.acceptance, self.searched, self.largest);
+        let alert_limit = acceptance.alert_limit;
+        work(&Judge { problem: &problem, solver, acceptance, alert_limit, largest, searched, rig: None })
+    }
+
+    fn pairs(&self) -> Vec<Correspondence> {
+        (0..self.model.len()).map(|i| Correspondence { model: i, cloud: i }).collect()
+    }
+
+    /// The set of all points at a pose, with residuals of this χ².
+    fn hypothesis(&self, pose: Transform<Object, Camera>, cost: f64) -> Hypothesis {
+        let likelihood = Likelihood { pose, cost };
+        Hypothesis { pairs: self.pairs(), pose, likelihood, score: 0.0, covariance: None, alternatives: Vec::new() }
+    }
+
+    /// What precision and prior say of a pose.
+    fn precise_and_near(&self, solver: &Fixed) -> Result<(), Fallen> {
+        self.judge(solver, |judge| judge.precise_and_near(&mut self.hypothesis(solver.pose, 0.0)))
+    }
+}
+
+fn refused(fallen: Result<(), Fallen>) -> Option<RejectionReason> {
+    match fallen {
+        Ok(()) => None,
+        Err(Fallen::Refused(refusal)) => Some(refusal),
+        Err(Fallen::Degenerate(why)) => panic!("{why}"),
+    }
+}
+
+fn close(found: f64, expected: f64) -> bool {
+    (found / expected - 1.0).abs() < 1e-6
+}
+
+#[test]
+fn a_set_has_as_many_points_as_are_asked_for_and_the_solver_needs() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    scene.acceptance.min_points = 5;
+    let (pairs, mut solver) = (scene.pairs(), Fixed::at(Transform::identity(), 0.0, 0.0));
+    assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..5])), Ok(()));
+    let few = Err(RejectionReason::TooFew { found: 4, needed: 5 });
+    assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..4])), few);
+    solver.minimum = 6;
+    assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..6])), Ok(()));
+    let few = Err(RejectionReason::TooFew { found: 5, needed: 6 });
+    assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..5])), few);
+}
+
+/// Three true pairs of six model points among 60 points of clutter that may be any of them: chance gives many such sets. Pairs that
+/// no search found are not held against it.
+///
+/// Seen to fail where chance refuses nothing.
+#[test]
+fn three_points_of_much_clutter_are_random() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -4.0));
+    for k in 0..60 {
+        let [x, y, z] = [1, 2, 3].map(|p: u32| (f64::from(k) * f64::from(p).sqrt() * 0.37).fract() * 3.0 - 1.5);
+        let position = UncertainPoint::isotropic(Point::new(x, y, z + 4.0), SIGMA);
+        scene.cloud.push(MeasuredPoint { position, pixels: None });
+    }
+    scene.candidates = Candidates::all(6, scene.cloud.len());
+    let (kabsch, three) = (Kabsch::default(), scene.pairs()[..3].to_vec());
+    match scene.judge(&kabsch, |judge| judge.a_contrario(&three)) {
+        Err(RejectionReason::AContrario { size: 3, expected, budget }) => {
+            assert!(expected > 1e-2 && budget == 1e-3, "{expected}")
+        }
+        other => panic!("{other:?}"),
+    }
+    let all = scene.pairs();
+    assert_eq!(scene.judge(&kabsch, |judge| judge.a_contrario(&all)), Ok(()));
+    scene.searched = false;
+    assert_eq!(scene.judge(&kabsch, |judge| judge.a_contrario(&three)), Ok(()));
+}
+
+#[test]
+fn more_random_sets_than_the_budget_are_refused() {
+    let scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    let rare = |expected: f64| scene.judge(&Kabsch::default(), |judge| judge.rare(4, expected));
+    assert_eq!((rare(0.0), rare(1e-3)), (Ok(()), Ok(())));
+    assert_eq!(rare(1.001e-3), Err(RejectionReason::AContrario { size: 4, expected: 1.001e-3, budget: 1e-3 }));
+    assert!(matches!(rare(f64::NAN), Err(RejectionReason::AContrario { .. })));
+}
+
+/// Six points leave 3 · 6 − 6 = 12 degrees of freedom: χ²₁₂ at 99.9 % is 32.91.
+#[test]
+fn residuals_pass_up_to_the_quantile_of_their_freedom() {
+    let scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    let of = |cost: f64| {
+        let hypothesis = scene.hypothesis(Transform::identity(), cost);
+        scene.judge(&Kabsch::default(), |judge| judge.residuals(&hypothesis))
+    };
+    assert_eq!((of(0.0), of(32.909)), (Ok(()), Ok(())));
+    match of(32.910) {
+        Err(RejectionReason::Residuals { chi2, limit }) => {
+            assert!(chi2 == 32.910 && close(limit, 32.909_490_407_360_21))
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(of(f64::NAN).is_err());
+}
+
+/// From the centre of the octahedron its points are one metre away: σ of the position moves each by √3 σ, of the attitude by √2 σ.
+#[test]
+fn a_pose_passes_whose_two_standard_deviations_are_within_the_limits() {
+    let scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    let of = |attitude: f64, position: f64| {
+        refused(scene.precise_and_near(&Fixed::at(Transform::identity(), attitude, position)))
+    };
+    assert_eq!((of(0.0, 0.0288), of(0.0349, 0.0)), (None, None));
+    match of(0.0, 0.0290) {
+        Some(RejectionReason::Imprecise { rms, limit }) => assert!(close(rms, 0.029 * 3.0_f64.sqrt()) && limit == 0.10),
+        other => panic!("{other:?}"),
+    }
+    match of(0.0351, 0.0) {
+        Some(RejectionReason::Attitude { sigma, limit }) => assert!(close(sigma, 0.0351) && limit == 0.07),
+        other => panic!("{other:?}"),
+    }
+    assert!(matches!(of(0.0, f64::NAN), Some(RejectionReason::Imprecise { .. })));
+}
+
+/// The prior's 5 cm and the fix's 12 cm are 13 cm together; √χ²₆ at 99.9 % is 4.739.
+#[test]
+fn a_gaussian_prior_lets_through_what_both_covariances_allow() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    scene.acceptance.alert_limit = 10.0;
+    let bound = PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05));
+    scene.prior = Some(Prior { object_from_camera: Transform::identity(), bound });
+    let of = |x: f64| refused(scene.precise_and_near(&Fixed::at(camera_at(x, 0.0, 0.0), 1e-4, 0.12)));
+    assert_eq!((of(0.0), of(0.616)), (None, None));
+    for x in [0.6165, -1.2] {
+        match of(x) {
+            Some(RejectionReason::Prior { off }) => {
+                assert!(close(off, x.abs() / (0.13 * 22.457_744_484_825_323_f64.sqrt())))
+            }
+            other => panic!("{x}: {other:?}"),
+        }
+    }
+}
+
+/// A box of 30 cm, and √χ²₁ at 99.9 % = 3.2905 standard deviations of 1 cm beyond it.
+#[test]
+fn a_box_lets_through_its_half_size_and_the_noise() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    scene.prior = Some(Prior { object_from_camera: Transform::identity(), bound: PriorBound::Box(0.3) });
+    let of = |at: [f64; 3]| {
+        let pose = camera_at(at[0], at[1], at[2]);
+        refused(scene.precise_and_near(&Fixed::at(pose, 0.0, 0.01)))
+    };
+    let limit = 0.3 + 0.01 * 10.827_566_170_662_733_f64.sqrt();
+    for axis in 0..3 {
+        let step = |size: f64| [0, 1, 2].map(|k| if k == axis { size } else { 0.2 });
+        assert_eq!((of(step(0.3329)), of(step(-0.3329))), (None, None));
+        match of(step(-0.3331)) {
+            Some(RejectionReason::Prior { off }) => assert!(close(off, 0.3331 / limit), "{off}"),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// χ² of the residuals, of the prior, and 16.27, χ²₃ at 99.9 %, for each pair fewer than the largest set has.
+///
+/// A vertex δ = 3 σ too far out leaves δ² 5/6 σ² = 7.5 and moves the pose by δ/6 = 1 mm; the prior is 0.1 m off with σ = 0.05 m.
+#[test]
+fn a_score_is_minus_half_of_all_that_speaks_against_the_set() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    scene.cloud[0].position.at.coords.x += 3.0 * SIGMA;
+    scene.largest = 8;
+    let score = |scene: &Scene| {
+        let solver = Kabsch::default();
+        let hypothesis = scene.judge(&solver, |judge| judge.hypothesis(&scene.pairs())).unwrap();
+        assert!((hypothesis.likelihood.cost - 7.5).abs() < 1e-3 && hypothesis.alternatives.is_empty());
+        hypothesis.score
+    };
+    let fewer = 2.0 * 16.266_236_196_238_13;
+    assert!((score(&scene) + 0.5 * (7.5 + fewer)).abs() < 1e-3, "{}", score(&scene));
+    let object_from_camera = camera_at(0.0, 0.1, 0.0);
+    let bound = PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05));
+    scene.prior = Some(Prior { object_from_camera, bound });
+    assert!((score(&scene) + 0.5 * (7.5 + fewer + 4.0004)).abs() < 1e-3, "{}", score(&scene));
+    scene.prior = Some(Prior { object_from_camera, bound: PriorBound::Box(0.2) });
+    assert!((score(&scene) + 0.5 * (7.5 + fewer)).abs() < 1e-3, "{}", score(&scene));
+}
+
+/// Another pose of the same pairs stands beside the solver's by its χ²; a less likely one before which the points hide does not.
+#[test]
+fn other_poses_of_a_set_are_ranked_by_what_they_are_worse() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -3.0));
+    scene.model.iter_mut().for_each(|point| point.normal = Some(-Vector3::z()));
+    let mut solver = Fixed::at(camera_at(0.0, 0.0, -3.0), 1e-3, 1e-3);
+    let of = |solver: &Fixed| scene.judge(solver, |judge| judge.hypothesis(&scene.pairs())).unwrap();
+    assert!(of(&solver).alternatives.is_empty());
+    let near = camera_at(0.5, 0.0, -3.0);
+    solver.alternatives = vec![
+        AlternativePose { pose: near, worse: 2.0 },
+        AlternativePose { pose: camera_at(0.0, 0.0, 3.0), worse: 1.0 },
+    ];
+    let own = of(&solver);
+    assert_eq!((own.pose, own.alternatives.len()), (solver.pose, 1));
+    assert!(
+        own.alternatives[0].object_from_camera == near && (own.alternatives[0].score - (own.score - 1.0)).abs() < 1e-6
+    );
+    solver.alternatives[0].worse = -2.0;
+    let other = of(&solver);
+    assert_eq!((other.pose, other.alternatives[0].object_from_camera), (near, solver.pose));
+    assert!((other.score - (own.score + 1.0)).abs() < 1e-6);
+    // Residuals that no set may have.
+    solver.alternatives[0].worse = 40.0;
+    assert!(of(&solver).alternatives.is_empty());
+}
+
+/// The camera stands at (0, 0, −3): a vertex that looks along −z is seen, and one that looks along z by acos(−3/√10) = 161.6° is not.
+///
+/// Seen to fail where no pose is refused for it.
+#[test]
+fn a_pose_behind_its_points_is_refused_with_the_worst_of_them() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -3.0));
+    scene.model.iter_mut().for_each(|point| point.normal = Some(-Vector3::z()));
+    let pose = camera_at(0.0, 0.0, -3.0);
+    let of = |scene: &Scene| {
+        let hypothesis = scene.hypothesis(pose, 0.0);
+        scene.judge(&Kabsch::default(), |judge| refused(judge.seen_from_the_front(&hypothesis)))
+    };
+    assert_eq!(of(&scene), None);
+    scene.model[1].normal = Some(Vector3::new(1.0, 0.0, 1.0));
+    scene.model[2].normal = Some(Vector3::z());
+    match of(&scene) {
+        Some(RejectionReason::Behind { point, angle, max }) => {
+            assert!(point == "V2" && close(angle, (-3.0 / 10.0_f64.sqrt()).acos()), "{point} {angle}");
+            assert!(max > std::f64::consts::FRAC_PI_2 && max < 2.0, "{max}");
+        }
+        other => panic!("{other:?}"),
+    }
+    // The whole judgement says so.
+    let kabsch = Kabsch::default();
+    let found = Identification::unproved(scene.pairs(), 6, 0);
+    let (outcome, _) = scene.judge(&kabsch, |judge| judge.poses(&found, None));
+    assert!(matches!(outcome, Outcome::Rejected(RejectionReason::Behind { .. })), "{outcome:?}");
+}
+
+#[test]
+fn poses_up_to_the_alert_limit_apart_are_one() {
+    let scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    let apart =
+        |x: f64| scene.judge(&Kabsch::default(), |judge| judge.apart(&Transform::identity(), &camera_at(x, 0.0, 0.0)));
+    assert_eq!([0.0, 0.0999, 0.1001, f64::NAN].map(apart), [false, false, true, true]);
+}
+
+#[test]
+fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    let of = |scene: &Scene, hinge: Option<(usize, f64)>| {
+        let hypothesis = scene.hypothesis(Transform::identity(), 0.0);
+        scene.judge(&Kabsch::default(), |judge| judge.without_any_one(&hypothesis, hinge))
+    };
+    assert_eq!((of(&scene, None), of(&scene, Some((2, 0.05)))), (Ok(()), Ok(())));
+    let refusal = RejectionReason::Hinge { point: "V2".into(), rms: 0.0501, limit: 0.10 };
+    assert_eq!(of(&scene, Some((2, 0.0501))), Err(refusal));
+    assert!(of(&scene, Some((2, f64::NAN))).is_err());
+    scene.searched = false;
+    assert_eq!(of(&scene, Some((2, 0.0501))), Ok(()));
+}
+
+/// What is known of a fix of six points with this χ² and this stretch.
+fn integrity(chi2: f64, stretch: Option<ScaleError>) -> Integrity {
+    Integrity {
+        redundancy: Redundancy::Excludable,
+        chi2,
+        freedom: 12,
+        chi2_limit: 32.909,
+        separation: None,
+        separation_two: None,
+        misidentified: None,
+        protection: None,
+        stretch,
+    }
+}
+
+/// A stretch of 1 % known to 0.4 %, 2.5 standard deviations, whose square is 6.25: more than 3.84, χ²₁ at 95 %, times what the other
+/// eleven degrees of freedom leave each. Points 10 m away are then off by (1 % + 2 · 0.4 %) · 10 m = 0.18 m.
+#[test]
+fn a_scale_error_is_refused_that_is_sure_and_moves_the_object_too_far() {
+    let stretch = |value: f64| Some(ScaleError { value, sigma: 0.004 });
+    let of = |distance: f64, chi2: f64, stretch: Option<ScaleError>| {
+        // The centre of the points, not the origin of the object, is so far away.
+        let mut scene = Scene::of(octahedron([3.0, 0.0, 1.0]), &Transform::identity());
+        scene.acceptance.confidence = 0.95;
+        let hypothesis = scene.hypothesis(camera_at(3.0, 0.0, 1.0 - distance), chi2);
+        scene.judge(&Kabsch::default(), |judge| judge.as_large_as_modelled(&hypothesis, &integrity(chi2, stretch)))
+    };
+    for value in [0.01, -0.01] {
+        let refusal = of(10.0, 17.0, stretch(value)).unwrap_err();
+        let RejectionReason::Stretched { stretch: reported, off, limit } = refusal else { panic!("{refusal}") };
+        assert!(reported.value == value && close(off, 0.18) && limit == 0.10, "{off}");
+    }
+    assert_eq!(of(10.0, 17.0, None), Ok(()));
+    // (1 % + 0.8 %) of 5.5 m and of 5.6 m: 9.9 cm and 10.08 cm.
+    assert!(of(5.5, 17.0, stretch(0.01)).is_ok() && of(5.6, 17.0, stretch(0.01)).is_err());
+    // 17.8 over eleven is 1.618 and 18 over eleven 1.636, times 3.8415 is 6.216 and 6.286.
+    assert!(of(10.0, 6.25 + 17.8, stretch(0.01)).is_err() && of(10.0, 6.25 + 18.0, stretch(0.01)).is_ok());
+    // Residuals that leave less than their noise make nothing surer: 1.95² is less than 3.84, 1.97² more.
+    assert!(of(30.0, 4.0, stretch(0.0078)).is_ok() && of(30.0, 4.0, stretch(0.00788)).is_err());
+    assert!(of(30.0, 0.5, stretch(0.0078)).is_ok());
+}
+
+/// A fix from (0, 0, −4) with σ of 1 mrad and 1 cm, and these levels.
+fn fixed(scene: &Scene, protection: Option<Protection>) -> Fix {
+    let pose = camera_at(0.0, 0.0, -4.0);
+    Fix {
+        object_from_camera: pose,
+        covariance: Covariance6::isotropic(0.001, 0.01),
+        pairs: scene.pairs(),
+        used: Vec::new(),
+        residuals: Vec::new(),
+        residual_rms: 0.0,
+        score: 0.0,
+        integrity: Integrity { protection, ..integrity(0.0, None) },
+    }
+}
+
+/// Half of the risk of 1e-4 is the radius of 4.749 standard deviations.
+#[test]
+fn levels_are_raised_to_poses_that_are_no_less_likely_than_a_hundredth_of_the_risk() {
+    let scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -4.0));
+    let other = camera_at(0.03, 0.04, -4.0).perturbed(&Vector6::new(0.0, 0.02, 0.0, 0.0, 0.0, 0.0));
+    let known = Protection { position: 0.06, attitude: 0.001 };
+    let level = |fraction: f64, known: Option<Protection>| {
+        let mut fix = fixed(&scene, known);
+        scene.judge(&Kabsch::default(), |judge| judge.cover(&mut fix, std::iter::once((fraction, &other))));
+        fix.integrity.protection
+    };
+    const K: f64 = 4.749_184_042_602_995;
+    for fraction in [1.0, COVERED * 1e-4, f64::NAN] {
+        let raised = level(fraction, Some(known)).unwrap();
+        assert!(close(raised.position, 0.05 + K * 0.01) && close(raised.attitude, 0.02 + K * 0.001), "{raised:?}");
+    }
+    assert_eq!(level(0.99e-6, Some(known)), Some(known));
+    assert_eq!(level(1.0, None), None);
+}
+
+/// Levels are those of the risk that is left, never less than what is known, and none where none is left or was known.
+#[test]
+fn a_probability_of_being_mistaken_is_taken_from_the_risk_of_a_fix() {
+    let scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -4.0));
+    let level = |known: Option<Protection>, misidentified: f64| {
+        let mut fix = fixed(&scene, known);
+        scene.judge(&Kabsch::default(), |judge| judge.protected(&mut fix, misidentified));
+        assert_eq!(fix.integrity.misidentified, Some(misidentified));
+        fix.integrity.protection
+    };
+    let low = Protection { position: 0.01, attitude: 0.001 };
+    // Half of 2e-5 is left.
+    let of = |risk: f64| Protection::quiet(&Covariance6::isotropic(0.001, 0.01), 0.5 * risk);
+    let raised = level(Some(low), 8e-5).unwrap();
+    assert!(raised.position >= of(2e-5).position && raised.attitude >= of(2e-5).attitude, "{raised:?}");
+    assert!(close(raised.position, of(2e-5).position) && raised.position > of(1e-4).position, "{raised:?}");
+    let high = Protection { position: 0.5, attitude: 0.4 };
+    assert_eq!(level(Some(high), 8e-5), Some(high));
+    assert_eq!((level(None, 8e-5), level(Some(high), 1e-4)), (None, None));
+}
+
+/// A fix of six points with one δ = 3 σ off: 12 degrees of freedom, χ² = 7.5, residuals of √(δ² 5/6 / 6) RMS.
+#[test]
+fn a_fix_reports_its_numbers() {
+    let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -4.0));
+    scene.cloud[0].position.at.coords.x += 3.0 * SIGMA;
+    let kabsch = Kabsch::default();
+    let found = Identification::unproved(scene.pairs(), 6, 0);
+    let (outcome, runner_up) = scene.judge(&kabsch, |judge| judge.poses(&found, Some(3e-5)));
+    let Outcome::Fix(fix) = outcome else { panic!("{outcome:?}") };
+    let known = &fix.integrity;
+    assert_eq!((known.freedom, known.redundancy, known.misidentified), (12, Redundancy::Excludable, Some(3e-5)));
+    assert!((known.chi2 - 7.5).abs() < 1e-3 && close(known.chi2_limit, 32.909_490_407_360_21), "{known:?}");
+    assert!((fix.residual_rms - 3.0 * SIGMA * (5.0_f64 / 36.0).sqrt()).abs() < 1e-6, "{}", fix.residual_rms);
+    assert!(known.separation.is_some() && known.separation_two.is_none() && known.protection.is_some());
+    assert_eq!((fix.pairs, fix.used, fix.residuals.len()), (scene.pairs(), vec![0, 1, 2, 3, 4, 5], 6));
+    assert_eq!(runner_up, None);
+}

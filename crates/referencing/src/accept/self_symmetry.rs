@@ -1,0 +1,179 @@
+//! Other readings of the same measured points.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+use seafix_geometry::{Camera, Object, Transform};
+
+use super::{
+    Outcome,
+    admitted::Admitted,
+    hypothesis::{Hypothesis, by_score},
+    judge::Judge,
+};
+use crate::{Correspondence, Kabsch, Observations, Solver};
+
+/// Pairs of model points that the first two measured points may be, beyond which other readings are not sought.
+const MAX_BASES: usize = 1_000_000;
+/// More readings of one set are not needed to call it ambiguous.
+const MAX_SYMMETRIC: usize = 64;
+impl Judge<'_> {
+    /// The outcome, or that it is ambiguous because the measured points of a fix are other points of the model as well.
+    ///
+    /// Where a motion maps the identified points of a model onto points of the model, the pose before it and the pose after
+    /// it explain the same measurements. Candidates, residuals, precision, prior and the visible sides of the points decide
+    /// between them as between any sets; what passes all is an alternative. A search that weighs evidence must leave all
+    /// alternatives together no more than [`Acceptance::doubt`](super::Acceptance::doubt), by the likelihood of the pairs and
+    /// the prior, and what it leaves them is taken from the fix's protection; of other searches none may pass. What the candidates do
+    /// not propose counts as much as those who propose may have mistaken the points for their like ([`Judge::mislabeled`]).
+    pub(super) fn distinguished(&self, mut outcome: Outcome, weighs: bool) -> Outcome {
+        let Outcome::Fix(fix) = &mut outcome else { return outcome };
+        let admitted = self.admitted(&fix.pairs);
+        let sets = self.symmetric_sets(&fix.pairs, &admitted);
+        if sets.is_empty() {
+            return outcome;
+        }
+        let Ok(own) = self.hypothesis(&fix.pairs) else { return outcome };
+        let mut possible: Vec<Hypothesis> = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok()).collect();
+        possible.retain(|other| self.faces(other) && self.residuals(other).is_ok());
+        // The likeliest first: those near one that is known are the same pose.
+        possible.sort_by(by_score);
+        let (mut near, mut others): (Vec<Hypothesis>, Vec<Hypothesis>) = (Vec::new(), Vec::new());
+        for mut other in possible {
+            if others.iter().any(|known| !self.apart(&known.pose, &other.pose))
+                || self.precise_and_near(&mut other).is_err()
+            {
+                continue;
+            }
+            if self.apart(&own.pose, &other.pose) { &mut others } else { &mut near }.push(other);
+        }
+        let fraction = |other: &Hypothesis| (other.score - own.score).exp();
+        self.cover(fix, near.iter().map(|other| (fraction(other), &other.pose)));
+        let mut weight = 0.0;
+        others.retain(|other| {
+            let mislabeled = if admitted.proposed { self.mislabeled(&own, other) } else { 1.0 };
+            let of_other = mislabeled * fraction(other);
+            weight += of_other;
+            weighs || mislabeled >= 1.0 || of_other > self.acceptance.doubt
+        });
+        if others.is_empty() || (weighs && weight <= self.acceptance.doubt * (1.0 + weight)) {
+            if weight > 0.0 && weighs {
+                // The search may have counted some of them among the poses elsewhere: what is counted twice is on the safe side.
+                let known = fix.integrity.misidentified.unwrap_or(0.0);
+                self.protected(fix, known + weight / (1.0 + weight));
+            }
+            return outcome;
+        }
+        Outcome::Ambiguous(std::iter::once(own).chain(others).map(Hypothesis::alternative).collect())
+    }
+
+    /// All sets of as many pairs in which the same measured points are other points of the model: a triangle of them, as wide
+    /// as they have one, is laid on every triangle of the model that is coherent with it, and each of the others must come to
+    /// lie at a model point of its own.
+    /// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
+    fn symmetric_sets(&self, pairs: &[Correspondence], admitted: &Admitted) -> BTreeSet<Vec<Correspondence>> {
+        let mut found = BTreeSet::new();
+        let Some(base) = self.wide(pairs) else { return found };
+        let [first, second, third] = base.map(|cloud| &admitted.models[&cloud]);
+        if first.len().saturating_mul(second.len()) > MAX_BASES {
+            return found;
+        }
+        let at = |model: usize, place: usize| Correspondence { model, cloud: base[place] };
+        let known: BTreeSet<&Correspondence> = pairs.iter().collect();
+        let measured = |a: usize, b: usize| self.problem.measured(base[a], base[b]);
+        let [near, far, opposite] = [measured(0, 1), measured(0, 2), measured(1, 2)];
+        let meet = |a: Correspondence, b: Correspondence, measured: f64| {
+            a.model != b.model && self.problem.agrees(a, b, measured)
+        };
+        for &i in first {
+            let seconds: Vec<usize> = second.iter().copied().filter(|&j| meet(at(i, 0), at(j, 1), near)).collect();
+            if seconds.is_empty() {
+                continue;
+            }
+            let thirds: Vec<usize> = third.iter().copied().filter(|&k| meet(at(i, 0), at(k, 2), far)).collect();
+            for &j in &seconds {
+                for &k in thirds.iter().filter(|&&k| meet(at(j, 1), at(k, 2), opposite)) {
+                    let three = [at(i, 0), at(j, 1), at(k, 2)];
+                    if three.iter().all(|pair| known.contains(pair)) {
+                        continue;
+                    }
+                    found.extend(self.completed(three, pairs, admitted));
+                    if found.len() >= MAX_SYMMETRIC {
+                        return found;
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// Three of the measured points, far apart: one far from their middle, the farthest from that, and the one that makes the
+    /// largest triangle with both.
+    fn wide(&self, pairs: &[Correspondence]) -> Option<[usize; 3]> {
+        let place = |pair: &Correspondence| self.problem.cloud[pair.cloud].position.at.coords;
+        let middle = pairs.iter().map(place).sum::<Vector3<f64>>() / pairs.len() as f64;
+        let largest = |size: &dyn Fn(Vector3<f64>) -> f64| {
+            pairs.iter().max_by(|a, b| size(place(a)).total_cmp(&size(place(b))).then_with(|| b.cmp(a)))
+        };
+        let first = largest(&|at| (at - middle).norm())?;
+        let second = largest(&|at| (at - place(first)).norm())?;
+        let side = place(second) - place(first);
+        let third = largest(&|at| side.cross(&(at - place(first))).norm())?;
+        let three = [first.cloud, second.cloud, third.cloud];
+        (three[0] != three[1] && three[0] != three[2] && three[1] != three[2]).then_some(three)
+    }
+
+    /// The set of all measured points of `pairs` that these three begin, if every other lies at a model point of its own.
+    fn completed(
+        &self,
+        three: [Correspondence; 3],
+        pairs: &[Correspondence],
+        admitted: &Admitted,
+    ) -> Option<Vec<Correspondence>> {
+        let pose =
+            Kabsch::default().solve(&Observations::of(&three, self.problem.model, self.problem.cloud, None)).ok()?;
+        let mut set = three.to_vec();
+        let mut taken: BTreeSet<usize> = three.iter().map(|pair| pair.model).collect();
+        for cloud in pairs.iter().map(|pair| pair.cloud).filter(|cloud| three.iter().all(|pair| pair.cloud != *cloud)) {
+            let model = self.nearest(&pose, cloud, &three, &admitted.models[&cloud])?;
+            if !taken.insert(model) {
+                return None;
+            }
+            set.push(Correspondence { model, cloud });
+        }
+        set.sort_unstable();
+        Some(set)
+    }
+
+    /// The model point nearest to where the pose places a measured point, of those that it may be and that are coherent with
+    /// the three.
+    fn nearest(
+        &self,
+        pose: &Transform<Object, Camera>,
+        cloud: usize,
+        three: &[Correspondence; 3],
+        admitted: &[usize],
+    ) -> Option<usize> {
+        let place = *pose * self.problem.cloud[cloud].position.at;
+        let three = three.map(|pair| (pair, self.problem.measured(pair.cloud, cloud)));
+        let coherent = |model: usize| {
+            let own = Correspondence { model, cloud };
+            three.iter().all(|&(pair, measured)| pair.model != model && self.problem.agrees(pair, own, measured))
+        };
+        let mut nearest = (f64::INFINITY, None);
+        for &model in admitted {
+            // Most are far: that is known sooner than their distances to the three.
+            let apart = (self.problem.model[model].at - place).norm_squared();
+            if apart < nearest.0 && coherent(model) {
+                nearest = (apart, Some(model));
+            }
+        }
+        nearest.1
+    }
+
+    /// Whether the camera sees the identified points from the sides from which they can be seen.
+    pub(super) fn faces(&self, hypothesis: &Hypothesis) -> bool {
+        let camera = hypothesis.pose.translation();
+        hypothesis.pairs.iter().all(|pair| self.problem.model[pair.model].shows_itself(&camera))
+    }
+}

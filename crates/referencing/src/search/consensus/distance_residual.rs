@@ -1,0 +1,154 @@
+//! What it costs that distances in the cloud are not those of the model.
+
+use nalgebra::Vector3;
+
+use super::likelihood::Term;
+
+/// What second order may add to the variance of a distance, as a share of it; it also keeps three places on a line apart.
+const CURVED: f64 = 0.1;
+
+/// So much strain (nats) is let pass: it may be of a pair near the right one, in whose place a better is chosen once the pose is fitted.
+const PASSES: f64 = 3.0;
+
+/// What the bound of a set loses to its strain (nats).
+#[inline]
+pub(in crate::search) fn lost_to(distance_residual: f64) -> f64 {
+    (distance_residual - PASSES).max(0.0)
+}
+
+/// The distance of two pairs: how it differs, and where it points.
+#[derive(Clone, Copy)]
+pub(in crate::search) struct Edge {
+    /// Measured minus known (m).
+    stretch: f64,
+    /// From the first measured place to the second.
+    along: Vector3<f64>,
+    /// Of the stretch (m²).
+    variance: f64,
+}
+
+impl Edge {
+    #[inline]
+    pub(in crate::search) fn of(a: &Term, b: &Term) -> Self {
+        let apart = b.cloud - a.cloud;
+        let measured = apart.norm();
+        Self {
+            stretch: measured - (b.model - a.model).norm(),
+            along: apart / measured,
+            variance: (1.0 + CURVED) * (a.variance + b.variance),
+        }
+    }
+}
+
+/// ½ χ² of the distance of two pairs: no pose that both fit has less of a residual (nats).
+#[inline]
+pub(in crate::search) fn residual_of_two(a: &Term, b: &Term) -> f64 {
+    let edge = Edge::of(a, b);
+    0.5 * edge.stretch * edge.stretch / edge.variance
+}
+
+/// ½ χ² of the three distances of three pairs: dᵀ (J Σ Jᵀ)⁻¹ d / 2, J what the errors of three places make of their distances.
+/// No pose that all fit has less of a residual (nats), errors taken to be small beside the distances.
+#[inline]
+pub(in crate::search) fn residual_of_three([a, b, c]: [&Term; 3], [ab, ac, bc]: [&Edge; 3]) -> f64 {
+    let (aa, bb, cc) = (ab.variance, ac.variance, bc.variance);
+    let of_a = a.variance * ab.along.dot(&ac.along);
+    let of_b = -b.variance * ab.along.dot(&bc.along);
+    let of_c = c.variance * ac.along.dot(&bc.along);
+    let (p, q, r) = (bb * cc - of_c * of_c, of_b * of_c - of_a * cc, of_a * of_c - of_b * bb);
+    let determinant = aa * p + of_a * q + of_b * r;
+    let (x, y, z) = (ab.stretch, ac.stretch, bc.stretch);
+    let square = x * x * p
+        + y * y * (aa * cc - of_b * of_b)
+        + z * z * (aa * bb - of_a * of_a)
+        + 2.0 * (x * y * q + x * z * r + y * z * (of_a * of_b - aa * of_c));
+    let distance_residual = 0.5 * square / determinant;
+    // Places that coincide have no direction: nothing is known.
+    if distance_residual.is_finite() { distance_residual.max(0.0) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use seafix_geometry::{MeasuredPoint, UncertainPoint};
+
+    use super::*;
+    use crate::{Correspondence, Kabsch, ModelPoint, Observations, Solver};
+
+    const SIGMA: f64 = 0.01;
+
+    /// ½ χ² of the best pose of these measured places, equally well known.
+    fn min_residual(model: &[Vector3<f64>; 3], cloud: &[Vector3<f64>; 3]) -> f64 {
+        let points = model.map(|at| ModelPoint::exact("", at.into()));
+        let measured =
+            cloud.map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at.into(), SIGMA), pixels: None });
+        let pairs = [0, 1, 2].map(|i| Correspondence { model: i, cloud: i });
+        let pose = Kabsch::default().solve(&Observations::of(&pairs, &points, &measured, None)).expect("three points");
+        let residual = |i: usize| (pose * measured[i].position.at).distance(&points[i].at);
+        (0..3).map(|i| residual(i).powi(2)).sum::<f64>() / (2.0 * SIGMA * SIGMA)
+    }
+
+    /// Seen to fail with the sign of the second point's share turned, and where the variance is that of one point.
+    #[test]
+    fn the_residual_of_three_is_the_smallest_residual_but_for_what_is_curved() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut sampled = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+        let mut compared = 0;
+        for _ in 0..2000 {
+            let model: [Vector3<f64>; 3] = std::array::from_fn(|_| sampled(2.0));
+            let (along, across) = (model[1] - model[0], model[2] - model[0]);
+            let sides = [along.norm(), across.norm(), (along - across).norm()];
+            let longest = sides.into_iter().fold(0.0, f64::max);
+            let flat = along.cross(&across).norm() / (longest * longest);
+            if sides.into_iter().any(|side| side < 0.5) || flat < 0.1 {
+                continue;
+            }
+            let cloud = model.map(|at| at + sampled(3.0 * SIGMA));
+            let term = |i: usize| Term {
+                cloud: cloud[i],
+                model: model[i],
+                weight: Matrix3::identity() / (SIGMA * SIGMA),
+                variance: SIGMA * SIGMA,
+                gain: 0.0,
+            };
+            let [a, b, c] = [0, 1, 2].map(term);
+            let [ab, ac, bc] = [Edge::of(&a, &b), Edge::of(&a, &c), Edge::of(&b, &c)];
+            let distance_residual = residual_of_three([&a, &b, &c], [&ab, &ac, &bc]);
+            let min = min_residual(&model, &cloud);
+            // In a flat triangle the distances hang together, and what is allowed for curvature costs more of χ².
+            let fraction = if flat < 0.5 { 0.0 } else { 0.8 };
+            assert!(
+                distance_residual <= min + 0.02 && distance_residual >= fraction * min - 0.1,
+                "{distance_residual} of {min}, altitude {flat}"
+            );
+            let of_edge = |edge: Edge| 0.5 * edge.stretch * edge.stretch / edge.variance;
+            assert!(
+                [ab, ac, bc].into_iter().all(|edge| of_edge(edge) <= distance_residual + 1e-9),
+                "an edge alone costs more"
+            );
+            compared += 1;
+        }
+        assert!(compared > 1000, "{compared}");
+    }
+
+    #[test]
+    fn places_that_coincide_or_lie_on_a_line_cost_a_number() {
+        let term = |x: f64, known: f64| Term {
+            cloud: Vector3::new(x, 0.0, 0.0),
+            model: Vector3::new(known, 0.0, 0.0),
+            weight: Matrix3::identity(),
+            variance: 1.0,
+            gain: 0.0,
+        };
+        let distance_residual = |places: [(f64, f64); 3]| {
+            let [a, b, c] = places.map(|(x, known)| term(x, known));
+            residual_of_three([&a, &b, &c], [&Edge::of(&a, &b), &Edge::of(&a, &c), &Edge::of(&b, &c)])
+        };
+        assert_eq!(distance_residual([(0.0, 0.0), (0.0, 1.0), (2.0, 3.0)]), 0.0);
+        // The end point a σ too far: a third of χ² stays, the rest is shared.
+        let along = distance_residual([(0.0, 0.0), (1.0, 1.0), (4.0, 3.0)]);
+        assert!((0.0..1.0 / 3.0).contains(&along) && along > 0.1, "{along}");
+    }
+}

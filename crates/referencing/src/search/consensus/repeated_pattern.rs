@@ -1,0 +1,262 @@
+//! Patterns that repeat by a step: what goes on beyond the object looks like a part of it.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::{
+    graph::ConsistencyGraph,
+    likelihood::{Mode, Terms, ln_fraction, ln_measured},
+};
+use crate::{ModelPoint, Problem, site::diameter};
+
+/// Of larger models no pattern is looked for: time grows with the cube.
+const MAX_POINTS: usize = 128;
+/// Threes in a row, one step apart, that make a pattern: so many, and this share of the points.
+const MIN_ROWS: usize = 3;
+const MIN_FRACTION: f64 = 0.25;
+/// What a point may be off its place in a row, as a share of the model's diameter.
+const OFF_FRACTION: f64 = 0.015;
+/// A step is no shorter than so many times that.
+const MIN_STEP: f64 = 3.0;
+/// An object with so many points that do not repeat shows itself by them.
+const TELLING: usize = 3;
+/// Sine of the angle between two steps below which they are one direction.
+const SAME: f64 = 0.3;
+
+/// The points of a model that repeat by a step (a lattice, a ladder, a row of bolts), and where they would go on.
+pub(in crate::search) struct Pattern {
+    /// Whether a model point is one of them.
+    repeats: Vec<bool>,
+    /// The next places beyond the model (object frame).
+    beyond: Vec<Vector3<f64>>,
+}
+
+/// ln of the evidence that the cloud shows such a pattern, against clutter alone (nats).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RepeatedPattern {
+    /// The pattern goes on where the likeliest pose has the object, which is not there.
+    pub alone: f64,
+    /// The pattern goes on, and the object is there.
+    pub around: f64,
+}
+
+impl Pattern {
+    /// `None` of a model without one.
+    pub(in crate::search) fn of(model: &[ModelPoint]) -> Option<Self> {
+        let n = model.len();
+        let min = ((MIN_FRACTION * n as f64).ceil() as usize).max(MIN_ROWS);
+        if !(MIN_ROWS + 2..=MAX_POINTS).contains(&n) {
+            return None;
+        }
+        let at: Vec<Vector3<f64>> = model.iter().map(|point| point.at.coords).collect();
+        let off = OFF_FRACTION * diameter(model);
+        let mut along: Vec<&Vector3<f64>> = at.iter().collect();
+        along.sort_by(|a, b| a.x.total_cmp(&b.x));
+        let near = |place: &Vector3<f64>| {
+            let from = along.partition_point(|p| p.x < place.x - off);
+            let mut beside = along[from..].iter().take_while(|p| p.x <= place.x + off);
+            beside.any(|p| (*p - place).norm_squared() <= off * off)
+        };
+        // Every point between two others: the steps to it, each once.
+        let mut steps: Vec<Vector3<f64>> = Vec::new();
+        for a in 0..n {
+            for c in 0..a {
+                let step = (at[a] - at[c]) / 2.0;
+                if step.norm() >= MIN_STEP * off && near(&(at[c] + step)) {
+                    steps.push(if forward(&step) { step } else { -step });
+                }
+            }
+        }
+        let alike = |step: &Vector3<f64>| steps.iter().filter(|other| (*other - step).norm() <= off).count();
+        let common = steps.iter().filter(|step| alike(step) >= min).copied().collect();
+        let basis = independent(common);
+        if basis.is_empty() {
+            return None;
+        }
+        let mut pattern = Self { repeats: vec![false; n], beyond: Vec::new() };
+        let next = |i: usize| basis.iter().flat_map(|step| [*step, -step]).map(move |step| (i, step));
+        for (i, step) in (0..n).flat_map(next) {
+            if near(&(at[i] + step)) {
+                pattern.repeats[i] = true;
+            }
+        }
+        // Others may lie on the same lattice, or on a finer one, with none beside them.
+        let (own, finer) = (Lattice::of(&basis, 1.0), Lattice::of(&repeated(&at, off), 0.5));
+        let of_it: Vec<usize> = (0..n).filter(|&i| pattern.repeats[i]).collect();
+        let on = |p: &Vector3<f64>| {
+            let mut steps = of_it.iter().map(|&i| p - at[i]);
+            steps.any(|step| own.off(&step) <= off || finer.off(&step) <= off)
+        };
+        let alone: Vec<usize> = (0..n).filter(|&i| !pattern.repeats[i] && on(&at[i])).collect();
+        alone.into_iter().for_each(|i| pattern.repeats[i] = true);
+        for (i, step) in (0..n).flat_map(next) {
+            let place = at[i] + step;
+            let known = || pattern.beyond.iter().any(|other| (other - place).norm() <= 2.0 * off);
+            if pattern.repeats[i] && !near(&place) && !known() {
+                pattern.beyond.push(place);
+            }
+        }
+        Some(pattern)
+    }
+
+    /// The points that tell the object from the pattern by themselves, if they are enough.
+    pub(in crate::search) fn distinctive(&self) -> Option<Vec<bool>> {
+        let distinctive: Vec<bool> = self.repeats.iter().map(|repeats| !repeats).collect();
+        (distinctive.iter().filter(|&&distinctive| distinctive).count() >= TELLING).then_some(distinctive)
+    }
+
+    /// What the pattern alone, or around the object, explains of the cloud as well as a pose does.
+    ///
+    /// Points of the pattern are as visible within the object as beyond it, all numbers being equally likely; the points
+    /// that do not repeat are the object's alone.
+    pub(in crate::search) fn repeated_pattern(
+        &self,
+        problem: &Problem<'_>,
+        terms: &Terms,
+        graph: &ConsistencyGraph,
+        mode: &Mode,
+    ) -> RepeatedPattern {
+        let repeats = |v: &&usize| self.repeats[graph.vertices[**v].model];
+        let of_pattern: Vec<usize> = mode.members.iter().filter(repeats).copied().collect();
+        let own: f64 = mode.members.iter().filter(|v| !repeats(v)).map(|&v| terms.residual_gain(v, &mode.motion)).sum();
+        let (n, all) = (self.repeats.len(), self.repeats.iter().filter(|&&repeats| repeats).count());
+        let (k, seen) = (mode.members.len(), of_pattern.len());
+        let ln_clutter = of_pattern.iter().map(|&v| terms.ln_density_about(v, graph.vertices[v].model)).sum::<f64>()
+            / seen.max(1) as f64;
+        let (mut further, mut gains) = (0, 0.0);
+        for place in self.beyond.iter().map(|place| mode.motion.apply(place)) {
+            let free = problem
+                .cloud
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| mode.members.iter().all(|&v| graph.vertices[v].cloud != *j));
+            let gain = free
+                .filter_map(|(_, point)| ln_measured(&point.position, &place))
+                .map(|ln_density| ln_density - ln_clutter)
+                .fold(0.0, f64::max);
+            gains += gain;
+            further += usize::from(gain > 0.0);
+        }
+        let shown = mode.ln_evidence - ln_fraction(k, n) - own;
+        let goes_on = gains + ln_fraction(seen + further, all + self.beyond.len());
+        // Where so many points do not repeat they have to tell the object: the same pattern may end anywhere.
+        let ends = if n - all >= TELLING { ln_fraction(seen, all) } else { f64::NEG_INFINITY };
+        let alone = shown + goes_on.max(ends);
+        RepeatedPattern { alone, around: alone + own + ln_fraction(k - seen, n - all) }
+    }
+}
+
+/// Up to three steps, the shortest in as many directions, by each of which [`MIN_ROWS`] points or more follow others.
+fn repeated(at: &[Vector3<f64>], off: f64) -> Vec<Vector3<f64>> {
+    let mut steps: Vec<Vector3<f64>> = Vec::new();
+    for (a, from) in at.iter().enumerate() {
+        let to = at[..a].iter().map(|to| to - from).filter(|step| step.norm() >= MIN_STEP * off);
+        steps.extend(to.map(|step| if forward(&step) { step } else { -step }));
+    }
+    steps.sort_by(|a, b| a.x.total_cmp(&b.x));
+    let alike = |step: &Vector3<f64>| {
+        let from = steps.partition_point(|other| other.x < step.x - off);
+        let beside = steps[from..].iter().take_while(|other| other.x <= step.x + off);
+        beside.filter(|other| (*other - step).norm_squared() <= off * off).count()
+    };
+    let common = steps.iter().filter(|step| alike(step) >= MIN_ROWS).copied().collect();
+    independent(common)
+}
+
+/// The shortest of some steps, up to three, each in another direction than the shorter ones.
+fn independent(mut steps: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    let by = |a: &Vector3<f64>, b: &Vector3<f64>| a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
+    steps.sort_by(|a, b| {
+        a.norm_squared().total_cmp(&b.norm_squared()).then(by(a, b).unwrap_or(std::cmp::Ordering::Equal))
+    });
+    let mut basis: Vec<Vector3<f64>> = Vec::new();
+    for step in steps {
+        let rest = basis.iter().fold(step, |rest, known| rest - known * (rest.dot(known) / known.norm_squared()));
+        if basis.len() < 3 && rest.norm() > SAME * step.norm() {
+            basis.push(step);
+        }
+    }
+    basis
+}
+
+/// All sums of whole multiples of one to three steps, or of a share of them.
+struct Lattice {
+    basis: Vec<Vector3<f64>>,
+    /// The least-squares multiples of a step.
+    multiples: DMatrix<f64>,
+}
+
+impl Lattice {
+    fn of(steps: &[Vector3<f64>], fraction: f64) -> Self {
+        let basis: Vec<Vector3<f64>> = steps.iter().map(|step| step * fraction).collect();
+        let columns = DMatrix::from_fn(3, basis.len(), |row, column| basis[column][row]);
+        let inverse = (!basis.is_empty()).then(|| columns.pseudo_inverse(0.0).ok()).flatten();
+        Self { multiples: inverse.unwrap_or_else(|| DMatrix::zeros(basis.len(), 3)), basis }
+    }
+
+    /// How far a step is from the nearest one of these.
+    fn off(&self, step: &Vector3<f64>) -> f64 {
+        let multiples = &self.multiples * step;
+        let full = self.basis.iter().zip(multiples.iter()).map(|(basis, m)| basis * m.round());
+        (step - full.sum::<Vector3<f64>>()).norm()
+    }
+}
+
+/// One of a step and its reverse.
+fn forward(step: &Vector3<f64>) -> bool {
+    step.iter().copied().find(|x| x.abs() > 1e-9).is_none_or(|x| x > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use seafix_geometry::Point;
+
+    use super::*;
+
+    fn pattern(places: impl IntoIterator<Item = [f64; 3]>) -> Option<(usize, usize)> {
+        let model: Vec<ModelPoint> = places.into_iter().map(|at| ModelPoint::exact("", Point::from(at))).collect();
+        let pattern = Pattern::of(&model)?;
+        Some((pattern.repeats.iter().filter(|&&repeats| repeats).count(), pattern.beyond.len()))
+    }
+
+    fn lattice(columns: u8, rows: u8) -> Vec<[f64; 3]> {
+        let row = |i: u8| (0..rows).map(move |k| [0.25 * f64::from(i), 0.25 * f64::from(k), 0.0]);
+        (0..columns).flat_map(row).collect()
+    }
+
+    #[test]
+    fn a_lattice_repeats_and_goes_on_at_each_side() {
+        let off = [[0.735, 0.66, 0.18], [0.105, 0.56, 0.09], [0.955, 0.09, 0.07], [0.425, 0.15, 0.22]];
+        assert_eq!(pattern(lattice(6, 5).into_iter().chain(off)), Some((30, 22)));
+        // A ladder of six rungs goes on at its two ends.
+        assert_eq!(pattern(lattice(6, 2)), Some((12, 4)));
+    }
+
+    #[test]
+    fn what_stands_alone_on_the_lattice_does_not_report_the_object() {
+        // A row, a column, and points with none beside them.
+        let row = (0..6).map(|x| (x, 0));
+        let nodes: Vec<(i32, i32)> = row.chain([(5, 2), (5, 3), (5, 4), (5, 5), (0, 2), (2, 3), (3, 5)]).collect();
+        let places: Vec<[f64; 3]> = nodes.iter().map(|&(x, y)| [0.3 * f64::from(x), 0.3 * f64::from(y), 0.0]).collect();
+        let all = |off: f64| {
+            let reported = [[0.14, 0.44, off], [0.75, 0.16, off], [1.33, 0.15, off]];
+            places.iter().copied().chain(reported.into_iter().filter(move |_| off > 0.0))
+        };
+        let distinctive = |off: f64| {
+            let model: Vec<ModelPoint> = all(off).map(|at| ModelPoint::exact("", Point::from(at))).collect();
+            let distinctive = Pattern::of(&model).expect("rows and columns").distinctive();
+            distinctive.map(|distinctive| distinctive.iter().filter(|&&distinctive| distinctive).count())
+        };
+        assert_eq!(distinctive(0.0), None);
+        assert_eq!(distinctive(0.2), Some(3));
+    }
+
+    #[test]
+    fn what_does_not_come_three_times_in_a_row_is_no_pattern() {
+        let corners = (0..8u8).map(|c| [0, 1, 2].map(|k| f64::from(c >> k & 1) * [1.0, 1.5, 2.2][k]));
+        assert_eq!(pattern(corners), None);
+        assert_eq!(pattern(lattice(2, 2)), None);
+        let places =
+            [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, -2.0, 0.0], [0.5, 0.0, 1.5], [1.0, 2.2, 0.3], [-1.6, 0.4, 1.0]];
+        assert_eq!(pattern(places), None);
+    }
+}

@@ -1,0 +1,90 @@
+//! Clutter that imitates the object, as the cloud itself shows it.
+
+use nalgebra::Vector3;
+
+use super::{
+    graph::ConsistencyGraph,
+    likelihood::{Mode, Terms, ln_fraction},
+    prior_terms::PriorTerms,
+};
+use crate::{Problem, search::alike::slack};
+
+/// What a pose elsewhere explains of the cloud that the likeliest pose says nothing of, and what follows for it.
+///
+/// Clutter spread evenly shows a pose of evidence Λ once in Λ frames. A frame where a pose *elsewhere* has that much, in places
+/// where the likeliest pose has no point of the object, shows that its clutter is not spread evenly: it repeats the object's own
+/// distances (it goes on where the object has part of a grating, say), and then the likeliest pose may be such an imitation too.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StructuredClutter {
+    /// ln of the evidence that clutter imitates the object (nats): that of the pose elsewhere, given what of its pairs are
+    /// points that the likeliest pose explains as the object's, over the places where that has none.
+    pub ln_evidence: f64,
+    /// ln of how much likelier the whole is if the likeliest pose is an imitation as well, one share of the places being filled
+    /// in both, than if the object is there and has a share of its own (nats).
+    pub ln_alone: f64,
+}
+
+/// Where the likeliest pose has the object's points.
+pub(in crate::search) struct Occupied<'a> {
+    pub(super) best: &'a Mode,
+    /// Along the first axis.
+    places: Vec<Vector3<f64>>,
+    /// Model points that no clutter imitates: those that do not repeat where others do.
+    distinctive: Vec<bool>,
+}
+
+impl<'a> Occupied<'a> {
+    pub(in crate::search) fn of(problem: &Problem<'_>, best: &'a Mode, distinctive: Option<Vec<bool>>) -> Self {
+        let mut places: Vec<Vector3<f64>> =
+            problem.model.iter().map(|point| best.motion.apply(&point.at.coords)).collect();
+        places.sort_by(|a, b| a.x.total_cmp(&b.x));
+        Self { best, places, distinctive: distinctive.unwrap_or_else(|| vec![false; problem.model.len()]) }
+    }
+
+    fn near(&self, place: &Vector3<f64>, off: f64) -> bool {
+        let from = self.places.partition_point(|p| p.x < place.x - off);
+        let mut beside = self.places[from..].iter().take_while(|p| p.x <= place.x + off);
+        beside.any(|p| (p - place).norm_squared() <= off * off)
+    }
+
+    /// Whether a pair's cloud point lies where the likeliest pose has the object.
+    pub(super) fn holds_place(&self, problem: &Problem<'_>, terms: &Terms, graph: &ConsistencyGraph, v: usize) -> bool {
+        self.near(&terms.pairs[v].cloud, slack(problem, graph.vertices[v]))
+    }
+
+    /// What another pose says of the clutter.
+    ///
+    /// Of its k′ pairs those whose cloud point lies where the object is are the object's own; given these, which fix most of the
+    /// pose, the other s of f free places have the evidence Λ(all)/Λ(own) with the share B(s, f). With k of n points at the
+    /// likeliest pose, an imitation like this one shows both with the share B(k + s, n + f), the object with B(k, n)·B(s, f);
+    /// points that no clutter imitates count for the object alone.
+    pub(in crate::search) fn structured_clutter(
+        &self,
+        problem: &Problem<'_>,
+        (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        other: &Mode,
+    ) -> StructuredClutter {
+        let model = |v: &usize| graph.vertices[*v].model;
+        let off = other.members.iter().map(|&v| slack(problem, graph.vertices[v])).fold(0.0, f64::max);
+        let (own, free): (Vec<usize>, Vec<usize>) =
+            other.members.iter().partition(|&&v| self.near(&terms.pairs[v].cloud, off));
+        let mut distinctive = self.distinctive.clone();
+        free.iter().for_each(|v| distinctive[model(v)] = false);
+        let mut seen = vec![false; distinctive.len()];
+        other.members.iter().for_each(|v| seen[model(v)] = true);
+        let unseen = |i: &usize| !seen[*i] && !self.near(&other.motion.apply(&problem.model[*i].at.coords), off);
+        let (all, imitable) = (distinctive.len(), distinctive.iter().filter(|&&distinctive| !distinctive).count());
+        let (s, empty) = (free.len(), (0..all).filter(unseen).count());
+        let f = s + (0..all).filter(|i| !distinctive[*i]).filter(unseen).count();
+        let (reported, k): (Vec<usize>, Vec<usize>) = self.best.members.iter().partition(|v| distinctive[model(v)]);
+        let reported: f64 = reported.iter().map(|&v| terms.residual_gain(v, &self.best.motion).max(0.0)).sum();
+        let given = other.ln_evidence_of(terms, prior_terms, &own) + ln_fraction(other.members.len(), all);
+        StructuredClutter {
+            ln_evidence: other.ln_evidence - given + ln_fraction(s, s + empty),
+            ln_alone: ln_fraction(k.len() + s, imitable + f)
+                - ln_fraction(k.len(), imitable)
+                - ln_fraction(s, f)
+                - reported,
+        }
+    }
+}

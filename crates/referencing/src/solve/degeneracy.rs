@@ -1,0 +1,124 @@
+//! How far points spread: what tells a line from a plane.
+
+use nalgebra::{Matrix3, Vector3};
+use seafix_component::in_range;
+
+use super::Degenerate;
+use crate::{Observation, Observations};
+
+/// Whether the setting `key` is a share that leaves something: from 0 to below 1.
+pub(super) fn fraction(key: &str, value: f64) -> Result<(), String> {
+    in_range((0.0..1.0).contains(&value), key, value, "a share from 0 to below 1")
+}
+
+/// The centroid of points.
+pub(crate) fn centroid(points: impl ExactSizeIterator<Item = Vector3<f64>>) -> Vector3<f64> {
+    let count = points.len().max(1) as f64;
+    points.sum::<Vector3<f64>>() / count
+}
+
+/// Σ (p − p̄)(p − p̄)ᵀ.
+fn scatter(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> Matrix3<f64> {
+    let centre = centroid(points.clone());
+    let mut scatter = Matrix3::zeros();
+    for p in points {
+        scatter += (p - centre) * (p - centre).transpose();
+    }
+    scatter
+}
+
+/// Whether the second extent is at least `min` of the first by a margin that needs no eigenvalues: with the
+/// eigenvalues l₁ ≥ l₂ ≥ l₃ of the scatter, l₂/l₁ ≥ (l₁l₂ + l₁l₃ + l₂l₃) / 2(l₁ + l₂ + l₃)².
+fn clearly_wide(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone, min: f64) -> bool {
+    let s = scatter(points);
+    let minor = |i: usize, j: usize| s[(i, i)] * s[(j, j)] - s[(i, j)] * s[(i, j)];
+    minor(0, 1) + minor(0, 2) + minor(1, 2) > 4.0 * min * min * s.trace() * s.trace()
+}
+
+/// Points whose second extent is less than this share of the first lie on a line.
+pub(crate) const ON_A_LINE: f64 = 1e-3;
+
+/// Second singular value over the first of the points about their centroid: 0 on a line, 1 on a disc.
+pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> f64 {
+    let scatter = scatter(points);
+    let mut values: [f64; 3] = scatter.symmetric_eigenvalues().into();
+    values.sort_by(f64::total_cmp);
+    if values[2] > 0.0 { (values[1].max(0.0) / values[2]).sqrt() } else { 0.0 }
+}
+
+/// Refuses too few points, and coordinates and noise that are not finite.
+pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
+    let found = data.points.len();
+    if found < needed {
+        return Err(Degenerate::TooFew { found, needed });
+    }
+    if !data.points.iter().all(Observation::is_finite) {
+        return Err(Degenerate::NotFinite);
+    }
+    let noise = data.points.iter().position(|point| !point.has_finite_noise());
+    noise.map_or(Ok(()), |index| Err(Degenerate::Noise { index }))
+}
+
+/// Refuses what [`finite`] refuses and, where a rig is given, points that it cannot have seen, or too far away to be
+/// measured by it.
+pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
+    // Sound points, which nearly all are, are known in one pass: what is not finite leaves no finite sum.
+    let (mut sum, mut front) = (0.0, true);
+    for point in &data.points {
+        let (seen, known) = (&point.measured.at.coords, &point.model.coords);
+        sum += (seen.x + seen.y + seen.z) + (known.x + known.y + known.z);
+        sum += point.measured.covariance.trace() + point.model_sigma;
+        front &= seen.z > 0.0;
+    }
+    if data.points.len() < needed || !sum.is_finite() {
+        finite(data, needed)?;
+    }
+    if data.rig.is_some() {
+        if !front {
+            in_front(data)?;
+        }
+        near(data)?;
+    }
+    Ok(())
+}
+
+/// Refuses what [`seen`] refuses, and points (measured or model) on a line: second extent below `min` of the first.
+pub(super) fn check(data: &Observations<'_>, needed: usize, min: f64) -> Result<(), Degenerate> {
+    seen(data, needed)?;
+    let model = data.points.iter().map(|point| point.model.coords);
+    let measured = data.points.iter().map(|point| point.measured.at.coords);
+    if clearly_wide(model.clone(), min) && clearly_wide(measured.clone(), min) {
+        return Ok(());
+    }
+    let ratio = second_ratio(model).min(second_ratio(measured));
+    // Written so that a NaN is refused too.
+    if ratio >= min { Ok(()) } else { Err(Degenerate::Collinear { ratio, min }) }
+}
+
+/// A distance known to no better than this share of itself is none: the parallax is within three of its standard
+/// deviations of nought.
+const FAR: f64 = 1.0 / 3.0;
+
+/// Refuses points so far away that not one distance is known to [`FAR`] of itself: two views of them are one view.
+fn near(data: &Observations<'_>) -> Result<(), Degenerate> {
+    // σ_d / d of a rectified rig, of any rig the same: the standard deviation along the line of sight over its length.
+    let square = |point: &Observation| {
+        let (at, covariance) = (&point.measured.at.coords, &point.measured.covariance);
+        let length = at.norm_squared();
+        at.dot(&(covariance * at)) / (length * length)
+    };
+    let mut best = f64::INFINITY;
+    for point in &data.points {
+        best = best.min(square(point));
+        if best <= FAR * FAR {
+            return Ok(());
+        }
+    }
+    Err(Degenerate::Far { fraction: best.sqrt(), max: FAR })
+}
+
+/// Refuses points measured behind the left camera: where a rig is given, they were seen.
+fn in_front(data: &Observations<'_>) -> Result<(), Degenerate> {
+    let behind = data.points.iter().position(|point| !(point.measured.at.coords.z > 0.0));
+    behind.map_or(Ok(()), |index| Err(Degenerate::Behind { index, depth: data.points[index].measured.at.coords.z }))
+}

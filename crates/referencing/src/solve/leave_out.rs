@@ -1,0 +1,108 @@
+//! The likeliest pose without some of the points, from the likeliest with all of them.
+
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
+
+use super::{
+    Mahalanobis, ScaleError,
+    descent::{Linearized, linearize},
+    mahalanobis::covariance,
+    scale_error::stretch,
+};
+use crate::Observations;
+
+/// What each point contributes to the likeliest pose of all, so that leaving some out costs six equations.
+pub(crate) struct Deletions<'a> {
+    data: &'a Observations<'a>,
+    pose: Transform<Object, Camera>,
+    all: Linearized,
+    each: Vec<Linearized>,
+    /// Of all points, had the fit a scale besides; `None` where they fix none.
+    pub(crate) stretch: Option<ScaleError>,
+}
+
+/// With fewer points left another valley may be the likeliest.
+const ENOUGH: usize = 5;
+/// A step of more than a standard deviation, squared, is not trusted to be straight.
+const NEAR: f64 = 1.0;
+/// Nor is an attitude less certain than this (rad, three axes together).
+const SURE: f64 = 0.01;
+
+impl<'a> Deletions<'a> {
+    /// `None` where all points together determine no pose.
+    pub(crate) fn of(data: &'a Observations<'a>) -> Option<Self> {
+        let solved = Mahalanobis::default().solved(data, |pose, terms| {
+            let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
+            let each = (0..data.points.len()).map(one).collect::<Result<Vec<_>, _>>();
+            each.map(|each| (*pose, each, stretch(&data.points, pose, terms)))
+        });
+        let (pose, each, stretch) = solved.ok()?;
+        let mut all = *each.first()?;
+        each[1..].iter().for_each(|one| all = all.plus(one));
+        Some(Self { data, pose, all, each, stretch })
+    }
+
+    /// The likeliest pose without the points `out`, and its covariance: one step from that of all points where it is
+    /// short and enough points are left, else from the beginning. `None` where the others determine no pose.
+    pub(crate) fn without(&self, out: &[usize]) -> Option<(Transform<Object, Camera>, Covariance6<Object, Camera>)> {
+        if self.each.len() >= out.len() + ENOUGH {
+            let left = out.iter().fold(self.all, |left, &k| left.less(&self.each[k]));
+            if let Ok(covariance) = left.covariance()
+                && covariance.fixed_view::<3, 3>(0, 0).trace() <= SURE * SURE
+                && let Some((step, decrement)) = left.step(0.0)
+                && decrement <= NEAR
+            {
+                return Some((self.pose.perturbed(&step), Covariance6::new(covariance)));
+            }
+        }
+        let mut fewer = self.data.clone();
+        let mut place = 0..;
+        fewer.points.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
+        Mahalanobis::default().solved(&fewer, |pose, terms| Ok((*pose, covariance(&fewer, pose, terms)?))).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Observation, Solver};
+    use nalgebra::Vector3;
+    use seafix_geometry::{Point, UncertainPoint};
+
+    /// Seven points, bare, one of them a little off.
+    fn seen() -> Observations<'static> {
+        let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -3.0].into());
+        let points = (0..7).map(|k| {
+            let (a, b) = (f64::from(k) * 1.3, f64::from(k * k % 5) * 0.4);
+            let at = Point::new(a.sin(), b - 0.7, 0.5 * (a * 0.7).cos());
+            let off = Vector3::new(2e-3, -1e-3, 3e-3) * f64::from(u8::from(k == 2));
+            Observation {
+                measured: UncertainPoint::isotropic(pose.inverse() * at + off, 2e-3),
+                pixels: None,
+                model: at,
+                model_sigma: 0.0,
+            }
+        });
+        Observations { points: points.collect(), rig: None }
+    }
+
+    #[test]
+    fn a_step_leads_where_the_beginning_does() {
+        let data = seen();
+        let all = Deletions::of(&data).unwrap();
+        for out in [&[2][..], &[0], &[2, 5]] {
+            let (pose, covariance) = all.without(out).unwrap();
+            let mut fewer = data.clone();
+            let mut place = 0..;
+            fewer.points.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
+            let witness = Mahalanobis::default();
+            let expected = witness.solve(&fewer).unwrap();
+            // In standard deviations.
+            let xi = expected.error_to(&pose);
+            let off = xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)).sqrt();
+            assert!(off < 0.02, "{out:?}: {off}");
+            let own = witness.covariance(&fewer, &expected).unwrap();
+            assert!((covariance.matrix - own.matrix).amax() < 0.02 * own.matrix.amax(), "{out:?}");
+        }
+        assert!(all.without(&[0, 1, 2, 3, 4]).is_none(), "two points are left");
+    }
+}

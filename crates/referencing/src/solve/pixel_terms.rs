@@ -1,0 +1,116 @@
+//! What the images say of each point, weights made ready.
+
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use seafix_geometry::StereoRig;
+use smallvec::SmallVec;
+
+use super::{Degenerate, descent::Term, mahalanobis::information, stereo_cameras::StereoCameras, whitened::Whitener};
+use crate::Observation;
+
+/// Up to so many points are kept without allocating.
+pub(super) const FEW: usize = 32;
+
+/// What of each point is compared with its projection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TermTarget {
+    /// The pixels where it was seen.
+    Pixels,
+    /// The pixels of the point as triangulated: what 3D–3D sees, with the covariance seen from the fitted point.
+    Triangulated,
+}
+
+/// The points of one problem, as the cameras saw them.
+pub(crate) struct PixelTerms<'a> {
+    cameras: StereoCameras<'a>,
+    all: SmallVec<[PixelTerm; FEW]>,
+    /// Whether a point of the model is uncertain, so that weights depend on the pose.
+    pub(super) weights_move: bool,
+}
+
+enum PixelTerm {
+    /// Pixels with their weights, and those with the model's error besides as the measured point shows it.
+    Seen { at: Vector4<f64>, weight: Whitener, frozen: Whitener, model_variance: f64 },
+    /// A point without pixels, with the information on it.
+    Bare { at: Vector3<f64>, information: Matrix3<f64> },
+}
+
+/// Pixels are never better known than this (px): exact ones would otherwise have infinite weight.
+pub(super) const PIXEL_FLOOR: f64 = 1e-6;
+
+impl<'a> PixelTerms<'a> {
+    /// Those of no point yet: [`see`](Self::see) fills them where they stand, for they are large.
+    #[inline]
+    pub(crate) fn new(rig: &'a StereoRig) -> Self {
+        Self { cameras: StereoCameras::of(rig), all: SmallVec::new(), weights_move: false }
+    }
+
+    /// # Errors
+    /// The first point whose covariance has no inverse, or that a camera cannot see where it was measured.
+    pub(crate) fn see(&mut self, points: &[Observation], target: TermTarget) -> Result<(), Degenerate> {
+        for (index, point) in points.iter().enumerate() {
+            let pixel_term = self.pixel_term(point, index, target)?;
+            self.weights_move |= matches!(pixel_term, PixelTerm::Seen { model_variance, .. } if model_variance > 0.0);
+            self.all.push(pixel_term);
+        }
+        Ok(())
+    }
+
+    fn pixel_term(&self, point: &Observation, index: usize, target: TermTarget) -> Result<PixelTerm, Degenerate> {
+        let Some(pixels) = &point.pixels else {
+            return Ok(PixelTerm::Bare { at: point.measured.at.coords, information: information(point) });
+        };
+        let noise = pixels.covariance + Matrix4::identity() * (PIXEL_FLOOR * PIXEL_FLOOR);
+        let weight = Whitener::of(&noise).ok_or(Degenerate::Noise { index })?;
+        let model_variance = point.model_sigma * point.model_sigma;
+        let (mut at, mut frozen) = (pixels.at.coordinates(), weight);
+        if target == TermTarget::Triangulated || model_variance > 0.0 {
+            let place = &point.measured.at.coords;
+            let (seen, j) = self.cameras.project(place).ok_or(Degenerate::Hidden { index, depth: place.z })?;
+            if target == TermTarget::Triangulated {
+                at = seen;
+            }
+            if model_variance > 0.0 {
+                frozen =
+                    Whitener::of(&(noise + j * j.transpose() * model_variance)).ok_or(Degenerate::Noise { index })?;
+            }
+        }
+        Ok(PixelTerm::Seen { at, weight, frozen, model_variance })
+    }
+
+    /// What the k-th point says, S = Σ_px + σ_model² J Jᵀ with J at the place where the pose puts it.
+    ///
+    /// With A = Jᵀ Σ_px⁻¹ J and g = Jᵀ Σ_px⁻¹ r, the model's error marginalised leaves (I + σ² A)⁻¹ A and
+    /// (I + σ² A)⁻¹ g (Woodbury).
+    #[inline]
+    pub(crate) fn live(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
+        match &self.all[k] {
+            PixelTerm::Seen { at, weight, model_variance, .. } => {
+                let term = self.seen(at, weight, place)?;
+                if *model_variance == 0.0 {
+                    return Some(term);
+                }
+                let blur = (Matrix3::identity() + term.information * *model_variance).try_inverse()?;
+                let pull = blur * term.pull;
+                let cost = term.cost - *model_variance * term.pull.dot(&pull);
+                Some(Term { information: blur * term.information, pull, cost })
+            }
+            PixelTerm::Bare { at, information } => Some(Term::of(*information, &(at - place))),
+        }
+    }
+
+    /// The same with J of the model's error at the measured point: the weights do not depend on the pose, so that
+    /// costs can be compared.
+    #[inline]
+    pub(crate) fn frozen(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
+        match &self.all[k] {
+            PixelTerm::Seen { at, frozen, .. } => self.seen(at, frozen, place),
+            PixelTerm::Bare { at, information } => Some(Term::of(*information, &(at - place))),
+        }
+    }
+
+    #[inline]
+    fn seen(&self, at: &Vector4<f64>, weight: &Whitener, place: &Vector3<f64>) -> Option<Term> {
+        let (expected, j) = self.cameras.project(place)?;
+        Some(weight.term(&j, &(at - expected)))
+    }
+}

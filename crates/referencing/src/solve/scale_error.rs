@@ -1,0 +1,129 @@
+//! Whether what was measured is as large as the model says.
+
+use nalgebra::{Matrix3, Vector3, Vector6};
+use seafix_geometry::{Camera, Object, Transform};
+
+use super::{
+    descent::{Term, linearize},
+    mahalanobis::Terms,
+};
+use crate::Observation;
+
+/// By how much measured distances are longer than the model's, as a share of them, had the fit a scale besides the motion.
+///
+/// A wrong baseline or focal length stretches all that is measured, a wrong survey the model. No three points tell: any
+/// triangle is nearly rigid to its noise. Of many it shows in every distance, long before a single residual is out of bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScaleError {
+    /// The estimate: measured distances are 1 + `value` times the model's.
+    pub value: f64,
+    /// Its standard deviation by the noise of the points.
+    pub sigma: f64,
+}
+
+/// The stretch of the points at their likeliest pose, one step of the fit with seven parameters.
+///
+/// A stretch ε moves the place p of a point by ε d, d = p − p̄ its lever from the mean of all. With J of the motion as in
+/// [`linearize`] and the pull W r of each point, ε = (Σ dᵀWr − cᵀ N⁻¹ Σ JᵀWr)/s and σ² = 1/s, N = Σ JᵀWJ, c = Σ JᵀWd,
+/// s = Σ dᵀWd − cᵀ N⁻¹ c. `None` where the points determine no motion, or no scale beside it; see [`isotropic`].
+pub(super) fn stretch(
+    points: &[Observation],
+    pose: &Transform<Object, Camera>,
+    terms: Terms<'_>,
+) -> Option<ScaleError> {
+    let all = linearize(points, pose, &terms).ok()?;
+    let covariance = all.covariance().ok()?;
+    let (r, t) = (pose.rotation_matrix(), pose.translation());
+    let places: Vec<Vector3<f64>> = points.iter().map(|point| r.tr_mul(&(point.model.coords - t))).collect();
+    let mean = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let (mut c, mut own, mut pull) = (Vector6::zeros(), 0.0, 0.0);
+    for (k, at) in places.iter().enumerate() {
+        let (said, d) = (terms(k, at)?, at - mean);
+        let weighted = said.information * d;
+        let turn = -at.cross(&weighted);
+        c += Vector6::new(turn.x, turn.y, turn.z, -weighted.x, -weighted.y, -weighted.z);
+        own += d.dot(&weighted);
+        pull += d.dot(&said.pull);
+    }
+    let by_motion = covariance * c;
+    let left = own - c.dot(&by_motion);
+    // What rounding leaves of points that are one place, or beside a coordinate that is as good as exact, is no information.
+    (left > ROUNDING * own)
+        .then(|| ScaleError { value: (pull - by_motion.dot(&all.gradient)) / left, sigma: (1.0 / left).sqrt() })
+}
+
+/// The same with every point as good in all directions as it is on average: where one coordinate is as good as exact, rounding leaves
+/// nothing of what the others say of the scale.
+pub(crate) fn isotropic(points: &[Observation], pose: &Transform<Object, Camera>) -> Option<ScaleError> {
+    let term = |k: usize, at: &Vector3<f64>| {
+        let Observation { measured, model_sigma, .. } = &points[k];
+        let variance = measured.covariance.trace() / 3.0 + model_sigma * model_sigma;
+        (variance > 0.0).then(|| Term::of(Matrix3::identity() / variance, &(measured.at.coords - at)))
+    };
+    stretch(points, pose, &term)
+}
+
+/// Less than this share of the information on the scale is what rounding leaves: where one weight is 10¹⁰ times the others', the
+/// inverse of N has five digits.
+const ROUNDING: f64 = 1e-4;
+
+#[cfg(test)]
+mod tests {
+    use seafix_geometry::{Point, UncertainPoint};
+
+    use super::*;
+    use crate::{Mahalanobis, Observations};
+
+    const SIGMA: f64 = 0.002;
+
+    /// Points at the corners of a box of sides 2, 2 and 1 m, measured `by` times as far from the camera.
+    fn stretched(by: f64) -> Option<ScaleError> {
+        let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -5.0].into());
+        let corner = |k: usize| Point::new((k & 1) as f64 * 2.0, (k >> 1 & 1) as f64 * 2.0, (k >> 2 & 1) as f64);
+        let seen = |k: usize| Observation {
+            measured: UncertainPoint::isotropic(((pose.inverse() * corner(k)).coords * by).into(), SIGMA),
+            pixels: None,
+            model: corner(k),
+            model_sigma: 0.0,
+        };
+        let data = Observations { points: (0..8).map(seen).collect(), rig: None };
+        Mahalanobis::default().solved(&data, |pose, terms| Ok(stretch(&data.points, pose, terms))).unwrap()
+    }
+
+    /// Of eight corners Σ ‖d‖² = 8 · (1 + 1 + ¼) = 18 m², and no motion does what a stretch does: σ = 2 mm/√18 m.
+    #[test]
+    fn a_box_that_is_larger_is_reported() {
+        let of_box = SIGMA / 18.0_f64.sqrt();
+        for by in [1.0, 1.01, 0.98] {
+            let found = stretched(by).unwrap();
+            assert!(
+                (found.sigma / of_box - 1.0).abs() < 1e-9
+                    && (found.value - (by - 1.0)).abs() < 1e-3 * (by - 1.0).abs() + 1e-9,
+                "{by}: {found:?}"
+            );
+        }
+    }
+
+    /// One coordinate that is known to a tenth of a micrometre takes all weight from the others.
+    #[test]
+    fn an_exact_coordinate_does_not_hide_it() {
+        let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -5.0].into());
+        let seen = |k: usize| {
+            let corner = Point::new((k & 1) as f64 * 2.0, (k >> 1 & 1) as f64 * 2.0, (k >> 2 & 1) as f64);
+            let at: Point<Camera> = ((pose.inverse() * corner).coords * 1.015).into();
+            let mut measured = UncertainPoint::isotropic(at, SIGMA);
+            measured.covariance[(0, 0)] = if k == 0 { 1e-14 } else { SIGMA * SIGMA };
+            Observation { measured, pixels: None, model: corner, model_sigma: 0.0 }
+        };
+        let points: Vec<Observation> = (0..8).map(seen).collect();
+        let found = isotropic(&points, &pose).unwrap();
+        assert!((found.value - 0.015).abs() < 1e-3 && found.sigma < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn no_points_have_none() {
+        let data = Observations { points: Vec::new(), rig: None };
+        let pose = Transform::exp(&[0.0; 6].into());
+        assert_eq!(stretch(&data.points, &pose, &|_, _: &_| None), None);
+    }
+}

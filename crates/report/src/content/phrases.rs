@@ -1,0 +1,191 @@
+//! Numbers about trials, with their keys.
+
+use crate::{
+    Field, Key, Number, format,
+    navigation_quantity::NavigationQuantity,
+    points_of_interest::PoiQuantity,
+    proportion,
+    run::{AttemptRow, Trial},
+};
+
+/// What a quantity is printed in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unit {
+    Plain,
+    Millimetres,
+    Degrees,
+}
+
+impl Unit {
+    pub(super) fn scale(self) -> f64 {
+        match self {
+            Self::Plain => 1.0,
+            Self::Millimetres => 1e3,
+            Self::Degrees => 1_f64.to_degrees(),
+        }
+    }
+
+    fn suffix(self) -> &'static str {
+        match self {
+            Self::Plain => "",
+            Self::Millimetres => " in mm",
+            Self::Degrees => " in deg",
+        }
+    }
+}
+
+/// The topic that counts stand on.
+fn counted(trial: &Trial) -> &'static str {
+    if trial.totals.is_some() { "/metrics/totals" } else { "/metrics/evaluation" }
+}
+
+/// How many of `group` there are.
+pub(super) fn count(trial: &Trial, group: &str, n: usize) -> Number {
+    Number::count(n, Key::of(trial, counted(trial), format!("count {group}")))
+}
+
+/// Their share of all attempts, in percent.
+pub(super) fn percent(trial: &Trial, group: &str, k: usize, n: usize) -> Number {
+    let key = Key::of(trial, counted(trial), format!("percent {group} of attempted"));
+    Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
+}
+
+/// Whether an attempt is of `group`, an outcome or a region.
+fn is_of(row: &AttemptRow, group: &str) -> bool {
+    match group {
+        "found" => row.found(),
+        "wrong" => row.wrong(),
+        "refused" => !row.found() && !row.wrong(),
+        _ => row.region().is_some_and(|region| region.name() == group),
+    }
+}
+
+/// The 95 % interval of the share of `group`, as [`fraction::interval`]; the other frames of a thinned log are only counted.
+fn ends(trial: &Trial, group: &str, k: usize, n: usize) -> (f64, f64) {
+    if trial.every() > 1 || !proportion::is_trajectory(&trial.header) {
+        return proportion::interval_of_counts(proportion::is_trajectory(&trial.header), k, n);
+    }
+    let events: Vec<bool> = trial.attempts().map(|(_, row)| is_of(row, group)).collect();
+    proportion::interval(true, &events)
+}
+
+/// Their share of all attempts or an end of its 95 % interval, in percent: `percent`, `low`, `high`.
+pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize), decimals: usize) -> Number {
+    let (low, high) = ends(trial, group, k, n);
+    let value = match what {
+        "low" => 100.0 * low,
+        "high" => 100.0 * high,
+        _ => 100.0 * k as f64 / n as f64,
+    };
+    let key = Key::of(trial, counted(trial), format!("{what} {group} of attempted"));
+    Number::new((n > 0).then_some(value), decimals, key)
+}
+
+/// The 95 % interval of that share. Of a thousand attempts or more it has two decimals: with one it would be its own share.
+pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
+    let (low, high) = ends(trial, group, k, n);
+    let decimals = if n < 1000 { 1 } else { 2 };
+    [("low", low), ("high", high)].map(|(end, value)| {
+        let key = Key::of(trial, counted(trial), format!("{end} {group} of attempted"));
+        Number::new((n > 0).then_some(100.0 * value), decimals, key)
+    })
+}
+
+/// A statistic of a quantity over the attempts of a group, `median m2_rms of found`.
+pub(super) fn statistic(
+    trial: &Trial,
+    name: &str,
+    field: Field,
+    group: &str,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let what = format!("{name} {} of {group}{}", field.name(), unit.suffix());
+    Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, field.topic(), what))
+}
+
+/// A statistic of what the navigator knew, over the frames that have it.
+pub(super) fn navigated(
+    trial: &Trial,
+    name: &str,
+    quantity: NavigationQuantity,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let what = format!("{name} {} of navigated{}", quantity.name(), unit.suffix());
+    Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/referencing/frame", what))
+}
+
+/// A statistic of a point of interest, over the frames that have it in view.
+pub(super) fn inspected(
+    trial: &Trial,
+    name: &str,
+    (quantity, point): (PoiQuantity, &str),
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let what = format!("{name} {} at the point {point}{}", quantity.name(), unit.suffix());
+    Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/metrics/inspection", what))
+}
+
+/// What the navigator knew after one frame.
+pub(super) fn navigated_at(
+    trial: &Trial,
+    (frame, stamp_ns): (u64, u64),
+    quantity: NavigationQuantity,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let key = Key {
+        what: format!("value {} of  at {frame}{}", quantity.name(), unit.suffix()),
+        topic: "/referencing/frame".to_owned(),
+        span: [stamp_ns; 2],
+        logs: vec![trial.file()],
+    };
+    Number::new(value.map(|value| value * unit.scale()), decimals, key)
+}
+
+/// One attempt's quantity.
+pub(super) fn value(
+    trial: &Trial,
+    (object, frame, stamp_ns): (&str, u64, u64),
+    field: Field,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
+    let key = Key {
+        what: format!("value {} of {object} at {frame}{}", field.name(), unit.suffix()),
+        topic: field.topic().to_owned(),
+        span: [stamp_ns; 2],
+        logs: vec![trial.file()],
+    };
+    Number::new(value.map(|value| value * unit.scale()), decimals, key)
+}
+
+/// The same key over several logs: what it says is summed, or said of the least, the greatest or the middle one.
+pub(super) fn over(trials: &[&Trial], topic: &str, what: String) -> Key {
+    let spans = trials.iter().map(|trial| trial.span());
+    let span = spans.fold([u64::MAX, 0], |[a, b], [from, to]| [a.min(from), b.max(to)]);
+    Key { what, topic: topic.to_owned(), span, logs: trials.iter().map(|trial| trial.file()).collect() }
+}
+
+/// A number of the header.
+pub(super) fn header(trial: &Trial, what: &str, value: Option<f64>, decimals: usize) -> Number {
+    Number::new(value, decimals, Key { span: [0; 2], ..Key::of(trial, "/run/header", what) })
+}
+
+/// The value of a trial on an axis.
+pub(super) fn axis(trial: &Trial, key: &str, value: Option<f64>) -> Number {
+    header(trial, &format!("axis {key}"), value, 4)
+}
+
+/// The number of a frame.
+pub(super) fn frame(trial: &Trial, number: u64, stamp_ns: u64) -> Number {
+    let key = Key { span: [stamp_ns; 2], ..Key::of(trial, "/referencing/frame", "frame") };
+    Number::count(number as usize, key)
+}
+
+/// As many decimals as a column needs.
+pub(super) fn decimals(values: impl Iterator<Item = Option<f64>>, unit: Unit) -> usize {
+    format::decimals(values.flatten().map(|value| value * unit.scale()))
+}

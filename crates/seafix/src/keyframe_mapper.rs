@@ -1,0 +1,190 @@
+//! Key frames on the way: laid, found again, kept for another run.
+
+use seafix_component::{Part, each_invalid};
+use seafix_geometry::StereoRig;
+use seafix_navigation::{
+    Displacement, Navigated, Navigator, PoseEstimate, PoseGraph, PoseGraphSettings, Recognition, RelativeMotion,
+    StereoPair, Traverse,
+};
+use seafix_referencing::{SOLVERS, Target};
+use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, Threads};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    PipelineError, SensorFrame,
+    event::NavigationEvent,
+    pipeline::{faults, invalid_setting, resolve},
+    session::places,
+};
+
+/// The key frames of a run.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Keyframes {
+    /// Whether the network is kept, as `<trial>.pose_graph` in the folder of the run.
+    pub add_keyframes: bool,
+    /// The network of an earlier run, relative to the experiment file; none where it is empty.
+    pub read: String,
+    /// SHA-256 of that file, where it must be a certain one; a log says which it was.
+    pub sha256: String,
+    /// When key frames are laid, and how they are found again.
+    pub settings: PoseGraphSettings,
+}
+
+impl Keyframes {
+    /// The same with every setting of its components written out.
+    pub fn resolved(&self) -> Result<Self, PipelineError> {
+        let r = &self.settings.recognition;
+        let recognition = Recognition {
+            filters: r.filters.iter().map(|filter| resolve(&FILTERS, filter)).collect::<Result<_, _>>()?,
+            detector: resolve(&DETECTORS, &r.detector)?,
+            locator: resolve(&LOCATORS, &r.locator)?,
+            descriptor: resolve(&DESCRIPTORS, &r.descriptor)?,
+            matcher: resolve(&MATCHERS, &r.matcher)?,
+            refinement: resolve(&REFINEMENTS, &r.refinement)?,
+            triangulator: resolve(&TRIANGULATORS, &r.triangulator)?,
+            between: resolve(&MATCHERS, &r.between)?,
+            minimal: resolve(&SOLVERS, &r.minimal)?,
+            solver: resolve(&SOLVERS, &r.solver)?,
+            ..r.clone()
+        };
+        Ok(Self { settings: PoseGraphSettings { recognition, ..self.settings.clone() }, ..self.clone() })
+    }
+
+    /// Everything that it cannot be worked with for.
+    pub fn invalid(&self) -> Vec<PipelineError> {
+        let r = &self.settings.recognition;
+        let filters =
+            r.filters.iter().enumerate().map(|(k, filter)| (format!("filters.{k}"), faults(&FILTERS, filter)));
+        let stages = [
+            ("detector", faults(&DETECTORS, &r.detector)),
+            ("locator", faults(&LOCATORS, &r.locator)),
+            ("descriptor", faults(&DESCRIPTORS, &r.descriptor)),
+            ("matcher", faults(&MATCHERS, &r.matcher)),
+            ("refinement", faults(&REFINEMENTS, &r.refinement)),
+            ("triangulator", faults(&TRIANGULATORS, &r.triangulator)),
+            ("between", faults(&MATCHERS, &r.between)),
+            ("minimal", faults(&SOLVERS, &r.minimal)),
+            ("solver", faults(&SOLVERS, &r.solver)),
+        ];
+        let stages = filters.chain(stages.map(|(stage, errors)| (stage.to_owned(), errors)));
+        let below = |(stage, errors): (String, Vec<PipelineError>)| {
+            errors.into_iter().map(move |error| {
+                let key =
+                    error.key.iter().fold(format!("settings.recognition.{stage}"), |all, key| format!("{all}.{key}"));
+                PipelineError { setting: "pose-graph", key: Some(key), ..error }
+            })
+        };
+        let mut all: Vec<PipelineError> = stages.flat_map(below).collect();
+        let mut rest = self.settings.clone();
+        if !all.is_empty() {
+            let Recognition {
+                points, consensus_px, draws, min_points, budget, confidence, max_sigma, candidates, ..
+            } = *r;
+            let own =
+                Recognition { points, consensus_px, draws, min_points, budget, confidence, ..Recognition::default() };
+            rest.recognition = Recognition { max_sigma, candidates, ..own };
+        }
+        let own = each_invalid(&rest, PoseGraphSettings::check);
+        all.extend(own.into_iter().map(|said| invalid_setting("pose-graph", format!("settings.{said}"))));
+        if self.read.is_empty() && !self.sha256.is_empty() {
+            let message = "sha256 says which file is read; name it by `read`".to_owned();
+            let (setting, key) = ("pose-graph", Some("sha256".to_owned()));
+            all.push(PipelineError { setting, key, part: Part::Key, near: None, message });
+        }
+        all
+    }
+}
+
+/// A run that lays key frames and finds them again.
+#[derive(Debug)]
+pub struct KeyframeMapper<'a> {
+    keyframes: &'a Keyframes,
+    traverse: Traverse<'a>,
+    /// Of each target, its place among the network's objects, and the other way round.
+    objects: Vec<usize>,
+    targets: Vec<Option<usize>>,
+}
+
+impl<'a> KeyframeMapper<'a> {
+    /// Begins a map of key frames, from the `earlier` map of another session where there is one.
+    pub fn begin(
+        keyframes: &'a Keyframes,
+        targets: &[Target],
+        rig: &'a StereoRig,
+        earlier: Option<&PoseGraph>,
+    ) -> Self {
+        let mut pose_graph = earlier.cloned().unwrap_or_default();
+        let mut objects = Vec::with_capacity(targets.len());
+        for (target, place) in targets.iter().zip(places(targets)) {
+            let known = pose_graph.objects.iter().position(|(name, _)| *name == target.name);
+            objects.push(known.unwrap_or_else(|| {
+                pose_graph.objects.push((target.name.clone(), place));
+                pose_graph.objects.len() - 1
+            }));
+        }
+        let of = |object: usize| objects.iter().position(|other| *other == object);
+        let back = (0..pose_graph.objects.len()).map(of).collect();
+        let traverse = Traverse::begin(&keyframes.settings, pose_graph, rig, Threads::One);
+        Self { keyframes, traverse, objects, targets: back }
+    }
+
+    /// Moves the map's pose by the odometry; `None` where no motion is known.
+    pub fn advance(&mut self, seconds: f64, motion: Option<&RelativeMotion>) {
+        self.traverse.advance(seconds, motion);
+    }
+
+    /// An object stands elsewhere than was believed.
+    pub fn displaced(&mut self, found: &Displacement) {
+        self.traverse.displaced(self.objects[found.object], found.place);
+    }
+
+    /// A frame: what it adds to the network, and what the network says of the pose.
+    pub fn visit(
+        &mut self,
+        sensor_frame: &SensorFrame,
+        pair: &StereoPair<'_>,
+        navigator: &mut Navigator<'_>,
+        taken: &[Navigated],
+        events: &mut Vec<NavigationEvent>,
+    ) {
+        let ours = |navigated: &Navigated| Navigated {
+            object: self.objects[navigated.object],
+            object_pose: navigated.object_pose.clone(),
+        };
+        let estimate = PoseEstimate {
+            stamp_ns: sensor_frame.stamp_ns,
+            navigated: navigator.pose().map(ours),
+            prior_pose: sensor_frame.prior.as_ref().map(|prior| (prior.world_from_camera, prior.covariance)),
+        };
+        let fixes: Vec<Navigated> = taken.iter().map(ours).collect();
+        let closure = self.traverse.visit(pair, &estimate, &fixes);
+        match closure.sought {
+            Some(Ok(found)) => {
+                let (pose_node, seen) = (found.pose_node, &found.recognized);
+                events.push(NavigationEvent::KeyframeFound {
+                    keyframe: pose_node,
+                    found: seen.found,
+                    matches: seen.matches,
+                    sigma: seen.motion.covariance.position_sigma(),
+                    given_up: found.given_up,
+                });
+                let theirs = |pose: Navigated| Some(Navigated { object: self.targets[pose.object]?, ..pose });
+                if let Some(pose) = found.navigated.and_then(theirs) {
+                    navigator.settle(&pose, format!("key frame {pose_node} found again"));
+                }
+            }
+            Some(Err(why)) => events.push(NavigationEvent::NoKeyframe { why: why.to_string() }),
+            None => {}
+        }
+        if let Some(pose_node) = closure.added {
+            events.push(NavigationEvent::KeyframeAdded { keyframe: pose_node });
+        }
+    }
+
+    /// The network as a file, where it is to be kept.
+    pub fn finish(self) -> Option<String> {
+        let pose_graph = self.traverse.finish();
+        self.keyframes.add_keyframes.then(|| pose_graph.text(&self.keyframes.settings.recognition))
+    }
+}

@@ -1,0 +1,226 @@
+//! The field: what stands on the bed, as it truly is, and as the site file describes it.
+
+mod builtin;
+mod bvh;
+mod change;
+mod check;
+mod clutter;
+mod inside;
+mod mesh;
+mod plan;
+mod random;
+mod rounded;
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use seafix_component::{Fault, read_text};
+use seafix_geometry::{Object, Point, Transform, World};
+use seafix_referencing::Site;
+
+pub use builtin::{BUILT_IN, built_in};
+pub use change::Changes;
+pub use plan::{
+    BoxBody, ChequerBody, CylinderBody, GEOMETRY_FORMAT, Geometry, MaterialPlan, MeshBody, ObjectGeometry, PanelBody,
+    SeabedPlan, Texture,
+};
+pub use random::RandomSite;
+
+pub(crate) use bvh::Bvh;
+pub(crate) use mesh::{Mesh, Skin, Triangle, Wear};
+
+use crate::{
+    seabed::{Mound, Seabed},
+    stream::{Purpose, Stream},
+    survey::{Mark, SurveyErrors, survey_marks},
+};
+
+/// A site as data: what a method is told, and the bodies that carry its points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SitePlan {
+    /// `seafix-site/1`, exact.
+    pub site: Site,
+    /// `seafix-geometry/1`.
+    pub geometry: Geometry,
+}
+
+impl SitePlan {
+    /// The plan of two texts.
+    ///
+    /// # Errors
+    /// Everything that is wrong with either.
+    pub fn parse(site: (&str, &Path), geometry: (&str, &Path)) -> Result<Self, Vec<Fault>> {
+        let described = Site::parse(site.0, site.1)?;
+        let shape = Geometry::parse(geometry.0, geometry.1).map_err(|fault| vec![fault])?;
+        let faults = check::faults(&shape, &described, geometry.0, geometry.1);
+        if faults.is_empty() { Ok(Self { site: described, geometry: shape }) } else { Err(faults) }
+    }
+
+    /// Reads `NAME.site.toml` and `NAME.geometry.toml`, given the path of the first.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or everything that is wrong with them.
+    pub fn read(path: &Path) -> Result<Self, Vec<Fault>> {
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let Some(stem) = name.strip_suffix(".site.toml") else {
+            let remedy = "a site for dives is NAME.site.toml, with NAME.geometry.toml beside it";
+            return Err(vec![Fault::new("not the name of a site file", path).remedy(remedy)]);
+        };
+        let other: PathBuf = path.with_file_name(format!("{stem}.geometry.toml"));
+        let read = |path: &Path| read_text(path).map_err(|fault| vec![fault]);
+        Self::parse((&read(path)?, path), (&read(&other)?, &other))
+    }
+
+    /// All faults of the geometry against the site; empty when it can be dived.
+    pub fn faults(&self) -> Vec<Fault> {
+        check::faults(&self.geometry, &self.site, "", Path::new(&self.geometry.name))
+    }
+}
+
+/// A feature point where it truly is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ScenePoint {
+    pub(crate) at: Vector3<f64>,
+    /// The side from which it is seen.
+    pub(crate) normal: Option<Vector3<f64>>,
+}
+
+/// One object as it truly stands.
+#[derive(Debug, Clone)]
+pub(crate) struct SceneObject {
+    pub(crate) points: Vec<ScenePoint>,
+}
+
+impl SceneObject {
+    /// The mean of its feature points.
+    pub(crate) fn centroid(&self) -> Vector3<f64> {
+        self.points.iter().map(|p| p.at).sum::<Vector3<f64>>() / self.points.len() as f64
+    }
+}
+
+/// Everything that can be seen, in the world.
+#[derive(Debug, Clone)]
+pub(crate) struct Scene {
+    /// What a method is told, with the errors of its survey.
+    pub(crate) nominal: Site,
+    /// Where the told objects truly are.
+    pub(crate) world_from_object: Vec<Transform<World, Object>>,
+    pub(crate) objects: Vec<SceneObject>,
+    pub(crate) mesh: Mesh,
+    pub(crate) bvh: Bvh,
+    pub(crate) seabed: Seabed,
+    /// The bed's skin is the last of the mesh's.
+    pub(crate) seabed_skin: u32,
+}
+
+impl Scene {
+    pub(crate) fn new(plan: &SitePlan, changes: &Changes, errors: SurveyErrors, seed: u64) -> Self {
+        let geometry = &plan.geometry;
+        let (mut nominal, mut truth, mut objects) = (Vec::new(), Vec::new(), Vec::new());
+        let mut mounds = Vec::new();
+        let mut poses = Vec::new();
+        for (index, object) in plan.site.objects.iter().enumerate() {
+            let number = index as u64;
+            let before = object.world_from_object.expect("every object stands somewhere; plans are checked");
+            let marks: Vec<Mark<'_>> = object
+                .points
+                .iter()
+                .map(|p| Mark {
+                    id: &p.id,
+                    at: (before * p.at).coords,
+                    normal: p.normal.map(|normal| before.rotation() * normal),
+                })
+                .collect();
+            let mut stream = Stream::new(seed, 0, number, Purpose::Survey);
+            let (mut described, fit) = survey_marks(&object.id, object.base, &marks, errors, &mut stream);
+            described.interest.clone_from(&object.interest);
+            let centre = marks.iter().map(|m| m.at).sum::<Vector3<f64>>() / marks.len() as f64;
+            let concerned = changes.concern(&object.id);
+            let now = if concerned { changes.moved(&before, &centre, seed, number) } else { before };
+            let moved = now * before.inverse();
+            objects.push(SceneObject {
+                points: object
+                    .points
+                    .iter()
+                    .map(|p| ScenePoint {
+                        at: (now * p.at).coords,
+                        normal: p.normal.map(|normal| now.rotation() * normal),
+                    })
+                    .collect(),
+            });
+            if concerned && changes.silt > 0.0 {
+                let reach = marks.iter().map(|m| (m.at - centre).xy().norm()).fold(0.0, f64::max);
+                mounds.push(Mound { centre: [centre.x, centre.y], radius: reach + 0.5, height: changes.silt });
+            }
+            poses.push((now, concerned));
+            truth.push(if moved == Transform::identity() { fit } else { moved * fit });
+            nominal.push(described);
+        }
+        let seabed = Seabed::with_relief(geometry.seabed.depth, geometry.seabed.relief, seed).silted(mounds);
+
+        let mut mesh = Mesh::default();
+        let texture = Stream::new(seed, 0, 0, Purpose::Texture).bits() as u32;
+        for shape in &geometry.objects {
+            let Some(index) = plan.site.objects.iter().position(|o| o.id == shape.id) else { continue };
+            let (pose, concerned) = &poses[index];
+            let wear =
+                if *concerned { Wear { rounding: changes.rounding, growth: changes.growth } } else { Wear::default() };
+            mesh.add(geometry, shape, pose, wear, texture);
+        }
+        for (index, (object, (_, concerned))) in objects.iter().zip(&poses).enumerate() {
+            let centre = object.centroid();
+            let mut rocks = Stream::new(seed, 0, index as u64, Purpose::Rocks);
+            clutter::rocks(&mut mesh, &seabed, &centre, geometry.seabed.rocks, &mut rocks);
+            if *concerned {
+                let mut stream = Stream::new(seed, 0, index as u64, Purpose::Occluders);
+                clutter::occluders(&mut mesh, &seabed, &centre, changes.occluders, &mut stream);
+            }
+        }
+        let bvh = Bvh::new(&mesh.triangles);
+        let seabed_skin = mesh.skins.len() as u32;
+        mesh.skins.push(Skin {
+            albedo: geometry.seabed.albedo as f32,
+            texture: geometry.seabed.texture,
+            seed: texture,
+            growth: 0.0,
+        });
+        let nominal =
+            Site { name: plan.site.name.clone(), frame: plan.site.frame, objects: nominal, warnings: Vec::new() };
+        Self { nominal, world_from_object: truth, objects, mesh, bvh, seabed, seabed_skin }
+    }
+
+    /// The first t > 0 at which `from + t·along` meets a body or the bed.
+    pub(crate) fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
+        let body = self.bvh.hit(&self.mesh.triangles, from, along, f64::INFINITY).map(|hit| hit.t);
+        body.into_iter().chain(self.seabed.hit(from, along)).min_by(f64::total_cmp)
+    }
+
+    /// Whether nothing lies between `from` and the place `to`, up to a millimetre before it.
+    pub(crate) fn clear(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
+        let along = to - from;
+        let before = 1.0 - 1e-3 / along.norm();
+        self.bvh.hit(&self.mesh.triangles, from, &along, before).is_none()
+            && self.seabed.hit(from, &along).is_none_or(|t| t >= before)
+    }
+
+    /// Whether a feature point is turned towards `from` and nothing hides it.
+    pub(crate) fn sees(&self, from: &Vector3<f64>, point: &ScenePoint) -> bool {
+        point.normal.is_none_or(|normal| normal.dot(&(from - point.at)) > 0.0) && self.clear(from, &point.at)
+    }
+
+    /// The distance from a place to the nearest body or bed, where it is below `limit` (m).
+    pub(crate) fn distance(&self, place: &Vector3<f64>, limit: f64) -> Option<f64> {
+        let body = self.bvh.distance(&self.mesh.triangles, place, limit);
+        // The bed is so gentle that the vertical distance is the distance.
+        let seabed = self.seabed.down(place.x, place.y) - place.z;
+        body.into_iter().chain((seabed < limit).then_some(seabed)).min_by(f64::total_cmp)
+    }
+
+    /// The place that `from` sees along `along`.
+    pub(crate) fn seen(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<Point<World>> {
+        self.hit(from, along).map(|t| Point::from(from + along * t))
+    }
+}
+
+#[cfg(test)]
+mod tests;
