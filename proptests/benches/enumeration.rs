@@ -70,12 +70,12 @@ fn main() {
 
 /// Medians over the problems as a cell of the table, or what most of them ended with.
 fn median(search: &dyn Search, problems: &[Planted]) -> Result<String, Rejected> {
-    let (mut tests, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut pair_tests, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
     let mut without = 0;
     for planted in problems {
         match planted.run(search) {
             Ok((spent, size, seconds)) => {
-                tests.push(spent);
+                pair_tests.push(spent);
                 sizes.push(size);
                 times.push(seconds);
             }
@@ -89,11 +89,11 @@ fn median(search: &dyn Search, problems: &[Planted]) -> Result<String, Rejected>
     }
     // Those that were stopped would have taken longer than any: the median of all stands where it would be.
     let middle = problems.len() / 2;
-    tests.sort_unstable();
+    pair_tests.sort_unstable();
     times.sort_by(f64::total_cmp);
     sizes.sort_unstable();
     let all = if without > 0 { format!(" ({without} without an answer)") } else { String::new() };
-    Ok(format!("{}, {}, {}{all}", grouped(tests[middle]), duration(times[middle]), sizes[sizes.len() / 2]))
+    Ok(format!("{}, {}, {}{all}", grouped(pair_tests[middle]), duration(times[middle]), sizes[sizes.len() / 2]))
 }
 
 /// A problem with a planted answer.
@@ -144,13 +144,13 @@ impl Planted {
             let start = Instant::now();
             let answer = black_box(search.search(black_box(&problem), &mut ChaCha8Rng::seed_from_u64(0)));
             times.push(start.elapsed().as_secs_f64());
-            let Identification { tests, pairs, undecided, .. } = answer?;
+            let Identification { pair_tests, pairs, undecided, .. } = answer?;
             if let Some(why @ Rejected::Budget { .. }) = undecided {
                 return Err(why);
             }
             if times.len() == 15 || times.iter().sum::<f64>() > 0.02 {
                 times.sort_by(f64::total_cmp);
-                return Ok((tests, pairs.len(), times[times.len() / 2]));
+                return Ok((pair_tests, pairs.len(), times[times.len() / 2]));
             }
         }
     }

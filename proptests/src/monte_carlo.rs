@@ -26,17 +26,17 @@ pub struct Cell {
     /// coverage, but not in means that a single one would make.
     pub elsewhere: u32,
     /// Root mean square of m2 over that of its bound.
-    pub m2: f64,
+    pub tre: f64,
     /// Root mean square of the position's error (m3) over that of its bound.
-    pub m3: f64,
+    pub position: f64,
     /// Root mean square of m3 over what [`foreseen`] says of it.
-    pub m3_foreseen: f64,
+    pub position_foreseen: f64,
     /// Greatest [`bent`] of the layouts: how far the likelihood is from the parabola that the bound takes it for.
     pub bent: f64,
     /// Root mean square of m2 (m).
-    pub m2_rms: f64,
+    pub tre_rms: f64,
     /// Root mean square of the position's error (m).
-    pub m3_rms: f64,
+    pub position_rms: f64,
     /// Length of the mean error of the position over its standard deviation by the bound.
     pub bias: f64,
     /// Mean NEES.
@@ -111,15 +111,16 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
     /// χ²₆ at 95 %.
     const NINETY_FIVE: f64 = 12.591_587_243_743_977;
     let mut cell = Cell::default();
-    let (mut m2, mut m3, mut m2_bound, mut m3_bound, mut counted, mut angle) = (0.0, 0.0, 0.0, 0.0, 0u32, 0.0);
-    let mut m3_foreseen = 0.0;
+    let (mut tre, mut position, mut tre_crlb, mut position_crlb, mut counted, mut angle) =
+        (0.0, 0.0, 0.0, 0.0, 0u32, 0.0);
+    let mut position_foreseen = 0.0;
     for placed in placed {
         let bound = bound(placed, settings);
         cell.layouts += 1;
         cell.attitude_sigma = cell.attitude_sigma.max(bound.attitude_sigma());
         cell.bent = cell.bent.max(bent(placed, settings.sigma_px, &bound));
         let curved = foreseen(placed, settings).map_or(f64::NAN, |covariance| covariance.position_sigma());
-        let (m2_limit, m3_limit) =
+        let (tre_limit, position_limit) =
             (transfer_bound(&bound, &placed.object_from_camera, &placed.model), bound.position_sigma());
         let mut mean = Vector3::zeros();
         let mut here = 0u32;
@@ -145,12 +146,12 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
                 cell.elsewhere += 1;
                 continue;
             }
-            m2 += transfer_rms(&pose, truth, &placed.model).expect("there are points").powi(2);
-            m3 += position_error(&pose, truth).powi(2);
+            tre += transfer_rms(&pose, truth, &placed.model).expect("there are points").powi(2);
+            position += position_error(&pose, truth).powi(2);
             angle += attitude_error(&pose, truth).powi(2);
-            m2_bound += m2_limit * m2_limit;
-            m3_bound += m3_limit * m3_limit;
-            m3_foreseen += curved * curved;
+            tre_crlb += tre_limit * tre_limit;
+            position_crlb += position_limit * position_limit;
+            position_foreseen += curved * curved;
             mean += pose.translation() - truth.translation();
             (cell.answered, here) = (cell.answered + 1, here + 1);
             if let Some(error) = error {
@@ -159,13 +160,14 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
                 cell.coverage += f64::from(u8::from(error <= NINETY_FIVE));
             }
         }
-        cell.bias += mean.norm() / f64::from(here.max(1)) / m3_limit;
+        cell.bias += mean.norm() / f64::from(here.max(1)) / position_limit;
     }
     cell.bias /= placed.len() as f64;
     let n = f64::from(cell.answered);
-    (cell.m2, cell.m3) = ((m2 / m2_bound).sqrt(), (m3 / m3_bound).sqrt());
-    cell.m3_foreseen = (m3 / m3_foreseen).sqrt();
-    (cell.m2_rms, cell.m3_rms, cell.attitude_rms) = ((m2 / n).sqrt(), (m3 / n).sqrt(), (angle / n).sqrt());
+    (cell.tre, cell.position) = ((tre / tre_crlb).sqrt(), (position / position_crlb).sqrt());
+    cell.position_foreseen = (position / position_foreseen).sqrt();
+    (cell.tre_rms, cell.position_rms, cell.attitude_rms) =
+        ((tre / n).sqrt(), (position / n).sqrt(), (angle / n).sqrt());
     (cell.nees, cell.coverage) = (cell.nees / f64::from(counted), cell.coverage / f64::from(counted + cell.elsewhere));
     cell
 }
@@ -262,8 +264,8 @@ pub fn paired(solver: &dyn Solver, other: &dyn Solver, settings: &Layout, layout
             let data = Observations { points, rig: Some(&placed.rig) };
             let (Ok(a), Ok(b)) = (solver.solve(&data), other.solve(&data)) else { continue };
             let truth = &placed.object_from_camera;
-            let m2 = |pose| transfer_rms(pose, truth, &placed.model).expect("there are points").powi(2);
-            differences[0].push(m2(&a) - m2(&b));
+            let tre = |pose| transfer_rms(pose, truth, &placed.model).expect("there are points").powi(2);
+            differences[0].push(tre(&a) - tre(&b));
             differences[1].push(position_error(&a, truth).powi(2) - position_error(&b, truth).powi(2));
         }
     }

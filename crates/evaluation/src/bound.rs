@@ -133,8 +133,8 @@ mod tests {
         let alone = 1.0 / bound.matrix.try_inverse().unwrap()[(5, 5)];
         assert!((alone * information - 1.0).abs() < 1e-6);
         assert!(bound.matrix[(5, 5)] >= alone);
-        let m2 = transfer_bound(&bound, &pose, &points.iter().map(|p| p.at).collect::<Vec<_>>());
-        assert!(m2 > 0.0 && m2 < 0.01, "{m2}");
+        let tre = transfer_bound(&bound, &pose, &points.iter().map(|p| p.at).collect::<Vec<_>>());
+        assert!(tre > 0.0 && tre < 0.01, "{tre}");
         assert!(cramer_rao(&rig, &pose, &points[..2]).is_none(), "two points leave a turn about their line");
         // What is left is of second order: it grows as the noise.
         let bent = nonlinearity(&rig, &pose, &points, &bound).unwrap();

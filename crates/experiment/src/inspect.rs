@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use seafix_geometry::{Object, Point, StereoRig, Transform, World};
-use seafix_log::InspectedPoint;
+use seafix_log::PointOfInterest;
 use seafix_navigation::{Navigated, ObjectPlacement, ObjectPose};
 use seafix_referencing::{Interest, Outcome, Site, TargetKind};
 
@@ -14,14 +14,14 @@ use seafix_data::source::Truth;
 /// What is believed comes from the navigated pose, and without navigation from the fix of the point's own object, else
 /// from the first of the frame: e = camera_from_object_est · p − camera_from_object_true · p. To an object that is not
 /// the pose's own it goes by the survey, whose errors it then has. What hides a point is not looked for.
-pub(crate) fn inspected(
+pub(crate) fn poi(
     truth: &Truth,
     site: &Site,
     rig: &StereoRig,
     kind: TargetKind,
     frame_result: &FrameResult,
     navigation_state: Option<&NavigationState>,
-) -> Vec<InspectedPoint> {
+) -> Vec<PointOfInterest> {
     let camera_from_world = truth.world_from_camera.inverse();
     let mut points = Vec::new();
     for (o, (object, place)) in site.objects.iter().zip(&truth.world_from_object).enumerate() {
@@ -42,7 +42,7 @@ pub(crate) fn inspected(
                 let information = object_pose.covariance.of_point(&believed).cholesky()?;
                 Some(error.dot(&information.solve(&error)))
             });
-            points.push(InspectedPoint {
+            points.push(PointOfInterest {
                 object: object.id.clone(),
                 point: interest.id.clone(),
                 at: at.coords.into(),

@@ -50,7 +50,7 @@ impl<'a> Evaluator<'a> {
         if let (Some(navigation_state), Some(row)) = (navigation_state, &mut record.navigation) {
             row.errors = errors(navigation_state, self);
         }
-        record.inspected = inspect::inspected(truth, self.site, rig, kind, frame_result, navigation_state);
+        record.poi = inspect::poi(truth, self.site, rig, kind, frame_result, navigation_state);
         for (attempt, row) in frame_result.attempts.iter().zip(record.targets.iter_mut()) {
             let Some(known) = &self.known(attempt.target) else { continue };
             let identified = row.evaluation.identified;
@@ -63,8 +63,8 @@ impl<'a> Evaluator<'a> {
             {
                 let true_pose = known.world_from_object.inverse() * truth.world_from_camera;
                 let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
-                row.evaluation.m2_bound = Some(transfer_bound(&bound, &true_pose, &model));
-                row.evaluation.m3_bound = Some(bound.position_sigma());
+                row.evaluation.tre_crlb = Some(transfer_bound(&bound, &true_pose, &model));
+                row.evaluation.position_crlb = Some(bound.position_sigma());
             }
             if let Outcome::Fix(fix) = &attempt.answer.outcome {
                 evaluate(&mut row.evaluation, fix, known, frame_result, truth, rig);
@@ -112,14 +112,14 @@ fn errors(navigation_state: &NavigationState, judge: &Evaluator<'_>) -> Navigati
         let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
         let sum: Vector3<f64> = known.points.iter().map(|point| point.coords).sum();
         let centroid = Point::from(sum / known.points.len() as f64);
-        errors.m2_rms = transfer_rms(&estimate, &true_pose, &model);
-        errors.m3_position = Some(position_error(&estimate, &true_pose));
-        errors.m3_attitude = Some(attitude_error(&estimate, &true_pose));
+        errors.tre_rms = transfer_rms(&estimate, &true_pose, &model);
+        errors.position_error = Some(position_error(&estimate, &true_pose));
+        errors.attitude_error = Some(attitude_error(&estimate, &true_pose));
         errors.nees = nees(&estimate, &true_pose, &navigated.object_pose.covariance, &centroid);
     }
-    if let Some((_, estimate, true_pose)) = navigation_state.unreferenced.as_ref().and_then(of) {
-        errors.unreferenced_m3_position = Some(position_error(&estimate, &true_pose));
-        errors.unreferenced_m3_attitude = Some(attitude_error(&estimate, &true_pose));
+    if let Some((_, estimate, true_pose)) = navigation_state.odometry_only.as_ref().and_then(of) {
+        errors.odometry_only_position_error = Some(position_error(&estimate, &true_pose));
+        errors.odometry_only_attitude_error = Some(attitude_error(&estimate, &true_pose));
     }
     errors
 }
@@ -191,15 +191,15 @@ fn evaluate(
 
     row.correct_pairs = Some(is_correct.iter().filter(|correct| **correct).count() as u32);
     row.wrong_pairs = Some(fix.used.iter().any(|&index| !is_correct[index]));
-    row.m1_rms = residual_rms(estimate, &of(&|_| true));
-    row.m1_unused_rms = residual_rms(estimate, &of(&|index| !fix.used.contains(&index)));
-    row.m2_rms = transfer_rms(estimate, &true_pose, &model);
-    row.m3_position = Some(position_error(estimate, &true_pose));
-    row.m3_attitude = Some(attitude_error(estimate, &true_pose));
+    row.fit_rms = residual_rms(estimate, &of(&|_| true));
+    row.fit_rms_unused = residual_rms(estimate, &of(&|index| !fix.used.contains(&index)));
+    row.tre_rms = transfer_rms(estimate, &true_pose, &model);
+    row.position_error = Some(position_error(estimate, &true_pose));
+    row.attitude_error = Some(attitude_error(estimate, &true_pose));
     row.nees = nees(estimate, &true_pose, &fix.covariance, &centroid);
     row.wrong = match &truth.answer {
         Some(answer) => Some(!answer.rule.holds(estimate, &true_pose, &model)),
-        None => row.m2_rms.map(|m2| !(m2 <= alert_limit(known.target.diameter()))),
+        None => row.tre_rms.map(|tre| !(tre <= alert_limit(known.target.diameter()))),
     };
 }
 

@@ -51,10 +51,10 @@ mod tests {
         target.outcome = Outcome::Fix;
         target.evaluation = Evaluation {
             wrong: Some(wrong),
-            m2_rms: Some(2.0),
-            m3_position: Some(3.0),
-            m2_bound: Some(1.0),
-            m3_bound: Some(1.0),
+            tre_rms: Some(2.0),
+            position_error: Some(3.0),
+            tre_crlb: Some(1.0),
+            position_crlb: Some(1.0),
             nees: Some(6.0),
             ..Evaluation::default()
         };
@@ -76,9 +76,9 @@ mod tests {
         assert_eq!(kept, [0, 1, 11, 20, 21, 31, 40, 41, 60, 80]);
         let totals = &thinned.totals;
         assert_eq!((totals.frames, totals.wrong, totals.found, totals.failures_left_out), (100, 10, 90, 5));
-        assert_eq!((totals.judged, totals.m2_squares, totals.m3_squares), (100, 400.0, 900.0));
+        assert_eq!((totals.judged, totals.tre_squares, totals.position_squares), (100, 400.0, 900.0));
         assert_eq!(
-            (totals.bounded, totals.m2_bound_squares, totals.nees_sum, totals.nees_within),
+            (totals.bounded, totals.tre_crlb_squares, totals.nees_sum, totals.nees_within),
             (100, 100.0, 600.0, 100)
         );
     }

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// The format that this version writes.
-const FORMAT: &str = "seafix-manifest/1.2";
+const FORMAT: &str = "seafix-manifest/2";
 
 /// What made a run: enough to make it again and to know whether it would be the same.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -157,7 +157,7 @@ impl Manifest {
             read_text(&file).map_err(|fault| without(folder).unwrap_or(fault.remedy("name the folder of a run")))?;
         let manifest: Self = serde_json::from_str(&text)
             .map_err(|error| Fault::new("a manifest that cannot be read", &file).on_line(error.line()).value(error))?;
-        if !manifest.format.starts_with("seafix-manifest/1.") {
+        if !manifest.format.starts_with("seafix-manifest/2") {
             return Err(Fault::new("not a manifest of this version", &file).value(manifest.format).remedy(FORMAT));
         }
         Ok(manifest)

@@ -129,9 +129,9 @@ fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) 
     let seafix::TargetTimes { candidates_ms, search_ms, solve_ms, total_ms } = attempt.times;
     record.times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms };
     record.optimal = Some(answer.optimal);
-    record.size_bound = answer.size_bound.map(|n| n as u64);
+    record.consensus_bound = answer.consensus_bound.map(|n| n as u64);
     record.nfa = answer.nfa;
-    record.tests = answer.tests;
+    record.pair_tests = answer.pair_tests;
     record.pairs = pairs(&answer.identified);
     record.evaluation.identified = Some(answer.identified.len() as u32);
     match &answer.outcome {
@@ -183,7 +183,7 @@ fn navigation(navigation_state: &NavigationState, targets: &[Target]) -> Navigat
         state: navigation_state.state.to_string(),
         due: navigation_state.due,
         pose: navigation_state.pose.as_ref().map(pose),
-        unreferenced: navigation_state.unreferenced.as_ref().map(pose),
+        odometry_only: navigation_state.odometry_only.as_ref().map(pose),
         odometry: OdometryStep {
             lost: navigation_state.odometry.lost.clone(),
             motion: step.map(|step| (step.motion.rows(), rows6(&step.covariance.matrix))),
@@ -197,14 +197,14 @@ fn integrity(it: &seafix_referencing::Integrity) -> Integrity {
     Integrity {
         redundancy: it.redundancy.name().to_owned(),
         chi2: it.chi2,
-        freedom: it.freedom as u64,
+        dof: it.dof as u64,
         chi2_limit: it.chi2_limit,
-        separation: it.separation,
-        separation_two: it.separation_two,
+        solution_separation: it.solution_separation,
+        solution_separation_two: it.solution_separation_two,
         protection_position: it.protection.map(|level| level.position),
         protection_attitude: it.protection.map(|level| level.attitude),
-        stretch: it.stretch.map(|it| it.value),
-        stretch_sigma: it.stretch.map(|it| it.sigma),
+        scale_error: it.scale_error.map(|it| it.value),
+        scale_error_sigma: it.scale_error.map(|it| it.sigma),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! One trial is one file. An experiment fills plain records ([`TrialHeader`], [`FrameRecord`]) and hands
 //! them to a [`Writer`]; [`read`] gives the same records back, bit for bit. Inside the file every
-//! record stands twice: exactly, in this project's own messages (`seafix.v1.*`, `proto/seafix`), and
+//! record stands twice: exactly, in this project's own messages (`seafix.v2.*`, `proto/seafix`), and
 //! drawn, in the well-known messages that Foxglove and Rerun display.
 //!
 //! ```
@@ -22,15 +22,15 @@
 //!
 //! | topic | message | |
 //! |---|---|---|
-//! | `/run/header` | `seafix.v1.TrialHeader` | once, before all else |
-//! | `/referencing/candidates` | `seafix.v1.Candidates` | one an attempted target and frame |
-//! | `/referencing/result` | `seafix.v1.ReferencingResult` | likewise |
-//! | `/metrics/evaluation` | `seafix.v1.Evaluation` | likewise: comparison with truth |
-//! | `/metrics/inspection` | `seafix.v1.Inspection` | one a frame with a point of interest in view: where the vehicle had it, and where it is |
-//! | `/metrics/timing` | `seafix.v1.Timing` | one a frame |
-//! | `/metrics/totals` | `seafix.v1.Totals` | once, last: what all frames add up to, logged or not |
-//! | `/referencing/inputs` | `seafix.v1.Inputs` | one a frame: what the method was given, to the last bit |
-//! | `/referencing/frame` | `seafix.v1.Frame` | one a frame, its last: cloud, key points, prior, truth, navigation |
+//! | `/run/header` | `seafix.v2.TrialHeader` | once, before all else |
+//! | `/referencing/candidates` | `seafix.v2.Candidates` | one an attempted target and frame |
+//! | `/referencing/result` | `seafix.v2.ReferencingResult` | likewise |
+//! | `/metrics/evaluation` | `seafix.v2.Evaluation` | likewise: comparison with truth |
+//! | `/metrics/inspection` | `seafix.v2.Inspection` | one a frame with a point of interest in view: where the vehicle had it, and where it is |
+//! | `/metrics/timing` | `seafix.v2.Timing` | one a frame |
+//! | `/metrics/totals` | `seafix.v2.Totals` | once, last: what all frames add up to, logged or not |
+//! | `/referencing/inputs` | `seafix.v2.Inputs` | one a frame: what the method was given, to the last bit |
+//! | `/referencing/frame` | `seafix.v2.Frame` | one a frame, its last: cloud, key points, prior, truth, navigation |
 //! | `/camera/left/image`, `/camera/right/image` | `foxglove.CompressedImage` | PNG, lossless; the only copy of the images |
 //! | `/camera/left/calibration`, `/camera/right/calibration` | `foxglove.CameraCalibration` | once |
 //! | `/camera/left/annotations`, `/camera/right/annotations` | `foxglove.ImageAnnotations` | key points, candidates, identified points |
@@ -75,8 +75,8 @@ pub use png::{encode_png, encode_png_16};
 pub use read::{Reader, TrialLog, looks_like, read};
 pub use record::{
     Alternative, AnswerRecord, Axis, CameraRecord, CloudPoint, Component, ELSEWHERE, Evaluation, ExactPose,
-    FrameRecord, FrameTimes, GreyImage, Inputs, InspectedPoint, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint,
-    NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PriorRecord,
+    FrameRecord, FrameTimes, GreyImage, Inputs, Integrity, Matrix3, Matrix4, Matrix6, ModelPoint, NavigatedRecord,
+    NavigationErrors, NavigationRecord, OdometryStep, Outcome, Pair, PixelPair, PointOfInterest, PriorRecord,
     ProblemRecord, Region, RigRecord, SensorReading, SharedStages, SitePoint, TargetModel, TargetRecord, TargetTimes,
     Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
 };

@@ -56,7 +56,7 @@ macro_rules! own {
     ($($message:ident),*) => {$(
         impl Logged for proto::$message {
             fn schema() -> Schema {
-                (concat!("seafix.v1.", stringify!($message)), proto::DESCRIPTORS)
+                (concat!("seafix.v2.", stringify!($message)), proto::DESCRIPTORS)
             }
         }
     )*};

@@ -200,20 +200,19 @@ impl Ellipsoid {
 /// The quantile of χ² with these degrees of freedom.
 ///
 /// It is found by bisection, and asked for a handful of arguments over and over: each thread remembers the last ones.
-pub(crate) fn chi_square(freedom: usize, confidence: f64) -> f64 {
+pub(crate) fn chi_square(dof: usize, confidence: f64) -> f64 {
     const REMEMBERED: usize = 64;
     thread_local! {
         static KNOWN: RefCell<VecDeque<(usize, f64, f64)>> = const { RefCell::new(VecDeque::new()) };
     }
-    let same = |&&(n, c, _): &&(usize, f64, f64)| n == freedom && c == confidence;
+    let same = |&&(n, c, _): &&(usize, f64, f64)| n == dof && c == confidence;
     if let Some((_, _, known)) = KNOWN.with_borrow(|known| known.iter().find(same).copied()) {
         return known;
     }
-    let quantile =
-        ChiSquared::new(freedom as f64).expect("the degrees of freedom are positive").inverse_cdf(confidence);
+    let quantile = ChiSquared::new(dof as f64).expect("the degrees of freedom are positive").inverse_cdf(confidence);
     KNOWN.with_borrow_mut(|known| {
         known.truncate(REMEMBERED - 1);
-        known.push_front((freedom, confidence, quantile));
+        known.push_front((dof, confidence, quantile));
     });
     quantile
 }
@@ -350,9 +349,9 @@ mod tests {
             (2, 0.99, 9.210_340_371_976_182),
         ];
         for _ in 0..3 {
-            for (freedom, confidence, quantile) in table {
-                let found = chi_square(freedom, confidence);
-                assert!((found / quantile - 1.0).abs() < 1e-9, "{freedom}, {confidence}: {found}");
+            for (dof, confidence, quantile) in table {
+                let found = chi_square(dof, confidence);
+                assert!((found / quantile - 1.0).abs() < 1e-9, "{dof}, {confidence}: {found}");
             }
         }
         // More arguments than the cache holds.

@@ -25,14 +25,14 @@ macro_rules! fields {
 }
 
 fields! {
-    M1 "m1_rms" |r| r.evaluation.m1_rms;
-    M1Unused "m1_unused_rms" |r| r.evaluation.m1_unused_rms;
-    M2 "m2_rms" |r| r.evaluation.m2_rms;
-    Position "m3_position" |r| r.evaluation.m3_position;
-    Attitude "m3_attitude" |r| r.evaluation.m3_attitude;
+    Fit "fit_rms" |r| r.evaluation.fit_rms;
+    FitUnused "fit_rms_unused" |r| r.evaluation.fit_rms_unused;
+    Tre "tre_rms" |r| r.evaluation.tre_rms;
+    Position "position_error" |r| r.evaluation.position_error;
+    Attitude "attitude_error" |r| r.evaluation.attitude_error;
     Nees "nees" |r| r.evaluation.nees;
-    M2Bound "m2_bound" |r| r.evaluation.m2_bound;
-    PositionBound "m3_bound" |r| r.evaluation.m3_bound;
+    TreCrlb "tre_crlb" |r| r.evaluation.tre_crlb;
+    PositionBound "position_crlb" |r| r.evaluation.position_crlb;
     Level "protection_position" |r| r.integrity.as_ref()?.protection_position;
     Limit "alert_limit" |r| r.evaluation.alert_limit;
     Residual "residual_rms" |r| r.residual_rms;
@@ -40,7 +40,7 @@ fields! {
     Identified "identified" |r| r.evaluation.identified.map(f64::from);
     Correct "correct_pairs" |r| r.evaluation.correct_pairs.map(f64::from);
     Candidates "candidates" |r| Some(r.candidates.iter().map(Vec::len).sum::<usize>() as f64);
-    Tests "tests" |r| r.tests.map(|tests| tests as f64);
+    Tests "pair_tests" |r| r.pair_tests.map(|pair_tests| pair_tests as f64);
     CandidatesTime "candidates_ms" |r| r.times.candidates_ms;
     SearchTime "search_ms" |r| r.times.search_ms;
     SolveTime "solve_ms" |r| r.times.solve_ms;

@@ -35,7 +35,7 @@ mod write;
 pub use compare::{Compared, compare};
 pub use error::ReportError;
 pub use index::{index, index_holds};
-pub use paper::PAPER_M1;
+pub use paper::PAPER_FIT_RMS;
 pub use summary::{Distribution, Limits, Row, RunSummary, StageTimeSummary};
 pub use verify::{Mismatch, Verified, verify};
 pub use write::{Forms, Report, report};

@@ -25,12 +25,12 @@ macro_rules! quantities {
 }
 
 quantities! {
-    M2 "navigated_m2_rms" m2_rms;
-    Position "navigated_m3_position" m3_position;
-    Attitude "navigated_m3_attitude" m3_attitude;
+    Tre "navigated_tre_rms" tre_rms;
+    Position "navigated_position_error" position_error;
+    Attitude "navigated_attitude_error" attitude_error;
     Nees "navigated_nees" nees;
-    AlonePosition "unreferenced_m3_position" unreferenced_m3_position;
-    AloneAttitude "unreferenced_m3_attitude" unreferenced_m3_attitude;
+    AlonePosition "odometry_only_position_error" odometry_only_position_error;
+    AloneAttitude "odometry_only_attitude_error" odometry_only_attitude_error;
 }
 
 /// Frames that are counted.

@@ -6,7 +6,7 @@ use crate::{format, run::Trial};
 
 /// Where in the logs a number comes from: enough to compute it again.
 ///
-/// Written as `median m2_rms of found in mm; /metrics/evaluation; 0..2000000000 ns; 001.mcap`.
+/// Written as `median tre_rms of found in mm; /metrics/evaluation; 0..2000000000 ns; 001.mcap`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Key {
     /// What was computed: a statistic, a quantity, the attempts it is over, the unit.
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn keys_are_read_as_they_were_written() {
         let key = Key {
-            what: "value m2_rms of a; b, 100% c\u{1b} at 3".to_owned(),
+            what: "value tre_rms of a; b, 100% c\u{1b} at 3".to_owned(),
             topic: "/metrics/evaluation".to_owned(),
             span: [3, 9],
             logs: vec!["a, b.mcap".to_owned(), "c;d.mcap".to_owned()],

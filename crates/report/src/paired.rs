@@ -227,7 +227,7 @@ fn between(run: &Run) -> Vec<Comparison> {
 pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
     fn keyed(trial: &Trial) -> Vec<(u64, &str, f64)> {
         let attempts = trial.attempts();
-        attempts.map(|(frame, row)| (frame.number, trial.object(row), row.error_or_failure(Field::M2))).collect()
+        attempts.map(|(frame, row)| (frame.number, trial.object(row), row.error_or_failure(Field::Tre))).collect()
     }
     matched(keyed(first), keyed(second))
 }
@@ -274,8 +274,8 @@ fn over_conditions(run: &Run, summary: &RunSummary, groups: &[Vec<usize>]) -> Ve
                 logs.extend([first, second]);
             }
         }
-        let m2 = |index: usize| summary.rows[index].m2_of_all.unwrap_or(f64::INFINITY).ln();
-        let errors: Vec<(f64, f64)> = logs.chunks(2).map(|pair| (m2(pair[0]), m2(pair[1]))).collect();
+        let tre = |index: usize| summary.rows[index].tre_of_all.unwrap_or(f64::INFINITY).ln();
+        let errors: Vec<(f64, f64)> = logs.chunks(2).map(|pair| (tre(pair[0]), tre(pair[1]))).collect();
         if !errors.is_empty() {
             found.push(of(String::new(), [methods[a].clone(), methods[b].clone()], logs, true, errors));
         }

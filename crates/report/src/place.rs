@@ -35,7 +35,7 @@ pub(crate) fn matrix(rows: &[[f64; 4]; 4]) -> Matrix4<f64> {
 
 /// Gives fixes of logs that are older than limits of their own those of their targets.
 pub(crate) fn limit(header: &TrialHeader, target: &mut TargetRecord) {
-    if target.evaluation.alert_limit.is_none() && target.evaluation.m3_position.is_some() {
+    if target.evaluation.alert_limit.is_none() && target.evaluation.position_error.is_some() {
         let model = header.targets.iter().find(|model| model.id == target.object);
         target.evaluation.alert_limit = model.map(|model| model.alert_limit);
     }

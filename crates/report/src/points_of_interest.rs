@@ -1,6 +1,6 @@
 //! The quantities of a point of interest in view, under the names that the columns of the results have.
 
-use seafix_log::InspectedPoint;
+use seafix_log::PointOfInterest;
 
 /// One quantity of a point of interest in view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,9 +19,9 @@ impl PoiQuantity {
     /// Its name.
     pub(crate) fn name(self) -> &'static str {
         match self {
-            Self::Range => "inspected_range",
-            Self::Error => "inspected_error",
-            Self::Nees => "inspected_nees",
+            Self::Range => "poi_range",
+            Self::Error => "poi_error",
+            Self::Nees => "poi_nees",
         }
     }
 
@@ -31,7 +31,7 @@ impl PoiQuantity {
     }
 
     /// Its value in the logged record; `None` where nothing is known.
-    pub(crate) fn of(self, point: &InspectedPoint) -> Option<f64> {
+    pub(crate) fn of(self, point: &PointOfInterest) -> Option<f64> {
         match self {
             Self::Range => Some(point.range()),
             Self::Error => point.error(),
@@ -41,6 +41,6 @@ impl PoiQuantity {
 }
 
 /// What a point is called, with its object.
-pub(crate) fn name(point: &InspectedPoint) -> String {
+pub(crate) fn name(point: &PointOfInterest) -> String {
     format!("{}/{}", point.object, point.point)
 }

@@ -56,7 +56,7 @@ pub(crate) struct Trial {
     /// SHA-256 of all results but the times.
     pub(crate) digest: Vec<u8>,
     rows: Vec<AttemptRow>,
-    inspected: Vec<Inspected>,
+    poi: Vec<Inspected>,
     words: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ pub(crate) struct Frame {
     rows: (u32, u32),
     /// What the navigator knew, where the trial navigates.
     pub(crate) navigated: Option<Box<NavigatedFrame>>,
-    inspected: (u32, u32),
+    poi: (u32, u32),
 }
 
 /// A point of interest in view of a frame.
@@ -164,7 +164,7 @@ impl Trial {
             shared: SharedStages::default(),
             digest: Vec::new(),
             rows: Vec::new(),
-            inspected: Vec::new(),
+            poi: Vec::new(),
             words: vec![String::new()],
         };
         let mut digest = Sha256::new();
@@ -182,7 +182,7 @@ impl Trial {
         trial.lacks = reader.recovered().map(str::to_owned);
         trial.frames.shrink_to_fit();
         trial.rows.shrink_to_fit();
-        trial.inspected.shrink_to_fit();
+        trial.poi.shrink_to_fit();
         Ok(trial)
     }
 
@@ -209,11 +209,11 @@ impl Trial {
                 values: values(target),
             });
         }
-        let poi_quantity = self.inspected.len() as u32;
-        for point in &frame.inspected {
+        let poi_quantity = self.poi.len() as u32;
+        for point in &frame.poi {
             let name = self.word(&points_of_interest::name(point), places);
             let values = PoiQuantity::ALL.map(|quantity| quantity.of(point).unwrap_or(f64::NAN));
-            self.inspected.push(Inspected { name, values });
+            self.poi.push(Inspected { name, values });
         }
         let step = frame.navigation.as_deref().and_then(|record| {
             let object = self.word(&record.pose.as_ref()?.object, places);
@@ -240,7 +240,7 @@ impl Trial {
             rows: (first, self.rows.len() as u32),
             navigated: frame.navigation.as_deref().map(|record| {
                 Box::new(NavigatedFrame {
-                    places: [&record.pose, &record.unreferenced]
+                    places: [&record.pose, &record.odometry_only]
                         .map(|pose| place::carried(&self.header, pose.as_ref())),
                     displaced: record.events.iter().filter(|event| event.contains(ELSEWHERE)).cloned().collect(),
                     step,
@@ -248,7 +248,7 @@ impl Trial {
                     values: std::array::from_fn(|index| NavigationQuantity::ALL[index].of(record).unwrap_or(f64::NAN)),
                 })
             }),
-            inspected: (poi_quantity, self.inspected.len() as u32),
+            poi: (poi_quantity, self.poi.len() as u32),
         });
     }
 
@@ -312,7 +312,7 @@ impl Trial {
 
     /// Each point of interest in view of each frame of the sample.
     pub(crate) fn views(&self) -> impl Iterator<Item = &Inspected> {
-        self.sample().flat_map(|frame| &self.inspected[frame.inspected.0 as usize..frame.inspected.1 as usize])
+        self.sample().flat_map(|frame| &self.poi[frame.poi.0 as usize..frame.poi.1 as usize])
     }
 
     /// What a point of interest is called, with its object.
@@ -394,12 +394,12 @@ impl AttemptRow {
 /// That the run's manifest, if it has one, is of a format that is known, a later minor version only adding, and that a finished
 /// run has all its logs.
 fn known_manifest(folder: &Path) -> Result<(), ReportError> {
-    const KNOWN: &str = "seafix-manifest/1";
+    const KNOWN: &str = "seafix-manifest/2";
     let path = folder.join("manifest.json");
     let manifest: Option<serde_json::Value> =
         fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
     match manifest.as_ref().and_then(|manifest| manifest["format"].as_str()) {
-        Some(found) if found != KNOWN && !found.starts_with("seafix-manifest/1.") => {
+        Some(found) if found != KNOWN && !found.starts_with("seafix-manifest/2.") => {
             return Err(ReportError::Newer { path, found: found.to_owned(), known: KNOWN });
         }
         _ => {}

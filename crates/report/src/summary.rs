@@ -40,7 +40,7 @@ pub struct Row {
     /// Frames of the trial.
     pub frames: usize,
     /// Frames with a fix of at least one target.
-    pub referenced_frames: usize,
+    pub fix_frames: usize,
     /// Frames with a wrong fix of at least one target.
     pub wrong_frames: usize,
     /// Attempts: one a frame and target that the prior puts in view.
@@ -56,17 +56,17 @@ pub struct Row {
     /// Why attempts were refused, and how often.
     pub reasons: BTreeMap<String, usize>,
     /// m1 of the fixes found: RMS of C·H − P over the identified points (m).
-    pub m1: Option<Distribution>,
+    pub fit: Option<Distribution>,
     /// m1 over the identified points that the solver did not use (m).
-    pub m1_unused: Option<Distribution>,
+    pub fit_unused: Option<Distribution>,
     /// m2 of the fixes found: RMS error of the transferred model points (m).
-    pub m2: Option<Distribution>,
+    pub tre: Option<Distribution>,
     /// Median of m2 over all attempts, refused and wrong ones as infinitely far off (m).
-    pub m2_of_all: Option<f64>,
+    pub tre_of_all: Option<f64>,
     /// m3 of the fixes found, position of the left camera (m).
-    pub m3_position: Option<Distribution>,
+    pub position_error: Option<Distribution>,
     /// m3 of the fixes found, attitude (rad).
-    pub m3_attitude: Option<Distribution>,
+    pub attitude_error: Option<Distribution>,
     /// Mean of the normalised error squared of the fixes found; 6 for an honest covariance.
     pub nees_mean: Option<f64>,
     /// How many fixes that mean is over.
@@ -94,9 +94,9 @@ pub struct Limits {
     /// How many fixes.
     pub count: u64,
     /// Of m2 (m), and its bound.
-    pub m2: [f64; 2],
+    pub tre: [f64; 2],
     /// Of the position (m), and its bound.
-    pub m3: [f64; 2],
+    pub position: [f64; 2],
     /// Mean of the normalised error squared.
     pub nees: f64,
     /// Share of the fixes whose normalised error squared is below the 95 % quantile of χ²₆.
@@ -111,8 +111,8 @@ impl Limits {
             let nees = totals.nees_count as f64;
             Self {
                 count: totals.judged,
-                m2: [rms(totals.m2_squares), rms(totals.m2_bound_squares)],
-                m3: [rms(totals.m3_squares), rms(totals.m3_bound_squares)],
+                tre: [rms(totals.tre_squares), rms(totals.tre_crlb_squares)],
+                position: [rms(totals.position_squares), rms(totals.position_crlb_squares)],
                 nees: totals.nees_sum / nees,
                 coverage: totals.nees_within as f64 / nees,
             }
@@ -240,7 +240,7 @@ impl Row {
             search,
             solver,
             frames: trial.sample().count(),
-            referenced_frames: 0,
+            fix_frames: 0,
             wrong_frames: 0,
             attempted: 0,
             found: 0,
@@ -248,12 +248,12 @@ impl Row {
             wrong: 0,
             unjudged: 0,
             reasons: BTreeMap::new(),
-            m1: None,
-            m1_unused: None,
-            m2: None,
-            m2_of_all: None,
-            m3_position: None,
-            m3_attitude: None,
+            fit: None,
+            fit_unused: None,
+            tre: None,
+            tre_of_all: None,
+            position_error: None,
+            attitude_error: None,
             nees_mean: None,
             nees_count: 0,
             identified: None,
@@ -268,7 +268,7 @@ impl Row {
                 .map(|s| s.p95),
         };
         for frame in trial.sample() {
-            row.referenced_frames += usize::from(trial.attempts_of(frame).any(|row| row.found() || row.wrong()));
+            row.fix_frames += usize::from(trial.attempts_of(frame).any(|row| row.found() || row.wrong()));
             row.wrong_frames += usize::from(trial.attempts_of(frame).any(AttemptRow::wrong));
         }
         let mut found: Vec<&AttemptRow> = Vec::new();
@@ -287,20 +287,20 @@ impl Row {
         }
         let values = |field: Field| found.iter().filter_map(move |fix| fix.get(field));
         let spread = |field: Field| Distribution::of(values(field));
-        row.m1 = spread(Field::M1);
-        row.m1_unused = spread(Field::M1Unused);
-        row.m2 = spread(Field::M2);
-        row.m3_position = spread(Field::Position);
-        row.m3_attitude = spread(Field::Attitude);
+        row.fit = spread(Field::Fit);
+        row.fit_unused = spread(Field::FitUnused);
+        row.tre = spread(Field::Tre);
+        row.position_error = spread(Field::Position);
+        row.attitude_error = spread(Field::Attitude);
         row.identified = spread(Field::Identified);
         let nees: Vec<f64> = values(Field::Nees).collect();
         row.nees_count = nees.len();
         row.nees_mean = (!nees.is_empty()).then(|| nees.iter().sum::<f64>() / nees.len() as f64);
-        if row.m2.is_some() && row.unjudged == 0 {
+        if row.tre.is_some() && row.unjudged == 0 {
             // The lower middle order statistic: between a number and infinity there is no mean.
-            let mut all_m2: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::M2)).collect();
-            all_m2.sort_by(f64::total_cmp);
-            row.m2_of_all = all_m2.get((all_m2.len().max(1) - 1) / 2).copied();
+            let mut all_tre: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::Tre)).collect();
+            all_tre.sort_by(f64::total_cmp);
+            row.tre_of_all = all_tre.get((all_tre.len().max(1) - 1) / 2).copied();
         }
         if let Some(totals) = &trial.totals {
             row.count(totals);
@@ -312,7 +312,7 @@ impl Row {
     fn count(&mut self, totals: &Totals) {
         let full = |count: u64| count as usize;
         (self.frames, self.attempted) = (full(totals.frames), full(totals.attempted));
-        (self.referenced_frames, self.wrong_frames) = (full(totals.referenced_frames), full(totals.wrong_frames));
+        (self.fix_frames, self.wrong_frames) = (full(totals.fix_frames), full(totals.wrong_frames));
         (self.found, self.wrong, self.unjudged) = (full(totals.found), full(totals.wrong), full(totals.unjudged));
         self.refused = full(totals.refused());
         self.reasons = totals.reasons.iter().map(|(reason, &count)| (reason.clone(), full(count))).collect();

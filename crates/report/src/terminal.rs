@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::{Distribution, PAPER_M1, Row, RunSummary, format};
+use crate::{Distribution, PAPER_FIT_RMS, Row, RunSummary, format};
 
 impl fmt::Display for RunSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -35,7 +35,7 @@ impl fmt::Display for RunSummary {
         let timed = self.rows.iter().any(|row| row.times.total_ms.is_some());
         let mut results = Table::new(
             &heads,
-            ["frames", "n", "found", "refused", "wrong", "m1 mm", "m2 mm", "m3 mm", "m3 deg"]
+            ["frames", "n", "found", "refused", "wrong", "fit mm", "TRE mm", "position mm", "attitude deg"]
                 .into_iter()
                 .chain(timed.then_some("ms")),
         );
@@ -46,14 +46,14 @@ impl fmt::Display for RunSummary {
             medians.into_iter().map(move |median| format::number(median, decimals)).collect::<Vec<_>>()
         };
         let columns = [
-            column(|row| row.m1, 1e3),
-            column(|row| row.m2, 1e3),
-            column(|row| row.m3_position, 1e3),
-            column(|row| row.m3_attitude, 1f64.to_degrees()),
+            column(|row| row.fit, 1e3),
+            column(|row| row.tre, 1e3),
+            column(|row| row.position_error, 1e3),
+            column(|row| row.attitude_error, 1f64.to_degrees()),
         ];
         for (index, row) in self.rows.iter().enumerate() {
             // A frame that attempted nothing stays in the count of frames; without truth nobody knows what is wrong.
-            let frames = format!("{}/{}", row.referenced_frames, row.frames);
+            let frames = format!("{}/{}", row.fix_frames, row.frames);
             let wrong =
                 if row.found > 0 && row.unjudged == row.found { "–".to_owned() } else { row.wrong.to_string() };
             let counts = [frames, row.attempted.to_string(), row.found.to_string(), row.refused.to_string(), wrong];
@@ -61,7 +61,7 @@ impl fmt::Display for RunSummary {
             let total = format::number(row.times.total_ms, 1);
             results.row(names[index].iter().cloned().chain(counts).chain(errors).chain(timed.then_some(total)));
         }
-        let paper = format!("{:.0}–{:.0}", PAPER_M1[0] * 1e3, PAPER_M1[1] * 1e3);
+        let paper = format!("{:.0}–{:.0}", PAPER_FIT_RMS[0] * 1e3, PAPER_FIT_RMS[1] * 1e3);
         let blank = |n| std::iter::repeat_n(String::new(), n);
         results.row(
             ["the paper".to_owned()]
@@ -74,7 +74,7 @@ impl fmt::Display for RunSummary {
         let max = f.width();
         let said = |text: &str| wrapped(text, max, 0);
         let note = said(
-            "frames fixed of all, targets attempted (n); m1 residual C·H − P, m2 transferred model points, m3 camera position and attitude; medians of the fixes found.",
+            "frames fixed of all, targets attempted (n); m1 residual C·H − P, the TRE transferred model points, m3 camera position and attitude; medians of the fixes found.",
         );
         writeln!(f, "{note}")?;
 
@@ -110,7 +110,8 @@ impl RunSummary {
     /// Errors beside their bound.
     fn limits(&self, heads: &[&str], names: &[Vec<String>]) -> Table {
         let leading = heads;
-        let heads = ["n", "m2 RMSE mm", "bound mm", "ratio", "m3 RMSE mm", "bound mm", "ratio", "NEES", "below 95 %"];
+        let heads =
+            ["n", "TRE RMSE mm", "bound mm", "ratio", "position RMSE mm", "bound mm", "ratio", "NEES", "below 95 %"];
         let mut table = Table::new(leading, heads);
         for (row, name) in self.rows.iter().zip(names) {
             let Some(limits) = row.limits else { continue };
@@ -120,7 +121,7 @@ impl RunSummary {
             };
             let consistency =
                 [(limits.nees, 3), (limits.coverage, 4)].map(|(x, digits)| format::number(Some(x), digits));
-            let numbers = beside(limits.m2).into_iter().chain(beside(limits.m3)).chain(consistency);
+            let numbers = beside(limits.tre).into_iter().chain(beside(limits.position)).chain(consistency);
             table.row(name.iter().cloned().chain([limits.count.to_string()]).chain(numbers));
         }
         table

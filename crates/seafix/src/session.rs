@@ -53,7 +53,7 @@ pub struct NavigationSession<'a> {
     /// Whether there has been a fix.
     fixed: bool,
     /// The first fix, carried along by odometry alone, until the way is lost.
-    unreferenced: Option<Navigated>,
+    odometry_only: Option<Navigated>,
 }
 
 /// The state of a navigation session after a frame.
@@ -66,7 +66,7 @@ pub struct NavigationState {
     /// The navigated pose, relative to the object of the last fix; `None` while there is none.
     pub pose: Option<Navigated>,
     /// The first fix, moved here by odometry alone; `None` before it and after a gap in the odometry.
-    pub unreferenced: Option<Navigated>,
+    pub odometry_only: Option<Navigated>,
     /// The motion of the odometry to this frame.
     pub odometry: Motion,
     /// What happened, in order.
@@ -126,7 +126,7 @@ impl<'a> NavigationSession<'a> {
             reported: 0,
             last: None,
             fixed: false,
-            unreferenced: None,
+            odometry_only: None,
         }
     }
 
@@ -201,9 +201,9 @@ impl<'a> NavigationSession<'a> {
         }
         self.report_changes(&mut events);
         let pose = self.navigator.pose().filter(|_| here).cloned();
-        let unreferenced = self.unreferenced.clone().filter(|_| here);
+        let odometry_only = self.odometry_only.clone().filter(|_| here);
         let state = self.navigator.state();
-        Ok((frame_result, NavigationState { state, due, pose, unreferenced, odometry, events, odometry_ms: moved.ms }))
+        Ok((frame_result, NavigationState { state, due, pose, odometry_only, odometry, events, odometry_ms: moved.ms }))
     }
 
     /// Carries the pose to this frame where the odometry knows the way.
@@ -234,7 +234,7 @@ impl<'a> NavigationSession<'a> {
         };
         self.navigator.advance(seconds, motion.as_ref());
         self.keyframe_mapper.iter_mut().for_each(|keyframe_mapper| keyframe_mapper.advance(seconds, motion.as_ref()));
-        self.unreferenced = self.unreferenced.take().zip(motion).map(|(pose, motion)| pose.after(&motion));
+        self.odometry_only = self.odometry_only.take().zip(motion).map(|(pose, motion)| pose.after(&motion));
         let Some(motion) = motion else {
             let why = if found.is_some() { "it failed" } else { "a new segment begins" };
             return Motion { lost: format!("{why}: {UNKNOWN_MOTION}"), step: None };
@@ -309,7 +309,7 @@ impl<'a> NavigationSession<'a> {
                 }
             }
             if !std::mem::replace(&mut self.fixed, true) {
-                self.unreferenced = Some(fix);
+                self.odometry_only = Some(fix);
             }
         }
         taken

@@ -128,8 +128,8 @@ fn pebbles(x: f64, y: f64, footprint: f64, seed: u32, cell: f64) -> f32 {
     let radius = 0.16 + 0.26 * fraction(3) * fraction(3);
     let room = 1.0 - 2.0 * radius;
     let (du, dv) = (fu - radius - room * fraction(8), fv - radius - room * fraction(16));
-    let stretch = 1.0 + 0.5 * fraction(20);
-    let (along, across) = if h & 0x800_0000 == 0 { (du, dv * stretch) } else { (du * stretch, dv) };
+    let scale_error = 1.0 + 0.5 * fraction(20);
+    let (along, across) = if h & 0x800_0000 == 0 { (du, dv * scale_error) } else { (du * scale_error, dv) };
     let distance = (along * along + across * across).sqrt();
     let soft = (footprint / cell) as f32 + 0.3 * radius;
     let inside = ((radius - distance) / soft + 0.5).clamp(0.0, 1.0);

@@ -86,7 +86,11 @@ fn in_other_orders(problems: usize, max_points: usize, orders: usize) {
                         let apart = one.object_from_camera.inverse() * other.object_from_camera;
                         assert!(apart.translation().norm() < 1e-9 && apart.rotation().angle() < 1e-9, "{name}");
                     }
-                    assert_eq!((first.optimal, first.size_bound), (again.optimal, again.size_bound), "{name}");
+                    assert_eq!(
+                        (first.optimal, first.consensus_bound),
+                        (again.optimal, again.consensus_bound),
+                        "{name}"
+                    );
                     match (first.nfa, again.nfa) {
                         (Some(one), Some(other)) => {
                             assert!((one - other).abs() <= 1e-6 * one, "{name}: {one}, {other}");

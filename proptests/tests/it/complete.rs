@@ -89,7 +89,7 @@ fn hold_problem<'a>(searches: impl Iterator<Item = &'a (Tried, Measure)>, proble
                 );
                 assert!(found.undecided.is_none(), "{}: {:?}", said(), found.undecided);
                 let bound = if search.claims.exact { max } else { graph.model_points() };
-                assert!((max..=bound).contains(&found.size_bound), "{}: {}", said(), found.size_bound);
+                assert!((max..=bound).contains(&found.consensus_bound), "{}: {}", said(), found.consensus_bound);
                 assert_eq!(found.optimal, search.claims.exact, "{}", said());
                 if search.claims.ties {
                     let mut sets = found.alternatives;

@@ -256,7 +256,7 @@ fn far_points_change_nothing() {
 #[test]
 fn a_few_points_far_away_hide_no_object() {
     let (mut alone, mut beside) = (0, [0; 3]);
-    let mut tests = [0; 2];
+    let mut pair_tests = [0; 2];
     for number in 0..150 {
         let generated = Generated::new(Family::A, 17, number, Presence::Present);
         let truth = Transform::from_rows(&generated.truth.t_cam_obj).expect("it was made of a rigid motion").inverse();
@@ -274,7 +274,7 @@ fn a_few_points_far_away_hide_no_object() {
             let mut rng = ChaCha8Rng::seed_from_u64(0);
             let attempt = file.attempt(&search, &solver, &Acceptance::default(), &mut rng);
             let Outcome::Fix(fix) = attempt.outcome else { return false };
-            tests[usize::from(far > 0.0)] += attempt.tests.expect("the search counts");
+            pair_tests[usize::from(far > 0.0)] += attempt.pair_tests.expect("the search counts");
             let off = rms_apart(&file.model, &fix.object_from_camera, &truth);
             assert!(off <= LIMIT, "number {number}, points {far} m away: {off} m off");
             true
@@ -284,11 +284,11 @@ fn a_few_points_far_away_hide_no_object() {
             beside.iter_mut().zip([1e2, 1e5, 1e8]).for_each(|(found, far)| *found += u32::from(fixed(far)));
         }
     }
-    println!("{alone} found, of them {beside:?} beside points far away; pair tests {tests:?}");
+    println!("{alone} found, of them {beside:?} beside points far away; pair tests {pair_tests:?}");
     assert!(alone >= 20, "{alone} are too few to tell");
     assert!(beside.iter().all(|found| 10 * found >= 9 * alone), "{beside:?} of {alone}");
     // Three times as many frames, of a twelfth more points each: a fifth more pairs.
-    assert!(tests[1] < 6 * tests[0], "{tests:?} pair tests");
+    assert!(pair_tests[1] < 6 * pair_tests[0], "{pair_tests:?} pair tests");
 }
 
 /// Nor do they make one of clutter, however few points are near and however many far, each by itself or in a group.

@@ -55,15 +55,15 @@ fn table() {
                                 let us = start.elapsed().as_secs_f64() * 1e6 / draws as f64;
                                 println!(
                                     "{name:7} {shape:7?} {points:2} {distance:4} {sigma_px:5} {model_sigma:5} {solver:20} {:6.3} {:6.3} {:5.3} {:6.3} {:.4} {:6.3} {:5} {:7.3} {:7.3} {us:.1}",
-                                    c.m2,
-                                    c.m3,
+                                    c.tre,
+                                    c.position,
                                     c.bias,
                                     c.nees,
                                     c.coverage,
                                     c.attitude_sigma.to_degrees(),
                                     c.refused,
-                                    c.m2_rms * 1e3,
-                                    c.m3_rms * 1e3
+                                    c.tre_rms * 1e3,
+                                    c.position_rms * 1e3
                                 );
                             }
                         }
@@ -86,7 +86,7 @@ fn weighted_solvers_reach_the_bound() {
             let solver = SOLVERS.build(&Choice::named(name)).expect("a solver");
             let settings = Layout { sigma_px: 0.5, rig: rig.clone(), ..Layout::default() };
             let found = cell(&*solver, &settings, 20, 2000, true);
-            for ratio in [found.m2, found.m3] {
+            for ratio in [found.tre, found.position] {
                 assert!((0.94..1.06).contains(&ratio), "{name}: {found:?}");
             }
             assert!((found.nees - 6.0).abs() < 4.0 * (12.0 / 2000.0_f64).sqrt(), "{name}: {found:?}");
@@ -229,14 +229,14 @@ fn every_cell_reaches_the_bound() {
                 let c = cell(&*build(solver), &settings, 20, 10_000, true);
                 let line = format!(
                     "{name} {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4} attitude {:.2}°",
-                    c.m2,
-                    c.m3,
+                    c.tre,
+                    c.position,
                     c.nees,
                     c.coverage,
                     c.attitude_sigma.to_degrees()
                 );
                 println!("{line}");
-                if c.m2 > 1.05 || c.m3 > 1.05 || !is_consistent(&c) || !(0.9428..=0.9571).contains(&c.coverage) {
+                if c.tre > 1.05 || c.position > 1.05 || !is_consistent(&c) || !(0.9428..=0.9571).contains(&c.coverage) {
                     missed.push(line);
                 }
             }
@@ -253,7 +253,10 @@ fn three_points_in_every_cell() {
     for (name, settings) in cells(3) {
         for solver in ["p3p-stereo", "stereo-reprojection"] {
             let c = three_points(&name, solver, &settings, 10_000);
-            println!("{name} {solver}: {} of 20 layouts, m2 {:.3} m3 {:.3} NEES {:.3}", c.layouts, c.m2, c.m3, c.nees);
+            println!(
+                "{name} {solver}: {} of 20 layouts, m2 {:.3} m3 {:.3} NEES {:.3}",
+                c.layouts, c.tre, c.position, c.nees
+            );
         }
     }
 }
@@ -315,19 +318,19 @@ fn three_compact(distance: f64, draws: u64) -> Vec<String> {
         let line = format!(
             "{distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere of {}; m3 over \
              what the likelihood foresees {:.3}; bent by {:.2} at most",
-            c.m2,
-            c.m3,
+            c.tre,
+            c.position,
             c.nees,
             c.coverage,
             c.ambiguous,
             c.refused,
             c.elsewhere,
             draws * 20,
-            c.m3_foreseen,
+            c.position_foreseen,
             c.bent
         );
         println!("{line}");
-        if c.m2 > 1.25 || c.m3 > 1.25 || !is_known(&c, draws * 20) {
+        if c.tre > 1.25 || c.position > 1.25 || !is_known(&c, draws * 20) {
             missed.push(line);
         }
     }
@@ -379,23 +382,23 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
             "seed {seed} {distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere \
              of {generated}; m3 over what the likelihood foresees {:.3}; bent by {:.2} at most; of {} layouts where the bound \
              means something (bent by {:.2} at most) m2 {:.3} m3 {:.3}",
-            c.m2,
-            c.m3,
+            c.tre,
+            c.position,
             c.nees,
             c.coverage,
             c.ambiguous,
             c.refused,
             c.elsewhere,
-            c.m3_foreseen,
+            c.position_foreseen,
             c.bent,
             meant.len(),
             m.bent,
-            m.m2,
-            m.m3
+            m.tre,
+            m.position
         );
         println!("{line}");
         let wide = allowance(generated);
-        let reached = [m.m2, m.m3, c.m2, c.m3_foreseen].iter().all(|ratio| *ratio <= 1.05 + wide);
+        let reached = [m.tre, m.position, c.tre, c.position_foreseen].iter().all(|ratio| *ratio <= 1.05 + wide);
         if !reached || !is_known(&c, generated) {
             missed.push(line);
         }
@@ -407,7 +410,7 @@ fn three_points(name: &str, solver: &str, settings: &Layout, draws: u64) -> Cell
     let keep = |placed: &_, bound: &_| is_meaningful(placed, settings.sigma_px, bound);
     let c = cell_where(&*build(solver), settings, 20, draws, true, keep);
     if c.layouts > 0 {
-        assert!(c.m2 <= 1.25 && c.m3 <= 1.25, "{name} {solver}: {c:?}");
+        assert!(c.tre <= 1.25 && c.position <= 1.25, "{name} {solver}: {c:?}");
         assert!(c.nees > 5.4 && c.nees < 6.6, "{name} {solver}: {c:?}");
     }
     c

@@ -147,7 +147,7 @@ fn absurd_tolerances_end() {
             }
             if delta == 10.0 {
                 let bound = match &answer {
-                    Ok(found) => found.size_bound,
+                    Ok(found) => found.consensus_bound,
                     Err(
                         Rejected::Budget { bound, .. }
                         | Rejected::TooLarge { bound, .. }
@@ -171,7 +171,7 @@ fn a_huge_cloud_ends() {
     problem.candidates = Candidates::all(4, 300_000);
     for search in each(BUDGET) {
         match search.answer(&problem) {
-            Ok(found) => assert!(found.size_bound >= found.pairs.len(), "{}", search.name),
+            Ok(found) => assert!(found.consensus_bound >= found.pairs.len(), "{}", search.name),
             Err(
                 Rejected::Budget { bound, .. } | Rejected::TooLarge { bound, .. } | Rejected::NotFound { bound, .. },
             ) => {
@@ -208,7 +208,7 @@ fn a_blow_up_ends_at_the_budget() {
     for search in each(BUDGET) {
         match search.answer(&problem) {
             Ok(found) => {
-                let (size, bound) = (found.pairs.len(), found.size_bound);
+                let (size, bound) = (found.pairs.len(), found.consensus_bound);
                 assert!(size <= bound && bound <= 50, "{}: {size}, {bound}", search.name);
                 let objection = objection(&problem.problem(), search.refuses_mirrors(), &found.pairs);
                 assert_eq!(objection, None, "{}", search.name);

@@ -87,7 +87,7 @@ fn bounds_hold(searches: &[Tried], planted: &Planted) -> TestCaseResult {
         let best = brute[usize::from(search.refuses_mirrors())].size;
         match search.answer(planted) {
             Ok(found) => {
-                let (size, bound) = (found.pairs.len(), found.size_bound);
+                let (size, bound) = (found.pairs.len(), found.consensus_bound);
                 prop_assert!(size <= best && best <= bound, "{}: {size} ≤ {best} ≤ {bound}", search.name);
                 prop_assert!(!is_proved_largest(&found) || size == best, "{}: {size} is not {best}", search.name);
             }
@@ -152,7 +152,7 @@ fn pruning_loses_nothing() {
     law(128, planted(SMALL), |planted| {
         for (bounded, free) in with(true).zip(with(false)) {
             let mut answers = [bounded, free].map(|search| search.answer(&planted));
-            answers.iter_mut().flatten().for_each(|found| found.tests = 0);
+            answers.iter_mut().flatten().for_each(|found| found.pair_tests = 0);
             let [bounded_answer, free_answer] = answers;
             prop_assert_eq!(bounded_answer, free_answer, "{}", &bounded.name);
         }

@@ -89,7 +89,7 @@ fn what_is_left_of_a_set_is_one() {
 fn a_difference_of_exactly_delta_is_coherent() {
     let searches = searches(BUDGET);
     let steps = prop::collection::vec((1u32..40, 0u32..4), 3..=5);
-    law(128, (steps, 0usize..3, 1u32..4, -6i32..=0), |(steps, axis, stretch, power)| {
+    law(128, (steps, 0usize..3, 1u32..4, -6i32..=0), |(steps, axis, scale_error, power)| {
         // Places along the axis in the model; the cloud's are stretched a little, the last the most.
         let unit = 2f64.powi(power);
         let at = |number: u32| Vector3::ith(axis, f64::from(number) * unit);
@@ -99,7 +99,7 @@ fn a_difference_of_exactly_delta_is_coherent() {
             seen.push(seen[seen.len() - 1] + step + more);
         }
         let last = seen.len() - 1;
-        seen[last] += stretch;
+        seen[last] += scale_error;
         let greatest = f64::from((seen[last] - known[last]).max(1)) * unit;
         let model: Vec<_> = known.iter().map(|&p| ModelPoint::exact("P", Point::from(at(p)))).collect();
         let cloud: Vec<_> = seen.iter().map(|&p| measured(at(p))).collect();
@@ -131,7 +131,7 @@ fn measured(at: Vector3<f64>) -> MeasuredPoint {
 /// one-to-one and, where the search refuses mirror images, every four points whose model volume
 /// exceeds 3 σ of the measured volume with the same sign.
 ///
-/// For any search: what it returns is admissible and no larger than brute force; its `size_bound` is
+/// For any search: what it returns is admissible and no larger than brute force; its `consensus_bound` is
 /// no smaller; where it says `optimal` all three are equal; where it says that its rivals are complete
 /// it names all sets of that size; where it refuses for lack of consensus brute force finds fewer than
 /// needed; where it calls the largest coherent set a mirror image brute force finds no admissible four,
@@ -163,7 +163,7 @@ fn no_admissible_set_is_larger() {
                 Ok(found) => {
                     let size = found.pairs.len();
                     prop_assert!(
-                        size <= best.size && best.size <= found.size_bound,
+                        size <= best.size && best.size <= found.consensus_bound,
                         "{name}: {size}, brute {}",
                         best.size
                     );
@@ -187,7 +187,7 @@ fn no_admissible_set_is_larger() {
                     let proof = largest || found.alternatives_complete;
                     prop_assert!(search.claims.exact || !proof, "{name}: no proof");
                     if largest {
-                        prop_assert_eq!((size, found.size_bound), (best.size, best.size), "{}", name);
+                        prop_assert_eq!((size, found.consensus_bound), (best.size, best.size), "{}", name);
                         proofs += 1;
                     }
                     if found.alternatives_complete {
@@ -257,7 +257,7 @@ fn a_planted_set_is_not_missed() {
             let size = planted.truth.len();
             match search.answer(&planted) {
                 Ok(found) => {
-                    prop_assert!(found.size_bound >= size, "{}: bound {}", search.name, found.size_bound);
+                    prop_assert!(found.consensus_bound >= size, "{}: bound {}", search.name, found.consensus_bound);
                     let found_size = found.pairs.len();
                     prop_assert!(!is_proved_largest(&found) || found_size >= size, "{}: {found_size}", search.name);
                 }

@@ -53,11 +53,11 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("RoughPose", "the log's schema"),
     ("Referenced", "the log's schema"),
     ("Unidentified", "the log's schema"),
-    ("referenced_frames", "the log's schema"),
+    ("fix_frames", "the log's schema"),
     ("unreferenced", "the log's schema"),
-    ("unreferenced_m3_position", "the log's schema"),
-    ("unreferenced_m3_attitude", "the log's schema"),
-    ("expected_chance_sets", "the log's schema"),
+    ("odometry_only_position_error", "the log's schema"),
+    ("odometry_only_attitude_error", "the log's schema"),
+    ("nfa", "the log's schema"),
 ];
 
 /// Keys of files that are not ours to change, and file names.

@@ -119,7 +119,7 @@ fn log(path: &Path) -> Result<Option<Fault>, LogError> {
 
 /// Whether an MCAP file has the header of a trial.
 fn is_of_a_trial(path: &Path) -> bool {
-    let own = |topic: &seafix_log::Topic| topic.schema == "seafix.v1.TrialHeader";
+    let own = |topic: &seafix_log::Topic| topic.schema == "seafix.v2.TrialHeader";
     Recording::open(path, |_| false).map_or(true, |recording| recording.topics().iter().any(own))
 }
 

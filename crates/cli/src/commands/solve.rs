@@ -149,11 +149,11 @@ fn people(answer: &Answer) -> String {
     if let Some(scale) = answer.scale {
         text += &format!(", scale {scale:.6}");
     }
-    if let Some(stretch) = answer.integrity.as_ref().and_then(|it| it.stretch)
-        && stretch.value.abs() > REPORTED * stretch.sigma
+    if let Some(scale_error) = answer.integrity.as_ref().and_then(|it| it.scale_error)
+        && scale_error.value.abs() > REPORTED * scale_error.sigma
     {
-        let (by, sigma) = (100.0 * stretch.value.abs(), 100.0 * stretch.sigma);
-        let longer = if stretch.value > 0.0 { "longer" } else { "shorter" };
+        let (by, sigma) = (100.0 * scale_error.value.abs(), 100.0 * scale_error.sigma);
+        let longer = if scale_error.value > 0.0 { "longer" } else { "shorter" };
         text += &format!(", measured distances {by:.1} ± {sigma:.1} % {longer} than the model's: rig or survey is off");
     }
     if let Some(why) = &answer.explanation {

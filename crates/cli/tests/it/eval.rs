@@ -18,9 +18,10 @@ fn walk(folder: &Path, name: &str, line: impl Fn(f64) -> String) {
 /// A walk on a helix, and the same stretched by one per cent.
 fn walks() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let helix = |stretch: f64| {
+    let helix = |scale_error: f64| {
         move |t: f64| {
-            let (x, y, z) = (stretch * 3.0 * (0.2 * t).cos(), stretch * 3.0 * (0.2 * t).sin(), stretch * 0.3 * t);
+            let (x, y, z) =
+                (scale_error * 3.0 * (0.2 * t).cos(), scale_error * 3.0 * (0.2 * t).sin(), scale_error * 0.3 * t);
             format!("{t} {x} {y} {z} 0 0 0 1\n")
         }
     };

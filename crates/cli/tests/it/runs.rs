@@ -25,7 +25,7 @@ fn two_runs_are_compared() {
     assert!(code == 0 && out.starts_with("no difference"), "{out}");
     let (code, out, _) = seafix(folder, &["diff", "a", "c"]);
     assert_eq!(code, 1);
-    assert!(out.starts_with("configuration\n  seed: 3 | 4\n") && out.contains("m2_rms:"), "{out}");
+    assert!(out.starts_with("configuration\n  seed: 3 | 4\n") && out.contains("tre_rms:"), "{out}");
     let (code, _, error) = seafix(folder, &["diff", "a", "nowhere"]);
     assert!(code == 3 && error.contains("name the folder of a finished run"), "{error}");
 }

@@ -131,7 +131,7 @@ impl Source for Mcap {
         let path = folder.join(&self.path);
         let one = |fault| vec![fault];
         let recording = Recording::open(&path, |_| false).map_err(|error| one(logged::fault(&path, &error)))?;
-        if recording.topics().iter().any(|topic| topic.schema == "seafix.v1.TrialHeader") {
+        if recording.topics().iter().any(|topic| topic.schema == "seafix.v2.TrialHeader") {
             return Ok(Box::new(Logged::open(&path, self.read)?));
         }
         if self.site.is_empty() {

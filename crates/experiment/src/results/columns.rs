@@ -1,6 +1,6 @@
 //! The columns of the table of results: one row a trial, frame and attempted target.
 
-use seafix_log::{FrameRecord, InspectedPoint, Integrity, NavigationRecord, TargetRecord};
+use seafix_log::{FrameRecord, Integrity, NavigationRecord, PointOfInterest, TargetRecord};
 
 /// One row: an attempt, its frame and its trial.
 #[derive(Debug, Clone, Copy)]
@@ -21,9 +21,9 @@ impl<'a> Row<'a> {
     }
 
     /// Of the points of interest in view the one that is nearest to the line of sight of the left camera.
-    fn inspected(&self) -> Option<&'a InspectedPoint> {
-        let off = |point: &InspectedPoint| point.at[0].hypot(point.at[1]) / point.at[2];
-        self.frame.inspected.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
+    fn poi(&self) -> Option<&'a PointOfInterest> {
+        let off = |point: &PointOfInterest| point.at[0].hypot(point.at[1]) / point.at[2];
+        self.frame.poi.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
     fn navigation(&self) -> Option<&'a NavigationRecord> {
@@ -78,19 +78,19 @@ pub static COLUMNS: &[Column] = columns![
     Integer "visible" = |r: &Row<'_>| r.target.evaluation.visible.map(i64::from),
     Integer "identified" = |r: &Row<'_>| r.target.evaluation.identified.map(i64::from),
     Integer "correct_pairs" = |r: &Row<'_>| r.target.evaluation.correct_pairs.map(i64::from),
-    Real "m1_rms" = |r: &Row<'_>| r.target.evaluation.m1_rms,
-    Real "m1_unused_rms" = |r: &Row<'_>| r.target.evaluation.m1_unused_rms,
-    Real "m2_rms" = |r: &Row<'_>| r.target.evaluation.m2_rms,
-    Real "m3_position" = |r: &Row<'_>| r.target.evaluation.m3_position,
-    Real "m3_attitude" = |r: &Row<'_>| r.target.evaluation.m3_attitude,
+    Real "fit_rms" = |r: &Row<'_>| r.target.evaluation.fit_rms,
+    Real "fit_rms_unused" = |r: &Row<'_>| r.target.evaluation.fit_rms_unused,
+    Real "tre_rms" = |r: &Row<'_>| r.target.evaluation.tre_rms,
+    Real "position_error" = |r: &Row<'_>| r.target.evaluation.position_error,
+    Real "attitude_error" = |r: &Row<'_>| r.target.evaluation.attitude_error,
     Real "nees" = |r: &Row<'_>| r.target.evaluation.nees,
-    Real "m2_bound" = |r: &Row<'_>| r.target.evaluation.m2_bound,
-    Real "m3_bound" = |r: &Row<'_>| r.target.evaluation.m3_bound,
+    Real "tre_crlb" = |r: &Row<'_>| r.target.evaluation.tre_crlb,
+    Real "position_crlb" = |r: &Row<'_>| r.target.evaluation.position_crlb,
     Real "residual_rms" = |r: &Row<'_>| r.target.residual_rms,
     Flag "optimal" = |r: &Row<'_>| r.target.optimal,
-    Integer "size_bound" = |r: &Row<'_>| r.target.size_bound.map(|n| n as i64),
+    Integer "consensus_bound" = |r: &Row<'_>| r.target.consensus_bound.map(|n| n as i64),
     Real "nfa" = |r: &Row<'_>| r.target.nfa,
-    Integer "tests" = |r: &Row<'_>| r.target.tests.map(|n| n as i64),
+    Integer "pair_tests" = |r: &Row<'_>| r.target.pair_tests.map(|n| n as i64),
     Real "detect_ms" = |r: &Row<'_>| r.frame.times.detect_ms,
     Real "locate_ms" = |r: &Row<'_>| r.frame.times.locate_ms,
     Real "describe_ms" = |r: &Row<'_>| r.frame.times.describe_ms,
@@ -104,26 +104,26 @@ pub static COLUMNS: &[Column] = columns![
     Real "odometry_ms" = |r: &Row<'_>| r.frame.times.odometry_ms,
     Text "navigation" = |r: &Row<'_>| r.navigation().map_or_else(String::new, |known| known.state.clone()),
     Text "navigated_object" = |r: &Row<'_>| r.navigation().and_then(|known| known.pose.as_ref()).map_or_else(String::new, |pose| pose.object.clone()),
-    Real "navigated_m2_rms" = |r: &Row<'_>| r.navigation()?.errors.m2_rms,
-    Real "navigated_m3_position" = |r: &Row<'_>| r.navigation()?.errors.m3_position,
-    Real "navigated_m3_attitude" = |r: &Row<'_>| r.navigation()?.errors.m3_attitude,
+    Real "navigated_tre_rms" = |r: &Row<'_>| r.navigation()?.errors.tre_rms,
+    Real "navigated_position_error" = |r: &Row<'_>| r.navigation()?.errors.position_error,
+    Real "navigated_attitude_error" = |r: &Row<'_>| r.navigation()?.errors.attitude_error,
     Real "navigated_nees" = |r: &Row<'_>| r.navigation()?.errors.nees,
-    Real "unreferenced_m3_position" = |r: &Row<'_>| r.navigation()?.errors.unreferenced_m3_position,
-    Integer "inspected_points" = |r: &Row<'_>| Some(r.frame.inspected.len() as i64),
-    Text "inspected" = |r: &Row<'_>| r.inspected().map_or_else(String::new, |point| format!("{}/{}", point.object, point.point)),
-    Real "inspected_range" = |r: &Row<'_>| r.inspected().map(InspectedPoint::range),
-    Real "inspected_error" = |r: &Row<'_>| r.inspected()?.error(),
-    Real "inspected_nees" = |r: &Row<'_>| r.inspected()?.nees,
+    Real "odometry_only_position_error" = |r: &Row<'_>| r.navigation()?.errors.odometry_only_position_error,
+    Integer "poi_in_view" = |r: &Row<'_>| Some(r.frame.poi.len() as i64),
+    Text "poi" = |r: &Row<'_>| r.poi().map_or_else(String::new, |point| format!("{}/{}", point.object, point.point)),
+    Real "poi_range" = |r: &Row<'_>| r.poi().map(PointOfInterest::range),
+    Real "poi_error" = |r: &Row<'_>| r.poi()?.error(),
+    Real "poi_nees" = |r: &Row<'_>| r.poi()?.nees,
     Text "redundancy" = |r: &Row<'_>| r.integrity().map_or_else(String::new, |it| it.redundancy.clone()),
     Real "chi2" = |r: &Row<'_>| Some(r.integrity()?.chi2),
-    Integer "chi2_freedom" = |r: &Row<'_>| Some(r.integrity()?.freedom as i64),
+    Integer "chi2_dof" = |r: &Row<'_>| Some(r.integrity()?.dof as i64),
     Real "chi2_limit" = |r: &Row<'_>| Some(r.integrity()?.chi2_limit),
-    Real "separation" = |r: &Row<'_>| r.integrity()?.separation,
-    Real "separation_two" = |r: &Row<'_>| r.integrity()?.separation_two,
+    Real "solution_separation" = |r: &Row<'_>| r.integrity()?.solution_separation,
+    Real "solution_separation_two" = |r: &Row<'_>| r.integrity()?.solution_separation_two,
     Real "protection_position" = |r: &Row<'_>| r.integrity()?.protection_position,
     Real "protection_attitude" = |r: &Row<'_>| r.integrity()?.protection_attitude,
-    Real "stretch" = |r: &Row<'_>| r.integrity()?.stretch,
-    Real "stretch_sigma" = |r: &Row<'_>| r.integrity()?.stretch_sigma,
+    Real "scale_error" = |r: &Row<'_>| r.integrity()?.scale_error,
+    Real "scale_error_sigma" = |r: &Row<'_>| r.integrity()?.scale_error_sigma,
     Real "alert_limit" = |r: &Row<'_>| r.target.evaluation.alert_limit,
     Text "region" = |r: &Row<'_>| r.target.region().map_or_else(String::new, |region| region.name().to_owned()),
 ];

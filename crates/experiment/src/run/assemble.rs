@@ -32,16 +32,16 @@ pub(super) fn assemble(
     let mut outputs: Vec<Output> = Vec::new();
     for trial in &manifest.trials {
         let of_trial: Vec<(&Sealed, TrialRows)> =
-            pieces.iter().filter_map(|piece| Some((piece, piece.stretch(&trial.name)?))).collect();
+            pieces.iter().filter_map(|piece| Some((piece, piece.scale_error(&trial.name)?))).collect();
         let logs = of_trial.iter().map(|(piece, _)| piece.log(&trial.name)).collect();
         outputs.push(Output { path: folder.join(&trial.log), kind: Kind::Log(logs) });
         // What one run knows after its last frame: a source that is navigated is one piece.
         if let Some(graph_text) = of_trial.iter().find_map(|(piece, _)| piece.pose_graph(&trial.name)) {
             outputs.push(Output { path: folder.join(pose_graph(&trial.name)), kind: Kind::PoseGraph(graph_text) });
         }
-        stretches.extend(of_trial.into_iter().map(|(_, stretch)| stretch));
+        stretches.extend(of_trial.into_iter().map(|(_, scale_error)| scale_error));
     }
-    manifest.rows = stretches.iter().map(|stretch| stretch.rows).sum();
+    manifest.rows = stretches.iter().map(|scale_error| scale_error.rows).sum();
     outputs.push(Output { path: folder.join("results.csv"), kind: Kind::Csv(&stretches) });
     outputs.push(Output { path: folder.join("results.parquet"), kind: Kind::Parquet(&stretches) });
 

@@ -99,7 +99,9 @@ fn said(group: &group::Group<'_>, piece: &Piece) -> String {
 
 /// The rows of a trial, as text.
 fn rows(sealed: &Sealed, trial: &str) -> std::io::Result<String> {
-    let Some(TrialRows { csv, text: (start, length), .. }) = sealed.stretch(trial) else { return Ok(String::new()) };
+    let Some(TrialRows { csv, text: (start, length), .. }) = sealed.scale_error(trial) else {
+        return Ok(String::new());
+    };
     let (mut file, mut text) = (File::open(csv)?, String::new());
     file.seek(SeekFrom::Start(start))?;
     file.take(length).read_to_string(&mut text)?;

@@ -74,7 +74,7 @@ impl Sealed {
     }
 
     /// The rows of a trial, where this piece has some.
-    pub(super) fn stretch(&self, trial: &str) -> Option<TrialRows> {
+    pub(super) fn scale_error(&self, trial: &str) -> Option<TrialRows> {
         let part = self.seal.trials.iter().find(|part| part.name == trial)?;
         let (csv, parquet) = (self.folder.join(CSV), self.folder.join(PARQUET));
         Some(TrialRows { csv, text: part.text, parquet, groups: part.groups, rows: part.rows })

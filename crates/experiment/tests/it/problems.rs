@@ -59,7 +59,7 @@ fn problems_in_files_are_those_that_were_generated() {
         };
         for (file, generated) in files.iter().zip(rows(folder.path(), &generated)) {
             assert_eq!(essence(file), essence(&generated), "family {name}");
-            let [a, b] = [file, &generated].map(|row| row.evaluation.m2_rms.unwrap_or(-1.0));
+            let [a, b] = [file, &generated].map(|row| row.evaluation.tre_rms.unwrap_or(-1.0));
             assert!((a - b).abs() < 1e-9, "{a} {b}");
         }
         assert!(files.iter().any(|row| row.outcome == Outcome::Fix && row.evaluation.wrong == Some(false)));

@@ -99,9 +99,10 @@ fn a_pose_is_carried_between_fixes() {
         assert_eq!(known.state, state, "{known:#?}");
         assert_eq!(known.odometry.motion.is_some(), frame.frame > 0);
         // Both are carried from the first fix; after the second they differ.
-        let (m3, alone) = (known.errors.m3_position.unwrap(), known.errors.unreferenced_m3_position.unwrap());
-        assert!(m3 < 0.03 && alone < 0.03, "frame {}: {m3} {alone}", frame.frame);
-        assert_eq!(m3 == alone, frame.frame < 3);
+        let (position, alone) =
+            (known.errors.position_error.unwrap(), known.errors.odometry_only_position_error.unwrap());
+        assert!(position < 0.03 && alone < 0.03, "frame {}: {position} {alone}", frame.frame);
+        assert_eq!(position == alone, frame.frame < 3);
     }
 }
 

@@ -69,19 +69,24 @@ fn what_supports_a_fix_stands_in_log_and_table() {
             }
             fixes += 1;
             let it = target.integrity.as_ref().unwrap();
-            assert_eq!((it.redundancy.as_str(), it.freedom), (grade, 3 * points - 6));
+            assert_eq!((it.redundancy.as_str(), it.dof), (grade, 3 * points - 6));
             assert!(it.chi2 > 0.0 || points == 3, "{it:?}");
             assert!(it.chi2 <= it.chi2_limit);
             let number = |name: &str| row[name].parse::<f64>().ok();
             assert_eq!(row["redundancy"], grade);
-            assert_eq!(number("chi2_freedom"), Some(it.freedom as f64));
-            let columns = ["chi2", "chi2_limit", "separation", "protection_position", "protection_attitude"];
-            let logged =
-                [Some(it.chi2), Some(it.chi2_limit), it.separation, it.protection_position, it.protection_attitude];
+            assert_eq!(number("chi2_dof"), Some(it.dof as f64));
+            let columns = ["chi2", "chi2_limit", "solution_separation", "protection_position", "protection_attitude"];
+            let logged = [
+                Some(it.chi2),
+                Some(it.chi2_limit),
+                it.solution_separation,
+                it.protection_position,
+                it.protection_attitude,
+            ];
             assert_eq!(columns.map(number), logged);
             assert_eq!(it.protection_position.is_some(), it.protection_attitude.is_some());
-            assert!(points != 3 || (it.separation, it.protection_position) == (None, None));
-            assert!(points != 13 || it.protection_position.unwrap() > it.separation.unwrap());
+            assert!(points != 3 || (it.solution_separation, it.protection_position) == (None, None));
+            assert!(points != 13 || it.protection_position.unwrap() > it.solution_separation.unwrap());
         }
         assert!(fixes > 0, "{points} points");
     }
@@ -129,40 +134,40 @@ fn the_log_and_the_table_state_what_the_fix_states() {
         let Answer::Fix(fix) = attempt.outcome else { panic!("{:?}", attempt.outcome) };
         let (said, it) = (&fix.integrity, target.integrity.as_ref().unwrap());
         assert_eq!(target.object_from_camera, Some(fix.object_from_camera.rows()));
-        assert_eq!((it.redundancy.as_str(), it.freedom), (said.redundancy.name(), said.freedom as u64));
+        assert_eq!((it.redundancy.as_str(), it.dof), (said.redundancy.name(), said.dof as u64));
         let fix_text = [
             Some(fix.residual_rms),
             Some(said.chi2),
             Some(said.chi2_limit),
-            said.separation,
-            said.separation_two,
+            said.solution_separation,
+            said.solution_separation_two,
             said.protection.map(|level| level.position),
             said.protection.map(|level| level.attitude),
-            said.stretch.map(|it| it.value),
-            said.stretch.map(|it| it.sigma),
+            said.scale_error.map(|it| it.value),
+            said.scale_error.map(|it| it.sigma),
         ];
         let log_value = [
             target.residual_rms,
             Some(it.chi2),
             Some(it.chi2_limit),
-            it.separation,
-            it.separation_two,
+            it.solution_separation,
+            it.solution_separation_two,
             it.protection_position,
             it.protection_attitude,
-            it.stretch,
-            it.stretch_sigma,
+            it.scale_error,
+            it.scale_error_sigma,
         ];
         assert_eq!(fix_text, log_value);
         assert!(fix_text.iter().all(Option::is_some), "{fix_text:?}");
         let columns = [
             "chi2",
             "chi2_limit",
-            "separation",
-            "separation_two",
+            "solution_separation",
+            "solution_separation_two",
             "protection_position",
             "protection_attitude",
-            "stretch",
-            "stretch_sigma",
+            "scale_error",
+            "scale_error_sigma",
         ];
         assert_eq!(columns.map(|name| row[name].parse::<f64>().ok())[..], fix_text[1..]);
         // Residuals are C·H − P of each pair, and their root mean square is what is logged.

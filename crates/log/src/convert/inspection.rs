@@ -1,11 +1,11 @@
 //! The points of interest in view.
 
 use super::Malformed;
-use crate::{FrameRecord, InspectedPoint, proto};
+use crate::{FrameRecord, PointOfInterest, proto};
 
 /// The message of the points of `frame`.
 pub(crate) fn inspection_message(frame: &FrameRecord) -> proto::Inspection {
-    let point = |point: &InspectedPoint| proto::InspectedPoint {
+    let point = |point: &PointOfInterest| proto::PointOfInterest {
         object: point.object.clone(),
         point: point.point.clone(),
         at: point.at.to_vec(),
@@ -13,21 +13,17 @@ pub(crate) fn inspection_message(frame: &FrameRecord) -> proto::Inspection {
         error: point.error(),
         nees: point.nees,
     };
-    proto::Inspection {
-        frame: frame.frame,
-        stamp_ns: frame.stamp_ns,
-        points: frame.inspected.iter().map(point).collect(),
-    }
+    proto::Inspection { frame: frame.frame, stamp_ns: frame.stamp_ns, points: frame.poi.iter().map(point).collect() }
 }
 
 /// The points that `message` holds.
-pub(crate) fn inspection_record(message: proto::Inspection) -> Result<Vec<InspectedPoint>, Malformed> {
+pub(crate) fn inspection_record(message: proto::Inspection) -> Result<Vec<PointOfInterest>, Malformed> {
     let place = |name: &str, numbers: &[f64]| {
         <[f64; 3]>::try_from(numbers)
             .map_err(|_| Malformed(format!("inspection.{name} has {} numbers instead of 3", numbers.len())))
     };
-    let point = |point: proto::InspectedPoint| {
-        Ok(InspectedPoint {
+    let point = |point: proto::PointOfInterest| {
+        Ok(PointOfInterest {
             at: place("at", &point.at)?,
             believed: if point.believed.is_empty() { None } else { Some(place("believed", &point.believed)?) },
             object: point.object,

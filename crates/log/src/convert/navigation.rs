@@ -5,14 +5,20 @@ use crate::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, p
 
 /// The message that holds `navigation`.
 pub(super) fn navigation_message(navigation: &NavigationRecord) -> proto::Navigation {
-    let NavigationErrors { m2_rms, m3_position, m3_attitude, nees, unreferenced_m3_position, unreferenced_m3_attitude } =
-        navigation.errors;
+    let NavigationErrors {
+        tre_rms,
+        position_error,
+        attitude_error,
+        nees,
+        odometry_only_position_error,
+        odometry_only_attitude_error,
+    } = navigation.errors;
     let motion = navigation.odometry.motion.as_ref();
     proto::Navigation {
         state: navigation.state.clone(),
         due: navigation.due,
         pose: navigation.pose.as_ref().map(navigated_message),
-        unreferenced: navigation.unreferenced.as_ref().map(navigated_message),
+        odometry_only: navigation.odometry_only.as_ref().map(navigated_message),
         odometry: Some(proto::OdometryStep {
             lost: navigation.odometry.lost.clone(),
             motion: motion.map_or_else(Vec::new, |(motion, _)| flat(motion)),
@@ -20,12 +26,12 @@ pub(super) fn navigation_message(navigation: &NavigationRecord) -> proto::Naviga
         }),
         events: navigation.events.clone(),
         errors: Some(proto::NavigationErrors {
-            m2_rms,
-            m3_position,
-            m3_attitude,
+            tre_rms,
+            position_error,
+            attitude_error,
             nees,
-            unreferenced_m3_position,
-            unreferenced_m3_attitude,
+            odometry_only_position_error,
+            odometry_only_attitude_error,
         }),
     }
 }
@@ -48,16 +54,16 @@ pub(super) fn navigation_record(message: proto::Navigation) -> Result<Navigation
         state: message.state,
         due: message.due,
         pose: message.pose.map(navigated_record).transpose()?,
-        unreferenced: message.unreferenced.map(navigated_record).transpose()?,
+        odometry_only: message.odometry_only.map(navigated_record).transpose()?,
         odometry: OdometryStep { lost: odometry.lost, motion: motion.zip(covariance) },
         events: message.events,
         errors: NavigationErrors {
-            m2_rms: errors.m2_rms,
-            m3_position: errors.m3_position,
-            m3_attitude: errors.m3_attitude,
+            tre_rms: errors.tre_rms,
+            position_error: errors.position_error,
+            attitude_error: errors.attitude_error,
             nees: errors.nees,
-            unreferenced_m3_position: errors.unreferenced_m3_position,
-            unreferenced_m3_attitude: errors.unreferenced_m3_attitude,
+            odometry_only_position_error: errors.odometry_only_position_error,
+            odometry_only_attitude_error: errors.odometry_only_attitude_error,
         },
     })
 }

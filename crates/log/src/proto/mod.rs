@@ -5,7 +5,7 @@
 #[rustfmt::skip]
 mod generated {
     pub mod seafix {
-        include!("seafix.v1.rs");
+        include!("seafix.v2.rs");
     }
     pub mod foxglove {
         #![allow(clippy::all, rustdoc::all, reason = "generated")]
@@ -26,7 +26,7 @@ pub(crate) use generated::{
 };
 
 /// The descriptors of this project's messages, a serialised `FileDescriptorSet`.
-pub(crate) const DESCRIPTORS: &[u8] = include_bytes!("seafix.v1.bin");
+pub(crate) const DESCRIPTORS: &[u8] = include_bytes!("seafix.v2.bin");
 
 /// The package, with its version, as schema names begin.
-pub(crate) const PACKAGE: &str = "seafix.v1.";
+pub(crate) const PACKAGE: &str = "seafix.v2.";

@@ -96,7 +96,7 @@ impl Pending {
             if inspection.frame != number {
                 return Err(format!("the inspection of frame {} stands in frame {number}", inspection.frame));
             }
-            frame.inspected = convert::inspection_record(inspection).map_err(|error| error.0)?;
+            frame.poi = convert::inspection_record(inspection).map_err(|error| error.0)?;
         }
         frame.images = <[GreyImage; 2]>::try_from(self.images).ok();
         let attempts = self.results.into_iter().zip(self.candidates).zip(self.evaluations).zip(target_times);

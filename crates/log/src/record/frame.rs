@@ -1,6 +1,6 @@
 //! What one stereo pair gave.
 
-use super::{Inputs, InspectedPoint, Matrix3, Matrix4, NavigationRecord, TargetModel, TargetRecord, TrialHeader};
+use super::{Inputs, Matrix3, Matrix4, NavigationRecord, PointOfInterest, TargetModel, TargetRecord, TrialHeader};
 
 /// One frame: what was seen, what was known, and what came of every attempted target.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -29,7 +29,7 @@ pub struct FrameRecord {
     /// What the navigator knew, where the trial navigates between fixes.
     pub navigation: Option<Box<NavigationRecord>>,
     /// The points of interest that truly are in both images.
-    pub inspected: Vec<InspectedPoint>,
+    pub poi: Vec<PointOfInterest>,
 }
 
 impl FrameRecord {

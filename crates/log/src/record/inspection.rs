@@ -2,7 +2,7 @@
 
 /// A point of interest that truly is in both images: where it is, and where the vehicle had it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct InspectedPoint {
+pub struct PointOfInterest {
     /// Id of its object.
     pub object: String,
     /// Its own id.
@@ -15,7 +15,7 @@ pub struct InspectedPoint {
     pub nees: Option<f64>,
 }
 
-impl InspectedPoint {
+impl PointOfInterest {
     /// How far from its true place the vehicle had it (m); `None` where no pose is known.
     pub fn error(&self) -> Option<f64> {
         let [x, y, z] = self.believed?;

@@ -14,7 +14,7 @@ pub use frame::{
 };
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
-pub use inspection::InspectedPoint;
+pub use inspection::PointOfInterest;
 pub use navigation::{ELSEWHERE, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 pub use region::Region;
 pub use target::{Alternative, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};

@@ -15,7 +15,7 @@ pub struct NavigationRecord {
     /// The camera relative to the object it was last fixed at; `None` while no fix holds.
     pub pose: Option<NavigatedRecord>,
     /// The first fix carried here by odometry alone; `None` before it and after the way was lost.
-    pub unreferenced: Option<NavigatedRecord>,
+    pub odometry_only: Option<NavigatedRecord>,
     /// What the odometry made of the pair.
     pub odometry: OdometryStep,
     /// What happened, in words: changes of state, fixes taken or doubted, displaced objects.
@@ -49,15 +49,15 @@ pub struct OdometryStep {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NavigationErrors {
     /// m2 of the navigated pose over the points of its object (m).
-    pub m2_rms: Option<f64>,
+    pub tre_rms: Option<f64>,
     /// m3, position (m).
-    pub m3_position: Option<f64>,
+    pub position_error: Option<f64>,
     /// m3, attitude (rad).
-    pub m3_attitude: Option<f64>,
+    pub attitude_error: Option<f64>,
     /// Normalised estimation error squared, six degrees of freedom.
     pub nees: Option<f64>,
     /// m3 of the first fix carried by odometry alone: position (m).
-    pub unreferenced_m3_position: Option<f64>,
+    pub odometry_only_position_error: Option<f64>,
     /// Likewise, attitude (rad).
-    pub unreferenced_m3_attitude: Option<f64>,
+    pub odometry_only_attitude_error: Option<f64>,
 }

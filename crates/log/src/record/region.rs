@@ -62,7 +62,7 @@ impl Region {
 impl TargetRecord {
     /// The region that the fix is in; `None` without a fix, its truth or its limit.
     pub fn region(&self) -> Option<Region> {
-        let error = self.evaluation.m3_position.filter(|_| self.outcome == Outcome::Fix)?;
+        let error = self.evaluation.position_error.filter(|_| self.outcome == Outcome::Fix)?;
         let level = self.integrity.as_ref().and_then(|it| it.protection_position);
         Some(Region::of(error, level, self.evaluation.alert_limit?))
     }

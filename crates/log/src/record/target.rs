@@ -36,11 +36,11 @@ pub struct TargetRecord {
     /// Whether the search proved that no larger set exists.
     pub optimal: Option<bool>,
     /// No admissible set has more pairs than this.
-    pub size_bound: Option<u64>,
+    pub consensus_bound: Option<u64>,
     /// Expected number of chance sets at least as large as the one found.
     pub nfa: Option<f64>,
     /// Pair tests that the search spent.
-    pub tests: Option<u64>,
+    pub pair_tests: Option<u64>,
     /// Root mean square of C·H − P over the pairs (m).
     pub residual_rms: Option<f64>,
     /// What supports the fix beyond its covariance, when referenced.
@@ -69,9 +69,9 @@ impl TargetRecord {
             used: Vec::new(),
             alternatives: Vec::new(),
             optimal: None,
-            size_bound: None,
+            consensus_bound: None,
             nfa: None,
-            tests: None,
+            pair_tests: None,
             residual_rms: None,
             integrity: None,
             evaluation: Evaluation::default(),
@@ -163,21 +163,21 @@ pub struct Integrity {
     /// χ² of the residuals at the most likely pose.
     pub chi2: f64,
     /// Its degrees of freedom.
-    pub freedom: u64,
+    pub dof: u64,
     /// What it exceeds with one minus the confidence.
     pub chi2_limit: f64,
     /// How far the position moves at most (m) when one point is left out.
-    pub separation: Option<f64>,
+    pub solution_separation: Option<f64>,
     /// The same when two are.
-    pub separation_two: Option<f64>,
+    pub solution_separation_two: Option<f64>,
     /// The protection level of the position (m).
     pub protection_position: Option<f64>,
     /// That of the attitude (rad).
     pub protection_attitude: Option<f64>,
     /// By how much measured distances are longer than the model's, as a share of them.
-    pub stretch: Option<f64>,
+    pub scale_error: Option<f64>,
     /// Its standard deviation.
-    pub stretch_sigma: Option<f64>,
+    pub scale_error_sigma: Option<f64>,
 }
 
 /// How an attempt compares with truth; `None` where truth or a pose is missing.
@@ -194,21 +194,21 @@ pub struct Evaluation {
     /// Pairs whose cloud point lies within 2 px of the true projections, in both images.
     pub correct_pairs: Option<u32>,
     /// m1 over the correctly identified pairs, RMS (m): the residual C·H − P.
-    pub m1_rms: Option<f64>,
+    pub fit_rms: Option<f64>,
     /// m1 without the points the solver used (m).
-    pub m1_unused_rms: Option<f64>,
+    pub fit_rms_unused: Option<f64>,
     /// m2 over all points of the target, RMS (m): the error of transferred model points.
-    pub m2_rms: Option<f64>,
+    pub tre_rms: Option<f64>,
     /// m3: error of the left camera's position in the object frame (m).
-    pub m3_position: Option<f64>,
+    pub position_error: Option<f64>,
     /// m3: error of its attitude (rad).
-    pub m3_attitude: Option<f64>,
+    pub attitude_error: Option<f64>,
     /// Normalised estimation error squared, six degrees of freedom.
     pub nees: Option<f64>,
     /// The Cramér–Rao bound on m2 (m), where it is known.
-    pub m2_bound: Option<f64>,
+    pub tre_crlb: Option<f64>,
     /// The Cramér–Rao bound on the position (m), where it is known.
-    pub m3_bound: Option<f64>,
+    pub position_crlb: Option<f64>,
     /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable. `None` in logs
     /// that are older than it, whose header has those of the targets.
     pub alert_limit: Option<f64>,

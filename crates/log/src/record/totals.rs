@@ -14,7 +14,7 @@ pub struct Totals {
     /// Frames.
     pub frames: u64,
     /// Frames with a fix of at least one target.
-    pub referenced_frames: u64,
+    pub fix_frames: u64,
     /// Frames with a wrong fix of at least one target.
     pub wrong_frames: u64,
     /// Attempts.
@@ -30,15 +30,15 @@ pub struct Totals {
     /// Fixes that truth could judge, wrong ones included.
     pub judged: u64,
     /// Over them: sum of m2² (m²).
-    pub m2_squares: f64,
+    pub tre_squares: f64,
     /// Sum of the squared errors of the position (m²).
-    pub m3_squares: f64,
+    pub position_squares: f64,
     /// Those of them that have a bound.
     pub bounded: u64,
     /// Over those: sum of the squared bounds on m2 (m²).
-    pub m2_bound_squares: f64,
+    pub tre_crlb_squares: f64,
     /// Sum of the squared bounds on the position (m²).
-    pub m3_bound_squares: f64,
+    pub position_crlb_squares: f64,
     /// Sum of the normalised errors squared.
     pub nees_sum: f64,
     /// Over so many fixes.
@@ -58,7 +58,7 @@ impl Totals {
     pub fn add(&mut self, frame: &FrameRecord) {
         let fixes = || frame.targets.iter().filter(|target| target.outcome == Outcome::Fix);
         self.frames += 1;
-        self.referenced_frames += u64::from(fixes().next().is_some());
+        self.fix_frames += u64::from(fixes().next().is_some());
         self.wrong_frames += u64::from(fixes().any(|fix| fix.evaluation.wrong == Some(true)));
         for target in frame.targets.iter().filter(|target| target.attempted()) {
             self.attempted += 1;
@@ -81,14 +81,14 @@ impl Totals {
                     self.unjudged += u64::from(known.is_none());
                 }
             }
-            if let (Some(m2), Some(m3)) = (fix.m2_rms, fix.m3_position) {
+            if let (Some(tre), Some(position)) = (fix.tre_rms, fix.position_error) {
                 self.judged += 1;
-                self.m2_squares += m2 * m2;
-                self.m3_squares += m3 * m3;
-                if let (Some(m2), Some(m3)) = (fix.m2_bound, fix.m3_bound) {
+                self.tre_squares += tre * tre;
+                self.position_squares += position * position;
+                if let (Some(tre), Some(position)) = (fix.tre_crlb, fix.position_crlb) {
                     self.bounded += 1;
-                    self.m2_bound_squares += m2 * m2;
-                    self.m3_bound_squares += m3 * m3;
+                    self.tre_crlb_squares += tre * tre;
+                    self.position_crlb_squares += position * position;
                 }
             }
             if let Some(nees) = fix.nees {
@@ -104,7 +104,7 @@ impl Totals {
         self.every = other.every;
         self.failures_left_out += other.failures_left_out;
         self.frames += other.frames;
-        self.referenced_frames += other.referenced_frames;
+        self.fix_frames += other.fix_frames;
         self.wrong_frames += other.wrong_frames;
         self.attempted += other.attempted;
         self.found += other.found;
@@ -114,11 +114,11 @@ impl Totals {
             *self.reasons.entry(reason.clone()).or_default() += count;
         }
         self.judged += other.judged;
-        self.m2_squares += other.m2_squares;
-        self.m3_squares += other.m3_squares;
+        self.tre_squares += other.tre_squares;
+        self.position_squares += other.position_squares;
         self.bounded += other.bounded;
-        self.m2_bound_squares += other.m2_bound_squares;
-        self.m3_bound_squares += other.m3_bound_squares;
+        self.tre_crlb_squares += other.tre_crlb_squares;
+        self.position_crlb_squares += other.position_crlb_squares;
         self.nees_sum += other.nees_sum;
         self.nees_count += other.nees_count;
         self.nees_within += other.nees_within;

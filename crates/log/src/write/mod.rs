@@ -108,7 +108,7 @@ impl Writer {
             sink.put(topic::RESULT, stamp, &convert::result_message(frame, index))?;
             sink.put(topic::EVALUATION, stamp, &convert::evaluation_message(frame, index))?;
         }
-        if !frame.inspected.is_empty() {
+        if !frame.poi.is_empty() {
             sink.put(topic::INSPECTION, stamp, &convert::inspection_message(frame))?;
         }
         sink.put(topic::TIMING, stamp, &convert::timing_message(frame))?;

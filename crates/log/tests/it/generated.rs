@@ -21,7 +21,7 @@ fn committed_code_is_what_the_protos_state() {
     let described = compiler.file_descriptor_set();
     let mut bare = described.clone();
     bare.file.iter_mut().for_each(|file| file.source_code_info = None);
-    committed("seafix.v1.bin", &bare.encode_to_vec());
+    committed("seafix.v2.bin", &bare.encode_to_vec());
 
     let folder = root.join("proto/foxglove");
     let schemas =
@@ -35,7 +35,7 @@ fn committed_code_is_what_the_protos_state() {
         let mut config = prost_build::Config::new();
         config.compile_well_known_types().bytes([".foxglove"]).out_dir(out.path()).compile_fds(set).unwrap();
     }
-    for name in ["seafix.v1.rs", "foxglove.rs", "google.protobuf.rs"] {
+    for name in ["seafix.v2.rs", "foxglove.rs", "google.protobuf.rs"] {
         committed(name, &fs::read(out.path().join(name)).unwrap());
     }
 }

@@ -12,7 +12,7 @@ fn write(path: &Path, frames: Range<u64>, part: bool) {
     let mut writer = create(path, &synthetic::header()).unwrap();
     // Sums of whole numbers, which are not rounded.
     let count = frames.end - frames.start;
-    let totals = Totals { every: 1, frames: count, m2_squares: count as f64, ..Totals::default() };
+    let totals = Totals { every: 1, frames: count, tre_squares: count as f64, ..Totals::default() };
     for number in frames {
         writer.frame(&synthetic::frame(number)).unwrap();
     }

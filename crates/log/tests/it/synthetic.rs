@@ -95,21 +95,21 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
     fixed.alternatives =
         vec![Alternative { object_from_camera: IDENTITY, pairs: vec![Pair { model: 1, cloud: 0 }], score: -7.5 }];
     fixed.optimal = Some(true);
-    fixed.size_bound = Some(3);
+    fixed.consensus_bound = Some(3);
     fixed.nfa = Some(1e-4);
-    fixed.tests = Some(1234);
+    fixed.pair_tests = Some(1234);
     fixed.residual_rms = Some(0.004);
     fixed.integrity = Some(Integrity {
         redundancy: "unmonitored".to_owned(),
         chi2: 2.5 + value(4),
-        freedom: 3,
+        dof: 3,
         chi2_limit: 16.3,
-        separation: None,
-        separation_two: Some(0.02),
+        solution_separation: None,
+        solution_separation_two: Some(0.02),
         protection_position: Some(0.03),
         protection_attitude: Some(0.004),
-        stretch: Some(-0.002),
-        stretch_sigma: Some(0.001),
+        scale_error: Some(-0.002),
+        scale_error_sigma: Some(0.001),
     });
     fixed.evaluation = Evaluation {
         wrong: Some(false),
@@ -117,14 +117,14 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         visible: Some(4),
         identified: Some(3),
         correct_pairs: Some(3),
-        m1_rms: Some(0.004),
-        m1_unused_rms: None,
-        m2_rms: Some(0.006),
-        m3_position: Some(0.01),
-        m3_attitude: Some(0.002),
+        fit_rms: Some(0.004),
+        fit_rms_unused: None,
+        tre_rms: Some(0.006),
+        position_error: Some(0.01),
+        attitude_error: Some(0.002),
         nees: Some(5.5),
-        m2_bound: Some(0.005),
-        m3_bound: None,
+        tre_crlb: Some(0.005),
+        position_crlb: None,
         alert_limit: Some(0.05),
     };
     fixed.times =
@@ -161,8 +161,8 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         },
         inputs: (number % 4 != 3).then(|| Box::new(inputs(number))),
         navigation: (number > 0).then(|| Box::new(navigation(number))),
-        inspected: (0..number % 3)
-            .map(|k| InspectedPoint {
+        poi: (0..number % 3)
+            .map(|k| PointOfInterest {
                 object: "A".to_owned(),
                 point: format!("valve-{k}"),
                 at: [0.1, value(70 + k), 1.5],
@@ -183,19 +183,19 @@ fn navigation(number: u64) -> NavigationRecord {
         state: "dead reckoning".to_owned(),
         due: odd,
         pose: odd.then(|| pose.clone()),
-        unreferenced: (!odd).then_some(pose),
+        odometry_only: (!odd).then_some(pose),
         odometry: OdometryStep {
             lost: if odd { "the left image shows nothing".to_owned() } else { String::new() },
             motion: (!odd).then(|| (at(0.1, 0.0, 1.0 / 7.0), covariance)),
         },
         events: vec!["fix at object A".to_owned(); number as usize % 3],
         errors: NavigationErrors {
-            m2_rms: odd.then_some(0.01),
-            m3_position: odd.then_some(1.0 / 3.0),
-            m3_attitude: (!odd).then_some(0.0),
+            tre_rms: odd.then_some(0.01),
+            position_error: odd.then_some(1.0 / 3.0),
+            attitude_error: (!odd).then_some(0.0),
             nees: Some(6.0),
-            unreferenced_m3_position: odd.then_some(0.1),
-            unreferenced_m3_attitude: (!odd).then_some(0.2),
+            odometry_only_position_error: odd.then_some(0.1),
+            odometry_only_attitude_error: (!odd).then_some(0.2),
         },
     }
 }

@@ -186,10 +186,10 @@ impl Ground {
         };
         // Partners that fit worse than their noise know less.
         let chi2: f64 = pairs.iter().map(Pair::apart).sum();
-        let freedom = (3 * found) as f64 - 6.0;
+        let dof = (3 * found) as f64 - 6.0;
         Ok(Registered {
             key_from_now: pose,
-            covariance: Covariance6::new(covariance * (chi2 / freedom).max(1.0)),
+            covariance: Covariance6::new(covariance * (chi2 / dof).max(1.0)),
             partners: found,
         })
     }

@@ -110,9 +110,9 @@ impl OdometrySession for StereoTracker<'_> {
     }
 
     fn trajectory(&self) -> OdometryTrajectory {
-        let segments = self.segments.iter().map(|stretch| {
-            let poses = stretch.poses.iter().map(|pose| self.waypoint(pose));
-            Segment { broken: stretch.broken.clone(), poses: poses.collect() }
+        let segments = self.segments.iter().map(|scale_error| {
+            let poses = scale_error.poses.iter().map(|pose| self.waypoint(pose));
+            Segment { broken: scale_error.broken.clone(), poses: poses.collect() }
         });
         OdometryTrajectory {
             segments: segments.collect(),

@@ -159,7 +159,7 @@ fn expected_about(problem: &Problem<'_>, pairs: &[Correspondence], size: usize, 
     let (mut sum, mut last) = (0.0, 0.0_f64);
     for j in (size..=available).take(MAX_SIZES) {
         let halved = (j - size).min(3);
-        let term = expected_of_size(problem, &frame, j, chi2 * freedom(j) / freedom(size), halved);
+        let term = expected_of_size(problem, &frame, j, chi2 * dof(j) / dof(size), halved);
         sum += term;
         // Not before the terms fall: among many candidates the larger sets may be the more.
         if term.is_nan() || (term <= NEGLIGIBLE * sum && term <= last.max(f64::MIN_POSITIVE)) {
@@ -173,7 +173,7 @@ fn expected_about(problem: &Problem<'_>, pairs: &[Correspondence], size: usize, 
     sum
 }
 
-fn freedom(size: usize) -> f64 {
+fn dof(size: usize) -> f64 {
     (3 * size - 6) as f64
 }
 

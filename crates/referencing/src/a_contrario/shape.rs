@@ -70,7 +70,7 @@ pub(super) struct Shape<'a> {
     null: &'a Null<'a>,
     noise: &'a Noise,
     /// Dimensions of the tube's section, and its radius.
-    freedom: f64,
+    dof: f64,
     radius: f64,
     /// ln of the tube's section, and of all else that the members share.
     ln_section: f64,
@@ -94,7 +94,7 @@ fn inertia<'x>(points: impl Iterator<Item = &'x Vector3<f64>>) -> Matrix3<f64> {
 
 impl<'a> Shape<'a> {
     pub(super) fn new(problem: &'a Problem<'a>, null: &'a Null<'a>, noise: &'a Noise, size: usize, chi2: f64) -> Self {
-        let freedom = (3 * size - 6) as f64;
+        let dof = (3 * size - 6) as f64;
         // Coherent sets are no worse than this anyway.
         let best = noise.whitening.norm();
         let widest = match problem.tolerance {
@@ -102,16 +102,16 @@ impl<'a> Shape<'a> {
             Tolerance::Sigmas(k) => k * (2.0 * noise.root.norm_squared()).sqrt(),
         };
         let radius = chi2.sqrt().min((size as f64).sqrt() * widest * best);
-        let ball = ln_ball(freedom);
-        let full = radius * libm::exp(ln_ball(freedom - 1.0) - ball) / (freedom + 1.0);
+        let ball = ln_ball(dof);
+        let full = radius * libm::exp(ln_ball(dof - 1.0) - ball) / (dof + 1.0);
         Self {
             problem,
             null,
             noise,
-            freedom,
+            dof,
             radius,
             ln_section: ball
-                + freedom * libm::log(radius)
+                + dof * libm::log(radius)
                 + 1.5 * libm::log(size as f64)
                 + (size as f64 - 1.0) * noise.ln_det_root
                 + null.ln_scale() * size as f64,
@@ -190,7 +190,7 @@ impl<'a> Shape<'a> {
             }
         }
         let Some(cholesky) = Cholesky::new(*turn) else { return 1.0 };
-        let mut along = || libm::pow(self.within_tolerance(set, &cholesky, sequence), self.freedom);
+        let mut along = || libm::pow(self.within_tolerance(set, &cholesky, sequence), self.dof);
         let directions = if set.len() > FEW { 1 } else { DIRECTIONS };
         (0..directions).map(|_| along()).sum::<f64>() / directions as f64
     }

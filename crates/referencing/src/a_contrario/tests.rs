@@ -76,7 +76,7 @@ impl Frame {
 /// The admissible sets of `size` pairs or more with at most this χ² per degree of freedom, one by one.
 fn count(problem: &Problem<'_>, size: usize, each: f64) -> usize {
     fn grow(problem: &Problem<'_>, size: usize, each: f64, from: usize, set: &mut Vec<Correspondence>) -> usize {
-        let good = |set: &[Correspondence]| set.len() >= size && best(problem, set).0 <= each * freedom(set.len());
+        let good = |set: &[Correspondence]| set.len() >= size && best(problem, set).0 <= each * dof(set.len());
         let mut found = usize::from(good(set));
         for model in from..problem.model.len() {
             for &cloud in &problem.candidates.lists[model] {
@@ -107,7 +107,7 @@ fn ratio(size: usize, each: f64, tolerance: f64, frames: usize, mut frame: impl 
     for _ in 0..frames {
         let frame = frame();
         let problem = frame.problem(tolerance);
-        expected += nfa(&problem, size, each * freedom(size));
+        expected += nfa(&problem, size, each * dof(size));
         counted += count(&problem, size, each);
     }
     counted as f64 / expected
@@ -180,10 +180,10 @@ fn an_order_of_the_points_is_as_good_as_another() {
     ];
     for (number, frame) in frames.iter().enumerate() {
         for size in [3, 5] {
-            let expected = nfa(&frame.problem(0.05), size, freedom(size));
+            let expected = nfa(&frame.problem(0.05), size, dof(size));
             for _ in 0..5 {
                 let other = renumbered(frame, &mut rng);
-                let again = nfa(&other.problem(0.05), size, freedom(size));
+                let again = nfa(&other.problem(0.05), size, dof(size));
                 assert!((again / expected - 1.0).abs() < 1e-9, "frame {number}, size {size}: {expected}, {again}");
             }
         }
@@ -198,13 +198,13 @@ fn a_translation_of_the_cloud_changes_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(18);
     for n in [60, 500] {
         let frame = putative(n, &mut rng);
-        let expected = nfa(&frame.problem(0.05), 3, freedom(3));
+        let expected = nfa(&frame.problem(0.05), 3, dof(3));
         for _ in 0..5 {
             let step = within(8.0, &mut rng);
             let moved = |point: &MeasuredPoint| measured(point.position.at.coords + step, [0.01; 3]);
             let (cloud, candidates) = (frame.cloud.iter().map(moved).collect(), frame.candidates.clone());
             let moved = Frame { model: frame.model.clone(), cloud, candidates, prior: None };
-            let again = nfa(&moved.problem(0.05), 3, freedom(3));
+            let again = nfa(&moved.problem(0.05), 3, dof(3));
             assert!((again / expected - 1.0).abs() < 1e-9, "{n} pairs: {expected}, {again}");
         }
     }

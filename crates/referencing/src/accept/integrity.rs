@@ -86,15 +86,15 @@ pub struct Integrity {
     /// χ² of the residuals at the most likely pose.
     pub chi2: f64,
     /// Its degrees of freedom, 3k − 6.
-    pub freedom: usize,
+    pub dof: usize,
     /// The χ² that a true set exceeds with one minus the confidence.
     pub chi2_limit: f64,
     /// Solution separation: the farthest that the position moves (m) when one point is left out; `None` with fewer
     /// than four points, or where one cannot be spared.
-    pub separation: Option<f64>,
+    pub solution_separation: Option<f64>,
     /// The same when two points are left out; `None` with fewer than five points, where two cannot be spared, or where
     /// [`Acceptance::two_wrong_rate`] is nought.
-    pub separation_two: Option<f64>,
+    pub solution_separation_two: Option<f64>,
     /// The probability that the pose is another, farther off than the alert limit, as most of the points are others than those of the
     /// fix, or that the object is not there at all, by a search that weighs evidence; `None` of one that counts, which does not
     /// say.
@@ -103,7 +103,7 @@ pub struct Integrity {
     /// that cannot be spared), or where [`misidentified`](Self::misidentified) exceeds that risk.
     pub protection: Option<Protection>,
     /// Whether what was measured is as large as the model says; `None` with fewer than four points, any three of which fit.
-    pub stretch: Option<ScaleError>,
+    pub scale_error: Option<ScaleError>,
 }
 
 /// How far the fix moves when points are left out, and what that protects.
@@ -116,7 +116,7 @@ pub(super) struct Separation {
     /// The levels.
     pub(super) protection: Option<Protection>,
     /// See [`Integrity::stretch`].
-    pub(super) stretch: Option<ScaleError>,
+    pub(super) scale_error: Option<ScaleError>,
     /// The point that the pose hangs on most: its place in the set, and by how much the model points that the fix transfers are
     /// off if it is a wrong match (m, RMS, one sigma); infinitely far where it cannot be spared. `None` with fewer than four.
     pub(super) hinge: Option<(usize, f64)>,
@@ -152,9 +152,9 @@ pub(super) fn protection(
     let own = Protection::quiet(covariance, 0.5 * risk);
     let even = || isotropic(&data.points, pose);
     let Some(deletions) = Deletions::of(data) else {
-        return Separation { stretch: even(), hinge: Some((0, f64::INFINITY)), ..Separation::default() };
+        return Separation { scale_error: even(), hinge: Some((0, f64::INFINITY)), ..Separation::default() };
     };
-    let stretch = deletions.stretch.or_else(even);
+    let scale_error = deletions.scale_error.or_else(even);
     let mut watch = Watch { pose, transfer, deletions, level: own, spared: true, hinge: None };
     let twice = acceptance.two_wrong_rate > 0.0;
     let fraction = if twice { 0.25 } else { 0.5 } * risk;
@@ -165,7 +165,7 @@ pub(super) fn protection(
         watch.farthest(twos, (fraction / acceptance.two_wrong_rate).min(1.0))
     });
     let available = identified && watch.spared && (!twice || n >= 6);
-    Separation { one, two, protection: available.then_some(watch.level), stretch, hinge: watch.hinge }
+    Separation { one, two, protection: available.then_some(watch.level), scale_error, hinge: watch.hinge }
 }
 
 /// A fix, watched while points are left out.

@@ -202,8 +202,8 @@ impl Judge<'_> {
 
     /// Whether a rigid motion explains the set within its noise.
     pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
-        let freedom = 3 * hypothesis.pairs.len() - 6;
-        let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(freedom, self.acceptance.confidence));
+        let dof = 3 * hypothesis.pairs.len() - 6;
+        let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(dof, self.acceptance.confidence));
         // Written so that a NaN is refused too.
         if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
     }
@@ -307,19 +307,19 @@ impl Judge<'_> {
     /// follows for the pose is within the alert limit: a rig that stretches all it measures by ε has the object nearer or farther by
     /// ε of its distance.
     fn as_large_as_modelled(&self, hypothesis: &Hypothesis, integrity: &Integrity) -> Result<(), RejectionReason> {
-        let Some(stretch) = integrity.stretch else { return Ok(()) };
+        let Some(scale_error) = integrity.scale_error else { return Ok(()) };
         // Where the residuals that it leaves are larger than their noise, so is the error of the scale.
-        let sigmas = stretch.value / stretch.sigma;
-        let left = (integrity.chi2 - sigmas * sigmas).max(0.0) / (integrity.freedom - 1) as f64;
+        let sigmas = scale_error.value / scale_error.sigma;
+        let left = (integrity.chi2 - sigmas * sigmas).max(0.0) / (integrity.dof - 1) as f64;
         let sure = sigmas * sigmas > chi_square(1, self.acceptance.confidence) * left.max(1.0);
         let count = hypothesis.pairs.len() as f64;
         let centre: Vector3<f64> =
             hypothesis.pairs.iter().map(|pair| self.problem.model[pair.model].at.coords).sum::<Vector3<f64>>() / count;
         // Points that a stretch moved farthest are those that were not identified: what is left shows less of it.
-        let max = stretch.value.abs() + UNDERSTATED * stretch.sigma;
+        let max = scale_error.value.abs() + UNDERSTATED * scale_error.sigma;
         let off = max * (hypothesis.pose.inverse() * Point::from(centre)).coords.norm();
         match sure && off > self.alert_limit {
-            true => Err(RejectionReason::Stretched { stretch, off, limit: self.alert_limit }),
+            true => Err(RejectionReason::Stretched { scale_error, off, limit: self.alert_limit }),
             false => Ok(()),
         }
     }
@@ -354,17 +354,17 @@ impl Judge<'_> {
         let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
         let mistaken = misidentified.unwrap_or(0.0);
         let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, mistaken);
-        let freedom = 3 * hypothesis.pairs.len() - 6;
+        let dof = 3 * hypothesis.pairs.len() - 6;
         let integrity = Integrity {
             redundancy: Redundancy::of(hypothesis.pairs.len()),
             chi2: hypothesis.likelihood.cost,
-            freedom,
-            chi2_limit: chi_square(freedom, self.acceptance.confidence),
-            separation: left_out.one,
-            separation_two: left_out.two,
+            dof,
+            chi2_limit: chi_square(dof, self.acceptance.confidence),
+            solution_separation: left_out.one,
+            solution_separation_two: left_out.two,
             misidentified,
             protection: left_out.protection,
-            stretch: left_out.stretch,
+            scale_error: left_out.scale_error,
         };
         let stands = self.without_any_one(&hypothesis, left_out.hinge);
         if let Err(refusal) = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity)) {

@@ -99,8 +99,8 @@ pub fn judge(
         outcome,
         runner_up,
         optimal: found.optimal && !thinned,
-        size_bound: Some(found.size_bound),
-        tests: Some(found.tests),
+        consensus_bound: Some(found.consensus_bound),
+        pair_tests: Some(found.pair_tests),
         copies_sought: found.posterior.as_ref().and_then(|posterior| posterior.copies_sought),
         evidence_gap: found.posterior.as_ref().and_then(|posterior| posterior.evidence_gap),
         identified: found.pairs,
@@ -118,8 +118,8 @@ pub fn judge_labelled(
 ) -> Attempt {
     let alert_limit = alert_limit(problem.model, acceptance);
     let judge = Judge { problem, solver, acceptance, alert_limit, largest: pairs.len(), searched: false, rig };
-    let size_bound = pairs.len();
-    let found = Identification::unproved(pairs, size_bound, 0);
+    let consensus_bound = pairs.len();
+    let found = Identification::unproved(pairs, consensus_bound, 0);
     let (outcome, runner_up) = match judge.size(&found.pairs) {
         Ok(()) => judge.poses(&found, None),
         Err(refusal) => (Outcome::Rejected(refusal), None),
@@ -129,9 +129,9 @@ pub fn judge_labelled(
         identified: found.pairs,
         runner_up,
         optimal: false,
-        size_bound: None,
+        consensus_bound: None,
         nfa: None,
-        tests: None,
+        pair_tests: None,
         copies_sought: None,
         evidence_gap: None,
     }

@@ -138,11 +138,11 @@ pub struct Attempt {
     /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
     pub optimal: bool,
     /// No admissible set has more pairs than this, where the search says so.
-    pub size_bound: Option<usize>,
+    pub consensus_bound: Option<usize>,
     /// Expected number of chance sets as large as the one found.
     pub nfa: Option<f64>,
     /// Pair tests spent by the search, where it says so.
-    pub tests: Option<u64>,
+    pub pair_tests: Option<u64>,
     /// Whether the search looked at all that may lead to a second copy of the object, whole or in part, beside the answer; `None`
     /// where it looks for none, or nothing was likely enough to be believed.
     pub copies_sought: Option<bool>,
@@ -165,11 +165,11 @@ impl Attempt {
 impl Attempt {
     /// The attempt that a search refused.
     pub(crate) fn without(why: Rejected) -> Self {
-        let tests = match why {
-            Rejected::Budget { tests, .. } => Some(tests),
+        let pair_tests = match why {
+            Rejected::Budget { pair_tests, .. } => Some(pair_tests),
             _ => None,
         };
-        let size_bound = match why {
+        let consensus_bound = match why {
             Rejected::Budget { bound, .. } | Rejected::TooLarge { bound, .. } | Rejected::NotFound { bound, .. } => {
                 Some(bound)
             }
@@ -182,9 +182,9 @@ impl Attempt {
             outcome: Outcome::Rejected(why.into()),
             identified: Vec::new(),
             runner_up: None,
-            size_bound,
+            consensus_bound,
             nfa: None,
-            tests,
+            pair_tests,
             copies_sought: None,
             evidence_gap: None,
         }

@@ -89,11 +89,11 @@ pub enum RejectionReason {
     #[error(
         "measured distances are {:.1} % {} than the model's (one sigma {:.1} %): if the rig is at fault, the object may be {off:.2} m \
          from where it seems to be, and {limit:.2} m are allowed; look at baseline, focal length and survey",
-        100.0 * .stretch.value.abs(), if .stretch.value > 0.0 { "longer" } else { "shorter" }, 100.0 * .stretch.sigma
+        100.0 * .scale_error.value.abs(), if .scale_error.value > 0.0 { "longer" } else { "shorter" }, 100.0 * .scale_error.sigma
     )]
     Stretched {
         /// By how much.
-        stretch: ScaleError,
+        scale_error: ScaleError,
         /// What that, and two standard deviations more, makes of the object's distance (m).
         off: f64,
         /// The alert limit (m).

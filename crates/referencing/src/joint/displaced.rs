@@ -20,7 +20,7 @@ pub struct JointFixes {
     /// χ² of pixels and surveys together.
     pub chi2: f64,
     /// Its degrees of freedom.
-    pub freedom: usize,
+    pub dof: usize,
     /// What χ² exceeds with one minus the confidence.
     pub chi2_limit: f64,
 }
@@ -66,7 +66,7 @@ pub fn joint_fixes(
     let max = |object: usize, observations_by_frame: &[ObjectObservations]| {
         observations_by_frame.iter().map(|g| g.count(object)).max().unwrap_or(0)
     };
-    let limit = |fix: &JointFix| chi_square(fix.freedom.max(1), confidence);
+    let limit = |fix: &JointFix| chi_square(fix.dof.max(1), confidence);
     // Written so that a NaN is refused too.
     while !(fix.chi2 <= limit(&fix)) {
         let seen = (0..members.len()).filter(|&o| members[o].placement != Placement::Displaced);
@@ -105,7 +105,7 @@ pub fn joint_fixes(
         displaced,
         left_out,
         chi2: fix.chi2,
-        freedom: fix.freedom,
+        dof: fix.dof,
         chi2_limit: limit(&fix),
     })
 }

@@ -134,7 +134,7 @@ fn agreeing(
     confidence: f64,
 ) -> Option<JointFix> {
     let fix = joint_fix(rig, members, std::slice::from_ref(object_observations)).ok()?;
-    (fix.chi2 <= chi_square(fix.freedom.max(1), confidence)).then_some(fix)
+    (fix.chi2 <= chi_square(fix.dof.max(1), confidence)).then_some(fix)
 }
 
 /// Where an object's points should be.

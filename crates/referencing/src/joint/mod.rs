@@ -77,7 +77,7 @@ pub struct JointFix {
     /// χ² of pixels and surveys together.
     pub chi2: f64,
     /// Its degrees of freedom.
-    pub freedom: usize,
+    pub dof: usize,
     /// The covariance of all unknowns together.
     covariance: Mat<f64>,
     /// For each object the block of its six unknowns.
@@ -152,7 +152,7 @@ pub fn joint_fix(
             .map(|o| (state.places[o], Covariance6::new(block(system.unknown(o)))))
             .collect(),
         chi2,
-        freedom: system.freedom(),
+        dof: system.dof(),
         unknowns: (0..members.len()).map(|o| system.unknown(o)).collect(),
         covariance,
     })

@@ -82,7 +82,7 @@ impl<'a> System<'a> {
     }
 
     /// Pixel coordinates and survey numbers, less the unknowns.
-    pub(super) fn freedom(&self) -> usize {
+    pub(super) fn dof(&self) -> usize {
         let pixels: usize =
             self.observations_by_frame.iter().map(|object_observations| 4 * object_observations.points.len()).sum();
         (pixels + 6 * self.surveys.iter().flatten().count()).saturating_sub(6 * self.blocks)

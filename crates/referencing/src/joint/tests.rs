@@ -68,7 +68,7 @@ fn one_object_alone_is_the_fix_of_one_object() {
     let (pose, own) = &fix.site_from_camera[0];
     assert!(expected.error_to(pose).amax() < 1e-10);
     assert!((own.matrix - covariance.matrix).amax() < 1e-8 * covariance.matrix.amax());
-    assert_eq!(fix.freedom, 14);
+    assert_eq!(fix.dof, 14);
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn a_displaced_object_is_found_where_it_is() {
     }
     // Believed to stand where it was surveyed, it spoils the fix, and χ² says so.
     let misled = joint_fix(&rig, &members(Placement::Exact), &seen).unwrap();
-    assert!(misled.chi2 > 100.0 * misled.freedom as f64, "{}", misled.chi2);
+    assert!(misled.chi2 > 100.0 * misled.dof as f64, "{}", misled.chi2);
     // Alone in view and displaced, it says nothing of the site.
     let alone =
         ObjectObservations { points: seen[0].points.iter().filter(|(object, _)| *object == 1).copied().collect() };
@@ -109,7 +109,7 @@ fn a_survey_is_one_error_an_object() {
     let survey =
         Covariance6::<Object, Object>::new(Matrix6::from_diagonal(&[1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4].into()));
     let draws = 400;
-    let (mut nees, mut chi2, mut freedom) = (0.0, 0.0, 0);
+    let (mut nees, mut chi2, mut dof) = (0.0, 0.0, 0);
     for _ in 0..draws {
         let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
         let mut truly = said;
@@ -129,13 +129,13 @@ fn a_survey_is_one_error_an_object() {
         let (pose, covariance) = &fix.site_from_camera[1];
         let xi = pose.error_to(&instant(1));
         nees += xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)) / f64::from(draws);
-        (chi2, freedom) = (chi2 + fix.chi2 / f64::from(draws), fix.freedom);
+        (chi2, dof) = (chi2 + fix.chi2 / f64::from(draws), fix.dof);
         assert!(fix.site_from_object[1].1.matrix.trace() < survey.matrix.trace());
     }
     // Four standard deviations of the mean.
     assert!((nees - 6.0).abs() < 4.0 * (12.0 / f64::from(draws)).sqrt(), "{nees}");
-    let spread = 4.0 * (2.0 * freedom as f64 / f64::from(draws)).sqrt();
-    assert!((chi2 - freedom as f64).abs() < spread, "{chi2} of {freedom}");
+    let spread = 4.0 * (2.0 * dof as f64 / f64::from(draws)).sqrt();
+    assert!((chi2 - dof as f64).abs() < spread, "{chi2} of {dof}");
 }
 
 /// Seen from an object itself, what all objects share cancels: the pose relative to each is as its covariance says, and

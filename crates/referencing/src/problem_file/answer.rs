@@ -45,14 +45,14 @@ pub struct Support {
     /// χ² of the residuals at the most likely pose.
     pub chi2: f64,
     /// Its degrees of freedom.
-    pub freedom: usize,
+    pub dof: usize,
     /// What a true set exceeds with one minus the confidence.
     pub chi2_limit: f64,
     /// The farthest that the position moves (m) when one point is left out.
-    pub separation: Option<f64>,
+    pub solution_separation: Option<f64>,
     /// The same when two points are left out, where two wrong matches are assumed to happen.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub separation_two: Option<f64>,
+    pub solution_separation_two: Option<f64>,
     /// The probability that the pose is another, farther off than the alert limit, or the object not there; null of searches that
     /// count and do not weigh.
     pub misidentified: Option<f64>,
@@ -64,7 +64,7 @@ pub struct Support {
     /// The alert limit (m): a fix whose level of position is beyond it, or that has none, is not available where integrity counts.
     pub alert_limit: f64,
     /// By how much measured distances are longer than the model's, as a share; null with fewer than four points.
-    pub stretch: Option<Estimate>,
+    pub scale_error: Option<Estimate>,
 }
 
 /// A number and its standard deviation, as they are printed.
@@ -90,15 +90,15 @@ impl Support {
         Self {
             redundancy: integrity.redundancy.name(),
             chi2: integrity.chi2,
-            freedom: integrity.freedom,
+            dof: integrity.dof,
             chi2_limit: integrity.chi2_limit,
-            separation: integrity.separation,
-            separation_two: integrity.separation_two,
+            solution_separation: integrity.solution_separation,
+            solution_separation_two: integrity.solution_separation_two,
             misidentified: integrity.misidentified,
             risk,
             protection: integrity.protection.map(|level| Levels { position: level.position, attitude: level.attitude }),
             alert_limit,
-            stretch: integrity.stretch.map(|it| Estimate { value: it.value, sigma: it.sigma }),
+            scale_error: integrity.scale_error.map(|it| Estimate { value: it.value, sigma: it.sigma }),
         }
     }
 }
@@ -142,11 +142,11 @@ pub struct Answer {
     /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
     pub optimal: bool,
     /// No admissible set has more pairs.
-    pub size_bound: Option<usize>,
+    pub consensus_bound: Option<usize>,
     /// Expected number of chance sets as large as the one found.
     pub nfa: Option<f64>,
     /// Pair tests of the search.
-    pub tests: Option<u64>,
+    pub pair_tests: Option<u64>,
     /// Whether all was looked at that may lead to a second copy of the object, whole or in part; of searches that look for one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copies_sought: Option<bool>,
@@ -219,9 +219,9 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
         },
         margin: attempt.margin(),
         optimal: attempt.optimal,
-        size_bound: attempt.size_bound,
+        consensus_bound: attempt.consensus_bound,
         nfa: attempt.nfa.filter(|expected| expected.is_finite()),
-        tests: attempt.tests,
+        pair_tests: attempt.pair_tests,
         copies_sought: attempt.copies_sought,
         evidence_gap: attempt.evidence_gap,
         time_ms,

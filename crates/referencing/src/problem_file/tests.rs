@@ -54,7 +54,7 @@ fn a_good_problem_is_answered_with_the_keys_of_the_format() {
         "unbelieved",
         "margin",
         "optimal",
-        "size_bound",
+        "consensus_bound",
         "nfa",
         "time_ms",
     ];

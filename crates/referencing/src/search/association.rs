@@ -21,7 +21,7 @@ pub(crate) struct Association {
     /// Which pairs are coherent.
     pub(crate) adjacency: BitMatrix,
     /// Pair tests spent on the edges.
-    pub(crate) tests: u64,
+    pub(crate) pair_tests: u64,
 }
 
 impl Association {
@@ -63,7 +63,7 @@ impl Association {
         }
         adjacency.mirror_upper();
         let count = vertices.len() as u64;
-        Self { vertices, adjacency, tests: count * count.saturating_sub(1) / 2 }
+        Self { vertices, adjacency, pair_tests: count * count.saturating_sub(1) / 2 }
     }
 
     /// The graph of those vertices alone that are to be kept.
@@ -75,7 +75,7 @@ impl Association {
         for (i, &v) in kept.iter().enumerate() {
             self.adjacency.ones(v).filter_map(|w| place[w]).filter(|&k| k > i).for_each(|k| adjacency.connect(i, k));
         }
-        Self { vertices: kept.iter().map(|&v| self.vertices[v]).collect(), adjacency, tests: 0 }
+        Self { vertices: kept.iter().map(|&v| self.vertices[v]).collect(), adjacency, pair_tests: 0 }
     }
 }
 

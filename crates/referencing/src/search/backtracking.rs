@@ -81,11 +81,11 @@ impl Search for Backtracking {
         let mut ties = std::mem::take(&mut run.found);
         let size = ties.first().map_or(0, Vec::len);
         if size < NEEDED {
-            let tests = self.budget - run.left;
+            let pair_tests = self.budget - run.left;
             return match complete {
                 true => Err(Rejected::NoConsensus { best: size, needed: NEEDED }),
                 false => {
-                    let ended = Rejected::Budget { budget, best: size, bound: possible, tests };
+                    let ended = Rejected::Budget { budget, best: size, bound: possible, pair_tests };
                     so_far(problem, self.orientation, ended)
                 }
             };
@@ -104,13 +104,13 @@ impl Search for Backtracking {
                 }
             }
         }
-        let tests = self.budget - run.left;
+        let pair_tests = self.budget - run.left;
         ties.sort();
         let alternatives_complete = complete && ties.len() < MAX_TIES;
         let best = ties.swap_remove(min_residual(problem, &vertices, &ties));
         let bound = if complete { size } else { possible };
         if !alternatives_complete && undecided.is_none() {
-            undecided = Some(Rejected::Budget { budget, best: size, bound, tests });
+            undecided = Some(Rejected::Budget { budget, best: size, bound, pair_tests });
         }
         Ok(Identification {
             alternatives: ties.iter().map(|set| run.pairs(set)).collect(),
@@ -118,7 +118,7 @@ impl Search for Backtracking {
             optimal: complete,
             undecided,
             posterior: None,
-            ..Identification::unproved(run.pairs(&best), bound, tests)
+            ..Identification::unproved(run.pairs(&best), bound, pair_tests)
         })
     }
 }
@@ -191,16 +191,16 @@ impl Run<'_> {
         }
         let mut rest = Vec::with_capacity(lists.len());
         for list in lists {
-            let mut tests = 0;
+            let mut pair_tests = 0;
             let stays = |other: &usize| {
-                tests += 1;
+                pair_tests += 1;
                 self.problem.coherent(self.vertices[vertex], self.vertices[*other]) && {
-                    tests += planes.len() as u64;
+                    pair_tests += planes.len() as u64;
                     !planes.iter().any(|plane| self.volumes.refuses(self.sense, plane, *other))
                 }
             };
             let kept: Vec<usize> = list.iter().copied().filter(stays).collect();
-            self.left = self.left.saturating_sub(tests);
+            self.left = self.left.saturating_sub(pair_tests);
             if self.left == 0 {
                 return Err(Spent);
             }

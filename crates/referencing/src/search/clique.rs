@@ -316,8 +316,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    fn spend(&mut self, tests: u64) -> Result<(), Stop> {
-        self.left = self.left.saturating_sub(tests);
+    fn spend(&mut self, pair_tests: u64) -> Result<(), Stop> {
+        self.left = self.left.saturating_sub(pair_tests);
         if self.left == 0 { Err(Stop) } else { Ok(()) }
     }
 }

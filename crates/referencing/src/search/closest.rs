@@ -30,12 +30,12 @@ where
         start: Transform<Object, Camera>,
     ) -> (Transform<Object, Camera>, Vec<Correspondence>, u64, bool) {
         let vertices = vertices(problem);
-        let (mut pose, mut last, mut tests) = (start, Vec::new(), 0);
+        let (mut pose, mut last, mut pair_tests) = (start, Vec::new(), 0);
         for _ in 0..self.iterations {
-            if tests + vertices.len() as u64 > self.budget {
-                return (pose, vertices, tests, true);
+            if pair_tests + vertices.len() as u64 > self.budget {
+                return (pose, vertices, pair_tests, true);
             }
-            tests += vertices.len() as u64;
+            pair_tests += vertices.len() as u64;
             let groups = vertices.chunk_by(|a, b| a.model == b.model);
             let nearest = |same: &[Correspondence]| {
                 let off = same.iter().map(|&pair| ((self.distance)(&pose, pair), pair));
@@ -57,6 +57,6 @@ where
                 None => break,
             }
         }
-        (pose, vertices, tests, false)
+        (pose, vertices, pair_tests, false)
     }
 }

@@ -77,11 +77,11 @@ impl Search for Gicp {
         let solver = Mahalanobis::default();
         let fit =
             |pairs: &[Correspondence]| solver.solve(&Observations::of(pairs, problem.model, problem.cloud, None)).ok();
-        let (pose, vertices, mut tests, ended) =
+        let (pose, vertices, mut pair_tests, ended) =
             Closest { distance, fit, keep, iterations, budget }.run(problem, prior.object_from_camera);
-        let ended = ended.then_some((budget, tests));
-        let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
-        conclude_within(problem, &ranked, self.orientation, tests, ended)
+        let ended = ended.then_some((budget, pair_tests));
+        let (_, ranked) = refined(problem, &vertices, pose, &mut pair_tests);
+        conclude_within(problem, &ranked, self.orientation, pair_tests, ended)
     }
 }
 

@@ -71,10 +71,10 @@ impl Search for GncTls {
             point.model_sigma = 0.0;
         }
         let finite = data.points.iter().all(|point| point.measured.covariance[(0, 0)].is_finite());
-        let mut tests = vertices.len() as u64;
+        let mut pair_tests = vertices.len() as u64;
         let pose = finite.then(|| solver.solve(&data).ok()).flatten().filter(|pose| pose.is_finite());
-        let ranked = pose.map(|pose| refined(problem, &vertices, pose, &mut tests).1).unwrap_or_default();
-        conclude(problem, &ranked, self.orientation, tests)
+        let ranked = pose.map(|pose| refined(problem, &vertices, pose, &mut pair_tests).1).unwrap_or_default();
+        conclude(problem, &ranked, self.orientation, pair_tests)
     }
 }
 

@@ -26,12 +26,12 @@ pub(super) fn grow(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
     sense: Sense,
-    tests: &mut u64,
+    pair_tests: &mut u64,
 ) -> Vec<Correspondence> {
     let volumes = Volumes::of(problem, ranked);
     let (mut taken, mut quadruples) = (Vec::new(), Quadruples::default());
     for next in 0..ranked.len() {
-        if admits(&volumes, &mut quadruples, sense, &taken, next, tests) {
+        if admits(&volumes, &mut quadruples, sense, &taken, next, pair_tests) {
             taken.push(next);
         }
     }
@@ -45,10 +45,10 @@ pub(super) fn admits(
     sense: Sense,
     taken: &[usize],
     next: usize,
-    tests: &mut u64,
+    pair_tests: &mut u64,
 ) -> bool {
     for &other in taken {
-        *tests += 1;
+        *pair_tests += 1;
         if !volumes.coherent(other, next) {
             return false;
         }
@@ -57,7 +57,7 @@ pub(super) fn admits(
         return true;
     }
     let members = decisive_members(taken);
-    *tests += Quadruples::count(members.len());
+    *pair_tests += Quadruples::count(members.len());
     !quadruples.refused(volumes, sense, members, next)
 }
 
@@ -72,10 +72,10 @@ pub(super) fn conclude(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
     orientation: bool,
-    mut tests: u64,
+    mut pair_tests: u64,
 ) -> Result<Identification, Rejected> {
     let sense = if orientation { Sense::Proper } else { Sense::Any };
-    let mut pairs = grow(problem, ranked, sense, &mut tests);
+    let mut pairs = grow(problem, ranked, sense, &mut pair_tests);
     if pairs.len() < NEEDED {
         return Err(Rejected::NotFound { bound: max_possible(problem), needed: NEEDED });
     }
@@ -83,11 +83,11 @@ pub(super) fn conclude(
     if orientation {
         if pairs.len() > MAX_ORIENTED {
             let kept = unmirrored(problem, pairs, MAX_QUADRUPLES);
-            tests += kept.tests;
+            pair_tests += kept.pair_tests;
             pairs = kept.pairs;
         }
         let all: Vec<_> = pairs.iter().copied().chain(vertices(problem)).collect();
-        let image = grow(problem, &all, Sense::Mirrored, &mut tests);
+        let image = grow(problem, &all, Sense::Mirrored, &mut pair_tests);
         if image.len() > pairs.len() && wholly_mirrored(problem, &image[..image.len().min(MAX_ORIENTED)]) {
             let mirrored = Rejected::Mirrored { best: image.len(), proved: false };
             if pairs.len() <= NEEDED {
@@ -97,7 +97,7 @@ pub(super) fn conclude(
         }
     }
     pairs.sort_unstable();
-    Ok(Identification { undecided, ..Identification::unproved(pairs, max_possible(problem), tests) })
+    Ok(Identification { undecided, ..Identification::unproved(pairs, max_possible(problem), pair_tests) })
 }
 
 /// The same of a search that may have ended at its budget, having spent so many tests: that is why its set is not to be believed,
@@ -109,15 +109,15 @@ pub(super) fn conclude_within(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
     orientation: bool,
-    tests: u64,
+    pair_tests: u64,
     ended: Option<(u64, u64)>,
 ) -> Result<Identification, Rejected> {
-    let concluded = conclude(problem, ranked, orientation, tests);
-    let Some((budget, tests)) = ended else { return concluded };
-    let ended = |best, bound| Rejected::Budget { budget, best, bound, tests };
+    let concluded = conclude(problem, ranked, orientation, pair_tests);
+    let Some((budget, pair_tests)) = ended else { return concluded };
+    let ended = |best, bound| Rejected::Budget { budget, best, bound, pair_tests };
     match concluded {
         Ok(found) => {
-            let ended = ended(found.pairs.len(), found.size_bound);
+            let ended = ended(found.pairs.len(), found.consensus_bound);
             Ok(Identification { undecided: found.undecided.or(Some(ended)), ..found })
         }
         Err(Rejected::NotFound { bound, .. }) => Err(ended(0, bound)),
@@ -133,20 +133,20 @@ pub(super) fn conclude_within(
 /// # Errors
 /// The reason itself, where nothing grows.
 pub(super) fn so_far(problem: &Problem<'_>, orientation: bool, why: Rejected) -> Result<Identification, Rejected> {
-    let Rejected::Budget { budget, bound, mut tests, .. } = why else { return Err(why) };
+    let Rejected::Budget { budget, bound, mut pair_tests, .. } = why else { return Err(why) };
     let sense = if orientation { Sense::Proper } else { Sense::Any };
     let some = evenly(vertices(problem), MAX_GROWN);
-    let sets = grown(&some, problem, sense, &mut tests);
+    let sets = grown(&some, problem, sense, &mut pair_tests);
     let Some(pairs) = sets.into_iter().next() else { return Err(why) };
     if orientation {
         // What is left of a mirror image is no set of the object's.
-        let images = grown(&some, problem, Sense::Mirrored, &mut tests);
+        let images = grown(&some, problem, Sense::Mirrored, &mut pair_tests);
         if images.first().is_some_and(|image| image.len() > pairs.len()) {
             return Err(why);
         }
     }
-    let undecided = Some(Rejected::Budget { budget, best: pairs.len(), bound, tests });
-    Ok(Identification { undecided, ..Identification::unproved(pairs, bound, tests) })
+    let undecided = Some(Rejected::Budget { budget, best: pairs.len(), bound, pair_tests });
+    Ok(Identification { undecided, ..Identification::unproved(pairs, bound, pair_tests) })
 }
 
 /// Admissible sets of pairs that contradict a pose, for comparison with it, the largest first.
@@ -163,10 +163,10 @@ fn evenly(all: Vec<Correspondence>, max: usize) -> Vec<Correspondence> {
 }
 
 /// The sets of three pairs and more that grow from a few of these, the largest first.
-fn grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, tests: &mut u64) -> Vec<Vec<Correspondence>> {
+fn grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, pair_tests: &mut u64) -> Vec<Vec<Correspondence>> {
     let begun = |first: Correspondence| {
         let ranked: Vec<Correspondence> = std::iter::once(first).chain(of.iter().copied()).collect();
-        let mut pairs = grow(problem, &ranked, sense, tests);
+        let mut pairs = grow(problem, &ranked, sense, pair_tests);
         pairs.sort_unstable();
         pairs
     };

@@ -69,11 +69,11 @@ impl Search for Icp {
             (*pose * problem.cloud[pair.cloud].position.at).distance(&problem.model[pair.model].at)
         };
         let fit = |pairs: &[Correspondence]| fitted(problem, pairs);
-        let (pose, vertices, mut tests, ended) =
+        let (pose, vertices, mut pair_tests, ended) =
             Closest { distance, fit, keep, iterations, budget }.run(problem, prior.object_from_camera);
-        let ended = ended.then_some((budget, tests));
-        let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
-        conclude_within(problem, &ranked, self.orientation, tests, ended)
+        let ended = ended.then_some((budget, pair_tests));
+        let (_, ranked) = refined(problem, &vertices, pose, &mut pair_tests);
+        conclude_within(problem, &ranked, self.orientation, pair_tests, ended)
     }
 }
 

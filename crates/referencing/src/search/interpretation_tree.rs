@@ -80,16 +80,16 @@ impl Search for InterpretationTree {
             settings: self,
             enough,
             best: Vec::new(),
-            tests: 0,
+            pair_tests: 0,
         };
         tree.descend(0, &mut Vec::new());
-        if tree.best.is_empty() && tree.tests >= self.budget {
-            let (budget, tests) = (self.budget, tree.tests);
-            let ended = Rejected::Budget { budget, best: 0, bound: max_possible(problem), tests };
+        if tree.best.is_empty() && tree.pair_tests >= self.budget {
+            let (budget, pair_tests) = (self.budget, tree.pair_tests);
+            let ended = Rejected::Budget { budget, best: 0, bound: max_possible(problem), pair_tests };
             return so_far(problem, self.orientation, ended);
         }
         let ranked: Vec<Correspondence> = tree.best.iter().map(|&v| vertices[v]).collect();
-        conclude(problem, &ranked, self.orientation, tree.tests)
+        conclude(problem, &ranked, self.orientation, tree.pair_tests)
     }
 }
 
@@ -102,7 +102,7 @@ struct Tree<'a> {
     settings: &'a InterpretationTree,
     enough: usize,
     best: Vec<usize>,
-    tests: u64,
+    pair_tests: u64,
 }
 
 impl Tree<'_> {
@@ -111,13 +111,13 @@ impl Tree<'_> {
         if taken.len() >= NEEDED && taken.len() > self.best.len() && self.explained(taken) {
             self.best.clone_from(taken);
         }
-        let over = self.tests >= self.settings.budget || self.best.len() >= self.enough;
+        let over = self.pair_tests >= self.settings.budget || self.best.len() >= self.enough;
         if over || taken.len() + self.levels.len() - level <= self.best.len() || level == self.levels.len() {
             return;
         }
         let sense = if self.settings.orientation { Sense::Proper } else { Sense::Any };
         for &vertex in self.levels[level] {
-            if admits(self.volumes, &mut self.quadruples, sense, taken, vertex, &mut self.tests) {
+            if admits(self.volumes, &mut self.quadruples, sense, taken, vertex, &mut self.pair_tests) {
                 taken.push(vertex);
                 self.descend(level + 1, taken);
                 taken.pop();
@@ -128,7 +128,7 @@ impl Tree<'_> {
 
     fn explained(&mut self, taken: &[usize]) -> bool {
         let pairs: Vec<Correspondence> = taken.iter().map(|&v| self.vertices[v]).collect();
-        self.tests += pairs.len() as u64;
+        self.pair_tests += pairs.len() as u64;
         let pose = fitted(self.problem, &pairs);
         pose.is_some_and(|pose| pairs.iter().all(|&pair| fraction(self.problem, &pose, pair) <= 1.0))
     }

@@ -83,16 +83,16 @@ impl Search for JointCompatibility {
             settings: self,
             limits,
             best: (Vec::new(), f64::INFINITY),
-            tests: 0,
+            pair_tests: 0,
         };
         run.descend(0, &mut Vec::new(), &Joint::default());
-        if run.best.0.len() < NEEDED && run.tests >= self.budget {
-            let (budget, best, tests) = (self.budget, run.best.0.len(), run.tests);
-            let ended = Rejected::Budget { budget, best, bound: max_possible(problem), tests };
+        if run.best.0.len() < NEEDED && run.pair_tests >= self.budget {
+            let (budget, best, pair_tests) = (self.budget, run.best.0.len(), run.pair_tests);
+            let ended = Rejected::Budget { budget, best, bound: max_possible(problem), pair_tests };
             return so_far(problem, self.orientation, ended);
         }
         let ranked: Vec<Correspondence> = run.best.0.iter().map(|&v| vertices[v]).collect();
-        conclude(problem, &ranked, self.orientation, run.tests)
+        conclude(problem, &ranked, self.orientation, run.pair_tests)
     }
 }
 
@@ -118,7 +118,7 @@ struct Run<'a> {
     /// Quantiles of χ² by degrees of freedom.
     limits: Vec<f64>,
     best: (Vec<usize>, f64),
-    tests: u64,
+    pair_tests: u64,
 }
 
 /// Share of a distance's variance that it has for itself: C of distances in one plane is singular.
@@ -131,12 +131,12 @@ impl Run<'_> {
         }
         let max = taken.len() + self.levels.len() - level;
         let hopeless = max < self.best.0.len() || (max == self.best.0.len() && joint.square >= self.best.1);
-        if level == self.levels.len() || hopeless || self.tests >= self.settings.budget {
+        if level == self.levels.len() || hopeless || self.pair_tests >= self.settings.budget {
             return;
         }
         let sense = if self.settings.orientation { Sense::Proper } else { Sense::Any };
         for &vertex in self.levels[level] {
-            if !admits(self.volumes, &mut self.quadruples, sense, taken, vertex, &mut self.tests) {
+            if !admits(self.volumes, &mut self.quadruples, sense, taken, vertex, &mut self.pair_tests) {
                 continue;
             }
             if let Some(longer) = self.joined(joint, taken, vertex) {
@@ -181,7 +181,7 @@ impl Run<'_> {
             joint.solved.push(off / deviation);
             joint.square += (off / deviation).powi(2);
         }
-        self.tests += joint.distances.len() as u64;
+        self.pair_tests += joint.distances.len() as u64;
         (joint.square <= self.limits[joint.distances.len()]).then_some(joint)
     }
 

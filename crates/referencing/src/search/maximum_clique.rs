@@ -70,11 +70,11 @@ impl Search for MaximumClique {
         let largest = cliques.run(1, MAX_TIES);
         let size = largest.found.first().map_or(0, Vec::len);
         if size < NEEDED {
-            let tests = graph.tests + (fraction - cliques.left());
+            let pair_tests = graph.pair_tests + (fraction - cliques.left());
             return match largest.complete {
                 true => Err(Rejected::NoConsensus { best: size, needed: NEEDED }),
                 false => {
-                    let ended = Rejected::Budget { budget, best: size, bound: largest.bound, tests };
+                    let ended = Rejected::Budget { budget, best: size, bound: largest.bound, pair_tests };
                     so_far(problem, self.orientation, ended)
                 }
             };
@@ -89,12 +89,12 @@ impl Search for MaximumClique {
         let mut pairs = pairs_of(&graph, &clique);
         let mut alternatives: Vec<Vec<Correspondence>> = ties.iter().map(|clique| pairs_of(&graph, clique)).collect();
         Self::different_first(&pairs, &mut alternatives);
-        let mut tests = graph.tests + (fraction - cliques.left());
+        let mut pair_tests = graph.pair_tests + (fraction - cliques.left());
         let (mut optimal, mut all) = (largest.complete, largest.all);
         let mut decided = all;
         if !all || alternatives.len() > self.alternatives {
             let (alike, spent) = all_alike(problem, &graph, &pairs, sense, budget - fraction + cliques.left());
-            tests += spent;
+            pair_tests += spent;
             if alike {
                 decided = true;
                 all = all && alternatives.len() <= self.alternatives;
@@ -104,22 +104,22 @@ impl Search for MaximumClique {
         if self.orientation && size > MAX_ORIENTED {
             // In the order of the graph: whom to drop does not depend on the order of the points.
             let kept = unmirrored(problem, clique.iter().map(|&vertex| graph.vertices[vertex]).collect(), budget);
-            tests += kept.tests;
+            pair_tests += kept.pair_tests;
             optimal = optimal && kept.complete && kept.pairs.len() == size;
             all = all && optimal;
             pairs = kept.pairs;
             pairs.sort_unstable();
         }
         let undecided = larger_image.or_else(|| {
-            (!decided).then_some(Rejected::Budget { budget, best: pairs.len(), bound: largest.bound, tests })
+            (!decided).then_some(Rejected::Budget { budget, best: pairs.len(), bound: largest.bound, pair_tests })
         });
         Ok(Identification {
             pairs,
             alternatives,
             alternatives_complete: all,
             optimal,
-            size_bound: largest.bound,
-            tests,
+            consensus_bound: largest.bound,
+            pair_tests,
             undecided,
             posterior: None,
         })

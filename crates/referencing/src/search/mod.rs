@@ -70,9 +70,9 @@ pub struct Identification {
     /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
     pub optimal: bool,
     /// No admissible set has more pairs than this.
-    pub size_bound: usize,
+    pub consensus_bound: usize,
     /// Pair tests spent, those that built the graph included.
-    pub tests: u64,
+    pub pair_tests: u64,
     /// Why the set is not to be believed by itself: a larger set is a mirror image, or the search ended
     /// before it had seen, or ruled out, every set as large that is unlike it. `None` also of a search
     /// that looks for no rivals.
@@ -83,14 +83,14 @@ pub struct Identification {
 
 impl Identification {
     /// A set of which nothing is proved but that no admissible set has more than `bound` pairs.
-    pub fn unproved(pairs: Vec<Correspondence>, bound: usize, tests: u64) -> Self {
+    pub fn unproved(pairs: Vec<Correspondence>, bound: usize, pair_tests: u64) -> Self {
         Self {
             pairs,
             alternatives: Vec::new(),
             alternatives_complete: false,
             optimal: false,
-            size_bound: bound,
-            tests,
+            consensus_bound: bound,
+            pair_tests,
             undecided: None,
             posterior: None,
         }
@@ -132,7 +132,7 @@ pub enum Rejected {
         /// No set is larger than this.
         bound: usize,
         /// Pair tests spent, those that built the graph included.
-        tests: u64,
+        pair_tests: u64,
     },
     /// More than the search holds in memory: it did not begin.
     #[error("{size} {what} are more than the {max} that the search takes; {}", FEWER)]

@@ -130,7 +130,7 @@ pub(crate) struct Unmirrored {
     /// Whether every four was tested.
     pub(crate) complete: bool,
     /// Fours tested.
-    pub(crate) tests: u64,
+    pub(crate) pair_tests: u64,
 }
 
 /// The set without the members of mirrored fours: the member of most of them is dropped, of equals
@@ -140,7 +140,7 @@ pub(crate) struct Unmirrored {
 /// in a well-spread core: a member whose image is mirrored is so with every triangle it is far from. What
 /// such a set says is then tested as a whole by the residuals of a rigid fit.
 pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, max: u64) -> Unmirrored {
-    let (mut complete, mut tests) = (true, 0);
+    let (mut complete, mut pair_tests) = (true, 0);
     loop {
         let all = choose(pairs.len(), 4) <= max;
         complete = complete && all;
@@ -154,7 +154,7 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
                     let rest = if all { 0..0 } else { 0..pairs.len() };
                     let plane = volumes.plane([b, c, d]);
                     for a in others.iter().copied().chain(rest).filter(|a| ![b, c, d].contains(a)) {
-                        tests += 1;
+                        pair_tests += 1;
                         if volumes.refuses(Sense::Proper, &plane, a) {
                             opposed.push([a, b, c, d].map(|i| i as u32));
                             if opposed.len() >= MAX_LISTED {
@@ -166,7 +166,7 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
             }
         }
         if opposed.is_empty() {
-            return Unmirrored { pairs, complete, tests };
+            return Unmirrored { pairs, complete, pair_tests };
         }
         let mut dropped = vec![false; pairs.len()];
         while !opposed.is_empty() {
@@ -248,7 +248,7 @@ mod tests {
     fn members_that_are_mirrored_are_dropped() {
         let kept = left(1_000_000);
         assert!(kept.complete && kept.pairs.len() >= 50 && kept.pairs.iter().all(|pair| pair.model < 55));
-        assert!(kept.tests >= choose(kept.pairs.len(), 4));
+        assert!(kept.pair_tests >= choose(kept.pairs.len(), 4));
         let kept = left(100_000);
         assert!(!kept.complete && kept.pairs.len() >= 50, "{}", kept.pairs.len());
         assert!(kept.pairs.iter().all(|pair| pair.model < 55), "the core tells them too");

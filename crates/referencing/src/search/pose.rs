@@ -46,12 +46,12 @@ pub(super) fn refined(
     problem: &Problem<'_>,
     vertices: &[Correspondence],
     start: Transform<Object, Camera>,
-    tests: &mut u64,
+    pair_tests: &mut u64,
 ) -> (f64, Vec<Correspondence>) {
     const MAX_ROUNDS: usize = 10;
     let (mut best, mut pairs, mut pose) = (f64::NEG_INFINITY, Vec::new(), start);
     for _ in 0..MAX_ROUNDS {
-        *tests += vertices.len() as u64;
+        *pair_tests += vertices.len() as u64;
         let near = explained(problem, vertices, &pose);
         let worth: f64 = near.iter().map(|(fraction, _)| 1.0 - fraction * fraction).sum();
         if !(worth > best) {

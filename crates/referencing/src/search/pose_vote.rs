@@ -70,36 +70,36 @@ impl Search for PoseVote {
             problem.cloud[pair.cloud].position.at - camera_from_object * problem.model[pair.model].at
         };
         let votes = Votes::of(vertices.iter().map(offset).collect(), self.radius);
-        let (mut tests, mut ended) = (0, None);
+        let (mut pair_tests, mut ended) = (0, None);
         let mut support: Vec<(usize, usize)> = Vec::new();
         for v in 0..vertices.len() {
-            let near = votes.near(v, &mut tests);
+            let near = votes.near(v, &mut pair_tests);
             // Vertices stand by model point.
             support.push((near.chunk_by(|&a, &b| vertices[a].model == vertices[b].model).count(), v));
-            if tests >= self.budget {
-                ended = Some((self.budget, tests));
+            if pair_tests >= self.budget {
+                ended = Some((self.budget, pair_tests));
                 break;
             }
         }
         support.sort_by_key(|&(count, v)| (std::cmp::Reverse(count), v));
         let mut best = (f64::NEG_INFINITY, Vec::new());
         for &(_, v) in support.iter().take(self.tries) {
-            let near = votes.near(v, &mut tests);
+            let near = votes.near(v, &mut pair_tests);
             let off = |w: usize| (votes.offsets[w] - votes.offsets[v]).norm_squared();
             let groups = near.chunk_by(|&a, &b| vertices[a].model == vertices[b].model);
             let nearest = groups.filter_map(|same| same.iter().copied().min_by(|&a, &b| off(a).total_cmp(&off(b))));
             let pairs: Vec<Correspondence> = nearest.map(|w| vertices[w]).collect();
             let Some(pose) = fitted(problem, &pairs) else { continue };
-            let (worth, explained) = refined(problem, &vertices, pose, &mut tests);
+            let (worth, explained) = refined(problem, &vertices, pose, &mut pair_tests);
             if worth > best.0 {
                 best = (worth, explained);
             }
-            if tests >= self.budget {
-                ended = Some((self.budget, tests));
+            if pair_tests >= self.budget {
+                ended = Some((self.budget, pair_tests));
                 break;
             }
         }
-        conclude_within(problem, &best.1, self.orientation, tests, ended)
+        conclude_within(problem, &best.1, self.orientation, pair_tests, ended)
     }
 }
 
@@ -125,13 +125,13 @@ impl Votes {
     }
 
     /// The offsets within the radius of one, ascending; itself among them.
-    fn near(&self, v: usize, tests: &mut u64) -> Vec<usize> {
+    fn near(&self, v: usize, pair_tests: &mut u64) -> Vec<usize> {
         let [x, y, z] = Self::cube(&self.offsets[v], self.radius);
         let mut near = Vec::new();
         for (i, j) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))) {
             let from = self.cubes.partition_point(|(cube, _)| *cube < [x + i, y + j, z - 1]);
             let cubes = self.cubes[from..].iter().take_while(|(cube, _)| *cube <= [x + i, y + j, z + 1]);
-            near.extend(cubes.map(|&(_, w)| w).inspect(|_| *tests += 1).filter(|&w| {
+            near.extend(cubes.map(|&(_, w)| w).inspect(|_| *pair_tests += 1).filter(|&w| {
                 let step = self.offsets[w] - self.offsets[v];
                 step.norm_squared() <= self.radius * self.radius
             }));

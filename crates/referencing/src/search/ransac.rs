@@ -62,21 +62,21 @@ impl Search for Ransac {
         feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
         let count = vertices.len();
-        let (mut tests, mut trials, mut needed) = (0, 0u64, f64::INFINITY);
+        let (mut pair_tests, mut trials, mut needed) = (0, 0u64, f64::INFINITY);
         let mut best = (0.0, None);
-        while count >= NEEDED && tests < self.budget && (trials as f64) < needed {
+        while count >= NEEDED && pair_tests < self.budget && (trials as f64) < needed {
             trials += 1;
             let [a, b, c] = [(); 3].map(|()| vertices[rng.random_range(0..count)]);
-            tests += 1;
+            pair_tests += 1;
             if !problem.coherent(a, b) {
                 continue;
             }
-            tests += 2;
+            pair_tests += 2;
             if !problem.coherent(a, c) || !problem.coherent(b, c) {
                 continue;
             }
             let Some(pose) = fitted(problem, &[a, b, c]) else { continue };
-            tests += count as u64;
+            pair_tests += count as u64;
             // Vertices stand by model point: the best candidate of each counts.
             let of = |same: &[Correspondence]| {
                 let min = same.iter().map(|&pair| fraction(problem, &pose, pair)).fold(1.0, f64::min);
@@ -90,20 +90,20 @@ impl Search for Ransac {
                 needed = libm::log(1.0 - self.confidence) / libm::log1p(-fraction.powi(3).min(1.0 - 1e-12));
             }
         }
-        let spent = tests;
+        let spent = pair_tests;
         let Some(pose) = best.1 else {
             let bound = max_possible(problem);
-            return match tests < self.budget {
+            return match pair_tests < self.budget {
                 true => Err(Rejected::NotFound { bound, needed: NEEDED }),
                 false => {
-                    let ended = Rejected::Budget { budget: self.budget, best: 0, bound, tests };
+                    let ended = Rejected::Budget { budget: self.budget, best: 0, bound, pair_tests };
                     so_far(problem, self.orientation, ended)
                 }
             };
         };
-        let (_, ranked) = refined(problem, &vertices, pose, &mut tests);
+        let (_, ranked) = refined(problem, &vertices, pose, &mut pair_tests);
         let ended = (spent >= self.budget && (trials as f64) < needed).then_some((self.budget, spent));
-        conclude_within(problem, &ranked, self.orientation, tests, ended)
+        conclude_within(problem, &ranked, self.orientation, pair_tests, ended)
     }
 }
 

@@ -130,12 +130,12 @@ impl Search for RigidConsensus {
         let parts = (&terms, &prior_terms, &graph);
         let none = BTreeSet::new();
         let mut swept = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget).sweep();
-        let mut tests = graph.tests + swept.tests;
+        let mut pair_tests = graph.pair_tests + swept.pair_tests;
         let strong = |swept: &Swept| swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG);
         // What nothing makes believe needs no proof.
         let proved =
             if self.prove && strong(&swept) { prove(problem.model, parts, &mut swept, self.budget) } else { None };
-        tests += proved.as_ref().map_or(0, |proved| proved.tests);
+        pair_tests += proved.as_ref().map_or(0, |proved| proved.pair_tests);
         // Up to a hundred megabytes that nobody needs from here on.
         swept.pairs = Vec::new();
         let mut clutter_density = ClutterDensity::default();
@@ -151,9 +151,9 @@ impl Search for RigidConsensus {
         if strong(&swept) {
             weighted(&mut swept);
         }
-        let ended = |best: usize, tests| Rejected::Budget { budget: self.budget, best, bound, tests };
+        let ended = |best: usize, pair_tests| Rejected::Budget { budget: self.budget, best, bound, pair_tests };
         let Some(best) = swept.modes.first() else {
-            return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, tests)) };
+            return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, pair_tests)) };
         };
         if let Some(image) = mirror_image(problem.model, parts, best) {
             return Err(Rejected::Mirrored { best: image.members.len(), proved: false });
@@ -169,8 +169,8 @@ impl Search for RigidConsensus {
             let elsewhere = |mode: &Mode| mode.members.iter().filter(|&&v| best.holds(v)).count() < NEEDED;
             let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
             let min = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
-            let left = self.budget.saturating_sub(swept.tests);
-            let work = swept.tests + graph.tests / PAIRS_A_WORD;
+            let left = self.budget.saturating_sub(swept.pair_tests);
+            let work = swept.pair_tests + graph.pair_tests / PAIRS_A_WORD;
             let full = work.max(MIN_EFFORT);
             beside = if pattern.is_some() {
                 Seeds::new(problem.model, parts, &taken, (min, STRONG), left).sweep()
@@ -185,7 +185,7 @@ impl Search for RigidConsensus {
             // What poses elsewhere say of the clutter, those that are as likely as no object, in an eighth of that time.
             let effort = left.min((work / 8).max(MIN_EFFORT / 10));
             let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
-            tests += others.tests;
+            pair_tests += others.pair_tests;
             weighted(&mut others);
             let occupied = Occupied::of(problem, best, pattern.as_ref().and_then(Pattern::distinctive));
             let mistaken = occupied.mistaken(problem, (&terms, &graph), &others.modes);
@@ -194,7 +194,7 @@ impl Search for RigidConsensus {
             let weight = |of: &StructuredClutter| of.ln_evidence + of.ln_alone;
             structured_clutter = clutter_patterns.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b)));
             weighted(&mut beside);
-            tests += beside.tests;
+            pair_tests += beside.pair_tests;
             repeated_pattern = pattern.map(|pattern| pattern.repeated_pattern(problem, &terms, &graph, best));
             unlikely = others.modes.into_iter().next();
             if unlikely.is_none() && swept.modes.iter().chain(&beside.modes).all(|mode| !elsewhere(mode)) {
@@ -206,9 +206,9 @@ impl Search for RigidConsensus {
         let evidence_gap = proved.map(gap);
         // What is returned is coherent throughout: of twenty true points some two are usually further from each
         // other than the tolerance, and the worst fitting give way. The belief keeps them.
-        let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut tests);
+        let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut pair_tests);
         if pairs.len() < NEEDED {
-            return if complete { Err(nothing) } else { so_far(problem, true, ended(pairs.len(), tests)) };
+            return if complete { Err(nothing) } else { so_far(problem, true, ended(pairs.len(), pair_tests)) };
         }
         pairs.sort_unstable();
         let explanation = |mode: &Mode| Explanation {
@@ -223,9 +223,9 @@ impl Search for RigidConsensus {
             alternatives_complete: false,
             // What is proved of a pose is not proved of what is left of its pairs where some contradict each other.
             optimal: evidence_gap == Some(0.0) && pairs.len() == best.members.len(),
-            size_bound: bound,
-            tests,
-            undecided: (!complete).then(|| ended(pairs.len(), tests)),
+            consensus_bound: bound,
+            pair_tests,
+            undecided: (!complete).then(|| ended(pairs.len(), pair_tests)),
             posterior: Some(Posterior {
                 explanations: explain(&swept),
                 beside: explain(&beside),
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!((plain.optimal, gap(&plain)), (false, None));
         assert_eq!((proved.optimal, gap(&proved)), (true, Some(0.0)));
         assert_eq!(plain.pairs, proved.pairs);
-        assert!(proved.tests > plain.tests);
+        assert!(proved.pair_tests > plain.pair_tests);
     }
 
     /// The first two points are pushed apart by 44 mm, more than Δ, each to 2.2 σ of where the pose of all puts it: one of them goes.

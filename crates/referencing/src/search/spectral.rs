@@ -62,10 +62,10 @@ impl Search for Spectral {
         let affinity = Affinity::of(problem, &graph, self.max_edges, |off| 1.0 - off * off)?;
         let mut x = vec![1.0; graph.vertices.len()];
         let (mut next, mut plain) = (x.clone(), x.clone());
-        let mut tests = graph.tests;
+        let mut pair_tests = graph.pair_tests;
         for _ in 0..self.iterations {
             affinity.products(&x, &mut next, &mut plain);
-            tests += affinity.edges() as u64;
+            pair_tests += affinity.edges() as u64;
             // Half of the last vector keeps eigenvalues of opposite sign from taking turns.
             let scale = next.iter().copied().fold(0.0, f64::max);
             next.iter_mut().zip(&x).for_each(|(next, x)| *next += 0.5 * scale * x);
@@ -79,7 +79,7 @@ impl Search for Spectral {
             }
         }
         let ranked: Vec<Correspondence> = by_weight(&x).into_iter().map(|v| graph.vertices[v]).collect();
-        conclude(problem, &ranked, self.orientation, tests)
+        conclude(problem, &ranked, self.orientation, pair_tests)
     }
 }
 

@@ -102,7 +102,7 @@ struct Refused {
     /// The last of these points; none after it is looked at.
     deepest: usize,
     /// What that costs for one choice of candidates of the points that follow: pair tests, and drawing.
-    tests: u64,
+    pair_tests: u64,
     sampled: u64,
 }
 
@@ -118,7 +118,7 @@ pub(super) struct Enumeration<'a> {
     samples: Samples,
     orientation: bool,
     budget: u64,
-    tests: u64,
+    pair_tests: u64,
     /// What drawing samples has cost, in pair tests.
     sampled: u64,
     /// Size of the largest coherent set met so far, as the beginning of a longer sample.
@@ -135,7 +135,7 @@ impl<'a> Enumeration<'a> {
         orientation: bool,
         budget: u64,
     ) -> Self {
-        Self { problem, lists, samples, orientation, budget, tests: 0, sampled: 0, best: 0, mirrored: None }
+        Self { problem, lists, samples, orientation, budget, pair_tests: 0, sampled: 0, best: 0, mirrored: None }
     }
 
     /// The first coherent sample, of at most `longest` points.
@@ -154,13 +154,13 @@ impl<'a> Enumeration<'a> {
                         optimal: true,
                         undecided,
                         posterior: None,
-                        ..Identification::unproved(pairs, q, self.tests)
+                        ..Identification::unproved(pairs, q, self.pair_tests)
                     });
                 }
                 Ok(None) => {}
                 Err(Spent) => {
                     let (budget, best) = (self.budget, self.best);
-                    let ended = Rejected::Budget { budget, best, bound: q, tests: self.tests };
+                    let ended = Rejected::Budget { budget, best, bound: q, pair_tests: self.pair_tests };
                     return so_far(self.problem, self.orientation, ended);
                 }
             }
@@ -172,7 +172,7 @@ impl<'a> Enumeration<'a> {
                 Ok(None) => {}
                 Err(Spent) => {
                     let (budget, best) = (self.budget, self.best);
-                    return Err(Rejected::Budget { budget, best, bound: 2, tests: self.tests });
+                    return Err(Rejected::Budget { budget, best, bound: 2, pair_tests: self.pair_tests });
                 }
             }
         }
@@ -183,7 +183,7 @@ impl<'a> Enumeration<'a> {
     fn samples_of(&mut self, q: usize) -> Result<Option<Vec<Correspondence>>, Spent> {
         let mut sample: Vec<usize> = (0..q).collect();
         loop {
-            let (tests, sampled) = (self.tests, self.sampled);
+            let (pair_tests, sampled) = (self.pair_tests, self.sampled);
             let deepest = match self.product_of(&sample)? {
                 Product::Coherent(found) => return Ok(Some(found)),
                 Product::Refused { deepest } => deepest,
@@ -191,8 +191,11 @@ impl<'a> Enumeration<'a> {
             // All later samples that begin with the same points are refused by the same tests: they are counted, not made.
             let after = self.choices(&sample[deepest + 1..]);
             let fraction = |spent: u64| (u128::from(spent) / after) as u64;
-            let refused =
-                Refused { deepest, tests: fraction(self.tests - tests), sampled: fraction(self.sampled - sampled) };
+            let refused = Refused {
+                deepest,
+                pair_tests: fraction(self.pair_tests - pair_tests),
+                sampled: fraction(self.sampled - sampled),
+            };
             self.pass_over(&refused, &mut sample)?;
             if !self.next(&mut sample, deepest) {
                 return Ok(None);
@@ -248,11 +251,11 @@ impl<'a> Enumeration<'a> {
 
     /// Counts so many choices for a sample of `q` points that each end after as many tests, in which the first `agree` points were
     /// found to agree.
-    fn count(&mut self, q: usize, tests: u64, choices: u128, agree: usize) -> Result<(), Spent> {
+    fn count(&mut self, q: usize, pair_tests: u64, choices: u128, agree: usize) -> Result<(), Spent> {
         let drawing = (q * q) as u64 / DRAWING;
-        let full = u128::from(self.left() / (drawing + tests)).min(choices);
+        let full = u128::from(self.left() / (drawing + pair_tests)).min(choices);
         // No more than the budget.
-        self.tests += full as u64 * tests;
+        self.pair_tests += full as u64 * pair_tests;
         self.sampled += full as u64 * drawing;
         if full > 0 {
             self.best = self.best.max(agree);
@@ -263,7 +266,7 @@ impl<'a> Enumeration<'a> {
         // The next choice is the one in which the budget ends.
         self.sampled += drawing;
         let last = self.left();
-        self.tests += last;
+        self.pair_tests += last;
         let agreed = (1..=q).take_while(|&points| all_pairs(points) <= last).last();
         self.best = self.best.max(agreed.unwrap_or(0));
         Err(Spent)
@@ -271,7 +274,7 @@ impl<'a> Enumeration<'a> {
 
     /// What is left of the budget.
     fn left(&self) -> u64 {
-        self.budget.saturating_sub(self.tests + self.sampled)
+        self.budget.saturating_sub(self.pair_tests + self.sampled)
     }
 
     /// Whether no four of pairs that agree in all distances are mirrored.
@@ -283,7 +286,7 @@ impl<'a> Enumeration<'a> {
             if self.left() == 0 {
                 return Err(Spent);
             }
-            self.tests += 1;
+            self.pair_tests += 1;
             if mirrored(self.problem, four) {
                 if self.mirrored.is_none() && wholly_mirrored(self.problem, pairs) {
                     self.mirrored = Some(pairs.len());
@@ -302,13 +305,13 @@ impl<'a> Enumeration<'a> {
         }
         // Of the samples that begin like this one up to `place`, this one is counted already.
         let (mut place, mut counted) = (refused.deepest, self.choices(&sample[refused.deepest + 1..]));
-        let each = u128::from(refused.tests + refused.sampled);
+        let each = u128::from(refused.pair_tests + refused.sampled);
         loop {
             let left = u128::from(self.left());
             let more = self.continuations(sample, place, left.saturating_add(counted));
             let choices = more.saturating_mul(self.choices(&sample[refused.deepest + 1..=place])) - counted;
             if choices.saturating_mul(each) <= left {
-                self.tests += choices as u64 * refused.tests;
+                self.pair_tests += choices as u64 * refused.pair_tests;
                 self.sampled += choices as u64 * refused.sampled;
                 if place == refused.deepest {
                     return Ok(());
@@ -498,10 +501,10 @@ mod tests {
     fn the_tests_of_a_sample_are_its_distances_and_its_quadruples() {
         for samples in [Samples::Permutations, Samples::Combinations] {
             let found = Scene::of(&PLACES, &PLACES).search(&search(samples, 7)).unwrap();
-            assert_eq!((found.pairs.len(), found.tests, found.size_bound, found.optimal), (4, 7, 4, true));
+            assert_eq!((found.pairs.len(), found.pair_tests, found.consensus_bound, found.optimal), (4, 7, 4, true));
             assert_eq!(found.undecided, None);
             let flat = StructuralCoherence { orientation: false, ..search(samples, 6) };
-            assert_eq!(Scene::of(&PLACES, &PLACES).search(&flat).unwrap().tests, 6);
+            assert_eq!(Scene::of(&PLACES, &PLACES).search(&flat).unwrap().pair_tests, 6);
         }
         let ended = Scene::of(&PLACES, &PLACES).search(&search(Samples::Permutations, 6)).unwrap();
         assert_eq!(budget_of(&ended), (6, 4, 4));
@@ -514,11 +517,14 @@ mod tests {
         let mut cloud = PLACES;
         cloud[3] = [9.0, 9.0, 9.0];
         let scene = Scene::of(&PLACES, &cloud);
-        for (samples, tests) in [(Samples::Permutations, 51), (Samples::Combinations, 7)] {
-            let found = scene.search(&search(samples, tests)).unwrap();
-            assert_eq!((found.pairs.len(), found.tests, found.size_bound, found.optimal), (3, tests, 3, true));
-            let ended = scene.search(&search(samples, tests - 1)).unwrap();
-            assert_eq!(budget_of(&ended), (tests - 1, 3, 3));
+        for (samples, pair_tests) in [(Samples::Permutations, 51), (Samples::Combinations, 7)] {
+            let found = scene.search(&search(samples, pair_tests)).unwrap();
+            assert_eq!(
+                (found.pairs.len(), found.pair_tests, found.consensus_bound, found.optimal),
+                (3, pair_tests, 3, true)
+            );
+            let ended = scene.search(&search(samples, pair_tests - 1)).unwrap();
+            assert_eq!(budget_of(&ended), (pair_tests - 1, 3, 3));
         }
     }
 
@@ -529,7 +535,7 @@ mod tests {
             (0..16).map(f64::from).map(|k| [k, (k * 1.7).sin() * 3.0, (k * 0.9).cos() * 2.0]).collect();
         let scene = Scene::of(&places, &places);
         let found = scene.search(&search(Samples::Combinations, 1941)).unwrap();
-        assert_eq!((found.pairs.len(), found.tests, found.undecided), (16, 1940, None));
+        assert_eq!((found.pairs.len(), found.pair_tests, found.undecided), (16, 1940, None));
         let ended = scene.search(&search(Samples::Combinations, 1940)).unwrap();
         assert_eq!(budget_of(&ended), (1940, 16, 16));
     }
@@ -541,7 +547,7 @@ mod tests {
         let best = |cloud: &[[f64; 3]], samples, budget| match Scene::of(model, cloud).search(&search(samples, budget))
         {
             Err(Rejected::NoConsensus { best, needed: 3 }) => Ok(best),
-            Err(Rejected::Budget { best, bound, tests, .. }) => Err((best, bound, tests)),
+            Err(Rejected::Budget { best, bound, pair_tests, .. }) => Err((best, bound, pair_tests)),
             other => panic!("{other:?}"),
         };
         for samples in [Samples::Permutations, Samples::Combinations] {
@@ -596,7 +602,7 @@ mod tests {
     /// All that a search may say, made test by test: samples, choices and pairs in the order that the enumeration counts them in.
     fn literally(scene: &Scene, problem: &Problem<'_>, search: &StructuralCoherence) -> (Option<usize>, u64, usize) {
         let n = scene.model.len();
-        let (mut tests, mut sampled, mut best) = (0, 0, 0);
+        let (mut pair_tests, mut sampled, mut best) = (0, 0, 0);
         for q in (NEEDED..=n).rev() {
             let mut sample: Vec<usize> = (0..q).collect();
             loop {
@@ -611,10 +617,10 @@ mod tests {
                     let mut coherent = true;
                     'tests: for place in 0..q {
                         for before in 0..place {
-                            if tests + sampled >= search.budget {
-                                return (None, tests, best);
+                            if pair_tests + sampled >= search.budget {
+                                return (None, pair_tests, best);
                             }
-                            tests += 1;
+                            pair_tests += 1;
                             if !problem.coherent(pairs[place], pairs[before]) {
                                 coherent = false;
                                 break 'tests;
@@ -623,7 +629,7 @@ mod tests {
                         best = best.max(place + 1);
                     }
                     if coherent {
-                        return (Some(q), tests, best);
+                        return (Some(q), pair_tests, best);
                     }
                     for place in (0..q).rev() {
                         if choice[place] + 1 < lists[place].len() {
@@ -643,7 +649,7 @@ mod tests {
                 }
             }
         }
-        (Some(0), tests, best)
+        (Some(0), pair_tests, best)
     }
 
     /// What is counted is what would be tested one by one, wherever the budget ends: at every budget up to the end of small searches,
@@ -684,7 +690,7 @@ mod tests {
                         }
                         break;
                     }
-                    let counted = (found, of.tests, of.best);
+                    let counted = (found, of.pair_tests, of.best);
                     assert_eq!(counted, literally(&scene, &problem, &search), "case {case}, {samples:?}, {budget}");
                 }
             }

@@ -69,7 +69,7 @@ impl Search for WeightedClique {
         let weight = |off: f64| libm::exp(-4.5 * off * off);
         let affinity = Affinity::of(problem, &graph, self.max_edges, weight)?;
         let mut ascent = Ascent::of(&affinity, graph.vertices.len());
-        let spent = |ascent: &Ascent<'_>| graph.tests + ascent.products * affinity.edges() as u64;
+        let spent = |ascent: &Ascent<'_>| graph.pair_tests + ascent.products * affinity.edges() as u64;
         let mut ended = None;
         for _ in 0..self.iterations {
             if spent(&ascent) > self.budget {

@@ -6,7 +6,7 @@ use super::{
     Mahalanobis, ScaleError,
     descent::{Linearized, linearize},
     mahalanobis::covariance,
-    scale_error::stretch,
+    scale_error::scale_error,
 };
 use crate::Observations;
 
@@ -17,7 +17,7 @@ pub(crate) struct Deletions<'a> {
     all: Linearized,
     each: Vec<Linearized>,
     /// Of all points, had the fit a scale besides; `None` where they fix none.
-    pub(crate) stretch: Option<ScaleError>,
+    pub(crate) scale_error: Option<ScaleError>,
 }
 
 /// With fewer points left another valley may be the likeliest.
@@ -33,12 +33,12 @@ impl<'a> Deletions<'a> {
         let solved = Mahalanobis::default().solved(data, |pose, terms| {
             let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
             let each = (0..data.points.len()).map(one).collect::<Result<Vec<_>, _>>();
-            each.map(|each| (*pose, each, stretch(&data.points, pose, terms)))
+            each.map(|each| (*pose, each, scale_error(&data.points, pose, terms)))
         });
-        let (pose, each, stretch) = solved.ok()?;
+        let (pose, each, scale_error) = solved.ok()?;
         let mut all = *each.first()?;
         each[1..].iter().for_each(|one| all = all.plus(one));
-        Some(Self { data, pose, all, each, stretch })
+        Some(Self { data, pose, all, each, scale_error })
     }
 
     /// The likeliest pose without the points `out`, and its covariance: one step from that of all points where it is

@@ -26,7 +26,7 @@ pub struct ScaleError {
 /// A stretch ε moves the place p of a point by ε d, d = p − p̄ its lever from the mean of all. With J of the motion as in
 /// [`linearize`] and the pull W r of each point, ε = (Σ dᵀWr − cᵀ N⁻¹ Σ JᵀWr)/s and σ² = 1/s, N = Σ JᵀWJ, c = Σ JᵀWd,
 /// s = Σ dᵀWd − cᵀ N⁻¹ c. `None` where the points determine no motion, or no scale beside it; see [`isotropic`].
-pub(super) fn stretch(
+pub(super) fn scale_error(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
     terms: Terms<'_>,
@@ -60,7 +60,7 @@ pub(crate) fn isotropic(points: &[Observation], pose: &Transform<Object, Camera>
         let variance = measured.covariance.trace() / 3.0 + model_sigma * model_sigma;
         (variance > 0.0).then(|| Term::of(Matrix3::identity() / variance, &(measured.at.coords - at)))
     };
-    stretch(points, pose, &term)
+    scale_error(points, pose, &term)
 }
 
 /// Less than this share of the information on the scale is what rounding leaves: where one weight is 10¹⁰ times the others', the
@@ -87,7 +87,7 @@ mod tests {
             model_sigma: 0.0,
         };
         let data = Observations { points: (0..8).map(seen).collect(), rig: None };
-        Mahalanobis::default().solved(&data, |pose, terms| Ok(stretch(&data.points, pose, terms))).unwrap()
+        Mahalanobis::default().solved(&data, |pose, terms| Ok(scale_error(&data.points, pose, terms))).unwrap()
     }
 
     /// Of eight corners Σ ‖d‖² = 8 · (1 + 1 + ¼) = 18 m², and no motion does what a stretch does: σ = 2 mm/√18 m.
@@ -124,6 +124,6 @@ mod tests {
     fn no_points_have_none() {
         let data = Observations { points: Vec::new(), rig: None };
         let pose = Transform::exp(&[0.0; 6].into());
-        assert_eq!(stretch(&data.points, &pose, &|_, _: &_| None), None);
+        assert_eq!(scale_error(&data.points, &pose, &|_, _: &_| None), None);
     }
 }

@@ -204,10 +204,13 @@ fn check_exact(
 ) {
     let problem = case.problem();
     match search.search(&problem, &mut ChaCha8Rng::seed_from_u64(0)) {
-        Ok(Identification { pairs, alternatives, alternatives_complete, optimal, size_bound, .. }) => {
+        Ok(Identification { pairs, alternatives, alternatives_complete, optimal, consensus_bound, .. }) => {
             assert!(admissible(&problem, &pairs, orientation), "case {seed}: {pairs:?} is not admissible");
             assert_eq!(pairs.len(), size, "case {seed}, orientation {orientation}");
-            assert!(optimal && alternatives_complete && size_bound == size, "case {seed}: {optimal} {size_bound}");
+            assert!(
+                optimal && alternatives_complete && consensus_bound == size,
+                "case {seed}: {optimal} {consensus_bound}"
+            );
             let mut found = alternatives;
             found.push(pairs);
             found.sort();

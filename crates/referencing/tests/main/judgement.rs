@@ -61,7 +61,7 @@ fn a_model_in_view_is_fixed() {
     let found = attempt(&model, &cloud, &Candidates::all(7, 27), None);
     let Outcome::Fix(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert_eq!(fix.pairs, (0..7).map(|i| Correspondence { model: i, cloud: i }).collect::<Vec<_>>());
-    assert_eq!((found.optimal, found.size_bound, &found.identified), (true, Some(7), &fix.pairs));
+    assert_eq!((found.optimal, found.consensus_bound, &found.identified), (true, Some(7), &fix.pairs));
     assert!(found.nfa.unwrap() < 1e-6);
     let xi = fix.object_from_camera.error_to(&motion());
     assert!(xi.dot(&fix.covariance.matrix.cholesky().unwrap().solve(&xi)) < 22.5, "within its covariance");
@@ -257,7 +257,7 @@ fn a_blow_up_stops_at_the_budget_with_an_honest_bound() {
     assert!(best >= 1 && bound == 50 && !found.optimal, "{best} {bound}");
     let search = MaximumClique { budget: 10_000, ..MaximumClique::default() };
     let found = compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
-    assert!(!found.optimal && found.size_bound.unwrap() <= 50, "{found:?}");
+    assert!(!found.optimal && found.consensus_bound.unwrap() <= 50, "{found:?}");
     assert!(!matches!(found.outcome, Outcome::Fix(_)));
 }
 
@@ -405,14 +405,14 @@ fn a_rig_that_stretches_what_it_measures_is_reported_and_refused_where_it_matter
     let mut squares = 0.0;
     for _ in 0..200 {
         let Outcome::Fix(fix) = attempt_at(12.0, 1.0) else { panic!("nothing is stretched") };
-        let stretch = fix.integrity.stretch.expect("seven points");
-        squares += (stretch.value / stretch.sigma).powi(2) / 200.0;
+        let scale_error = fix.integrity.scale_error.expect("seven points");
+        squares += (scale_error.value / scale_error.sigma).powi(2) / 200.0;
     }
     // χ²₁ on average: 1 ± .1.
     assert!((0.6..1.4).contains(&squares), "{squares}");
     let Outcome::Fix(fix) = attempt_at(3.0, 1.015) else { panic!("4.5 cm off") };
-    let stretch = fix.integrity.stretch.expect("seven points");
-    assert!((stretch.value - 0.015).abs() < 4.0 * stretch.sigma, "{stretch:?}");
+    let scale_error = fix.integrity.scale_error.expect("seven points");
+    assert!((scale_error.value - 0.015).abs() < 4.0 * scale_error.sigma, "{scale_error:?}");
     let outcome = attempt_at(12.0, 1.015);
     let Outcome::Rejected(refusal @ RejectionReason::Stretched { off, .. }) = outcome else { panic!("{outcome:?}") };
     assert!((0.14..0.32).contains(&off) && refusal.reason() == "gate", "{refusal}");
@@ -505,13 +505,13 @@ fn what_was_not_examined_is_not_believed() {
     };
     let mut found = MaximumClique::default().search(&problem, &mut rng).expect("a set");
     assert_eq!(found.undecided, None);
-    let why = Rejected::Budget { budget: 5, best: 7, bound: 7, tests: 9 };
+    let why = Rejected::Budget { budget: 5, best: 7, bound: 7, pair_tests: 9 };
     found.undecided = Some(why.clone());
     let refused = judge(&problem, Ok(found), &Kabsch::default(), &Acceptance::default(), None);
     assert_eq!(refused.outcome, Outcome::Rejected(RejectionReason::Search(why.clone())));
     assert_eq!((refused.outcome.reason(), refused.identified.len()), (Some("budget"), 7));
     let none = judge(&problem, Err(why), &Kabsch::default(), &Acceptance::default(), None);
-    assert_eq!((none.tests, none.size_bound, none.optimal), (Some(9), Some(7), false));
+    assert_eq!((none.pair_tests, none.consensus_bound, none.optimal), (Some(9), Some(7), false));
 }
 
 /// Measured points at one depth, each with a depth noise of 30 mm and 2 mm across: one disparity for all.
@@ -552,7 +552,7 @@ fn named_points_are_tested_for_their_residuals_alone() {
     };
     let found = judge_labelled(&problem, said([0, 1, 2, 3, 4]), &Kabsch::default(), &strict, None);
     assert!(matches!(found.outcome, Outcome::Fix(_)), "{:?}", found.outcome);
-    assert_eq!((found.nfa, found.tests, found.optimal), (None, None, false));
+    assert_eq!((found.nfa, found.pair_tests, found.optimal), (None, None, false));
     let exchanged = judge_labelled(&problem, said([1, 0, 2, 3, 4]), &Kabsch::default(), &strict, None);
     assert_eq!(exchanged.outcome.reason(), Some("gate"), "{:?}", exchanged.outcome);
     let few = judge_labelled(&problem, said([0, 1, 2, 3, 4])[..2].to_vec(), &Kabsch::default(), &strict, None);

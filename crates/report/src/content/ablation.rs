@@ -16,10 +16,10 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
             .map(Head::numbers),
     );
     let caption = text![
-        "Each setting by itself, all others pooled: shares of all attempts; the least, the middle and the greatest of the trials’ medians of m2 over all attempts, failures as infinitely far off; the middle of their median times."
+        "Each setting by itself, all others pooled: shares of all attempts; the least, the middle and the greatest of the trials’ medians of the TRE over all attempts, failures as infinitely far off; the middle of their median times."
     ];
     let mut table = Table::new("ablation", caption, heads);
-    let all = summary.rows.iter().filter_map(|row| row.m2_of_all).map(|m2| m2 * 1e3);
+    let all = summary.rows.iter().filter_map(|row| row.tre_of_all).map(|tre| tre * 1e3);
     let digits = decimals(all);
     for (place, axis) in axes.iter().enumerate() {
         let value = |row: &Row| row.axes[place].value.clone();
@@ -37,15 +37,15 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
                 let key = over("/metrics/evaluation", &format!("percent {group} of attempted"));
                 Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
             };
-            let mut m2: Vec<f64> = own.iter().filter_map(|&i| summary.rows[i].m2_of_all).map(|m| m * 1e3).collect();
-            let middle = (!m2.is_empty()).then(|| seafix_evaluation::median(&mut m2));
-            let ends = m2.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
-            let [min, max] = ends.map(|end| (!m2.is_empty()).then_some(end));
+            let mut tre: Vec<f64> = own.iter().filter_map(|&i| summary.rows[i].tre_of_all).map(|m| m * 1e3).collect();
+            let middle = (!tre.is_empty()).then(|| seafix_evaluation::median(&mut tre));
+            let ends = tre.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
+            let [min, max] = ends.map(|end| (!tre.is_empty()).then_some(end));
             let error = |which: &str, value| {
                 Number::new(
                     value,
                     digits,
-                    over("/metrics/evaluation", &format!("{which} all m2_rms of attempted in mm")),
+                    over("/metrics/evaluation", &format!("{which} all tre_rms of attempted in mm")),
                 )
             };
             let mut times: Vec<f64> = own.iter().filter_map(|&i| summary.rows[i].times.total_ms).collect();

@@ -2,7 +2,7 @@
 
 use super::{answer, phrases};
 use crate::{
-    Number, PAPER_M1, Row, RunSummary,
+    Number, PAPER_FIT_RMS, Row, RunSummary,
     document::{Text, bold, code, text},
     format::number,
     paired::Comparison,
@@ -51,7 +51,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
     if !summary.rows.iter().any(|row| row.solver == "triad") || run.trials.iter().all(|trial| !trial.images) {
         return texts;
     }
-    let [low, high] = PAPER_M1.map(|m| number(Some(m * 1e3), 0));
+    let [low, high] = PAPER_FIT_RMS.map(|m| number(Some(m * 1e3), 0));
     texts.push(text![format!(
         "For orientation: of a virtual scene of its own, at 2–5 m, the paper reports m1 of {low}–{high} mm, and neither rates nor the error of the vehicle’s pose ({}).",
         paper::CITATION

@@ -116,8 +116,8 @@ fn value(row: &Row, key: &str) -> String {
 type Metric = (&'static str, Field, fn(&Row) -> Option<Distribution>);
 
 const METRICS: [Metric; 2] = [
-    ("error of the model points (m2)", Field::M2, |row| row.m2),
-    ("error of the camera’s position (m3)", Field::Position, |row| row.m3_position),
+    ("error of the model points (TRE)", Field::Tre, |row| row.tre),
+    ("error of the camera’s position", Field::Position, |row| row.position_error),
 ];
 
 /// One sentence a quantity, every trial in it: along the condition, or most first.
@@ -134,8 +134,8 @@ fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
         (fraction.value.is_some()).then(|| text![labels.of_trial(row), ": ", fraction, " % of ", n])
     });
     let mut said = vec![list("Found of the attempts", found)];
-    let m1: Metric = ("residual of the identified points (m1)", Field::M1, |row| row.m1);
-    for (name, field, of) in METRICS.into_iter().chain([m1]) {
+    let fit: Metric = ("residual of the identified points", Field::Fit, |row| row.fit);
+    for (name, field, of) in METRICS.into_iter().chain([fit]) {
         let digits = phrases::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
         let medians = order.iter().map(|&index| {
             let (row, spread) = (&summary.rows[index], of(&summary.rows[index])?);
@@ -268,18 +268,18 @@ fn limits(run: &Run, summary: &RunSummary) -> Vec<Text> {
                     Number::new(ratios.iter().copied().reduce(pick), 3, phrases::over(&trials, "/metrics/totals", what))
                 })
             };
-            let [m2_low, m2_high] = ends(Field::M2, &ratios(|limits| limits.m2));
-            let [m3_low, m3_high] = ends(Field::Position, &ratios(|limits| limits.m3));
+            let [tre_low, tre_high] = ends(Field::Tre, &ratios(|limits| limits.tre));
+            let [position_low, position_high] = ends(Field::Position, &ratios(|limits| limits.position));
             (!own.is_empty()).then(|| {
                 text![
                     format!("{method}: the root mean square error of the model points is "),
-                    m2_low,
+                    tre_low,
                     " to ",
-                    m2_high,
+                    tre_high,
                     " times the Cramér–Rao bound, that of the camera’s position ",
-                    m3_low,
+                    position_low,
                     " to ",
-                    m3_high,
+                    position_high,
                     " times."
                 ]
             })

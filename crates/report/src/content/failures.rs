@@ -63,7 +63,7 @@ fn worst(run: &Run) -> Vec<Case<'_>> {
         trials.flat_map(|(index, trial)| trial.attempts().map(move |(frame, row)| (index, frame, row)))
     };
     let error = |row: &AttemptRow| {
-        let errors = [Field::M2, Field::M1, Field::Residual].map(|field| row.get(field));
+        let errors = [Field::Tre, Field::Fit, Field::Residual].map(|field| row.get(field));
         errors.into_iter().flatten().next().unwrap_or(0.0)
     };
     let max = |cases: Vec<Case<'_>>, n: usize| -> Vec<(usize, u64)> {
@@ -106,10 +106,10 @@ fn best(run: &Run) -> Option<(usize, u64)> {
 
 fn table(run: &Run, worst: &[Case<'_>]) -> Table {
     let columns = [
-        ("m1 (mm)", Field::M1, Unit::Millimetres),
-        ("m2 (mm)", Field::M2, Unit::Millimetres),
-        ("m3 (mm)", Field::Position, Unit::Millimetres),
-        ("m3 (°)", Field::Attitude, Unit::Degrees),
+        ("fit RMS (mm)", Field::Fit, Unit::Millimetres),
+        ("TRE (mm)", Field::Tre, Unit::Millimetres),
+        ("position error (mm)", Field::Position, Unit::Millimetres),
+        ("attitude error (°)", Field::Attitude, Unit::Degrees),
         ("NEES", Field::Nees, Unit::Plain),
     ];
     let digits = columns.map(|(_, field, unit)| {

@@ -29,19 +29,19 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     };
     let (null, alternative, unit) = if first.over_conditions {
         (
-            "over the conditions, the ratio of the median m2 of two methods lies symmetrically about one",
+            "over the conditions, the ratio of the median the TRE of two methods lies symmetrically about one",
             "one of the two has the less median m2",
             "the conditions, one pair each",
         )
     } else if first.between_conditions {
         (
-            "frame by frame of the same random numbers, the difference of m2 of two conditions lies symmetrically about nothing",
+            "frame by frame of the same random numbers, the difference of the TRE of two conditions lies symmetrically about nothing",
             "one of the two has the less m2",
             "the attempts that both made, in pairs",
         )
     } else {
         (
-            "the difference of m2 of two trials on the same attempts lies symmetrically about nothing",
+            "the difference of the TRE of two trials on the same attempts lies symmetrically about nothing",
             "one of the two has the less m2",
             "the attempts that both made, in pairs",
         )

@@ -112,5 +112,5 @@ fn number(
         "median" => Some(seafix_evaluation::quantile(&mut values, 0.5)),
         _ => Some(seafix_evaluation::quantile(&mut values, 0.95)),
     };
-    phrases::inspected(trial, statistic, (quantity, point), value, (unit, decimals))
+    phrases::poi(trial, statistic, (quantity, point), value, (unit, decimals))
 }

@@ -53,7 +53,7 @@ fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let bound = 6; // the dark grey of the palette
     let ticks: Vec<f64> = on(&key).iter().filter_map(|value| value.parse().ok()).collect();
     let heads =
-        [Head::words("condition"), Head::words("series"), Head::numbers(headed(&key)), Head::numbers("RMS m2 (mm)")];
+        [Head::words("condition"), Head::words("series"), Head::numbers(headed(&key)), Head::numbers("RMS TRE (mm)")];
     let mut data =
         Table::new("error-over-noise", text!["Every point of the figure of error over noise."], heads.to_vec());
     let mut panels = Vec::new();
@@ -64,15 +64,15 @@ fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
             let rows = with_limits().filter(|(_, row)| conditions(row) == *place && (is_bound || row.solver == method));
             let mut points: Vec<([f64; 2], usize)> = rows
                 .filter_map(|(index, row)| {
-                    let m2 = row.limits?.m2[usize::from(is_bound)] * 1e3;
-                    Some(([value(row, &key)?.parse().ok()?, m2], index))
+                    let tre = row.limits?.tre[usize::from(is_bound)] * 1e3;
+                    Some(([value(row, &key)?.parse().ok()?, tre], index))
                 })
                 .collect();
             points.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
             points.dedup_by(|a, b| is_bound && a.0[0] == b.0[0]);
-            for ([x, m2], index) in &points {
-                let what = if is_bound { "bound m2_bound of judged" } else { "rms m2_rms of judged" };
-                let number = total(&run.trials[*index], what, m2 / 1e3, Unit::Millimetres, 4);
+            for ([x, tre], index) in &points {
+                let what = if is_bound { "bound tre_crlb of judged" } else { "rms tre_rms of judged" };
+                let number = total(&run.trials[*index], what, tre / 1e3, Unit::Millimetres, 4);
                 let noise = phrases::axis(&run.trials[*index], &key, Some(*x));
                 data.line(false, vec![place.clone().into(), method.into(), noise.into(), number.into()]);
             }
@@ -97,7 +97,7 @@ fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let rows = panels.len().div_ceil(columns);
     for (index, panel) in panels.iter_mut().enumerate() {
         if index % columns == 0 {
-            panel.y.label = "RMS m2 (mm)".to_owned();
+            panel.y.label = "RMS TRE (mm)".to_owned();
         }
         if index / columns == rows - 1 {
             panel.x.label = headed(&key);
@@ -113,7 +113,7 @@ fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     Some(Figure {
         id: "error-over-noise".to_owned(),
         caption: text![
-            "Root mean square error of the transferred model points (m2) over the pixel noise, both axes logarithmic and shared by all panels; over every fix of a trial, wrong ones included. Grey: the Cramér–Rao bound, which no unbiased estimate betters on average."
+            "Root mean square error of the transferred model points (TRE) over the pixel noise, both axes logarithmic and shared by all panels; over every fix of a trial, wrong ones included. Grey: the Cramér–Rao bound, which no unbiased estimate betters on average."
         ],
         drawing: chart.draw()?,
         data,
@@ -150,16 +150,16 @@ pub(super) fn same_axes(panels: &mut [Panel]) {
 
 fn table(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
-        "Root mean squares beside the Cramér–Rao bound, over all n fixes, wrong ones included: m2, the position (m3), their ratio to the bound. NEES: mean of the normalised error squared, 6 for an honest covariance; below 95 %: share of the fixes within the χ² quantile of 95 %."
+        "Root mean squares beside the Cramér–Rao bound, over all n fixes, wrong ones included: m2, the position, their ratio to the bound. NEES: mean of the normalised error squared, 6 for an honest covariance; below 95 %: share of the fixes within the χ² quantile of 95 %."
     ];
     let mut above = results::blank(summary, 1);
-    above.extend([Head::over(3, "m2 (mm)"), Head::over(3, "m3 (mm)"), Head::words(""), Head::words("")]);
+    above.extend([Head::over(3, "TRE (mm)"), Head::over(3, "position error (mm)"), Head::words(""), Head::words("")]);
     let mut below = results::heads(summary);
     below.push(Head::numbers("n"));
     below.extend((0..2).flat_map(|_| ["RMSE", "bound", "ratio"].map(Head::numbers)));
     below.extend(["NEES", "below 95 %"].map(Head::numbers));
     let limits = |which: fn(&crate::Limits) -> f64| summary.rows.iter().map(move |row| row.limits.map(|l| which(&l)));
-    let digits = [limits(|l| l.m2[1]), limits(|l| l.m3[1])].map(|of| phrases::decimals(of, Unit::Millimetres));
+    let digits = [limits(|l| l.tre[1]), limits(|l| l.position[1])].map(|of| phrases::decimals(of, Unit::Millimetres));
     let mut table = Table { id: "limits".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let Some(limits) = row.limits else { continue };
@@ -167,7 +167,8 @@ fn table(run: &Run, summary: &RunSummary) -> Table {
         line.push(
             Number::count(limits.count as usize, crate::Key::of(trial, "/metrics/totals", "count judged")).into(),
         );
-        let pairs = [(Field::M2, Field::M2Bound, limits.m2), (Field::Position, Field::PositionBound, limits.m3)];
+        let pairs =
+            [(Field::Tre, Field::TreCrlb, limits.tre), (Field::Position, Field::PositionBound, limits.position)];
         for ((field, bounded, [rmse, bound]), digits) in pairs.into_iter().zip(digits) {
             let said = |what: String, value, digits| total(trial, &what, value, Unit::Millimetres, digits);
             line.push(said(format!("rms {} of judged", field.name()), rmse, digits).into());

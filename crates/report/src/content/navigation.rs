@@ -26,8 +26,8 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
         "The navigated pose, relative to the object of the last fix, at every frame that has one. Tried, fixed: frames at which a fix was due, and those with one; lost: frames to which the odometry knew no motion. The last three columns: the first fix, carried along by odometry alone, until that is lost or the dive ends."
     ];
     let mut above = results::blank(summary, 5);
-    above.extend([Head::over(4, "m3 (mm)"), Head::over(1, "m2 (mm)"), Head::over(1, "NEES")]);
-    above.push(Head::over(3, "without further fixes: m3 (mm)"));
+    above.extend([Head::over(4, "position error (mm)"), Head::over(1, "TRE (mm)"), Head::over(1, "NEES")]);
+    above.push(Head::over(3, "without further fixes: position error (mm)"));
     let mut below = results::heads(summary);
     below.extend(["frames", "with pose", "tried", "fixed", "lost"].map(Head::numbers));
     below.extend(["rms", "median", "p95", "most"].map(Head::numbers));
@@ -44,7 +44,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
         for name in ["rms", "median", "q95", "greatest"] {
             line.push(statistic(trial, name, NavigationQuantity::Position, Unit::Millimetres).into());
         }
-        line.push(statistic(trial, "q95", NavigationQuantity::M2, Unit::Millimetres).into());
+        line.push(statistic(trial, "q95", NavigationQuantity::Tre, Unit::Millimetres).into());
         line.push(statistic(trial, "mean", NavigationQuantity::Nees, Unit::Plain).into());
         for name in ["median", "q95", "last"] {
             line.push(statistic(trial, name, NavigationQuantity::AlonePosition, Unit::Millimetres).into());

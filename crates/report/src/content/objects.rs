@@ -23,7 +23,7 @@ const GROUPS: [Group; 4] = [
 ];
 
 /// The errors that are told, and what they are called in a head.
-const ERRORS: [(&str, Field); 2] = [("m2 (mm)", Field::M2), ("m3 (mm)", Field::Position)];
+const ERRORS: [(&str, Field); 2] = [("TRE (mm)", Field::Tre), ("position error (mm)", Field::Position)];
 
 /// The section, where any trial looked for several objects and logged all its frames.
 pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
@@ -65,7 +65,7 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
             let median = error(trial, object, "median", Field::Position);
             said.extend(text![format!("{}{object}: ", if place > 0 { "; " } else { "" }), found, " of ", attempted]);
             if median.value.is_some() {
-                said.extend(text![" found, median m3 ", median, " mm"]);
+                said.extend(text![" found, median position error ", median, " mm"]);
             }
         }
         said.push(".".into());

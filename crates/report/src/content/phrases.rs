@@ -91,7 +91,7 @@ pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Numbe
     })
 }
 
-/// A statistic of a quantity over the attempts of a group, `median m2_rms of found`.
+/// A statistic of a quantity over the attempts of a group, `median tre_rms of found`.
 pub(super) fn statistic(
     trial: &Trial,
     name: &str,
@@ -117,7 +117,7 @@ pub(super) fn navigated(
 }
 
 /// A statistic of a point of interest, over the frames that have it in view.
-pub(super) fn inspected(
+pub(super) fn poi(
     trial: &Trial,
     name: &str,
     (quantity, point): (PoiQuantity, &str),

@@ -29,7 +29,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         (
             text![italic("found, refused, wrong")],
             text![
-                "A fix is wrong when m2 exceeds the alert limit (the smaller of 0.10 m and 5 % of the target’s diameter); an attempt without a fix is refused; all others are found. The three add up to the attempts. ",
+                "A fix is wrong when the TRE exceeds the alert limit (the smaller of 0.10 m and 5 % of the target’s diameter); an attempt without a fix is refused; all others are found. The three add up to the attempts. ",
                 intervals(run)
             ],
         ),
@@ -131,7 +131,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     ]);
     if !comparisons.is_empty() {
         let unit = if comparisons[0].over_conditions {
-            "Methods are compared over conditions, one value each: the median of m2 over all attempts, failures as infinitely far off; the difference is the ratio of two such medians"
+            "Methods are compared over conditions, one value each: the median of the TRE over all attempts, failures as infinitely far off; the difference is the ratio of two such medians"
         } else if comparisons[0].between_conditions {
             "Frame k of every trial is drawn from the same random numbers, so that only the condition differs: trials are compared frame by frame and target by target, as far as both attempted it, failures as infinitely far off, by the median of the paired differences of m2, where not both fail"
         } else {

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Up to where recall is summed up: the error, the bound as it is printed, its unit.
-const AREAS: [(Field, f64, Unit); 2] = [(Field::M2, 50.0, Unit::Millimetres), (Field::Attitude, 5.0, Unit::Degrees)];
+const AREAS: [(Field, f64, Unit); 2] = [(Field::Tre, 50.0, Unit::Millimetres), (Field::Attitude, 5.0, Unit::Degrees)];
 
 /// The table; nothing where no truth tells an error.
 pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
@@ -30,7 +30,7 @@ pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
     let mut above = results::blank(summary, 1);
     above.push(Head::over(2, "area under recall (%)"));
     let mut below = results::heads(summary);
-    below.extend(["n", "m2 to 50 mm", "m3 to 5°"].map(Head::numbers));
+    below.extend(["n", "TRE to 50 mm", "attitude to 5°"].map(Head::numbers));
     if known {
         above.push(Head::words(""));
         above.extend(ARMS.map(|arm| Head::over(2, format!("at {arm} m (mm)"))));
@@ -68,7 +68,7 @@ pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
 
 fn caption(run: &Run, known: bool) -> Text {
     let mut caption = text![
-        "Area under recall: the share of all n attempts whose error is below a bound, averaged over the bounds from none to 50 mm of m2 and to 5° of attitude (m3); 100 % if no fix erred, refused and wrong attempts add nothing."
+        "Area under recall: the share of all n attempts whose error is below a bound, averaged over the bounds from none to 50 mm of the TRE and to 5° of attitude; 100 % if no fix erred, refused and wrong attempts add nothing."
     ];
     if known {
         caption.push(" At 1, 2 and 5 m: error of the fixes found at a point that far from the centroid of the points they used, its rotation included, root mean square over all directions.".into());

@@ -6,7 +6,7 @@ use super::{
     reach,
 };
 use crate::{
-    Distribution, Field, PAPER_M1, Row, RunSummary,
+    Distribution, Field, PAPER_FIT_RMS, Row, RunSummary,
     document::{Block, Cell, Head, Section, Span, Table, italic, text},
     format::{headed, number},
     paired::Comparison,
@@ -88,7 +88,7 @@ fn outcomes(run: &Run, summary: &RunSummary) -> Table {
             line.push(phrases::percent(trial, group, k, row.attempted).into());
             line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
         }
-        line.push(phrases::count(trial, "fixed-frames", row.referenced_frames).into());
+        line.push(phrases::count(trial, "fixed-frames", row.fix_frames).into());
         line.push(phrases::count(trial, "wrong-frames", row.wrong_frames).into());
         line.push(phrases::count(trial, "frames", row.frames).into());
         let points = row.identified.map(|spread| spread.median);
@@ -107,11 +107,18 @@ struct Column {
 }
 
 const COLUMNS: [Column; 5] = [
-    Column { name: "m1 (mm)", field: Field::M1, unit: Unit::Millimetres, value: |row| row.m1 },
-    Column { name: "unused (mm)", field: Field::M1Unused, unit: Unit::Millimetres, value: |row| row.m1_unused },
-    Column { name: "m2 (mm)", field: Field::M2, unit: Unit::Millimetres, value: |row| row.m2 },
-    Column { name: "m3 (mm)", field: Field::Position, unit: Unit::Millimetres, value: |row| row.m3_position },
-    Column { name: "m3 (°)", field: Field::Attitude, unit: Unit::Degrees, value: |row| row.m3_attitude },
+    Column { name: "fit RMS (mm)", field: Field::Fit, unit: Unit::Millimetres, value: |row| row.fit },
+    Column { name: "unused (mm)", field: Field::FitUnused, unit: Unit::Millimetres, value: |row| row.fit_unused },
+    Column { name: "TRE (mm)", field: Field::Tre, unit: Unit::Millimetres, value: |row| row.tre },
+    Column {
+        name: "position error (mm)",
+        field: Field::Position,
+        unit: Unit::Millimetres,
+        value: |row| row.position_error,
+    },
+    Column {
+        name: "attitude error (°)", field: Field::Attitude, unit: Unit::Degrees, value: |row| row.attitude_error
+    },
 ];
 
 fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table {
@@ -119,7 +126,7 @@ fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table 
     let mut caption = text![
         "Errors of the fixes found: median and 95 % quantile over n fixes. m3: position of the camera, and its attitude; unused: m1 without the points the solver used. ",
         italic("All"),
-        ": median of m2 over all attempts, refused and wrong ones counted as infinitely far off. ",
+        ": median of the TRE over all attempts, refused and wrong ones counted as infinitely far off. ",
     ];
     caption.push(Span::from(match (comparisons.first(), any_best) {
         (None, _) => "Nothing is compared: no two trials saw the same frames.",
@@ -136,11 +143,11 @@ fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table 
     let mut below = heads(summary);
     below.push(Head::numbers("n"));
     below.extend(COLUMNS.iter().flat_map(|_| ["median", "p95"].map(Head::numbers)));
-    below.extend([Head::numbers("m2 all (mm)"), Head::numbers("NEES mean")]);
+    below.extend([Head::numbers("TRE all (mm)"), Head::numbers("NEES mean")]);
     let digits = COLUMNS.each_ref().map(|column| {
         phrases::decimals(summary.rows.iter().map(|row| (column.value)(row).map(|s| s.median)), column.unit)
     });
-    let all_digits = phrases::decimals(summary.rows.iter().map(|row| row.m2_of_all), Unit::Millimetres);
+    let all_digits = phrases::decimals(summary.rows.iter().map(|row| row.tre_of_all), Unit::Millimetres);
     let mut table = Table { id: "errors".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut line = cells(row);
@@ -151,16 +158,16 @@ fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table 
                 phrases::statistic(trial, name, column.field, "found", value, (column.unit, digits))
             };
             let median = as_number("median", spread.map(|s| s.median));
-            let marked = column.field == Field::M2 && best(comparisons, index);
+            let marked = column.field == Field::Tre && best(comparisons, index);
             line.push(if marked { Span::Best(median).into() } else { median.into() });
             line.push(Cell::minor(as_number("q95", spread.map(|s| s.p95))));
         }
         let unit = (Unit::Millimetres, all_digits);
-        line.push(phrases::statistic(trial, "all", Field::M2, "attempted", row.m2_of_all, unit).into());
+        line.push(phrases::statistic(trial, "all", Field::Tre, "attempted", row.tre_of_all, unit).into());
         line.push(phrases::statistic(trial, "mean", Field::Nees, "found", row.nees_mean, (Unit::Plain, 2)).into());
         table.line(breaks(summary, index), line);
     }
-    let [low, high] = PAPER_M1.map(|m| number(Some(m * 1e3), 0));
+    let [low, high] = PAPER_FIT_RMS.map(|m| number(Some(m * 1e3), 0));
     let mut line = vec![Cell::from("The paper")];
     line.extend((1..heads(summary).len()).map(|_| Cell::from("")));
     line.push("–".into());

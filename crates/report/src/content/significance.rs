@@ -72,7 +72,7 @@ pub(super) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Ve
     sure.sort_by(|a, b| a.holm.total_cmp(&b.holm));
     if sure.is_empty() && !comparisons.is_empty() {
         let what = if comparisons[0].between_conditions { "Frame by frame" } else { "On the same attempts" };
-        return vec![text![format!("{what} no difference of m2 is significant.")]];
+        return vec![text![format!("{what} no difference of the TRE is significant.")]];
     }
     let as_number =
         |comparison: &Comparison| match comparison.difference.is_finite() && comparison.interval.0.is_finite() {
@@ -133,7 +133,7 @@ fn sentence(run: &Run, comparison: &Comparison) -> Text {
 fn key(run: &Run, comparison: &Comparison, what: &str) -> Key {
     let trials: Vec<&Trial> = comparison.logs.iter().map(|&index| &run.trials[index]).collect();
     let over = if comparison.over_conditions { " over conditions" } else { " over attempts" };
-    super::phrases::over(&trials, "/metrics/evaluation", format!("{what} m2_rms{over}"))
+    super::phrases::over(&trials, "/metrics/evaluation", format!("{what} tre_rms{over}"))
 }
 
 fn table(run: &Run, comparisons: &[Comparison]) -> Table {
@@ -143,9 +143,9 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
     let head = if over { "first / second" } else { "first − second (mm)" };
     let within = if over { format!("within {MARGIN_RATIO}×") } else { format!("within {} mm", MARGIN * 1e3) };
     let caption = text![if over {
-        "Methods over conditions: n conditions, median ratio of the medians of m2 over all attempts with its 95 % interval, rank-biserial effect (+: the first errs less), p of the signed rank test adjusted after Holm; where that is not significant, whether the two are shown to be equivalent, and within which factor the 90 % interval is. Bold: significant."
+        "Methods over conditions: n conditions, median ratio of the medians of the TRE over all attempts with its 95 % interval, rank-biserial effect (+: the first errs less), p of the signed rank test adjusted after Holm; where that is not significant, whether the two are shown to be equivalent, and within which factor the 90 % interval is. Bold: significant."
     } else {
-        "Paired comparisons on the same attempts: median of the differences of m2 (first − second), where not both fail, with its 95 % interval, rank-biserial effect (+: the first errs less, 1: in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted; where the difference is not significant, whether the two are shown to be equivalent, by the 90 % interval, which is within so many mm, and by McNemar’s test, which must find no difference. Bold: significant."
+        "Paired comparisons on the same attempts: median of the differences of the TRE (first − second), where not both fail, with its 95 % interval, rank-biserial effect (+: the first errs less, 1: in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted; where the difference is not significant, whether the two are shown to be equivalent, by the 90 % interval, which is within so many mm, and by McNemar’s test, which must find no difference. Bold: significant."
     }];
     let mut heads = vec![Head::words("Condition"), Head::words("first"), Head::words("second"), Head::numbers("n")];
     heads.extend([
@@ -206,7 +206,7 @@ fn holm(run: &Run, comparisons: &[Comparison], own: &Comparison) -> Number {
     let family: Vec<usize> = own.logs.iter().chain(others.flat_map(|other| &other.logs)).copied().collect();
     let trials: Vec<&Trial> = family.iter().map(|&index| &run.trials[index]).collect();
     let over = if own.over_conditions { "conditions" } else { "attempts" };
-    let what = format!("holm m2_rms over {over} in families of {}", own.logs.len());
+    let what = format!("holm tre_rms over {over} in families of {}", own.logs.len());
     Number::probability(own.holm, super::phrases::over(&trials, "/metrics/evaluation", what))
 }
 
@@ -242,7 +242,7 @@ fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
     };
     let none = if over { 1.0 } else { 0.0 };
     let zero = Layer::Guide { points: vec![[none, -0.5], [none, n as f64 - 0.5]], note: String::new(), dash: 0 };
-    let label = if over { "ratio of the medians of m2" } else { "median difference of m2 (mm)" };
+    let label = if over { "ratio of the medians of m2" } else { "median difference of TRE (mm)" };
     let panel = Panel {
         x: if over { Axis::logarithmic(label) } else { Axis::linear(label) },
         y: Axis { range: Some([-0.6, n as f64 - 0.4]), ..Axis::named("", names.collect()) },

@@ -61,7 +61,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         });
     }
     if let Some((quantity, point)) = rest.split_once(" at the point ") {
-        return Some(inspected(first, quantity, point, span, log)?.map(|value| value * scale));
+        return Some(poi(first, quantity, point, span, log)?.map(|value| value * scale));
     }
     if let Some((of, object)) = rest.split_once(" on the object ") {
         return Some(on_object(first, of, object, span, log)?.map(|value| value * scale));
@@ -170,9 +170,8 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
 }
 
 /// `NAME QUANTITY at the point OBJECT/POINT`: over the frames that have the point in view.
-fn inspected(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
-    let own =
-        log.sample(span).flat_map(|frame| &frame.inspected).filter(|seen| points_of_interest::name(seen) == point);
+fn poi(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let own = log.sample(span).flat_map(|frame| &frame.poi).filter(|seen| points_of_interest::name(seen) == point);
     if (name, quantity) == ("count", "views") {
         return Some(Some(own.count() as f64));
     }
@@ -290,7 +289,7 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
     if let Some(totals) = &log.totals {
         let n = match group {
             "frames" => totals.frames,
-            "fixed-frames" => totals.referenced_frames,
+            "fixed-frames" => totals.fix_frames,
             "wrong-frames" => totals.wrong_frames,
             "attempted" => totals.attempted,
             "found" => totals.found,
@@ -413,16 +412,16 @@ fn histogram(which: &str, range: &str, span: [u64; 2], logs: &[&Log]) -> Option<
 fn totals(which: &str, of: &str, log: &Log) -> Option<Option<f64>> {
     let totals = log.totals.as_ref()?;
     let rms = |squares: f64| (squares / totals.judged as f64).sqrt();
-    let [m2, m2_bound, m3, m3_bound] =
-        [totals.m2_squares, totals.m2_bound_squares, totals.m3_squares, totals.m3_bound_squares].map(rms);
+    let [tre, tre_crlb, position, position_crlb] =
+        [totals.tre_squares, totals.tre_crlb_squares, totals.position_squares, totals.position_crlb_squares].map(rms);
     let nees = totals.nees_count as f64;
     Some(Some(match (which, of.strip_suffix(" of judged")?) {
-        ("rms", "m2_rms") => m2,
-        ("rms", "m3_position") => m3,
-        ("bound", "m2_bound") => m2_bound,
-        ("bound", "m3_bound") => m3_bound,
-        ("ratio", "m2_rms") => m2 / m2_bound,
-        ("ratio", "m3_position") => m3 / m3_bound,
+        ("rms", "tre_rms") => tre,
+        ("rms", "position_error") => position,
+        ("bound", "tre_crlb") => tre_crlb,
+        ("bound", "position_crlb") => position_crlb,
+        ("ratio", "tre_rms") => tre / tre_crlb,
+        ("ratio", "position_error") => position / position_crlb,
         ("mean", "nees") => totals.nees_sum / nees,
         ("within", "nees") => totals.nees_within as f64 / nees,
         _ => return None,
@@ -503,7 +502,7 @@ fn once(logs: &[&Log], span: [u64; 2], conditions: bool) -> Rc<(usize, Statistic
 fn errors(first: &Log, second: &Log, span: [u64; 2]) -> Vec<(f64, f64)> {
     let of = |log: &Log| -> BTreeMap<(u64, String), f64> {
         let rows = log.sample(span).flat_map(|frame| frame.rows.iter().map(move |row| (frame.number, row)));
-        rows.map(|(number, row)| ((number, row.record.object.clone()), error(&row.record, Field::M2))).collect()
+        rows.map(|(number, row)| ((number, row.record.object.clone()), error(&row.record, Field::Tre))).collect()
     };
     let second = of(second);
     of(first).into_iter().filter_map(|(key, error)| Some((error, *second.get(&key)?))).collect()
@@ -512,7 +511,7 @@ fn errors(first: &Log, second: &Log, span: [u64; 2]) -> Vec<(f64, f64)> {
 /// The logarithms of the medians over all attempts.
 fn medians(logs: &[&Log], span: [u64; 2]) -> Vec<(f64, f64)> {
     let of = |log: &Log| {
-        let all = answer("all m2_rms of attempted", span, &[log]).flatten();
+        let all = answer("all tre_rms of attempted", span, &[log]).flatten();
         all.unwrap_or(f64::INFINITY).ln()
     };
     logs.chunks_exact(2).map(|pair| (of(pair[0]), of(pair[1]))).collect()

@@ -8,7 +8,7 @@ use std::{
 };
 
 use seafix_log::{
-    FrameTimes, InspectedPoint, NavigationRecord, Outcome, Reader, TargetRecord, Totals, TrialHeader, TruthRecord,
+    FrameTimes, NavigationRecord, Outcome, PointOfInterest, Reader, TargetRecord, Totals, TrialHeader, TruthRecord,
 };
 
 use crate::{
@@ -47,7 +47,7 @@ pub(super) struct Seen {
     pub(super) carried: [[f64; 3]; 2],
     /// What it says of the growth of the error between fixes.
     pub(super) step: Option<Step>,
-    pub(super) inspected: Vec<InspectedPoint>,
+    pub(super) poi: Vec<PointOfInterest>,
     /// Key points, points, candidates, identified, used.
     pub(super) marks: [usize; 5],
     pub(super) rows: Vec<Row>,
@@ -118,7 +118,7 @@ impl Log {
                 Row { record: row, candidates: lists.iter().map(Vec::len).sum(), at, arms }
             });
             let carried = frame.navigation.as_deref().map_or([[f64::NAN; 3]; 2], |known| {
-                [&known.pose, &known.unreferenced].map(|pose| place::carried(&header, pose.as_ref()))
+                [&known.pose, &known.odometry_only].map(|pose| place::carried(&header, pose.as_ref()))
             });
             let step = frame.navigation.as_deref().and_then(|record| {
                 let object = &record.pose.as_ref()?.object;
@@ -132,7 +132,7 @@ impl Log {
                 stamp_ns: frame.stamp_ns,
                 times: frame.times,
                 navigation: frame.navigation,
-                inspected: frame.inspected,
+                poi: frame.poi,
                 truth: frame
                     .truth
                     .as_ref()
@@ -161,7 +161,7 @@ impl Log {
 
 /// How far points are moved that stand around the centroid, six along the axes: their mean square is that of a sphere of them.
 fn moved(header: &TrialHeader, truth: Option<&TruthRecord>, row: &TargetRecord, arm: f64) -> f64 {
-    let judged = lever::misplaced(header, truth, row).filter(|_| row.evaluation.m3_attitude.is_some());
+    let judged = lever::misplaced(header, truth, row).filter(|_| row.evaluation.attitude_error.is_some());
     let Some((e, centroid)) = judged else { return f64::NAN };
     let ends = (0..6).map(|k| {
         let mut end = centroid;

@@ -74,13 +74,13 @@ fn a_newer_log_is_refused_with_both_versions() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("001.mcap");
     let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
-    let schema = writer.add_schema("seafix.v2.TrialHeader", "protobuf", b"").unwrap();
+    let schema = writer.add_schema("seafix.v3.TrialHeader", "protobuf", b"").unwrap();
     let channel = writer.add_channel(schema, "/run/header", "protobuf", &Default::default()).unwrap();
     let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
     writer.write_to_known_channel(&header, b"").unwrap();
     writer.finish().unwrap();
     let refused = report(folder.path(), &folder.path().join("report"), Forms::ALL).unwrap_err().to_string();
-    assert!(refused.contains("seafix.v2.TrialHeader") && refused.contains("seafix.v1.TrialHeader"), "{refused}");
+    assert!(refused.contains("seafix.v3.TrialHeader") && refused.contains("seafix.v2.TrialHeader"), "{refused}");
     assert!(!folder.path().join("report").exists(), "nothing is written");
 }
 
@@ -90,7 +90,7 @@ fn a_newer_manifest_is_refused_with_both_versions() {
     let folder = tempfile::tempdir().unwrap();
     write_run(folder.path(), &[5.0]);
     let out = folder.path().join("report");
-    for (format, known) in [("1.9", true), ("1.12", true), ("12", false), ("2", false), ("9.1", false)] {
+    for (format, known) in [("2", true), ("2.9", true), ("2.12", true), ("12", false), ("1.2", false), ("9.1", false)] {
         let manifest = format!("{{\"format\": \"seafix-manifest/{format}\"}}");
         fs::write(folder.path().join("manifest.json"), manifest).unwrap();
         let made = report(folder.path(), &out, Forms::ALL);
@@ -98,6 +98,6 @@ fn a_newer_manifest_is_refused_with_both_versions() {
         let Err(refused) = made else { continue };
         let refused = refused.to_string();
         assert!(refused.contains(&format!("seafix-manifest/{format}")), "{refused}");
-        assert!(refused.contains("knows seafix-manifest/1"), "{refused}");
+        assert!(refused.contains("knows seafix-manifest/2"), "{refused}");
     }
 }

@@ -30,7 +30,7 @@ fn write(folder: &Path, totals: bool, change: impl Fn(&mut FrameRecord)) {
         row.reason.clear();
         row.object_from_camera.get_or_insert(frame.truth.as_ref().unwrap().world_from_camera);
         row.integrity = Some(Integrity { protection_position: level, ..Integrity::default() });
-        row.evaluation.m3_position = Some(error);
+        row.evaluation.position_error = Some(error);
         row.evaluation.alert_limit = Some(0.05);
         change(&mut frame);
         sums.add(&frame);

@@ -8,8 +8,8 @@ use std::{
 };
 
 use seafix_log::{
-    Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, InspectedPoint,
-    Integrity, ModelPoint, Outcome, Pair, PixelPair, PriorRecord, RigRecord, TargetModel, TargetRecord, TargetTimes,
+    Axis, CameraRecord, CloudPoint, Component, Evaluation, FrameRecord, FrameTimes, GreyImage, Integrity, ModelPoint,
+    Outcome, Pair, PixelPair, PointOfInterest, PriorRecord, RigRecord, TargetModel, TargetRecord, TargetTimes,
     TrialHeader, TruthRecord, Writer,
 };
 
@@ -184,11 +184,11 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
             visible: Some(9),
             identified: Some(7),
             correct_pairs: Some(7),
-            m1_rms: Some(scale),
-            m1_unused_rms: (solver == "triad").then_some(1.3 * scale),
-            m2_rms: Some(if wrong { 0.4 } else { 1.4 * scale }),
-            m3_position: Some(4.0 * scale),
-            m3_attitude: Some(turn),
+            fit_rms: Some(scale),
+            fit_rms_unused: (solver == "triad").then_some(1.3 * scale),
+            tre_rms: Some(if wrong { 0.4 } else { 1.4 * scale }),
+            position_error: Some(4.0 * scale),
+            attitude_error: Some(turn),
             nees: Some(6.0 + 4.0 * noise(seed + 4)),
             ..Evaluation::default()
         };
@@ -218,8 +218,8 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         },
         inputs: None,
         navigation: None,
-        inspected: (0..number % 3)
-            .map(|k| InspectedPoint {
+        poi: (0..number % 3)
+            .map(|k| PointOfInterest {
                 object: target.id.clone(),
                 point: ["panel", "valve over of <2>"][k as usize].to_owned(),
                 at: [0.1, 0.0, distance],

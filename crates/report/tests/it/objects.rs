@@ -16,7 +16,7 @@ fn made(header: &seafix_log::TrialHeader, number: u64) -> FrameRecord {
         let mut pod = frame.targets[0].clone();
         pod.object = OBJECTS[1].to_owned();
         let evaluation = &mut pod.evaluation;
-        evaluation.m3_position = evaluation.m3_position.map(|error| 3.0 * error);
+        evaluation.position_error = evaluation.position_error.map(|error| 3.0 * error);
         evaluation.wrong = Some(number == 6);
         frame.targets.push(pod);
     }
@@ -68,12 +68,12 @@ fn each_object_has_its_own_attempts() {
             let errors = |take: fn(&seafix_log::Evaluation) -> Option<f64>| {
                 median(found.iter().filter_map(|row| take(&row.evaluation)).collect()) * 1e3
             };
-            let (m2, m3) = (errors(|e| e.m2_rms), errors(|e| e.m3_position));
+            let (tre, position) = (errors(|e| e.tre_rms), errors(|e| e.position_error));
             let line = format!(",{object},{n},{},{refused},{},", found.len(), wrong.len());
             let medians = table.lines().filter_map(|l| l.split_once(&line)?.1.split(',').next()?.parse::<f64>().ok());
             let medians: Vec<f64> = medians.collect();
-            assert!(medians.len() == 2 && medians.iter().all(|of| (of - m2).abs() < 1e-9), "{line} {m2} in {table}");
-            let said = format!("{object}: {} of {n} found, median m3 {m3:.1} mm", found.len());
+            assert!(medians.len() == 2 && medians.iter().all(|of| (of - tre).abs() < 1e-9), "{line} {tre} in {table}");
+            let said = format!("{object}: {} of {n} found, median position error {position:.1} mm", found.len());
             assert!(page.contains(&said), "{said}");
         }
     }
@@ -90,7 +90,7 @@ fn of_points_of_interest_the_best_and_the_worst_known_are_reported() {
     report(folder.path(), &out, Forms::ALL).unwrap();
     let page = fs::read_to_string(out.join("report.tex")).unwrap();
     let known = |name: &str| -> f64 {
-        let seen = trials[0].iter().flat_map(|frame| &frame.inspected).filter(|point| point.point == name);
+        let seen = trials[0].iter().flat_map(|frame| &frame.poi).filter(|point| point.point == name);
         let errors = seen.filter_map(|point| {
             let away = |axis: usize| Some((point.believed?[axis] - point.at[axis]).powi(2));
             Some((away(0)? + away(1)? + away(2)?).sqrt() * 1e3)

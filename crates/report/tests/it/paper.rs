@@ -63,13 +63,13 @@ fn numbers_are_those_of_the_log() {
         assert_eq!(row.reasons.values().sum::<usize>(), row.refused);
         let log = read(&folder.path().join(format!("{}.mcap", row.trial))).unwrap();
         let fixes = log.frames.iter().flat_map(|frame| &frame.targets);
-        let mut m2: Vec<f64> = fixes
+        let mut tre: Vec<f64> = fixes
             .filter(|fix| fix.outcome == Outcome::Fix && fix.evaluation.wrong == Some(false))
-            .filter_map(|fix| fix.evaluation.m2_rms)
+            .filter_map(|fix| fix.evaluation.tre_rms)
             .collect();
-        m2.sort_by(f64::total_cmp);
-        let middle = (m2[(m2.len() - 1) / 2] + m2[m2.len() / 2]) / 2.0;
-        assert!((row.m2.unwrap().median - middle).abs() < 1e-15);
+        tre.sort_by(f64::total_cmp);
+        let middle = (tre[(tre.len() - 1) / 2] + tre[tre.len() / 2]) / 2.0;
+        assert!((row.tre.unwrap().median - middle).abs() < 1e-15);
         assert!((0.1..0.3).contains(&row.disparity_sigma.unwrap()), "0.4 px uniform in both images");
     }
     let wrong: Vec<usize> = summary.rows.iter().map(|row| row.wrong).collect();

@@ -32,8 +32,8 @@ fn areas_and_lever_arms_are_as_by_hand() {
                 [0.0, 0.0, 1.0, pose[2][3] + 0.003],
                 [0.0, 0.0, 0.0, 1.0],
             ];
-            row.evaluation.m2_rms = Some(0.01 * place as f64);
-            row.evaluation.m3_attitude = Some(0.02);
+            row.evaluation.tre_rms = Some(0.01 * place as f64);
+            row.evaluation.attitude_error = Some(0.02);
         }
         writer.frame(&frame).unwrap();
     }

@@ -22,7 +22,7 @@ fn all_numbers_are_computed_again() {
     assert!(verified.numbers > 500, "{}", verified.numbers);
     // All cells of the tables of numbers carry a key: a bare number is none.
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
-    assert!(page.contains("title=\"q95 inspected_error at the point ") && page.contains("valve over of &lt;2&gt;"));
+    assert!(page.contains("title=\"q95 poi_error at the point ") && page.contains("valve over of &lt;2&gt;"));
     let bare =
         page.split("<td class=\"n\">").skip(1).filter(|cell| cell.starts_with(|c: char| c.is_ascii_digit())).count();
     let axes = 4; // the distance stands in the tables of results
@@ -35,7 +35,7 @@ fn a_changed_digit_is_found() {
     made(folder.path());
     let page = folder.path().join("report/report.html");
     let text = fs::read_to_string(&page).unwrap();
-    let at = text.find("title=\"median m2_rms of found in mm").unwrap();
+    let at = text.find("title=\"median tre_rms of found in mm").unwrap();
     let digit = at + text[at..].find("</data>").unwrap() - 1;
     let mut bytes = text.into_bytes();
     bytes[digit] = if bytes[digit] == b'9' { b'8' } else { bytes[digit] + 1 };
@@ -124,7 +124,7 @@ fn a_lost_log_is_missed() {
     write_run(folder.path(), &[2.0]);
     let manifest = |state: &str| {
         let trials = r#"[{"log": "not-there.mcap"}]"#;
-        let text = format!(r#"{{"format": "seafix-manifest/1.1", "state": "{state}", "trials": {trials}}}"#);
+        let text = format!(r#"{{"format": "seafix-manifest/2.1", "state": "{state}", "trials": {trials}}}"#);
         fs::write(folder.path().join("manifest.json"), text).unwrap();
         report(folder.path(), &folder.path().join("report"), Forms::ALL)
     };

@@ -161,11 +161,11 @@ impl Eval {
         let along = if self.pairs_from_fix { &matched.reference } else { &matched.estimate };
         // Across a break nothing is known, so nothing is judged.
         let (mut both, mut segments) = (Vec::new(), Vec::new());
-        for stretch in matched.stretches() {
-            let from = stretch.start;
-            let own = pairs(&along[stretch.clone()], delta, self.all_pairs, self.delta_tol);
+        for scale_error in matched.stretches() {
+            let from = scale_error.start;
+            let own = pairs(&along[scale_error.clone()], delta, self.all_pairs, self.delta_tol);
             both.extend(own.into_iter().map(|(i, j)| (from + i, from + j)));
-            let (reference, estimate) = (&matched.reference[stretch.clone()], &matched.estimate[stretch]);
+            let (reference, estimate) = (&matched.reference[scale_error.clone()], &matched.estimate[scale_error]);
             let own = drift(reference, estimate, &self.segments);
             segments.extend(own.into_iter().map(|segment| DriftSegment {
                 from: from + segment.from,

@@ -42,9 +42,9 @@ fn three_points_are_unavailable() {
 #[test]
 fn levels_grow_with_noise_and_with_a_smaller_risk() {
     let (data, _) = seen(6);
-    let (separation, level) = of(&data, &Acceptance::default());
+    let (solution_separation, level) = of(&data, &Acceptance::default());
     let level = level.expect("six points");
-    assert!(separation.unwrap() < 1e-9 && level.position > 0.0 && level.attitude > 0.0);
+    assert!(solution_separation.unwrap() < 1e-9 && level.position > 0.0 && level.attitude > 0.0);
     let strict = of(&data, &Acceptance { risk: 1e-6, ..Acceptance::default() }).1.unwrap();
     assert!(strict.position > level.position && strict.attitude > level.attitude);
     let mut noisy = data;
@@ -70,15 +70,15 @@ fn what_the_points_may_be_mistaken_for_is_taken_from_the_risk() {
 /// One coordinate that is as good as exact takes all weight from the others, and three points any of which fit say nothing.
 #[test]
 fn every_fix_of_four_points_has_a_scale_error() {
-    let stretch = |count: usize, exact: bool| {
+    let scale_error = |count: usize, exact: bool| {
         let (mut data, pose) = seen(count);
         data.points[0].measured.covariance[(0, 0)] = if exact { 1e-16 } else { SIGMA * SIGMA };
         let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
-        protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), 0.0).stretch
+        protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), 0.0).scale_error
     };
-    assert_eq!(stretch(3, false), None);
+    assert_eq!(scale_error(3, false), None);
     for count in [4, 6] {
-        let [even, exact] = [false, true].map(|exact| stretch(count, exact).expect("four points or more"));
+        let [even, exact] = [false, true].map(|exact| scale_error(count, exact).expect("four points or more"));
         assert!(even.value.abs().max(exact.value.abs()) < 1e-6, "{count}: {even:?} {exact:?}");
         // What the others say of the scale is left, and the exact one cannot say it all.
         assert!((0.7..1.05).contains(&(exact.sigma / even.sigma)), "{count}: {even:?} {exact:?}");
@@ -93,9 +93,12 @@ fn one_wrong_match_is_within_the_level() {
         data.points[wrong].measured.at = data.points[wrong].measured.at + Vector3::new(0.1, -0.2, 0.1);
         let pose = Mahalanobis::default().solve(&data).unwrap();
         let off = (pose.translation() - truth.translation()).norm();
-        let (separation, level) = of(&data, &Acceptance::default());
+        let (solution_separation, level) = of(&data, &Acceptance::default());
         let level = level.expect("six points");
-        assert!(off > 10.0 * SIGMA && off <= level.position && separation.unwrap() >= off - 1e-6, "{off} {level:?}");
+        assert!(
+            off > 10.0 * SIGMA && off <= level.position && solution_separation.unwrap() >= off - 1e-6,
+            "{off} {level:?}"
+        );
     }
 }
 
@@ -137,7 +140,7 @@ fn octahedron(sigma: f64) -> Observations<'static> {
 }
 
 /// The separation of the most likely pose with its own covariance.
-fn separation(data: &Observations<'_>, acceptance: &Acceptance) -> Separation {
+fn solution_separation(data: &Observations<'_>, acceptance: &Acceptance) -> Separation {
     let witness = Mahalanobis::default();
     let pose = witness.solve(data).unwrap();
     let covariance = witness.covariance(data, &pose).unwrap();
@@ -231,7 +234,7 @@ fn a_level_covers_another_pose_and_its_error() {
 #[test]
 fn half_of_the_risk_belongs_to_right_matches() {
     let rare = Acceptance { wrong_match_rate: 1e-3, ..Acceptance::default() };
-    let level = separation(&octahedron(SIGMA), &rare).protection.unwrap();
+    let level = solution_separation(&octahedron(SIGMA), &rare).protection.unwrap();
     // Of a wrong match 5e-5/1e-3 = 0.05 is left: 2.80 √(3/14) σ is less than 4.75 σ/√6.
     let own = RADII[0].1 * SIGMA;
     assert!(close(level.position, own / 6.0_f64.sqrt()) && close(level.attitude, own / 2.0), "{level:?}");
@@ -240,7 +243,7 @@ fn half_of_the_risk_belongs_to_right_matches() {
 /// The other half over the rate of wrong matches is the probability that the pose without one point may err beyond the level.
 #[test]
 fn the_other_half_over_the_rate_belongs_to_one_wrong_match() {
-    let found = separation(&octahedron(SIGMA), &Acceptance::default());
+    let found = solution_separation(&octahedron(SIGMA), &Acceptance::default());
     let (level, k) = (found.protection.unwrap(), RADII[1].1 * SIGMA);
     assert!(
         close(level.position, k * (3.0_f64 / 14.0).sqrt()) && close(level.attitude, k / 2.8_f64.sqrt()),
@@ -249,7 +252,7 @@ fn the_other_half_over_the_rate_belongs_to_one_wrong_match() {
     assert!(found.one.unwrap() < 1e-12 && found.two.is_none());
     // Two wrong matches: a quarter of the risk each. Without +x and +y the greatest variances are σ²/3 and σ²/1.5.
     let acceptance = Acceptance { two_wrong_rate: 0.05, ..Acceptance::default() };
-    let found = separation(&octahedron(SIGMA), &acceptance);
+    let found = solution_separation(&octahedron(SIGMA), &acceptance);
     let (level, k) = (found.protection.unwrap(), RADII[1].1 * SIGMA);
     assert!(close(level.position, k / 3.0_f64.sqrt()) && close(level.attitude, k / 1.5_f64.sqrt()), "{level:?}");
     assert!(found.one.unwrap() < 1e-12 && found.two.unwrap() < 1e-9);
@@ -264,7 +267,7 @@ fn a_level_is_the_separation_and_the_radius_beyond_it() {
     const OFF: f64 = 0.01;
     let mut data = octahedron(SIGMA);
     data.points[0].measured.at.coords.x += OFF;
-    let found = separation(&data, &Acceptance::default());
+    let found = solution_separation(&data, &Acceptance::default());
     let (level, k) = (found.protection.unwrap(), RADII[1].1 * SIGMA);
     let near = |found: f64, expected: f64| (found - expected).abs() < 2e-6;
     assert!(near(found.one.unwrap(), OFF / 6.0), "{found:?}");
@@ -275,13 +278,13 @@ fn a_level_is_the_separation_and_the_radius_beyond_it() {
     assert!(point == 0 && near(off, (OFF / 6.0).hypot(SIGMA * (267.0_f64 / 210.0).sqrt())), "{point} {off}");
     // The same of a vertex that stands last.
     data.points.rotate_left(1);
-    let last = separation(&data, &Acceptance::default());
+    let last = solution_separation(&data, &Acceptance::default());
     assert_eq!(last.hinge.unwrap().0, 5);
     assert!(near(last.hinge.unwrap().1, off) && near(last.protection.unwrap().position, level.position));
     // Five times as far: the separation of the attitude alone exceeds what its covariance adds to the other levels.
     let mut data = octahedron(SIGMA);
     data.points[0].measured.at.coords.x += 5.0 * OFF;
-    let level = separation(&data, &Acceptance::default()).protection.unwrap();
+    let level = solution_separation(&data, &Acceptance::default()).protection.unwrap();
     assert!((level.attitude - (5.0 * OFF / 14.0 + k / 2.8_f64.sqrt())).abs() < 2e-4, "{level:?}");
     assert!((level.position - (5.0 * OFF / 6.0 + k * (3.0_f64 / 14.0).sqrt())).abs() < 2e-4, "{level:?}");
 }
@@ -321,9 +324,9 @@ fn a_point_that_cannot_be_spared_leaves_no_level() {
     for (point, at) in data.points.iter_mut().zip(places) {
         (point.model, point.measured.at) = (at.into(), at.into());
     }
-    let found = separation(&data, &Acceptance::default());
+    let found = solution_separation(&data, &Acceptance::default());
     assert_eq!((found.one, found.protection, found.hinge), (None, None, Some((2, f64::INFINITY))));
-    assert!(found.stretch.is_some());
+    assert!(found.scale_error.is_some());
 }
 
 /// Points whose second extent is half a thousandth of the first determine no pose that is trusted, and yet their scale: its standard
@@ -341,15 +344,15 @@ fn points_near_a_line_have_a_scale_and_no_level() {
     let found = protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), 0.0);
     assert_eq!((found.one, found.two, found.protection), (None, None, None));
     assert_eq!(found.hinge, Some((0, f64::INFINITY)));
-    let stretch = found.stretch.unwrap();
-    assert!(stretch.value.abs() < 1e-9 && close(stretch.sigma, SIGMA / 5.0_f64.sqrt()), "{stretch:?}");
+    let scale_error = found.scale_error.unwrap();
+    assert!(scale_error.value.abs() < 1e-9 && close(scale_error.sigma, SIGMA / 5.0_f64.sqrt()), "{scale_error:?}");
 }
 
 /// The attitude without one vertex is known to σ/√2.8: up to 35 mrad it has a level.
 #[test]
 fn a_weak_attitude_without_one_point_leaves_no_level() {
     for (sigma, available) in [(0.0345, true), (0.0355, false)] {
-        let found = separation(&octahedron(sigma * 2.8_f64.sqrt()), &Acceptance::default());
+        let found = solution_separation(&octahedron(sigma * 2.8_f64.sqrt()), &Acceptance::default());
         assert_eq!(found.protection.is_some(), available, "{sigma}: {found:?}");
         // The pose itself can be had without any one point.
         assert!(found.one.is_some());
@@ -375,7 +378,7 @@ fn levels_are_exceeded_with_no_more_than_the_risk() {
             data.points[trial / 2 % 6].measured.at = data.points[trial / 2 % 6].measured.at + wrong;
         }
         let pose = Mahalanobis::default().solve(&data).unwrap();
-        let level = separation(&data, &acceptance).protection.expect("six points");
+        let level = solution_separation(&data, &acceptance).protection.expect("six points");
         exceeded += usize::from(pose.translation().norm() > level.position);
     }
     assert!((1..120).contains(&exceeded), "{exceeded} of {trials}");

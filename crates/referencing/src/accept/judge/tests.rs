@@ -347,17 +347,17 @@ fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
 }
 
 /// What is known of a fix of six points with this χ² and this stretch.
-fn integrity(chi2: f64, stretch: Option<ScaleError>) -> Integrity {
+fn integrity(chi2: f64, scale_error: Option<ScaleError>) -> Integrity {
     Integrity {
         redundancy: Redundancy::Excludable,
         chi2,
-        freedom: 12,
+        dof: 12,
         chi2_limit: 32.909,
-        separation: None,
-        separation_two: None,
+        solution_separation: None,
+        solution_separation_two: None,
         misidentified: None,
         protection: None,
-        stretch,
+        scale_error,
     }
 }
 
@@ -365,27 +365,27 @@ fn integrity(chi2: f64, stretch: Option<ScaleError>) -> Integrity {
 /// eleven degrees of freedom leave each. Points 10 m away are then off by (1 % + 2 · 0.4 %) · 10 m = 0.18 m.
 #[test]
 fn a_scale_error_is_refused_that_is_sure_and_moves_the_object_too_far() {
-    let stretch = |value: f64| Some(ScaleError { value, sigma: 0.004 });
-    let of = |distance: f64, chi2: f64, stretch: Option<ScaleError>| {
+    let scale_error = |value: f64| Some(ScaleError { value, sigma: 0.004 });
+    let of = |distance: f64, chi2: f64, scale_error: Option<ScaleError>| {
         // The centre of the points, not the origin of the object, is so far away.
         let mut scene = Scene::of(octahedron([3.0, 0.0, 1.0]), &Transform::identity());
         scene.acceptance.confidence = 0.95;
         let hypothesis = scene.hypothesis(camera_at(3.0, 0.0, 1.0 - distance), chi2);
-        scene.judge(&Kabsch::default(), |judge| judge.as_large_as_modelled(&hypothesis, &integrity(chi2, stretch)))
+        scene.judge(&Kabsch::default(), |judge| judge.as_large_as_modelled(&hypothesis, &integrity(chi2, scale_error)))
     };
     for value in [0.01, -0.01] {
-        let refusal = of(10.0, 17.0, stretch(value)).unwrap_err();
-        let RejectionReason::Stretched { stretch: reported, off, limit } = refusal else { panic!("{refusal}") };
+        let refusal = of(10.0, 17.0, scale_error(value)).unwrap_err();
+        let RejectionReason::Stretched { scale_error: reported, off, limit } = refusal else { panic!("{refusal}") };
         assert!(reported.value == value && close(off, 0.18) && limit == 0.10, "{off}");
     }
     assert_eq!(of(10.0, 17.0, None), Ok(()));
     // (1 % + 0.8 %) of 5.5 m and of 5.6 m: 9.9 cm and 10.08 cm.
-    assert!(of(5.5, 17.0, stretch(0.01)).is_ok() && of(5.6, 17.0, stretch(0.01)).is_err());
+    assert!(of(5.5, 17.0, scale_error(0.01)).is_ok() && of(5.6, 17.0, scale_error(0.01)).is_err());
     // 17.8 over eleven is 1.618 and 18 over eleven 1.636, times 3.8415 is 6.216 and 6.286.
-    assert!(of(10.0, 6.25 + 17.8, stretch(0.01)).is_err() && of(10.0, 6.25 + 18.0, stretch(0.01)).is_ok());
+    assert!(of(10.0, 6.25 + 17.8, scale_error(0.01)).is_err() && of(10.0, 6.25 + 18.0, scale_error(0.01)).is_ok());
     // Residuals that leave less than their noise make nothing surer: 1.95² is less than 3.84, 1.97² more.
-    assert!(of(30.0, 4.0, stretch(0.0078)).is_ok() && of(30.0, 4.0, stretch(0.00788)).is_err());
-    assert!(of(30.0, 0.5, stretch(0.0078)).is_ok());
+    assert!(of(30.0, 4.0, scale_error(0.0078)).is_ok() && of(30.0, 4.0, scale_error(0.00788)).is_err());
+    assert!(of(30.0, 0.5, scale_error(0.0078)).is_ok());
 }
 
 /// A fix from (0, 0, −4) with σ of 1 mrad and 1 cm, and these levels.
@@ -454,10 +454,12 @@ fn a_fix_reports_its_numbers() {
     let (outcome, runner_up) = scene.judge(&kabsch, |judge| judge.poses(&found, Some(3e-5)));
     let Outcome::Fix(fix) = outcome else { panic!("{outcome:?}") };
     let known = &fix.integrity;
-    assert_eq!((known.freedom, known.redundancy, known.misidentified), (12, Redundancy::Excludable, Some(3e-5)));
+    assert_eq!((known.dof, known.redundancy, known.misidentified), (12, Redundancy::Excludable, Some(3e-5)));
     assert!((known.chi2 - 7.5).abs() < 1e-3 && close(known.chi2_limit, 32.909_490_407_360_21), "{known:?}");
     assert!((fix.residual_rms - 3.0 * SIGMA * (5.0_f64 / 36.0).sqrt()).abs() < 1e-6, "{}", fix.residual_rms);
-    assert!(known.separation.is_some() && known.separation_two.is_none() && known.protection.is_some());
+    assert!(
+        known.solution_separation.is_some() && known.solution_separation_two.is_none() && known.protection.is_some()
+    );
     assert_eq!((fix.pairs, fix.used, fix.residuals.len()), (scene.pairs(), vec![0, 1, 2, 3, 4, 5], 6));
     assert_eq!(runner_up, None);
 }

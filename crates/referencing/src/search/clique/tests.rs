@@ -50,7 +50,7 @@ fn graph(models: &[usize], clouds: &[usize], edge: impl Fn(usize, usize) -> bool
         }
     }
     let vertices = models.iter().zip(clouds).map(|(&model, &cloud)| Correspondence { model, cloud });
-    Association { vertices: vertices.collect(), adjacency, tests: 0 }
+    Association { vertices: vertices.collect(), adjacency, pair_tests: 0 }
 }
 
 /// The edge i–j, i < j, of a graph by the bits of its number.

@@ -20,7 +20,7 @@ pub(in crate::search) fn lost_to(distance_residual: f64) -> f64 {
 #[derive(Clone, Copy)]
 pub(in crate::search) struct Edge {
     /// Measured minus known (m).
-    stretch: f64,
+    scale_error: f64,
     /// From the first measured place to the second.
     along: Vector3<f64>,
     /// Of the stretch (m²).
@@ -33,7 +33,7 @@ impl Edge {
         let apart = b.cloud - a.cloud;
         let measured = apart.norm();
         Self {
-            stretch: measured - (b.model - a.model).norm(),
+            scale_error: measured - (b.model - a.model).norm(),
             along: apart / measured,
             variance: (1.0 + CURVED) * (a.variance + b.variance),
         }
@@ -44,7 +44,7 @@ impl Edge {
 #[inline]
 pub(in crate::search) fn residual_of_two(a: &Term, b: &Term) -> f64 {
     let edge = Edge::of(a, b);
-    0.5 * edge.stretch * edge.stretch / edge.variance
+    0.5 * edge.scale_error * edge.scale_error / edge.variance
 }
 
 /// ½ χ² of the three distances of three pairs: dᵀ (J Σ Jᵀ)⁻¹ d / 2, J what the errors of three places make of their distances.
@@ -57,7 +57,7 @@ pub(in crate::search) fn residual_of_three([a, b, c]: [&Term; 3], [ab, ac, bc]: 
     let of_c = c.variance * ac.along.dot(&bc.along);
     let (p, q, r) = (bb * cc - of_c * of_c, of_b * of_c - of_a * cc, of_a * of_c - of_b * bb);
     let determinant = aa * p + of_a * q + of_b * r;
-    let (x, y, z) = (ab.stretch, ac.stretch, bc.stretch);
+    let (x, y, z) = (ab.scale_error, ac.scale_error, bc.scale_error);
     let square = x * x * p
         + y * y * (aa * cc - of_b * of_b)
         + z * z * (aa * bb - of_a * of_a)
@@ -123,7 +123,7 @@ mod tests {
                 distance_residual <= min + 0.02 && distance_residual >= fraction * min - 0.1,
                 "{distance_residual} of {min}, altitude {flat}"
             );
-            let of_edge = |edge: Edge| 0.5 * edge.stretch * edge.stretch / edge.variance;
+            let of_edge = |edge: Edge| 0.5 * edge.scale_error * edge.scale_error / edge.variance;
             assert!(
                 [ab, ac, bc].into_iter().all(|edge| of_edge(edge) <= distance_residual + 1e-9),
                 "an edge alone costs more"

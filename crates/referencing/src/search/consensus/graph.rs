@@ -34,7 +34,7 @@ pub(in crate::search) struct ConsistencyGraph {
     words: usize,
     bits: Vec<u64>,
     /// Pair tests spent.
-    pub(in crate::search) tests: u64,
+    pub(in crate::search) pair_tests: u64,
 }
 
 /// Coordinates side by side, single precision, about the cloud's centre.
@@ -57,7 +57,8 @@ impl ConsistencyGraph {
         let clouds = vertices.iter().map(|pair| pair.cloud + 1).max().unwrap_or(0);
         let mut lasts = vec![1 << 63; words];
         starts[1..].iter().for_each(|end| lasts[(end - 1) / 64] |= 1 << ((end - 1) % 64));
-        let mut graph = Self { vertices, starts, lasts, clouds, rank, words, bits: vec![0; words * count], tests: 0 };
+        let mut graph =
+            Self { vertices, starts, lasts, clouds, rank, words, bits: vec![0; words * count], pair_tests: 0 };
         let turn = prior_terms.known.as_ref().map(|known| {
             // Beyond the first order a turn by ω moves a point by ω²/2 of its lever.
             let turn = TURN_SIGMAS * known.attitude;
@@ -73,7 +74,7 @@ impl ConsistencyGraph {
                 None => coherent(&columns, a, from / 64, &mut row),
                 Some(turn) => compatible(&columns, a, from / 64, turn, &mut row),
             }
-            graph.tests += (count - from) as u64;
+            graph.pair_tests += (count - from) as u64;
             graph.fill(problem, a, from, &row, &by_cloud);
         }
         graph

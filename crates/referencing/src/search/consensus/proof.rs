@@ -36,7 +36,7 @@ pub(in crate::search) struct Proved {
     /// No coherent set has more evidence than this (nats).
     pub(in crate::search) bound: f64,
     /// Work done.
-    pub(in crate::search) tests: u64,
+    pub(in crate::search) pair_tests: u64,
 }
 
 /// Branch and bound over all coherent sets, each met once: at its first pair, its second, and so on.
@@ -109,7 +109,7 @@ pub(in crate::search) fn prove(
     let listed = swept.complete && swept.looked_for <= prover.best.ln_evidence - below;
     let open = if listed { prover.of_pairs(swept, below) } else { prover.of_each() };
     swept.insert(prover.better);
-    Some(Proved { bound: open.max(prover.best.ln_evidence), tests: prover.spent })
+    Some(Proved { bound: open.max(prover.best.ln_evidence), pair_tests: prover.spent })
 }
 
 impl<'a> Prover<'a> {

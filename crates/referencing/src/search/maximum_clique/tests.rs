@@ -87,7 +87,7 @@ fn the_other_sets_of_a_symmetric_object_are_reported() {
     let scene = Scene::of(&PYRAMID, &PYRAMID);
     for alternatives in [64, 3, 2, 0] {
         let found = scene.search(&MaximumClique { alternatives, ..MaximumClique::default() }).unwrap();
-        assert_eq!((found.pairs.len(), found.alternatives.len(), found.size_bound), (8, 3, 8), "{alternatives}");
+        assert_eq!((found.pairs.len(), found.alternatives.len(), found.consensus_bound), (8, 3, 8), "{alternatives}");
         assert!(found.optimal && found.alternatives_complete && found.undecided.is_none(), "{alternatives}: {found:?}");
         assert!(found.alternatives.iter().flatten().all(|pair| !found.pairs.contains(pair)));
     }
@@ -108,8 +108,15 @@ fn sets_that_are_alike_are_reported_as_far_as_asked_for() {
     assert_eq!((all.alternatives.len(), all.alternatives_complete), (511, true));
     // Whether sets are alike costs tests, and is asked only where there are more rivals than are to be told.
     let apart = Scene::of(&places, &[&places[..], &moved(&places, [9.0, 0.0, 0.0])].concat()).named();
-    let tests = |alternatives| apart.search(&MaximumClique { alternatives, ..MaximumClique::default() }).unwrap().tests;
-    assert!(tests(1) == tests(64) && tests(0) > tests(1), "{} {} {}", tests(0), tests(1), tests(64));
+    let pair_tests =
+        |alternatives| apart.search(&MaximumClique { alternatives, ..MaximumClique::default() }).unwrap().pair_tests;
+    assert!(
+        pair_tests(1) == pair_tests(64) && pair_tests(0) > pair_tests(1),
+        "{} {} {}",
+        pair_tests(0),
+        pair_tests(1),
+        pair_tests(64)
+    );
     // Thirteen points have more such sets than are looked at: that they are alike decides, and they are not complete.
     let places = scattered(13);
     let scene = Scene::of(&places, &[&places[..], &moved(&places, [0.002, 0.0, 0.0])].concat()).named();
@@ -125,7 +132,9 @@ fn sets_that_are_alike_are_reported_as_far_as_asked_for() {
     let found = scene.search(&MaximumClique::default()).unwrap();
     assert!(!found.alternatives_complete && found.alternatives.len() == MAX_TIES, "{}", found.alternatives.len());
     match found.undecided {
-        Some(Rejected::Budget { budget: BUDGET, best: 13, bound: 13, tests }) => assert_eq!(tests, found.tests),
+        Some(Rejected::Budget { budget: BUDGET, best: 13, bound: 13, pair_tests }) => {
+            assert_eq!(pair_tests, found.pair_tests)
+        }
         other => panic!("{other:?}"),
     }
 }
@@ -206,7 +215,7 @@ fn what_is_too_small_or_too_large_is_reported() {
     assert_eq!(scene.search(&MaximumClique::default()), Err(Rejected::NoConsensus { best: 2, needed: 3 }));
     // The budget ends before two are found to agree: the graph, and one test more.
     let ended = scene.search(&MaximumClique { budget: 1, ..MaximumClique::default() });
-    assert_eq!(ended, Err(Rejected::Budget { budget: 1, best: 1, bound: 2, tests: 6 + 1 }));
+    assert_eq!(ended, Err(Rejected::Budget { budget: 1, best: 1, bound: 2, pair_tests: 6 + 1 }));
     let scene = Scene::of(&four, &four);
     let large = scene.search(&MaximumClique { max_pairs: 15, ..MaximumClique::default() }).unwrap_err();
     assert!(matches!(large, Rejected::TooLarge { size: 16, max: 15, .. }), "{large}");
@@ -218,12 +227,14 @@ fn what_is_too_small_or_too_large_is_reported() {
 fn tests_are_those_of_the_graph_and_of_the_proof() {
     let four = scattered(4);
     let found = Scene::of(&four, &four).named().search(&MaximumClique::default()).unwrap();
-    assert_eq!(found.tests, 6 + 8);
+    assert_eq!(found.pair_tests, 6 + 8);
     let ended = Scene::of(&four, &four).named().search(&MaximumClique { budget: 1, ..MaximumClique::default() });
     let ended = ended.unwrap();
     assert!(!ended.optimal && !ended.alternatives_complete, "{ended:?}");
     match ended.undecided {
-        Some(Rejected::Budget { budget: 1, best, bound: 4, tests }) => assert!(best >= 3 && tests >= 6, "{tests}"),
+        Some(Rejected::Budget { budget: 1, best, bound: 4, pair_tests }) => {
+            assert!(best >= 3 && pair_tests >= 6, "{pair_tests}")
+        }
         other => panic!("{other:?}"),
     }
 }
@@ -238,10 +249,10 @@ fn large_sets_are_tested_for_mirror_images_as_a_full() {
     assert!(found.pairs == named(45) && found.optimal && found.alternatives_complete, "{found:?}");
     // The pairs of the graph, and all fours of 45 points in the end.
     let grown = 237_170;
-    assert_eq!(found.tests, 990 + grown + 148_995);
+    assert_eq!(found.pair_tests, 990 + grown + 148_995);
     let flat = MaximumClique { orientation: false, ..MaximumClique::default() };
     let found = scene.search(&flat).unwrap();
-    assert!(found.pairs == named(45) && found.tests < 2_000, "{}", found.tests);
+    assert!(found.pairs == named(45) && found.pair_tests < 2_000, "{}", found.pair_tests);
     // Those that are nearly flat are coherent with their image.
     for at in &mut places {
         at[2] *= 1e-4;

@@ -2,7 +2,7 @@
 
 use super::{caption, distinct, figure, panels, series};
 use crate::{
-    Distribution, Field, Number, PAPER_M1, Row, RunSummary,
+    Distribution, Field, Number, PAPER_FIT_RMS, Row, RunSummary,
     content::phrases::{self, Unit},
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
@@ -57,8 +57,7 @@ pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     heads.extend(["p5 (mm)", "median (mm)", "p95 (mm)"].map(Head::numbers));
     let mut data =
         Table::new("error-over-condition", text!["Every point of the figure of error over the condition."], heads);
-    let metrics: [Metric; 2] =
-        [(Field::M1, |row| row.m1, "m1, residual (mm)"), (Field::M2, |row| row.m2, "m2, model points (mm)")];
+    let metrics: [Metric; 2] = [(Field::Fit, |row| row.fit, "fit RMS (mm)"), (Field::Tre, |row| row.tre, "TRE (mm)")];
     let mut plotted = Vec::new();
     for (field, value, label) in metrics {
         let mut layers = Vec::new();
@@ -98,8 +97,8 @@ pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
         if ranges(&key) {
             layers.splice(0..0, laws(&ticks, &all));
         }
-        if field == Field::M1 {
-            let [from, to] = PAPER_M1.map(|m| m * 1e3);
+        if field == Field::Fit {
+            let [from, to] = PAPER_FIT_RMS.map(|m| m * 1e3);
             layers.insert(0, Layer::Range { from, to, note: "the paper, 2–5 m".to_owned() });
         }
         let x = Axis { logarithmic: wide, ..Axis::linear(headed(&key)) }.at(ticks.clone());
@@ -158,7 +157,7 @@ pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
             (Field::SearchTime, Unit::Plain, "search (ms)"),
         ]
     } else {
-        &[(Field::M2, Unit::Millimetres, "m2 of the fixes found (mm)")]
+        &[(Field::Tre, Unit::Millimetres, "TRE of the fixes found (mm)")]
     };
     let heads = [Head::words("condition"), Head::words("series"), Head::words("metric")].into_iter();
     let heads = heads.chain(["n", "p5", "p25", "median", "p75", "p95"].map(Head::numbers));

@@ -2,7 +2,7 @@
 
 use super::{caption, distinct, figure, series};
 use crate::{
-    Field, PAPER_M1, RunSummary,
+    Field, PAPER_FIT_RMS, RunSummary,
     content::phrases::{self, Unit},
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
@@ -23,12 +23,12 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
         Head::words("series"),
         Head::numbers("frame"),
         Head::words("target"),
-        Head::numbers("m1 (mm)"),
-        Head::numbers("m2 (mm)"),
+        Head::numbers("fit RMS (mm)"),
+        Head::numbers("TRE (mm)"),
     ];
     let mut data =
         Table::new("error-over-frames", text!["Every point of the figure of error over frames."], heads.to_vec());
-    let metrics = [(Field::M1, "m1, residual (mm)"), (Field::M2, "m2, model points (mm)")];
+    let metrics = [(Field::Fit, "fit RMS (mm)"), (Field::Tre, "TRE (mm)")];
     let mut points = vec![vec![Vec::new(); names.len()]; 2];
     // What errs alike in a frame stands side by side.
     let aside = |index: usize| 0.6 * ((index as f64 + 0.5) / names.len() as f64 - 0.5);
@@ -49,8 +49,8 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
                     names[index].clone().into(),
                     at.into(),
                     object.into(),
-                    as_number(Field::M1).into(),
-                    as_number(Field::M2).into(),
+                    as_number(Field::Fit).into(),
+                    as_number(Field::Tre).into(),
                 ],
             );
         }
@@ -59,8 +59,8 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
         let marks = points.into_iter().enumerate();
         let mut layers: Vec<Layer> =
             marks.map(|(series, points)| Layer::Marks { series, points, radius: 1.8 }).collect();
-        if field == Field::M1 {
-            let [from, to] = PAPER_M1.map(|m| m * 1e3);
+        if field == Field::Fit {
+            let [from, to] = PAPER_FIT_RMS.map(|m| m * 1e3);
             layers.insert(0, Layer::Range { from, to, note: "the paper, 2–5 m".to_owned() });
         }
         Panel { x: Axis::linear("frame"), y: Axis::logarithmic(label), layers, ..Panel::default() }

@@ -26,14 +26,14 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     if names.len() > 7 {
         return None;
     }
-    let heads = [Head::words("condition"), Head::words("series"), Head::numbers("m2 below (mm)")];
+    let heads = [Head::words("condition"), Head::words("series"), Head::numbers("TRE below (mm)")];
     let heads = heads.into_iter().chain(["recall (%)", "low (%)", "high (%)"].map(Head::numbers));
     let mut data = Table::new("recall", text!["Every point of the figure of recall."], heads.collect());
     let mut plotted = Vec::new();
     for (condition, members) in &groups {
         let (mut bands, mut lines) = (Vec::new(), Vec::new());
         for (name, trial) in members {
-            let errors: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::M2)).collect();
+            let errors: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::Tre)).collect();
             let n = errors.len();
             if errors.iter().all(|error| error.is_infinite()) {
                 continue;
@@ -48,7 +48,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
                 line.push([threshold, fraction]);
                 band.push([threshold, low, high]);
                 let as_number = |(what, value): (&str, f64)| {
-                    let what = format!("{what} m2_rms<={threshold} of attempted in mm");
+                    let what = format!("{what} tre_rms<={threshold} of attempted in mm");
                     Number::new(Some(value), 2, Key::of(trial, "/metrics/evaluation", what)).into()
                 };
                 let mut cells = vec![condition.clone().into(), name.clone().into(), threshold.to_string().into()];
@@ -66,7 +66,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
         bands.extend(lines);
         plotted.push(Panel {
             title: condition.clone(),
-            x: Axis::logarithmic("m2 below (mm)").at(vec![1.0, 2.0, 5.0, 10.0, 20.0, 50.0]),
+            x: Axis::logarithmic("TRE below (mm)").at(vec![1.0, 2.0, 5.0, 10.0, 20.0, 50.0]),
             y: Axis::linear("recall (%)").within([0.0, 104.0]),
             layers: bands,
             equal: false,
@@ -79,7 +79,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     let chart = Chart { panels: plotted, columns, page, shape: if columns == 2 { 0.6 } else { 0.75 }, legend };
     let bands = proportion::called(run.trials.iter().map(|trial| &trial.header)).replace("intervals", "bands");
     let said = format!(
-        "Recall: the share of all attempts whose m2 is below a bound, with {bands}; refused and wrong attempts are below none."
+        "Recall: the share of all attempts whose the TRE is below a bound, with {bands}; refused and wrong attempts are below none."
     );
     super::figure("recall", caption(&said, run), &chart, data)
 }

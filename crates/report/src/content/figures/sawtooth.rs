@@ -21,8 +21,8 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
     let heads = [
         Head::words("trial"),
         Head::numbers("frame"),
-        Head::numbers("navigated m3 (mm)"),
-        Head::numbers("without further fixes, m3 (mm)"),
+        Head::numbers("navigated position error (mm)"),
+        Head::numbers("without further fixes, position error (mm)"),
         Head::words("fixed"),
     ];
     let mut data = Table::new("sawtooth", text!["Every point of the figure of the error between fixes."], heads.into());
@@ -70,7 +70,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         panels.push(Panel {
             title: trial.header.axes.iter().map(condition).collect::<Vec<_>>().join(", "),
             x: Axis::linear("time (s)"),
-            y: Axis::logarithmic("m3 (mm)"),
+            y: Axis::logarithmic("position error (mm)"),
             layers,
             ..Panel::default()
         });

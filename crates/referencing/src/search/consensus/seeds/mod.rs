@@ -58,7 +58,7 @@ pub(in crate::search) struct Swept {
     /// Whether every three was looked at and followed that could lead to a set of fewer pairs than the whole.
     pub(in crate::search) parts: bool,
     /// Work done.
-    pub(in crate::search) tests: u64,
+    pub(in crate::search) pair_tests: u64,
 }
 
 impl Swept {
@@ -188,7 +188,7 @@ impl<'a> Seeds<'a> {
         let complete = followed && complete;
         let followed = self.follow_all(parts, until).1 && self.spent <= until;
         let parts = followed && self.parts.every == 1 && !self.parts.dropped;
-        Swept { modes: self.modes, complete, pairs, looked_for, parts, tests: self.spent }
+        Swept { modes: self.modes, complete, pairs, looked_for, parts, pair_tests: self.spent }
     }
 
     /// Follows the pairs whose bound is of interest, the greatest first, until so much is spent; these pairs, and whether that was enough.

@@ -92,7 +92,7 @@ pub struct Navigation {
     pub pose: ::core::option::Option<Navigated>,
     /// The first fix carried here by odometry alone.
     #[prost(message, optional, tag = "4")]
-    pub unreferenced: ::core::option::Option<Navigated>,
+    pub odometry_only: ::core::option::Option<Navigated>,
     #[prost(message, optional, tag = "5")]
     pub odometry: ::core::option::Option<OdometryStep>,
     /// What happened, in words.
@@ -130,18 +130,18 @@ pub struct OdometryStep {
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct NavigationErrors {
     #[prost(double, optional, tag = "1")]
-    pub m2_rms: ::core::option::Option<f64>,
+    pub tre_rms: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "2")]
-    pub m3_position: ::core::option::Option<f64>,
+    pub position_error: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "3")]
-    pub m3_attitude: ::core::option::Option<f64>,
+    pub attitude_error: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "4")]
     pub nees: ::core::option::Option<f64>,
     /// Of the first fix carried by odometry alone.
     #[prost(double, optional, tag = "5")]
-    pub unreferenced_m3_position: ::core::option::Option<f64>,
+    pub odometry_only_position_error: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "6")]
-    pub unreferenced_m3_attitude: ::core::option::Option<f64>,
+    pub odometry_only_attitude_error: ::core::option::Option<f64>,
 }
 /// What is the same for every frame of a trial. Topic /run/header, once, before all else.
 /// Metres, radians, seconds, pixels (centre of the first pixel: 0, 0). Matrices are written row by row,
@@ -477,27 +477,27 @@ pub struct Evaluation {
     pub correct_pairs: ::core::option::Option<u32>,
     /// RMS over the correctly identified pairs of |object_from_camera C - P| (m).
     #[prost(double, optional, tag = "10")]
-    pub m1_rms: ::core::option::Option<f64>,
+    pub fit_rms: ::core::option::Option<f64>,
     /// The same without the points the solver used (m).
     #[prost(double, optional, tag = "11")]
-    pub m1_unused_rms: ::core::option::Option<f64>,
+    pub fit_rms_unused: ::core::option::Option<f64>,
     /// RMS over all points of the target of |E p - p|, E the error of the pose (m).
     #[prost(double, optional, tag = "12")]
-    pub m2_rms: ::core::option::Option<f64>,
+    pub tre_rms: ::core::option::Option<f64>,
     /// Error of the left camera's position in the object frame (m).
     #[prost(double, optional, tag = "13")]
-    pub m3_position: ::core::option::Option<f64>,
+    pub position_error: ::core::option::Option<f64>,
     /// Error of its attitude (rad).
     #[prost(double, optional, tag = "14")]
-    pub m3_attitude: ::core::option::Option<f64>,
+    pub attitude_error: ::core::option::Option<f64>,
     /// Normalised estimation error squared, six degrees of freedom.
     #[prost(double, optional, tag = "15")]
     pub nees: ::core::option::Option<f64>,
     /// Cramer-Rao bound on m2, and on the position (m): what no unbiased estimate betters on average.
     #[prost(double, optional, tag = "16")]
-    pub m2_bound: ::core::option::Option<f64>,
+    pub tre_crlb: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "17")]
-    pub m3_bound: ::core::option::Option<f64>,
+    pub position_crlb: ::core::option::Option<f64>,
     /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable.
     #[prost(double, optional, tag = "18")]
     pub alert_limit: ::core::option::Option<f64>,
@@ -514,7 +514,7 @@ pub struct Totals {
     #[prost(uint64, tag = "3")]
     pub frames: u64,
     #[prost(uint64, tag = "4")]
-    pub referenced_frames: u64,
+    pub fix_frames: u64,
     #[prost(uint64, tag = "5")]
     pub wrong_frames: u64,
     #[prost(uint64, tag = "6")]
@@ -532,16 +532,16 @@ pub struct Totals {
     #[prost(uint64, tag = "11")]
     pub judged: u64,
     #[prost(double, tag = "12")]
-    pub m2_squares: f64,
+    pub tre_squares: f64,
     #[prost(double, tag = "13")]
-    pub m3_squares: f64,
+    pub position_squares: f64,
     /// The same of the bounds, over those of them that have one.
     #[prost(uint64, tag = "14")]
     pub bounded: u64,
     #[prost(double, tag = "15")]
-    pub m2_bound_squares: f64,
+    pub tre_crlb_squares: f64,
     #[prost(double, tag = "16")]
-    pub m3_bound_squares: f64,
+    pub position_crlb_squares: f64,
     /// Sum of the normalised errors squared, over how many fixes, and how many of them are below 12.592.
     #[prost(double, tag = "17")]
     pub nees_sum: f64,
@@ -642,11 +642,11 @@ pub struct Inspection {
     #[prost(uint64, tag = "2")]
     pub stamp_ns: u64,
     #[prost(message, repeated, tag = "3")]
-    pub points: ::prost::alloc::vec::Vec<InspectedPoint>,
+    pub points: ::prost::alloc::vec::Vec<PointOfInterest>,
 }
 /// One point of interest, frame of the left camera.
 #[derive(Clone, PartialEq, ::prost::Message)]
-pub struct InspectedPoint {
+pub struct PointOfInterest {
     #[prost(string, tag = "1")]
     pub object: ::prost::alloc::string::String,
     #[prost(string, tag = "2")]
@@ -707,13 +707,13 @@ pub struct ReferencingResult {
     pub optimal: ::core::option::Option<bool>,
     /// No admissible set has more pairs than this.
     #[prost(uint64, optional, tag = "16")]
-    pub size_bound: ::core::option::Option<u64>,
+    pub consensus_bound: ::core::option::Option<u64>,
     /// Expected number of chance sets at least as large as the one found.
     #[prost(double, optional, tag = "17")]
-    pub expected_chance_sets: ::core::option::Option<f64>,
+    pub nfa: ::core::option::Option<f64>,
     /// Pair tests that the search spent.
     #[prost(uint64, optional, tag = "18")]
-    pub tests: ::core::option::Option<u64>,
+    pub pair_tests: ::core::option::Option<u64>,
     /// Root mean square of C H - P over the pairs (m).
     #[prost(double, optional, tag = "19")]
     pub residual_rms: ::core::option::Option<f64>,
@@ -731,16 +731,16 @@ pub struct Integrity {
     #[prost(double, tag = "2")]
     pub chi2: f64,
     #[prost(uint64, tag = "3")]
-    pub freedom: u64,
+    pub dof: u64,
     /// What chi2 exceeds with one minus the confidence.
     #[prost(double, tag = "4")]
     pub chi2_limit: f64,
     /// How far the position moves at most (m) when one point is left out; absent where one cannot be spared.
     #[prost(double, optional, tag = "5")]
-    pub separation: ::core::option::Option<f64>,
+    pub solution_separation: ::core::option::Option<f64>,
     /// The same when two are; absent where two wrong matches are not assumed to happen.
     #[prost(double, optional, tag = "6")]
-    pub separation_two: ::core::option::Option<f64>,
+    pub solution_separation_two: ::core::option::Option<f64>,
     /// Protection levels: radii of the position (m) and of the attitude (rad) that the errors exceed with no more than the
     /// stated risk; absent where nothing vouches for the fix.
     #[prost(double, optional, tag = "7")]
@@ -750,9 +750,9 @@ pub struct Integrity {
     /// By how much measured distances are longer than the model's, as a share of them, and its standard deviation; absent with
     /// fewer than four points.
     #[prost(double, optional, tag = "9")]
-    pub stretch: ::core::option::Option<f64>,
+    pub scale_error: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "10")]
-    pub stretch_sigma: ::core::option::Option<f64>,
+    pub scale_error_sigma: ::core::option::Option<f64>,
 }
 /// A point of the target and the cloud point believed to be it, by their indices.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
