@@ -147,7 +147,7 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
         let core = if all { (0..pairs.len()).collect() } else { core(problem, &pairs, max) };
         let volumes = Volumes::of(problem, &pairs);
         let mut opposed: Vec<[u32; 4]> = Vec::new();
-        'fours: for (place, &d) in core.iter().enumerate() {
+        'quadruples: for (place, &d) in core.iter().enumerate() {
             for (k, &c) in core[..place].iter().enumerate() {
                 for (j, &b) in core[..k].iter().enumerate() {
                     let others = if all { &core[..j] } else { &[] };
@@ -158,7 +158,7 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
                         if volumes.refuses(Sense::Proper, &plane, a) {
                             opposed.push([a, b, c, d].map(|i| i as u32));
                             if opposed.len() >= MAX_LISTED {
-                                break 'fours;
+                                break 'quadruples;
                             }
                         }
                     }
