@@ -249,7 +249,7 @@ const CHUNK: usize = 32;
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn brightnesses(patch: &Patch, north: &[f64], east: &[f64], out: &mut [f32]) {
     let ([first_north, first_east], [rows, columns]) = (patch.first.map(|n| n as f64), patch.count.map(|n| n as i32));
-    let (most_north, most_east) = (f64::from(rows - 1), f64::from(columns - 1));
+    let (max_north, max_east) = (f64::from(rows - 1), f64::from(columns - 1));
     let (mut x, mut y) = ([0.0; CHUNK], [0.0; CHUNK]);
     for ((north, east), out) in north.chunks(CHUNK).zip(east.chunks(CHUNK)).zip(out.chunks_mut(CHUNK)) {
         let n = out.len();
@@ -257,8 +257,8 @@ fn brightnesses(patch: &Patch, north: &[f64], east: &[f64], out: &mut [f32]) {
         y[..n].copy_from_slice(east);
         let (mut fx, mut fy, mut place) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK], [0_i32; CHUNK]);
         for i in 0..CHUNK {
-            let u = (x[i] / CELL - first_north).clamp(0.0, most_north);
-            let v = (y[i] / CELL - first_east).clamp(0.0, most_east);
+            let u = (x[i] / CELL - first_north).clamp(0.0, max_north);
+            let v = (y[i] / CELL - first_east).clamp(0.0, max_east);
             let (row, column) = ((u as i32).min(rows - 2), (v as i32).min(columns - 2));
             (fx[i], fy[i]) = ((u - f64::from(row)) as f32, (v - f64::from(column)) as f32);
             place[i] = row * columns + column;

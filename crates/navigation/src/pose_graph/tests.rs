@@ -264,7 +264,7 @@ fn nees((error, covariance): &(Vector6<f64>, Matrix6<f64>)) -> f64 {
 /// So many ways back over key frames end where they began, and err as they say.
 ///
 /// Seen to fail when the motion from a key frame is 5 cm off.
-fn ways_back(draws: u64, points: usize) {
+fn returns(draws: u64, points: usize) {
     let (rig, settings) = (rig(), PoseGraphSettings { min_loop_distance: 5.0, ..PoseGraphSettings::default() });
     let (mut sum, mut squares, mut alone) = (0.0, 0.0, 0.0);
     for seed in 0..draws {
@@ -284,14 +284,14 @@ fn ways_back(draws: u64, points: usize) {
 
 #[test]
 fn a_path_back_over_key_frames_ends_where_it_began() {
-    ways_back(4, FEW);
+    returns(4, FEW);
 }
 
 #[test]
 #[ignore = "long: 300 pieces of other ground, 24 dives"]
-fn key_frames_and_ways_back_in_many_draws() {
+fn key_frames_and_returns_in_many_draws() {
     refused(300);
-    ways_back(24, 2500);
+    returns(24, 2500);
 }
 
 #[test]

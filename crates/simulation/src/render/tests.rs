@@ -22,7 +22,7 @@ pub(super) fn scene(plan: &SitePlan) -> Scene {
 }
 
 /// Kept for all tests: to make looks takes longer than to draw with them.
-static LOOKS: LazyLock<Arc<SurfaceTextures>> = LazyLock::new(|| SurfaceTextures::shared(5));
+static TEXTURES: LazyLock<Arc<SurfaceTextures>> = LazyLock::new(|| SurfaceTextures::shared(5));
 
 pub(super) fn studio(scale: f64, water: Water, imager: Imager, port: Port, distortion: &[f64]) -> Studio {
     let size = [1024.0, 768.0].map(|n| (n * scale) as u32);
@@ -39,7 +39,7 @@ pub(super) fn studio(scale: f64, water: Water, imager: Imager, port: Port, disto
         .collect();
     let left = RenderCamera::new(Lens::new(camera, port.clone()), lamps, &water);
     let right = RenderCamera::new(Lens::new(camera, port), there, &water);
-    let textures = Arc::clone(&LOOKS);
+    let textures = Arc::clone(&TEXTURES);
     Studio::new(left, right, water, imager, textures, true, 1, 2)
 }
 
