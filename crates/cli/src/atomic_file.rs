@@ -1,4 +1,4 @@
-//! Files that have their name only when they are whole.
+//! Files that get their name when they are complete.
 
 use std::{
     fs,
@@ -9,22 +9,22 @@ use seafix_component::Fault;
 
 use crate::exit::{Failure, OUTPUT};
 
-/// A file that is begun and not finished; it is removed where it stays so.
+/// An unfinished file; it is removed on drop.
 pub(crate) struct AtomicFile<'a> {
     path: &'a Path,
     partial: PathBuf,
 }
 
-/// Writes a file; what had its name before stays where that fails.
+/// Writes a file; an existing file of its name stays if that fails.
 pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
     AtomicFile::begin(path)?.finish(content)
 }
 
 impl<'a> AtomicFile<'a> {
-    /// Finds out whether the file can be written, before long work.
+    /// Creates the unfinished file, so that an unwritable path is detected before long work.
     pub(crate) fn begin(path: &'a Path) -> Result<Self, Failure> {
         if path.exists() && !path.is_file() {
-            let fault = Fault::new("the output is no file", path).remedy("name a file, new or to be replaced");
+            let fault = Fault::new("the output is not a file", path).remedy("name a new file, or one to replace");
             return Err(Failure::new(OUTPUT, fault));
         }
         let mut partial = path.as_os_str().to_owned();
@@ -47,7 +47,7 @@ fn failed(path: &Path, error: &std::io::Error) -> Failure {
 
 impl Drop for AtomicFile<'_> {
     fn drop(&mut self) {
-        // After a rename there is none.
+        // There is none after a rename.
         let _ = fs::remove_file(&self.partial);
     }
 }

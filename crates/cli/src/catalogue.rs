@@ -1,16 +1,16 @@
-//! All registries: what `list` and `show` print, and the README's tables.
+//! The catalogue of all registries, for `list`, `show` and the tables of `docs/components.md`.
 
 use seafix_component::Listing;
 use seafix_experiment::components;
 
-/// One kind of component: its plural and its components.
+/// A kind of component with its names and components.
 pub(crate) struct Kind {
     pub(crate) singular: &'static str,
     pub(crate) plural: &'static str,
     pub(crate) listings: Vec<Listing>,
 }
 
-/// All kinds, in the order in which a frame meets them.
+/// All kinds, in the order of the stages.
 pub(crate) fn kinds() -> Vec<Kind> {
     let kind = |listings: Vec<Listing>| {
         let singular = listings.first().map_or("", |listing| listing.kind);
@@ -38,12 +38,12 @@ fn plural(kind: &str) -> &'static str {
     }
 }
 
-/// The kind of this name, in the singular.
+/// The kind with this singular name.
 pub(crate) fn kind_of(singular: &str) -> Kind {
     kinds().into_iter().find(|kind| kind.singular == singular).expect("every kind of component is in the catalogue")
 }
 
-/// The README's tables, between its markers.
+/// The tables of `docs/components.md`, between its markers.
 pub(crate) fn markdown() -> String {
     let mut text = String::new();
     for kind in kinds() {
@@ -60,7 +60,7 @@ pub(crate) fn markdown() -> String {
 mod tests {
     use std::{fs, path::Path};
 
-    /// Holds the part of a page below the line `begin` against `fresh`, or writes it there.
+    /// Compares the part of a page between `begin` and `end` with `fresh`, or writes it there.
     fn holds(page: &str, begin: &str, end: &str, fresh: &str) {
         let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(page);
         let text = fs::read_to_string(&page).unwrap();
@@ -88,8 +88,8 @@ mod tests {
         holds("README.md", begin, "<!-- end of summary -->", &format!("```\n{results}\n```\n"));
     }
 
-    /// Every number with a decimal point, and every count "n of m", of a finding stands in the answer of the report that it
-    /// links. Seen to fail with a digit changed.
+    /// Every number with a decimal point in a finding is in the answer of the linked report.
+    /// Seen to fail with a digit changed.
     #[test]
     fn the_readme_repeats_the_published_findings() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

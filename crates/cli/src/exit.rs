@@ -1,22 +1,22 @@
-//! How a command ends.
+//! Exit codes and failures of commands.
 
 use seafix_component::Fault;
 use seafix_experiment::RunError;
 
 use crate::signals;
 
-/// Done; refused frames and problems included.
+/// Success; rejected frames and problems included.
 pub(crate) const DONE: u8 = 0;
-/// Done, and something was found: `check` saw faults.
+/// Success with findings: `check` listed faults, `diff` differences.
 pub(crate) const FINDINGS: u8 = 1;
-/// The command line or an experiment file is wrong.
+/// An invalid command line or experiment file.
 pub(crate) const USAGE: u8 = 2;
-/// Something they refer to is wrong: a data set, a site, a problem, an image, a log.
+/// An invalid input that they refer to: a data set, a site, a problem, an image, a log.
 pub(crate) const INPUT: u8 = 3;
-/// The output or the machine failed.
+/// A failure of the output or of the machine.
 pub(crate) const OUTPUT: u8 = 4;
 
-/// A command that could not do its work: the exit code and one line for each fault.
+/// The failure of a command: its exit code and one line for each fault.
 #[derive(Debug)]
 pub(crate) struct Failure {
     pub(crate) code: u8,
@@ -44,5 +44,5 @@ impl From<RunError> for Failure {
     }
 }
 
-/// What a command returns: its exit code, or why it failed.
+/// The result of a command: its exit code, or its failure.
 pub(crate) type Ended = Result<u8, Failure>;

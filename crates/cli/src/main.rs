@@ -14,7 +14,7 @@ mod publication;
 mod signals;
 mod terminal;
 
-/// Positions of an underwater vehicle relative to a known structure, from stereo images.
+/// Position and attitude of an underwater vehicle relative to a known structure, from stereo images.
 #[derive(Debug, Parser)]
 #[command(name = "seafix", version, propagate_version = true)]
 struct Arguments {

@@ -1,4 +1,4 @@
-//! Point clouds as PLY, the format that MeshLab, CloudCompare and Open3D read.
+//! Point clouds in the format PLY, for MeshLab, CloudCompare and Open3D.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use seafix_vision::Image;
 
 use crate::{atomic_file, exit::Failure};
 
-/// Writes `cloud` as binary PLY: position (m, left camera's axes), the grey of the left image there,
-/// and the standard deviation of the position (m, √ of the covariance's trace).
+/// Writes `cloud` as binary PLY: position (m, in the left camera), grey value of the left image,
+/// and standard deviation of the position (m, √ of the covariance's trace).
 ///
 /// # Errors
-/// The file cannot be written; what had its name before stays.
+/// The file cannot be written; an existing file of its name stays.
 pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Result<(), Failure> {
     let mut bytes = format!(
         "ply\nformat binary_little_endian 1.0\ncomment left camera: x right, y down, z forward; metres\n\

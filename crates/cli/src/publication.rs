@@ -1,4 +1,4 @@
-//! `seafix-reports/1`: which experiments are run and reported into a folder that is kept.
+//! Lists of published experiments: the format `seafix-reports/1`.
 
 use std::{
     collections::BTreeSet,
@@ -12,7 +12,7 @@ use serde::Deserialize;
 
 const FORMAT: &str = "seafix-reports/1";
 
-/// The file: its reports, in the order of the page that sums them up.
+/// The file: its reports in the order of the page of all findings.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -25,17 +25,17 @@ struct File {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
-    /// The experiment file, from the folder of this one.
+    /// The experiment file, relative to the folder of the list.
     experiment: String,
-    /// Settings that change it, `source.frames=60`; its page says so.
+    /// Changed settings, `source.frames=60`; the page states them.
     #[serde(default)]
     set: Vec<String>,
 }
 
-/// One experiment that is to be run and reported.
+/// A published experiment.
 #[derive(Debug)]
 pub(crate) struct Published {
-    /// What its folders are called: the experiment's name.
+    /// The experiment's name, and that of its folders.
     pub(crate) name: String,
     pub(crate) plan: Plan,
 }
@@ -43,14 +43,14 @@ pub(crate) struct Published {
 /// Reads the list and every experiment in it.
 ///
 /// # Errors
-/// Everything that is wrong with the list and its experiments.
+/// All faults of the list and its experiments.
 pub(crate) fn read(path: &Path) -> Result<Vec<Published>, Vec<Fault>> {
     let text = read_text(path).map_err(|fault| vec![fault])?;
     let file: File = toml::from_str(&text).map_err(|error| vec![Fault::in_toml(path, &text, &error)])?;
     let mut faults = Vec::new();
     if file.format != FORMAT {
-        let fault = Fault::new("another format", path).value(format!("`{}`", file.format));
-        faults.push(fault.remedy(format!("this program reads {FORMAT}")));
+        let fault = Fault::new("unsupported format", path).value(format!("`{}`", file.format));
+        faults.push(fault.remedy(format!("use {FORMAT}")));
     }
     if file.report.is_empty() {
         faults.push(Fault::new("no report", path).remedy("add [[report]] with `experiment = \"FILE.toml\"`"));
@@ -61,7 +61,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Published>, Vec<Fault>> {
         match Plan::read(&experiment, &entry.set) {
             Ok(plan) if names.insert(plan.name.clone()) => published.push(Published { name: plan.name.clone(), plan }),
             Ok(plan) => {
-                let fault = Fault::new("two reports of one name", path).value(format!("`{}`", plan.name));
+                let fault = Fault::new("two reports with one name", path).value(format!("`{}`", plan.name));
                 faults.push(fault.remedy("rename one of the experiment files"));
             }
             Err(more) => faults.extend(more),
@@ -87,15 +87,15 @@ mod tests {
         let one = "[[report]]\nexperiment = 'a.toml'\n";
         assert_eq!(reported(&format!("format = 'seafix-reports/1'\n{one}")), Ok(1));
         let reported_of = |text: &str| reported(text).unwrap_err();
-        assert!(reported_of(&format!("format = 'seafix-reports/1'\n{one}{one}")).contains("two reports of one name"));
-        assert!(reported_of(&format!("format = 'seafix-reports/2'\n{one}")).contains("another format"));
+        assert!(reported_of(&format!("format = 'seafix-reports/1'\n{one}{one}")).contains("two reports with one name"));
+        assert!(reported_of(&format!("format = 'seafix-reports/2'\n{one}")).contains("unsupported format"));
         assert!(reported_of("format = 'seafix-reports/1'\n").contains("no report"));
         assert!(reported_of("format = 'seafix-reports/1'\n[[report]]\nexperimnt = 'a.toml'\n").contains("list.toml:3"));
         let both = reported_of("format = 'seafix-reports/0'\n[[report]]\nexperiment = 'b.toml'\n");
-        assert!(both.contains("another format") && both.contains("b.toml"), "{both}");
+        assert!(both.contains("unsupported format") && both.contains("b.toml"), "{both}");
     }
 
-    /// A page without its tags, a space for every white space, entities as they are read.
+    /// The text of a page: tags removed, white space joined, entities decoded.
     fn plain(page: &str) -> String {
         let text: String = page.split('<').map(|part| part.split_once('>').map_or(part, |(_, text)| text)).collect();
         let signs = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&#39;", "'"), ("&nbsp;", " "), ("&amp;", "&")];
@@ -103,8 +103,8 @@ mod tests {
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// The committed reports agree with each other and with the list; no experiment runs. What an experiment gives today is
-    /// no matter of a release's reports.
+    /// The committed reports agree with each other and with the list. No experiment runs: a release's reports need not equal
+    /// the results of the current program.
     ///
     /// Seen to fail with a digit of README.md changed, and with two reports exchanged in it.
     #[test]
@@ -125,7 +125,7 @@ mod tests {
             let said: Vec<String> = said.map(|said| said.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
             assert!(!said.is_empty(), "{name}");
             for sentence in said {
-                assert!(page.contains(&sentence), "reports/{name}/report.html does not say: {sentence}");
+                assert!(page.contains(&sentence), "reports/{name}/report.html lacks: {sentence}");
             }
             for link in section.split("](").skip(1).map(|rest| rest.split_once(')').unwrap().0) {
                 assert!(link.starts_with(&format!("{name}/")) && reports.join(link).exists(), "reports/{link}");

@@ -1,4 +1,4 @@
-//! Writing for people: standard output that may be cut off, progress where somebody watches.
+//! Output for people: standard output that may be closed, and the progress of a run.
 
 use std::{
     io::{ErrorKind, IsTerminal, Write, stderr, stdout},
@@ -14,27 +14,27 @@ use crate::{
     signals,
 };
 
-/// Prints `text` to standard output. A reader that went away (`| head`) ends the program quietly.
+/// Prints `text` to standard output. A closed pipe (`| head`) ends the program quietly.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
-        Err(error) => Err(Failure::new(OUTPUT, format!("cannot write to standard output ({error})"))),
+        Err(error) => Err(Failure::new(OUTPUT, format!("cannot write to standard output: {error}"))),
         Ok(()) => Ok(()),
     }
 }
 
-/// How many columns standard output has: those of the terminal, or 80.
+/// The number of columns of standard output: that of the terminal, or 80.
 pub(crate) fn width() -> usize {
     terminal_size::terminal_size_of(stdout()).map_or(80, |(width, _)| usize::from(width.0))
 }
 
-/// Tells the person on standard error; a run does not stop because nobody listens.
+/// Prints a line to standard error; a failure of this is ignored, so that it stops no run.
 pub(crate) fn notify(line: &str) {
     let _ = writeln!(stderr(), "{line}");
 }
 
-/// Shows the progress of a run on standard error: a bar where it is a terminal, else a line now and then.
+/// The progress of a run on standard error: a bar on a terminal, otherwise a line for every tenth of the frames.
 pub(crate) struct Progress {
     bar: ProgressBar,
     watched: bool,
@@ -47,7 +47,7 @@ impl Progress {
         Self { bar: ProgressBar::hidden().with_style(style), watched: stderr().is_terminal() }
     }
 
-    /// So many steps are to come.
+    /// Sets the number of steps.
     pub(crate) fn expect(&self, frames: usize) {
         self.bar.set_length(frames as u64);
         if self.watched {
@@ -55,13 +55,12 @@ impl Progress {
         }
     }
 
-    /// One of them is done.
+    /// Counts a finished step.
     pub(crate) fn step(&self, message: &str) {
         self.bar.inc(1);
         if self.watched {
             self.bar.set_message(message.to_owned());
         } else {
-            // A log file gets a line at every tenth of the way.
             let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(1).max(1));
             if done * 10 / all != done.saturating_sub(1) * 10 / all {
                 notify(&format!("{done}/{all} frames"));
@@ -77,7 +76,7 @@ impl Progress {
 impl Observer for Progress {
     fn begins(&self, frames: usize, bytes: u64, folder: &Path) {
         notify(&format!(
-            "{frames} frames, at most about {} MB of log, into {}",
+            "{frames} frames, at most about {} MB of logs, in {}",
             bytes.div_ceil(1_000_000),
             folder.display()
         ));
@@ -85,7 +84,7 @@ impl Observer for Progress {
     }
 
     fn renews(&self, reason: &str) {
-        notify(&format!("a kept run is made again: {reason}"));
+        notify(&format!("a kept run is repeated: {reason}"));
     }
 
     fn warns(&self, warning: &Fault) {
@@ -93,7 +92,7 @@ impl Observer for Progress {
     }
 
     fn resumes(&self, frames: usize) {
-        notify(&format!("{frames} of them are there already"));
+        notify(&format!("{frames} of them are complete already"));
         self.bar.set_position(frames as u64);
     }
 

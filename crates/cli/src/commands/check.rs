@@ -17,7 +17,7 @@ use crate::{
     terminal::print,
 };
 
-/// Of the motions of a target, and of the points that exclude one, so many are named.
+/// The maximum number of listed motions of a target, and of listed points that exclude one.
 const MAX_NOTED: usize = 5;
 
 pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
@@ -42,15 +42,15 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
     Ok(if found { FINDINGS } else { DONE })
 }
 
-/// What is examined of `path`: itself, or, of a folder that is no data set but holds files that can be examined, these and
-/// those of the folders in it, in the order of their names.
+/// Adds the files to check at `path`: itself, or the files of known formats in a folder that is no data set, recursively
+/// and sorted by name.
 fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     let before = files.len();
     let entries = if path.is_dir() && !dataset::is_one(path) { std::fs::read_dir(path).ok() } else { None };
     let mut entries: Vec<PathBuf> =
         entries.into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
     entries.sort();
-    // A run: its manifest and logs; its report and pieces are made of them.
+    // A run is checked by its manifest and logs; report and pieces derive from them.
     let run = path.is_dir() && is_run(path);
     if run {
         files.push(path.to_owned());
@@ -59,14 +59,14 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     for entry in entries {
         let name = entry.to_string_lossy();
         let known = [".toml", ".json", ".mcap"].iter().any(|end| name.ends_with(end)) && !name.ends_with(".truth.json");
-        // Links are not followed: they may lead back.
+        // Links are not followed: they may be circular.
         let is_link = entry.is_symlink();
         match entry.is_dir() {
             true if dataset::is_one(&entry) => files.push(entry),
             true if !is_link => {
                 let here = files.len();
                 gather(&entry, files);
-                // A folder of other things says nothing.
+                // A folder without a known file is not listed.
                 let other = files[here..].first().is_some_and(|first| *first == entry) && !is_run(&entry);
                 other.then(|| files.truncate(here));
             }
@@ -79,22 +79,22 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// What was found in a file or folder.
+/// The result of checking a file or folder.
 #[derive(Default)]
 struct Examined {
     faults: Vec<String>,
     warnings: Vec<Fault>,
-    /// What it holds, where that is not plain to see.
+    /// A summary of the contents of a recording.
     note: String,
 }
 
-/// The faults and warnings of one file or folder, by what it is.
+/// The faults and warnings of one file or folder, by its format.
 fn examine(path: &Path, limits: ImageLimits) -> Examined {
     let lines = |faults: Vec<Fault>| faults.iter().map(ToString::to_string).collect();
     if path.extension().is_some_and(|extension| extension == "mcap") {
         return match log(path) {
             Ok(warning) => Examined { warnings: warning.into_iter().collect(), ..Examined::default() },
-            // Sound, and no trial's: then a recording.
+            // An intact file without a trial header is a recording.
             Err(LogError::Foreign { .. }) if !is_of_a_trial(path) => {
                 let (faults, warnings, reported) = check_recording(path, limits);
                 let note = if reported.is_empty() { reported } else { format!("note: {reported}\n") };
@@ -107,13 +107,13 @@ fn examine(path: &Path, limits: ImageLimits) -> Examined {
     Examined { faults: lines(faults), warnings, note: String::new() }
 }
 
-/// Reads a log from end to end, a frame at a time; a warning where it was saved of one that was not whole.
+/// Reads all frames of a log; the result is a warning for a log that `seafix recover` saved.
 fn log(path: &Path) -> Result<Option<Fault>, LogError> {
     let mut reader = Reader::open(path)?;
     reader.by_ref().try_for_each(|frame| frame.map(|_| ()))?;
     Ok(reader.recovered().map(|lost| {
-        let fault = Fault::new(format!("a log that was saved of one that was not whole ({lost})"), path);
-        fault.remedy("what it lacks is in no result")
+        let fault = Fault::new(format!("recovered log with losses ({lost})"), path);
+        fault.remedy("results lack the lost frames")
     }))
 }
 
@@ -154,17 +154,17 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     }
 }
 
-/// Bodies are checked with the site that they belong to.
+/// A geometry file is checked together with its site file.
 fn geometry(path: &Path) -> Result<(), Vec<Fault>> {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let Some(stem) = name.strip_suffix(".geometry.toml") else {
-        let remedy = "the bodies of NAME.site.toml are NAME.geometry.toml";
+        let remedy = "name it NAME.geometry.toml, beside its NAME.site.toml";
         return Err(vec![Fault::new("not the name of a geometry file", path).remedy(remedy)]);
     };
     SitePlan::read(&path.with_file_name(format!("{stem}.site.toml"))).map(|_| ())
 }
 
-/// What of a site's targets is mapped onto itself, and which points would tell: notes, no faults.
+/// Notes on the self-symmetries of a site's targets and on the points that exclude them.
 fn congruences(path: &Path) -> String {
     let site =
         read_text(path).ok().filter(|text| format(text).is_some_and(|format| format.starts_with("seafix-site/")));
@@ -176,7 +176,7 @@ fn congruences(path: &Path) -> String {
             let ids: Vec<String> =
                 congruence.broken_by.iter().take(MAX_NOTED).map(|&i| format!("`{}`", target.points[i].id)).collect();
             let reported = match ids.as_slice() {
-                [] => "no point excludes it; add one that it does not map onto another".to_owned(),
+                [] => "no point excludes it; add a point that the motion maps onto no other".to_owned(),
                 ids => {
                     let more = congruence.broken_by.len() - ids.len();
                     let more = if more > 0 { format!(" or of {more} more") } else { String::new() };
@@ -192,7 +192,7 @@ fn congruences(path: &Path) -> String {
     notes
 }
 
-/// The `format` that a TOML text says it has.
+/// The value of `format` in a TOML text.
 fn format(text: &str) -> Option<String> {
     toml::from_str::<toml::Table>(text).ok()?.get("format")?.as_str().map(str::to_owned)
 }

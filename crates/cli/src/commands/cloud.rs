@@ -26,7 +26,7 @@ pub(crate) struct Cloud {
     left: PathBuf,
     /// The right image.
     right: PathBuf,
-    /// The rig that took them: a dataset.toml, of which only the rig and `bits` are read.
+    /// The stereo rig: a dataset.toml, of which only the rig and `bits` are read.
     #[arg(long, value_name = "DATASET.toml")]
     rig: PathBuf,
     /// The detector [default: the pipeline's].
@@ -38,24 +38,24 @@ pub(crate) struct Cloud {
     /// The matcher [default: the pipeline's].
     #[arg(long)]
     matcher: Option<String>,
-    /// At most so many key points an image [default: the detector's].
+    /// Maximum number of key points in an image [default: the detector's].
     #[arg(long)]
     features: Option<u32>,
     /// Change a setting of the pipeline: a dotted key and a TOML value, `detector.sigma=1.5`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// How many times the cloud is made, for its times.
+    /// Number of repetitions, for the statistics of times.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     repeat: u32,
-    /// How many threads work; the cloud does not depend on it.
+    /// Number of threads; the cloud does not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
     #[command(flatten)]
     limits: Limits,
-    /// One JSON object, for programs: every point, and the times of the stages.
+    /// Print one JSON object with all points and the times of the stages.
     #[arg(long)]
     json: bool,
-    /// Write the cloud here, as PLY.
+    /// Write the cloud to this PLY file.
     #[arg(long, value_name = "CLOUD.ply")]
     out: Option<PathBuf>,
 }
@@ -81,7 +81,7 @@ impl Cloud {
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
-            .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
         let (look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
         let warnings: Vec<Fault> = warning
             .into_iter()
@@ -104,7 +104,7 @@ impl Cloud {
         Ok(DONE)
     }
 
-    /// The default pipeline with what the command line changes.
+    /// The default pipeline with the changes of the command line.
     fn pipeline(&self) -> Result<Pipeline, Failure> {
         let mut pipeline = Pipeline::default();
         let choose = |choice: &mut Choice, name: &Option<String>| {
@@ -118,7 +118,7 @@ impl Cloud {
         if let Some(features) = self.features {
             pipeline.detector = pipeline.detector.with("features", i64::from(features));
         }
-        // A wrong name is told before `--set` is blamed for it.
+        // An unknown name is reported before an error of `--set`.
         pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
         changed_pipeline(&pipeline, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))
     }
@@ -139,7 +139,7 @@ impl Cloud {
         (look, times)
     }
 
-    /// A word about each image in which there is nothing to find.
+    /// A warning for each image without key points.
     fn blind(&self, look: &FrontEndOutput, images: [&Image; 2]) -> Vec<Fault> {
         let of = |((file, image), found): ((&PathBuf, &Image), &[Keypoint])| {
             let (min, max) = image.pixels().iter().fold((f32::MAX, f32::MIN), |(a, b), &p| (a.min(p), b.max(p)));
@@ -147,13 +147,13 @@ impl Cloud {
                 let [width, height] = [image.width(), image.height()];
                 Fault::new("an image without a key point", file)
                     .value(format!("{width} x {height} px, grey levels from {min} to {max}"))
-                    .remedy("see whether its camera saw anything, and whether the detector asks for too much")
+                    .remedy("check the image, and lower the threshold of the detector")
             })
         };
         [&self.left, &self.right].into_iter().zip(images).zip(look.keypoints()).filter_map(of).collect()
     }
 
-    /// For people: how much was found, and how long each stage took.
+    /// The output for people: counts, and the times of the stages.
     fn people(&self, look: &FrontEndOutput, times: &[StageTimes]) -> String {
         let [left, right] = look.keypoints().map(<[_]>::len);
         let depths = look.cloud.iter().map(|point| point.position.at.coords.z);
@@ -161,7 +161,7 @@ impl Cloud {
         let depth = if look.cloud.is_empty() { String::new() } else { format!(", {near:.2} to {far:.2} m deep") };
         let (matches, points) = (look.matches.len(), look.cloud.len());
         let mut text = format!("{left} and {right} key points, {matches} matches, {points} points{depth}\n");
-        text += &format!("{:12}{:>10}{:>12}\n", "stage", "least ms", "median ms");
+        text += &format!("{:12}{:>10}{:>12}\n", "stage", "min ms", "median ms");
         for (stage, [min, median]) in summary(times) {
             text += &format!("{stage:12}{min:10.2}{median:12.2}\n");
         }
@@ -174,7 +174,7 @@ impl Cloud {
         )
     }
 
-    /// For programs: everything.
+    /// The output for programs: one JSON object.
     fn machines(&self, look: &FrontEndOutput, times: &[StageTimes], pipeline: &Pipeline, warnings: &[Fault]) -> String {
         let points: Vec<Value> = look.cloud.iter().map(point).collect();
         let times: serde_json::Map<String, Value> = summary(times)
@@ -205,7 +205,7 @@ impl Cloud {
     }
 }
 
-/// A word where images and rig do not belong together.
+/// A warning for a rig that contradicts its images.
 fn epipolar_warning(off: EpipolarCheck, rig: &StereoRig, file: &Path) -> Option<Fault> {
     let lines = if rig.is_rectified() {
         "the same rows"
@@ -216,16 +216,16 @@ fn epipolar_warning(off: EpipolarCheck, rig: &StereoRig, file: &Path) -> Option<
     };
     off.contradict().then(|| {
         let EpipolarCheck { matches, near, rms_px } = off;
-        Fault::new("a rig that the images contradict", file)
+        Fault::new("the images contradict the rig", file)
             .value(format!(
-                "{near} of {matches} matches lie within {} px of {lines}, rms {rms_px:.1} px",
+                "{near} of {matches} matches are within {} px of {lines}, RMS {rms_px:.1} px",
                 EpipolarCheck::NEAR
             ))
             .remedy("give the calibration of these images; images that are not rectified need their own rig")
     })
 }
 
-/// A word where key points came to no point, and what the exchanged images would give.
+/// A warning for key points without a triangulated point, with the result for exchanged images.
 fn nothing(
     front_end: &FrontEnd,
     look: &FrontEndOutput,
@@ -241,7 +241,7 @@ fn nothing(
     front_end.run(right, left, rig, &mut exchanged);
     let (matches, points) = (exchanged.matches.len(), exchanged.cloud.len());
     Some(
-        Fault::new("key points and no point", file)
+        Fault::new("key points, but no triangulated point", file)
             .value(format!(
                 "{in_left} and {in_right} key points, {} matches; with left and right exchanged {matches} matches, \
                  {points} points",
@@ -251,7 +251,7 @@ fn nothing(
     )
 }
 
-/// The least and the median time of every stage and of the whole, `total` (ms).
+/// The minimum and median time (ms) of every stage and of their sum, `total`.
 fn summary(times: &[StageTimes]) -> Vec<(&'static str, [f64; 2])> {
     let stages: Vec<Vec<(&'static str, f64)>> = times.iter().map(StageTimes::stages).collect();
     let of = |mut all: Vec<f64>| {

@@ -16,10 +16,10 @@ pub(crate) struct Compare {
     /// The folders of two or more runs.
     #[arg(required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
-    /// Compare runs of different data all the same.
+    /// Compare runs of different data too.
     #[arg(long)]
     force: bool,
-    /// A folder for the comparison as a page, compare.html.
+    /// Write the comparison as a page, compare.html, into this folder.
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -28,7 +28,7 @@ impl Compare {
     pub(crate) fn execute(&self) -> Ended {
         for (index, run) in self.runs.iter().enumerate() {
             if self.runs[..index].contains(run) {
-                return Err(Failure::new(USAGE, format!("{} is named twice; name different runs", run.display())));
+                return Err(Failure::new(USAGE, format!("{} is given twice; name different runs", run.display())));
             }
         }
         let compared = compare(&self.runs, self.force, self.out.as_deref(), Some(width())).map_err(failure)?;

@@ -1,4 +1,4 @@
-//! `seafix completions` and `seafix man`: derived from the command line's own definition.
+//! `seafix completions` and `seafix man`, derived from the definition of the command line.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use crate::{
 /// The program's name in completions and manual pages.
 const PROGRAM: &str = "seafix";
 
-/// Prints the completions of a shell.
+/// The completion script of a shell.
 #[derive(Debug, Args)]
 pub(crate) struct Completions {
     /// The shell.
@@ -22,7 +22,7 @@ pub(crate) struct Completions {
     bounding_box: ShellName,
 }
 
-/// The shells that completions exist for.
+/// The supported shells.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum ShellName {
     /// GNU Bourne-again shell.
@@ -53,10 +53,10 @@ impl Completions {
     }
 }
 
-/// Writes the manual pages.
+/// The manual pages.
 #[derive(Debug, Args)]
 pub(crate) struct Man {
-    /// The folder for the pages, one a command; it is made if it does not exist.
+    /// The folder for the pages, one for each command; it is created if it does not exist.
     folder: PathBuf,
 }
 
@@ -67,8 +67,8 @@ impl Man {
             clap_mangen::generate_to(program.name(PROGRAM), folder)
         };
         write(&self.folder).map_err(|error| {
-            let what = format!("cannot write ({error})");
-            Failure::new(OUTPUT, Fault::new(what, &self.folder).remedy("name a folder that can be written"))
+            let what = format!("cannot write manual pages ({error})");
+            Failure::new(OUTPUT, Fault::new(what, &self.folder).remedy("name a writable folder"))
         })?;
         Ok(DONE)
     }

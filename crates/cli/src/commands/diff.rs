@@ -12,11 +12,11 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Diff {
-    /// The folder of one run.
+    /// The folder of the first run.
     first: PathBuf,
-    /// The folder of another.
+    /// The folder of the second run.
     second: PathBuf,
-    /// How many differing values of the results are shown one by one.
+    /// Maximum number of differing values that are listed.
     #[arg(long, default_value_t = 10)]
     max: usize,
 }
@@ -53,6 +53,6 @@ impl Diff {
 fn line(change: &Change) -> String {
     let value = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
     let line = format!("  {}: {} | {}", change.what, value(&change.first), value(&change.second));
-    // Names come from files: nothing in them may move the cursor or start a new line.
+    // Names come from files; control characters in them must not reach the terminal.
     line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>() + "\n"
 }

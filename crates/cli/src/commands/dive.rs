@@ -10,9 +10,9 @@ use crate::exit::{Ended, Failure, INPUT, OUTPUT, USAGE};
 
 #[derive(Debug, Args)]
 pub(crate) struct Dive {
-    /// The experiment file; the dive of its first trial is made.
+    /// The experiment file; the dive of its first trial is simulated.
     experiment: PathBuf,
-    /// How many stereo pairs; otherwise as many as the experiment says.
+    /// Number of stereo pairs [default: that of the experiment].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Change a setting of the experiment: a dotted key and a TOML value, `source.water.attenuation=0.3`.
@@ -24,7 +24,7 @@ pub(crate) struct Dive {
     /// The licence of the data set.
     #[arg(long, default_value = "MIT OR Apache-2.0")]
     licence: String,
-    /// How many threads work; the images do not depend on it [default: all cores].
+    /// Number of threads; the images do not depend on it [default: all cores].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -38,7 +38,7 @@ impl Dive {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, usize::from))
             .build()
-            .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
         pool.install(|| {
             let sequence = trial
                 .source

@@ -15,29 +15,31 @@ use crate::{
 pub(crate) struct Generate {
     /// The family: paper-scale, site-scale, no-prior, putative, lattice, few-visible or dense-clutter.
     family: Family,
-    /// The seed; equal seeds give equal problems.
+    /// The seed of the random numbers; equal seeds give equal problems.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How many problems.
+    /// Number of problems.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     count: u64,
-    /// The number of the first in its family; what is varied cycles with the number.
+    /// Number of the first problem in its family; the family's parameters cycle with the number.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
     first: u64,
-    /// Leave the object away: the cloud is clutter.
+    /// Omit the object: the cloud is clutter only.
     #[arg(long)]
     absent: bool,
-    /// The folder of the problems; it must not exist, or be empty.
+    /// The folder of the problems, new or empty.
     #[arg(long)]
     out: PathBuf,
 }
 
 impl Generate {
     pub(crate) fn execute(&self) -> Ended {
-        let failed = |error: &dyn std::fmt::Display| Failure::new(OUTPUT, format!("{}: {error}", self.out.display()));
+        let failed = |error: &dyn std::fmt::Display| {
+            Failure::new(OUTPUT, format!("cannot write into {}: {error}", self.out.display()))
+        };
         fs::create_dir_all(&self.out).map_err(|error| failed(&error))?;
         if fs::read_dir(&self.out).map_err(|error| failed(&error))?.next().is_some() {
-            return Err(failed(&"the folder is not empty; name another with --out"));
+            return Err(failed(&"the folder is not empty; name another folder with --out"));
         }
         let presence = if self.absent { Presence::Absent } else { Presence::Present };
         for number in self.first..self.first + self.count {

@@ -1,15 +1,15 @@
-//! How large an image a command reads.
+//! Limits of the size of an image.
 
 use clap::Args;
 use seafix_io::ImageLimits;
 
-/// Nothing of the declared size is made before it is compared with these.
+/// Limits of images, compared with the declared size before any allocation.
 #[derive(Debug, Args)]
 pub(crate) struct Limits {
-    /// The most pixels that an image may declare.
+    /// Maximum number of pixels of an image.
     #[arg(long, value_name = "PIXELS", default_value_t = ImageLimits::default().pixels)]
     max_pixels: u64,
-    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    /// Maximum memory of an image decoder, and maximum size of an image file (bytes).
     #[arg(long, value_name = "BYTES", default_value_t = ImageLimits::default().bytes)]
     max_bytes: u64,
 }

@@ -11,10 +11,10 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct List {
-    /// Only this kind: sources, filters, detectors, locators, descriptors, matchers, refinements, triangulators,
+    /// List this kind only: sources, filters, detectors, locators, descriptors, matchers, refinements, triangulators,
     /// searches, solvers, odometries, policies or fusions.
     kind: Option<String>,
-    /// As the tables of the README.
+    /// Print the tables of docs/components.md.
     #[arg(long, conflicts_with = "kind")]
     markdown: bool,
 }

@@ -14,7 +14,7 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Merge {
-    /// The folders of all shards of one run, made by `seafix run --shard k/n`.
+    /// The folders of all shards of one run, from `seafix run --shard k/n`.
     #[arg(required = true)]
     shards: Vec<PathBuf>,
     #[command(flatten)]

@@ -31,32 +31,32 @@ mod show;
 mod solve;
 mod sweep;
 
-/// What `seafix` can do.
+/// The subcommands of `seafix`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Run an experiment, or the default pipeline on a data set: logs, results and a report.
     Run(run::Run),
-    /// Run an experiment in shards, here or on a cluster, and join them.
+    /// Run an experiment in shards, on this machine or on a cluster, and merge them.
     Sweep(sweep::Sweep),
-    /// Join the shards of a run into the run.
+    /// Merge the shards of a run.
     Merge(merge::Merge),
-    /// Solve coherence problems (coherence-problem/1), one result each.
+    /// Solve coherence problems (coherence-problem/1), one answer each.
     Solve(solve::Solve),
-    /// Make the cloud of measured points of one stereo pair.
+    /// Triangulate the cloud of one stereo pair.
     Cloud(cloud::Cloud),
-    /// Make a model of an object from points that were marked by hand in one stereo pair.
+    /// Build the model of an object from points marked by hand in one stereo pair.
     Model(model::Model),
-    /// Follow a stereo rig through a data set: poses relative to the first.
+    /// Estimate the trajectory of a stereo rig through a data set, relative to the first pose.
     Odometry(odometry::Odometer),
-    /// Draw identification problems with truth (coherence-problem/1).
+    /// Generate coherence problems with truth (coherence-problem/1).
     Generate(generate::Generate),
-    /// Compare runs of the same data: results side by side, and which differences are sure.
+    /// Compare runs of the same data: results side by side, significance of the differences.
     Compare(compare::Compare),
-    /// Say what differs between two runs: configuration, inputs, results.
+    /// List the differences of two runs: configuration, inputs, results.
     Diff(diff::Diff),
-    /// Judge a trajectory against a reference: absolute and relative errors, drift (evo's definitions).
+    /// Compute the errors of a trajectory: absolute and relative pose errors, drift (evo's definitions).
     Eval(eval::Eval),
-    /// Say everything that is wrong with a data set, site, experiment, problem or log.
+    /// List all faults of a data set, site, experiment, problem or log.
     Check {
         /// The files and folders.
         #[arg(required = true)]
@@ -64,32 +64,32 @@ pub(crate) enum Command {
         #[command(flatten)]
         limits: limits::Limits,
     },
-    /// List the components that experiment files can name.
+    /// List the components for experiment files.
     List(list::List),
-    /// Show a component: what it does, its source, its settings and their defaults.
+    /// Show the purpose, source and settings of a component, with defaults.
     Show {
         /// The component's name.
         name: String,
     },
-    /// Print the JSON schema of a file format, for editors that complete as one types.
+    /// Print the JSON schema of a file format, for completion in editors.
     Schema {
-        /// Which format.
+        /// The format.
         #[arg(value_enum)]
         of: schema::Format,
     },
-    /// Save what is sound of a log that was cut off or damaged.
+    /// Save the intact part of a damaged or truncated log, or of an unfinished run.
     Recover(recover::Recover),
     /// Run a search and a solver on the logged inputs of another run.
     Replay(replay::Replayed),
-    /// Make the reports of runs again, from their logs alone, or verify them.
+    /// Make the reports of runs from their logs only, or verify them.
     Report(report::Report),
-    /// Run the experiments of a list and keep their reports: what a repository says it found.
+    /// Run the experiments of a list and write their reports into a folder of the repository.
     Publish(publish::Publish),
-    /// Make a dive: stereo pairs with truth, visibility and rough poses, as a data set.
+    /// Simulate a dive: stereo pairs with truth, visibility and prior poses, as a data set.
     Dive(dive::Dive),
     /// Write the frames of an experiment's source as a data set.
     Export(export::Export),
-    /// Print the completions of a shell, for its start-up file.
+    /// Print a completion script for a shell.
     Completions(completions::Completions),
     /// Write the manual pages of all commands.
     Man(completions::Man),

@@ -27,22 +27,22 @@ pub(crate) struct Model {
     left: PathBuf,
     /// The right image.
     right: PathBuf,
-    /// The rig that took them: a dataset.toml, of which only the rig and `bits` are read.
+    /// The stereo rig: a dataset.toml, of which only the rig and `bits` are read.
     #[arg(long, value_name = "DATASET.toml")]
     rig: PathBuf,
-    /// What was marked: lines id,left_u,left_v,right_u,right_v below that header (px); an empty right place is sought.
+    /// The marks (px): lines id,left_u,left_v,right_u,right_v below that header; empty right coordinates are searched for.
     #[arg(long, value_name = "CLICKS.csv")]
     points: PathBuf,
-    /// The name of the object.
+    /// The id of the object.
     #[arg(long, default_value = "object")]
     id: String,
     /// P1, P2 and P3 of the object's frame: origin, the side of -y, the x axis [default: the widest triangle].
     #[arg(long, value_name = "P1,P2,P3", value_delimiter = ',', num_args = 1)]
     base: Vec<String>,
-    /// How far a mark may be from its corner (px).
+    /// Maximum distance of a mark from its corner (px).
     #[arg(long, default_value_t = 4.0)]
     reach: f64,
-    /// Standard deviation of a mark at which no corner is found (px).
+    /// Standard deviation of a mark without a corner (px).
     #[arg(long, default_value_t = 1.0)]
     mark_sigma: f64,
     /// Change a setting of the pipeline: a dotted key and a TOML value, `locator.name="junction"`.
@@ -50,10 +50,10 @@ pub(crate) struct Model {
     set: Vec<String>,
     #[command(flatten)]
     limits: Limits,
-    /// One JSON object, for programs: every point with its covariance.
+    /// Print one JSON object with every point and its covariance.
     #[arg(long)]
     json: bool,
-    /// Write the site (seafix-site/1) here; without it, it is printed.
+    /// Write the site (seafix-site/1) to this file [default: standard output].
     #[arg(long, value_name = "SITE.toml")]
     out: Option<PathBuf>,
 }
@@ -64,13 +64,20 @@ impl Model {
         let input = |fault: Fault| Failure::new(INPUT, fault);
         for (name, value, max) in [("reach", self.reach, 100.0), ("mark-sigma", self.mark_sigma, 100.0)] {
             if !(value > 0.0 && value <= max) {
-                return Err(usage(format!("--{name} {value}: more than 0, at most {max} (px)")));
+                return Err(usage(format!(
+                    "invalid --{name} {value}: outside of 0 to {max} px; give a positive number"
+                )));
             }
         }
         let base = match &self.base[..] {
             [] => None,
             [p1, p2, p3] => Some([p1, p2, p3].map(String::clone)),
-            other => return Err(usage(format!("--base {}: three ids, separated by commas", other.join(",")))),
+            other => {
+                return Err(usage(format!(
+                    "invalid --base {}: not three ids; separate three ids by commas",
+                    other.join(",")
+                )));
+            }
         };
         let pipeline =
             changed_pipeline(&Pipeline::default(), &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
@@ -103,7 +110,7 @@ impl Model {
     }
 }
 
-/// How a point was found, in two words.
+/// The methods that located a point in the left and right image.
 fn found(point: &HandPoint) -> [&'static str; 2] {
     let left = if point.corner { "corner" } else { "as marked" };
     let right = match (point.aligned, point.mark.right.is_some()) {
@@ -115,7 +122,7 @@ fn found(point: &HandPoint) -> [&'static str; 2] {
     [left, right]
 }
 
-/// For people: each point, how it was found, and how well it is known.
+/// The output for people: position, standard deviation and method of each point.
 fn people(model: &HandModel) -> String {
     let mut text = format!(
         "{:16} {:>9} {:>9} {:>9}  {:>7} {:>7}  {:9} right\n",
@@ -130,10 +137,10 @@ fn people(model: &HandModel) -> String {
     }
     let object = &model.site.objects[0];
     let base = object.base.map(|index| object.points[index].id.clone());
-    text + &format!("{} points; the frame is that of {}\n", model.points.len(), base.join(", "))
+    text + &format!("{} points; the object frame is that of {}\n", model.points.len(), base.join(", "))
 }
 
-/// For programs: everything.
+/// The output for programs: one JSON object.
 fn machines(model: &HandModel) -> String {
     let point = |point: &HandPoint| -> Value {
         let [left, right] = found(point);

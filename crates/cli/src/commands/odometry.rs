@@ -25,42 +25,42 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Odometer {
-    /// The folder of a data set; neither its site nor its truth is looked at.
+    /// The folder of a data set; its site and truth are not used.
     dataset: PathBuf,
-    /// Write the poses here, in TUM's format: world_from_camera, the world being the first left camera.
+    /// Write the poses world_from_camera to this file in TUM's format; the world frame is the first left camera.
     #[arg(long, value_name = "FILE.tum")]
     out: Option<PathBuf>,
-    /// The odometry.
+    /// The odometry component.
     #[arg(long, default_value = "stereo", value_name = "NAME")]
     odometry: String,
     /// Change a setting of the odometry: a dotted key and a TOML value, `detector.features=2000`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
+    /// Sort pairs by time and keep the first of each stamp; by default unsorted pairs are an error.
     #[arg(long)]
     sort_stamps: bool,
-    /// Take the rig as it is written, even where the images say that its cameras are turned another way.
+    /// Do not correct the rotation of the right camera, even if the images contradict the rig.
     #[arg(long)]
     keep_rig: bool,
-    /// How many threads work; the poses do not depend on it.
+    /// Number of threads; poses do not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
-    /// One JSON object, for programs: every pose, every pair that was left out, and the times.
+    /// Print one JSON object with all poses, skipped pairs and times.
     #[arg(long)]
     json: bool,
 }
 
-/// A smaller share of the landmarks that agree with the motion, in the median over the pairs, is worth a warning.
+/// Median fraction of landmarks that agree with the motion; a smaller one causes a warning.
 const LITTLE_AGREEMENT: f64 = 0.45;
 
-/// What came of all pairs.
+/// The result of the odometry over all pairs.
 struct Trip {
     trajectory: OdometryTrajectory,
-    /// Stamp of each pair that the odometry was given.
+    /// Stamps of the pairs that the odometry received.
     given: Vec<u64>,
-    /// Stamp of each pair whose images could not be read, and why.
+    /// Stamps of the pairs with unreadable images, with the faults.
     unread: Vec<(u64, Fault)>,
-    /// Milliseconds of the odometry, reading left out.
+    /// Time of the odometry (ms), without reading of files.
     odometry_ms: f64,
 }
 
@@ -81,8 +81,8 @@ impl Odometer {
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
-            .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
-        // A file that cannot be written shall not be found out after the work.
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
+        // An output that cannot be written is reported before the work.
         let out = self.out.as_deref().map(AtomicFile::begin).transpose()?;
         if let Some(fault) = swapped_at_first(&dataset) {
             return Err(Failure::new(INPUT, fault));
@@ -110,7 +110,7 @@ impl Odometer {
         Ok(DONE)
     }
 
-    /// The odometry and its settings, all written out.
+    /// The odometry and its complete settings.
     fn build(&self) -> Result<(Box<dyn Odometry>, Choice), Failure> {
         let usage = |error| Failure::new(USAGE, error);
         let choice = ODOMETRIES.resolve(&Choice::named(&self.odometry)).map_err(usage)?;
@@ -120,7 +120,7 @@ impl Odometer {
         Ok((ODOMETRIES.build(&choice).map_err(usage)?, choice))
     }
 
-    /// Leads every pair that can be read through the odometry.
+    /// Processes all readable pairs.
     fn travel(&self, odometry: &dyn Odometry, dataset: &Dataset) -> Result<Trip, Failure> {
         let threads = if self.threads > 1 { Threads::Pool } else { Threads::One };
         let mut session = odometry.begin(&dataset.rig, dataset.body_from_camera, threads);
@@ -152,29 +152,29 @@ impl Odometer {
             progress.step("");
         }
         progress.end();
-        // Half a passage is none.
+        // A sequence with less than half of its pairs is not evaluated.
         if given.len() < unread.len() {
             let fault = Fault::new("fewer than half of the stereo pairs can be read", &dataset.folder)
                 .value(format!("{} of {}", given.len(), given.len() + unread.len()))
-                .remedy("restore the images named above, or leave their lines out");
+                .remedy("restore the images named above, or remove their lines");
             return Err(Failure::new(INPUT, fault));
         }
         Ok(Trip { trajectory: session.trajectory(), given, unread, odometry_ms })
     }
 }
 
-/// A word on a rig that was turned.
+/// The warning of a corrected rotation of the right camera.
 fn turned(found: &RightCameraRotation) -> String {
     let [baseline, ray] = found.turn.map(f64::to_degrees);
     format!(
-        "the images contradict the rig: what looks alike lies {:.1} px (median) off its epipolar lines; {:.1} px with the right \
-         camera turned by {baseline:.3}° about the baseline and {ray:.3}° about its line of sight, which was done \
-         (`--keep-rig` leaves it): calibrate again, for what epipolar lines do not tell may be wrong too",
+        "the images contradict the rig: matches are {:.1} px (median) off its epipolar lines; the right camera was turned by \
+         {baseline:.3}° about the baseline and {ray:.3}° about its line of sight, which leaves {:.1} px (`--keep-rig` \
+         prevents it); calibrate again, since other parameters may be wrong too",
         found.given_px, found.left_px
     )
 }
 
-/// The two images of a frame, which one image twice is not.
+/// The two images of a frame; identical images are an error.
 fn stereo_images(dataset: &Dataset, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
     let (left, right) = dataset.pair(frame)?;
     if are_identical(&left, &right) {
@@ -197,7 +197,7 @@ impl Trip {
         all
     }
 
-    /// What to say where no pair was followed: how many there were, and what was wrong with most of them.
+    /// The fault of a sequence without a motion: number of pairs and most frequent cause.
     fn motionless(&self, folder: &Path) -> Option<Fault> {
         let outcomes = &self.trajectory.outcomes;
         if outcomes.iter().any(|outcome| matches!(outcome, OdometryOutcome::Followed { .. })) {
@@ -214,24 +214,22 @@ impl Trip {
         let reasons: Vec<Lost> = outcomes.iter().filter_map(skipped).chain(breaks).collect();
         let alike =
             |a: &Lost| reasons.iter().filter(|b| std::mem::discriminant(a) == std::mem::discriminant(b)).count();
-        // A pair that begins a segment is not left out, and no motion leads to it all the same.
+        // A pair that starts a segment is not skipped, although no motion leads to it.
         let reported = |a: &Lost| {
             let same = |b: &Lost| std::mem::discriminant(a) == std::mem::discriminant(b);
             let out = outcomes.iter().filter_map(skipped).filter(same).count();
             match alike(a) - out {
-                0 => format!("{out} left out"),
+                0 => format!("{out} skipped"),
                 breaks => format!("{} without a motion", out + breaks),
             }
         };
-        // The first of the most frequent kind.
+        // The first cause of the most frequent kind.
         let max = reasons.iter().rev().max_by_key(|lost| alike(lost));
         let unread = self.unread.len();
         Some(match max {
             Some(lost) if alike(lost) >= unread => {
                 fault.value(format!("{counts}; {}: {lost}", reported(lost))).remedy(match lost {
-                    Lost::Still { .. } => {
-                        "see whether something fixed to the vehicle is in view, and paint it over in the images"
-                    }
+                    Lost::Still { .. } => "mask parts of the vehicle in the images",
                     Lost::Jump { .. } => "check the stamps of the pairs, and that the rig is the one that took them",
                     _ => "check the images and that the rig is the one that took them",
                 })
@@ -239,24 +237,24 @@ impl Trip {
             _ if unread > 0 => {
                 fault.value(format!("{counts}; {unread} cannot be read")).remedy("restore the images named above")
             }
-            _ => fault.value(counts).remedy("a motion needs two stereo pairs at least"),
+            _ => fault.value(counts).remedy("a motion needs at least two stereo pairs"),
         })
     }
 
-    /// What is odd about the whole way.
+    /// Warnings about the complete trajectory.
     fn warnings(&self) -> Vec<String> {
         let agreement = self.trajectory.agreement().filter(|fraction| *fraction < LITTLE_AGREEMENT);
         let said = |fraction: f64| {
             format!(
-                "only {:.0} % of the landmarks agree with the motion (median over the pairs): is something fixed to the \
-                 vehicle in view, or are the cameras out of step?",
+                "only {:.0} % of the landmarks agree with the motion (median over the pairs): a part of the vehicle may be in \
+                 view, or the cameras may not be synchronised",
                 100.0 * fraction
             )
         };
         agreement.map(said).into_iter().collect()
     }
 
-    /// Landmarks found in a pair, of those sought: the least, and the means; `None` by an odometry without.
+    /// The minimum and mean number of landmarks tracked in a pair, and the mean number predicted; `None` without landmarks.
     fn landmarks(&self) -> Option<[f64; 3]> {
         let followed: Vec<(usize, usize)> = self.trajectory.outcomes.iter().filter_map(of_followed).collect();
         let count = followed.len() as f64;
@@ -277,12 +275,12 @@ fn of_followed(outcome: &OdometryOutcome) -> Option<(usize, usize)> {
     }
 }
 
-/// TUM's text: every pose, in order of time; a comment where a segment begins that is not joined to the one before.
+/// The poses in TUM's format, in order of time, with a comment before every segment after a break.
 fn poses(trajectory: &OdometryTrajectory) -> String {
     let mut text = "# world_from_camera, the world is the first left camera: seconds tx ty tz qx qy qz qw\n".to_owned();
     for segment in &trajectory.segments {
         if let Some(why) = &segment.broken {
-            text += &format!("# broken: the motion to here is unknown and left out ({why})\n");
+            text += &format!("# broken: the motion to this pose is unknown ({why})\n");
         }
         let stamped: Vec<_> = segment.poses.iter().map(|pose| (pose.stamp_ns, pose.world_from_camera)).collect();
         text += &tum::print(&stamped);
@@ -295,7 +293,7 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// For people: how far, how fast, and where not.
+/// The output for people: length, speed, breaks and skipped pairs.
 fn people(trip: &Trip) -> String {
     let trajectory = &trip.trajectory;
     let poses = trajectory.waypoints().count();
@@ -304,14 +302,14 @@ fn people(trip: &Trip) -> String {
     let mut text = format!("{poses} of {pairs} over {:.2} m", trajectory.length());
     text += &format!(", {:.1} pairs a second\n", trip.pairs_a_second());
     if let Some([min, found, sought]) = trip.landmarks() {
-        text += &format!("{found:.0} of {sought:.0} landmarks found in a pair, at least {min:.0}\n");
+        text += &format!("{found:.0} of {sought:.0} landmarks tracked in a pair (mean), at least {min:.0}\n");
     }
     for segment in trajectory.segments.iter().filter(|segment| segment.broken.is_some()) {
         text += &format!("broken before {}: {}\n", seconds(segment.poses[0].stamp_ns), why(segment));
     }
     let left_out = trip.left_out();
     if !left_out.is_empty() {
-        text += &format!("{} left out\n", counted(left_out.len(), "pair"));
+        text += &format!("{} skipped\n", counted(left_out.len(), "pair"));
     }
     for (stamp, why) in &left_out {
         text += &format!("  {}: {why}\n", seconds(*stamp));
@@ -321,7 +319,7 @@ fn people(trip: &Trip) -> String {
     text + &format!("ms a pair: {}\n", stages.join(", "))
 }
 
-/// For programs: everything.
+/// The output for programs: one JSON object.
 fn machines(
     trip: &Trip,
     right_camera_rotation: Option<&RightCameraRotation>,

@@ -1,4 +1,4 @@
-//! Writing the stereo pairs of a source as a data set, with the user told how far it is.
+//! Output of a source's stereo pairs as a data set, with progress.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::{
 pub(super) fn write(sequence: &dyn Sequence, out: &Path, licence: &str) -> Ended {
     let progress = Progress::new();
     let count = sequence.frames();
-    notify(&format!("{count} frames into {}", out.display()));
+    notify(&format!("{count} frames in {}", out.display()));
     progress.expect(count);
     let written = dataset::write(sequence, out, licence, &|| progress.step(""));
     progress.end();

@@ -19,32 +19,32 @@ use crate::{
     terminal::{Progress, notify, print},
 };
 
-/// Runs the experiments of a list and reports them into a folder that can be kept beside the program. A run is kept, and made
-/// again only when something changes that its results depend on: configuration, inputs, the version of a component.
+/// Runs the experiments of a list and writes their reports into a folder of the repository. Runs are kept; a run is
+/// repeated only if its results may have changed: by its configuration, inputs, or the version of a component.
 #[derive(Debug, Args)]
 pub(crate) struct Publish {
     /// The list of experiments (seafix-reports/1).
     #[arg(default_value = "experiments/reports.toml")]
     list: PathBuf,
-    /// Where the reports go, a folder each, and README.md, which says what they found.
+    /// The folder of the reports, one folder each, and of README.md with their findings.
     #[arg(long, default_value = "reports")]
     out: PathBuf,
-    /// Where the runs are kept, a folder each. A run whose results would change is made again in its place.
+    /// The folder of the kept runs, one folder each.
     #[arg(long, default_value = "runs/reports")]
     runs: PathBuf,
-    /// Of the list only the experiments of these names; README.md is left as it is.
+    /// Publish only the experiments of these names; README.md does not change.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
-    /// Write nothing: compute every printed number again from the logs of the kept runs, and say what differs.
+    /// Write nothing: compute every printed number again from the logs of the kept runs, and list differences.
     #[arg(long, conflicts_with_all = ["overwrite", "check"])]
     verify: bool,
-    /// Write nothing: make a part of this many kept runs again, at most 8 frames of each, and say what differs.
+    /// Write nothing: repeat a part of N kept runs, at most 8 frames of each, and list differences.
     #[arg(long, value_name = "N", conflicts_with = "overwrite")]
     check: Option<usize>,
-    /// Use no kept run: remove those that are there, and make all again.
+    /// Remove all kept runs and repeat them.
     #[arg(long)]
     overwrite: bool,
-    /// How many threads work; the answers do not depend on it [default: all cores].
+    /// Number of threads; results do not depend on it [default: all cores].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -54,7 +54,7 @@ impl Publish {
         let mut list = publication::read(&self.list).map_err(|faults| Failure::faults(USAGE, &faults))?;
         if let Some(unknown) = self.only.iter().find(|name| !list.iter().any(|one| one.name == **name)) {
             let names: Vec<&str> = list.iter().map(|one| one.name.as_str()).collect();
-            let what = format!("`{unknown}` is not in {}; there are {}", self.list.display(), names.join(", "));
+            let what = format!("no experiment `{unknown}` in {}; it has {}", self.list.display(), names.join(", "));
             return Err(Failure::new(USAGE, what));
         }
         list.retain(|one| self.only.is_empty() || self.only.contains(&one.name));
@@ -80,22 +80,22 @@ impl Publish {
         Ok(DONE)
     }
 
-    /// A run without durations: the same bytes wherever it is made.
+    /// The options of a run without durations: it has the same bytes on every machine.
     fn options(&self, folder: PathBuf) -> Options {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Options { threads: self.threads.map_or(cores, usize::from), timed: false, ..Options::into(folder) }
     }
 
-    /// Makes a run, where none that is kept has its results; whether one was kept.
+    /// Makes a run unless a kept run has its identity; the result states whether one was kept.
     fn run(&self, one: &Published) -> Result<bool, Failure> {
         let existing = if self.overwrite { Existing::Overwrite } else { Existing::Keep };
         let options = Options { existing, ..self.options(self.runs.join(&one.name)) };
         Ok(watched(|progress| run(&one.plan, &options, progress))?.kept)
     }
 
-    /// Makes a part of some kept runs again.
+    /// Repeats a part of some kept runs.
     fn check_some(&self, list: &[Published], count: usize) -> Ended {
-        // By their identities: another sample whenever a run changes, the same until then.
+        // Sorted by identity: the sample changes whenever a run changes, and only then.
         let kept = |one: &'_ Published| kept_identity(&self.runs.join(&one.name));
         let mut sample: Vec<(String, &Published)> = list.iter().filter_map(|one| Some((kept(one)?, one))).collect();
         sample.sort_by(|a, b| a.0.cmp(&b.0));
@@ -108,16 +108,16 @@ impl Publish {
                 watched(|progress| remake(&one.plan, &folder, CHECKED, &options, progress))?;
             same += usize::from(differing.is_empty());
             let said = if differing.is_empty() { "the same" } else { "not the same" };
-            print(&format!("{}: {} made again, {said}\n", one.name, counted(frames, "frame")))?;
+            print(&format!("{}: {} repeated, {said}\n", one.name, counted(frames, "frame")))?;
             for what in differing {
-                print(&format!("{}: {what} differ; raise the VERSION of what changed\n", one.name))?;
+                print(&format!("{}: {what} differ; raise the VERSION of the changed component\n", one.name))?;
             }
         }
-        print(&format!("{same} of {} kept runs are what would be made now\n", sample.len()))?;
+        print(&format!("{same} of {} kept runs equal a new run\n", sample.len()))?;
         Ok(if same == sample.len() { DONE } else { FINDINGS })
     }
 
-    /// Tells of reports of experiments that are not in the list, and how many. They stay: nobody asked for their removal.
+    /// Lists the reports of experiments that are not in the list, and counts them. They are not removed.
     fn distinguish_others(&self, list: &[Published]) -> usize {
         let Ok(entries) = fs::read_dir(&self.out) else { return 0 };
         let mut others: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
@@ -125,7 +125,10 @@ impl Publish {
         others.sort();
         for path in &others {
             let list = self.list.display();
-            notify(&format!("{}: a report that is not in {list}: remove it if it is not wanted", path.display()));
+            notify(&format!(
+                "{}: the experiment of this report is not in {list}; remove the report if it is not needed",
+                path.display()
+            ));
         }
         others.len()
     }
@@ -139,7 +142,7 @@ impl Publish {
                     holding += usize::from(holds);
                     findings.push(section);
                 }
-                // The others are verified all the same.
+                // The others are verified nevertheless.
                 Err(failure) => {
                     let all = unreadable.get_or_insert(Failure { code: failure.code, lines: Vec::new() });
                     all.lines.extend(failure.lines);
@@ -150,11 +153,11 @@ impl Publish {
         if self.only.is_empty() {
             holds &= self.distinguish_others(list) == 0;
             if unreadable.is_none() && !index_holds(findings.iter().map(String::as_str), &self.out) {
-                print(&format!("{} is not what the logs make\n", self.out.join("README.md").display()))?;
+                print(&format!("{} differs from the page made from the logs\n", self.out.join("README.md").display()))?;
                 holds = false;
             }
         }
-        print(&format!("{holding} of {} reports are what their logs make\n", list.len()))?;
+        print(&format!("{holding} of {} reports agree with their logs\n", list.len()))?;
         match unreadable {
             Some(failure) => Err(failure),
             None => Ok(if holds { DONE } else { FINDINGS }),
@@ -162,10 +165,10 @@ impl Publish {
     }
 }
 
-/// Frames of a kept run, for each trial, that a check makes again at most.
+/// Maximum number of frames of a trial that a check repeats.
 const CHECKED: usize = 8;
 
-/// Does work that a person watches and may end.
+/// Runs `work` with progress and signal handling.
 fn watched<T>(work: impl FnOnce(&Progress) -> Result<T, RunError>) -> Result<T, Failure> {
     let progress = Progress::new();
     signals::listen();
@@ -175,7 +178,7 @@ fn watched<T>(work: impl FnOnce(&Progress) -> Result<T, RunError>) -> Result<T, 
     Ok(done?)
 }
 
-/// Whether a folder is a report that this command wrote.
+/// Whether a folder holds a report of this command.
 fn is_report(folder: &Path) -> bool {
     folder.join("report.html").exists() && folder.join("summary.txt").exists()
 }

@@ -16,9 +16,9 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Recover {
-    /// The log: cut off, damaged, or left as `.partial` by a run that was killed; or the folder of a run that did not end.
+    /// A truncated or damaged log, a `.partial` of a killed run, or the folder of an unfinished run.
     log: PathBuf,
-    /// The file to write [default: NAME-recovered.mcap beside it], or the folder [default: `recovered` in it].
+    /// The file to write [default: NAME-recovered.mcap beside the log], or the folder [default: `recovered` in the run's].
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -41,7 +41,7 @@ impl Recover {
             notify(&format!("lost: {lost} in {}", self.log.display()));
         }
         print(&format!(
-            "{}: {} messages, {} whole frames, up to stamp {} ns; {} messages of torn frames left out\n",
+            "{}: {} messages, {} complete frames, up to stamp {} ns; {} messages of incomplete frames dropped\n",
             out.display(),
             found.messages,
             found.frames,
@@ -52,7 +52,7 @@ impl Recover {
     }
 }
 
-/// Whose fault it is: that of the files read, or of those written.
+/// The failure of an error: of the input or of the output.
 fn failure(error: LogError) -> Failure {
     let written = is_of_output(&error);
     Failure::new(if written { OUTPUT } else { INPUT }, error)
@@ -62,7 +62,7 @@ fn is_of_output(error: &LogError) -> bool {
     matches!(error, LogError::Write { .. }) || matches!(error, LogError::Io { doing, .. } if *doing != "read")
 }
 
-/// Joins what there is of every trial of a run that did not end: pieces that are whole, and of the others what is sound.
+/// Joins the pieces of every trial of an unfinished run: complete pieces, and the intact part of the others.
 fn of_run(run: &Path, out: &Path) -> Ended {
     if out.exists() {
         return Err(Failure::new(OUTPUT, format!("{} exists; name another folder with --out", out.display())));
@@ -75,7 +75,7 @@ fn of_run(run: &Path, out: &Path) -> Ended {
         }
     }
     if trials.is_empty() {
-        let what = format!("{} holds no piece of a run that did not end; name a log", run.display());
+        let what = format!("cannot recover {}: no piece of an unfinished run; name a log", run.display());
         return Err(Failure::new(INPUT, what));
     }
     let io =
@@ -106,7 +106,7 @@ fn of_run(run: &Path, out: &Path) -> Ended {
             let mut frames = 0;
             let counted = Reader::open(&to).and_then(|log| log.without_images().for_each_frame(|_| frames += 1));
             counted.map_err(failure)?;
-            print(&format!("{}: {frames} whole frames of {} pieces\n", to.display(), parts.len()))?;
+            print(&format!("{}: {frames} complete frames of {} pieces\n", to.display(), parts.len()))?;
         }
         if saved.exists() {
             fs::remove_dir_all(&saved).map_err(|error| io(&saved, error))?;
@@ -115,7 +115,7 @@ fn of_run(run: &Path, out: &Path) -> Ended {
     Ok(DONE)
 }
 
-/// What is in a folder, by name.
+/// The entries of a folder, sorted by name.
 fn inside(folder: &Path) -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> =
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();

@@ -16,21 +16,21 @@ use crate::{
 pub(crate) struct Replayed {
     /// The log of a trial.
     log: PathBuf,
-    /// A search instead of the logged one; given several times, a trial each.
+    /// A search in place of the logged one; every further --search adds a trial.
     #[arg(long, value_name = "NAME")]
     search: Vec<String>,
-    /// A solver instead of the logged one; given several times, a trial each.
+    /// A solver in place of the logged one; every further --solver adds a trial.
     #[arg(long, value_name = "NAME")]
     solver: Vec<String>,
     /// Change another setting: a dotted key and a TOML value, `pipeline.gate={chi-square=0.999}`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Start from the logged clouds or the logged images [default: clouds, unless a stage before them is changed].
+    /// Start from the logged clouds or images [default: clouds, unless an earlier stage is changed].
     #[arg(long)]
     from: Option<From>,
     #[command(flatten)]
     place: RunFolder,
-    /// Log no durations: two runs of one replay then have the same bytes.
+    /// Log no durations; two runs of one replay then have the same bytes.
     #[arg(long)]
     untimed: bool,
 }

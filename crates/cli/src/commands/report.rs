@@ -13,25 +13,25 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Report {
-    /// The folders of the runs, a report each.
+    /// The folders of the runs; each gets a report.
     #[arg(required = true)]
     runs: Vec<PathBuf>,
-    /// Where the report goes, or a folder below it for each of several runs [default: report/ in the run's folder].
+    /// The folder of the report, or of one folder for each of several runs [default: report/ in the run's folder].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The page [default: all forms].
+    /// Write the page [default: all forms].
     #[arg(long)]
     html: bool,
-    /// The LaTeX source.
+    /// Write the LaTeX source.
     #[arg(long)]
     latex: bool,
-    /// The PDF.
+    /// Write the PDF.
     #[arg(long)]
     pdf: bool,
-    /// Write nothing: compute every printed number again from the logs, and say what of the report and the run differs.
+    /// Write nothing: compute every printed number again from the logs, and list differences of report and run.
     #[arg(long, conflicts_with_all = ["html", "latex", "pdf", "index"])]
     verify: bool,
-    /// Also write README.md into the folder of all reports: what the runs found.
+    /// Also write README.md with the findings of all runs into the folder of the reports.
     #[arg(long, requires = "out")]
     index: bool,
 }
@@ -59,7 +59,7 @@ impl Report {
         Ok(DONE)
     }
 
-    /// Where each report goes.
+    /// The folder of each report.
     fn folders(&self) -> Result<Vec<PathBuf>, Failure> {
         let several = self.runs.len() > 1 || self.index;
         let folder = |run: &PathBuf| match &self.out {
@@ -71,7 +71,7 @@ impl Report {
         for (index, one) in folders.iter().enumerate() {
             if folders[..index].contains(one) {
                 let line = format!(
-                    "two runs would write their report to {}; give them folders of different names",
+                    "cannot write two reports into {}; give the folders of the runs different names",
                     one.display()
                 );
                 return Err(Failure::new(USAGE, line));
@@ -91,21 +91,21 @@ impl Report {
     }
 }
 
-/// Verifies a report and the files of its run, and says what was found; whether all is as it was written, and what the run
-/// adds to the page of all reports.
+/// Verifies a report and the files of its run and prints the result. Returns whether everything is unchanged, and the
+/// run's section of the page of all reports.
 pub(crate) fn verified(run: &Path, folder: &Path) -> Result<(bool, String), Failure> {
     let verified = verify(run, folder).map_err(failure)?;
     let changed = changed_outputs(run).map_err(|fault| Failure::faults(INPUT, &[fault]))?;
     let full = changed.is_empty();
     let mut changed: String = changed.iter().map(|fault| format!("{fault}\n")).collect();
     if !run.join("manifest.json").exists() {
-        changed += &format!("note: {} has no manifest: its logs were read, its tables not looked at\n", run.display());
+        changed += &format!("note: {} has no manifest; its logs were verified, its tables were not\n", run.display());
     }
     print(&format!("{changed}{}", said(&verified, &folder.display().to_string())))?;
     Ok((verified.holds() && full, verified.findings))
 }
 
-/// What a verification found, for people.
+/// The result of a verification as text.
 fn said(verified: &Verified, folder: &str) -> String {
     let mut text = String::new();
     for wrong in &verified.mismatches {
@@ -113,21 +113,21 @@ fn said(verified: &Verified, folder: &str) -> String {
     }
     let Verified { missing, changed, strays, .. } = verified;
     let unlike =
-        [(missing, "is missing"), (changed, "is not what the logs make"), (strays, "is none of this report's")];
+        [(missing, "is missing"), (changed, "differs from the logs"), (strays, "does not belong to this report")];
     for (files, what) in unlike {
         files.iter().for_each(|file| text += &format!("{file} {what}\n"));
     }
     let text: String = text.chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect();
     let equal = verified.numbers - verified.mismatches.len();
     let alike = verified.files - missing.len() - changed.len();
-    let more = if strays.is_empty() { String::new() } else { format!(", {} that are none of its", strays.len()) };
+    let more = if strays.is_empty() { String::new() } else { format!(", {} that do not belong to it", strays.len()) };
     format!(
-        "{text}{folder}: {equal} of {} numbers equal to the last digit, {alike} of {} files as the logs make them{more}\n",
+        "{text}{folder}: {equal} of {} numbers equal to the last digit, {alike} of {} files equal to those made from the logs{more}\n",
         verified.numbers, verified.files
     )
 }
 
-/// Logs that cannot be read are input, a report that cannot be written is output.
+/// The failure of an error: an unreadable log is a failure of input, an unwritable report one of output.
 pub(crate) fn failure(error: ReportError) -> Failure {
     let output = matches!(error, ReportError::Io { doing: "write", .. } | ReportError::Foreign { .. });
     let code = if output { OUTPUT } else { INPUT };

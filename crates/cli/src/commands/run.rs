@@ -22,36 +22,36 @@ pub(crate) struct Run {
     set: Vec<String>,
     #[command(flatten)]
     place: RunFolder,
-    /// Make only the k-th of n parts of the run; `seafix merge` joins them.
+    /// Run shard k of n only; `seafix merge` merges all shards.
     #[arg(long, value_name = "K/N", requires = "out")]
     shard: Option<Shard>,
-    /// Say what it would take, by trying frames of every source for some seconds, and keep nothing.
+    /// Estimate frames, disk and time from frames of every source, processed for some seconds; keep nothing.
     #[arg(long, conflicts_with_all = ["out", "shard"])]
     dry_run: bool,
-    /// Log no durations: two runs of one experiment then have the same bytes.
+    /// Log no durations; two runs of one experiment then have the same bytes.
     #[arg(long)]
     untimed: bool,
-    /// Let every trial compute all of its stages itself, so that its durations are its own; without it, trials with equal
+    /// Compute all stages in every trial, so that durations are those of the trial alone; by default trials with equal
     /// stages share them.
     #[arg(long)]
     separate: bool,
 }
 
-/// Where a run goes, and who works on it.
+/// The folder of a run, and its number of threads.
 #[derive(Debug, Args)]
 pub(crate) struct RunFolder {
-    /// The folder of the run; it must not exist or be empty [default: the next free one below runs/].
+    /// The folder of the run, new or empty [default: the next free one below runs/].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Go on with the run that is in the folder, if it is the same one; begin it if there is none. Of a run that was killed the
-    /// pieces that were in work are made again: at most 8 frames a thread with images, 8192 without; where a trial navigates,
-    /// all frames of its source.
+    /// Resume the run of the folder if it is the same run; start it if there is none. Pieces that a killed run had not
+    /// completed are repeated: at most 8 frames a thread with images, 8192 without, and all frames of a source with
+    /// navigation.
     #[arg(long, requires = "out", conflicts_with = "overwrite")]
     resume: bool,
-    /// Remove the run that is in the folder first.
+    /// Remove the run in the folder first.
     #[arg(long, requires = "out")]
     overwrite: bool,
-    /// How many threads work; the answers do not depend on it [default: all cores].
+    /// Number of threads; results do not depend on it [default: all cores].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -92,20 +92,20 @@ impl Run {
     }
 }
 
-/// Trials, frames, disk and time, in words.
+/// The estimate of a dry run as text: trials, frames, disk and time.
 fn reported(plan: &Plan, estimate: &RunEstimate, threads: usize) -> String {
     let lines = plan.trials.iter().zip(&estimate.frames);
     let mut text: String = lines.map(|(trial, frames)| format!("{:60} {frames:>9} frames\n", trial.name)).collect();
     let frames: usize = estimate.frames.iter().sum();
     text += &format!(
-        "{} trials, {frames} frames, about {} MB (twice that while it is joined), about {} on {threads} threads\n",
+        "{} trials, {frames} frames, about {} MB (twice that while pieces are joined), about {} on {threads} threads\n",
         plan.trials.len(),
         estimate.bytes.div_ceil(1_000_000),
         duration(estimate.on(threads).as_secs_f64()),
     );
-    let build = if cfg!(debug_assertions) { ", a build with assertions" } else { "" };
+    let build = if cfg!(debug_assertions) { ", built with assertions" } else { "" };
     text + &format!(
-        "by {} frames, tried on one thread in {:.1} s, this machine as busy as it is{build}; cores are not always whole ones\n",
+        "estimated from {} frames on one thread in {:.1} s, at the current load{build}; cores may share hardware\n",
         estimate.tried,
         estimate.spent.as_secs_f64()
     )
@@ -119,10 +119,10 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// Makes the report of a run that is complete on so many threads, and prints its summary.
+/// Makes the report of a finished run on a number of threads, and prints its summary.
 pub(crate) fn report_on(finished: &seafix_experiment::Finished, threads: usize) -> Result<(), Failure> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| Failure::new(OUTPUT, format!("no threads ({error}): {threads}")))?;
+    let pool = pool.map_err(|error| Failure::new(OUTPUT, format!("cannot start {threads} threads: {error}")))?;
     let written = pool.install(|| report(&finished.folder, &finished.folder.join("report"), Forms::ALL));
     let written = written.map_err(super::report::failure)?;
     print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))

@@ -26,7 +26,7 @@ pub(crate) fn execute(of: Format) -> Ended {
     Ok(DONE)
 }
 
-/// What an experiment file may hold. Components and their settings are those of the registries, with their defaults.
+/// The schema of an experiment file, with the registered components, their settings and defaults.
 fn experiment() -> Value {
     let said = |what: &str, kind: &str| json!({ "type": kind, "description": what });
     let mut pipeline = properties(&toml::Table::try_from(Pipeline::default()).expect("settings are a table"));
@@ -42,7 +42,7 @@ fn experiment() -> Value {
     for part in ["odometry", "policy", "fusion"] {
         navigation.insert(part.to_owned(), component(part));
     }
-    navigation.insert("faults".to_owned(), said("how the odometry fails: kind, from, to, amount", "array"));
+    navigation.insert("faults".to_owned(), said("failures of the odometry: kind, from, to, amount", "array"));
     let pose_graph = properties(&toml::Table::try_from(Keyframes::default()).expect("settings are a table"));
     navigation.insert(
         "pose-graph".to_owned(),
@@ -65,13 +65,13 @@ fn experiment() -> Value {
     });
     let axis = json!({
         "type": "object",
-        "description": "one thing that varies; the grid of all gives the trials",
+        "description": "an axis of the grid of trials",
         "properties": {
-            "key": said("the setting, as a dotted path; with cases and zip, what the axis is called", "string"),
-            "values": said("its values", "array"),
+            "key": said("the dotted path of the setting; with cases and zip, the name of the axis", "string"),
+            "values": said("the values of the setting", "array"),
             "range": range, "log-range": range,
-            "cases": { "type": "array", "items": case, "description": "settings that vary together, under a name" },
-            "zip": said("lists of equal length, by the paths of their settings", "object"),
+            "cases": { "type": "array", "items": case, "description": "labelled sets of settings that vary together" },
+            "zip": said("lists of equal length by the paths of settings that vary together", "object"),
         },
         "required": ["key"],
         "additionalProperties": false,
@@ -81,10 +81,10 @@ fn experiment() -> Value {
         "title": "seafix experiment",
         "type": "object",
         "properties": {
-            "question": said("what it asks, in one English sentence", "string"),
+            "question": said("the question of the experiment, one English sentence", "string"),
             "seed": { "type": "integer", "minimum": 0, "default": 0 },
             "repetitions": { "type": "integer", "minimum": 1, "default": 1 },
-            "base": said("a file whose settings hold where this one has none of its own", "string"),
+            "base": said("a file with the settings that this file omits", "string"),
             "source": component("source"),
             "pipeline": { "type": "object", "properties": pipeline, "additionalProperties": false },
             "navigation": { "type": "object", "properties": navigation, "additionalProperties": false },
@@ -99,12 +99,12 @@ fn experiment() -> Value {
     })
 }
 
-/// A component by its name alone, or a table with its name and settings.
+/// The schema of a component: its name, or a table with name and settings.
 fn component(kind: &str) -> Value {
     component_with(kind, &["name"])
 }
 
-/// The same where a table without a name holds the settings of the default.
+/// The schema of a component whose table may omit the name of the default.
 fn with_default(kind: &str) -> Value {
     component_with(kind, &[])
 }
@@ -119,7 +119,7 @@ fn component_with(kind: &str, required: &[&str]) -> Value {
         .map(|one| {
             let mut settings = properties(&one.defaults);
             settings.insert("name".to_owned(), json!({ "const": one.name }));
-            // Settings without a default value are not known here.
+            // Settings without a default value are unknown here.
             json!({ "type": "object", "description": one.summary, "properties": settings, "required": required })
         })
         .collect();
@@ -130,10 +130,10 @@ fn properties(defaults: &toml::Table) -> Map<String, Value> {
     defaults.iter().map(|(key, value)| (key.clone(), setting(value))).collect()
 }
 
-/// What a setting may be, by its default.
+/// The schema of a setting, by its default.
 fn setting(default: &toml::Value) -> Value {
     match default {
-        // Settings of several forms are tables or words; a component is either.
+        // A setting with several forms, as a component, is a table or a string.
         toml::Value::Table(table) => {
             json!({ "type": ["object", "string"], "properties": properties(table) })
         }

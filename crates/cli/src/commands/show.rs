@@ -10,7 +10,7 @@ use crate::{
 
 pub(crate) fn execute(name: &str) -> Ended {
     let kinds = kinds();
-    // One name may stand in several kinds: a detector and its descriptor are both called `surf`.
+    // Several kinds may have one name: `surf` is a detector and a descriptor.
     let found: Vec<String> = kinds
         .iter()
         .flat_map(|kind| &kind.listings)

@@ -20,31 +20,31 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Solve {
-    /// Problems in the format coherence-problem/1.
+    /// Problem files in the format coherence-problem/1.
     #[arg(required = true)]
     problems: Vec<PathBuf>,
-    /// The search.
+    /// The search component.
     #[arg(long, default_value = "rigid-consensus")]
     search: String,
-    /// The solver. These problems have no pixels, so it must take bare points.
+    /// The solver component; it must not need pixels, which these problems do not have.
     #[arg(long, default_value = "mahalanobis")]
     solver: String,
-    /// Change a setting of the search, the solver or of what is believed: a dotted key and a TOML value,
+    /// Change a setting of the search, the solver or the acceptance: a dotted key and a TOML value,
     /// `search.budget=1000000`, `acceptance.absence=1e-3`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// How many problems are worked on at a time.
+    /// Number of problems that are solved at the same time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
-    /// Where nothing is found in the shells, look in larger ones, then everywhere: the object may have been displaced.
+    /// Repeat a search without a fix with larger gates, then without gates, for a displaced object.
     #[arg(long)]
     expand_gates: bool,
-    /// One JSON object a line, for programs.
+    /// Print one JSON object a line.
     #[arg(long)]
     json: bool,
 }
 
-/// What a problem is solved with.
+/// The settings of the method.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Settings {
@@ -73,8 +73,7 @@ impl Solve {
         let search = SEARCHES.build(&settings.search).map_err(usage)?;
         let solver = SOLVERS.build(&settings.solver).map_err(usage)?;
         if solver.needs_pixels() {
-            let what =
-                format!("solver `{}` needs pixels and a rig, which these problems have not", settings.solver.name);
+            let what = format!("cannot solve with `{}`: it needs pixels and a rig", settings.solver.name);
             return Err(Failure::new(USAGE, format!("{what}; use `mahalanobis`")));
         }
         let method = Method {
@@ -84,16 +83,16 @@ impl Solve {
             expand_gates: self.expand_gates,
         };
         let solve = |path: &PathBuf| {
-            // Every problem has the same stream: its answer depends on no other.
+            // Every problem has its own stream of the same seed, so that answers do not depend on each other.
             solve_file(path, &method, Stream::new(0, 0, 0, Purpose::Search).rng())
         };
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
-            .map_err(|error| Failure::new(OUTPUT, format!("no threads ({error})")))?;
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
         let groups = || {
             let mut ended = DONE;
-            // In groups, so that answers appear while the rest is worked on, in the order of the arguments.
+            // Groups let answers appear early, in the order of the arguments.
             for group in self.problems.chunks(usize::from(self.threads)) {
                 let lines: Vec<Line> = group.par_iter().map(solve).collect();
                 for line in &lines {
@@ -119,12 +118,13 @@ impl Solve {
     }
 }
 
-/// A stretch of so many standard deviations is told: of exact rigs and models one fix in fifteen thousand has it.
+/// Minimum scale error (standard deviations) that is printed; with exact rigs and models one fix in fifteen thousand
+/// exceeds it.
 const REPORTED: f64 = 4.0;
 
-/// How far apart two poses put the object.
+/// The difference of two poses of the object, as text.
 fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
-    let Some(pose) = pose else { return "which is not believed either".to_owned() };
+    let Some(pose) = pose else { return "which is not accepted either".to_owned() };
     let square: f64 = (0..3).map(|k| (pose[k][3] - other[k][3]).powi(2)).sum();
     // The trace of RᵀS is 1 + 2 cos of the turn between R and S.
     let trace: f64 = (0..3).flat_map(|i| (0..3).map(move |k| pose[i][k] * other[i][k])).sum();
@@ -132,13 +132,13 @@ fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
     format!("whose origin is {:.2} m off, turned by {turn:.0}°", square.sqrt())
 }
 
-/// An answer for people: what came of it, then the pose.
+/// The output for people: outcome, then pose.
 fn people(answer: &Answer) -> String {
     let mut text = format!("{}: {}", answer.file, answer.outcome);
     if let Some(pairs) = &answer.pairs {
         let proved = match (answer.optimal, answer.evidence_gap) {
-            (true, None) => ", proved largest",
-            (true, Some(_)) => ", proved likeliest",
+            (true, None) => ", proved maximum",
+            (true, Some(_)) => ", proved best",
             (false, _) => "",
         };
         text += &format!(", {} points{proved}", pairs.len());
@@ -154,16 +154,18 @@ fn people(answer: &Answer) -> String {
     {
         let (by, sigma) = (100.0 * scale_error.value.abs(), 100.0 * scale_error.sigma);
         let longer = if scale_error.value > 0.0 { "longer" } else { "shorter" };
-        text += &format!(", measured distances {by:.1} ± {sigma:.1} % {longer} than the model's: rig or survey is off");
+        text += &format!(
+            ", measured distances {by:.1} ± {sigma:.1} % {longer} than the model's: rig or survey has a scale error"
+        );
     }
     if let Some(why) = &answer.explanation {
         text += &format!(": {why}");
     }
     text += &match (&answer.runner_up, answer.margin) {
         (Some(other), Some(margin)) => {
-            format!("; {margin:.1} better than the next pose, {}", apart(answer.t_cam_obj.as_ref(), &other.t_cam_obj))
+            format!("; score {margin:.1} above the next pose, {}", apart(answer.t_cam_obj.as_ref(), &other.t_cam_obj))
         }
-        _ if answer.t_cam_obj.is_some() => "; no other pose was met".to_owned(),
+        _ if answer.t_cam_obj.is_some() => "; no other pose found".to_owned(),
         _ => String::new(),
     };
     text += &format!(" ({:.1} ms)\n", answer.time_ms);
@@ -174,18 +176,18 @@ fn people(answer: &Answer) -> String {
     text
 }
 
-/// By how much a fix may be off at the stated risk, beside what is too much.
+/// The protection level of a fix and its alert limit, as text.
 fn protected(support: &Support) -> String {
     let limit = format!("the alert limit of {:.3} m", support.alert_limit);
     match (support.protection, support.misidentified) {
         (None, Some(mistaken)) if !(mistaken < support.risk) => {
             let risk = support.risk;
             format!(
-                "no protection level: the points may be others with a probability of {mistaken:.1e}, at a risk of {risk:.0e}; not known to be within {limit}"
+                "no protection level: probability of a misidentification {mistaken:.1e} above the risk {risk:.0e}; not protected within {limit}"
             )
         }
         (None, _) => {
-            format!("no protection level: too few points, or one that cannot be spared; not known to be within {limit}")
+            format!("no protection level: too few points, or an indispensable one; not protected within {limit}")
         }
         (Some(level), _) => {
             let is = if level.position <= support.alert_limit { "within" } else { "beyond" };

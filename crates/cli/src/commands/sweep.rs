@@ -24,27 +24,27 @@ pub(crate) struct Sweep {
     /// Change a setting of the experiment: a dotted key and a TOML value, `source.frames=3`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Into how many shards the run is dealt.
+    /// Number of shards of the run.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     shards: u32,
-    /// Who runs them.
+    /// The engine that runs the shards.
     #[arg(long, value_enum, default_value = "local")]
     executor: Engine,
-    /// The folder of the run; its shards lie in DIR-shards until they are merged. The same command goes on with them.
+    /// The folder of the run. Its shards are in DIR-shards until they are merged; the same command resumes them.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Threads of each shard.
+    /// Number of threads of each shard.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
-    /// Log no durations: two runs of one experiment then have the same bytes.
+    /// Log no durations; two runs of one experiment then have the same bytes.
     #[arg(long)]
     untimed: bool,
-    /// Let every trial compute all of its stages itself, so that its durations are its own.
+    /// Compute all stages in every trial, so that durations are those of the trial alone.
     #[arg(long)]
     separate: bool,
 }
 
-/// The engines that are known.
+/// The supported engines.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Engine {
     /// This machine.
@@ -73,7 +73,7 @@ impl Sweep {
             Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()))
         };
         if self.out.exists() && fs::read_dir(&self.out).map_or(true, |mut entries| entries.next().is_some()) {
-            let what = format!("{} is there already; name another folder", self.out.display());
+            let what = format!("{} exists and is not empty; name another folder", self.out.display());
             return Err(Failure::new(OUTPUT, what));
         }
         let shards = absolute(&self.shards_folder())?;
@@ -82,13 +82,13 @@ impl Sweep {
         let script = shards.join("shard.sh");
         fs::write(&script, self.script(&shards, executor.variable())?).map_err(|error| refuse(&script, error))?;
         let (tasks, threads) = (self.shards as usize, usize::from(self.threads));
-        notify(&format!("{tasks} shards of {} into {}", plan.name, shards.display()));
+        notify(&format!("{tasks} shards of {} in {}", plan.name, shards.display()));
         signals::listen();
         let ran = executor.run(&Array { script, tasks, threads, name: format!("seafix-{}", plan.name), logs });
         signals::end_at_once();
         ran?;
         if signals::turned_out() {
-            return Err(Failure::new(signals::exit_code(), "interrupted; the same command goes on where it ended"));
+            return Err(Failure::new(signals::exit_code(), "interrupted; the same command resumes the sweep"));
         }
         self.merge(&shards)
     }
@@ -99,16 +99,16 @@ impl Sweep {
         PathBuf::from(name)
     }
 
-    /// What each task does: its shard, or what is missing of it.
+    /// The script of each task: it runs or resumes its shard.
     fn script(&self, shards: &Path, variable: &str) -> Result<String, Failure> {
         let program = std::env::current_exe()
-            .map_err(|error| Failure::new(OUTPUT, format!("nobody knows where seafix lies: {error}")))?;
-        // From the same folder, so that the run's log says the same command.
-        let here =
-            std::env::current_dir().map_err(|error| Failure::new(OUTPUT, format!("no folder to run in: {error}")))?;
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot locate the program seafix: {error}")))?;
+        // Run from the same folder, so that the run's log has the same command.
+        let here = std::env::current_dir()
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot determine the current folder: {error}")))?;
         let set: String = self.set.iter().map(|setting| format!(" --set {}", quoted(setting))).collect();
         Ok(format!(
-            "#!/bin/sh\n# One shard of a sweep; {variable} says which.\ncd {} || exit 4\nexec {} run {}{set} --shard \"${variable}/{}\" --out {}/\"${variable}\" --resume --threads {}{}{}\n",
+            "#!/bin/sh\n# Shard {variable} of a sweep.\ncd {} || exit 4\nexec {} run {}{set} --shard \"${variable}/{}\" --out {}/\"${variable}\" --resume --threads {}{}{}\n",
             quoted(&here.to_string_lossy()),
             quoted(&program.to_string_lossy()),
             quoted(&self.experiment.to_string_lossy()),
@@ -130,7 +130,7 @@ impl Sweep {
             (1..=self.shards).zip(&folders).filter(|(_, folder)| !full(folder)).map(|(k, _)| k.to_string()).collect();
         if !missing.is_empty() {
             let what = format!(
-                "shards {} did not end; what they said is in {}; the same command goes on with them",
+                "shards {} did not finish; see their output in {}; the same command resumes them",
                 missing.join(", "),
                 shards.join("logs").display()
             );
@@ -149,10 +149,11 @@ impl Sweep {
 }
 
 fn absolute(path: &Path) -> Result<PathBuf, Failure> {
-    std::path::absolute(path).map_err(|error| Failure::new(OUTPUT, format!("{}: {error}", path.display())))
+    std::path::absolute(path)
+        .map_err(|error| Failure::new(OUTPUT, format!("cannot resolve {}: {error}", path.display())))
 }
 
-/// A word for the shell, whatever is in it.
+/// A quoted word for a POSIX shell.
 fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }

@@ -1,9 +1,9 @@
-//! Under HyperQueue: one task array on its workers.
+//! The executor for HyperQueue: one task array on its workers.
 
 use super::{Array, Executor, engine, word};
 use crate::exit::Failure;
 
-/// `hq submit --array`, to the server that `hq` finds.
+/// A task array, submitted by `hq submit --array` to the server that `hq` finds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HyperQueue;
 

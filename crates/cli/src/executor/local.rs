@@ -1,4 +1,4 @@
-//! On this machine.
+//! The executor on this machine.
 
 use std::{
     fs::File,
@@ -11,7 +11,7 @@ use crate::{
     signals,
 };
 
-/// As many tasks at a time as the machine has cores for.
+/// The local executor: as many simultaneous tasks as the machine has cores for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Local;
 
@@ -49,15 +49,15 @@ impl Local {
         let mut command = Command::new("sh");
         command.arg(&array.script).env(self.variable(), task.to_string());
         let child = command.stdin(Stdio::null()).stdout(log).stderr(said).spawn();
-        child.map_err(|error| Failure::new(OUTPUT, format!("cannot begin task {task}: {error}")))
+        child.map_err(|error| Failure::new(OUTPUT, format!("cannot start task {task}: {error}")))
     }
 }
 
-/// Until one of them has ended.
+/// Waits until one of them has ended.
 fn wait(running: &mut Vec<Child>) {
     let before = running.len();
     loop {
-        // One that cannot be asked is not waited for.
+        // A process whose state cannot be read counts as ended.
         running.retain_mut(|child| matches!(child.try_wait(), Ok(None)));
         if running.len() < before {
             return;

@@ -1,4 +1,4 @@
-//! Who runs the parts of a sweep. Seafix cuts and merges; an engine that exists already schedules, retries and spreads.
+//! Executors of the shards of a sweep. Seafix partitions and merges; the engine schedules, retries and distributes.
 
 mod hyperqueue;
 mod local;
@@ -17,37 +17,37 @@ pub(crate) use slurm::Slurm;
 pub(crate) struct Array {
     /// A shell script that reads the number of its task from the variable that [`Executor::variable`] names.
     pub(crate) script: PathBuf,
-    /// How many tasks.
+    /// Number of tasks.
     pub(crate) tasks: usize,
-    /// Threads that each task uses.
+    /// Number of threads of each task.
     pub(crate) threads: usize,
-    /// What the engine calls the whole.
+    /// Name of the array in the engine.
     pub(crate) name: String,
-    /// Where what task k says goes: `k.log`.
+    /// Folder of the tasks' output; that of task k is `k.log`.
     pub(crate) logs: PathBuf,
 }
 
-/// Runs the tasks of an array, wherever, and waits for them.
+/// An engine that runs the tasks of an array and waits for them.
 pub(crate) trait Executor {
-    /// The variable that holds the number of a task.
+    /// The environment variable with the number of a task.
     fn variable(&self) -> &'static str;
 
-    /// Returns when every task has ended. Whether they did their work shows in what they leave.
+    /// Runs all tasks and returns when they have ended. Their success is judged by the shards they leave.
     ///
     /// # Errors
-    /// The engine cannot be reached, or refuses the array.
+    /// The engine cannot be reached, or rejects the array.
     fn run(&self, array: &Array) -> Result<(), Failure>;
 }
 
-/// A command of an engine that must be there.
+/// Runs a command of an engine.
 fn engine(program: &str, engine: &str, arguments: &[&str]) -> Result<(), Failure> {
     let status = std::process::Command::new(program).args(arguments).status();
     match status {
-        // A task that failed makes the engine's command fail: the shards tell which.
+        // A failed task makes the engine's command fail; the shards show which task it was.
         Ok(_) => Ok(()),
         Err(error) => Err(Failure::new(
             OUTPUT,
-            format!("cannot run `{program}` ({error}); install {engine}, or sweep with --executor local"),
+            format!("cannot run `{program}`: {error}; install {engine}, or use --executor local"),
         )),
     }
 }

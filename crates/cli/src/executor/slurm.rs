@@ -1,9 +1,9 @@
-//! On a cluster under Slurm: one job array.
+//! The executor for a Slurm cluster: one job array.
 
 use super::{Array, Executor, engine, word};
 use crate::exit::Failure;
 
-/// `sbatch --array`, on a file system that all nodes share.
+/// A job array, submitted by `sbatch --array`; all nodes share a file system.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slurm;
 

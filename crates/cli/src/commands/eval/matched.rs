@@ -1,4 +1,4 @@
-//! Which poses belong together, and how one way is laid on the other.
+//! Association and alignment of two trajectories.
 
 use std::path::Path;
 
@@ -8,32 +8,32 @@ use seafix_evaluation::trajectory::{Alignment, Pose, align, associate};
 use super::Eval;
 use crate::exit::{Failure, INPUT, USAGE};
 
-/// The poses that belong together.
+/// The associated poses of two trajectories.
 pub(super) struct Matched {
     pub(super) reference: Vec<Pose>,
     pub(super) estimate: Vec<Pose>,
     pub(super) stamps: Option<Vec<u64>>,
-    /// Where a stretch without a break begins, zero first: what lies in two stretches has no known motion between.
+    /// The first index of every stretch without a break, from 0; motions between stretches are unknown.
     pub(super) stretches: Vec<usize>,
-    /// How many poses the two files hold.
+    /// The numbers of poses of the two files.
     pub(super) of: (usize, usize),
-    /// The share of the reference's time between the first and the last matched pose.
+    /// The fraction of the reference's time between the first and the last matched pose.
     pub(super) covered: f64,
 }
 
 impl Matched {
-    /// The share of the shorter trajectory that found its partner.
+    /// The fraction of poses of the shorter trajectory with a partner.
     pub(super) fn fraction(&self) -> f64 {
         self.reference.len() as f64 / self.of.0.min(self.of.1).max(1) as f64
     }
 
-    /// How far apart two ways end that begin in one pose (m); of a way that is broken none knows.
+    /// The distance of the last poses (m) of the trajectories with equal first poses; `None` after a break.
     pub(super) fn end(&self) -> Option<f64> {
         let trajectory = |poses: &[Pose]| poses[0].to(&poses[poses.len() - 1]).position;
         (self.stretches.len() == 1).then(|| (trajectory(&self.reference) - trajectory(&self.estimate)).norm())
     }
 
-    /// The stretches without a break, as places from and up to.
+    /// The stretches without a break, as ranges of indices.
     pub(super) fn stretches(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
         let ends = self.stretches.iter().skip(1).copied().chain([self.reference.len()]);
         self.stretches.iter().copied().zip(ends).map(|(from, to)| from..to)
@@ -58,16 +58,16 @@ impl Eval {
         let nanoseconds = |name: &str, seconds: f64| {
             let ns = seconds * 1e9;
             if !(ns.abs() < 9e18) {
-                return Err(Failure::new(USAGE, format!("{name} {seconds}: give seconds")));
+                return Err(Failure::new(USAGE, format!("invalid {name} {seconds}; give seconds")));
             }
             Ok(ns.round() as i64)
         };
         let tolerance = u64::try_from(nanoseconds("--t-max-diff", self.t_max_diff)?).map_err(|_| {
-            Failure::new(USAGE, format!("--t-max-diff {}: give seconds, not negative", self.t_max_diff))
+            Failure::new(USAGE, format!("invalid --t-max-diff {}; give seconds of at least zero", self.t_max_diff))
         })?;
         let offset = nanoseconds("--t-offset", self.t_offset)?;
         if self.estimate.is_none() && !is_log(&self.reference) {
-            return Err(Failure::new(USAGE, "no trajectory to judge; give ESTIMATE, or a log for both"));
+            return Err(Failure::new(USAGE, "no trajectory to evaluate; give ESTIMATE, or a log"));
         }
         let (reference, estimate) = (
             read(&self.reference, LoggedTrajectory::True, self.sort_stamps)?,
@@ -87,7 +87,7 @@ impl Eval {
             (a, b) if of.0 == of.1 => ((0..of.0).map(|i| (i, i)).collect(), a.clone().or_else(|| b.clone())),
             _ => {
                 return refuse(format!(
-                    "{} and {} poses, one of them without stamps; give as many poses, or stamps, to both,",
+                    "cannot associate {} and {} poses without stamps; give stamps, or equal numbers of poses,",
                     of.0, of.1
                 ));
             }
@@ -101,7 +101,7 @@ impl Eval {
         };
         if belong.len() < 2 {
             return refuse(format!(
-                "only {} of {} and {} poses belong together; check --t-offset and --t-max-diff,",
+                "only {} of {} and {} poses are associated; check --t-offset and --t-max-diff,",
                 belong.len(),
                 of.0,
                 of.1
@@ -127,7 +127,7 @@ impl Eval {
         let n = self.n_to_align.unwrap_or(usize::MAX).min(matched.reference.len());
         let found = align(&matched.reference[..n], &matched.estimate[..n], self.scale).map_err(|why| {
             let (a, b) = (self.reference.display(), self.estimate().display());
-            Failure::new(INPUT, format!("no alignment of {b} with {a}: {why}"))
+            Failure::new(INPUT, format!("cannot align {b} with {a}: {why}"))
         })?;
         Ok(Some(if self.align { found } else { Alignment { scale: found.scale, ..Alignment::IDENTITY } }))
     }

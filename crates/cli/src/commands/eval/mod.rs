@@ -17,61 +17,61 @@ use crate::{
     terminal::{notify, print},
 };
 
-/// Below this share of matched poses the statistics come with a warning.
+/// Minimum fraction of matched poses; a smaller one causes a warning.
 const MOSTLY: f64 = 0.9;
 
 #[derive(Debug, Args)]
 pub(crate) struct Eval {
-    /// The trajectory to measure against: TUM, KITTI or EuRoC; or a log (.mcap), for its truth.
+    /// The reference trajectory: TUM, KITTI or EuRoC, or a log (.mcap) for its truth.
     reference: PathBuf,
-    /// The trajectory to judge; left out, a way of the log.
+    /// The estimated trajectory [default: a trajectory of the log].
     estimate: Option<PathBuf>,
-    /// Which way of a log is judged.
+    /// The evaluated trajectory of a log.
     #[arg(long, value_enum, default_value = "odometry")]
     trajectory: TrajectoryArgument,
-    /// Lay the estimate on the reference first (Umeyama).
+    /// Align the estimate with the reference first (Umeyama).
     #[arg(short, long)]
     align: bool,
-    /// Correct the scale of the estimate; alone, only the scale.
+    /// Correct the scale of the estimate; without --align, only the scale.
     #[arg(short, long)]
     scale: bool,
-    /// Lay the first matched pose of the estimate on the reference's.
+    /// Align the first matched poses.
     #[arg(long, conflicts_with = "align")]
     align_origin: bool,
-    /// Find the alignment from so many first poses.
+    /// Align with the first N poses only.
     #[arg(long, value_name = "N")]
     n_to_align: Option<usize>,
-    /// What of a pose difference counts.
+    /// The measured part of a pose difference.
     #[arg(short, long, default_value = "trans_part")]
     relation: Name,
-    /// How far apart the poses of a relative error are.
+    /// Distance of the two poses of a relative error.
     #[arg(short, long, default_value_t = 1.0)]
     delta: f64,
-    /// The unit of the delta: frames, metres, degrees or radians.
+    /// Unit of the delta: frames, metres, degrees or radians.
     #[arg(short = 'u', long, default_value = "f")]
     delta_unit: Unit,
-    /// By which share of the delta a pair of --all-pairs may miss it.
+    /// Tolerance of the delta with --all-pairs, as a fraction.
     #[arg(long, default_value_t = 0.1)]
     delta_tol: f64,
-    /// Take pairs from every pose on, not only one after the other.
+    /// Use a pair from every pose, not only consecutive pairs.
     #[arg(long)]
     all_pairs: bool,
-    /// Choose the pairs along the reference instead of the estimate.
+    /// Choose pairs along the reference instead of the estimate.
     #[arg(long)]
     pairs_from_fix: bool,
-    /// Poses further apart in time (s) do not belong together.
+    /// Maximum difference of associated stamps (s).
     #[arg(long, default_value_t = 0.01)]
     t_max_diff: f64,
-    /// Sort lines that are out of order by time, and keep the first of each stamp; otherwise such a file is refused.
+    /// Sort lines by time and keep the first of each stamp; by default unsorted lines are an error.
     #[arg(long)]
     sort_stamps: bool,
-    /// Added to the estimate's stamps (s).
+    /// Offset that is added to the estimate's stamps (s).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     t_offset: f64,
-    /// The lengths (m) of the stretches over which drift is taken.
+    /// Path lengths (m) of the drift segments.
     #[arg(long, value_delimiter = ',', default_value = "5,10,20,40")]
     segments: Vec<f64>,
-    /// Write the matched, aligned estimate: `.tum`, `.kitti` or `.csv` (EuRoC).
+    /// Write the matched, aligned estimate to this file: `.tum`, `.kitti` or `.csv` (EuRoC).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object.
@@ -79,7 +79,7 @@ pub(crate) struct Eval {
     json: bool,
 }
 
-/// A relation by its name.
+/// A relation with its name on the command line.
 #[derive(Debug, Clone, Copy)]
 struct Name(Relation);
 
@@ -114,10 +114,10 @@ enum Unit {
     R,
 }
 
-/// A way that a log holds.
+/// A trajectory of a log.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum TrajectoryArgument {
-    /// By odometry alone.
+    /// By odometry only.
     Odometry,
     /// By the navigated pose and the survey.
     Navigated,
@@ -132,18 +132,18 @@ impl From<TrajectoryArgument> for LoggedTrajectory {
     }
 }
 
-/// What the errors come to.
+/// The errors of a trajectory.
 struct Errors {
     ape: Option<Summary>,
     rpe: Summary,
     segments: Vec<DriftSegment>,
     path: f64,
-    /// The distance of the last poses (m), the first laid on each other, where the way between is known.
+    /// The distance of the last poses (m) after alignment of the first; `None` after a break.
     end: Option<f64>,
     alignment: Option<Alignment>,
 }
 
-/// `once`, `2 times`.
+/// A count as text: `once`, `2 times`.
 fn times(count: usize) -> String {
     if count == 1 { "once".to_owned() } else { format!("{count} times") }
 }
@@ -159,7 +159,7 @@ impl Eval {
         let Name(relation) = self.relation;
         let absolute = relation.is_absolute().then(|| ape(&matched.reference, &matched.estimate, relation));
         let along = if self.pairs_from_fix { &matched.reference } else { &matched.estimate };
-        // Across a break nothing is known, so nothing is judged.
+        // Motions across a break are unknown and not evaluated.
         let (mut both, mut segments) = (Vec::new(), Vec::new());
         for scale_error in matched.stretches() {
             let from = scale_error.start;
@@ -183,8 +183,8 @@ impl Eval {
         };
         if matched.stretches.len() > 1 {
             notify(&format!(
-                "warning: the way is broken {}; RPE and drift are taken between the breaks, APE speaks for the whole only if \
-                 nothing moved in them",
+                "warning: the trajectory is broken {}; RPE and drift are computed between the breaks, and APE is valid only if \
+                 the rig did not move in them",
                 times(matched.stretches.len() - 1)
             ));
         }
@@ -192,7 +192,7 @@ impl Eval {
             let (reference, estimate) = (self.reference.display(), self.estimate().display());
             let covered = 100.0 * matched.covered;
             notify(&format!(
-                "warning: {estimate} covers {covered:.1} % of the time of {reference}; errors speak for that part"
+                "warning: {estimate} covers {covered:.1} % of the time of {reference}; errors are those of that part"
             ));
         }
         if matched.fraction() < MOSTLY {
@@ -212,29 +212,32 @@ impl Eval {
         Ok(DONE)
     }
 
-    /// The file with what is judged.
+    /// The file of the estimate.
     fn estimate(&self) -> &Path {
         self.estimate.as_ref().unwrap_or(&self.reference)
     }
 
     fn delta(&self) -> Result<Delta, Failure> {
-        let refuse = |what: &str| Err(Failure::new(USAGE, format!("--delta {}: {what}", self.delta)));
+        let refuse = |what: &str| Err(Failure::new(USAGE, format!("invalid --delta {}: {what}", self.delta)));
         if !(self.delta > 0.0 && self.delta.is_finite()) {
             return refuse("give a number above zero");
         }
         if !(self.delta_tol >= 0.0 && self.delta_tol.is_finite()) {
-            return Err(Failure::new(USAGE, format!("--delta-tol {}: give a share, zero or above", self.delta_tol)));
+            return Err(Failure::new(
+                USAGE,
+                format!("invalid --delta-tol {}; give a fraction of at least zero", self.delta_tol),
+            ));
         }
         if let Some(wrong) = self.segments.iter().find(|&&length| !(length > 0.0 && length.is_finite())) {
-            return Err(Failure::new(USAGE, format!("--segments {wrong}: give lengths above zero, in metres")));
+            return Err(Failure::new(USAGE, format!("invalid --segments {wrong}; give lengths above zero, in metres")));
         }
         match self.delta_unit {
-            Unit::F if self.delta.fract() != 0.0 => refuse("frames are counted in whole numbers"),
+            Unit::F if self.delta.fract() != 0.0 => refuse("give a whole number of frames"),
             Unit::F => Ok(Delta::Frames(self.delta as usize)),
             Unit::M => Ok(Delta::Metres(self.delta)),
-            Unit::D if self.delta > 180.0 => refuse("an angle is at most 180 degrees"),
+            Unit::D if self.delta > 180.0 => refuse("give an angle of at most 180 degrees"),
             Unit::D => Ok(Delta::Radians(self.delta.to_radians())),
-            Unit::R if self.delta > std::f64::consts::PI => refuse("an angle is at most pi"),
+            Unit::R if self.delta > std::f64::consts::PI => refuse("give an angle of at most pi"),
             Unit::R => Ok(Delta::Radians(self.delta)),
         }
     }

@@ -1,4 +1,4 @@
-//! What was found, for people and for machines.
+//! Output of the errors as text and as JSON.
 
 use seafix_evaluation::trajectory::{DriftSegment, Summary};
 use serde_json::{Value, json};
@@ -20,14 +20,14 @@ impl Eval {
         );
         text += &match &found.alignment {
             None => "alignment  none\n".to_owned(),
-            Some(_) if self.align_origin => "alignment  first pose on first pose\n".to_owned(),
+            Some(_) if self.align_origin => "alignment  first poses\n".to_owned(),
             Some(alignment) if !self.align => format!("alignment  scale only, {:.6}\n", alignment.scale),
             Some(alignment) if self.scale => format!("alignment  similarity, scale {:.6}\n", alignment.scale),
             Some(_) => "alignment  rigid\n".to_owned(),
         };
         text += &match matched.stretches.len() {
             1 => String::new(),
-            count => format!("segments   {count}, the way is broken between them\n"),
+            count => format!("segments   {count}, with breaks between them\n"),
         };
         text += &format!("path       {:.3} m of reference", found.path);
         if let Some(end) = found.end {
@@ -80,7 +80,7 @@ impl Eval {
         text
     }
 
-    /// The legs of each length: translation as a share, rotation in rad/m.
+    /// The drift for each length: translation as a fraction, rotation in rad/m.
     fn segments(&self, found: &Errors) -> Vec<(f64, Summary, Summary)> {
         let of = |length: f64| {
             let segments: Vec<&DriftSegment> =
