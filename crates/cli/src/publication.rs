@@ -103,8 +103,8 @@ mod tests {
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// The committed reports agree with each other and with the list. No experiment runs: a release's reports need not equal
-    /// the results of the current program.
+    /// The committed reports agree with each other and with the list. No experiment runs: a release's reports need not
+    /// equal the results of the current program.
     ///
     /// Seen to fail with a digit of README.md changed, and with two reports exchanged in it.
     #[test]

@@ -42,8 +42,8 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
     Ok(if found { FINDINGS } else { DONE })
 }
 
-/// Adds the files to check at `path`: itself, or the files of known formats in a folder that is no data set, recursively
-/// and sorted by name.
+/// Adds the files to check at `path`: itself, or the files of known formats in a folder that is no data set,
+/// recursively and sorted by name.
 fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     let before = files.len();
     let entries = if path.is_dir() && !dataset::is_one(path) { std::fs::read_dir(path).ok() } else { None };

@@ -30,7 +30,7 @@ pub(crate) struct Model {
     /// The stereo rig: a dataset.toml, of which only the rig and `bits` are read.
     #[arg(long, value_name = "DATASET.toml")]
     rig: PathBuf,
-    /// The marks (px): lines id,left_u,left_v,right_u,right_v below that header; empty right coordinates are searched for.
+    /// The marks (px): lines id,left_u,left_v,right_u,right_v below that header; empty right coordinates are estimated.
     #[arg(long, value_name = "CLICKS.csv")]
     points: PathBuf,
     /// The id of the object.

@@ -254,7 +254,8 @@ impl Trip {
         agreement.map(said).into_iter().collect()
     }
 
-    /// The minimum and mean number of landmarks tracked in a pair, and the mean number predicted; `None` without landmarks.
+    /// The minimum and mean number of landmarks tracked in a pair, and the mean number searched for; `None` without
+    /// landmarks.
     fn landmarks(&self) -> Option<[f64; 3]> {
         let followed: Vec<(usize, usize)> = self.trajectory.outcomes.iter().filter_map(of_followed).collect();
         let count = followed.len() as f64;

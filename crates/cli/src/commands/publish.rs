@@ -125,10 +125,7 @@ impl Publish {
         others.sort();
         for path in &others {
             let list = self.list.display();
-            notify(&format!(
-                "{}: the experiment of this report is not in {list}; remove the report if it is not needed",
-                path.display()
-            ));
+            notify(&format!("{}: report of no experiment in {list}; remove it if it is not needed", path.display()));
         }
         others.len()
     }
@@ -153,7 +150,7 @@ impl Publish {
         if self.only.is_empty() {
             holds &= self.distinguish_others(list) == 0;
             if unreadable.is_none() && !index_holds(findings.iter().map(String::as_str), &self.out) {
-                print(&format!("{} differs from the page made from the logs\n", self.out.join("README.md").display()))?;
+                print(&format!("{} differs from the logs\n", self.out.join("README.md").display()))?;
                 holds = false;
             }
         }

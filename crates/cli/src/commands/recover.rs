@@ -18,7 +18,7 @@ use crate::{
 pub(crate) struct Recover {
     /// A truncated or damaged log, a `.partial` of a killed run, or the folder of an unfinished run.
     log: PathBuf,
-    /// The file to write [default: NAME-recovered.mcap beside the log], or the folder [default: `recovered` in the run's].
+    /// The output file [default: NAME-recovered.mcap beside the log] or folder [default: `recovered` in the run's].
     #[arg(long)]
     out: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! Bad input gets one line with file, place and remedy, the right exit code, and nothing half-written.
+//! Invalid input: one line with file, place and remedy, the right exit code, and no partial output.
 
 use std::{
     fs,
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::{ended_with, program};
 
-/// A small sound data set: two images of noise, a rig, a site of three points.
+/// A small valid data set: two images of noise, a rig, a site of three points.
 struct Sample {
     folder: TempDir,
 }
@@ -91,7 +91,7 @@ impl Sample {
         self.put(name, &text.replace(from, to))
     }
 
-    /// Runs the data set; it must fail with `code`, say every one of `parts`, and write nothing.
+    /// Runs the data set; it must fail with `code`, report every one of `parts`, and write nothing.
     fn refused(&self, code: i32, parts: &[&str]) {
         let out = self.path("out");
         refused(&["run", self.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()], code, parts);
@@ -99,7 +99,7 @@ impl Sample {
     }
 }
 
-/// A plain image in the text form of PGM.
+/// A uniform image in the text form of PGM.
 fn pgm(width: usize, height: usize) -> String {
     let pixels: Vec<String> = (0..width * height).map(|i| ((i * 7919) % 251).to_string()).collect();
     format!("P2\n{width} {height}\n255\n{}\n", pixels.join("\n"))
@@ -111,7 +111,7 @@ fn other(width: usize, height: usize) -> String {
     format!("P2\n{width} {height}\n255\n{}\n", pixels.join("\n"))
 }
 
-/// The command must fail with `code` and one line for each fault; together they say every one of `parts`.
+/// The command must fail with `code` and one line for each fault; together they contain every one of `parts`.
 fn refused(arguments: &[&str], code: i32, parts: &[&str]) {
     let output = program().args(arguments).output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
@@ -184,7 +184,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
     assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains(counted));
     let (code, said, out) = run("strict", &["--set", "source.reject-mismatched-images=true"]);
     assert!(code == Some(3) && said.contains("c.pgm") && !out.exists(), "{said}");
-    // Two of three belong to another calibration.
+    // Two of three images have the size of another calibration.
     sample.change("frames.csv", "2000000000,a.pgm,c.pgm", "2000000000,a.pgm,c.pgm\n3000000000,c.pgm,c.pgm");
     let (code, said, out) = run("most", &[]);
     assert!(code == Some(3) && said.contains("32×48, calibrated 64×48") && !out.exists(), "{said}");
@@ -217,7 +217,7 @@ fn a_path_that_leads_out() {
     Sample::new().change("frames.csv", "a.pgm,b.pgm", "../a.pgm,b.pgm").refused(3, &["frames.csv:2", "leads out"]);
 }
 
-/// Each of these changes of the description is refused with its own words.
+/// Each of these changes of the description is rejected with its own message.
 fn each_refused(changes: &[(&str, &str, &[&str])]) {
     for (from, to, parts) in changes {
         Sample::new().change("dataset.toml", from, to).refused(3, &[&["dataset.toml:"], *parts].concat());
@@ -271,14 +271,14 @@ fn a_quaternion_off_unit_length() {
     assert_eq!(text.matches("it was normalised").count(), 1, "{text}");
 }
 
-/// One image of the sample replaced by these bytes.
+/// The sample with one image replaced by these bytes.
 fn with_image(bytes: &[u8]) -> Sample {
     let sample = Sample::new();
     fs::write(sample.path("a.pgm"), bytes).unwrap();
     sample
 }
 
-/// A PNG's first 41 bytes, declaring this size.
+/// The first 41 bytes of a PNG that declares this size.
 fn png_header(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
     bytes.extend(width.to_be_bytes());
@@ -315,7 +315,7 @@ fn the_limits_of_images_are_settings() {
     );
 }
 
-/// What `check` says of the sample, and its exit code.
+/// The output of `check` for the sample, and its exit code.
 fn checked(sample: &Sample) -> (Option<i32>, String) {
     let output = program().arg("check").arg(sample.folder.path()).output().unwrap();
     (output.status.code(), String::from_utf8(output.stdout).unwrap())
@@ -331,7 +331,7 @@ fn one_image_for_both_cameras() {
     let reported = said.contains("left and right images that are the same in") && said.contains("1 of 1 pairs");
     assert!(code == Some(1) && reported && !said.contains("in order"), "{said}");
     sample.refused(3, &["a.pgm", "left and right images that are the same", "one image twice has no depth"]);
-    // Two images of nothing are alike and no mistake.
+    // Two uniform images are equal without being a mistake.
     let dark = format!("P2\n64 48\n255\n{}", "9\n".repeat(64 * 48));
     sample.put("a.pgm", &dark).put("b.pgm", &dark);
     assert_eq!(checked(&sample).0, Some(0));
@@ -394,7 +394,7 @@ fn an_unknown_setting() {
     refused(&["run", &file], 2, &["e.toml:5", "did you mean `choose`?"]);
 }
 
-/// B32. A type error, a date for a number, a key that comes twice: refused with the line, and nothing is written.
+/// B32. A type error, a date in place of a number, a duplicate key: rejected with the line, and nothing is written.
 ///
 /// Seen to fail when lines are counted one too far.
 #[test]
@@ -426,7 +426,7 @@ fn a_setting_of_another_type_or_twice() {
     }
 }
 
-/// Every stage of reading finds something here; the nearest right word, line and column of each.
+/// Every stage of reading reports a fault here, with line, column and the nearest valid word.
 #[test]
 fn all_faults_of_an_experiment_at_once() {
     let text = "sorce = 'dive'\nquestion = ''\n\
@@ -470,8 +470,8 @@ fn all_faults_of_an_experiment_at_once() {
     }
 }
 
-/// Each at the key or value itself, also where a component's name is misspelt, and on axes. Seen to fail where what is misspelt ends
-/// the search, and where an axis is told by its header.
+/// Faults are located at the key or value itself, also for a misspelt component and on axes. Seen to fail when a
+/// misspelt word ends the check, and when an axis is located by its header.
 #[test]
 fn a_fault_is_reported_where_it_stands() {
     let start = "question = 'why'\n";
@@ -561,7 +561,7 @@ fn a_value_out_of_range() {
 
 #[test]
 fn dives_that_cannot_be() {
-    // Line, place, value and remedy of each.
+    // Line, place, value and remedy of each fault.
     let start = "question = 'why'\n[source]\nname = 'dive'\nframes = 2\nrate = 0.0\n";
     let waypoints = "[source.route]\nkind = 'waypoints'\n";
     for (text, parts) in [
@@ -611,7 +611,7 @@ fn dives_that_cannot_be() {
             fs::write(folder.path().join(format!("{name}.geometry.toml")), geometry).unwrap();
         }
         let out = folder.path().join("out");
-        // Of settings 2; of a site, or of a way over it, 3.
+        // The code is 2 for settings, 3 for a site or a route over it.
         let code = if parts[0].starts_with("e.toml") { 2 } else { 3 };
         refused(&["dive", &file, "--out", out.to_str().unwrap()], code, &parts);
         assert!(!out.exists(), "{text}");
@@ -688,8 +688,8 @@ const PROBLEM: &str = r#"{"format": "coherence-problem/1", "id": "t",
 "cloud": [[0,0,5],[1,0,5],[0,2,5],[0,0,8]],
 "sigma": 0.001, "delta": 0.01, "prior": null, "putative": null}"#;
 
-/// Each of these changes of a good problem is one line with the element, its place, the value and what to give: of `solve` an
-/// error, of `check` a finding.
+/// Each of these changes of a valid problem is one line with element, place, value and remedy: an error of `solve`, a
+/// finding of `check`.
 #[test]
 fn problems_that_cannot_be() {
     let folder = TempDir::new().unwrap();
@@ -718,7 +718,7 @@ fn problems_that_cannot_be() {
     }
 }
 
-/// What is legal and hardly meant is told by `check`, and is no finding.
+/// Valid but improbable values are warnings of `check`, not findings.
 #[test]
 fn problems_that_are_hardly_meant() {
     let folder = TempDir::new().unwrap();

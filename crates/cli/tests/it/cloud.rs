@@ -1,4 +1,4 @@
-//! Two images to a cloud, as a person and as a program asks for it.
+//! `seafix cloud`: from two images to a cloud, with output for people and for programs.
 
 use std::{
     fs,
@@ -16,7 +16,7 @@ fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample").join(name)
 }
 
-/// The first stereo pair of the sample, and more arguments.
+/// The command for the first stereo pair of the sample, with further arguments.
 fn cloud(more: &[&str], code: i32) -> Ended {
     let table = fs::read_to_string(sample("frames.csv")).unwrap();
     let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
@@ -45,7 +45,7 @@ fn a_program_gets_every_point_and_the_times() {
         let (position, covariance) = (&point["position"], &point["covariance"]);
         assert!(position[2].as_f64().unwrap() > 0.0);
         assert!((0..3).all(|i| covariance[i][i].as_f64().unwrap() > 0.0));
-        // The rig of the sample is rectified: the two rows agree but for noise.
+        // The rig of the sample is rectified: the two rows agree within noise.
         let row = |side: &str| point[side][1].as_f64().unwrap();
         assert!((row("left") - row("right")).abs() < 3.0, "{point}");
     }
@@ -100,7 +100,7 @@ fn the_cloud_is_written_full() {
     let count: usize = header.split("element vertex ").nth(1).unwrap().lines().next().unwrap().parse().unwrap();
     assert_eq!(bytes.len() - end, count * (3 * 8 + 3 + 4));
     assert!(said.contains(&format!("{count} points")), "{said}");
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing half-written stays");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file stays");
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn images_that_changed_places_are_refused() {
     assert!(said.contains("left and right images that have changed places") && said.lines().count() == 1, "{said}");
 }
 
-/// The cloud of two of the sample's images with a changed rig; what it says on standard error.
+/// The standard error of `cloud` for two of the sample's images with a changed rig.
 fn said(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("dataset.toml");
@@ -129,20 +129,20 @@ fn one_image_twice_is_refused() {
     assert!(said.contains("left and right images that are the same") && said.lines().count() == 1, "{said}");
 }
 
-/// Images that were not made by their rig are told by their epipolar distances, and a rig that is called rectified and is
-/// not by its numbers.
+/// Images of another rig are detected by their epipolar distances, and a rig that is falsely called rectified by its
+/// parameters.
 #[test]
 fn rows_that_do_not_correspond_are_reported() {
     let images = ["left000.png", "right000.png"];
     assert_eq!(said(images, |rig| rig, 0), "");
-    // The right camera looks 20 rows lower than it says.
+    // The right camera points 20 rows lower than its calibration.
     let lower = |rig: String| {
         let (left, right) = rig.split_once("[rig.right]").unwrap();
         format!("{left}[rig.right]{}", right.replace("cy = 383.5", "cy = 403.5"))
     };
     let reported = said(images, lower, 0);
     assert!(reported.contains("warning: a rig that is called rectified and is not in "), "{reported}");
-    // As above, but the numbers hold the rows for equal.
+    // The same, with a calibration of equal rows.
     let upright =
         |rig: String| rig.replace("-0.25]", "0.0]").replacen("0.0, 1.0, 0.0, 0.0]", "0.0, 1.0, 0.0, -0.25]", 1);
     let reported = said(images, upright, 0);
@@ -159,13 +159,13 @@ fn key_points_that_come_to_nothing_are_reported() {
     let images = [sample("right000.png"), sample("left000.png")];
     let run = |images: &[PathBuf; 2]| {
         let mut command = program();
-        // Too few corners to say that the images have changed places.
+        // Too few corners for the swap check.
         ended(command.arg("cloud").args(images).arg("--rig").arg(sample("dataset.toml"))).error
     };
     assert!(run(&images).contains("changed places"));
     let folder = TempDir::new().unwrap();
     let few = images.map(|image| {
-        // All dark but for a small part of the image.
+        // The image is dark except for a small part.
         let name = folder.path().join(image.file_name().unwrap());
         let mut grey = read_image(&image, [1024, 768], 16, ImageLimits::default()).unwrap();
         let seen = |i: usize| (440..560).contains(&(i % 1024)) && (330..400).contains(&(i / 1024));

@@ -1,4 +1,4 @@
-//! `seafix eval`: trajectories in, errors out.
+//! `seafix eval`: errors of trajectories.
 
 use std::{fs, path::Path};
 
@@ -15,7 +15,7 @@ fn walk(folder: &Path, name: &str, line: impl Fn(f64) -> String) {
     fs::write(folder.join(name), (0..50).map(|i| line(f64::from(i))).collect::<String>()).unwrap();
 }
 
-/// A walk on a helix, and the same stretched by one per cent.
+/// A helix, and the same with a scale error of one per cent.
 fn walks() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let helix = |scale_error: f64| {
@@ -81,14 +81,14 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     walk(folder.path(), "seven.tum", |t| format!("{t} 0 0 0 0 0 1\n"));
     fs::write(folder.path().join("empty.tum"), "# nothing\n").unwrap();
     for (arguments, code, words) in [
-        (&["truth.tum", "later.tum"][..], 3, "only 0 of 50 and 50 poses belong together"),
+        (&["truth.tum", "later.tum"][..], 3, "only 0 of 50 and 50 poses are associated"),
         (&["truth.tum", "line.tum", "-a"], 3, "one point, or one line"),
         (&["truth.tum", "short.tum", "-a"], 3, "2 poses; an alignment takes 3"),
         (&["truth.tum", "few.kitti"], 3, "without stamps"),
         (&["truth.tum", "seven.tum"], 3, "7 columns in seven.tum:1"),
         (&["truth.tum", "empty.tum"], 3, "without poses in empty.tum"),
         (&["truth.tum", "nowhere.tum"], 3, "nowhere.tum"),
-        (&["truth.tum", "odometry.tum", "-d", "1.5"], 2, "whole numbers"),
+        (&["truth.tum", "odometry.tum", "-d", "1.5"], 2, "whole number of frames"),
         (&["truth.tum", "odometry.tum", "-d", "200", "-u", "d"], 2, "at most 180"),
         (&["truth.tum", "odometry.tum", "--out", "no/where.tum"], 4, "no/where.tum"),
     ] {
@@ -99,13 +99,13 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     }
 }
 
-/// Nothing is judged across a break: a way that stands still while it is lost has no error within its segments.
+/// Motions across a break are not evaluated: a trajectory that stands still while lost has no error in its segments.
 ///
-/// Seen to fail when comments are passed over: legs run across the break.
+/// Seen to fail when comments are ignored: segments then cross the break.
 #[test]
 fn breaks_are_not_crossed() {
     let folder = walks();
-    // The estimate misses ten seconds of the helix in the middle, as an odometry that was lost.
+    // The estimate lacks ten seconds in the middle of the helix, as an odometry that was lost.
     let text = fs::read_to_string(folder.path().join("truth.tum")).unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     lines.iter_mut().skip(25).for_each(|line| {
@@ -113,7 +113,7 @@ fn breaks_are_not_crossed() {
         words[1] += 2.0;
         *line = words.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
     });
-    lines.insert(25, "# broken: the motion to here is unknown".to_owned());
+    lines.insert(25, "# broken: the motion to this pose is unknown".to_owned());
     fs::write(folder.path().join("lost.tum"), lines.join("\n") + "\n").unwrap();
     let (code, out, warned) = eval(folder.path(), &["truth.tum", "lost.tum", "--json", "--segments", "2"]);
     let value: Value = serde_json::from_str(&out).unwrap();
@@ -126,21 +126,21 @@ fn breaks_are_not_crossed() {
         "{segment}"
     );
     assert_eq!((&value["breaks"][0]["pose"], &value["end_m"]), (&25.into(), &Value::Null));
-    assert!(warned.contains("warning: the way is broken once"), "{warned}");
+    assert!(warned.contains("warning: the trajectory is broken once"), "{warned}");
     let (_, out, _) = eval(folder.path(), &["truth.tum", "lost.tum"]);
-    assert!(out.contains("segments   2, the way is broken between them"), "{out}");
-    // What is written says so again.
+    assert!(out.contains("segments   2, with breaks between them"), "{out}");
+    // The written trajectory has the same break.
     eval(folder.path(), &["truth.tum", "lost.tum", "--out", "again.tum"]);
     assert!(fs::read_to_string(folder.path().join("again.tum")).unwrap().contains("# broken"));
 }
 
-/// A log knows where its odometry was lost, too: a pair that was left out is gone over, a motion that did not come breaks the way.
+/// A log has the breaks of its odometry: a skipped pair is bridged, a missing motion is a break.
 ///
-/// Seen to fail when a lost motion leaves its pair out, and when no break is kept.
+/// Seen to fail when a lost motion skips its pair, and when no break is kept.
 #[test]
 fn breaks_of_a_log_are_not_crossed() {
     let folder = tempfile::tempdir().unwrap();
-    // Pairs .2 s apart; the third is black, and the motion to the fifth is lost.
+    // Pairs every 0.2 s; the third is black, and the motion to the fifth is lost.
     let dive = "question = 'Is a break crossed?'\nseed = 1\n\
         [source]\nname = 'dive'\nframes = 7\nrate = 5.0\nstart = 30.4\n\
         rig.size = [512, 384]\nrig.focal = 250.0\nwater.attenuation = 0.15\n\
@@ -160,14 +160,14 @@ fn breaks_of_a_log_are_not_crossed() {
         (&3.into(), &Value::Null, &Value::Null)
     );
     assert!(value["rpe"]["max"].as_f64().unwrap() < 0.02, "{value}");
-    assert!(warned.contains("warning: the way is broken once"), "{warned}");
-    // The same way as a file is judged alike.
+    assert!(warned.contains("warning: the trajectory is broken once"), "{warned}");
+    // The same trajectory in a file has the same errors.
     let (_, of_file, _) = eval(folder.path(), &[log, "way.tum", "--json"]);
     let of_file: Value = serde_json::from_str(&of_file).unwrap();
     assert_eq!((&of_file["rpe"]["pairs"], &of_file["breaks"]), (&value["rpe"]["pairs"], &value["breaks"]));
 }
 
-/// Seen to fail when nobody looks at the order of a quaternion, or of the lines.
+/// Seen to fail when the order of quaternions or lines is not checked.
 #[test]
 fn orders_are_not_guessed() {
     let folder = walks();

@@ -1,4 +1,4 @@
-//! Drawn problems are files like any others: they are checked, solved, and refused where they cannot be.
+//! `seafix generate`: generated problems are checked and solved like others; invalid arguments are rejected.
 
 use std::{fs, path::Path};
 

@@ -1,11 +1,12 @@
-//! A sweep by HyperQueue's Python package: `SEAFIX_HYPERQUEUE=/path/to/python cargo test --release -p seafix hyperqueue -- --ignored`.
+//! A sweep by HyperQueue's Python package:
+//! `SEAFIX_HYPERQUEUE=/path/to/python cargo test --release -p seafix-cli hyperqueue -- --ignored`.
 
 use std::{env, fs, os::unix::fs::PermissionsExt, path::Path, process::Command};
 
 const EXPERIMENT: &str = "question = 'Which?'\nseed = 3\n[source]\nname = 'virtual-points'\nframes = 40\n\
                           [[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'triad']\n";
 
-/// Three shards on a real server and worker are merged to the bytes of one run. Seen to fail with tasks numbered from 0.
+/// Three shards on a real server and worker merge into the bytes of one run. Seen to fail with tasks numbered from 0.
 #[test]
 #[ignore = "long: needs HyperQueue"]
 fn a_sweep_by_hyperqueue_is_the_run() {

@@ -1,9 +1,9 @@
-//! The layers of the workspace: which package may depend on which.
+//! The layers of the workspace and the permitted dependencies of its packages.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-/// The packages from the lowest layer to the highest. A package depends on packages of lower layers only; packages of one
-/// line do not know each other. `ARCHITECTURE.md` explains the lines.
+/// The packages from the lowest layer to the highest. A package depends on packages of lower layers only, never on one
+/// of its own layer. `ARCHITECTURE.md` explains the layers.
 const LAYERS: &[&[&str]] = &[
     &["seafix-component"],
     &["seafix-geometry"],
@@ -15,17 +15,17 @@ const LAYERS: &[&[&str]] = &[
     &["seafix-cli"],
 ];
 
-/// Dependencies that a package must not have, whatever the layers say, and why.
+/// Dependencies that are forbidden although the layers permit them, with reasons.
 const FORBIDDEN: &[(&str, &str, &str)] = &[
-    ("seafix", "seafix-evaluation", "the library knows no truth"),
+    ("seafix", "seafix-evaluation", "the library does not depend on truth"),
     ("seafix", "seafix-log", "the library writes no log"),
     ("seafix-evaluation", "seafix-referencing", "no error measure depends on the method that is measured"),
-    ("seafix-report", "seafix-experiment", "a report reads logs alone"),
-    ("seafix-report", "seafix-data", "a report reads logs alone"),
-    ("seafix-report", "seafix-simulation", "a report reads logs alone"),
+    ("seafix-report", "seafix-experiment", "a report reads logs only"),
+    ("seafix-report", "seafix-data", "a report reads logs only"),
+    ("seafix-report", "seafix-simulation", "a report reads logs only"),
 ];
 
-/// Of each package its dependencies in the workspace, those of tests left out.
+/// The dependencies of each package in the workspace, without those of tests.
 fn dependencies() -> BTreeMap<String, Vec<String>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let crates = fs::read_dir(root.join("crates")).unwrap().map(|entry| entry.unwrap().path());

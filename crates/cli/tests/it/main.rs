@@ -1,6 +1,6 @@
-//! The program from outside.
+//! Tests of the program as a process.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and print its measurements")]
 
 use std::process::Command;
 
@@ -21,12 +21,12 @@ mod safety;
 mod slurm;
 mod solve;
 
-/// The program, ready for its arguments.
+/// The command of the program, without arguments.
 fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_seafix"))
 }
 
-/// What a call of the program left: its exit code, and what it wrote on standard output and standard error.
+/// The result of a call: exit code, standard output and standard error.
 struct Ended {
     code: Option<i32>,
     out: String,
@@ -39,7 +39,7 @@ fn ended(command: &mut Command) -> Ended {
     Ended { code: output.status.code(), out: text(output.stdout), error: text(output.stderr) }
 }
 
-/// What a call left that must end with this exit code.
+/// The result of a call that must end with this exit code.
 fn ended_with(code: i32, command: &mut Command) -> Ended {
     let ended = ended(command);
     assert_eq!(ended.code, Some(code), "{}{}", ended.out, ended.error);

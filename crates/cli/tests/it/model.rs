@@ -1,4 +1,4 @@
-//! A model by hand, as a person asks for it.
+//! `seafix model`: a model from marked points.
 
 use std::{
     fs,
@@ -13,10 +13,10 @@ fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample").join(name)
 }
 
-/// Four corners of the third pair, to a pixel or so; the right places are sought.
+/// Marks of four corners of the third pair, to a pixel or so; right coordinates are estimated.
 const CLICKS: &str = "id,left_u,left_v,right_u,right_v\nA,{A}\nB,{B}\nC,{C}\nD,{D}\n";
 
-/// The marks, with the places of four corners that the cloud of the pair has.
+/// The marks, and four corners at the same positions in the cloud of the pair.
 fn clicks() -> String {
     let mut command = program();
     command.args(["cloud", "--json", "--rig"]).arg(sample("dataset.toml"));
@@ -48,7 +48,7 @@ fn a_model_is_a_site_that_check_takes() {
     let said = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D", "--out", "valve.toml"], 0).out;
     assert!(said.ends_with("4 points; the frame is that of B, C, D\n"), "{said}");
     ended_with(0, program().arg("check").arg(folder.path().join("valve.toml")));
-    // Without a file the site is printed, and nothing else with it.
+    // Without --out the site alone is printed.
     let printed = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D"], 0).out;
     assert_eq!(printed, fs::read_to_string(folder.path().join("valve.toml")).unwrap());
     let json = model(folder.path(), &marks, &["--json"], 0).out;
@@ -65,7 +65,7 @@ fn what_is_wrong_is_one_line_and_leaves_no_file() {
         ("u,v\n", &[], 3, "the first line is `id,left_u,left_v,right_u,right_v`"),
         ("id,left_u,left_v,right_u,right_v\n", &[], 3, "too few marks for a model"),
         (&outside, &[], 3, "clicks.csv:3: `B` at -20, 5"),
-        (&marks, &["--base", "A,B"], 2, "three ids, separated by commas"),
+        (&marks, &["--base", "A,B"], 2, "separate three ids by commas"),
         (&marks, &["--base", "A,B,X"], 3, "a base point is not marked"),
         (&marks, &["--reach", "0"], 2, "--reach 0: more than 0"),
     ];

@@ -1,4 +1,4 @@
-//! Odometry over a small made-up passage, as a person and as a program asks for it.
+//! Odometry over a small synthetic sequence, with output for people and for programs.
 
 use std::{fs, path::PathBuf};
 
@@ -10,16 +10,16 @@ use crate::{Ended, ended_with, program};
 const SIZE: [usize; 2] = [320, 240];
 const FOCAL: f64 = 250.0;
 const BASELINE: f64 = 0.1;
-/// The way between two pairs, along x (m).
+/// The motion between two pairs, along x (m).
 const STEP: f64 = 0.04;
 const PAIRS: usize = 8;
 
-/// Two walls that stand in a corner, textured with waves and random tiles; the rig moves along x.
+/// Two walls of a corner, textured with waves and random tiles; the rig moves along x.
 struct Sequence {
     folder: TempDir,
 }
 
-/// The brightness of a place of the wall (m).
+/// The brightness of the wall at a point (m).
 fn texture(x: f64, y: f64) -> f64 {
     let tile = |scale: f64| {
         let (i, j) = ((x * scale).floor() as i64 as u32, (y * scale).floor() as i64 as u32);
@@ -31,7 +31,7 @@ fn texture(x: f64, y: f64) -> f64 {
     0.5 * tile(23.0) + 0.3 * tile(9.0) + 0.2 * tile(3.0)
 }
 
-/// What a camera at (x, 0, 0) that looks along z sees, each pixel the mean of 3×3 rays.
+/// The image of a camera at (x, 0, 0) that looks along z; each pixel is the mean of 3×3 rays.
 fn view(x: f64) -> Vec<u8> {
     let [width, height] = SIZE;
     let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
@@ -69,7 +69,7 @@ impl Sequence {
         sequence
     }
 
-    /// Writes frames.csv: (tenths of a second, which pair of images).
+    /// Writes frames.csv with (tenths of a second, index of the image pair).
     fn frames(&self, pairs: &[(u64, usize)]) {
         let line = |(tenths, pair): &(u64, usize)| {
             format!("{},l{pair}.pgm,r{pair}.pgm\n", 1_000_000_000 + tenths * 100_000_000)
@@ -85,7 +85,7 @@ impl Sequence {
         self.folder.path().join(name)
     }
 
-    /// Writes dataset.toml with a right camera that is turned by so many degrees about x.
+    /// Writes dataset.toml with a right camera turned by an angle (degrees) about x.
     fn turn(&self, degrees: f64) {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let text = fs::read_to_string(self.path("dataset.toml")).unwrap();
@@ -99,14 +99,14 @@ impl Sequence {
         ended_with(code, program().arg("odometry").arg(self.folder.path()).args(more))
     }
 
-    /// What is said on standard error by a command that ends with `code`.
+    /// The standard error of a command that ends with `code`.
     fn refusal(&self, more: &[&str], code: i32) -> String {
         let ended = self.odometry(more, code);
         assert!(ended.out.is_empty());
         ended.error
     }
 
-    /// Puts stripes in place of the left image of `pair`: it shows something, and no point of the right one.
+    /// Replaces the left image of `pair` by stripes, which show no point of the right image.
     fn spoil(&self, pair: usize) {
         let [width, height] = SIZE;
         let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
@@ -122,7 +122,7 @@ impl Sequence {
         serde_json::from_str(&self.odometry(&[&["--json"], more].concat(), 0).out).unwrap()
     }
 
-    /// The x of every pose.
+    /// The x coordinates of all poses.
     fn paths(all: &Value) -> Vec<f64> {
         let segments = all["segments"].as_array().unwrap();
         let poses = segments.iter().flat_map(|segment| segment["poses"].as_array().unwrap());
@@ -130,8 +130,8 @@ impl Sequence {
     }
 }
 
-/// A rig whose right camera stands otherwise than it is written: that is told, and the way is found all the same; `--keep-rig`
-/// takes it as it is written, and then nothing is found.
+/// A wrong rotation of the right camera is reported and corrected; `--keep-rig` prevents the correction, and then no
+/// motion is found.
 #[test]
 fn a_camera_that_is_turned_is_reported_and_turned_back() {
     let sequence = Sequence::new();
@@ -158,7 +158,7 @@ fn the_path_is_found_written_and_reported() {
     for (pair, x) in paths.iter().enumerate() {
         assert!((x - STEP * pair as f64).abs() < 0.01 * STEP * PAIRS as f64, "{pair}: {paths:?}");
     }
-    // Threads change nothing, and the file has the same poses.
+    // The number of threads changes nothing, and the file has the same poses.
     assert_eq!(sequence.json(&["--threads", "3"])["segments"], all["segments"]);
     let file = sequence.path("way.tum");
     let said = sequence.odometry(&["--out", file.to_str().unwrap()], 0).out;
@@ -176,7 +176,7 @@ fn what_cannot_be_used_is_left_out_and_reported() {
     let black = format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes();
     sequence.put("r2.pgm", [black, vec![0; SIZE[0] * SIZE[1]]].concat());
     fs::remove_file(sequence.path("l4.pgm")).unwrap();
-    // Pair 6 again, as from a frozen camera.
+    // Pair 6 repeats, as from a frozen camera.
     sequence.frames(&[(0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (7, 6), (8, 7)]);
     let all = sequence.json(&[]);
     let why: Vec<&str> = all["left_out"].as_array().unwrap().iter().map(|one| one["why"].as_str().unwrap()).collect();
@@ -199,8 +199,8 @@ fn a_gap_and_a_leap_break_the_path() {
     assert_eq!(segments.len(), 2, "{all}");
     assert!(segments[1]["broken"].as_str().unwrap().contains("7.900 s"), "{all}");
     let paths = Sequence::paths(&all);
-    assert_eq!(paths[1], paths[2], "the motion between is left out, not guessed");
-    // Faster than is believed at every pair: no motion at all.
+    assert_eq!(paths[1], paths[2], "an unknown motion is not guessed");
+    // Every motion exceeds the maximum speed: no motion is accepted.
     let said = sequence.refusal(&["--set", "max-speed=0.1"], 3);
     assert!(said.contains("0.1 m/s"), "{said}");
     sequence.frames(&[(0, 0), (1, 1), (1_000_000_000, 2), (1_000_000_001, 3)]);
@@ -222,7 +222,7 @@ fn what_cannot_be_is_refused_in_one_line() {
     assert!(said.contains("frames.csv:4") && said.contains("not after the one before"), "{said}");
 }
 
-/// Each of two pairs has too few points to follow and to begin with: what comes after is a segment, and says why.
+/// Two pairs with too few points are followed by a new segment with the reason of the break.
 #[test]
 fn no_break_goes_unannounced() {
     let sequence = Sequence::new();
@@ -245,14 +245,14 @@ fn no_motion_is_no_result() {
     let nothing = || !file.exists() && !sequence.path("way.tum.partial").exists();
     sequence.frames(&[(0, 0)]);
     let said = sequence.refusal(&out, 3);
-    assert!(said.contains("1 pose from 1 stereo pair; a motion needs two") && nothing(), "{said}");
+    assert!(said.contains("1 pose from 1 stereo pair; a motion needs at least two") && nothing(), "{said}");
     let black = [format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes(), vec![0; SIZE[0] * SIZE[1]]].concat();
     (0..3).for_each(|pair| sequence.put(&format!("l{pair}.pgm"), &black));
     sequence.frames(&[(0, 0), (1, 1), (2, 2)]);
     let said = sequence.refusal(&out, 3);
-    assert!(said.contains("0 poses from 3 stereo pairs; 3 left out: the left image shows nothing"), "{said}");
+    assert!(said.contains("0 poses from 3 stereo pairs; 3 skipped: the left image shows nothing"), "{said}");
     assert!(nothing());
-    // More than half of the images are not there: each is named once, and then the rule.
+    // More than half of the images are missing: each is named once, then the rule.
     sequence.frames(&[(0, 20), (1, 21), (2, 5)]);
     let said = sequence.refusal(&out, 3);
     assert!(said.contains("fewer than half of the stereo pairs can be read") && said.contains("1 of 3"), "{said}");
@@ -272,7 +272,7 @@ fn exchanged_images_are_refused() {
     assert!(said.contains("changed places"), "{said}");
 }
 
-/// Seen to fail when the two images are not compared: a pair without depth was only a pair that could not be followed.
+/// Seen to fail when the two images are not compared: a pair without depth was reported as one that cannot be tracked.
 #[test]
 fn one_image_twice_is_left_out_or_refused() {
     let sequence = Sequence::new();
@@ -286,7 +286,7 @@ fn one_image_twice_is_left_out_or_refused() {
     assert!(said.contains("left and right images that are the same") && said.contains("l0.pgm"), "{said}");
 }
 
-/// A data set whose Doppler log and gyro are tables is reckoned without looking at its images; one without is refused.
+/// Dead reckoning uses the tables of Doppler log and gyro, not the images; a data set without the tables is rejected.
 #[test]
 fn readings_lead_the_path() {
     let sequence = Sequence::new();
@@ -304,7 +304,7 @@ fn readings_lead_the_path() {
         };
         format!("stamp_ns,arrival_ns,{columns},sigma\n") + &(0..2 * PAIRS as u64).map(line).collect::<String>()
     };
-    // Forward is the camera's own frame here; no noise, so that a value may repeat.
+    // The body frame is the camera's here; there is no noise, so that values may repeat.
     sequence.put("d.csv", table("vx,vy,vz", &format!("{},0,0,0", STEP / 0.1)));
     sequence.put("g.csv", table("wx,wy,wz", "0,0,0,0"));
     let all = sequence.json(&by_readings);
@@ -322,7 +322,7 @@ fn a_sound_path_is_not_doubted() {
     assert!(all["agreement"].as_f64().unwrap() > 0.35 && all["warnings"].as_array().unwrap().is_empty(), "{all}");
 }
 
-/// Pairs that are out of order are refused, or sorted where that is asked for.
+/// Unsorted pairs are rejected, or sorted on request.
 #[test]
 fn pairs_out_of_order_are_sorted_on_request() {
     let sequence = Sequence::new();
@@ -332,9 +332,9 @@ fn pairs_out_of_order_are_sorted_on_request() {
     assert_eq!(Sequence::paths(&sequence.json(&["--sort-stamps"])), sorted);
 }
 
-/// Stamps that cannot be are named as such, not the images: by `check`, and by an odometry that finds no motion with them.
+/// Impossible stamps are reported instead of the images, by `check` and by an odometry without a motion.
 ///
-/// Seen to fail when nobody looks at the times.
+/// Seen to fail when stamps are not checked.
 #[test]
 fn impossible_times_are_reported() {
     let sequence = Sequence::new();
@@ -355,9 +355,9 @@ fn impossible_times_are_reported() {
     assert!(!stamped(&|k| 1_000_000_000 + k * 100_000_000).contains("warning"), "sound stamps");
 }
 
-/// A dive that is written as a data set names what its Doppler log and gyro said, and is reckoned by it.
+/// A dive written as a data set names its tables of Doppler log and gyro, and dead reckoning uses them.
 ///
-/// Seen to fail when the command writes the tables and names them nowhere.
+/// Seen to fail when the command writes the tables without naming them.
 #[test]
 fn a_dive_is_integrated_by_its_readings() {
     let folder = TempDir::new().unwrap();
@@ -373,8 +373,8 @@ fn a_dive_is_integrated_by_its_readings() {
 }
 
 impl Sequence {
-    /// Lays, over a share of the columns of every pair's images, what cameras elsewhere see: the share, and where the one and the
-    /// other are at each pair (m).
+    /// Replaces a fraction of the columns of every pair's images by the view of other cameras. The closure gives, for
+    /// each pair, the fraction and the positions of both rigs (m).
     fn overlay(&self, paths: impl Fn(usize) -> (f64, f64, f64)) {
         let [width, height] = SIZE;
         let head = format!("P5\n{width} {height}\n255\n").len();
@@ -392,54 +392,57 @@ impl Sequence {
     }
 }
 
-/// A part of the vehicle that has more points than the rest stands still in every image: that is not the vehicle's motion, and
-/// is not told as one.
+/// A part of the vehicle with more points than the ground stands still in every image; it is not taken for the motion
+/// of the vehicle.
 ///
-/// Seen to fail when only the largest consensus is looked at: the vehicle stood still, and a warning said that much disagrees. And
-/// when what was doubted is believed as soon as the ground is out of view.
+/// Seen to fail when only the largest consensus is examined: the vehicle stood still, with a warning of disagreement.
+/// Seen to fail also when a doubtful motion is accepted as soon as the ground is out of view.
 #[test]
 fn a_part_of_the_vehicle_is_no_ground() {
     let sequence = Sequence::new();
     for fraction in [0.5, 0.65, 0.8] {
-        // In the end the ground is out of view.
+        // Finally the ground is out of view.
         sequence.overlay(|pair| (if pair < 5 { fraction } else { 0.97 }, STEP * pair as f64, 1.0));
         let said = sequence.refusal(&[], 3);
         assert!(
-            said.contains("stand still in the image") && said.contains("fixed to the vehicle"),
+            said.contains("stand still in the image") && said.contains("parts of the vehicle"),
             "{fraction}: {said}"
         );
     }
 }
 
-/// Where half of the image moves otherwise than the motion that is told, that is told too.
+/// A motion that contradicts half of the image is reported with a warning.
 ///
-/// Seen to fail when the warning is held back.
+/// Seen to fail without the warning.
 #[test]
 fn much_that_disagrees_is_reported() {
     let sequence = Sequence::new();
     sequence.overlay(|pair| (0.5, STEP * pair as f64, 1.0 - STEP * pair as f64));
     let said = sequence.odometry(&[], 0).error;
-    assert!(said.contains("of the landmarks agree with the motion") && said.contains("fixed to the vehicle"), "{said}");
+    assert!(
+        said.contains("of the landmarks agree with the motion") && said.contains("a part of the vehicle"),
+        "{said}"
+    );
 }
 
-/// What was seen to move before is no part of the vehicle: it stands still where the vehicle does, whatever passes by.
+/// Points that have moved before are ground: they stand still with the vehicle, even while other things pass by.
 ///
-/// Seen to fail when nobody asks where landmarks were before, and when a pair that is passed by becomes a key frame.
+/// Seen to fail when earlier positions of landmarks are ignored, and when a skipped pair becomes a key frame.
 #[test]
 fn a_vehicle_that_stops_stands_still() {
     let sequence = Sequence::new();
     let stop = STEP * (PAIRS / 2) as f64;
     sequence.overlay(|pair| (0.4, (STEP * pair as f64).min(stop), 1.0 - 3.0 * STEP * pair as f64));
-    // With few key frames: those from before the stop are not given up for others that show the same.
+    // With few key frames, those from before the stop are not replaced by others of the same view.
     let all = sequence.json(&["--set", "window=3"]);
     let paths = Sequence::paths(&all);
     assert_eq!((paths.len(), all["segments"].as_array().unwrap().len()), (PAIRS, 1), "{all}");
     assert!(paths.iter().enumerate().all(|(pair, x)| (x - (STEP * pair as f64).min(stop)).abs() < 0.005), "{paths:?}");
 }
 
-/// Where nothing tells whether it stands, no motion is told; how it went on from there is, once it moves.
+/// No motion is reported while a standstill is undecided; the motion over it is reported once the vehicle moves.
 ///
-/// Seen to fail when such pairs break the way, and when standing is believed.
+/// Seen to fail when such pairs break the trajectory, and when the standstill is accepted.
 #[test]
 fn a_vehicle_that_starts_is_followed_from_where_it_stood() {
     let sequence = Sequence::new();

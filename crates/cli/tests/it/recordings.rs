@@ -1,4 +1,4 @@
-//! Recordings of ROS 2: what is read of them, and what is refused.
+//! Recordings of ROS 2: supported messages and rejected files.
 
 use std::{
     collections::BTreeMap,
@@ -15,11 +15,11 @@ fn sample() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample")
 }
 
-/// Common Data Representation, little end first: numbers stand on multiples of their size.
+/// Common Data Representation, little-endian: numbers are aligned to multiples of their size.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
-    /// A message that begins with a header.
+    /// A message that starts with a header.
     fn new(stamp_ns: u64, frame: &str) -> Self {
         Self(vec![0, 1, 0, 0]).header(stamp_ns, frame)
     }
@@ -49,11 +49,11 @@ impl Cdr {
     }
 }
 
-/// A stereo recording, all of which can be changed before it is written.
+/// A stereo recording that tests change before it is written.
 struct Bag {
     /// Left and right images of each pair (PNG).
     images: Vec<[Vec<u8>; 2]>,
-    /// What is called rectified by its topic's name.
+    /// Whether the topics' names call the images rectified.
     rectified: bool,
     model: &'static str,
     /// P[0] and P[3] of the two cameras at each pair.
@@ -92,7 +92,7 @@ impl Bag {
         }
     }
 
-    /// Writes it with an experiment beside it, in a folder.
+    /// Writes the recording and an experiment into a folder.
     fn write(&self) -> TempDir {
         let folder = TempDir::new().unwrap();
         let at = |name: &str| folder.path().join(name);
@@ -148,7 +148,7 @@ impl Bag {
         (output.status.code().unwrap(), String::from_utf8(output.stdout).unwrap())
     }
 
-    /// Both `check` and `run` must say all of `parts`, in a line, and nothing is written.
+    /// Both `check` and `run` must report all of `parts` in a line and write nothing.
     fn refused(&self, parts: &[&str]) {
         let folder = self.write();
         let check = seafix(folder.path(), &["check", "bag.mcap"]);
@@ -166,7 +166,7 @@ fn seafix(folder: &Path, arguments: &[&str]) -> std::process::Output {
     program().current_dir(folder).args(arguments).output().unwrap()
 }
 
-/// Frames of the run, its frames with a fix, and the warnings in its manifest.
+/// The number of frames, the number of frames with a fix, and the warnings of the manifest.
 fn ran(folder: &Path) -> (usize, usize, Vec<String>) {
     let output = seafix(folder, &["run", "e.toml", "--out", "out"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -221,9 +221,9 @@ fn baselines_that_contradict_each_other() {
     with([-0.25, 0.0, 0.0]).refused(&[&parts[..], &["/tf 0.2500 m at [0.250"]].concat());
     with([0.0, 0.25, 0.0]).refused(&[&parts[..], &["/tf 0.2500 m at [0.000, -0.250"]].concat());
     with([0.2532, 0.0, 0.0]).refused(&parts);
-    // A drawing is no calibration.
+    // A drawing is not a calibration.
     assert_eq!(with([0.2518, 0.01, 0.0]).checked().0, 0);
-    // Of one of them alone there is nothing to contradict.
+    // One of them alone contradicts nothing.
     let mut silent = with([0.25, 0.0, 0.0]);
     silent.p = vec![[[500.0, 0.0]; 2]; 5];
     let (code, said) = silent.checked();
@@ -241,7 +241,7 @@ fn a_fisheye_lens_is_no_pinhole() {
             "/cam/left/camera_info",
             "rectify the images",
         ]);
-        // P holds for rectified images, whatever the lens.
+        // P is valid for rectified images of any lens.
         assert_eq!(Bag { model, ..Bag::sound() }.checked().0, 0);
     }
     assert_eq!(Bag { rectified: false, ..Bag::sound() }.checked().0, 0);
@@ -252,7 +252,7 @@ fn cameras_that_have_changed_places() {
     let mut bag = Bag::sound();
     bag.images.iter_mut().for_each(|pair| pair.reverse());
     bag.refused(&["left and right images that have changed places", "lie behind the cameras", "`left-info`"]);
-    // With their calibrations exchanged as well they are a rig again, of which it is told.
+    // With calibrations exchanged too they are a valid rig, which is reported.
     bag.p.iter_mut().for_each(|p| p.reverse());
     bag.tf = Some([-0.25, 0.0, 0.0]);
     let (code, said) = bag.checked();

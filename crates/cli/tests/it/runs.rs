@@ -1,4 +1,4 @@
-//! What can be done with runs: comparing two, and saving a log that was cut off.
+//! Commands on runs: check, compare, diff, recover, publish.
 
 use std::{fs, path::Path};
 
@@ -30,7 +30,7 @@ fn two_runs_are_compared() {
     assert!(code == 3 && error.contains("name the folder of a finished run"), "{error}");
 }
 
-/// Trials belong together by what they are, not by where they stand. Seen to fail with rows paired by the trial's place.
+/// Trials are paired by their settings, not by their index. Seen to fail with rows paired by the trial's index.
 #[test]
 fn runs_with_their_trials_in_another_order_are_the_same() {
     let folder = tempfile::tempdir().unwrap();
@@ -53,7 +53,7 @@ fn runs_with_their_trials_in_another_order_are_the_same() {
         let (code, out, _) = seafix(folder, &["diff", "a", other]);
         assert_eq!(code, 1, "{out}");
         assert!(alone.iter().all(|name| out.contains(name)) && out.contains("trials: 2 | 4"), "{out}");
-        // What is in both is the same.
+        // The common part is equal.
         assert!(out.lines().filter(|line| line.contains(" differ")).all(|line| line.starts_with("  row:")), "{out}");
     }
     let (code, _, error) = seafix(folder, &["run", "e.toml", "--out", "s", "--shard", "1/2"]);
@@ -62,7 +62,7 @@ fn runs_with_their_trials_in_another_order_are_the_same() {
     assert!(code == 3 && error.contains("a shard of a run") && error.contains("seafix merge"), "{error}");
 }
 
-/// A run is checked by its own manifest, its report by `report --verify`; what a damaged shard is told to do mends it.
+/// A run is checked by its manifest, its report by `report --verify`; the remedy of a damaged shard repairs it.
 #[test]
 fn a_run_is_checked_by_what_it_wrote() {
     let folder = tempfile::tempdir().unwrap();
@@ -152,7 +152,7 @@ fn a_log_that_was_cut_off_is_saved() {
     let bytes = fs::read(&log).unwrap();
     fs::write(folder.join("cut.mcap.partial"), &bytes[..bytes.len() - 30]).unwrap();
     let (code, out, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
-    assert!(code == 0 && out.contains("2 whole frames"), "{out}{error}");
+    assert!(code == 0 && out.contains("2 complete frames"), "{out}{error}");
     assert_eq!(seafix(folder, &["check", "cut-recovered.mcap"]).0, 0);
     let (code, _, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
     assert!(code == 4 && error.contains("name another file with --out"), "{error}");
@@ -162,8 +162,8 @@ fn a_log_that_was_cut_off_is_saved() {
     assert!(code == 3 && error.contains("not an MCAP file"), "{error}");
 }
 
-/// What the message of an interrupted run promises. A shard leaves its pieces as they are: here the first and the third of
-/// three, 16 + 8 frames, and a torn one is laid beside them.
+/// The recovery that the message of an interrupted run promises. A shard leaves its pieces: here the first and the
+/// third of three, 16 + 8 frames, and a truncated one is added.
 #[test]
 fn a_run_that_did_not_end_is_saved() {
     let folder = tempfile::tempdir().unwrap();
@@ -177,14 +177,14 @@ fn a_run_that_did_not_end_is_saved() {
     let bytes = fs::read(folder.join("a/pieces/000002/001.mcap")).unwrap();
     fs::write(torn.join("001.mcap.partial"), &bytes[..100]).unwrap();
     let (code, out, error) = seafix(folder, &["recover", "a"]);
-    assert!(code == 0 && out.contains("24 whole frames of 2 pieces"), "{out}{error}");
+    assert!(code == 0 && out.contains("24 complete frames of 2 pieces"), "{out}{error}");
     assert!(error.contains("lost: no message in it is readable"), "{error}");
     assert_eq!(seafix(folder, &["check", "a/recovered/001.mcap"]).0, 0);
     assert_eq!(seafix(folder, &["report", "a/recovered"]).0, 0);
     let (code, _, error) = seafix(folder, &["recover", "a"]);
     assert!(code == 4 && error.contains("name another folder with --out"), "{error}");
     let (code, _, error) = seafix(folder, &["recover", "a/pieces"]);
-    assert!(code == 3 && error.contains("no piece of a run"), "{error}");
+    assert!(code == 3 && error.contains("no piece of an unfinished run"), "{error}");
 }
 
 /// All files below a folder.
@@ -202,8 +202,8 @@ fn files(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
     found
 }
 
-/// Reports that a repository keeps are made again to the last byte, from the logs or from nothing; what was changed in
-/// them, and in the page that sums them up, is noticed.
+/// Published reports are reproduced to the last byte, from kept runs or from new ones; changes of them and of the page
+/// of all findings are detected.
 #[test]
 fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     let folder = tempfile::tempdir().unwrap();
@@ -225,8 +225,8 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     assert!(code == 0 && out.contains("reports/README.md"), "{out}{error}");
     list(&(entry("a", "set = ['source.frames=3']") + &entry("b", "")));
     let (code, _, error) = publish(&[]);
-    assert!(code == 0 && error.contains("reports/gone: a report that is not in list.toml"), "{error}");
-    assert!(folder.join("reports/gone/report.html").exists(), "nobody asked for its removal");
+    assert!(code == 0 && error.contains("reports/gone: report of no experiment in list.toml"), "{error}");
+    assert!(folder.join("reports/gone/report.html").exists(), "it is not removed");
     fs::remove_dir_all(folder.join("reports/gone")).unwrap();
     let first = files(&folder.join("reports"));
     assert!(first.contains_key("b/main.svg"), "{:?}", first.keys());
@@ -235,7 +235,7 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     assert!(!text("b/report.html").contains("Not the experiment as its file says"));
     assert!(text("README.md").contains("[![The main figure of b](b/main.svg)](b/report.html)"));
     assert!(text("README.md").contains(&format!("Made by seafix {}.", env!("CARGO_PKG_VERSION"))));
-    // The version that ran is left out: a kept run serves every version with its results.
+    // The page omits the version of the program: a kept run serves every version with its results.
     assert!(!text("b/report.html").contains(&format!("seafix {}", env!("CARGO_PKG_VERSION"))));
     assert!(first.values().map(Vec::len).sum::<usize>() < 1_000_000);
 
@@ -250,7 +250,7 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     for file in ["reports/README.md", "reports/b/summary.txt"] {
         fs::write(folder.join(file), "found: all").unwrap();
         let (code, out, _) = publish(&["--verify"]);
-        assert!(code == 1 && out.contains("is not what the logs make"), "{file}: {out}");
+        assert!(code == 1 && out.contains("differs from the logs"), "{file}: {out}");
         assert_eq!(publish(&[]).0, 0);
     }
     let stray = folder.join("reports/old");
@@ -260,7 +260,7 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     }
     let (code, out, error) = publish(&["--verify"]);
     assert!(
-        code == 1 && out.contains("2 of 2 reports") && error.contains("reports/old: a report that is not"),
+        code == 1 && out.contains("2 of 2 reports") && error.contains("reports/old: report of no experiment"),
         "{out}{error}"
     );
     fs::remove_dir_all(stray).unwrap();
@@ -270,13 +270,13 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     fs::rename(folder.join("a-away"), folder.join("reports/a")).unwrap();
 
     let (code, _, error) = publish(&["--only", "c"]);
-    assert!(code == 2 && error.contains("`c` is not in list.toml; there are a, b"), "{error}");
+    assert!(code == 2 && error.contains("no experiment `c` in list.toml; it has a, b"), "{error}");
     let (code, out, _) = seafix(folder, &["check", "list.toml"]);
     assert!(code == 0 && out.contains("in order"), "{out}");
 }
 
-/// A run is kept as long as its results are those of the program, and no longer; what is made again has the bytes of the kept
-/// run. Seen to fail with runs kept that did not end.
+/// A run is kept exactly as long as its results are those of the program; a repeated part has the bytes of the kept
+/// run. Seen to fail with unfinished runs kept.
 #[test]
 fn a_kept_run_is_made_again_when_its_results_may_differ() {
     let folder = tempfile::tempdir().unwrap();
@@ -316,7 +316,7 @@ fn a_kept_run_is_made_again_when_its_results_may_differ() {
         changes.iter().for_each(|(from, to)| change(from, to));
         let (code, _, error) = publish(&[]);
         assert!(code == 0 && error.contains("a: kept run") && error.contains("b: new run"), "{error}");
-        // Without git nobody knows the commit, and the program goes on with what is there.
+        // Without git the commit is unknown, and the program uses the kept run.
         assert!(error.contains(reason) || reason == "it did not end", "no `{reason}` in {error}");
         assert!(bytes() == first, "{reason}");
     }
@@ -333,12 +333,12 @@ fn a_kept_run_is_made_again_when_its_results_may_differ() {
     fs::write(run.join("results.csv"), changed).unwrap();
     let (code, out, _) = publish(&["--check", "5"]);
     assert!(code == 1 && out.contains("1 of 2 kept runs") && out.contains("raise the VERSION"), "{out}");
-    assert_eq!(fs::read_dir(folder.join("runs/reports")).unwrap().count(), 2, "nothing is left of a check");
+    assert_eq!(fs::read_dir(folder.join("runs/reports")).unwrap().count(), 2, "a check leaves nothing behind");
     fs::write(run.join("results.csv"), table).unwrap();
 
-    // What is not ours is not removed.
+    // Foreign files are not removed.
     fs::write(run.join("notes.txt"), "mine").unwrap();
-    assert_eq!(publish(&[]).0, 0, "a kept run is not touched");
+    assert_eq!(publish(&[]).0, 0, "a kept run does not change");
     change(&own, "00000000");
     let (code, _, error) = publish(&[]);
     assert!(code == 4 && error.contains("notes.txt"), "{error}");

@@ -1,4 +1,4 @@
-//! Nothing is lost: runs that are killed, interrupted, out of disk, or in each other's way.
+//! Robustness: runs that are killed, interrupted, out of disk space, or started twice lose nothing.
 
 use std::{
     collections::BTreeMap,
@@ -14,7 +14,7 @@ use tempfile::TempDir;
 const EXPERIMENT: &str = "question = 'Is anything lost?'\nseed = 3\n[source]\nname = 'virtual-points'\n\
     [[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'triad']\n";
 
-/// A folder with an experiment of so many frames.
+/// A folder with an experiment of `frames` frames.
 fn experiment(frames: usize) -> TempDir {
     let folder = TempDir::new().unwrap();
     fs::write(
@@ -40,7 +40,7 @@ fn ended(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8(output.stderr.clone()).unwrap())
 }
 
-/// The files of a run, all but its manifest, which tells of the machine.
+/// The files of a run except its manifest, which depends on the machine.
 fn files(run: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![run.to_owned()];
@@ -70,18 +70,18 @@ fn state(run: &Path) -> String {
     manifest["state"].as_str().unwrap().to_owned()
 }
 
-/// Waits until some piece of the run is there, however long a busy machine takes.
+/// Waits for the first complete piece of the run, without a time limit.
 fn until_begun(child: &mut Child, run: &Path) {
     let begun = |run: &Path| fs::read_dir(run.join("pieces")).is_ok_and(|mut all| all.next().is_some());
     while !begun(run) {
-        assert!(child.try_wait().unwrap().is_none(), "it ended before it began");
+        assert!(child.try_wait().unwrap().is_none(), "the run ended before its first piece");
         sleep(Duration::from_millis(2));
     }
 }
 
-/// Begins a run of more frames than it gets to and stops it amid its pieces for as long as `meanwhile` takes: how it ends.
+/// Starts a long run, stops it between pieces while `meanwhile` runs, and returns its end.
 ///
-/// The process stands still meanwhile, so no schedule of the machine lets it end first.
+/// The process is stopped (`SIGSTOP`), so that it cannot end first.
 fn while_stopped(folder: &Path, meanwhile: impl FnOnce()) -> (Option<i32>, String) {
     let mut child = run(folder, "out", &["--threads", "1"]).spawn().unwrap();
     until_begun(&mut child, &folder.join("out"));
@@ -96,7 +96,7 @@ fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([&format!("-{name}"), &pid]).status().unwrap().success());
 }
 
-/// Every log that a killed run left: what is closed is sound, what is not can be saved, or has no frame yet.
+/// Checks every log of a killed run: a closed one is valid, an open one can be recovered or has no frame yet.
 fn recoverable(folder: &Path, run: &Path) {
     let logs = |ending: &str| -> Vec<String> {
         let all = files(run).into_keys().map(|name| run.join(name).to_str().unwrap().to_owned());
@@ -115,7 +115,7 @@ fn recoverable(folder: &Path, run: &Path) {
     }
 }
 
-/// Kills a run at random instants; resumed it must end with the bytes of one that was not killed.
+/// Kills a run at random instants; the resumed run must have the bytes of one that was not killed.
 fn kill(times: u64, frames: usize) {
     let folder = experiment(frames);
     let folder = folder.path();
@@ -126,7 +126,7 @@ fn kill(times: u64, frames: usize) {
     for time in 0..times {
         let out = format!("run-{time}");
         let mut child = run(folder, &out, &[]).spawn().unwrap();
-        // Spread over the run by the golden ratio. A busy machine may have become a quicker one.
+        // Instants are distributed over the run by the golden ratio. The load of the machine may have changed.
         let (begun, moment) = (Instant::now(), full.mul_f64((time as f64 * 0.618_033_988_75).fract()));
         while begun.elapsed() < moment && child.try_wait().unwrap().is_none() {
             sleep(Duration::from_micros(200));
@@ -146,23 +146,23 @@ fn kill(times: u64, frames: usize) {
         same(&folder.join("whole"), &out_path);
         fs::remove_dir_all(&out_path).unwrap();
     }
-    println!("{killed} of {times} runs were killed, {lost} of them amid their pieces");
+    println!("{killed} of {times} runs were killed, {lost} of them with incomplete pieces");
 }
 
-/// Seen to fail when pieces count as made whatever they are.
+/// Seen to fail when incomplete pieces count as complete.
 #[test]
 fn a_run_that_is_killed_and_resumed_has_the_same_bytes() {
     kill(3, 60);
 }
 
-/// `cargo test --release -p seafix safety::two_hundred -- --ignored --nocapture`
+/// `cargo test --release -p seafix-cli safety::two_hundred -- --ignored --nocapture`
 #[test]
 #[ignore = "long: 200 runs"]
 fn two_hundred_kills() {
     kill(200, 2000);
 }
 
-/// Seen to fail when signals are not heard.
+/// Seen to fail when signals are ignored.
 #[test]
 fn an_interrupted_run_ends_in_good_order() {
     let folder = experiment(1_000_000);
@@ -176,13 +176,13 @@ fn an_interrupted_run_ends_in_good_order() {
         assert_eq!(ended, Some(code), "{error}");
         assert!(error.contains("interrupted") && error.contains("--resume"), "{error}");
         assert_eq!(state(&folder.join(name)), "interrupted");
-        // What had begun is closed, with its summary.
+        // Open logs are closed, with their summary.
         assert!(files(&folder.join(name)).keys().all(|file| !file.to_string_lossy().ends_with(".mcap.partial")));
         recoverable(folder, &folder.join(name));
     }
 }
 
-/// Seen to fail when a lock that another holds is taken for granted.
+/// Seen to fail when the lock of another process is ignored.
 #[test]
 fn two_runs_in_one_folder() {
     let folder = experiment(1_000_000);
@@ -196,18 +196,18 @@ fn two_runs_in_one_folder() {
     }
     first.kill().unwrap();
     first.wait().unwrap();
-    // The lock went with it.
+    // The lock is released.
     let (code, error) = ended(&run(folder, "out", &["--overwrite", "--set", "source.frames=3"]).output().unwrap());
     assert_eq!(code, Some(0), "{error}");
 }
 
-/// Seen to fail where nobody looks into the folder.
+/// Seen to fail when the contents of the folder are not checked.
 #[test]
 fn a_run_that_is_there_stays_unless_reported_otherwise() {
     let folder = experiment(4);
     let folder = folder.path();
     let run = |more: &[&str]| ended(&run(folder, "out", more).output().unwrap());
-    assert_eq!(run(&["--resume"]).0, Some(0), "there is none yet, so it begins");
+    assert_eq!(run(&["--resume"]).0, Some(0), "a new run starts");
     let before = files(&folder.join("out"));
     let (code, error) = run(&[]);
     assert!(code == Some(4) && error.contains("not empty") && error.contains("--resume"), "{error}");
@@ -217,7 +217,7 @@ fn a_run_that_is_there_stays_unless_reported_otherwise() {
     assert!(files(&folder.join("out")) == before);
     assert_eq!(run(&["--overwrite", "--set", "seed=4"]).0, Some(0));
     assert!(files(&folder.join("out")) != before);
-    // A run over key frames leaves its network.
+    // A run with key frames writes its pose graph.
     fs::write(folder.join("out/001-solver-kabsch.pose-graph"), "").unwrap();
     assert_eq!(run(&["--overwrite"]).0, Some(0));
     fs::write(folder.join("out/thesis.txt"), "all my work").unwrap();
@@ -226,7 +226,7 @@ fn a_run_that_is_there_stays_unless_reported_otherwise() {
     assert!(folder.join("out/results.csv").exists());
 }
 
-/// A file that may grow no further is an error like a full disk.
+/// The limit of a file's size is an error like a full disk.
 #[test]
 fn a_file_that_may_grow_no_further_is_stated() {
     let folder = experiment(40);
@@ -239,14 +239,14 @@ fn a_file_that_may_grow_no_further_is_stated() {
     assert_eq!(code, Some(4), "{error}");
     assert!(error.contains("File too large") && error.contains("out/"), "{error}");
     assert!(run(folder, "whole", &[]).output().unwrap().status.success());
-    // Recovering says why as well.
+    // Recovery reports the reason too.
     let (code, error) = limited("recover whole/001-solver-kabsch.mcap --out saved.mcap", 8);
     assert!(code == Some(4) && error.contains("File too large") && error.contains("saved.mcap.partial"), "{error}");
     assert!(run(folder, "out", &["--resume"]).output().unwrap().status.success());
     same(&folder.join("whole"), &folder.join("out"));
 }
 
-/// What was saved of a log is told wherever it is read again.
+/// A recovered log is reported as such by every reader.
 #[test]
 fn a_recovered_log_counts_as_what_it_is() {
     let folder = experiment(40);
@@ -260,7 +260,7 @@ fn a_recovered_log_counts_as_what_it_is() {
         let said = [output.stdout, output.stderr].concat();
         (output.status.code(), String::from_utf8(said).unwrap())
     };
-    // Whole it stays what it was.
+    // Recovery of a complete log changes nothing.
     assert_eq!(said(&["recover", log, "--out", "saved/a.mcap"]).0, Some(0));
     let (code, text) = said(&["check", "saved/a.mcap"]);
     assert!(code == Some(0) && !text.contains("warning"), "{text}");
@@ -272,7 +272,7 @@ fn a_recovered_log_counts_as_what_it_is() {
         "{text}"
     );
     let (code, text) = said(&["check", "saved/a.mcap"]);
-    assert!(code == Some(0) && text.contains("warning: a log that was saved of one that was not whole"), "{text}");
+    assert!(code == Some(0) && text.contains("warning: recovered log with losses"), "{text}");
     let (code, text) = said(&["report", "saved"]);
     assert!(code == Some(0) && text.contains("warning: a.mcap was saved of a log that was not whole"), "{text}");
     let page = fs::read_to_string(folder.join("saved/report/report.html")).unwrap();
@@ -282,8 +282,8 @@ fn a_recovered_log_counts_as_what_it_is() {
         assert!(code == Some(3) && text.contains("logs that were saved of a run that is not whole"), "{text}");
     }
     let (code, text) = said(&["replay", "saved/a.mcap", "--untimed", "--out", "again"]);
-    assert!(code == Some(0) && text.contains("a log that was saved of one that was not whole"), "{text}");
-    // A record whose head is damaged claims anything.
+    assert!(code == Some(0) && text.contains("recovered log with losses"), "{text}");
+    // A record with a damaged head may declare any length.
     let mut broken = bytes.clone();
     let middle = bytes.len() / 2;
     broken[middle..].fill(0xff);
@@ -292,7 +292,7 @@ fn a_recovered_log_counts_as_what_it_is() {
     assert!(!text.contains("18446744073709551615"), "{text}");
 }
 
-/// What a finished run leaves, and that neither threads nor surroundings leave a trace in it.
+/// The files of a finished run do not depend on threads or environment.
 ///
 /// Seen to fail when streams of random numbers depend on the thread.
 #[test]
@@ -312,7 +312,7 @@ fn a_finished_run_is_the_same_by_any_number_of_threads() {
     assert_eq!(manifest("one"), manifest("three"));
 }
 
-/// Seen to fail where pieces are not counted.
+/// Seen to fail when pieces are not counted.
 #[test]
 fn a_shard_that_is_missing_is_named() {
     let folder = experiment(40);
@@ -323,7 +323,7 @@ fn a_shard_that_is_missing_is_named() {
     }
     let (code, error) = ended(&seafix(folder, &["merge", "1", "3", "--out", "all"]).output().unwrap());
     assert!(code == Some(3) && error.contains("of shard 2/3") && !error.contains("in 1:"), "{error}");
-    // A piece that was changed is another matter.
+    // A changed piece is another error.
     assert!(run(folder, "2", &["--shard", "2/3"]).output().unwrap().status.success());
     let piece = fs::read_dir(folder.join("2/pieces")).unwrap().next().unwrap().unwrap().path();
     fs::write(piece.join("rows.csv"), "nothing").unwrap();
@@ -353,7 +353,7 @@ fn a_folder_that_goes_away_is_no_finished_run() {
     assert!(!error.contains("panicked"), "{error}");
 }
 
-/// Seen to fail without the look at the lock: nothing else tells.
+/// Seen to fail without the check of the lock; nothing else detects this.
 #[test]
 fn a_folder_that_another_run_has_is_no_finished_run() {
     let folder = experiment(300);
@@ -365,7 +365,7 @@ fn a_folder_that_another_run_has_is_no_finished_run() {
     assert!(code == Some(4) && error.contains("removed or replaced"), "{code:?} {error}");
 }
 
-/// Seen to fail where nobody looks whether the shard has a piece.
+/// Seen to fail when the shard is not checked for pieces.
 #[test]
 fn an_empty_shard_states_so() {
     let folder = experiment(30);
@@ -405,7 +405,7 @@ fn a_run_without_memory_is_resumed() {
             env!("CARGO_BIN_EXE_seafix")
         );
         let output = Command::new("sh").args(["-c", &command]).current_dir(folder).output().unwrap();
-        // It may end in the report, when the results are there already: whole.
+        // It may end in the report, after the complete results.
         let [results, expected] = ["small", "whole"].map(|out| fs::read(folder.join(out).join("results.csv")).ok());
         assert!(results.is_none() && !output.status.success() || results == expected);
         if folder.join("small").exists() {
@@ -417,7 +417,7 @@ fn a_run_without_memory_is_resumed() {
     same(&folder.join("whole"), &folder.join("small"));
 }
 
-/// What made a run says which commit the program is of, where `git` can tell: where it cannot, that is no other program.
+/// A manifest has the commit of the program, if `git` gives it; an unknown commit does not count as another program.
 #[test]
 fn a_run_that_could_not_ask_for_its_commit_is_resumed() {
     let folder = experiment(4);
@@ -432,7 +432,7 @@ fn a_run_that_could_not_ask_for_its_commit_is_resumed() {
             assert_eq!(code, Some(0), "{out}: {error}");
         }
     }
-    // Another commit than one that is known is another program; an export without its history knows none.
+    // A different known commit is another program; an export without history has no commit.
     let manifest = folder.join("known before/manifest.json");
     let text = fs::read_to_string(&manifest).unwrap();
     if let Some((before, after)) = text.split_once("\"commit\": \"") {
@@ -442,7 +442,7 @@ fn a_run_that_could_not_ask_for_its_commit_is_resumed() {
     }
 }
 
-/// Of a short run every nth change of a file fails, for each n that `takes` says.
+/// Every nth change of a file fails in a short run, for each n that `takes` accepts.
 fn fail(takes: impl Fn(u64) -> bool) {
     let folder = experiment(3);
     let folder = folder.path();
@@ -486,14 +486,14 @@ fn a_full_disk_is_stated_and_nothing_is_lost() {
     fail(|every| every % 61 == 1);
 }
 
-/// `cargo test --release -p seafix safety::every_write -- --ignored --nocapture`
+/// `cargo test --release -p seafix-cli safety::every_write -- --ignored --nocapture`
 #[test]
 #[ignore = "long: several hundred runs"]
 fn every_write_fails_in_turn() {
     fail(|_| true);
 }
 
-/// Runs on so many threads, and in so many shards that are merged, `repeats` times each: all have the bytes of one run.
+/// Repeats runs on several numbers of threads and shards, `repeats` times each: all have the bytes of one run.
 fn spread(repeats: usize, frames: usize, cases: &[(usize, &str)]) {
     let folder = experiment(frames);
     let folder = folder.path();
@@ -534,7 +534,7 @@ fn neither_threads_nor_shards_change_a_byte() {
     spread(1, 60, &[(1, "8"), (3, "2")]);
 }
 
-/// `cargo test --release -p seafix safety::twenty_repeats -- --ignored --nocapture`
+/// `cargo test --release -p seafix-cli safety::twenty_repeats -- --ignored --nocapture`
 #[test]
 #[ignore = "long: 1020 runs"]
 fn twenty_repeats_change_no_byte() {
@@ -554,5 +554,5 @@ fn a_sweep_is_the_run() {
     same(&folder.join("whole"), &folder.join("swept"));
     assert!(!folder.join("swept-shards").exists());
     let (code, error) = ended(&seafix(folder, &sweep).output().unwrap());
-    assert!(code == Some(4) && error.contains("swept is there already"), "{error}");
+    assert!(code == Some(4) && error.contains("swept exists and is not empty"), "{error}");
 }

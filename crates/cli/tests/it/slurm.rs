@@ -1,5 +1,5 @@
-//! A sweep through Slurm: a real controller and a real node, on this machine, as long as the test takes. It needs Debian's
-//! `slurm-wlm`, which brings `munge`, and root, who may start their daemons.
+//! A sweep by Slurm, with a real controller and node on this machine. It needs Debian's `slurm-wlm`, which includes
+//! `munge`, and root to start their daemons.
 
 use std::{
     fs,
@@ -14,7 +14,7 @@ use std::{
 const EXPERIMENT: &str = "question = 'Is it the run?'\nseed = 3\nsource = { name = 'virtual-points', frames = 200 }\n\
     [[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'triad']\n";
 
-/// A cluster of one node, its daemons in a folder of their own.
+/// A cluster of one node, with its daemons in a separate folder.
 struct Cluster<'a> {
     folder: &'a Path,
     daemons: Vec<Child>,
@@ -30,7 +30,7 @@ impl<'a> Cluster<'a> {
         let at = folder.display();
         let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
         let host = host.trim().split('.').next().unwrap();
-        // Ports that are free now.
+        // Free ports.
         let [one, other] = [0, 0].map(|_| TcpListener::bind("127.0.0.1:0").unwrap());
         let [controller, node] = [&one, &other].map(|port| port.local_addr().unwrap().port());
         drop((one, other));
@@ -110,8 +110,8 @@ impl Drop for Cluster<'_> {
     }
 }
 
-/// Three shards as a job array are merged to the bytes of one run; and an array of which a task fails is told. Seen to fail with the array
-/// numbered from 0.
+/// Three shards of a job array merge into the bytes of one run, and a failed task is reported. Seen to fail with the
+/// array numbered from 0.
 #[test]
 #[ignore = "long: needs Slurm"]
 fn a_sweep_by_slurm_is_the_run() {
@@ -133,7 +133,7 @@ fn a_sweep_by_slurm_is_the_run() {
             "{file}"
         );
     }
-    // A task that cannot write ends, and the sweep says which; the same command goes on with it.
+    // A task that cannot write fails, and the sweep names it; the same command resumes it.
     fs::create_dir_all(folder.join("again-shards")).unwrap();
     fs::write(folder.join("again-shards/2"), "in the way").unwrap();
     let again = ["sweep", "e.toml", "--untimed", "--shards", "3", "--executor", "slurm", "--out", "again"];
@@ -142,5 +142,5 @@ fn a_sweep_by_slurm_is_the_run() {
     fs::remove_file(folder.join("again-shards/2")).unwrap();
     assert_eq!(seafix(&again).0, Some(0));
     assert!(fs::read(folder.join("whole/results.csv")).unwrap() == fs::read(folder.join("again/results.csv")).unwrap());
-    println!("3 shards by Slurm: the bytes of one run; a failed task told and made again");
+    println!("3 shards by Slurm: the bytes of one run; a failed task reported and repeated");
 }

@@ -1,10 +1,10 @@
-//! `seafix solve`: what stands beside a fix, and what is refused.
+//! `seafix solve`: integrity of fixes, rejected settings.
 
 use serde_json::{Value, json};
 
 use crate::program;
 
-/// A problem of seven points, exact, and where it lies.
+/// The file of an exact problem of seven points.
 fn problem(folder: &tempfile::TempDir) -> String {
     let model = [
         [0.0, 0.0, 0.0],
@@ -42,7 +42,7 @@ fn a_fix_states_what_supports_it() {
     let level = integrity["protection"]["position"].as_f64().unwrap();
     assert!(level > 0.002 && level < 0.1, "{level}");
     assert!(integrity["protection"]["attitude"].as_f64().unwrap() > 0.0);
-    // A twentieth of the diameter, of some two metres, is no less than ten centimetres.
+    // A twentieth of the diameter of some two metres is at least ten centimetres.
     assert_eq!(integrity["alert_limit"], 0.1);
     for (fraction, is) in [(1.01, "within"), (0.99, "beyond")] {
         let limit = fraction * level;
@@ -53,7 +53,7 @@ fn a_fix_states_what_supports_it() {
     }
 }
 
-/// Eight points that a half-turn maps onto each other, but for one that is so many millimetres off.
+/// Eight points that a half-turn maps onto each other, except for one with an offset (mm).
 fn nearly_symmetric(folder: &tempfile::TempDir, off: f64) -> String {
     let half = [[0.6, 0.3, 0.1], [0.2, -0.7, 0.4], [0.5, 0.5, -0.3], [0.1, 0.4, -0.5]];
     let mut model: Vec<[f64; 3]> = half.iter().flat_map(|&[x, y, z]| [[x, y, z], [-x, -y, z]]).collect();
@@ -68,10 +68,10 @@ fn nearly_symmetric(folder: &tempfile::TempDir, off: f64) -> String {
     file.display().to_string()
 }
 
-/// With 4 mm nothing tells the two poses apart; with 7 mm the other one is less likely than is asked of a fix, but not than a level may
-/// be wrong; with 8 mm there is a level.
+/// An offset of 4 mm leaves the poses ambiguous. With 7 mm the alternative is improbable enough for a fix, but not for
+/// a protection level; with 8 mm there is a level.
 ///
-/// Seen to fail where levels take no account of other poses.
+/// Seen to fail when levels ignore alternative poses.
 #[test]
 fn a_level_that_is_missing_states_why() {
     let folder = tempfile::tempdir().unwrap();
@@ -83,8 +83,8 @@ fn a_level_that_is_missing_states_why() {
     let (mistaken, risk) = (integrity["misidentified"].as_f64().unwrap(), integrity["risk"].as_f64().unwrap());
     assert!(mistaken > risk && mistaken < 0.01 && integrity["protection"].is_null(), "{integrity}");
     let expected = format!(
-        "no protection level: the points may be others with a probability of {mistaken:.1e}, at a risk of {risk:.0e}; \
-         not known to be within the alert limit of {:.3} m",
+        "no protection level: probability of a misidentification {mistaken:.1e} above the risk {risk:.0e}; \
+         not protected within the alert limit of {:.3} m",
         integrity["alert_limit"].as_f64().unwrap()
     );
     assert!(said(7.0).contains(&expected), "{}", said(7.0));
@@ -103,7 +103,7 @@ fn a_solver_of_pixels_is_refused_on_points_alone() {
     }
 }
 
-/// Seen to fail where what `--set` says is read and not used.
+/// Seen to fail when the settings of `--set` are parsed and not used.
 #[test]
 fn settings_are_used_and_wrong_ones_named() {
     let folder = tempfile::tempdir().unwrap();
