@@ -1,13 +1,14 @@
-//! What the paper's enumeration costs beside searches that prune: pair tests and times at 5 to 13 points, three
+//! The cost of the paper's enumeration against searches that prune: pair tests and times for 5 to 13 points, three
 //! candidates each.
 //!
-//! Planted problems, one thread, a budget of 10⁸ pair tests: `cargo bench -p seafix-proptests --bench enumeration`,
-//! some minutes. Points lie anywhere in a box of 2 × 1.5 × 1 m, noise 5 mm, Δ = 3√2 σ; a point's candidates are its image
-//! and two others within 0.25 m of it, or three others when it was not measured. With every point measured the first
-//! sample is the answer; one that was not makes the enumeration exhaust all samples of n points before those of n − 1.
+//! Generated problems, one thread, a budget of 10⁸ pair tests: `cargo bench -p seafix-proptests --bench enumeration`,
+//! some minutes. Points lie anywhere in a box of 2 × 1.5 × 1 m, noise 5 mm, Δ = 3√2 σ. A point's candidates are its
+//! image and two others within 0.25 m of it, or three others for an unmeasured point. With every point measured the
+//! first sample is the answer; with one unmeasured point the enumeration exhausts all samples of n points before those
+//! of n − 1.
 //!
-//! Each figure is the median of five problems. A strategy that its budget stopped on most of them says so, and is not
-//! tried with more points.
+//! Each figure is the median of five problems. A strategy that reaches its budget on most of them is marked, and not
+//! tested with more points.
 
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 
@@ -22,15 +23,15 @@ use seafix_referencing::{
     Candidates, Identification, ModelPoint, Prior, PriorBound, Problem, Rejected, SEARCHES, Search, Tolerance,
 };
 
-/// Pair tests before a strategy is stopped.
+/// Maximum number of pair tests of a strategy.
 const BUDGET: i64 = 100_000_000;
-/// Problems a figure is the median of.
+/// Number of problems of a median.
 const PROBLEMS: u64 = 5;
-/// Candidates a point.
+/// Number of candidates of a point.
 const LIST: usize = 3;
 /// Standard deviation of a measured coordinate (m).
 const SIGMA: f64 = 0.005;
-/// Half-size of the shell that the candidates lie in (m).
+/// Half-size of the gate of the candidates (m).
 const GATE: f64 = 0.25;
 
 fn main() {
@@ -68,7 +69,7 @@ fn main() {
     }
 }
 
-/// Medians over the problems as a cell of the table, or what most of them ended with.
+/// The medians over the problems as a cell of the table, or the most frequent failure.
 fn median(search: &dyn Search, problems: &[Planted]) -> Result<String, Rejected> {
     let (mut pair_tests, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
     let mut without = 0;
@@ -87,7 +88,7 @@ fn median(search: &dyn Search, problems: &[Planted]) -> Result<String, Rejected>
             }
         }
     }
-    // Those that were stopped would have taken longer than any: the median of all stands where it would be.
+    // Stopped problems count as slower than any other.
     let middle = problems.len() / 2;
     pair_tests.sort_unstable();
     times.sort_by(f64::total_cmp);
@@ -96,12 +97,12 @@ fn median(search: &dyn Search, problems: &[Planted]) -> Result<String, Rejected>
     Ok(format!("{}, {}, {}{all}", grouped(pair_tests[middle]), duration(times[middle]), sizes[sizes.len() / 2]))
 }
 
-/// A problem with a planted answer.
+/// A problem with a known solution.
 struct Planted {
     model: Vec<ModelPoint>,
     cloud: Vec<MeasuredPoint>,
     candidates: Candidates,
-    /// The true pose with its shells: what has a prior has shells to leave out.
+    /// The true pose with its gates, for searches that use a prior.
     prior: Prior,
 }
 
@@ -130,7 +131,7 @@ impl Planted {
         Self { candidates: Candidates::from_pairs(n, pairs), model, cloud, prior }
     }
 
-    /// Pair tests, points found and seconds (the median of some runs).
+    /// Pair tests, points found and seconds (median of some runs).
     fn run(&self, search: &dyn Search) -> Result<(u64, usize, f64), Rejected> {
         let problem = Problem {
             model: &self.model,
@@ -156,7 +157,7 @@ impl Planted {
     }
 }
 
-/// 1234567 as 1 234 567.
+/// A number with groups of digits: 1234567 as 1 234 567.
 fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().filter_map(|group| str::from_utf8(group).ok()).collect();

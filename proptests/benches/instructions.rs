@@ -1,9 +1,9 @@
-//! How many instructions each search takes on the same problems as `searches`, by the registry: a figure that no other work of the
-//! machine disturbs.
+//! The number of instructions of each search on the problems of `searches`, by the registry. Load of the machine does
+//! not affect it.
 //!
-//! Counted by `valgrind --tool=callgrind`, which must be installed: `cargo bench -p seafix-proptests --bench instructions`, some
-//! minutes; one family: `… -- a`. What takes more than 150 ms by itself is not counted, since there it would be many seconds. The last row is a whole fix
-//! by the defaults: search, solver, and all that an answer carries.
+//! `valgrind --tool=callgrind` counts them and must be installed: `cargo bench -p seafix-proptests --bench
+//! instructions`, some minutes; one family: `… -- a`. A search of more than 150 ms is not counted, since it would take
+//! many seconds. The last row is a complete fix by the defaults: search, solver, and the complete answer.
 
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 
@@ -22,17 +22,17 @@ use seafix_component::Choice;
 use seafix_proptests::problems::Listed;
 use seafix_referencing::{Acceptance, SEARCHES, SOLVERS, compute_fix};
 
-/// What takes longer is not counted.
+/// Maximum time of a counted search.
 const LONG: Duration = Duration::from_millis(150);
-/// Calls before those that are counted, and these: the first fills what is made once.
+/// Number of calls before the counted ones, and of these; the first calls fill caches.
 const BEFORE: usize = 1;
 const COUNTED: usize = 2;
-/// The search of the whole fix, its solver, and the name of its row.
-const DEFAULT: (&str, &str, &str) = ("rigid-consensus", "mahalanobis", "a whole fix");
+/// The search and solver of the complete fix, and the name of its row.
+const DEFAULT: (&str, &str, &str) = ("rigid-consensus", "mahalanobis", "a complete fix");
 
 fn main() {
     let given: Vec<String> = std::env::args().collect();
-    // As its own child under valgrind: so many calls, and nothing else.
+    // The child process under valgrind: a number of calls, nothing else.
     if let Some(place) = given.iter().position(|word| word == "--calls") {
         let call = prepared(&given[place + 1], given[place + 2].parse().expect("a number"));
         let calls: usize = given[place + 3].parse().expect("a number");
@@ -84,7 +84,7 @@ fn cell(row: &str, family: usize) -> String {
     }
 }
 
-/// Instructions of a process that makes so many calls.
+/// The number of instructions of a process with this number of calls.
 fn instructions(row: &str, family: usize, calls: usize) -> Option<f64> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])

@@ -1,9 +1,9 @@
-//! How long each search takes on a medium problem of each family, by the registry: a new one is timed the day it is
+//! The time of each search on a medium problem of each family, by the registry; a new search is included when it is
 //! listed.
 //!
-//! One thread, candidates already listed, defaults of every search: `cargo bench -p seafix-proptests --bench searches`;
-//! one family: `… --bench searches -- search/a`; in a hurry `… -- --quick`. A search that needs more than half a second is
-//! run once, and its time printed.
+//! One thread, candidates listed beforehand, default settings: `cargo bench -p seafix-proptests --bench searches`; one
+//! family: `… --bench searches -- search/a`; quickly `… -- --quick`. A search of more than half a second runs once, and
+//! its time is printed.
 
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 
@@ -22,7 +22,7 @@ use seafix_component::Choice;
 use seafix_proptests::problems::Listed;
 use seafix_referencing::SEARCHES;
 
-/// What takes longer is run once.
+/// Time above which a search runs once.
 const LONG: Duration = Duration::from_millis(500);
 
 fn searches(criterion: &mut Criterion) {
@@ -32,7 +32,7 @@ fn searches(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(format!("search/{}", family.name()));
         for name in SEARCHES.names() {
             let search = SEARCHES.build(&Choice::named(name)).expect("the defaults are in range");
-            // Every call has the same stream: what is timed is one run, not a mixture.
+            // Every call has the same stream, so that one run is timed, not a mixture.
             let run = || search.search(black_box(&problem), &mut ChaCha8Rng::seed_from_u64(1));
             let started = Instant::now();
             let _ = black_box(run());

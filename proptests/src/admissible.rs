@@ -1,39 +1,38 @@
-//! The largest admissible sets by plain enumeration: what searches are held against.
+//! Maximum admissible sets by complete enumeration: the reference for searches.
 //!
-//! Everything is written anew here, distances, tolerances and volumes included, with no eye to speed.
+//! Distances, tolerances and volumes are implemented independently here, without regard to speed.
 //!
-//! The tests of `seafix-referencing` have a brute force of their own, for one search and in many cases.
-//! This one is independent of it on purpose: the definition of an admissible set is what all laws of
-//! searches rest on, and a misreading of it would have to be made twice. It also says what is wrong with
-//! a set that is not admissible, and which cases rounding decides.
+//! The tests of `seafix-referencing` have another brute force, for one search and in many cases. This one is
+//! independent on purpose: all laws of searches rest on the definition of an admissible set, and two implementations do
+//! not share a misreading. It also states the defect of a set that is not admissible, and detects cases that rounding
+//! decides.
 
 use nalgebra::Vector3;
 use seafix_referencing::{Correspondence, Problem, Tolerance};
 
-/// A difference nearer to its bound than this (m), or a volume nearer to its limit (m³), is decided
-/// by rounding.
+/// Margin of a bound: rounding decides a difference (m) or a volume (m³) that is nearer to its bound.
 const ROUNDING: f64 = 1e-12;
 
-/// All admissible sets of the largest size.
+/// The admissible sets of maximum size.
 #[derive(Debug, Clone, Default)]
 pub struct Largest {
-    /// Their size.
+    /// Their common size.
     pub size: usize,
     /// The sets, each in the order of the model points.
     pub sets: Vec<Vec<Correspondence>>,
-    /// Whether a test was so near its bound that rounding decided it: nothing can be held against this.
+    /// Whether rounding decided a test; the result is then no reference.
     pub doubtful: bool,
 }
 
-/// The largest sets of candidate pairs that are coherent and one-to-one and, with `orientation`, of
-/// which no four are a mirror image.
+/// Finds the maximum coherent, one-to-one sets of candidate pairs; with `orientation`, sets without four pairs of a
+/// mirror image.
 pub fn largest(problem: &Problem<'_>, orientation: bool) -> Largest {
     let mut largest = Largest::default();
     extend(problem, orientation, 0, &mut Vec::new(), &mut largest);
     largest
 }
 
-/// Each candidate of model point `i` in turn, and none.
+/// Tries each candidate of model point `i`, and none.
 fn extend(problem: &Problem<'_>, orientation: bool, i: usize, set: &mut Vec<Correspondence>, largest: &mut Largest) {
     if i == problem.model.len() {
         if set.len() > largest.size {
@@ -68,7 +67,7 @@ fn extend(problem: &Problem<'_>, orientation: bool, i: usize, set: &mut Vec<Corr
     extend(problem, orientation, i + 1, set, largest);
 }
 
-/// What keeps a set from being admissible; `None` if nothing does.
+/// The reason why a set is not admissible; `None` for an admissible set.
 pub fn objection(problem: &Problem<'_>, orientation: bool, set: &[Correspondence]) -> Option<String> {
     for (k, &a) in set.iter().enumerate() {
         if !problem.candidates.lists[a.model].contains(&a.cloud) {
@@ -89,7 +88,7 @@ pub fn objection(problem: &Problem<'_>, orientation: bool, set: &[Correspondence
     four.map(|four| format!("{four:?} are a mirror image"))
 }
 
-/// | |P_a P_b| − |C_a C_b| | (m).
+/// The difference of distances | |P_a P_b| − |C_a C_b| | (m).
 pub fn difference(problem: &Problem<'_>, a: Correspondence, b: Correspondence) -> f64 {
     let length = |v: Vector3<f64>| (v.x * v.x + v.y * v.y + v.z * v.z).sqrt();
     let known = length(model(problem, b) - model(problem, a));
@@ -97,7 +96,7 @@ pub fn difference(problem: &Problem<'_>, a: Correspondence, b: Correspondence) -
     (known - measured).abs()
 }
 
-/// Δ of the two pairs (m).
+/// The tolerance Δ of two pairs (m).
 pub fn tolerance(problem: &Problem<'_>, a: Correspondence, b: Correspondence) -> f64 {
     match problem.tolerance {
         Tolerance::Fixed(delta) => delta,
@@ -106,7 +105,7 @@ pub fn tolerance(problem: &Problem<'_>, a: Correspondence, b: Correspondence) ->
             let variance: f64 = [a, b]
                 .iter()
                 .map(|pair| {
-                    // The variance along the step; along z where two measured points coincide.
+                    // The variance along the step; along z for coincident measured points.
                     let n = if step == Vector3::zeros() { Vector3::z() } else { step / step.norm() };
                     let s = problem.cloud[pair.cloud].position.covariance;
                     (n.transpose() * s * n).x + problem.model[pair.model].sigma * problem.model[pair.model].sigma
@@ -121,14 +120,13 @@ fn coherent(problem: &Problem<'_>, a: Correspondence, b: Correspondence) -> bool
     difference(problem, a, b) <= tolerance(problem, a, b)
 }
 
-/// Whether the model's volume exceeds three standard deviations of the measured one, and the two
-/// have not the same sign.
+/// Whether the model's volume exceeds three standard deviations of the measured one, with the opposite sign.
 pub fn is_mirrored(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
     let (known, measured, limit) = volumes(problem, four);
     known.abs() > limit && known * measured <= 0.0
 }
 
-/// The model's volume (m³), the measured one, and what the model's must exceed to decide.
+/// The model's volume (m³), the measured one, and the threshold of the model's for a decision.
 fn volumes(problem: &Problem<'_>, four: [Correspondence; 4]) -> (f64, f64, f64) {
     let volume = |p: [Vector3<f64>; 4]| (p[1] - p[0]).cross(&(p[2] - p[0])).dot(&(p[3] - p[0])) / 6.0;
     let known = volume(four.map(|pair| model(problem, pair)));
@@ -149,7 +147,7 @@ fn volumes(problem: &Problem<'_>, four: [Correspondence; 4]) -> (f64, f64, f64) 
     (known, measured, 3.0 * variance.sqrt() + ROUNDING)
 }
 
-/// Whether rounding decides if the four are a mirror image.
+/// Whether rounding decides if four pairs are a mirror image.
 fn doubtful(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
     let (known, measured, limit) = volumes(problem, four);
     let edge = known.abs() > ROUNDING / 100.0 && (known.abs() - limit).abs() < 4.0 * ROUNDING;

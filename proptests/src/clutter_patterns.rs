@@ -1,4 +1,4 @@
-//! Scenes whose clutter imitates the object: what is spread evenly in no shell.
+//! Scenes with structured clutter, which is not uniform in any gate.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -8,60 +8,60 @@ use seafix_referencing::{Gate, ModelPoint, Prior, PriorBound, Problem, Tolerance
 
 use crate::problems::Planted;
 
-/// What the clutter of a scene is like.
+/// The kind of clutter of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClutterPattern {
-    /// The object is a grating of 5 × 4 points; clutter lies on the same grating, which goes on about it.
+    /// A grating of 5 × 4 object points, continued by clutter on the same grating.
     Grating,
-    /// The same of an object that has twelve of the points of a grating of 6 × 5.
+    /// An object with twelve of the points of a grating of 6 × 5, continued by clutter on the same grating.
     Gaps,
-    /// The object's points lie on the edges of a box, and so does clutter.
+    /// Object points and clutter on the edges of a box.
     Edges,
-    /// The object's points come in twos nearer to each other than twice the tolerance, and all is measured twice.
+    /// Object points in pairs nearer than twice the tolerance, each point measured twice.
     Doubles,
-    /// The object's points lie anywhere, and clutter is bunched about each, 4 cm a coordinate, in shells of 10 cm.
+    /// Object points anywhere, with clutter clumped about each, 4 cm on each coordinate, in gates of 10 cm.
     Clumped,
 }
 
 impl ClutterPattern {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 5] = [Self::Grating, Self::Gaps, Self::Edges, Self::Doubles, Self::Clumped];
 
-    /// Half a shell (m).
+    /// Half-size of the gate (m).
     fn gate(self) -> f64 {
         if self == Self::Clumped { 0.1 } else { GATE }
     }
 }
 
-/// A scene: the problem that a search is given.
+/// A scene: the problem of a search.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// Model, cloud, candidates and truth.
     pub planted: Planted,
-    /// The rough pose.
+    /// The prior pose.
     pub prior: Option<Prior>,
 }
 
 impl Scene {
-    /// The problem as a search takes it.
+    /// The problem for a search.
     pub fn problem(&self) -> Problem<'_> {
         Problem { prior: self.prior.as_ref(), ..self.planted.problem() }
     }
 }
 
-/// Half the box whose edges carry points (m).
+/// Half-size of the box whose edges carry points (m).
 const HALF: [f64; 3] = [1.25, 0.75, 0.75];
-/// From one point of the grating to the next (m).
+/// Distance of neighbouring points of the grating (m).
 const PITCH: f64 = 0.3;
-/// Of clutter that is bunched about a point (m).
+/// Standard deviation of clutter clumped about a point (m).
 const BUNCH: f64 = 0.04;
-/// Standard deviation of a measured coordinate (m), the tolerance of a distance, and half a shell.
+/// Standard deviation of a measured coordinate (m), tolerance of a distance, and half-size of a gate.
 const SIGMA: f64 = 0.01;
 const DELTA: f64 = 0.045;
 const GATE: f64 = 0.5;
 
 fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
-    // Twelve uniform numbers: near enough to a Gaussian here.
+    // The sum of twelve uniform numbers approximates a Gaussian sufficiently.
     Vector3::from_fn(|_, _| (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>())
 }
 
@@ -75,7 +75,7 @@ fn on_edge(rng: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| if axis == along { at[axis] } else { HALF[axis] * at[axis].signum() })
 }
 
-/// Points with at least so much between any two.
+/// Points with a minimum distance between any two.
 fn apart(rng: &mut ChaCha8Rng, count: usize, min: f64, draw: fn(&mut ChaCha8Rng) -> Vector3<f64>) -> Vec<Vector3<f64>> {
     let mut points: Vec<Vector3<f64>> = Vec::new();
     while points.len() < count {
@@ -87,7 +87,7 @@ fn apart(rng: &mut ChaCha8Rng, count: usize, min: f64, draw: fn(&mut ChaCha8Rng)
     points
 }
 
-/// One scene, with `visible` of the object's points in view and a prior.
+/// A scene with `visible` object points in view and a prior.
 pub fn scene(clutter_pattern: ClutterPattern, visible: usize, seed: u64) -> Scene {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let rng = &mut rng;

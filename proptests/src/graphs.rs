@@ -1,11 +1,12 @@
-//! Every small association graph, and points that have it.
+//! All small association graphs, and points that realise them.
 //!
-//! A search takes points, not a graph. Whether two pairs agree is a question of the difference D − d of their two distances and
-//! of Δ² = k² nᵀ (Σ_a + Σ_b) n, n the direction between the cloud points a and b. [`Posts`] chooses the covariances
-//! Σ_a = s I + Σ_b λ_ab n nᵀ: fifteen numbers λ for the fifteen pairs of six cloud points, in which all Δ² are linear. So each Δ²
-//! is put five per cent above or below (D − d)², and any set of pairs of cloud points agrees. The six points are pairs of posts at the
-//! corners of a triangle, and the model is a tetrahedron or an octahedron whose opposite corners are such a pair: then all covariances
-//! are positive definite. They are so large that no four points tell an image from its reflection.
+//! A search takes points, not a graph. Two pairs agree if the difference D − d of their two distances is within Δ² = k²
+//! nᵀ (Σ_a + Σ_b) n, with n the direction between the cloud points a and b. [`Posts`] chooses the covariances Σ_a = s I
+//! + Σ_b λ_ab n nᵀ: fifteen numbers λ for the fifteen pairs of six cloud points, in which all Δ² are linear. Each Δ² is
+//! thus set five per cent above or below (D − d)², so that any set of pairs of cloud points agrees. The six points are
+//! pairs of posts at the corners of a triangle; the model is a tetrahedron or an octahedron whose opposite corners are
+//! such a pair. All covariances are then positive definite. They are so large that no four points distinguish an image
+//! from its reflection.
 
 use std::collections::HashSet;
 
@@ -15,14 +16,14 @@ use seafix_referencing::{Candidates, Correspondence, ModelPoint, Tolerance};
 
 use crate::problems::Planted;
 
-/// Vertices at most.
+/// Maximum number of vertices.
 pub const MAX: usize = 6;
-/// Pairs of them.
+/// Number of pairs of them.
 const PAIRS: usize = MAX * (MAX - 1) / 2;
-/// Model points at most for which all distances of the model are the same.
+/// Maximum number of model points with equal distances.
 const TETRAHEDRON: usize = 4;
 
-/// The number of a pair: those of the first points come first.
+/// The index of a pair; pairs of the first points come first.
 fn pair(a: usize, b: usize) -> usize {
     let (low, high) = (a.min(b), a.max(b));
     high * (high - 1) / 2 + low
@@ -33,19 +34,19 @@ fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(|b| (0..b).map(move |a| (a, b)))
 }
 
-/// An association graph: candidate pairs, and which cloud points agree with each other.
+/// An association graph: candidate pairs, and the agreement of cloud points.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Graph {
     /// The model point of each vertex.
     pub models: Vec<usize>,
     /// The cloud point of each vertex.
     pub clouds: Vec<usize>,
-    /// Which pairs of cloud points agree, a bit each.
+    /// The agreement of pairs of cloud points, one bit each.
     agree: u16,
 }
 
 impl Graph {
-    /// Whether two vertices are adjacent: different model points, different cloud points, and these agree.
+    /// Whether two vertices are adjacent: different model points, and different cloud points that agree.
     pub fn adjacent(&self, v: usize, w: usize) -> bool {
         let apart = self.models[v] != self.models[w] && self.clouds[v] != self.clouds[w];
         apart && self.agree >> pair(self.clouds[v], self.clouds[w]) & 1 == 1
@@ -57,17 +58,17 @@ impl Graph {
             .all(|(v, w)| self.models[v] == self.models[w] || self.clouds[v] == self.clouds[w] || self.adjacent(v, w))
     }
 
-    /// How many model points it has.
+    /// The number of model points.
     pub fn model_points(&self) -> usize {
         self.models.iter().max().map_or(0, |max| max + 1)
     }
 
-    /// Its pair of a vertex.
+    /// The candidate pair of a vertex.
     pub fn correspondence(&self, v: usize) -> Correspondence {
         Correspondence { model: self.models[v], cloud: self.clouds[v] }
     }
 
-    /// All cliques by trying every subset, each in the order of the model points; the largest first, equals in order.
+    /// All cliques by enumeration of subsets, each in the order of the model points; largest first, ties in order.
     pub fn cliques(&self) -> Vec<Vec<Correspondence>> {
         let n = self.models.len();
         let sorted = |set: Vec<usize>| {
@@ -84,7 +85,7 @@ impl Graph {
         cliques
     }
 
-    /// Its edges, and which vertices share a cloud point, a bit each pair of vertices.
+    /// The edges, and the pairs of vertices with a common cloud point, one bit for each pair of vertices.
     fn key(&self) -> (u16, u16) {
         let bits = |of: &dyn Fn(usize, usize) -> bool| {
             pairs(self.models.len()).filter(|&(v, w)| of(v, w)).fold(0, |bits, (v, w)| bits | 1 << pair(v, w))
@@ -92,7 +93,7 @@ impl Graph {
         (bits(&|v, w| self.adjacent(v, w)), bits(&|v, w| self.clouds[v] == self.clouds[w]))
     }
 
-    /// Whether every two cloud points that agree are those of some two vertices of different model points.
+    /// Whether all agreeing cloud points belong to vertices of different model points.
     fn is_sparing(&self) -> bool {
         let used = |bit: &usize| {
             let of =
@@ -103,17 +104,17 @@ impl Graph {
     }
 }
 
-/// Which graphs.
+/// A class of graphs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Which {
-    /// Every vertex has a cloud point of its own: all graphs.
+    /// Every vertex has its own cloud point: all graphs.
     Own,
-    /// Some vertices share a cloud point; of up to four model points.
+    /// Some vertices share a cloud point; up to four model points.
     Shared,
 }
 
-/// The graphs on `n` vertices with every assignment of these to model points, up to the names of model points; those that differ by
-/// the names of vertices alone are one graph, unless `labelled`.
+/// The graphs on `n` vertices with every assignment to model points, up to renaming of model points, and, unless
+/// `labelled`, up to renaming of vertices.
 pub fn graphs(n: usize, which: Which, labelled: bool) -> Vec<Graph> {
     let mut all = Vec::new();
     for models in partitions(n).into_iter().filter(|models| in_blocks(models)) {
@@ -146,7 +147,7 @@ pub fn graphs(n: usize, which: Which, labelled: bool) -> Vec<Graph> {
     all
 }
 
-/// All partitions of `n` things, as the number of the part of each; parts are numbered as they come.
+/// All partitions of `n` elements, as the part of each element; parts are numbered in order of appearance.
 fn partitions(n: usize) -> Vec<Vec<usize>> {
     (0..n).fold(vec![Vec::new()], |shorter, _| {
         let with_one_more = |parts: Vec<usize>| {
@@ -157,13 +158,13 @@ fn partitions(n: usize) -> Vec<Vec<usize>> {
     })
 }
 
-/// Whether the parts stand one behind the other, none larger than the one before: one partition of each kind.
+/// Whether parts are consecutive and of decreasing size: one partition of each kind.
 fn in_blocks(parts: &[usize]) -> bool {
     let size = |part: usize| parts.iter().filter(|&&other| other == part).count();
     parts.is_sorted() && parts.windows(2).all(|two| size(two[0]) >= size(two[1]))
 }
 
-/// The renamings of vertices that keep together what has the same model point.
+/// The permutations of vertices that preserve the groups of equal model points.
 fn renamings(models: &[usize]) -> Vec<Vec<usize>> {
     let n = models.len();
     let orders = (0..n).fold(vec![Vec::new()], |shorter: Vec<Vec<usize>>, _| {
@@ -187,19 +188,19 @@ const SIDE: f64 = 40.0;
 /// The cloud points (m).
 const POSTS: [[f64; 3]; MAX] =
     [[6.0, 0.0, 3.0], [6.0, 0.0, -3.0], [-3.0, 5.0, 3.0], [-3.0, 5.0, -3.0], [-3.0, -5.0, 3.0], [-3.0, -5.0, -3.0]];
-/// By what share Δ² is above or below the squared difference of the distances.
+/// Relative margin of Δ² above or below the squared difference of distances.
 const MARGIN: f64 = 0.05;
-/// k: so small that the standard deviations, of a size with SIDE / k, hide every reflection.
+/// The factor k: so small that the standard deviations, of the order SIDE / k, hide every reflection.
 const SIGMAS: f64 = 0.01;
-/// A Δ within which all distances agree (m).
+/// A tolerance Δ with which all distances agree (m).
 pub const ANY: f64 = 1e3;
-/// Ways of [`Posts::realised`] to turn the model, and the cloud.
+/// Number of rotations that [`Posts::realised`] applies to model and cloud.
 pub const TURNS: usize = 6;
 
-/// What makes a graph of points.
+/// The construction of points for a graph.
 #[derive(Debug)]
 pub struct Posts {
-    /// λ of all pairs, for each Δ² that is to be 1 m² higher.
+    /// The λ of all pairs for each Δ² that increases by 1 m².
     lambdas: SMatrix<f64, PAIRS, PAIRS>,
 }
 
@@ -220,7 +221,8 @@ impl Default for Posts {
 }
 
 impl Posts {
-    /// Points that have this graph, model and cloud turned in one of [`TURNS`] ways each, so that they come in other orders.
+    /// Points with this graph; model and cloud are each rotated in one of [`TURNS`] ways, so that they come in other
+    /// orders.
     pub fn realised(&self, graph: &Graph, [model, cloud]: [usize; 2]) -> Planted {
         let count = graph.model_points();
         let corners: Vec<Vector3<f64>> = (0..MAX).map(octahedron).collect();
@@ -276,7 +278,7 @@ fn tetrahedron(corner: usize) -> Vector3<f64> {
     Vector3::new(sign(0b1100), sign(0b1010), sign(0b0110)) * (SIDE / 8f64.sqrt())
 }
 
-/// One of six ways to turn or reflect about the origin.
+/// One of six rotations or reflections about the origin.
 fn turned(turn: usize, at: Vector3<f64>) -> Vector3<f64> {
     let sign = if turn < 3 { 1.0 } else { -1.0 };
     Vector3::from_fn(|axis, _| sign * at[(axis + turn) % 3])

@@ -1,4 +1,4 @@
-//! How a law is tried.
+//! Execution of laws.
 
 use std::{env, fmt::Debug};
 
@@ -7,16 +7,16 @@ use proptest::{
     test_runner::{Config, FileFailurePersistence, RngSeed, TestCaseError, TestCaseResult, TestRunner},
 };
 
-/// The seed of every law's draws, unless `PROPTEST_RNG_SEED` gives another.
+/// The seed of every law, unless `PROPTEST_RNG_SEED` gives another.
 const SEED: u64 = 1038;
 
 /// The number of cases of a law, or of draws of a Monte Carlo, whose full number is `full`.
 ///
-/// `PROPTEST_CASES` scales it, and 256 is the full number. Without it an eighth is tried, but no fewer than 32 and no more than
-/// the full number.
+/// `PROPTEST_CASES` scales the number; 256 gives the full number. The default is an eighth, at least 32 and at most the
+/// full number.
 ///
 /// # Panics
-/// When `PROPTEST_CASES` is no number.
+/// If `PROPTEST_CASES` is not a number.
 #[must_use]
 pub fn cases(full: u32) -> u32 {
     let Ok(asked) = env::var("PROPTEST_CASES") else { return full.min(32.max(full / 8)) };
@@ -24,10 +24,10 @@ pub fn cases(full: u32) -> u32 {
     u32::try_from(u64::from(full) * asked / 256).unwrap_or(u32::MAX).max(1)
 }
 
-/// Tries `holds` on so many [`cases`] of `strategy`. The number of cases tried.
+/// Tests `holds` on [`cases`] values of `strategy` and returns their number.
 ///
 /// # Panics
-/// With the smallest counterexample found, when the law does not hold.
+/// If the law does not hold, with the smallest counterexample found.
 pub fn law<S: Strategy>(full: u32, strategy: S, holds: impl Fn(S::Value) -> TestCaseResult) -> u32
 where
     S::Value: Debug,
@@ -47,16 +47,17 @@ where
     cases
 }
 
-/// Whether so many cases must show what a law is about: many do by any seed, a few by the fixed one.
+/// Whether the number of cases suffices to require its subject for any seed; a smaller number does so for the fixed
+/// seed.
 #[must_use]
 pub fn distinctive(cases: u32) -> bool {
     cases >= 100 || cases >= 8 && env::var_os("PROPTEST_RNG_SEED").is_none()
 }
 
-/// Requires that `count` of `cases` met what a law is about, at least one in so many.
+/// Requires that at least one in `one_in` of the `cases` tested the subject of a law.
 ///
 /// # Panics
-/// When the draws hardly ever meet it.
+/// If the draws hardly ever do.
 pub fn not_idle(what: &str, count: u32, cases: u32, one_in: u32) {
     assert!(
         !distinctive(cases) || u64::from(count) * u64::from(one_in) >= u64::from(cases),
@@ -64,10 +65,10 @@ pub fn not_idle(what: &str, count: u32, cases: u32, one_in: u32) {
     );
 }
 
-/// `value ≤ limit`, or the failure that says what was measured; a NaN fails.
+/// Checks `value ≤ limit`; the failure has the value. A NaN fails.
 ///
 /// # Errors
-/// When it is not.
+/// If it does not hold.
 pub fn within(what: &str, value: f64, limit: f64) -> TestCaseResult {
     if value <= limit { Ok(()) } else { Err(TestCaseError::fail(format!("{what}: {value:e}, at most {limit:e}"))) }
 }

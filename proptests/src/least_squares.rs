@@ -1,12 +1,11 @@
-//! The least sum of squared residuals over all rigid motions, by a way no solver takes.
+//! The minimum sum of squared residuals over all rigid motions, by a method that no solver uses.
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
 use crate::scenes::Scene;
 
-/// The least Σ ‖C_k H − P_k‖² (m²) over all rigid motions H: from the largest eigenvalue of Horn's 4×4
-/// matrix, without computing the motion (Horn, *Closed-form solution of absolute orientation using
-/// unit quaternions*, 1987).
+/// The minimum Σ ‖C_k H − P_k‖² (m²) over all rigid motions H, from the largest eigenvalue of Horn's 4×4 matrix and
+/// without the motion (Horn, *Closed-form solution of absolute orientation using unit quaternions*, 1987).
 pub fn least_squares(scene: &Scene) -> f64 {
     let count = scene.points.len() as f64;
     let known: Vector3<f64> = scene.points.iter().map(|p| p.model.coords).sum::<Vector3<f64>>() / count;

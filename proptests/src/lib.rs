@@ -1,10 +1,9 @@
-//! Laws that every component of Seafix obeys.
+//! Laws of all components of Seafix.
 //!
-//! `src/` holds what the laws draw from and compare with: one idea a file, nothing that is tested.
-//! `tests/it/` holds the laws, one file a theme; a law's name states it, its doc comment gives the number
-//! and the statement. Laws over searches and solvers run over the registries by name, with the
-//! defaults and with every value of every switch, so that a component listed tomorrow is tested
-//! tomorrow.
+//! `src/` holds the strategies and references of the laws: one idea a file, nothing that is tested. `tests/it/` holds
+//! the laws, one file for each theme; a law's name states it, its doc comment gives number and statement. Laws of
+//! searches and solvers run over the registries by name, with the defaults and with every value of every switch, so
+//! that a new component is tested as soon as it is listed.
 //!
 //! ```text
 //! cargo test -p seafix-proptests                                    # the short suite
@@ -12,8 +11,9 @@
 //! PROPTEST_RNG_SEED=7 cargo test -p seafix-proptests                # other draws
 //! ```
 //!
-//! [`cases`] says how many cases a law has: few by default, as many as `PROPTEST_CASES` asks for in the long proof. Seeds are
-//! fixed, so every run draws the same cases; what failed once is kept in `proptest-regressions/` and tried first ever after.
+//! [`cases`] gives the number of cases of a law: few by default, more with `PROPTEST_CASES` in the long proof. Seeds
+//! are fixed, so that every run draws the same cases. Failed cases are kept in `proptest-regressions/` and tested
+//! first.
 
 pub mod admissible;
 pub mod clutter_patterns;

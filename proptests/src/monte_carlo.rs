@@ -1,4 +1,4 @@
-//! Many draws of one layout: the errors of a solver beside the Cramér–Rao bound.
+//! Monte Carlo of a layout: the errors of a solver against the Cramér–Rao bound.
 
 use nalgebra::{Matrix4, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -11,56 +11,56 @@ use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transfo
 use seafix_referencing::{Observation, Observations, SOLVERS, Solver, StereoReprojection};
 use seafix_simulation::{Layout, Placed};
 
-/// What the draws of one cell say of one solver.
+/// The statistics of one solver in one cell.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Cell {
-    /// Layouts that were drawn from.
+    /// Number of layouts.
     pub layouts: u32,
-    /// Draws that were answered.
+    /// Number of draws with an answer.
     pub answered: u32,
-    /// Draws that were not.
+    /// Number of draws without an answer.
     pub refused: u32,
-    /// Draws in which another pose was as likely, where that was asked: these are not answered either.
+    /// Number of draws with an equally probable alternative, if alternatives are examined; they have no answer either.
     pub ambiguous: u32,
-    /// Answers in another valley than the truth's, of NEES above 100, where rivals were asked for: wrong, and in the
-    /// coverage, but not in means that a single one would make.
+    /// Number of answers in another minimum than the truth's, with NEES above 100, if alternatives are examined. They
+    /// are wrong and count in the coverage, but not in means, which a single one would dominate.
     pub elsewhere: u32,
-    /// Root mean square of m2 over that of its bound.
+    /// Ratio of the RMS target registration error to the RMS of its bound.
     pub tre: f64,
-    /// Root mean square of the position's error (m3) over that of its bound.
+    /// Ratio of the RMS position error to the RMS of its bound.
     pub position: f64,
-    /// Root mean square of m3 over what [`foreseen`] says of it.
+    /// Ratio of the RMS position error to the RMS of its prediction by [`foreseen`].
     pub position_foreseen: f64,
-    /// Greatest [`bent`] of the layouts: how far the likelihood is from the parabola that the bound takes it for.
+    /// Maximum [`bent`] of the layouts: deviation of the likelihood from the parabola that the bound assumes.
     pub bent: f64,
-    /// Root mean square of m2 (m).
+    /// RMS target registration error (m).
     pub tre_rms: f64,
-    /// Root mean square of the position's error (m).
+    /// RMS position error (m).
     pub position_rms: f64,
-    /// Length of the mean error of the position over its standard deviation by the bound.
+    /// Length of the mean position error, relative to its standard deviation by the bound.
     pub bias: f64,
     /// Mean NEES.
     pub nees: f64,
-    /// Share of draws whose NEES lies below the 95 % quantile of χ² with six degrees of freedom.
+    /// Fraction of draws with a NEES below the 95 % quantile of χ² with six degrees of freedom.
     pub coverage: f64,
-    /// Greatest standard deviation of the attitude by the bound, over three axes together (rad).
+    /// Maximum standard deviation of the attitude by the bound, over three axes together (rad).
     pub attitude_sigma: f64,
-    /// Root mean square error of the attitude (rad).
+    /// RMS attitude error (rad).
     pub attitude_rms: f64,
 }
 
-/// What a solver makes of `draws` draws, spread evenly over `layouts` layouts of these settings.
+/// The statistics of a solver over `draws` draws, distributed evenly over `layouts` layouts of these settings.
 ///
 /// # Panics
-/// When the settings describe no layout.
+/// If the settings describe no layout.
 pub fn cell(solver: &dyn Solver, settings: &Layout, layouts: u64, draws: u64, covariance: bool) -> Cell {
     cell_where(solver, settings, layouts, draws, covariance, |_, _| true)
 }
 
-/// The same of those layouts alone that `keep` keeps, given the bound.
+/// The same for the layouts that `keep` accepts, given the bound.
 ///
 /// # Panics
-/// When the settings describe no layout.
+/// If the settings describe no layout.
 pub fn cell_where(
     solver: &dyn Solver,
     settings: &Layout,
@@ -78,7 +78,7 @@ pub fn cell_where(
 /// The layouts of these settings and this seed.
 ///
 /// # Panics
-/// When the settings describe no layout.
+/// If the settings describe no layout.
 pub fn placed(settings: &Layout, seed: u64, layouts: u64) -> Vec<Placed> {
     let place = |number| Layout { number, ..settings.clone() }.place(seed).expect("the layout can be placed");
     (0..layouts).map(place).collect()
@@ -87,7 +87,7 @@ pub fn placed(settings: &Layout, seed: u64, layouts: u64) -> Vec<Placed> {
 /// The Cramér–Rao bound of a layout.
 ///
 /// # Panics
-/// When its points determine no pose.
+/// If its points determine no pose.
 pub fn bound(placed: &Placed, settings: &Layout) -> Covariance6<Object, Camera> {
     let pixels = Matrix4::identity() * settings.sigma_px.powi(2);
     let seen = placed.model.iter().map(|&at| Seen { at, model_sigma: settings.model_sigma, pixels });
@@ -95,20 +95,20 @@ pub fn bound(placed: &Placed, settings: &Layout) -> Covariance6<Object, Camera> 
         .expect("three points and more determine a pose")
 }
 
-/// What is asked of every layout.
+/// The experiment on every layout.
 #[derive(Debug, Clone, Copy)]
 pub struct Asked {
-    /// Draws of each.
+    /// Number of draws of each layout.
     pub draws: u64,
-    /// Whether covariances are held against the errors.
+    /// Whether covariances are compared with errors.
     pub covariance: bool,
-    /// With how much more of χ² another pose makes a draw ambiguous; `None` to answer whatever else is as likely.
+    /// Difference of χ² within which another pose makes a draw ambiguous; `None` ignores alternatives.
     pub alternatives: Option<f64>,
 }
 
-/// What a solver makes of the draws of these layouts.
+/// The statistics of a solver over the draws of these layouts.
 pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked: &Asked) -> Cell {
-    /// χ²₆ at 95 %.
+    /// The 95 % quantile of χ²₆.
     const NINETY_FIVE: f64 = 12.591_587_243_743_977;
     let mut cell = Cell::default();
     let (mut tre, mut position, mut tre_crlb, mut position_crlb, mut counted, mut angle) =
@@ -172,7 +172,7 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
     cell
 }
 
-/// The draw as a solver takes it.
+/// The observations of a draw for a solver.
 pub fn observations(placed: &Placed, draw: u64, model_sigma: f64) -> Option<Vec<Observation>> {
     observations_of(placed, &placed.draw(draw)?, model_sigma)
 }
@@ -187,32 +187,32 @@ fn observations_of(placed: &Placed, cloud: &[MeasuredPoint], model_sigma: f64) -
     Some(cloud.iter().zip(&placed.model).map(point).collect())
 }
 
-/// Whether the Cramér–Rao bound is meaningful for a layout. It is a bound for the valley of the truth alone, and
-/// linear: the layout is [`bent`] by a tenth at most, and no pose in another valley comes so near to the exact pixels
-/// (χ² below 64) that noise would prefer it more often than Q(√64 / 2) = 3e-5. Where one does, the likeliest pose
-/// itself is now and then a wrong one, fifty bounds away.
+/// Whether the Cramér–Rao bound is meaningful for a layout. It is linear and local to the minimum at the truth. The
+/// layout must be [`bent`] by a tenth at most, and no pose in another minimum may be so near to the exact pixels (χ²
+/// below 64) that noise prefers it more often than Q(√64 / 2) = 3e-5. Otherwise the maximum-likelihood pose itself is
+/// sometimes wrong, fifty bounds away.
 pub fn is_meaningful(placed: &Placed, sigma_px: f64, bound: &Covariance6<Object, Camera>) -> bool {
     bent(placed, sigma_px, bound) <= 0.1 && alternative(placed, sigma_px) >= 64.0
 }
 
-/// [`nonlinearity`] of a layout's exact pixels within its bound: the relative curvature of Bates and Watts, nought where the
-/// posterior is the bound's Gaussian; infinite where a pose within the bound sees a point no more.
+/// The [`nonlinearity`] of a layout's exact pixels within its bound: the relative curvature of Bates and Watts. It is
+/// zero if the posterior is the bound's Gaussian, and infinite if a pose within the bound has a point out of view.
 pub fn bent(placed: &Placed, sigma_px: f64, bound: &Covariance6<Object, Camera>) -> f64 {
     let pixels = Matrix4::identity() * sigma_px.powi(2);
     let seen: Vec<Seen> = placed.model.iter().map(|&at| Seen { at, model_sigma: 0.0, pixels }).collect();
     nonlinearity(&placed.rig, &placed.object_from_camera, &seen, bound).unwrap_or(f64::INFINITY)
 }
 
-/// What the likelihood of the exact pixels leaves open about the true pose: the bound where it is straight, and where it is
-/// bent the second moment of its profile. It is a property of the layout, as the bound is. `None` where that has no value.
+/// The position error that the likelihood of the exact pixels predicts: the bound where it is linear, elsewhere the
+/// second moment of its profile. It is a property of the layout, as the bound is. `None` if it has no value.
 pub fn foreseen(placed: &Placed, settings: &Layout) -> Option<Covariance6<Object, Camera>> {
     let points = observations_of(placed, &placed.exact(settings.sigma_px), settings.model_sigma)?;
     let data = Observations { points, rig: Some(&placed.rig) };
     StereoReprojection::default().covariance(&data, &placed.object_from_camera).ok()
 }
 
-/// The least χ² of the exact pixels in any valley but the truth's, from 64 starts turned about the centroid; infinite
-/// where all lead to the truth.
+/// The minimum χ² of the exact pixels in any minimum except the truth's, from 64 starts rotated about the centroid;
+/// infinite if all lead to the truth.
 pub fn alternative(placed: &Placed, sigma_px: f64) -> f64 {
     let solver = SOLVERS.build(&Choice::named("stereo-reprojection").with("starts", 1)).expect("a solver");
     let Some(mut exact) = observations_of(placed, &placed.exact(sigma_px), 0.0) else { return f64::INFINITY };
@@ -236,7 +236,7 @@ pub fn alternative(placed: &Placed, sigma_px: f64) -> f64 {
     min
 }
 
-/// χ² of the pixels at a pose; `None` where a point is behind a camera.
+/// The χ² of the pixels at a pose; `None` if a point is behind a camera.
 pub fn pixel_chi2(
     placed: &Placed,
     points: &[Observation],
@@ -250,11 +250,11 @@ pub fn pixel_chi2(
     points.iter().map(of).sum()
 }
 
-/// Mean over standard error of the paired differences of squared m2, and of squared m3: above nought where `solver` errs
-/// more than `other` on the same draws.
+/// Mean over standard error of the paired differences of squared target registration errors, and of squared position
+/// errors; positive if `solver` has larger errors than `other` on the same draws.
 ///
 /// # Panics
-/// When the settings describe no layout.
+/// If the settings describe no layout.
 pub fn paired(solver: &dyn Solver, other: &dyn Solver, settings: &Layout, layouts: u64, draws: u64) -> [f64; 2] {
     let mut differences: [Vec<f64>; 2] = Default::default();
     for number in 0..layouts {

@@ -1,4 +1,4 @@
-//! A vehicle that goes from object to object: true poses, odometry and fixes with errors as stated.
+//! A vehicle that travels from object to object: true poses, odometry and fixes with the stated errors.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, UncertainPoint, World, so3};
@@ -6,26 +6,26 @@ use seafix_navigation::{ConsiderStates, Navigated, ObjectPlacement, ObjectPose, 
 use seafix_referencing::{Mahalanobis, Observation, Observations, Solver};
 use seafix_simulation::{Purpose, Stream};
 
-/// What a voyage is made of.
+/// The settings of a dive.
 #[derive(Debug, Clone)]
 pub struct NavigationScenario {
-    /// Objects along the way, each 10 m from the one before, up to 3 m aside.
+    /// Number of objects on the route, every 10 m, up to 3 m aside.
     pub objects: usize,
-    /// Standard deviations of a step of odometry: attitude (rad) and position (m), an axis.
+    /// Standard deviations of an odometry step on each axis: attitude (rad) and position (m).
     pub odometry: (f64, f64),
-    /// The same of a fix.
+    /// Standard deviations of a fix on each axis: attitude (rad) and position (m).
     pub fix: (f64, f64),
-    /// The same of an object's surveyed place.
+    /// Standard deviations of an object's surveyed pose on each axis: attitude (rad) and position (m).
     pub survey: (f64, f64),
-    /// Which share of a fix's variance is common to all fixes of one object: its model's.
+    /// Fraction of a fix's variance that all fixes of an object share: the model's.
     pub shared: f64,
-    /// The way of one step (m).
+    /// Length of a step (m).
     pub step: f64,
-    /// Standard deviation of the change of heading in a step (rad); 0 goes straight on.
+    /// Standard deviation of the change of heading in a step (rad); 0 goes straight.
     pub meander: f64,
-    /// Standard deviation of the points of each object's model (m), where they are looked at.
+    /// Standard deviation of the points of each object's model (m), for fixes by points.
     pub model: f64,
-    /// The same of a point measured by the cameras, an axis.
+    /// Standard deviation of a point measured by the cameras, on each axis (m).
     pub measured: f64,
 }
 
@@ -45,33 +45,33 @@ impl Default for NavigationScenario {
     }
 }
 
-/// A voyage on its way: one of many with the same settings.
+/// A dive in progress: one of many with the same settings.
 #[derive(Debug)]
 pub struct Sailing<'a> {
     settings: &'a NavigationScenario,
     stream: Stream,
-    /// Where the objects truly stand.
+    /// The true poses of the objects.
     pub world_from_object: Vec<Transform<World, Object>>,
-    /// Where the survey says they stand.
+    /// The surveyed poses of the objects.
     pub surveyed: Vec<ObjectPlacement>,
-    /// Where the camera truly is.
+    /// The true pose of the camera.
     pub world_from_camera: Transform<World, Camera>,
     heading: f64,
-    /// Of each object, what all its fixes err by.
+    /// For each object, the common error of all its fixes.
     common: Vec<Vector6<f64>>,
-    /// Of each object the points: where they are, and where its model has them.
+    /// For each object, its points: true positions and positions in the model.
     points: Vec<Vec<[Point<Object>; 2]>>,
-    /// Whether it goes backwards.
+    /// Whether the vehicle travels backwards.
     back: bool,
 }
 
-/// Points of an object, within a metre of its origin.
+/// The points of an object, within a metre of its origin.
 const POINTS: usize = 10;
-/// The tangent of the angle from the optical axis within which a point is in view.
+/// Tangent of the half-angle of view: points within it are in view.
 const VIEW: f64 = 1.5;
 
 impl NavigationScenario {
-    /// The voyage number `number`.
+    /// The dive with index `number`.
     pub fn set_out(&self, number: u64) -> Sailing<'_> {
         let mut stream = Stream::new(1, number, 0, Purpose::Points);
         let mut apart = Stream::new(1, number, 1, Purpose::Points);
@@ -115,7 +115,7 @@ fn normal6(stream: &mut Stream, (attitude, position): (f64, f64)) -> Vector6<f64
 }
 
 impl Sailing<'_> {
-    /// One step along a meandering way, and what odometry says of it.
+    /// A step along the meandering route, as odometry measures it.
     pub fn step(&mut self) -> RelativeMotion {
         self.heading = 0.9 * self.heading + self.settings.meander * self.stream.normal();
         let ahead = if self.back { -self.settings.step } else { self.settings.step };
@@ -127,7 +127,7 @@ impl Sailing<'_> {
         RelativeMotion::new(motion * error.inverse(), Covariance6::isotropic(attitude, position))
     }
 
-    /// A fix at an object.
+    /// A fix of an object.
     pub fn fix(&mut self, object: usize) -> Navigated {
         let (attitude, position) = self.settings.fix;
         let own = normal6(&mut self.stream, self.settings.fix) * (1.0 - self.settings.shared).sqrt();
@@ -137,13 +137,13 @@ impl Sailing<'_> {
         Navigated { object, object_pose: ObjectPose::new(object_from_camera, covariance) }
     }
 
-    /// From now on it goes the other way.
+    /// Reverses the direction of travel.
     pub fn turn_about(&mut self) {
         self.back = !self.back;
     }
 
-    /// A fix by the points of an object that are in view, as a solver makes it of its model and of what the cameras
-    /// measure; `None` where too few are in view.
+    /// A fix from the points of an object in view, solved from its model and the cameras' measurements; `None` with too
+    /// few points.
     pub fn observe(&mut self, object: usize) -> Option<Navigated> {
         let camera_from_object = self.truth(object).inverse();
         let (mut points, mut places) = (Vec::new(), Vec::new());
@@ -169,7 +169,7 @@ impl Sailing<'_> {
         })
     }
 
-    /// A fix that is wrong by a turn of up to half a turn and a shift of up to `reach` (m).
+    /// A wrong fix: rotated by up to half a turn and shifted by up to `reach` (m).
     pub fn wrong_fix(&mut self, object: usize, reach: f64) -> Navigated {
         let turn = self.stream.normal3(1.0).normalize() * self.stream.between(0.2, 3.1);
         let shift = self.stream.normal3(1.0).normalize() * self.stream.between(0.1 * reach, reach);
@@ -179,26 +179,26 @@ impl Sailing<'_> {
         Navigated { object, object_pose: ObjectPose::new(object_from_camera, right.covariance) }
     }
 
-    /// Moves an object by `metres` in a direction of its own, without telling the survey.
+    /// Displaces an object by `metres` in its own direction, without a change of the survey.
     pub fn displace(&mut self, object: usize, metres: f64) {
         let shift = self.stream.normal3(1.0).normalize() * metres;
         let moved = Transform::<Object, Object>::new(so3::exp(&self.stream.normal3(0.02)), shift);
         self.world_from_object[object] = self.world_from_object[object] * moved;
     }
 
-    /// The camera relative to an object.
+    /// The pose of the camera relative to an object.
     pub fn truth(&self, object: usize) -> Transform<Object, Camera> {
         self.world_from_object[object].inverse() * self.world_from_camera
     }
 
-    /// The normalised error squared of a pose.
+    /// The normalised estimation error squared of a pose.
     pub fn nees(&self, pose: &Navigated) -> f64 {
         let error = pose.object_pose.object_from_camera.error_to(&self.truth(pose.object));
         let matrix: Matrix6<f64> = pose.object_pose.covariance.matrix;
         matrix.cholesky().map_or(f64::INFINITY, |c| error.dot(&c.solve(&error)))
     }
 
-    /// The distance between the believed and the true place of the camera (m).
+    /// The distance between estimated and true position of the camera (m).
     pub fn off(&self, pose: &Navigated) -> f64 {
         (pose.object_pose.object_from_camera.translation() - self.truth(pose.object).translation()).norm()
     }

@@ -1,7 +1,8 @@
-//! A navigator with little to tell: a few events, and what each must do, in whole numbers.
+//! A discrete model of the navigator: few events, and their results in integers.
 //!
-//! Fixes are exact or off by whole multiples of one shift of the world, so that two agree where their numbers are equal and
-//! contradict each other by far where they are not. What the navigator must then know is a matter of whole numbers, written here anew.
+//! Fixes are exact, or off by multiples of one shift of the world, so that two agree if their integers are equal and
+//! contradict each other by far otherwise. The state that the navigator must have is then a matter of integers, and is
+//! implemented independently here.
 
 use std::sync::Mutex;
 
@@ -12,42 +13,42 @@ use seafix_navigation::{
     Situation, State,
 };
 
-/// What can happen to a navigator.
+/// An event for a navigator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Happening {
-    /// A second passes, and odometry tells the motion.
+    /// A second passes, with a motion from odometry.
     Step,
-    /// A second passes, and odometry does not tell that the camera stood still.
+    /// A second passes without a motion from odometry; the camera stood still.
     Lost,
-    /// A fix of this kind comes.
+    /// A fix of this kind arrives.
     Fix(Kind),
-    /// The navigator is asked whether a fix is due, an object being in view or not.
+    /// The navigator is asked whether a fix is due, with an object in view or not.
     Due(bool),
-    /// Half a second passes at whose end images tell no motion.
+    /// Half a second passes, and the images give no motion.
     Blind(bool),
-    /// A pose by a key frame that was found again; one that is well known, or not.
+    /// A pose from a recognised key frame arrives, with a small covariance or a large one.
     Settle(bool),
 }
 
-/// Fixes.
+/// The kinds of fixes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A right one of the first object.
+    /// A right fix of the first object.
     Right,
-    /// A wrong one of it, always the same.
+    /// A wrong fix of the first object, always the same.
     Wrong,
-    /// Another wrong one of it.
+    /// Another wrong fix of the first object.
     Otherwise,
-    /// A right one of the second object, which does not stand where the site says.
+    /// A right fix of the second object, which is displaced from its survey.
     Moved,
-    /// A right one of the third object.
+    /// A right fix of the third object.
     Third,
-    /// A right one of the third object, of which little is seen.
+    /// A right fix of the third object with few points in view.
     Imprecise,
 }
 
 impl Kind {
-    /// Its object, and how many shifts the camera is off that one has who believes the fix and the survey.
+    /// The object, and the camera's error in shifts according to the fix and the survey.
     fn states(self) -> (usize, i32) {
         match self {
             Self::Right => (0, 0),
@@ -59,16 +60,16 @@ impl Kind {
     }
 }
 
-/// How many objects there are.
+/// Number of objects.
 pub const OBJECTS: usize = 3;
-/// How many shifts the second object stands from where it was surveyed.
+/// Displacement of the second object from its survey (shifts).
 pub const DISPLACED: i32 = 2;
 /// The age (s) at which a fix is due.
 pub const INTERVAL: f64 = 1.75;
-/// So many fixes in a row overrule what was known.
+/// Number of successive fixes that overrule the navigated pose.
 const VOTES: usize = 3;
 
-/// A policy by age that remembers what it was told.
+/// A policy by age that records its inputs.
 #[derive(Debug, Default)]
 pub struct Listener(Mutex<Option<Situation>>);
 
@@ -80,37 +81,37 @@ impl Policy for Listener {
 }
 
 impl Listener {
-    /// What it was told since this was asked last.
+    /// The situation since the last question.
     pub fn reported(&self) -> Option<Situation> {
         self.0.lock().expect("no thread died").take()
     }
 }
 
-/// Where objects and camera are.
+/// The true poses of objects and camera.
 #[derive(Debug)]
 pub struct Site {
-    /// Where the survey has the objects.
+    /// The surveyed poses of the objects.
     pub surveyed: Vec<ObjectPlacement>,
-    /// What odometry says of each second.
+    /// The odometry's motion in each second.
     pub step: RelativeMotion,
-    /// Where the camera is after so many steps.
+    /// The camera's pose after each number of steps.
     cameras: Vec<Transform<World, Camera>>,
 }
 
-/// One shift of the world (m).
+/// A shift of the world (m).
 const SHIFT: [f64; 3] = [2.0, -1.0, 1.5];
-/// Standard deviation of the position of a fix (m), that of a glimpse, and of a surveyed place.
+/// Standard deviation of the position of a fix (m), of a fix with few points, and of a surveyed position.
 const FIX: f64 = 0.005;
 const IMPRECISE: f64 = 0.05;
 const SURVEY: f64 = 0.02;
-/// The part of a fix's that all of its object have in common.
+/// The part of a fix's variance that all fixes of its object share.
 const MODEL: f64 = 0.0045;
-/// That of a settled pose that is well known, and of one that is not.
+/// Standard deviations of a settled pose, for a small covariance and for a large one.
 const SETTLED: f64 = 0.004;
 const HARDLY: f64 = 1.0;
 
 impl Site {
-    /// A site, and a way of so many steps through it.
+    /// A site, and a route of `steps` steps through it.
     pub fn new(steps: usize) -> Self {
         let place = |xi: [f64; 6]| ObjectPlacement {
             world_from_object: Transform::exp(&xi.into()),
@@ -131,12 +132,12 @@ impl Site {
         Self { surveyed, step, cameras }
     }
 
-    /// The place of an object, so many shifts from where it was surveyed.
+    /// The pose of an object, displaced from its survey by a number of shifts.
     pub fn place(&self, object: usize, shifts: i32) -> Transform<World, Object> {
         shifted(shifts) * self.surveyed[object].world_from_object
     }
 
-    /// The camera after so many steps relative to an object, so many shifts off by the survey.
+    /// The camera's pose relative to an object after a number of steps, with an error in shifts by the survey.
     pub fn camera(&self, object: usize, steps: usize, shifts: i32) -> Transform<Object, Camera> {
         self.surveyed[object].world_from_object.inverse() * shifted(shifts) * self.cameras[steps]
     }
@@ -160,18 +161,18 @@ fn shifted(times: i32) -> Transform<World, World> {
     Transform::new(nalgebra::UnitQuaternion::identity(), Vector3::from(SHIFT) * f64::from(times))
 }
 
-/// What a navigator did.
+/// The result of an event for a navigator.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Did {
-    /// What the fix did.
+    /// The navigator's event for a fix.
     Fix(Event),
-    /// What it answered.
+    /// The answer to a question.
     Said(bool),
-    /// It answers nothing.
+    /// No answer.
     Went,
 }
 
-/// What an event of a fix must be.
+/// The expected event of a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Must {
     /// [`Event::Taken`].
@@ -182,18 +183,18 @@ pub enum Must {
     Doubted,
     /// [`Event::Relocated`].
     Relocated,
-    /// [`Event::Disputed`] of these two, the second so many shifts from its place if the first stands right.
+    /// [`Event::Disputed`] of these two; the second is displaced by this number of shifts if the first is right.
     Disputed([usize; 2], i32),
-    /// [`Event::Displaced`] of this object by so many shifts.
+    /// [`Event::Displaced`] of this object by this number of shifts.
     Displaced(usize, i32),
     /// The answer to a question.
     Said(bool),
-    /// Nothing that is told.
+    /// No event.
     Went,
 }
 
 impl Must {
-    /// Whether it is what was done.
+    /// Whether the result is as expected.
     pub fn is(self, did: &Did, site: &Site) -> bool {
         let near = |x: f64, y: f64| (x - y).abs() < 1e-9;
         let shift = Vector3::from(SHIFT).norm();
@@ -218,29 +219,29 @@ impl Must {
     }
 }
 
-/// Two objects of which one stands elsewhere, and where each stands if the other is right.
+/// Two objects of which one is displaced, and the pose of each if the other is right.
 #[derive(Debug, Clone)]
 struct Dispute {
     objects: [usize; 2],
     moved: [i32; 2],
 }
 
-/// What must be known, in whole numbers.
+/// The expected state of the navigator, in integers.
 #[derive(Debug, Clone)]
 pub struct Ledger {
-    /// The object of the last fix taken, and how many shifts the camera is off by it and the survey.
+    /// The object of the last accepted fix, and the camera's error in shifts by it and the survey.
     pub known: Option<(usize, i32)>,
-    /// Where the objects stand.
+    /// The poses of the objects.
     pub places: [i32; OBJECTS],
-    /// Of each object the fixes that were doubted: what the last said, and how many in a row.
+    /// For each object, the doubted fixes: the last one, and the number of successive ones.
     doubts: [Option<(i32, usize)>; OBJECTS],
     agreed: Vec<[usize; 2]>,
     disputes: Vec<Dispute>,
-    /// What the pose rests on.
+    /// The basis of the pose.
     pub state: State,
-    /// Seconds, and those with a motion, since a fix was taken; none before.
+    /// Seconds, and seconds with a motion, since the last accepted fix; `None` before.
     pub since: Option<(f64, usize)>,
-    /// Steps in all.
+    /// Number of steps.
     pub steps: usize,
 }
 
@@ -260,7 +261,8 @@ impl Default for Ledger {
 }
 
 impl Ledger {
-    /// What this does to it, where `better` says whether a settled pose is better known than what there is; and what must be answered.
+    /// Applies an event and returns the expected result; `better` states whether a settled pose is better known than
+    /// the current one.
     pub fn enter(&mut self, happening: Happening, better: bool) -> Must {
         match happening {
             Happening::Step => {
@@ -304,17 +306,17 @@ impl Ledger {
         }
     }
 
-    /// Whether an object is one of two of which one was moved.
+    /// Whether an object is one of two of which one is displaced.
     pub fn is_disputed(&self, object: usize) -> bool {
         self.disputes.iter().any(|dispute| dispute.objects.contains(&object))
     }
 
-    /// How many shifts the camera is off by the survey of any object.
+    /// The camera's error in shifts by the survey of an object.
     pub fn known_at(&self, object: usize) -> Option<i32> {
         self.known.map(|(known, off)| self.places[known] + off - self.seen_from(known, object))
     }
 
-    /// Where an object stands, seen from another that stands where it was surveyed or found.
+    /// The pose of an object relative to another one that is at its surveyed or corrected position.
     fn seen_from(&self, known: usize, object: usize) -> i32 {
         let between = self.disputes.iter().find(|one| one.objects.contains(&known) && one.objects.contains(&object));
         match between {
@@ -378,7 +380,7 @@ impl Ledger {
             self.take(object, off);
             return Must::Relocated;
         }
-        // World of the camera by either, the other object's place from it.
+        // The camera in the world by either object, and the other object's pose from it.
         let camera = [self.places[known] + by, self.places[object] + off];
         let moved = [camera[1] - by, camera[0] - off];
         let confirmed =
@@ -397,7 +399,8 @@ impl Ledger {
         }
     }
 
-    /// Which of two objects was moved: a third confirms the survey of one of them, or that it was moved, and not both.
+    /// The displaced object of two: a third confirms either the survey of one of them or its displacement, and not
+    /// both.
     fn verdict(&self, object: usize, off: i32) -> Option<(usize, i32)> {
         let (known, by) = self.known.filter(|(known, _)| *known != object)?;
         self.disputes.iter().find_map(|dispute| {
@@ -407,7 +410,7 @@ impl Ledger {
                 (false, true) => 1,
                 _ => return None,
             };
-            // How far both are apart in what they say of the camera; the suspect's place belongs to one of them.
+            // The difference of the camera's poses by both objects; the suspect's pose belongs to one of them.
             let apart = self.places[known] + by - self.places[object] - off;
             let farther = dispute.moved[side] - self.places[dispute.objects[side]];
             let sign = if dispute.objects[side] == known { 1 } else { -1 };
@@ -429,10 +432,10 @@ impl Ledger {
     }
 }
 
-/// How long it is blind (s).
+/// Duration of a gap without images (s).
 pub const BLIND: f64 = 0.5;
 
-/// Lets something happen to a navigator, after so many steps.
+/// Applies an event to a navigator after a number of steps.
 pub fn happens(navigator: &mut Navigator<'_>, site: &Site, steps: usize, happening: Happening) -> Did {
     match happening {
         Happening::Step => navigator.advance(1.0, Some(&site.step)),
@@ -447,7 +450,7 @@ pub fn happens(navigator: &mut Navigator<'_>, site: &Site, steps: usize, happeni
     Did::Went
 }
 
-/// Whether a settled pose is better known than this one of the same object.
+/// Whether a settled pose is better known than this pose of the same object.
 pub fn is_better(well: bool, known: Option<&Navigated>) -> bool {
     let sigma = settled(well).position_sigma();
     known.is_none_or(|known| sigma < known.object_pose.covariance.position_sigma())

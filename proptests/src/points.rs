@@ -6,13 +6,13 @@ use seafix_geometry::{Frame, Point};
 
 use crate::poses::{rotation, vector};
 
-/// Points with each coordinate within ±`reach` (m).
+/// Points with coordinates within ±`reach` (m).
 pub fn point<F: Frame>(reach: f64) -> impl Strategy<Value = Point<F>> {
     vector(reach).prop_map(Point::from)
 }
 
-/// Triangles with two sides of 0.3 to 10 m, every angle's sine at least 1e-3 (the thinnest base a
-/// site file may have), the first corner within ±50 m along each axis; one in three is thin.
+/// Triangles with two sides of 0.3 to 10 m and sines of all angles of at least 1e-3 (the thinnest base of a site file),
+/// the first corner within ±50 m on each axis; one in three is thin.
 pub fn triangle<F: Frame>() -> impl Strategy<Value = [Point<F>; 3]> {
     let angle = prop_oneof![2 => 0.05..3.0, 1 => (-2.9..-1.0).prop_map(|e: f64| 10f64.powf(e))];
     (vector(50.0), rotation(), 0.3..10.0, 0.3..10.0, angle)

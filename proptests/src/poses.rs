@@ -19,8 +19,8 @@ pub fn turn(angles: impl Strategy<Value = f64>) -> impl Strategy<Value = UnitQua
     (direction(), angles).prop_map(|(axis, angle)| so3::exp(&(axis * angle)))
 }
 
-/// Any rotation: mostly uniform (Shoemake, *Uniform random rotations*, 1992), at times the identity,
-/// a small turn, a half turn, or nearly one.
+/// Rotations: mostly uniform (Shoemake, *Uniform random rotations*, 1992), sometimes the identity, a small rotation, a
+/// half-turn, or nearly one.
 pub fn rotation() -> impl Strategy<Value = UnitQuaternion<f64>> {
     let uniform = (0.0..=1.0, 0.0..TAU, 0.0..TAU).prop_map(|(u, a, b): (f64, f64, f64)| {
         let (s, c) = ((1.0 - u).sqrt(), u.sqrt());
@@ -35,18 +35,17 @@ pub fn rotation() -> impl Strategy<Value = UnitQuaternion<f64>> {
     ]
 }
 
-/// Vectors with each coordinate within ±`reach` (m).
+/// Vectors with coordinates within ±`reach` (m).
 pub fn vector(reach: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-reach..=reach).prop_map(Vector3::from)
 }
 
-/// Rigid motions with any rotation and a translation within ±`reach` (m) along each axis.
+/// Rigid motions with any rotation and a translation within ±`reach` (m) on each axis.
 pub fn pose<A: Frame, B: Frame>(reach: f64) -> impl Strategy<Value = Transform<A, B>> {
     (rotation(), vector(reach)).prop_map(|(rotation, translation)| Transform::new(rotation, translation))
 }
 
-/// How far two motions are apart: the angle between them (rad) and the distance of their
-/// translations (m).
+/// The difference of two motions: the angle between them (rad) and the distance of their translations (m).
 pub fn apart<A: Frame, B: Frame>(a: &Transform<A, B>, b: &Transform<A, B>) -> (f64, f64) {
     (so3::angle(&(a.rotation().inverse() * b.rotation())), (a.translation() - b.translation()).norm())
 }

@@ -1,4 +1,4 @@
-//! Coherence problems with a planted answer.
+//! Coherence problems with a known solution.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::{prelude::*, sample::Index};
@@ -7,25 +7,25 @@ use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, Tolera
 
 use crate::poses::{rotation, vector};
 
-/// A problem and what was planted in it.
+/// A problem and its solution.
 #[derive(Debug, Clone)]
 pub struct Planted {
     /// The model's points.
     pub model: Vec<ModelPoint>,
-    /// The cloud: first the images of the visible points, then decoys, then clutter.
+    /// The cloud: images of visible points, then decoys, then clutter.
     pub cloud: Vec<MeasuredPoint>,
-    /// The true image of every visible point, and others.
+    /// The candidates: the true image of every visible point, and others.
     pub candidates: Candidates,
-    /// When distances agree.
+    /// The tolerance of distances.
     pub tolerance: Tolerance,
     /// The true pairs, of the visible points.
     pub truth: Vec<Correspondence>,
-    /// Where the camera is.
+    /// The true pose of the camera.
     pub pose: Transform<Object, Camera>,
 }
 
 impl Planted {
-    /// The problem as a search takes it.
+    /// The problem for a search.
     pub fn problem(&self) -> Problem<'_> {
         Problem {
             model: &self.model,
@@ -37,10 +37,10 @@ impl Planted {
     }
 }
 
-/// A problem of a file with its candidates listed.
+/// The problem of a file with its candidates.
 #[derive(Debug, Clone)]
 pub struct Listed {
-    /// What the file says.
+    /// The problem of the file.
     pub file: CoherenceProblem,
     /// Its candidates.
     pub candidates: Candidates,
@@ -56,7 +56,7 @@ impl Listed {
         Self { file, candidates }
     }
 
-    /// The problem as a search takes it.
+    /// The problem for a search.
     pub fn problem(&self) -> Problem<'_> {
         let Self { file, candidates } = self;
         Problem {
@@ -69,44 +69,44 @@ impl Listed {
     }
 }
 
-/// How the points of a model lie.
+/// The arrangement of a model's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
     /// Anywhere in a box of 2 × 1.5 × 1 m.
     Scattered,
-    /// On a lattice of 0.25 m, 3 × 3 × 3: many equal distances, many mirror images of parts.
+    /// On a lattice of 0.25 m, 3 × 3 × 3: many equal distances and many mirror images of parts.
     Lattice,
-    /// In one plane, 2 × 1.5 m.
+    /// In a plane, 2 × 1.5 m.
     Flat,
-    /// Within a few tolerances of each other, the images being each other's candidates: two model points
-    /// may both suit one cloud point.
+    /// Within a few tolerances of each other, with images that are candidates of each other: one cloud point may suit
+    /// two model points.
     Dense,
 }
 
-/// The most points a problem may have, and the most candidates a point.
+/// The maximum size of a problem.
 #[derive(Debug, Clone, Copy)]
 pub struct Size {
-    /// Model points.
+    /// Maximum number of model points.
     pub points: usize,
-    /// Candidates a point.
+    /// Maximum number of candidates of a point.
     pub list: usize,
-    /// Points of the cloud that are neither images nor decoys.
+    /// Maximum number of cloud points that are neither images nor decoys.
     pub clutter: usize,
 }
 
-/// What brute force can enumerate: 7 points, 4 candidates each.
+/// A size for brute force: 7 points, 4 candidates each.
 pub const SMALL: Size = Size { points: 7, list: 4, clutter: 6 };
-/// What exact searches can settle, all alike.
+/// A size for exact searches, with equal numbers of candidates.
 pub const MEDIUM: Size = Size { points: 11, list: 5, clutter: 20 };
-/// What it cannot: more vertices than a machine word has bits.
+/// A size beyond brute force: more vertices than bits of a machine word.
 pub const LARGE: Size = Size { points: 24, list: 6, clutter: 60 };
 
-/// One model point's draws.
+/// The draws of a model point.
 #[derive(Debug, Clone)]
 struct Generated {
     place: Vector3<f64>,
     cell: [u8; 3],
-    /// Of its image, and of its decoy (shares of the problem's noise).
+    /// The noise of its image, and of its decoy (fractions of the problem's noise).
     noise: [Vector3<f64>; 2],
     visible: bool,
     /// Whether the cloud also holds the image of its reflection.
@@ -137,7 +137,7 @@ fn generated(list: usize) -> impl Strategy<Value = Generated> {
         })
 }
 
-/// What all points of a problem share.
+/// The common draws of a problem.
 #[derive(Debug, Clone)]
 struct Shared {
     layout: Layout,
@@ -145,9 +145,9 @@ struct Shared {
     /// Whether the cloud is the model's mirror image.
     mirrored: bool,
     tolerance: Tolerance,
-    /// Greatest noise of a coordinate (m).
+    /// Maximum noise of a coordinate (m).
     noise: f64,
-    /// Standard deviations (m) of measured points along the camera's axes, of model points.
+    /// Standard deviations (m) of measured points on the camera's axes, and of model points.
     sigma: [f64; 4],
 }
 
@@ -164,7 +164,7 @@ fn shared() -> impl Strategy<Value = Shared> {
         .prop_map(|(layout, camera_from_object, mirrored, tolerance, noise, exactly, (across, depth, model))| {
             let (noise, across) = match tolerance {
                 Tolerance::Fixed(delta) => (noise * delta * 0.4, across * exactly),
-                // A tolerance of no width finds nothing: measured points are uncertain here.
+                // A tolerance of zero accepts nothing: measured points are uncertain here.
                 Tolerance::Sigmas(_) => (noise * (across + 1e-3), across + 1e-3),
             };
             Shared {
@@ -220,7 +220,7 @@ fn plant(shared: &Shared, points: &[Generated], clutter: &[Vector3<f64>]) -> Pla
     }
     places.extend(clutter.iter().map(|p| shared.camera_from_object * Point::from(p.component_mul(&extent))));
     for (list, generated) in lists.iter_mut().zip(points) {
-        // Images and decoys come first; the list grows to as many as were drawn.
+        // Images and decoys come first; clutter extends the list to the drawn length.
         let reach = if shared.layout == Layout::Dense { truth.len() } else { places.len() };
         let more = generated.others.len().saturating_sub(list.len());
         list.extend(generated.others.iter().filter(|_| reach > 0).take(more).map(|other| other.index(reach)));

@@ -1,4 +1,4 @@
-//! Stereo rigs and points that they see.
+//! Stereo rigs and points in their view.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -6,13 +6,12 @@ use seafix_geometry::{Camera, Pinhole, Point, StereoRig, Transform};
 
 use crate::poses::turn;
 
-/// The greatest depth (m) of a drawn point.
+/// Maximum depth of a point (m).
 pub const FARTHEST: f64 = 20.0;
-/// The least focal length times baseline (px m) of a drawn rig.
+/// Minimum focal length times baseline of a rig (px m).
 pub const MIN_FB: f64 = 50.0;
 
-/// A camera of 1024 to 4096 × 768 to 3072 px, 53 to 102 degrees wide, its principal point near the
-/// middle.
+/// Cameras of 1024 to 4096 × 768 to 3072 px, 53 to 102 degrees wide, with the principal point near the middle.
 fn pinhole(distortion: Vec<f64>) -> impl Strategy<Value = Pinhole> {
     (1u32..=4, 0.4..1.0, 0.98..1.02, 0.45..0.55, 0.45..0.55).prop_map(move |(scale, widths, aspect, x, y)| {
         let size = [1024 * scale, 768 * scale];
@@ -22,7 +21,7 @@ fn pinhole(distortion: Vec<f64>) -> impl Strategy<Value = Pinhole> {
     })
 }
 
-/// Two equal cameras without distortion, one beside the other along x.
+/// Rigs of two equal cameras without distortion, side by side on x.
 pub fn rectified() -> impl Strategy<Value = StereoRig> {
     (pinhole(Vec::new()), 1.0..4.0).prop_map(|(camera, fold): (Pinhole, f64)| {
         let baseline = Vector3::new(-fold * MIN_FB / camera.focal()[0], 0.0, 0.0);
@@ -31,9 +30,9 @@ pub fn rectified() -> impl Strategy<Value = StereoRig> {
     })
 }
 
-/// Two different cameras with mild lens distortion of 4, 5 or 8 coefficients, the second displaced in
-/// any direction across the axis (vertical baselines included) and a little along it, turned by up
-/// to 15 degrees about any axis.
+/// Rigs of two different cameras with mild lens distortion of 4, 5 or 8 coefficients. The second is displaced in any
+/// direction across the axis (vertical baselines included) and a little along it, and rotated by up to 15 degrees about
+/// any axis.
 pub fn general() -> impl Strategy<Value = StereoRig> {
     let lens = || {
         let coefficient = |limit: f64| -limit..=limit;
@@ -62,13 +61,12 @@ pub fn general() -> impl Strategy<Value = StereoRig> {
     )
 }
 
-/// Places in the left image and depths; the law decides whether the other camera sees the point.
+/// Pixels of the left image with depths; the law decides whether the other camera sees the point.
 pub fn seen_by_left() -> impl Strategy<Value = (f64, f64, f64)> {
     (0.0..=1.0, 0.0..=1.0, 0.3..=FARTHEST)
 }
 
-/// The point at this share of the left image's width and height, at depth `z` (m), where the lens
-/// model has one.
+/// The point at these fractions of the left image's width and height, at depth `z` (m), if the lens model has one.
 pub fn point_at(rig: &StereoRig, (across, down, z): (f64, f64, f64)) -> Option<Point<Camera>> {
     let [width, height] = rig.left().size().map(|pixels| f64::from(pixels - 1));
     let direction = rig.left().normalize(&seafix_geometry::Pixel { u: across * width, v: down * height })?;

@@ -1,4 +1,4 @@
-//! What solvers are given: identified points, with the pose they were made from.
+//! Inputs of solvers: identified points with their true pose.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -10,30 +10,30 @@ use crate::{
     rigs,
 };
 
-/// Identified points, the rig that saw them if there is one, and the true pose.
+/// Identified points, their rig if any, and the true pose.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// The points.
     pub points: Vec<Observation>,
     /// The rig.
     pub rig: Option<StereoRig>,
-    /// Where the points were seen from.
+    /// The true pose of the camera.
     pub object_from_camera: Transform<Object, Camera>,
 }
 
 impl Scene {
-    /// The points as a solver takes them.
+    /// The observations for a solver.
     pub fn observations(&self) -> Observations<'_> {
         Observations { points: self.points.clone(), rig: self.rig.as_ref() }
     }
 
-    /// Sum of squared residuals C·H − P (m²).
+    /// The sum of squared residuals C·H − P (m²).
     pub fn squares(&self, object_from_camera: &Transform<Object, Camera>) -> f64 {
         self.points.iter().map(|point| point.residual(object_from_camera).norm_squared()).sum()
     }
 
-    /// The scene with its camera moved: `motion` carries the old camera's coordinates to the new one's.
-    /// Bare points only; the pixels of a moved camera would be others.
+    /// The scene with a moved camera: `motion` maps the old camera's coordinates to the new one's. Only for points
+    /// without pixels, which would change.
     #[must_use]
     pub fn camera_moved(&self, motion: &Transform<Camera, Camera>) -> Self {
         let r = motion.rotation_matrix();
@@ -48,7 +48,7 @@ impl Scene {
         moved
     }
 
-    /// The scene with its object moved within the object's frame.
+    /// The scene with the object moved in the object's frame.
     #[must_use]
     pub fn object_moved(&self, motion: &Transform<Object, Object>) -> Self {
         let mut moved = self.clone();
@@ -59,7 +59,7 @@ impl Scene {
         moved
     }
 
-    /// The scene as a mirror shows it: the measured points reflected in the camera's x.
+    /// The mirrored scene: measured points reflected in the camera's x.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let mut mirrored = self.clone();
@@ -72,8 +72,8 @@ impl Scene {
     }
 }
 
-/// Model points about the object's origin: 3 to 16, 0.6 to 6 m in extent, in a plane or not, no
-/// nearer to a line than a second extent of 0.2 of the first.
+/// Model points about the object's origin: 3 to 16, 0.6 to 6 m in extent, planar or not, with a second extent of at
+/// least 0.2 of the first.
 pub fn model() -> impl Strategy<Value = Vec<Vector3<f64>>> {
     let flat = prop::bool::weighted(0.25);
     (prop::collection::vec(vector(1.0), 3..=16), rotation(), flat, 0.3..3.0)
@@ -87,7 +87,7 @@ pub fn model() -> impl Strategy<Value = Vec<Vector3<f64>>> {
         })
 }
 
-/// Eigenvalues of the scatter of points about their centroid (m²), ascending.
+/// The eigenvalues of the scatter of points about their centroid (m²), ascending.
 pub fn extents(points: &[Vector3<f64>]) -> [f64; 3] {
     let centre: Vector3<f64> = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let scatter: Matrix3<f64> = points.iter().map(|p| (p - centre) * (p - centre).transpose()).sum();
@@ -96,8 +96,7 @@ pub fn extents(points: &[Vector3<f64>]) -> [f64; 3] {
     values
 }
 
-/// The corners of a box of 1 × 0.8 × 0.6 m, 4 m before the camera, bare and without noise: the easiest
-/// scene there is.
+/// The corners of a box of 1 × 0.8 × 0.6 m, 4 m before the camera, without pixels and noise: the easiest scene.
 pub fn corners() -> Scene {
     let truth = Transform::new(UnitQuaternion::identity(), Vector3::new(0.0, 0.0, -4.0));
     let points = (0..8).map(|i| {
@@ -112,8 +111,8 @@ pub fn corners() -> Scene {
     Scene { points: points.collect(), rig: None, object_from_camera: truth }
 }
 
-/// Bare points from a camera anywhere within ±`reach` (m), each coordinate with up to `noise` (m) of
-/// noise, three times that in depth.
+/// Points without pixels, from a camera anywhere within ±`reach` (m), with a noise of up to `noise` (m) on each
+/// coordinate, and three times that in depth.
 pub fn bare(reach: f64, noise: f64) -> impl Strategy<Value = Scene> {
     let noises = prop::collection::vec(vector(1.0), 16);
     (model(), pose::<Object, Camera>(reach), noises, 0.5..2.0).prop_map(move |(model, truth, noises, trust)| {
@@ -133,8 +132,8 @@ pub fn bare(reach: f64, noise: f64) -> impl Strategy<Value = Scene> {
     })
 }
 
-/// Points that a stereo rig sees at 4 to 12 m, their pixels off by up to `noise` (px), triangulated.
-/// Three at least, no nearer to a line than bare ones.
+/// Points of a stereo rig at 4 to 12 m, triangulated from pixels with a noise of up to `noise` (px). At least three
+/// points, as far from a line as those without pixels.
 pub fn seen(noise: f64) -> impl Strategy<Value = Scene> {
     let noises = prop::collection::vec(prop::array::uniform4(-1.0..=1.0f64), 16);
     (rigs::rectified(), model(), rotation(), 4.0..12.0, noises).prop_filter_map(

@@ -1,4 +1,4 @@
-//! All searches, what each claims, and what it is given.
+//! All searches, their claims and their inputs.
 
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use seafix_geometry::Transform;
@@ -9,22 +9,22 @@ use crate::{
     variants::{Variant, variants},
 };
 
-/// What a search says.
+/// The answer of a search.
 pub type Answer = Result<Identification, Rejected>;
 
-/// What a search claims beyond what all do: coherent, one-to-one sets without mirror images, honest bounds, and no
+/// The claims of a search beyond those of all: coherent, one-to-one sets without mirror images, valid bounds, and no
 /// dependence on the order of the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Claims {
-    /// Within its budget, that no admissible set is larger.
+    /// The maximum admissible set, within its budget.
     pub exact: bool,
-    /// That it names every other set of the same size, or says that it does not.
+    /// All other sets of the same size, or a notice that they are not listed.
     pub ties: bool,
-    /// That it begins at a prior, and refuses without one.
+    /// A start at a prior, and rejection without one.
     pub prior: bool,
 }
 
-/// The claims by name. One that is not listed claims the most.
+/// The claims by name; an unlisted search claims everything.
 const CLAIMS: [(&str, Claims); 12] = {
     const EXACT: Claims = Claims { exact: true, ties: true, prior: false };
     const RANKS: Claims = Claims { exact: false, ties: false, ..EXACT };
@@ -45,17 +45,17 @@ const CLAIMS: [(&str, Claims); 12] = {
     ]
 };
 
-/// A search with settings chosen, and its claims.
+/// A search with chosen settings, and its claims.
 #[derive(Debug)]
 pub struct Tried {
     variant: Variant<dyn Search>,
-    /// What a failure calls it.
+    /// The name for failures.
     pub name: String,
-    /// What it claims.
+    /// The claims.
     pub claims: Claims,
 }
 
-/// Every search with every combination of its switches; its budget, if it has one, as given.
+/// Every search with every combination of its switches, and with the given budget if it has one.
 pub fn searches(budget: i64) -> Vec<Tried> {
     let max = Claims { exact: true, ties: true, prior: false };
     let claims = |name: &str| CLAIMS.iter().find(|(listed, _)| *listed == name).map_or(max, |(_, claims)| *claims);
@@ -67,7 +67,7 @@ pub fn searches(budget: i64) -> Vec<Tried> {
 }
 
 impl Tried {
-    /// Whether it refuses mirror images. One without the switch is held to it.
+    /// Whether it rejects mirror images; a search without the switch must do so.
     pub fn refuses_mirrors(&self) -> bool {
         self.variant.switch("orientation").unwrap_or(true)
     }
@@ -77,35 +77,35 @@ impl Tried {
         self.variant.has("budget")
     }
 
-    /// The value of a switch; `None` where it has none.
+    /// The value of a switch; `None` if it has none.
     pub fn switch(&self, key: &str) -> Option<bool> {
         self.variant.switch(key)
     }
 
-    /// Its answer; a search that begins at a prior is given the pose that was planted, within 10 m.
+    /// The answer; a search that starts at a prior gets the true pose, within 10 m.
     pub fn answer(&self, planted: &Planted) -> Answer {
         let prior = Prior { object_from_camera: planted.pose, bound: PriorBound::Box(10.0) };
         let prior = self.claims.prior.then_some(&prior);
         self.answer_to(&Problem { prior, ..planted.problem() })
     }
 
-    /// Its answer to a problem as it is.
+    /// The answer to an unchanged problem.
     pub fn answer_to(&self, problem: &Problem<'_>) -> Answer {
         self.variant.component.search(problem, &mut ChaCha8Rng::seed_from_u64(7))
     }
 }
 
-/// All sets that an answer names.
+/// All sets of an answer.
 pub fn sets(answer: &Answer) -> impl Iterator<Item = &Vec<Correspondence>> {
     answer.iter().flat_map(|found| std::iter::once(&found.pairs).chain(&found.alternatives))
 }
 
-/// The pose of a problem that has none.
+/// The pose of a problem without one.
 pub fn nowhere() -> Transform<seafix_geometry::Object, seafix_geometry::Camera> {
     Transform::identity()
 }
 
-/// Whether a set is called the largest; a search by likelihood calls it the likeliest.
+/// Whether a set is claimed to be maximum; a search by likelihood claims it to be most probable.
 pub fn is_proved_largest(found: &Identification) -> bool {
     found.optimal && found.posterior.is_none()
 }

@@ -6,9 +6,9 @@ use toml::Value;
 /// A component built from a choice.
 #[derive(Debug)]
 pub struct Variant<T: ?Sized> {
-    /// The choice with every setting written out.
+    /// The choice with all settings.
     choice: Choice,
-    /// What a failure calls it: name and the settings that were chosen.
+    /// The name for failures: component and chosen settings.
     pub name: String,
     /// The component.
     pub component: Box<T>,
@@ -20,18 +20,17 @@ impl<T: ?Sized> Variant<T> {
         self.choice.settings.contains_key(key)
     }
 
-    /// The value of a switch of this name; `None` where the component has none.
+    /// The value of a switch of this name; `None` if the component has none.
     pub fn switch(&self, key: &str) -> Option<bool> {
         self.choice.settings.get(key)?.as_bool()
     }
 }
 
-/// All components of a registry, each with every combination of its switches (the settings that are
-/// true or false, or one of a few words). `given` settings replace the default wherever a component
-/// has them.
+/// All components of a registry with every combination of their switches (boolean settings, and settings with a few
+/// words). The `given` settings replace the default of every component that has them.
 ///
 /// # Panics
-/// When a listed component cannot be built from its own settings.
+/// If a listed component cannot be built from its own settings.
 pub fn variants<T: ?Sized>(registry: &Registry<T>, given: &[(&str, i64)]) -> Vec<Variant<T>> {
     let variants_of = |listing: &Listing| {
         let has = |(key, _): &&(&str, i64)| listing.defaults.contains_key(*key);
@@ -55,11 +54,11 @@ pub fn variants<T: ?Sized>(registry: &Registry<T>, given: &[(&str, i64)]) -> Vec
     registry.listings().iter().flat_map(variants_of).map(build).collect()
 }
 
-/// The values of a switch; of any other setting only what it is.
+/// The values of a switch; for any other setting only its type.
 fn values_of<T: ?Sized>(registry: &Registry<T>, name: &str, key: &str, default: &Value) -> Vec<Value> {
     match default {
         Value::Boolean(_) => vec![true.into(), false.into()],
-        // The refusal of a word that is none of them names them all.
+        // The error of an invalid word lists all valid ones.
         Value::String(_) => match registry.build(&Choice::named(name).with(key, "\u{1}")) {
             Ok(_) => vec![default.clone()],
             Err(refusal) => {

@@ -1,4 +1,4 @@
-//! An object before the camera, some of its points seen among clutter: what the default search is asked of scenes drawn for a law.
+//! An object before the camera, with some points in view among clutter: scenes for laws of the default search.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
@@ -8,38 +8,39 @@ use seafix_referencing::{
 };
 use seafix_simulation::{Purpose, Stream};
 
-/// Anywhere in a box of these half-sizes about the origin, evenly.
+/// Uniform positions in a box of these half-sizes about the origin.
 pub fn anywhere(stream: &mut Stream, half: [f64; 3]) -> Vector3<f64> {
     Vector3::from(half.map(|half| stream.between(-half, half)))
 }
 
-/// A turn by up to 3.1 rad about any axis.
+/// A rotation by up to 3.1 rad about any axis.
 pub fn any_turn(stream: &mut Stream) -> UnitQuaternion<f64> {
     so3::exp(&(stream.normal3(1.0).normalize() * stream.between(0.0, 3.1)))
 }
 
-/// A model of exact points that are seen from everywhere.
+/// A model of exact points without normals.
 pub fn exact_model(points: &[Vector3<f64>]) -> Vec<ModelPoint> {
     let point = |(k, at): (usize, &Vector3<f64>)| ModelPoint::exact(format!("p{k}"), Point::from(*at));
     points.iter().enumerate().map(point).collect()
 }
 
-/// What is measured of an object, and where it is.
+/// The measurements of an object, and its pose.
 #[derive(Debug, Clone)]
 pub struct View {
     /// The object.
     pub model: Vec<ModelPoint>,
-    /// The points seen of it, then clutter.
+    /// The measured points of it, then clutter.
     pub cloud: Vec<MeasuredPoint>,
     /// The true pose.
     pub truth: Transform<Object, Camera>,
-    /// A rough pose, if there is one.
+    /// The prior pose, if any.
     pub prior: Option<Prior>,
     sigma: f64,
 }
 
 impl View {
-    /// These points of a model as they are measured, each coordinate to `sigma` (m), without clutter and without a rough pose.
+    /// The measurements of these model points, with noise `sigma` (m) on each coordinate, without clutter and prior
+    /// pose.
     pub fn of(
         stream: &mut Stream,
         model: Vec<ModelPoint>,
@@ -56,7 +57,7 @@ impl View {
         view
     }
 
-    /// So many points of clutter beside them, anywhere in a box of these half-sizes (m), `distance` (m) ahead.
+    /// Adds clutter points, uniform in a box of these half-sizes (m), `distance` (m) ahead.
     #[must_use]
     pub fn among(mut self, stream: &mut Stream, count: usize, distance: f64, half: [f64; 3]) -> Self {
         for _ in 0..count {
@@ -65,8 +66,9 @@ impl View {
         self
     }
 
-    /// A rough pose that has every model point within `half` (m) of its place along each camera axis: the true one, turned and then
-    /// moved by what `error` draws (rad about the camera's axes, m), of which the first that is near enough is taken.
+    /// A prior pose that predicts every model point within `half` (m) of its true position on each camera axis. It is
+    /// the true pose, rotated and then shifted by a draw of `error` (rad about the camera's axes, m); the first draw
+    /// that is near enough is used.
     #[must_use]
     pub fn before(mut self, half: f64, mut error: impl FnMut() -> [Vector3<f64>; 2]) -> Self {
         let camera_from_object = self.truth.inverse();
@@ -86,7 +88,7 @@ impl View {
         self.cloud.push(MeasuredPoint { position: UncertainPoint::isotropic(at, self.sigma), pixels: None });
     }
 
-    /// What the default search and `mahalanobis` make of it, candidates by the rough pose, or all where there is none.
+    /// The answer of the default search and `mahalanobis`, with candidates by the prior pose, or all without one.
     pub fn outcome(&self, delta: f64, acceptance: &Acceptance) -> Outcome {
         let Self { model, cloud, prior, .. } = self;
         let candidates = match prior {
@@ -96,7 +98,7 @@ impl View {
         self.outcome_of(&candidates, delta, acceptance)
     }
 
-    /// The same of these candidates.
+    /// The same for these candidates.
     pub fn outcome_of(&self, candidates: &Candidates, delta: f64, acceptance: &Acceptance) -> Outcome {
         let Self { model, cloud, prior, .. } = self;
         let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Fixed(delta), prior: prior.as_ref() };
