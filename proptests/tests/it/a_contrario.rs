@@ -1,4 +1,4 @@
-//! The expected number of chance sets is what frames without the object show.
+//! The number of false alarms equals the number observed in frames without the object.
 
 use seafix_geometry::{Point, UncertainPoint};
 use seafix_referencing::{
@@ -11,22 +11,22 @@ use seafix_simulation::{
 
 /// Bounds of the bins of the prediction.
 const BINS: [f64; 6] = [1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
-/// χ² per degree of freedom that sets may have.
+/// Maximum χ² per degree of freedom of a counted set.
 const EACH: [f64; 7] = [0.1, 0.2, 0.4, 0.7, 1.2, 2.0, 3.0];
-/// A bin with fewer sets says nothing.
+/// Minimum number of sets in a bin; a smaller bin is ignored.
 const ENOUGH: f64 = 100.0;
 const SIZES: std::ops::RangeInclusive<usize> = 3..=7;
 
-/// How the clutter of a frame lies.
+/// The distribution of a frame's clutter.
 #[derive(Clone, Copy, PartialEq)]
 enum Clutter {
-    /// As the null model has it: the candidates are drawn anew.
+    /// Clutter of the null model: candidates are drawn anew.
     Null,
-    /// As the family has it: on edges and the floor too.
+    /// Clutter of the family, also on edges and the floor.
     Family,
 }
 
-/// Predicted and observed numbers of sets, a bin of the prediction each.
+/// Predicted and observed numbers of sets for each bin of the prediction.
 #[derive(Default, Clone, Copy)]
 struct Bins {
     predicted: [f64; 5],
@@ -41,7 +41,7 @@ impl Bins {
         }
     }
 
-    /// Within a half and twice in every bin with enough sets.
+    /// Whether every bin with enough sets is predicted within a factor of two.
     fn hold(&self, family: &str) {
         for bin in (0..5).filter(|&bin| self.observed[bin] >= ENOUGH) {
             let ratio = self.observed[bin] / self.predicted[bin];
@@ -58,7 +58,7 @@ impl Bins {
     }
 }
 
-/// A frame without its object: the problem, and its candidates.
+/// A frame without its object: the problem and its candidates.
 fn frame(family: Family, number: u64, clutter: Clutter) -> (CoherenceProblem, Candidates) {
     let mut problem = Generated::new(family, 77, number, Presence::Absent).problem.problem();
     let mut candidates = problem.candidates().unwrap();
@@ -69,7 +69,7 @@ fn frame(family: Family, number: u64, clutter: Clutter) -> (CoherenceProblem, Ca
     (problem, candidates)
 }
 
-/// Draws the candidates anew by the null model, as many of each model point as there were.
+/// Draws the candidates anew by the null model, the same number for each model point.
 fn redraw(problem: &mut CoherenceProblem, candidates: &mut Candidates, stream: &mut Stream) {
     let covariance = problem.cloud[0].position.covariance;
     let measured =
@@ -186,15 +186,15 @@ fn small(family: Family) -> Box<dyn Fn(&u64) -> bool> {
     match family {
         Family::D => Box::new(|k| k / 4 % 13 < 4),
         Family::A | Family::E => Box::new(|_| true),
-        // Without those whose depth is worse: the sets are counted by one σ.
+        // Without problems of worse depth: sets are counted by one σ.
         Family::B => Box::new(|k| k % 3 == 0 && k / 9 % 2 == 0),
         _ => Box::new(|k| k % 3 == 0),
     }
 }
 
-/// Drawn anew, candidates show as many sets as are predicted, bin by bin.
+/// Candidates drawn anew have the predicted number of sets, bin by bin.
 ///
-/// Seen to fail when 2.5 times as many are predicted, and when 2.5 times as few are.
+/// Seen to fail when 2.5 times as many are predicted, and when 2.5 times fewer are.
 #[test]
 fn the_null_model_is_predicted() {
     let mut all = Bins::default();
@@ -208,11 +208,11 @@ fn the_null_model_is_predicted() {
     }
 }
 
-/// Every bin of every family: within a half and twice wherever a hundred sets or more were there, and where all families are
-/// put together in each bin. Clutter as the families have it, on edges and floors, is printed beside.
+/// Every bin of every family is predicted within a factor of two, if it has a hundred sets or more, and so is each bin
+/// over all families. Numbers for the families' own clutter, on edges and floors, are printed too.
 ///
-/// `cargo test --release -p seafix-proptests nfa:: -- --ignored --nocapture`; `CHANCE_FAMILIES` (abcdefg), `CHANCE_TIMES` (1)
-/// so many times the frames, `CHANCE_CLUTTER` (null family).
+/// `cargo test --release -p seafix-proptests nfa:: -- --ignored --nocapture`; `CHANCE_FAMILIES` (abcdefg),
+/// `CHANCE_TIMES` (1) multiplies the frames, `CHANCE_CLUTTER` (null family).
 #[test]
 #[ignore = "long: seven families"]
 fn every_bin_is_predicted() {
@@ -225,7 +225,7 @@ fn every_bin_is_predicted() {
         let mut all = Bins::default();
         for letter in families.chars() {
             let family: Family = letter.to_string().parse().expect("a family");
-            // Every set of a lattice cannot be listed.
+            // The sets of a lattice are too many to list.
             if family == Family::E && clutter == Clutter::Family {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! What is solved and what is wrongly believed, by how much is asked for.
+//! Solved problems and wrong answers for several settings of the acceptance.
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,23 @@ use seafix_proptests::problems::Listed;
 use seafix_referencing::{Acceptance, Mahalanobis, Outcome, RigidConsensus, Search, judge};
 use seafix_simulation::families::{Family, Generated, Presence};
 
-/// Nothing is refused as absent by this much.
+/// A bound of the probability of absence that rejects nothing.
 const ANYTHING: f64 = 0.999_999;
 
-/// What came of one drawn problem.
+/// The result of one generated problem.
 struct Tried {
-    /// Whether there is an answer to be had.
+    /// Whether the problem has a solution.
     defined: bool,
-    /// The believed probability that the object is not there, of what passes all other tests; 1 of what does not.
+    /// The probability of absence of a pose that passes all other tests; 1 of any other.
     absent: f64,
-    /// Of that, the part of a pattern that looks like it.
+    /// The part of it that is due to a repeated pattern.
     alike: f64,
-    /// Of the same, the expected number of chance sets as good, with the crowd about it.
+    /// The NFA of the same set, with the local density of clutter.
     nfa: f64,
-    /// Why the default settings do not believe it; `None` where they do.
+    /// The reason of the rejection by the default settings; `None` if they accept.
     refused: Option<&'static str>,
     right: bool,
-    /// Whether the likeliest pose is right, believed or not.
+    /// Whether the most probable pose is right, accepted or not.
     map_estimate: bool,
 }
 
@@ -38,7 +38,7 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
         Transform::<Camera, Object>::from_rows(&generated.truth.t_cam_obj).expect("it is a rigid motion").inverse();
     let rule = Solved { ideal_rms: generated.truth.ideal_tre_rms, putative: file.putative.is_some() };
     let at: Vec<Point<Object>> = file.model.iter().map(|point| point.at).collect();
-    // Nothing is refused for what chance gives either: the default's row is judged by the default.
+    // Nothing is rejected by its NFA either: the row of the default is judged by the default.
     let acceptance = Acceptance { absence: ANYTHING, max_nfa: f64::INFINITY, ..Acceptance::default() };
     let found = RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0));
     let posterior = found.as_ref().ok().and_then(|found| found.posterior.clone()).unwrap_or_default();
@@ -49,7 +49,7 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
     let by_default = judge(&problem, found.clone(), &solver, &Acceptance::default(), None).outcome;
     let refused = by_default.reason();
     let attempt = judge(&problem, found, &solver, &acceptance, None);
-    // With nothing refused as absent any second pose would be a copy: what the default answers is judged as it answers.
+    // Without rejection of absence any second pose would be a copy, so the default's answer is judged as it is.
     let answers = [by_default, attempt.outcome].into_iter().find(|outcome| matches!(outcome, Outcome::Fix(_)));
     if let Some(Outcome::Fix(reference)) = answers {
         let probabilities = posterior.probabilities(&file.model, 0.08);
@@ -61,12 +61,13 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
     Tried { defined: generated.truth.pose_defined, absent, alike, nfa, refused, right, map_estimate }
 }
 
-/// Solved (of the defined), wrong (of the answers, object present), and answered although the object is absent, for some
-/// settings of `acceptance.absence`.
+/// Numbers of solved (of those with a solution), wrong (of the answers with the object present), and answered problems
+/// without the object, for several values of `acceptance.absence`.
 ///
 /// `cargo test --release -p seafix-proptests acceptance:: -- --ignored --nocapture`; `ACCEPTANCE_FAMILIES` (abcdefg),
-/// `ACCEPTANCE_PRESENT` (252) and `ACCEPTANCE_ABSENT` (252) frames each, `ACCEPTANCE_SEED` (21), `ACCEPTANCE_PAIRS` the most
-/// candidate pairs of a problem, `ACCEPTANCE_STEP` from one problem's number to the next (3: of b, f and g those of 500 points).
+/// `ACCEPTANCE_PRESENT` (252) and `ACCEPTANCE_ABSENT` (252) frames of each family, `ACCEPTANCE_SEED` (21),
+/// `ACCEPTANCE_PAIRS`, the maximum number of candidate pairs of a problem, `ACCEPTANCE_STEP`, the step of the problems'
+/// numbers (3: those of 500 points in b, f and g).
 #[test]
 #[ignore = "table"]
 fn what_is_solved_depends_on_what_is_believed() {
@@ -112,13 +113,13 @@ fn what_is_solved_depends_on_what_is_believed() {
         for absence in [0.5, 0.1, 1e-2, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 1e-6] {
             row(format!("{absence:.0e}"), &|one| one.absent <= absence);
         }
-        // The defined that are not solved: why not, with the likeliest pose right and wrong.
+        // The unsolved problems with a solution: reasons, with the most probable pose right and wrong.
         let mut reasons: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
         for one in with.iter().filter(|one| one.defined && !(one.refused.is_none() && one.right)) {
             reasons.entry(one.refused.unwrap_or("answered")).or_default()[usize::from(!one.map_estimate)] += 1;
         }
         println!("{name}, of {defined} not solved (likeliest pose right, wrong): {reasons:?}");
-        // The default, or the expected number of chance sets and a bound of the probability of absence.
+        // The default, or the NFA with a bound of the probability of absence.
         for (nfa, absence) in [(1e-4, 1e-2), (3e-5, 1e-2), (1e-5, 1e-2), (3e-5, 5e-4), (1e-5, 5e-4)] {
             let rare = |one: &Tried| one.nfa <= nfa && one.absent <= absence && one.alike <= 2e-5;
             row(format!("{nfa:.0e} sets, {absence:.0e}"), &|one| one.refused.is_none() || rare(one));

@@ -1,4 +1,4 @@
-//! What a problem is answered depends on the problem, and on nothing else.
+//! An answer depends on the problem and on nothing else.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use seafix_referencing::{
 };
 use seafix_simulation::families::{Family, Generated, Presence};
 
-/// The numbers of the points of a problem in another order: the new place k has the old point order[k].
+/// A permutation of the points of a problem: the new index k has the old point order[k].
 struct Order {
     models: Vec<usize>,
     clouds: Vec<usize>,
@@ -36,7 +36,7 @@ impl Order {
         }
     }
 
-    /// The pairs by their old numbers.
+    /// The pairs by their old indices.
     fn back(&self, pairs: &[Correspondence]) -> Vec<Correspondence> {
         let old =
             |pair: &Correspondence| Correspondence { model: self.models[pair.model], cloud: self.clouds[pair.cloud] };
@@ -51,9 +51,9 @@ fn attempt(problem: &CoherenceProblem) -> Attempt {
     problem.attempt(&RigidConsensus::default(), &Mahalanobis::default(), &Acceptance::default(), &mut rng)
 }
 
-/// P24 of the whole answer: whether there is one, by which pairs, what is proved of it and how likely chance is.
+/// P24 for the complete answer: its pairs, what is proved of it, and its NFA do not depend on the order of the points.
 ///
-/// Seen to fail where the samples of the expected chance sets follow the numbers of the points.
+/// Seen to fail when the samples of the NFA depend on the indices of the points.
 #[test]
 fn the_order_of_the_points_changes_no_answer() {
     in_other_orders(2, 200, 1);
@@ -65,8 +65,8 @@ fn no_order_of_the_points_changes_an_answer() {
     in_other_orders(8, 500, 2);
 }
 
-/// So many problems of each family with and without the object, of the first that have no more points than this, each in so many other
-/// orders.
+/// Tests problems of each family with and without the object, the first ones up to a number of points, each in several
+/// other orders.
 fn in_other_orders(problems: usize, max_points: usize, orders: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(24);
     let mut outcomes = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Navigation from fix to fix: consistent, bounded, and not led astray by one wrong fix or a moved object.
+//! Navigation between fixes: consistent, bounded, and robust against a wrong fix or a displaced object.
 
 use nalgebra::Matrix6;
 use proptest::prelude::*;
@@ -12,9 +12,9 @@ use seafix_navigation::{
 use seafix_proptests::{cases, law, navigation_scenario::NavigationScenario, poses::pose, within};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Every policy asks for a fix where there is none yet and an object is in view.
+/// Every policy asks for a fix before the first one, with an object in view.
 ///
-/// Seen to fail when the interval compares the wrong way round.
+/// Seen to fail with the comparison of the interval inverted.
 #[test]
 fn without_a_fix_every_policy_wants_one() {
     let none = Situation { seconds: f64::INFINITY, metres: f64::INFINITY, sigma: f64::INFINITY, in_view: true };
@@ -23,9 +23,9 @@ fn without_a_fix_every_policy_wants_one() {
     }
 }
 
-/// A policy that wants a fix wants it still when it is older, the way longer and the pose less certain.
+/// A policy that asks for a fix still asks when the fix is older, the path longer and the pose less certain.
 ///
-/// Seen to fail when the interval compares the wrong way round.
+/// Seen to fail with the comparison of the interval inverted.
 #[test]
 fn a_policy_does_not_change_its_mind() {
     let number = || prop_oneof![Just(0.0), 0.0..100.0];
@@ -44,7 +44,7 @@ fn a_policy_does_not_change_its_mind() {
     );
 }
 
-/// Two fusions of the same knowledge do not depend on the frame of the object: T ↦ A T on both sides.
+/// The fusion of two poses does not depend on the frame of the object: T ↦ A T on both sides.
 ///
 /// Seen to fail when the innovation is taken in the frame of the object.
 #[test]
@@ -70,9 +70,9 @@ fn a_fusion_knows_no_origin() {
     });
 }
 
-/// P10. By the world and back a pose is what it was; exact surveys add nothing.
+/// P10. A pose passed to another object through the world and back is unchanged; exact surveys add no covariance.
 ///
-/// Seen to fail when the two places are exchanged.
+/// Seen to fail when the two surveyed poses are exchanged.
 #[test]
 fn passing_there_and_back_changes_nothing() {
     let place = pose::<World, Object>(50.0);
@@ -90,7 +90,7 @@ fn passing_there_and_back_changes_nothing() {
     });
 }
 
-/// Mean NEES over dives and instants, each dive's mean counted once for the interval.
+/// Mean NEES over dives and instants; each dive's mean counts once for the interval.
 fn consistency(dives: u32, steps: usize) -> (f64, f64) {
     let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 20.0 }, Fuse::default());
     let mut means = Vec::new();
@@ -114,10 +114,10 @@ fn consistency(dives: u32, steps: usize) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// The error of the navigated pose is as large as its covariance says: the mean NEES of six degrees
-/// of freedom lies within 4 of its own standard errors of 6.
+/// The navigated pose has consistent errors: the mean NEES of six degrees of freedom is within 4 of its own standard
+/// errors of 6.
 ///
-/// Seen to fail when the survey is left out of a passage.
+/// Seen to fail when a change of object ignores the survey.
 #[test]
 fn the_navigated_pose_has_an_error_as_much_as_it_states() {
     let dives = cases(100);
@@ -126,8 +126,8 @@ fn the_navigated_pose_has_an_error_as_much_as_it_states() {
     assert!((mean - 6.0).abs() < 4.0 * error, "{mean} ± {error}");
 }
 
-/// NEES over dives that go past three objects and back, looking at their points: the mean of all dives and instants, and the
-/// share of instants at which the mean of the dives lies within its 95 % bounds.
+/// NEES over dives past three objects and back, with fixes by points: the mean of all dives and instants, and the
+/// fraction of instants at which the mean of the dives is within its 95 % bounds.
 fn navigated_errors(dives: u32, policy: &dyn Policy, fusion: &dyn Fusion, consider_states: bool) -> (f64, f64) {
     const STEPS: usize = 160;
     let scenario = NavigationScenario { objects: 3, meander: 0.0, ..NavigationScenario::default() };
@@ -161,17 +161,16 @@ fn navigated_errors(dives: u32, policy: &dyn Policy, fusion: &dyn Fusion, consid
     (sums.iter().sum::<f64>() / STEPS as f64 / n, within as f64 / STEPS as f64)
 }
 
-/// However often fixes come, what all fixes of a model have wrong is learned from none of them, and what a passage took up
-/// of two surveys the way back gives away: for every policy and for a fix every frame, every 10 s and every 40 s,
-/// the mean NEES of `fuse` and of the paper's `replace` lies within its 95 % bounds, and does so at nine instants of ten.
-/// Of all that is known to be shared, `fuse` says no more than it knows where there are the most fixes; taken for
-/// independent, they make it far too sure there.
+/// Common errors of a model are learned from no fix, however frequent, and the surveys' errors of a change of object
+/// cancel on the return. The mean NEES of `fuse` and of the paper's `replace` is within its 95 % bounds for every
+/// policy and for fixes every frame, every 10 s and every 40 s, and at nine instants of ten. With the shared errors
+/// known, `fuse` is not overconfident even with the most fixes; with fixes taken as independent it is, by far.
 ///
-/// Seen to fail when the fixes' share in the model's errors is left out: 28 instead of 6 with a fix every frame.
+/// Seen to fail when the fixes' correlation by the model's errors is ignored: 28 instead of 6 with a fix every frame.
 #[test]
 fn what_a_model_has_wrong_is_not_learned_from_many_fixes() {
     let dives = cases(100);
-    // 95 % of a mean of so many χ² of six degrees of freedom.
+    // 95 % bounds of a mean of χ² of six degrees of freedom.
     let bound = 1.96 * (12.0 / f64::from(dives)).sqrt();
     let intervals = [0.0, 10.0, 40.0].map(|seconds| Choice::named("interval").with("seconds", seconds));
     for choice in POLICIES.names().map(Choice::named).chain(intervals) {
@@ -188,7 +187,7 @@ fn what_a_model_has_wrong_is_not_learned_from_many_fixes() {
     assert!(alone > 12.0, "{alone}");
 }
 
-/// Mean NEES in the end of dives that stay at one object, with a fix a second for a minute.
+/// Mean NEES at the end of dives that stay at one object, with a fix a second for a minute.
 fn stayed(dives: u32, fusion: &str, shared: f64) -> f64 {
     let scenario = NavigationScenario { objects: 1, shared, ..NavigationScenario::default() };
     let (policy, fusion) = (Interval { seconds: 1.0 }, FUSIONS.build(&Choice::named(fusion)).expect("it is listed"));
@@ -205,10 +204,10 @@ fn stayed(dives: u32, fusion: &str, shared: f64) -> f64 {
     sum / f64::from(dives)
 }
 
-/// The intersection is never too sure of itself, whatever the fixes of an object share and nobody says; where it is not said,
-/// `fuse` takes them for independent and believes itself far too much.
+/// Covariance intersection is never overconfident with unknown correlations of the fixes of an object; `fuse` takes the
+/// fixes as independent and is overconfident.
 ///
-/// Seen to fail when the intersection weighs both with one.
+/// Seen to fail when the intersection weights both with one.
 #[test]
 fn shared_errors_do_not_add_up_to_certainty() {
     let dives = cases(100);
@@ -217,15 +216,15 @@ fn shared_errors_do_not_add_up_to_certainty() {
         println!(
             "NEES after a minute, share {shared} of the variance common: intersect {intersected:.1}, fuse {fused:.1}"
         );
-        // Six on average, and three standard errors.
+        // Six on average, plus three standard errors.
         assert!(intersected < 6.0 + 3.0 * (12.0 / f64::from(dives)).sqrt(), "{shared}: {intersected}");
         assert!(shared == 0.0 || fused > 12.0, "{shared}: {fused}");
     }
 }
 
-/// A glimpse of another object that is far worse than the pose carried here leaves the pose where it is.
+/// A fix of another object that is far less accurate than the carried pose leaves the pose at its object.
 ///
-/// Seen to fail when every fix passes.
+/// Seen to fail when every fix changes the object.
 #[test]
 fn a_poor_observation_moves_no_pose() {
     let scenario = NavigationScenario { survey: (0.02, 0.05), ..NavigationScenario::default() };
@@ -242,8 +241,8 @@ fn a_poor_observation_moves_no_pose() {
     assert_eq!(navigator.pose().unwrap().object, 1);
 }
 
-/// Errors along 5 km with a fix every `every` seconds: RMS of the first and of the last third over the dives, and
-/// the slope (m per km) with its standard error.
+/// Errors over 5 km with a fix every `every` seconds: RMS of the first and of the last third over the dives, and the
+/// slope (m per km) with its standard error.
 fn far(dives: u64, every: f64, steps: usize) -> (f64, f64, f64, f64) {
     let (scenario, policy, fusion) = (
         NavigationScenario { objects: 1, ..NavigationScenario::default() },
@@ -261,7 +260,7 @@ fn far(dives: u64, every: f64, steps: usize) -> (f64, f64, f64, f64) {
             if navigator.due(true) {
                 navigator.fix(&sailing.fix(0));
             }
-            // The error of the camera's place in its own surroundings: of the pose, not of a far origin.
+            // The position error in the camera's surroundings, not about a far origin.
             let known = navigator.pose().expect("the first instant has a fix");
             let error = known.object_pose.object_from_camera.error_to(&sailing.truth(0));
             xs.push(step as f64 * scenario.step * 1e-3);
@@ -282,9 +281,10 @@ fn far(dives: u64, every: f64, steps: usize) -> (f64, f64, f64, f64) {
     (first.sqrt(), last.sqrt(), slope, error)
 }
 
-/// With a fix every 40 s the error does not grow over 5 km: the slope's interval holds zero. Without it does.
+/// The error does not grow over 5 km with a fix every 40 s: the interval of the slope contains zero. It grows without
+/// fixes.
 ///
-/// Seen to fail when later fixes are not taken.
+/// Seen to fail when later fixes are ignored.
 #[test]
 fn fixes_bound_the_error_over_any_distance() {
     let steps = (5000.0 / NavigationScenario::default().step) as usize;
@@ -298,9 +298,10 @@ fn fixes_bound_the_error_over_any_distance() {
     assert!(slope > 5.0 * error && last > 3.0 * first);
 }
 
-/// Straight on without fixes the attitude errs like √n and the place like n^1.5: doubling the way multiplies them by √2 and √8.
+/// Without fixes on a straight path the attitude error grows like √n and the position error like n^1.5: twice the path
+/// multiplies them by √2 and √8.
 ///
-/// Seen to fail when the covariance is not turned with the motion.
+/// Seen to fail when the covariance is not rotated with the motion.
 #[test]
 fn dead_reckoning_grows_as_predicted() {
     let scenario = NavigationScenario {
@@ -334,7 +335,7 @@ fn dead_reckoning_grows_as_predicted() {
     assert!((long[0] / short[0] - 2f64.sqrt()).abs() < 0.15 && (long[1] / short[1] - 8f64.sqrt()).abs() < 0.3);
 }
 
-/// How many of `dives` dives reject one wrong fix and keep their pose.
+/// The number of `dives` dives that reject one wrong fix and keep their pose.
 fn unmoved_by_one_wrong_fix(dives: u64) -> u64 {
     let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 10.0 }, Fuse::default());
     let mut unmoved = 0;
@@ -356,7 +357,7 @@ fn unmoved_by_one_wrong_fix(dives: u64) -> u64 {
 
 /// `fuse` rejects one wrong fix.
 ///
-/// Seen to fail when the gate lets everything pass.
+/// Seen to fail with a gate that accepts everything.
 #[test]
 fn one_wrong_fix_is_rejected() {
     let unmoved = unmoved_by_one_wrong_fix(2000);
@@ -364,8 +365,8 @@ fn one_wrong_fix_is_rejected() {
     assert!(unmoved >= 1998);
 }
 
-/// Of `dives` dives past `objects` objects, one of which was moved, each in its turn: how many report it, how many leave open
-/// which of two was moved, and how many reports name another.
+/// For dives past `objects` objects with each in turn displaced: the number of dives that report it, that leave open
+/// which of two is displaced, and of reports that name another.
 fn displaced(dives: u64, objects: usize, metres: f64, fusion: Fuse) -> [u64; 3] {
     let (scenario, policy) =
         (NavigationScenario { objects, ..NavigationScenario::default() }, Interval { seconds: 5.0 });
@@ -373,7 +374,7 @@ fn displaced(dives: u64, objects: usize, metres: f64, fusion: Fuse) -> [u64; 3] 
     for number in 0..dives {
         let mut sailing = scenario.set_out(number);
         let moved = (number as usize) % objects;
-        // One that is displaced is turned too, by however little it is shifted.
+        // A displaced object is also rotated, however small its shift.
         if metres > 0.0 {
             sailing.displace(moved, metres);
         }
@@ -399,10 +400,10 @@ fn displaced(dives: u64, objects: usize, metres: f64, fusion: Fuse) -> [u64; 3] 
     [reported, open, false_reports]
 }
 
-/// A displaced object is reported, whichever it is, the one that is fixed first included, and drags no other.
+/// A displaced object is reported, also if it has the first fix, and moves no other object.
 ///
-/// Seen to fail when what was doubted is forgotten between two fixes, and when of two objects that nothing else confirms the
-/// later is blamed.
+/// Seen to fail when doubted fixes are forgotten between two fixes, and when the later of two unconfirmed objects is
+/// called displaced.
 #[test]
 fn a_displaced_object_is_reported() {
     for metres in [0.1, 0.2, 0.5] {
@@ -422,9 +423,10 @@ fn a_displaced_object_is_reported() {
     assert!(false_reports < 30);
 }
 
-/// The two laws above over so many dives that the intervals are narrow: 999 of 1000 wrong fixes are rejected, 99 of 100 displaced
-/// objects reported, with less than one false report in 1000 frames. 0.1 m are some five standard deviations of what survey and
-/// odometry leave open across the way: a gate that a right fix in ten thousand fails would report 98.6 of 100.
+/// The two laws above over many dives, for narrow intervals: 999 of 1000 wrong fixes are rejected, and 99 of 100
+/// displaced objects reported, with less than one false report in 1000 frames. A displacement of 0.1 m is some five
+/// standard deviations of survey and odometry over the route; a gate that one right fix in ten thousand fails would
+/// report 98.6 of 100.
 #[test]
 #[ignore = "long: 50 000 dives"]
 fn wrong_fixes_and_displaced_objects_in_many_dives() {
@@ -445,10 +447,10 @@ fn wrong_fixes_and_displaced_objects_in_many_dives() {
     }
 }
 
-/// Of two objects that disagree, without a third, none is named: that one of the two was moved is told, the pose at each is
-/// what it would be without the other, and either's place stays that of the survey.
+/// Two inconsistent objects without a third: neither is called displaced. The inconsistency is reported, the pose at
+/// each is that without the other, and both keep their surveyed poses.
 ///
-/// Seen to fail when of two objects that nothing else confirms the later is blamed.
+/// Seen to fail when the later of two unconfirmed objects is called displaced.
 #[test]
 fn without_a_third_none_of_two_is_blamed() {
     let (scenario, policy, fusion) = (
@@ -483,9 +485,9 @@ fn without_a_third_none_of_two_is_blamed() {
     assert!(n_reported >= 198);
 }
 
-/// Where odometry is lost nothing is carried across, and the log says why.
+/// A lost odometry carries nothing across, and the log has the reason.
 ///
-/// Seen to fail when the last fix outlives a break.
+/// Seen to fail when the last fix survives a break.
 #[test]
 fn a_break_is_no_motion() {
     let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 5.0 }, Fuse::default());
@@ -503,10 +505,10 @@ fn a_break_is_no_motion() {
     assert!(navigator.changes().iter().all(|change| !change.why.is_empty()));
 }
 
-/// It searches where a fix is due and an object should be in view but none has been taken, after dead reckoning too, and no
-/// longer than that; images that tell nothing leave the pose where it was, and a fix stays due.
+/// The state is `searching` exactly while a fix is due and an object should be in view without a fix, also after dead
+/// reckoning. Images without a motion leave the pose unchanged, and the fix stays due.
 ///
-/// Seen to fail when only a rough pose can search.
+/// Seen to fail when only a prior pose can search.
 #[test]
 fn the_state_is_what_it_is_stated_to_be() {
     use State::{DeadReckoning, Fixed, Searching};
@@ -527,7 +529,7 @@ fn the_state_is_what_it_is_stated_to_be() {
         states.push(navigator.state());
     }
     assert_eq!(states, [DeadReckoning, Searching, Searching, DeadReckoning, Searching, Fixed]);
-    // Each change is told once, and leads from the state before.
+    // Each change is reported once, from the previous state.
     let changes = navigator.changes();
     assert!(changes.windows(2).all(|two| two[0].to == two[1].from && !two[1].why.is_empty()), "{changes:?}");
 }

@@ -1,4 +1,4 @@
-//! Every search: clutter that imitates the object is not the object.
+//! Every search: clutter that resembles the object gets no fix.
 
 use nalgebra::Vector3;
 use rand::RngExt;
@@ -11,7 +11,7 @@ use seafix_referencing::{
     Search, Tolerance, candidates, compute_fix, rms_apart,
 };
 
-/// Answers and wrong ones of so many scenes.
+/// Numbers of answers and wrong ones over the scenes.
 fn answered(name: &str, clutter_pattern: ClutterPattern, visible: usize, scenes: u64) -> (usize, usize) {
     let search = SEARCHES.build(&Choice::named(name)).expect("it is listed");
     let (mut answers, mut wrong) = (0, 0);
@@ -47,11 +47,12 @@ fn what_structured_clutter_are_answered() {
     }
 }
 
-/// Points of the lattice that the object has part of, clutter that is measured twice as the object's points come in twos, and clutter
-/// that is bunched where they are expected are not the object.
+/// Clutter of the lattice that continues the object, of points measured twice, and clumped about the predicted
+/// positions is not taken for the object.
 ///
-/// Seen to fail when no imitation is weighed (a fifth of the gratings), when two points measured at one place count as two
-/// (two of the doubled scenes), and when clutter is taken to be as dense everywhere in a shell (two of the bunched).
+/// Seen to fail without the test for structured clutter (a fifth of the gratings), when two points measured at one
+/// position count as two (two of the doubled scenes), and when the density of clutter is taken as uniform in a gate
+/// (two of the clumped).
 #[test]
 fn clutter_that_resembles_the_object_is_not_fixed() {
     for (clutter_pattern, scenes) in
@@ -62,11 +63,11 @@ fn clutter_that_resembles_the_object_is_not_fixed() {
     }
 }
 
-/// What a camera sees of an object of so many points and about it: in m, the noise 1 cm.
+/// The measurements of an object with `n` points and of its surroundings; in m, noise 1 cm.
 struct Shown {
     points: Vec<Vector3<f64>>,
     camera_from_object: Transform<Camera, Object>,
-    /// Half the size of the shells; `None` where there is no prior.
+    /// Half-size of the gates; `None` without a prior.
     half: Option<f64>,
     cloud: Vec<Vector3<f64>>,
 }
@@ -78,7 +79,7 @@ impl Shown {
         Self { points, camera_from_object: Transform::new(so3::exp(&place(1.8)), at), half, cloud: Vec::new() }
     }
 
-    /// The first `count` of its points, moved in the object's frame, each with an error.
+    /// The first `count` of its points, moved in the object's frame, with noise.
     fn shows(
         &mut self,
         count: usize,
@@ -107,14 +108,14 @@ impl Shown {
     }
 }
 
-/// An object a twentieth or a tenth larger or smaller is hardly ever answered, as four or five of its points lie within their noise
-/// where the model's do; and by no search with a set of which chance gives more than `acceptance.max_nfa`.
+/// An object a twentieth or a tenth larger or smaller is rarely answered, since four or five of its points are within
+/// noise of the model's. No search answers with a set whose NFA exceeds `acceptance.max_nfa`.
 ///
-/// Seen to fail when chance is not asked of searches that weigh evidence.
+/// Seen to fail when the NFA is not tested for searches by evidence.
 #[test]
 fn a_set_that_random_gives_is_no_answer() {
     let acceptance = Acceptance::default();
-    // These end at their budget, which takes seconds.
+    // These reach their budget, which takes seconds.
     let enumerates = |name: &&str| ["complete-enumeration", "structural-coherence"].contains(name);
     for name in SEARCHES.names().filter(|name| !enumerates(name)) {
         let search = SEARCHES.build(&Choice::named(name)).expect("it is listed");
@@ -137,9 +138,9 @@ fn a_set_that_random_gives_is_no_answer() {
     }
 }
 
-/// A smaller second copy of the object is told: what is seen of it would be believed by itself.
+/// A smaller second copy of the object is reported: its points would suffice for acceptance by themselves.
 ///
-/// Seen to fail when no second copy is believed.
+/// Seen to fail when no second copy is accepted.
 #[test]
 fn a_smaller_copy_is_not_passed_over() {
     for seed in 0..6 {
@@ -171,8 +172,8 @@ fn a_smaller_copy_is_not_passed_over() {
     }
 }
 
-/// Of so many frames those that are answered where `seen` of an object's `n` points are seen beside a whole copy of it, 35 cm off, among
-/// `times` as many points of clutter.
+/// The number of answered frames with `seen` of an object's `n` points in view beside a complete copy, 35 cm away,
+/// among `times` as many points of clutter.
 fn passed_over((n, seen): (usize, usize), times: usize, half: Option<f64>, frames: u64) -> usize {
     let search = SEARCHES.build(&Choice::named("rigid-consensus")).expect("it is listed");
     let answered = |seed: u64| {
@@ -188,10 +189,11 @@ fn passed_over((n, seen): (usize, usize), times: usize, half: Option<f64>, frame
     (0..frames).filter(|&seed| answered(seed)).count()
 }
 
-/// So is one of which ten points are seen, among a hundred of clutter: the whole beside it is found at once, and that is no
-/// reason to look for the half as shortly.
+/// A copy of ten points among a hundred of clutter is reported as well: the complete one beside it is found at once,
+/// which does not shorten the search for the partial one.
 ///
-/// Seen to fail, with 21 of 60, where a quarter of what was spent on the whole is spent on its parts, and no least.
+/// Seen to fail, with 21 of 60, when a quarter of the effort for the complete copy is spent on parts, without a
+/// minimum.
 #[test]
 fn half_a_copy_among_clutter_is_not_passed_over() {
     assert_eq!(passed_over((20, 10), 5, Some(0.6), 60), 0);
@@ -210,9 +212,9 @@ fn how_often_copies_are_passed_over() {
     }
 }
 
-/// Answers have a pose to be held against where three pairs speak for one: it is elsewhere, and explains less.
+/// An answer has an alternative wherever three pairs support one: it is elsewhere and explains less.
 ///
-/// Seen to fail when the other pose may be the answer itself.
+/// Seen to fail when the alternative may be the answer itself.
 #[test]
 fn answers_are_held_against_a_pose_elsewhere() {
     let (mut answers, mut held) = (0, 0);

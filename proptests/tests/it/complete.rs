@@ -1,4 +1,5 @@
-//! Small domains tested whole: every small association graph, and every order of a few events of the navigator.
+//! Complete enumeration of small domains: all small association graphs, and all orders of a few events of the
+//! navigator.
 
 use seafix_component::Choice;
 use seafix_navigation::{Event, FUSIONS, Navigated, Navigator, State};
@@ -9,21 +10,22 @@ use seafix_proptests::{
 };
 use seafix_referencing::{Correspondence, Kabsch, Observations, Problem, Rejected, Solver, Tolerance};
 
-/// The least set that is an answer.
+/// The minimum size of an answer.
 const NEEDED: usize = 3;
 
-/// What a search maximises.
+/// The objective of a search.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Measure {
     /// The size of a coherent set.
     Size,
-    /// That of one that passes a joint test of all distances besides, as each coherent set of [`Posts`] does.
+    /// The size of a coherent set that also passes a joint test of all distances, as each coherent set of [`Posts`]
+    /// does.
     Jointly,
-    /// That of one that a rigid motion explains besides.
+    /// The size of a coherent set that a rigid motion also explains.
     Rigidly,
 }
 
-/// The searches that are exact, and in which measure.
+/// The exact searches and their objectives.
 fn exact() -> Vec<(Tried, Measure)> {
     let measure = |search: &Tried| match search.name.split(' ').next() {
         _ if search.claims.exact => Some(Measure::Size),
@@ -34,7 +36,7 @@ fn exact() -> Vec<(Tried, Measure)> {
     searches(1_000_000).into_iter().filter_map(|search| measure(&search).map(|measure| (search, measure))).collect()
 }
 
-/// Whether each pair is within the tolerance of where the least-squares pose of all puts it.
+/// Whether each pair is within the tolerance of its position by the least-squares pose of all.
 fn is_rigid(problem: &Problem<'_>, set: &[Correspondence]) -> bool {
     let slack = |pair: &Correspondence| match problem.tolerance {
         Tolerance::Fixed(delta) => delta,
@@ -51,7 +53,7 @@ fn is_rigid(problem: &Problem<'_>, set: &[Correspondence]) -> bool {
     })
 }
 
-/// Holds searches against brute force over one graph, and over the same with a fixed Δ where one gives it.
+/// Compares searches with brute force over one graph, and over the same with a fixed Δ where one gives it.
 fn hold<'a>(
     searches: impl Iterator<Item = &'a (Tried, Measure)> + Clone,
     posts: &Posts,
@@ -111,10 +113,10 @@ fn hold_problem<'a>(searches: impl Iterator<Item = &'a (Tried, Measure)>, proble
     }
 }
 
-/// P22, P23, P34 over a whole domain: of every association graph with up to six vertices, with every assignment of its vertices to
-/// model points, every exact search returns a largest clique, and with a tie rule all of them. Graphs and assignments that differ by
-/// the names of vertices alone count once. So do those with up to five vertices and four model points of which some share a
-/// cloud point, with every relation of cloud points.
+/// P22, P23, P34 over a complete domain. For every association graph of up to six vertices, with every assignment of
+/// its vertices to model points, every exact search returns a maximum clique, and one with a tie rule all of them.
+/// Graphs and assignments that differ only by the names of vertices count once. The same holds for graphs of up to five
+/// vertices and four model points with shared cloud points, for every relation of cloud points.
 #[test]
 fn every_graph_of_six_vertices_is_searched_right() {
     let (searches, posts) = (exact(), Posts::default());
@@ -123,15 +125,15 @@ fn every_graph_of_six_vertices_is_searched_right() {
         .chain((0..MAX).flat_map(|n| graphs(n, Which::Shared, false)));
     for (number, graph) in all.enumerate() {
         for model in 0..TURNS {
-            // All searches once, those that name ties, whose order of vertices matters, in every order.
+            // All searches once; those that list ties, for which the order of vertices matters, in every order.
             let some = searches.iter().filter(|(search, _)| model == 0 || search.claims.ties);
             hold(some, &posts, &graph, [(model + number) % TURNS, number / TURNS % TURNS]);
         }
     }
 }
 
-/// The long form of the law above: graphs that differ by the names of vertices are all tried, model and cloud turned in each of some
-/// ways, and vertices that share cloud points are up to six.
+/// The long form of the law above: all numberings of vertices, several rotations of model and cloud, and up to six
+/// vertices that share cloud points.
 #[test]
 #[ignore = "long: 2.5 million graphs"]
 fn every_graph_is_searched_right_whatever_its_vertices_are_called() {
@@ -144,29 +146,29 @@ fn every_graph_is_searched_right_whatever_its_vertices_are_called() {
     }
 }
 
-/// Every order of some events, up to so many.
+/// All orders of some events, up to a number of them.
 struct Orders<'a> {
     site: &'a Site,
     listener: &'a Listener,
     alphabet: &'a [Happening],
     longest: usize,
-    /// Instants seen.
+    /// Number of instants.
     count: usize,
-    /// How often each event of a fix was seen: taken, left, doubted, relocated, disputed, displaced.
+    /// Counts of each event of a fix: taken, left, doubted, relocated, disputed, displaced.
     seen: [usize; 6],
 }
 
-/// What of the past the laws ask for.
+/// The part of the past that the laws need.
 #[derive(Clone, Copy, Default)]
 struct Past {
-    /// Wrong fixes so far, and whether one came when nothing was known.
+    /// The wrong fixes so far, and whether one came without a known pose.
     lies: usize,
     believed: bool,
-    /// Whether a pose was taken since odometry was lost.
+    /// Whether a pose was accepted since odometry was lost.
     taken: bool,
-    /// Whether one was at this instant.
+    /// Whether one was accepted at this instant.
     now: bool,
-    /// Whether the last question whether a fix is due was answered with yes, an object in view, and nothing taken since.
+    /// Whether a fix was last due, with an object in view and none accepted since.
     sought: bool,
 }
 
@@ -203,7 +205,7 @@ impl Orders<'_> {
         self.count += 1;
         self.remembers(navigator, past, happening, &did, trail);
 
-        // What told nothing moved nothing, and without information none is gained.
+        // An event without information moves nothing and gains no information.
         let reported = matches!(did, Did::Fix(Event::Doubted(_) | Event::Left) | Did::Said(_)) && !better;
         if reported {
             assert!(navigator.pose() == before.as_ref() && navigator.places() == places, "{trail:?}");
@@ -221,7 +223,7 @@ impl Orders<'_> {
         };
         assert!(moved.eq(named), "{trail:?}: {did:?}");
 
-        // Where fixes are right, so are pose and places; so it is with two wrong ones that meet a pose.
+        // Right fixes give a right pose and right object poses; so do two wrong fixes of a known pose.
         if !past.believed && past.lies < 3 {
             if let Some(Must::Displaced(object, shifts)) = named.map(|_| must) {
                 assert_eq!((object, shifts), (1, seafix_proptests::orders::DISPLACED), "{trail:?}");
@@ -236,7 +238,7 @@ impl Orders<'_> {
             assert!(navigator.pose().is_none_or(right), "{trail:?}: {:?}", navigator.pose());
         }
 
-        // Whether a fix is due is asked with what is the case.
+        // The policy receives the true situation.
         if let (Happening::Due(in_view) | Happening::Blind(in_view), Some(reported)) =
             (happening, self.listener.reported())
         {
@@ -257,7 +259,7 @@ impl Orders<'_> {
         }
     }
 
-    /// What the navigator knows is what the ledger says.
+    /// The navigator's state equals that of the integer model.
     fn knows(&self, navigator: &Navigator<'_>, ledger: &Ledger, trail: &[Happening]) {
         let sound = |pose: &Navigated| pose.object_pose.covariance.matrix.cholesky().is_some();
         assert!(navigator.pose().is_none_or(sound), "{trail:?}: {:?}", navigator.pose());
@@ -277,7 +279,7 @@ impl Orders<'_> {
         }
     }
 
-    /// The state is what it is said to be, and every change of it is told.
+    /// The state is the reported one, and every change of it is reported.
     fn remembers(
         &mut self,
         navigator: &Navigator<'_>,
@@ -336,14 +338,14 @@ impl Orders<'_> {
         assert!(chained && reported && changes.last().is_none_or(|last| last.to == state), "{trail:?}: {changes:?}");
     }
 
-    /// Without a fix a pose is known no better than before, with one of its object no worse.
+    /// The covariance does not decrease without a fix, and does not increase with a fix of its object.
     fn learns(&self, before: &Navigated, after: &Navigated, happening: Happening, did: &Did, trail: &[Happening]) {
         let [old, new] = [before, after].map(|pose| pose.object_pose.covariance.matrix.determinant());
         match (happening, did) {
             (Happening::Step, _) => assert!(new > old, "{trail:?}: {old:e} {new:e}"),
             (_, Did::Fix(Event::Taken)) if before.object == after.object => {
-                // Covariance intersection finds its weight ω to 0.618⁴⁰ = 4.4e-9. Where the pose alone (ω = 1) is best,
-                // d log det / dω = 6 − tr(A⁻¹B) lies between 0 and 6 there.
+                // Covariance intersection determines its weight ω to 0.618⁴⁰ = 4.4e-9. If the pose alone (ω = 1) is
+                // best, d log det / dω = 6 − tr(A⁻¹B) is between 0 and 6 there.
                 assert!(new <= old * (1.0 + 6.0 * 4.4e-9), "{trail:?}: {old:e} {new:e}");
             }
             _ => {}
@@ -351,7 +353,7 @@ impl Orders<'_> {
     }
 }
 
-/// Every order of these events up to so many, with a fusion; how often each event of a fix was met.
+/// All orders of these events up to a number of them, with a fusion; returns the counts of each event of a fix.
 fn hold_orders(alphabet: &[Happening], longest: usize, fusion: &str) -> [usize; 6] {
     let (site, listener) = (Site::new(longest), Listener::default());
     let fusion = FUSIONS.build(&Choice::named(fusion)).unwrap();
@@ -364,9 +366,10 @@ fn hold_orders(alphabet: &[Happening], longest: usize, fusion: &str) -> [usize; 
 
 use Happening::{Blind, Due, Fix, Lost, Settle, Step};
 
-/// Every order of up to five fixes of three objects, right and wrong ones, with and without a motion between them or with it lost:
-/// what becomes of each fix, pose, places, disputes and state are what whole numbers say, what told nothing moves nothing, a
-/// covariance grows without a fix and not with one, and two wrong fixes move nothing that is known.
+/// Every order of up to five right and wrong fixes of three objects, with a motion between them, without one, or with
+/// odometry lost. Events, pose, object poses, disputes and state agree with the integer model. An event without
+/// information moves nothing, the covariance grows without a fix and not with one, and two wrong fixes move no known
+/// pose.
 #[test]
 fn every_order_of_five_fixes_is_judged_right() {
     let kinds = [Kind::Right, Kind::Wrong, Kind::Otherwise, Kind::Moved, Kind::Third, Kind::Imprecise];
@@ -375,16 +378,16 @@ fn every_order_of_five_fixes_is_judged_right() {
     assert!(seen.iter().all(|&count| count > 12), "{seen:?}");
 }
 
-/// Every order of up to six questions, instants and poses: the state is what it is said to be, and each change is told.
+/// Every order of up to six questions, instants and poses: the state is the reported one, and each change is reported.
 #[test]
 fn every_order_of_six_questions_is_answered_right() {
     let alphabet = [Step, Lost, Fix(Kind::Right), Due(true), Due(false), Blind(true), Settle(true)];
     hold_orders(&alphabet, 6, "fuse");
 }
 
-/// What takes longer than six events, with fewer of them: an object that nothing confirms is the one that was moved, though it was
-/// met first; what was doubted of an object in dispute is forgotten with a fix that agrees, and a dispute with the next of the same
-/// two. And a pose found again forgets what was doubted.
+/// Sequences of more than six events, with fewer kinds. An unconfirmed object is the displaced one, although it was
+/// fixed first. Doubted fixes of a disputed object are forgotten with a consistent fix, and a dispute with the next one
+/// of the same two. A recognised key frame also clears doubted fixes.
 #[test]
 fn every_order_of_a_few_more_events_is_judged_right() {
     let [right, wrong] = [Kind::Right, Kind::Wrong].map(Fix);
@@ -393,8 +396,8 @@ fn every_order_of_a_few_more_events_is_judged_right() {
     hold_orders(&[right, wrong, Step, Settle(true)], 6, "fuse");
 }
 
-/// The long form of the laws above: every order of up to six of all events but `Settle(false)`. After a pose that is hardly known
-/// the answers depend on covariances, which the ledger of whole numbers does not have.
+/// The long form of the laws above: every order of up to six of all events except `Settle(false)`. After a pose with a
+/// large covariance, answers depend on covariances, which the integer model does not have.
 #[test]
 #[ignore = "long: 10 million instants"]
 fn every_order_of_six_events_is_judged_right() {
@@ -407,7 +410,8 @@ fn every_order_of_six_events_is_judged_right() {
     }
 }
 
-/// Of fixes of three objects every order of up to nine: one that was moved is found, and confirms a third that is then moved.
+/// Every order of up to nine fixes of three objects: a displaced object is detected, and confirms a third, which is
+/// then displaced.
 #[test]
 #[ignore = "long: 350 000 instants"]
 fn every_order_of_nine_fixes_is_judged_right() {

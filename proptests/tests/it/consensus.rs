@@ -1,4 +1,4 @@
-//! The search that weighs evidence: what it believes is what happens.
+//! The search by evidence: its probabilities are frequencies.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -11,11 +11,11 @@ use seafix_referencing::{
 };
 use seafix_simulation::families::{Family, Generated, Presence};
 
-/// Poses within this (m, RMS over the model points) are one.
+/// Maximum difference of equal poses (m, RMS over the model points).
 const LIMIT: f64 = 0.08;
 
-/// The believed shares of one drawn problem, and whether the likeliest pose is the true one; `None` where nothing
-/// was found.
+/// The posterior probabilities of a generated problem, and whether the most probable pose is right; `None` without a
+/// pose.
 fn believed(family: Family, seed: u64, number: u64, presence: Presence) -> Option<(PosteriorProbabilities, bool)> {
     let generated = Generated::new(family, seed, number, presence);
     let listed = Listed::new(generated.problem.problem());
@@ -28,7 +28,7 @@ fn believed(family: Family, seed: u64, number: u64, presence: Presence) -> Optio
     Some((posterior.probabilities(problem.model, LIMIT), right))
 }
 
-/// Whether the object is believed to be somewhere, by the default acceptance and solver.
+/// Whether the default acceptance and solver give a pose.
 fn fixed(family: Family, seed: u64, number: u64, presence: Presence) -> bool {
     let problem = Generated::new(family, seed, number, presence).problem.problem();
     let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
@@ -37,9 +37,11 @@ fn fixed(family: Family, seed: u64, number: u64, presence: Presence) -> bool {
     matches!(attempt.outcome, Outcome::Fix(_))
 }
 
-/// Points of a grid stand in rows, and three in a row fix no pose: the likeliest pose of most of its points is found all the same.
+/// Points of a grid are collinear in threes, which determine no pose: the most probable pose of most of its points is
+/// found nevertheless.
 ///
-/// Seen to fail, in both frames, where model points with as many candidates stand in the order of their coordinates, row by row.
+/// Seen to fail, in both frames, when model points with equal numbers of candidates are sorted by coordinates, row by
+/// row.
 #[test]
 fn no_pose_is_lost_where_points_stand_in_rows() {
     for number in [19, 217] {
@@ -48,10 +50,10 @@ fn no_pose_is_lost_where_points_stand_in_rows() {
     }
 }
 
-/// Where the object is not there, no pose is given: 300 frames at the paper's scale, some at a site's, and some where the
-/// lattice that the object is a part of goes on about its place.
+/// No pose is given without the object: 300 frames at the scale of the paper, some at that of a site, and some with a
+/// lattice that continues the object about its place.
 ///
-/// Seen to fail when few expected chance sets are enough for a pose in shells: of a lattice they say nothing.
+/// Seen to fail when a small NFA suffices for a pose in gates: it says nothing about a lattice.
 #[test]
 fn no_object_no_pose() {
     for (family, frames) in [(Family::A, 300), (Family::E, 60), (Family::F, 12)] {
@@ -67,7 +69,7 @@ fn no_object_no_pose() {
 #[ignore = "long: 30 000 frames"]
 fn clutter_alone_is_never_fixed() {
     let frames = std::env::var("CONSENSUS_FRAMES").map_or(30_000, |n| n.parse().expect("a number"));
-    // What stricter and looser settings would accept, before the tests of the residuals.
+    // Acceptance by stricter and looser settings, before the tests of residuals.
     let believed: Vec<PosteriorProbabilities> = (0..frames)
         .filter_map(|number| believed(Family::A, 5, number, Presence::Absent))
         .map(|(probabilities, _)| probabilities)
@@ -84,8 +86,8 @@ fn clutter_alone_is_never_fixed() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// The believed probability of absence is the frequency of absence: frames with and without the object, one each,
-/// in bins of the belief; and the believed probability of the likeliest pose is how often it is the true one.
+/// The posterior probability of absence is the frequency of absence, over equally many frames with and without the
+/// object, in bins of the probability. The posterior probability of the best pose is the frequency of its being right.
 ///
 /// `cargo test --release -p seafix-proptests consensus::beliefs_are -- --ignored --nocapture`; `CONSENSUS_FAMILIES` (a),
 /// `CONSENSUS_FRAMES` (6000) of each kind.
@@ -97,7 +99,7 @@ fn posteriors_are_calibrated() {
     println!("| family | what | believed wrong | happened | frames |\n|---|---|---|---|---|");
     for name in families.chars() {
         let family: Family = name.to_string().parse().expect("a family");
-        // How probable it is called that what is claimed is wrong, and whether it is.
+        // The probability of the claim's being wrong, and whether it is.
         let (mut there, mut poses) = (Vec::new(), Vec::new());
         for number in 0..count {
             for presence in [Presence::Present, Presence::Absent] {
@@ -113,8 +115,8 @@ fn posteriors_are_calibrated() {
                 let happened = bin.iter().filter(|(_, wrong)| *wrong).count();
                 println!("| {name} | {what} | {mean:.1e} | {happened} | {} |", bin.len());
             }
-            // Of those called wrong with a hundredth at most, so many may be: the cloud is not what the model takes it
-            // for in everything, and the default acceptance asks for much less.
+            // Expected number of wrong claims of a probability of at most a hundredth: the model of the cloud is not
+            // exact, and the default acceptance asks for much less.
             let (sure, max) = (1e-2, 0.1);
             let said: Vec<bool> =
                 posteriors.iter().filter(|(posterior, _)| *posterior <= sure).map(|(_, wrong)| *wrong).collect();
@@ -125,8 +127,8 @@ fn posteriors_are_calibrated() {
                 assert!(said.len() >= 100, "{what}: {} beliefs are no test", said.len());
                 assert!(fraction <= max, "{name}, {what}: {missed} of {} were wrong", said.len());
             } else {
-                // At a site's scale minutes give some tens of such beliefs, and in f their true share is near the
-                // tenth: one more wrong or less would decide. What so few can show is that it is more than that.
+                // At the scale of a site some minutes give only tens of such probabilities, and in f their true
+                // frequency is near a tenth, so that a single claim would decide. The test only shows an excess.
                 let (low, _) = clopper_pearson(missed, said.len().max(1), 0.95);
                 assert!(low <= max, "{name}, {what}: {missed} of {} were wrong", said.len());
             }
@@ -134,14 +136,14 @@ fn posteriors_are_calibrated() {
     }
 }
 
-/// Bins of a probability by its odds, a factor of ten each; all below a millionth are one.
+/// Bins of a probability by its odds, a factor of ten each; all below a millionth are one bin.
 fn decade(p: f64) -> i32 {
     let odds = (p.max(1e-7) / (1.0 - p).max(1e-7)).log10();
     odds.round() as i32
 }
 
-/// What is believed of few drawn frames is right: the true pose is the likeliest in nine of ten where five points or
-/// more are visible, and the answers that the default acceptance gives are right.
+/// The posterior is right over few generated frames: the true pose is the most probable in nine of ten with five or
+/// more visible points, and the answers of the default acceptance are right.
 #[test]
 fn the_true_pose_is_the_largest_probable() {
     let (mut defined, mut right) = (0, 0);
@@ -161,9 +163,10 @@ fn the_true_pose_is_the_largest_probable() {
     assert!(right * 10 >= defined * 9, "{right} of {defined}");
 }
 
-/// Nor is it pruned by a pose elsewhere of a self-similar model that is found before it and explains nearly as many points.
+/// The true pose of a self-similar model is not pruned by another pose that is found first and explains nearly as many
+/// points.
 ///
-/// Seen to fail (of number 215) where the bounds take residuals to cost large sets all that they do.
+/// Seen to fail (problem 215) when the bounds charge large sets the full cost of their residuals.
 #[test]
 fn the_true_pose_is_the_largest_probable_in_a_lattice() {
     for number in 208..217 {
@@ -172,14 +175,14 @@ fn the_true_pose_is_the_largest_probable_in_a_lattice() {
     }
 }
 
-/// The cloud points of a copy of the object: each visible point once more, where another pose has it.
+/// The cloud points of a copy of the object: each visible point again, at another pose.
 fn with_copy(generated: &Generated, by: [f64; 3], turned: [f64; 3]) -> CoherenceProblem {
     let mut file = generated.problem.problem();
     let truth: Transform<Camera, Object> =
         Transform::from_rows(&generated.truth.t_cam_obj).expect("it is a rigid motion");
     let centre = truth * Point::from([0.0; 3]);
     let turn = so3::exp(&turned.into());
-    // The noise of the copy is that of the object, turned with it.
+    // The noise of the copy is that of the object, rotated with it.
     let copy = |&[_, cloud]: &[usize; 2]| {
         let mut point = file.cloud[cloud];
         let lever = point.position.at - centre;
@@ -191,8 +194,8 @@ fn with_copy(generated: &Generated, by: [f64; 3], turned: [f64; 3]) -> Coherence
     file
 }
 
-/// Where the cloud holds the object twice, equally visible, and the prior allows both, no pose is given; and never that of
-/// the copy.
+/// A cloud with two equally visible copies of the object, both within the prior, gets no pose, and never that of the
+/// copy.
 #[test]
 fn two_copies_are_ambiguous() {
     let (mut alone, mut ambiguous, mut tried) = (0, 0, 0);
@@ -208,11 +211,11 @@ fn two_copies_are_ambiguous() {
             problem.attempt(&search, &solver, &Acceptance::default(), &mut rng).outcome
         };
         alone += u32::from(matches!(outcome(&generated.problem.problem()), Outcome::Fix(_)));
-        // Into the shells, and 9 cm or more off.
+        // Inside the gates, and at least 9 cm away.
         let half = generated.truth.params.gate.expect("family a has shells");
         let by = [0.2 * half + 0.05, -0.2 * half - 0.05, 0.1 * half];
         let twice = outcome(&with_copy(&generated, by, [0.02, 0.03, -0.02]));
-        // Where the copy reaches out of its shells the object may still be told from it.
+        // A copy that extends beyond its gates may be distinguishable.
         if let Outcome::Fix(reference) = &twice {
             let is_true = |pair: &&Correspondence| generated.truth.pairs.contains(&[pair.model, pair.cloud]);
             let right = reference.pairs.iter().filter(is_true).count();
@@ -225,7 +228,7 @@ fn two_copies_are_ambiguous() {
     assert!(2 * alone > tried, "{alone} of {tried} would be referenced without the copy");
 }
 
-/// Candidates beyond the shells and points that are no candidates change nothing.
+/// Candidates outside of the gates, and points that are no candidates, change nothing.
 #[test]
 fn far_points_change_nothing() {
     for number in 0..40 {
@@ -246,13 +249,14 @@ fn far_points_change_nothing() {
     }
 }
 
-/// Without a prior a few cloud points far away, wrong matches of what is distant, keep no object from being found: it is as
-/// often as without them, and costs as much; but for those just believed, as the box of what is near reaches half of the object's
-/// length farther where it is not all there is (30, 30 and 30 of 32: for a pose in three times the volume one is absent with 4.5e-5
-/// instead of 1.6e-5, the other as with two points 40 cm outside its box and no far ones).
+/// Without a prior, a few distant cloud points (false matches) do not prevent a fix: rate and cost are those without
+/// them. An exception is an object near the acceptance threshold, since the box of near points extends by half of the
+/// object's length if there are more points (30, 30 and 30 of 32: for a pose in three times the volume one has a
+/// probability of absence of 4.5e-5 instead of 1.6e-5, the other as with two points 40 cm outside its box and no
+/// distant ones).
 ///
-/// Seen to fail where clutter is as thin as the box of all points is large (9, 0 and 0 of 32 are found), and where rounding
-/// is a share of the farthest coordinate, so that every distance agrees.
+/// Seen to fail when the density of clutter is that of the box of all points (9, 0 and 0 of 32 found), and when the
+/// rounding error is a fraction of the largest coordinate, so that all distances agree.
 #[test]
 fn a_few_points_far_away_hide_no_object() {
     let (mut alone, mut beside) = (0, [0; 3]);
@@ -287,13 +291,13 @@ fn a_few_points_far_away_hide_no_object() {
     println!("{alone} found, of them {beside:?} beside points far away; pair tests {pair_tests:?}");
     assert!(alone >= 20, "{alone} are too few to tell");
     assert!(beside.iter().all(|found| 10 * found >= 9 * alone), "{beside:?} of {alone}");
-    // Three times as many frames, of a twelfth more points each: a fifth more pairs.
+    // Three times as many frames, with a twelfth more points each: a fifth more pairs.
     assert!(pair_tests[1] < 6 * pair_tests[0], "{pair_tests:?} pair tests");
 }
 
-/// Nor do they make one of clutter, however few points are near and however many far, each by itself or in a group.
+/// Distant points do not turn clutter into an object, for any numbers of near and distant points, single or in groups.
 ///
-/// Seen to fail, with 17 of 800 frames, where clutter is as thin as the box of all points is large.
+/// Seen to fail, with 17 of 800 frames, when the density of clutter is that of the box of all points.
 #[test]
 fn a_few_points_far_away_make_no_object() {
     let mut wrong = Vec::new();

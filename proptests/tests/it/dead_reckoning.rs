@@ -1,4 +1,4 @@
-//! What every odometry owes that goes by readings of a Doppler log and a gyro.
+//! Laws of every odometry by readings of a Doppler log and a gyro.
 
 use std::{path::Path, sync::LazyLock};
 
@@ -15,10 +15,10 @@ use seafix_simulation::{Mission, Purpose, Stream, vehicle::Current};
 use seafix_vision::{Image, Threads};
 
 const SECOND: u64 = 1_000_000_000;
-/// When the first pair is taken.
+/// The time of the first pair.
 const START: u64 = 100 * SECOND;
 
-/// The odometries that go by readings.
+/// The odometries by readings.
 fn listening() -> Vec<(&'static str, Box<dyn Odometry>)> {
     let built = |name| (name, ODOMETRIES.build(&Choice::named(name)).unwrap());
     ODOMETRIES.names().map(built).filter(|(_, odometry)| odometry.listens()).collect()
@@ -29,7 +29,7 @@ fn rig() -> StereoRig {
     StereoRig::new(camera, camera, Transform::new(Default::default(), -Vector3::x())).unwrap()
 }
 
-/// An odometry at work on pairs that show nothing.
+/// An odometry session with uniform images.
 struct Journeying<'a> {
     session: Box<dyn seafix_navigation::OdometrySession + 'a>,
     image: Image,
@@ -58,14 +58,14 @@ fn reading(device: Device, stamp_ns: u64, value: Vector3<f64>, sigma: f64) -> Re
     Reading { device, stamp_ns, value, covariance: Matrix3::identity() * (sigma * sigma) }
 }
 
-/// Rate of turn and velocity of a vehicle that rolls, pitches, turns and heaves, at a time (s).
+/// Rate of turn and velocity of a vehicle that rolls, pitches, yaws and heaves, at a time (s).
 fn twist(t: f64) -> Vector6<f64> {
     let rate = Vector3::new(0.1 * t.sin(), 0.15 * (0.7 * t).cos(), 0.3 * (0.5 * t).sin());
     let velocity = Vector3::new(0.5 + 0.2 * (0.8 * t).sin(), 0.1 * t.cos(), 0.05 * (1.3 * t).sin());
     Vector6::new(rate.x, rate.y, rate.z, velocity.x, velocity.y, velocity.z)
 }
 
-/// The body after `seconds` in the frame that it began with, by steps a thousand times finer than any sensor's.
+/// The body after `seconds` in its initial frame, by steps a thousand times finer than any sensor's.
 fn true_path(seconds: f64) -> Transform<Body, Body> {
     let steps = (seconds * 5000.0).round() as usize;
     let h = seconds / steps as f64;
@@ -74,7 +74,7 @@ fn true_path(seconds: f64) -> Transform<Body, Body> {
     })
 }
 
-/// What both devices say at a time after the start (ns), the log at `at`.
+/// The readings of both devices at a time after the start (ns), with the log at `at`.
 fn exact(after: u64, at: &Vector3<f64>) -> [Reading; 2] {
     let said = twist(after as f64 * 1e-9);
     let (rate, velocity) = (said.fixed_rows::<3>(0).into_owned(), said.fixed_rows::<3>(3).into_owned());
@@ -84,10 +84,10 @@ fn exact(after: u64, at: &Vector3<f64>) -> [Reading; 2] {
     ]
 }
 
-/// Exact readings give the way back, to an error that falls with the square of the time between them, wherever the log and
-/// the camera sit in the vehicle.
+/// Exact readings give the trajectory, with an error that falls with the square of their interval, for any position of
+/// log and camera in the vehicle.
 ///
-/// Seen to fail when the value at the beginning of a stretch stands for it.
+/// Seen to fail when the initial value of an interval replaces its mean.
 #[test]
 fn exact_readings_give_the_path_back() {
     let (rig, truth) = (rig(), true_path(8.0));
@@ -111,10 +111,9 @@ fn exact_readings_give_the_path_back() {
     });
 }
 
-/// The steps chain to the pose, and readings that come late, in whatever order, lead to the pose that they would have led
-/// to in time.
+/// The steps chain to the pose, and late readings in any order lead to the same pose as timely ones.
 ///
-/// Seen to fail when late readings go to the end of the list.
+/// Seen to fail when late readings are appended to the list.
 #[test]
 fn late_readings_are_put_in_order() {
     let rig = rig();
@@ -151,10 +150,9 @@ fn late_readings_are_put_in_order() {
     });
 }
 
-/// B59: no odometry by readings invents a motion. Nothing said, or nothing that a vehicle does, is a pair left out; when the
-/// device is heard again after too long, a segment begins where the last one ended. Bad stamps are refused.
-///
-/// Seen to fail when the silence behind the last reading is not counted.
+/// B59: no odometry by readings invents a motion. A pair without readings, or with impossible ones, is skipped; after
+/// too long a silence a segment starts where the last one ended. Invalid stamps are rejected.
+/// Seen to fail when the silence after the last reading is ignored.
 #[test]
 fn no_odometry_by_readings_invents_a_motion() {
     let rig = rig();
@@ -169,7 +167,7 @@ fn no_odometry_by_readings_invents_a_motion() {
                     let noise = 1e-3 * (step as f64).sin();
                     let sane = Vector3::new(0.3 + noise, noise, 0.0);
                     trajectory.deliver(&[reading(other, stamp, sane * 0.1, 1e-3)]);
-                    // For five seconds the device is silent, or says what cannot be: too much, or the same again and again.
+                    // For five seconds the device is silent, or its readings are invalid: too large, or frozen.
                     let said = if (20..70).contains(&step) { value } else { Some(sane) };
                     trajectory
                         .deliver(&said.map(|said| reading(silent, stamp, said, 1e-3)).into_iter().collect::<Vec<_>>());
@@ -203,18 +201,18 @@ fn no_odometry_by_readings_invents_a_motion() {
     }
 }
 
-/// Where the camera was at each pair of a dive, and the motions to all but the first.
+/// The camera's poses at the pairs of a dive, and the motions to all but the first.
 type Dived = (Vec<Transform<Object, Camera>>, Vec<RelativeMotion>);
 
-/// What an odometry by readings tells of dives with the sensors' usual errors: of a steady vehicle, and of one that turns a corner
-/// in a current, which wanders as the defaults say.
+/// The results of an odometry by readings over dives with the sensors' usual errors: of a steady vehicle, and of one
+/// that turns a corner in a current, whose errors vary as by the defaults.
 struct Dives {
     name: &'static str,
     steady: Vec<Dived>,
     pushed: Vec<Dived>,
 }
 
-/// As many of each as the bounds below are for.
+/// The numbers of both that the bounds below assume.
 static DIVES: LazyLock<Vec<Dives>> = LazyLock::new(|| {
     let mission = |frames| Mission { as_points: true, frames, rate: 5.0, ..Mission::default() };
     let current = Current { speed: 0.2, sigma: 0.05, tau: 10.0, ..Current::default() };
@@ -270,7 +268,7 @@ fn nees(error: &Vector6<f64>, covariance: &Matrix6<f64>) -> f64 {
     error.dot(&covariance.cholesky().unwrap().solve(error))
 }
 
-/// The normalised error squared of the pose after the motions of the dives, at some pairs of each: the means.
+/// The mean normalised estimation error squared of the pose after the motions of the dives, at some pairs of each.
 fn consistency(dives: &[Dived], at: &[usize]) -> Vec<f64> {
     let mean = |pair: usize| {
         let error = |(true_path, steps): &Dived| {
@@ -283,16 +281,16 @@ fn consistency(dives: &[Dived], at: &[usize]) -> Vec<f64> {
     at.iter().map(|&pair| mean(pair)).collect()
 }
 
-/// Four standard errors of the mean of so many χ² of six degrees of freedom.
+/// Four standard errors of a mean of χ² of six degrees of freedom.
 fn nees_bound(dives: &[Dived]) -> f64 {
     4.0 * (12.0 / dives.len() as f64).sqrt()
 }
 
-/// The motion since the first pair errs as its covariance says, after half a second, eight seconds and more: noise, scale and
-/// bias, late readings, what is held until they come, and what velocity and rate do between them. The mean NEES of six degrees of freedom lies within
-/// four of its standard errors of 6.
+/// The motion since the first pair has consistent errors after half a second, eight seconds and more: noise, scale and
+/// bias, late readings, held values, and changes of velocity and rate between readings. The mean NEES of six degrees of
+/// freedom is within four of its standard errors of 6.
 ///
-/// Seen to fail when errors that last count as errors of each step alone.
+/// Seen to fail when correlated errors count as independent errors of each step.
 #[test]
 fn dead_integrated_motions_are_consistent() {
     for Dives { name, steady, pushed } in &*DIVES {
@@ -302,9 +300,9 @@ fn dead_integrated_motions_are_consistent() {
     }
 }
 
-/// A network of dead-reckoned legs, five pairs each, over 20 s, with a pose from elsewhere at its beginning and after a
-/// quarter, which tell scale and bias for the rest: the mean NEES of every station; of the motion across half of the legs;
-/// of the pose that further steps, for 8 s, lead to from the last station.
+/// A pose graph of dead-reckoned edges, five pairs each, over 20 s, with a prior pose at the start and after a quarter,
+/// which determine scale and bias for the rest. Its results are the mean NEES of every node, of the motion over half of
+/// the edges, and of the pose after further steps of 8 s from the last node.
 fn median_network_means(dives: &[Dived]) -> (Vec<f64>, [f64; 2]) {
     const EDGE_STEPS: usize = 5;
     const EDGES: usize = 20;
@@ -353,13 +351,11 @@ fn median_network_means(dives: &[Dived]) -> (Vec<f64>, [f64; 2]) {
     (pose_nodes, [across, further])
 }
 
-/// A network whose legs are dead reckoned says how well it knows its poses: over dives of a steady vehicle the mean NEES of
-/// every station, that of the motion across half of its legs, and that of the pose that goes on from it lie within four
-/// standard errors of 6; where a current pushes it through corners, which are no random walk, that of all stations
-/// together.
+/// A pose graph of dead-reckoned edges is consistent. Over dives of a steady vehicle the mean NEES of every node, of
+/// the motion over half of its edges, and of the pose that continues from it is within four standard errors of 6; for a
+/// current that pushes the vehicle through corners, which is no random walk, that of all nodes together.
 ///
-/// Seen to fail when legs are taken as independent of each other, and when a pose of the network shares nothing with the
-/// steps that follow.
+/// Seen to fail when edges are taken as independent, and when a pose of the graph is not correlated with later steps.
 #[test]
 fn pose_graphs_over_dead_reckoning_are_consistent() {
     for Dives { name, steady, pushed } in &*DIVES {

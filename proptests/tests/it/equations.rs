@@ -1,4 +1,4 @@
-//! The paper's equations, in the paper's rows.
+//! The paper's equations, in row vectors.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -13,7 +13,7 @@ use seafix_proptests::{
     within,
 };
 
-/// The reach of coordinates (m).
+/// Maximum coordinate (m).
 const REACH: f64 = 100.0;
 
 /// P9. Formula (5) with exact points returns the true H: rotation ≤ 1e-12 / sin, translation ≤
@@ -41,12 +41,12 @@ fn direct_referencing_is_exact() {
     });
 }
 
-/// P10. Formula (2), by way of the world, equals formula (5), direct, on noise-free data: ≤ 1e-10.
+/// P10. Formula (2), through the world, equals formula (5), direct, on noise-free data: ≤ 1e-10.
 ///
-/// The base that was surveyed and the three points that were identified are different points of
-/// the object; both triangles have sines of 0.05 and more, sides of 0.3 to 10 m.
+/// The surveyed base and the three identified points are different points of the object; both triangles have sines of
+/// at least 0.05 and sides of 0.3 to 10 m.
 ///
-/// Seen to fail when Eq. (2) leaves out the inverse of the object's place in the world.
+/// Seen to fail when Eq. (2) omits the inverse of the object's pose in the world.
 #[test]
 fn by_the_world_and_direct_agree() {
     let solid = |corners: &[Point<Object>; 3]| sine_of_smallest_angle(corners) >= 0.05;
@@ -56,7 +56,7 @@ fn by_the_world_and_direct_agree() {
         512,
         (base, identified, pose::<World, Object>(20.0), pose::<World, BodyAtStart>(50.0), pose::<World, Body>(50.0)),
         |(base, identified, placed, world_from_start, world_from_body)| {
-            // The object's frame is the one that Eq. (1) builds on the surveyed base.
+            // The object frame is that of Eq. (1) on the surveyed base.
             let [p1, p2, p3] = base.map(|point| placed * Point::from(point.coords * 0.2));
             let object_to_world = eq1(&p1, &p2, &p3).expect("no line");
             let seen = identified.map(|point| placed * Point::from(point.coords * 0.2));
@@ -70,8 +70,8 @@ fn by_the_world_and_direct_agree() {
     );
 }
 
-/// A vehicle's way: poses in the world, one after another, by steps of up to half a metre and three
-/// degrees, from within ±30 m.
+/// A trajectory of a vehicle: successive poses in the world with steps of up to half a metre and three degrees, from
+/// within ±30 m.
 fn track(
     start: (nalgebra::UnitQuaternion<f64>, Vector3<f64>),
     turns: &[Vector3<f64>],
@@ -89,14 +89,14 @@ fn track(
     path
 }
 
-/// Where the chain of odometry of a way carries its first pose, one step at a time, in rows.
+/// The chain of odometry from the first pose of a trajectory, step by step, in row vectors.
 fn chained(path: &[Transform<World, Body>]) -> H<BodyAtFix, Body> {
     let first: H<BodyAtFix, Body> = H::from(Transform::identity());
     path.windows(2).fold(first, |chain, pair| chain * H::<Body, Body>::from(pair[1].inverse() * pair[0]))
 }
 
-/// P11. Chain (6): a fix at i carried to j by exact odometry equals a fix at j: ≤ 1e-10 after 2 000
-/// steps; with j = i the result is the fix bit for bit.
+/// P11. Chain (6): a fix at i carried to j by exact odometry equals a fix at j: ≤ 1e-10 after 2 000 steps; for j = i it
+/// is the fix bit for bit.
 ///
 /// Seen to fail when Eq. (6) is taken without the inverse.
 #[test]

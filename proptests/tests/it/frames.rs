@@ -1,4 +1,4 @@
-//! The frame that three points define, of an object and of a site.
+//! The frame of three points, of an object and of a site.
 
 use proptest::prelude::*;
 use seafix_geometry::{Camera, Object, Point, Transform, World, triad};
@@ -13,10 +13,10 @@ use seafix_referencing::{ModelPoint, Site, SiteObject, TargetKind};
 /// P7. The triad frame: unit vectors to 1e-14, mutually orthogonal to 1e-13, right-handed (det = +1),
 /// origin = P1 exactly, e1 along P1→P3 and e3 normal to P1P2 and P1P3, P2 with y < 0.
 ///
-/// The directions are held to 1e-13 over the sine of the smallest angle, the accuracy that the
-/// coordinates' own rounding allows.
+/// The tolerance of the directions is 1e-13 over the sine of the smallest angle, the accuracy that rounding of the
+/// coordinates allows.
 ///
-/// Seen to fail when z is turned round (P2 has y > 0) and when P2 and P3 change places.
+/// Seen to fail when z is inverted (P2 has y > 0) and when P2 and P3 are exchanged.
 #[test]
 fn three_points_make_a_frame() {
     law(1024, triangle::<World>(), |corners| {
@@ -58,7 +58,7 @@ fn a_frame_moves_with_its_points() {
     });
 }
 
-/// Any object: a base of its own frame's rule, further points, and a surveyed place in the world.
+/// Objects: a base by the rule of the frame, further points, and a surveyed pose in the world.
 fn object() -> impl Strategy<Value = SiteObject> {
     (triangle::<World>(), prop::collection::vec((point::<Object>(3.0), 0.0..0.01), 0..6)).prop_map(|(base, more)| {
         let [p1, p2, p3] = base;
@@ -79,11 +79,11 @@ fn object() -> impl Strategy<Value = SiteObject> {
     })
 }
 
-/// P13. The site's frame is the frame of the chosen object: H from that object to the site is I exactly,
-/// so that its points keep their coordinates bit for bit; every other object's points stand where the
-/// survey has them: ≤ 1e-12 (1 + L).
+/// P13. The site frame is the frame of the chosen object: H from that object to the site is I exactly, so that its
+/// points keep their coordinates bit for bit. Every other object's points are at their surveyed positions: ≤ 1e-12 (1 +
+/// L).
 ///
-/// Seen to fail when the chosen object is carried through the world and back like the others.
+/// Seen to fail when the chosen object is transformed through the world and back like the others.
 #[test]
 fn the_chosen_object_is_the_frame_of_the_site() {
     law(256, (prop::collection::vec(object(), 1..5), any::<prop::sample::Index>()), |(mut objects, chosen)| {

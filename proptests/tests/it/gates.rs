@@ -1,4 +1,4 @@
-//! Stage 1: shells hold what they must, and candidates are what shells hold.
+//! Stage 1: gates and candidates.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -27,12 +27,12 @@ fn listed(
     lists
 }
 
-/// Where a pose predicts a model point.
+/// The predicted position of a model point.
 fn predicted(pose: &Transform<Object, Camera>, p: Vector3<f64>) -> Vector3<f64> {
     (pose.inverse() * Point::from(p)).coords
 }
 
-/// Model, cloud, predicted pose and half-size of the shells (m).
+/// Model, cloud, predicted pose and half-size of the gates (m).
 type Scene = (Vec<Vector3<f64>>, Vec<Vector3<f64>>, Transform<Object, Camera>, f64);
 
 /// A model, a cloud about its predictions and a prior.
@@ -48,7 +48,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
     })
 }
 
-/// P14. The min–max shell of a set contains every point of the set, and each of its faces touches one, exactly.
+/// P14. The bounding box of a set contains every point of the set, and each of its faces touches one, exactly.
 ///
 /// Seen to fail when the union takes the later corner instead of the outer one.
 #[test]
@@ -65,8 +65,8 @@ fn a_gate_holds_its_points_and_touches_them() {
     });
 }
 
-/// P15. A cloud point is a candidate when each computed difference of coordinates is at most the half-size (closed), and is
-/// none when the half-size is the next smaller number.
+/// P15. A cloud point is a candidate if each computed difference of coordinates is at most the half-size (closed), and
+/// no candidate for the next smaller half-size.
 ///
 /// Seen to fail when the comparison is < instead of ≤.
 #[test]
@@ -83,10 +83,11 @@ fn a_point_on_the_face_is_a_candidate() {
     });
 }
 
-/// P16, P17, P18. Candidates are those of a plain scan; they grow with the half-size; they do not depend on the order of
-/// the cloud.
+/// P16, P17, P18. Candidates are those of a linear scan, grow with the half-size, and do not depend on the order of the
+/// cloud.
 ///
-/// Seen to fail when the last point of the cloud is forgotten, and when the half-size shrinks by a thousandth beyond 0.3 m.
+/// Seen to fail when the last point of the cloud is omitted, and when the half-size shrinks by a thousandth beyond 0.3
+/// m.
 #[test]
 fn candidates_are_a_plain_scan() {
     let listed_some = Cell::new(0);
@@ -118,8 +119,8 @@ fn candidates_are_a_plain_scan() {
     not_idle("lists of two and more", listed_some.get(), cases, 4);
 }
 
-/// P19. Cloud and prior moved together, by a translation and by quarter turns about the axes, leave the candidates as they
-/// are, up to points within 1e-9 m of a face.
+/// P19. A common translation, or quarter-turns about the axes, of cloud and prior do not change the candidates, except
+/// for points within 1e-9 m of a face.
 ///
 /// Seen to fail when the box is not a cube.
 #[test]

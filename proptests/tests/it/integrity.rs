@@ -1,4 +1,4 @@
-//! P71. Protection levels: radii that errors exceed with no more than the stated risk, wrong matches included.
+//! P71. Protection levels: bounds that errors exceed with at most the stated risk, wrong matches included.
 
 use std::fmt::Write as _;
 
@@ -10,14 +10,14 @@ use seafix_referencing::{
 };
 use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
 
-/// Half-size (m) of the shell in which a wrong match lies.
+/// Half-size of the gate of a wrong match (m).
 const GATE: f64 = 0.25;
-/// That of one in which most wrong matches pass for noise.
+/// Half-size of a gate in which most wrong matches pass for noise (m).
 const HIDDEN: f64 = 0.02;
-/// Draws of one layout.
+/// Number of draws of a layout.
 const DRAWS: u64 = 500;
 
-/// One believed fix.
+/// An accepted fix.
 struct Fix {
     points: usize,
     position: f64,
@@ -25,23 +25,24 @@ struct Fix {
     protection: Option<Protection>,
 }
 
-/// What came of all fixes.
+/// The statistics of all fixes.
 #[derive(Default)]
 struct Count {
-    /// Fixes that were simulated.
+    /// Number of simulated fixes.
     generated: u64,
-    /// Draws that noise left without a point that can be triangulated, and those of layouts that fit no view: no fixes.
+    /// Number of draws with a point that cannot be triangulated, and of those with a layout outside of the view: no
+    /// fixes.
     undrawn: u64,
-    /// Fixes with a wrong match.
+    /// Number of fixes with a wrong match.
     wrong: u64,
     fixed: u64,
     available: u64,
     within_alert: u64,
     position: u64,
     attitude: u64,
-    /// Fixes of three points that were given a level.
+    /// Number of fixes of three points with a protection level.
     unmonitored: u64,
-    /// Of the position: error (mm) and level (mm), each a tenth of a decade.
+    /// For the position, error (mm) and level (mm), each in a tenth of a decade.
     stanford: Vec<[u32; 40]>,
 }
 
@@ -79,8 +80,8 @@ impl Count {
     }
 }
 
-/// Fixes of the `number`-th layout: three to twelve points, 1.5 to 5 m, spread or compact; at the rate of the settings one
-/// point is replaced by one that is uniform in its shell of this half-size (m).
+/// Fixes of layout `number`: three to twelve points, 1.5 to 5 m, spread or compact. At the rate of the settings one
+/// point is replaced by one that is uniform in its gate of this half-size (m).
 fn fixes(number: u64, acceptance: &Acceptance, gate: f64) -> Count {
     let mut choose = Stream::new(71, number, 0, Purpose::Survey);
     let rigs = [VirtualRig::default(), VirtualRig { size: [1600, 1200], focal: 1348.3, baseline: 0.25 }];
@@ -114,7 +115,7 @@ fn fixes(number: u64, acceptance: &Acceptance, gate: f64) -> Count {
     count
 }
 
-/// The points that are wrong matches: one at its rate, two at theirs, mostly none.
+/// The wrong matches: one or two at their rates, mostly none.
 fn wrong(points: usize, acceptance: &Acceptance, stream: &mut Stream) -> Vec<usize> {
     let (one, two) = (acceptance.wrong_match_rate, acceptance.two_wrong_rate);
     match stream.unit() {
@@ -127,7 +128,7 @@ fn wrong(points: usize, acceptance: &Acceptance, stream: &mut Stream) -> Vec<usi
     }
 }
 
-/// The fix that the tests of the method let pass, every point identified as drawn.
+/// The accepted fix with every point identified as drawn.
 fn fix(placed: &Placed, cloud: &[MeasuredPoint], acceptance: &Acceptance) -> Option<Fix> {
     let model: Vec<ModelPoint> = placed.model.iter().map(|&at| ModelPoint::exact("", at)).collect();
     let pairs: Vec<Correspondence> = (0..model.len()).map(|i| Correspondence { model: i, cloud: i }).collect();
@@ -145,7 +146,7 @@ fn fix(placed: &Placed, cloud: &[MeasuredPoint], acceptance: &Acceptance) -> Opt
     })
 }
 
-/// `layouts` layouts on two threads; the same counts on any number.
+/// `layouts` layouts on two threads; counts do not depend on the number of threads.
 fn trial(layouts: u64, acceptance: &Acceptance, gate: f64) -> Count {
     let half = |first: u64| {
         let mut all = Count::default();
@@ -161,14 +162,14 @@ fn trial(layouts: u64, acceptance: &Acceptance, gate: f64) -> Count {
     all
 }
 
-/// What no draw leaves more than once in a thousand trials where the risk is just met: n·p + 3.09 √(n·p).
+/// The count that is exceeded once in a thousand experiments if the risk is just met: n·p + 3.09 √(n·p).
 fn max(generated: u64, risk: f64) -> u64 {
     let expected = generated as f64 * risk;
     (expected + 3.09 * expected.sqrt()).floor() as u64
 }
 
-/// P71 over 1 000 000 draws at risk 1e-4: at most 130 violations, each of position and of attitude. Writes the counts of
-/// a Stanford diagram where `STANFORD` names a file.
+/// P71 over 1 000 000 draws at risk 1e-4: at most 130 violations, each of position and of attitude. `STANFORD` names a
+/// file for the counts of a Stanford diagram.
 #[test]
 #[ignore = "long: a million fixes"]
 fn a_million_fixes_keep_their_levels() {
@@ -176,7 +177,7 @@ fn a_million_fixes_keep_their_levels() {
     million(&acceptance);
 }
 
-/// The same where two wrong matches happen besides, in two of a hundred draws, and the settings say so.
+/// The same with two wrong matches in two of a hundred draws, known to the settings.
 #[test]
 #[ignore = "long: a million fixes"]
 fn a_million_fixes_keep_their_levels_under_two_wrong_matches() {
@@ -212,7 +213,7 @@ fn million(acceptance: &Acceptance) {
     assert!(all.position <= 130 && all.attitude <= 130, "position {}, attitude {}", all.position, all.attitude);
 }
 
-/// P71, short: `layouts` times 500 draws, no level for three points, and a level for `available` of ten at least.
+/// P71, short: `layouts` times 500 draws, no level for three points, and a level for at least `available` of ten.
 fn held(layouts: u64, acceptance: &Acceptance, gate: f64, available: u64) {
     let all = trial(layouts, acceptance, gate);
     println!(
@@ -225,33 +226,36 @@ fn held(layouts: u64, acceptance: &Acceptance, gate: f64, available: u64) {
     assert!(all.position <= max && all.attitude <= max, "{} {} of {max}", all.position, all.attitude);
 }
 
-/// P71, short: 5000 draws at risk 1e-3. Levels are far above the errors, for whichever point may be wrong
-/// widens them; the two laws below come nearer.
+/// P71, short: 5000 draws at risk 1e-3. Levels far exceed the errors, since any point may be wrong; the two laws below
+/// are tighter.
 ///
-/// Seen to fail when three points are given a level, and with levels of a tenth (11 897 beyond of 33 in 20 000 draws).
+/// Seen to fail when three points have a level, and with levels of a tenth (11 897 violations, 33 allowed, in 20 000
+/// draws).
 #[test]
 fn levels_hold() {
     held(10, &Acceptance { risk: 1e-3, ..Acceptance::default() }, GATE, 5);
 }
 
-/// P71 where nothing is wrong and the settings say so: only the noise is left to be protected against.
+/// P71 without wrong matches, known to the settings: levels protect against noise only.
 ///
-/// Seen to fail with levels a third smaller, 249 and 225 beyond of 33 in 20 000 draws, and without the radius of the fix itself.
+/// Seen to fail with levels a third smaller (249 and 225 violations, 33 allowed, in 20 000 draws), and without the
+/// radius of the fix itself.
 #[test]
 fn levels_hold_against_noise_alone() {
     held(10, &Acceptance { risk: 1e-3, wrong_match_rate: 1e-12, ..Acceptance::default() }, GATE, 5);
 }
 
-/// Settings under which no test leaves a wrong match out, so that levels alone speak of it.
+/// Settings without a test that excludes wrong matches, so that only levels protect.
 fn without_tests(risk: f64, wrong_match_rate: f64, two_wrong_rate: f64) -> Acceptance {
     let wide = Acceptance { alert_limit: 1e3, alert_fraction: 1e3, attitude_limit: 1e3, ..Acceptance::default() };
     Acceptance { confidence: 1.0 - 1e-12, risk, wrong_match_rate, two_wrong_rate, ..wide }
 }
 
-/// P71 where in every draw a match is wrong by so little that nothing leaves it out, 5000 draws.
+/// P71 with a wrong match in every draw that is too small to be excluded, 5000 draws.
 ///
-/// Seen to fail when levels are the radius of the fix itself (1037 and 1058 beyond of 461 in 20 000 draws), and when the radius of the
-/// fix without the point is left out (598 and 599); when the separation is (490 and 485), only the long form tells.
+/// Seen to fail when levels are the radius of the fix itself (1037 and 1058 violations, 461 allowed, in 20 000 draws),
+/// and without the radius of the fix without the point (598 and 599). Without the separation (490 and 485) only the
+/// long form fails.
 #[test]
 fn levels_hold_where_wrong_matches_hide() {
     held(10, &without_tests(0.02, 1.0, 0.0), HIDDEN, 1);
@@ -259,16 +263,17 @@ fn levels_hold_where_wrong_matches_hide() {
 
 /// P71 under two wrong matches, short: 2500 draws at risk 1e-3, two wrong in one of ten and one in another.
 ///
-/// Seen to fail with levels of a tenth (4404 beyond of 19 in 10 000 draws); by less only the law below fails.
+/// Seen to fail with levels of a tenth (4404 violations, 19 allowed, in 10 000 draws); with larger ones only the law
+/// below fails.
 #[test]
 fn levels_hold_under_two_wrong_matches() {
     held(5, &Acceptance { risk: 1e-3, two_wrong_rate: 0.1, ..Acceptance::default() }, GATE, 3);
 }
 
-/// The same where in every draw two are wrong by little, 2500 draws.
+/// The same with two small wrong matches in every draw, 2500 draws.
 ///
-/// Seen to fail when sets of two are not left out (692 and 711 beyond of 461 in 20 000 draws), and when levels are the radius of the
-/// fix itself (1070 and 1097).
+/// Seen to fail when sets of two are not excluded (692 and 711 violations, 461 allowed, in 20 000 draws), and when
+/// levels are the radius of the fix itself (1070 and 1097).
 #[test]
 fn levels_hold_where_two_wrong_matches_hide() {
     held(5, &without_tests(0.02, 1e-12, 1.0), HIDDEN, 1);

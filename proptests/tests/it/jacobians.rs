@@ -1,4 +1,4 @@
-//! P46. Every derivative that the geometry computes by formulas, against central differences at random places.
+//! P46. All analytic derivatives of the geometry against central differences at random arguments.
 
 use std::cell::Cell;
 
@@ -15,17 +15,17 @@ use seafix_proptests::{
 };
 use seafix_referencing::SOLVERS;
 
-/// The step (m, rad) of the differences.
+/// The step of the differences (m, rad).
 const STEP: f64 = 1e-5;
 
-/// A point up to 20 m before a camera, up to as far beside its axis as it is deep.
+/// Points up to 20 m before a camera, up to 45° off its axis.
 fn before() -> impl Strategy<Value = Point<Camera>> {
     (0.5..20.0, -0.5..0.5, -0.4..0.4).prop_map(|(z, x, y)| Point::new(x * z, y * z, z))
 }
 
 /// ∂pixel/∂p of one camera and of a rig, with every kind of lens: ≤ 1e-6 of the largest.
 ///
-/// Seen to fail when the lens's tangential terms are left out of the derivative.
+/// Seen to fail when the lens's tangential terms are omitted from the derivative.
 #[test]
 fn projections() {
     law(512, (prop_oneof![rectified().boxed(), general().boxed()], before()), |(rig, at)| {
@@ -56,7 +56,7 @@ fn one_camera<F: Frame>(camera: &Pinhole, at: &Point<F>) -> Result<(), TestCaseE
 
 /// The left Jacobian V(φ) of rotations, Exp(φ + δ) ≈ Exp(V δ) Exp(φ): ≤ 1e-8 for angles up to π.
 ///
-/// Seen to fail when the two series change places.
+/// Seen to fail when the two series are exchanged.
 #[test]
 fn rotations() {
     law(512, vector(1.8), |phi| {
@@ -70,8 +70,8 @@ fn rotations() {
     });
 }
 
-/// The covariance that a pose gives to a point, J Σ Jᵀ with J = ∂(T⁻¹ P)/∂ξ under T · Exp(ξ): ≤ 1e-8 of the largest, at any
-/// pose. The same J is that of the solvers' normal equations.
+/// The covariance of a point by that of a pose, J Σ Jᵀ with J = ∂(T⁻¹ P)/∂ξ under T · Exp(ξ): ≤ 1e-8 of the largest, at
+/// any pose. The solvers' normal equations use the same J.
 ///
 /// Seen to fail when the lever has the other sign.
 #[test]
@@ -92,9 +92,9 @@ fn points_under_a_pose() {
     });
 }
 
-/// Ad(T), ∂ of a perturbation carried from one frame to the other: ≤ 1e-8 of the largest.
+/// Ad(T), the derivative of a perturbation in another frame: ≤ 1e-8 of the largest.
 ///
-/// Seen to fail when the translation's block stands on the other side.
+/// Seen to fail when the translation's block is on the other side.
 #[test]
 fn perturbations_across_a_motion() {
     law(512, pose::<Object, Camera>(5.0), |at: Transform<Object, Camera>| {
@@ -108,8 +108,8 @@ fn perturbations_across_a_motion() {
     });
 }
 
-/// What an error of the model makes of a pose, by each solver's own word, against the pose from a model moved by as much:
-/// ≤ 1e-3 of the largest, of points seen by a rig without noise.
+/// The sensitivity of a pose to errors of the model, as each solver states it, against the pose of a shifted model: ≤
+/// 1e-3 of the largest, for points in view of a rig without noise.
 ///
 /// Seen to fail when the lever of the closed form has the other sign.
 #[test]
@@ -119,7 +119,7 @@ fn errors_of_the_model() {
         scenes.set(scenes.get() + 1);
         for name in SOLVERS.names() {
             let solver = SOLVERS.build(&Choice::named(name)).unwrap();
-            // Of a general-purpose optimiser, which takes the most time, no more than how many there are is asked.
+            // General-purpose optimisers are slow; only some of the derivatives are tested for them.
             if !solver.to_rounding() && scenes.get() > 2 {
                 continue;
             }

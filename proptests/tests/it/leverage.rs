@@ -1,4 +1,4 @@
-//! One point far from the others: what it seems to say of the pose is only as good as it is the right one.
+//! A single point far from the others determines the pose only if it is right.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Transform};
@@ -13,9 +13,9 @@ const SIGMA: f64 = 0.005;
 const DELTA: f64 = 4.0 * SIGMA;
 const GATE: f64 = 0.3;
 
-/// A panel of ten points, 30 cm wide, on an object of three metres with forty more; of the panel eight points are seen, of the rest of
-/// the object `far`, and 200 points of clutter about the panel, two metres before the camera. With a rough pose, or without and among
-/// 100 points.
+/// A panel of ten points, 30 cm wide, on an object of three metres with forty more points. Eight points of the panel
+/// are in view, `far` of the rest, and 200 points of clutter about the panel, two metres before the camera; with a
+/// prior pose, or without one among 100 points.
 fn panel(number: u64, far: usize, prior: bool) -> View {
     let mut stream = Stream::new(number, 0, 0, Purpose::View);
     let stream = &mut stream;
@@ -31,10 +31,10 @@ fn panel(number: u64, far: usize, prior: bool) -> View {
     if prior { view.before(GATE, error) } else { view }
 }
 
-/// A panel alone does not say where the far points of its object are, and clutter that is near one of them does not either: no pose
-/// off by more than the alert limit is believed, with a rough pose and without.
+/// A panel alone does not determine the far points of its object, nor does clutter near one of them: no pose with an
+/// error above the alert limit is accepted, with a prior pose and without.
 ///
-/// Seen to fail where the covariance of all points decides: 12 of 107 fixes with a rough pose are beyond.
+/// Seen to fail when the covariance of all points decides: 12 of 107 fixes with a prior pose exceed the limit.
 #[test]
 fn one_accidental_far_point_makes_no_pose() {
     for (prior, frames) in [(true, cases(512)), (false, cases(192))] {
@@ -57,9 +57,9 @@ fn one_accidental_far_point_makes_no_pose() {
     }
 }
 
-/// Points of all the object are evidence of where it is, and none of them is missed much.
+/// Points over the complete object determine its pose, and few of them are rejected.
 ///
-/// Seen to fail where every pose is taken to hang on a point.
+/// Seen to fail when every pose is taken to depend on a single point.
 #[test]
 fn far_points_that_bear_each_other_out_make_one() {
     let off = |number: u64| {

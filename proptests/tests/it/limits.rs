@@ -1,4 +1,4 @@
-//! Monte Carlo of the solvers beside the Cramér–Rao bound.
+//! Monte Carlo of the solvers against the Cramér–Rao bound.
 
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ fn cameras() -> [(&'static str, VirtualRig); 2] {
 }
 
 /// The table of all solvers over layouts and cameras; `LIMITS_DRAWS`, `LIMITS_SOLVERS` (`mahalanobis,kabsch`),
-/// `LIMITS_DISTANCES`, `LIMITS_POINTS`, `LIMITS_SIGMAS` and `LIMITS_MODEL` choose.
+/// `LIMITS_DISTANCES`, `LIMITS_POINTS`, `LIMITS_SIGMAS` and `LIMITS_MODEL` select its cells.
 #[test]
 #[ignore = "table"]
 fn table() {
@@ -74,11 +74,11 @@ fn table() {
     }
 }
 
-/// P46, P47, short form: over 2000 draws of a spread layout the two solvers that weigh by covariance have m2 and m3
-/// within 6 % of the Cramér–Rao bound, and a NEES whose mean is six to four of its own standard deviations. The long
-/// form is the table below with 10 000 draws.
+/// P46, P47, short form: over 2000 draws of a spread layout the two weighted solvers have target registration error and
+/// position error within 6 % of the Cramér–Rao bound, and a mean NEES within four of its standard deviations of six.
+/// The long form is the table below with 10 000 draws.
 ///
-/// Seen to fail when covariances are a fifth too small, and when the right image is left out.
+/// Seen to fail when covariances are a fifth too small, and when the right image is ignored.
 #[test]
 fn weighted_solvers_reach_the_bound() {
     for (_, rig) in cameras() {
@@ -94,7 +94,7 @@ fn weighted_solvers_reach_the_bound() {
     }
 }
 
-/// Every cell of METHOD §3: camera, shape, distance, pixel noise.
+/// All cells: camera, shape, distance, pixel noise.
 fn cells(points: usize) -> Vec<(String, Layout)> {
     let mut all = Vec::new();
     for (camera, rig) in cameras() {
@@ -113,12 +113,12 @@ fn cells(points: usize) -> Vec<(String, Layout)> {
     all
 }
 
-/// m2 and m3 of a solver (mm), and half a unit of the last digit of each.
+/// Target registration error and position error of a solver (mm), and half a unit of the last digit of each.
 type Printed = [(f64, f64); 2];
 
-/// Errors that others found for thirteen points over the view at a disparity noise of 0.3 px: camera, distance (m), and of
-/// `triad`, `kabsch` and the likeliest pose the root mean square errors of model points and of the camera's position (mm),
-/// as printed, with half a unit of the last digit.
+/// An independent table of errors of thirteen points over the view at a disparity noise of 0.3 px: camera, distance
+/// (m), and for `triad`, `kabsch` and maximum likelihood the RMS errors of model points and of the camera's position
+/// (mm), as printed, with half a unit of the last digit.
 #[rustfmt::skip]
 const ELSEWHERE: [(usize, f64, [Printed; 3]); 3] = [
     (1, 1.75, [[(2.8, 0.05), (10.5, 0.05)], [(1.5, 0.05), (5.9, 0.05)], [(0.32, 0.005), (1.2, 0.05)]]),
@@ -126,12 +126,13 @@ const ELSEWHERE: [(usize, f64, [Printed; 3]); 3] = [
     (0, 5.0, [[(72.0, 0.5), (154.0, 0.5)], [(34.0, 0.5), (85.0, 0.5)], [(1.9, 0.05), (4.3, 0.05)]]),
 ];
 
-/// Figure 2: the table of [`ELSEWHERE`] within its Monte Carlo error, which is that of twenty layouts: errors differ by a
-/// tenth from layout to layout, those of their mean by two or three percent. 100 layouts, 20 draws each; 500 in the long form.
+/// Figure 2: the table of [`ELSEWHERE`] is reproduced within the Monte Carlo error of twenty layouts: errors differ by
+/// a tenth from layout to layout, their mean by two or three per cent. 100 layouts, 20 draws each; 500 in the long
+/// form.
 ///
-/// The model points are then other points of the view than those that the pose rests on. Over these themselves, as in
-/// all other figures, least squares err by an eighth less, which no choice of layouts explains: seen to fail there, at 7 to 13
-/// standard errors.
+/// The evaluated model points are other points of the view than those of the pose. Evaluated at the points of the pose,
+/// as in all other figures, least squares have an error smaller by an eighth, which no choice of layouts explains: seen
+/// to fail there, at 7 to 13 standard errors.
 #[test]
 fn the_table_of_others_is_reproduced() {
     reproduces(100);
@@ -150,7 +151,8 @@ fn reproduces(layouts: u64) {
         let (camera, rig) = cameras()[camera].clone();
         for (solver, expected) in ["triad", "kabsch", "stereo-reprojection"].iter().zip(columns) {
             let built = build(solver);
-            // Of every draw the squares of m2 over other points, over those used, and of m3 (mm²).
+            // For every draw, the squared target registration error of other points and of the used ones, and the
+            // squared position error (mm²).
             let layout = |number: u64| -> Vec<[f64; 3]> {
                 let settings = Layout {
                     points: USED + 40,
@@ -178,7 +180,7 @@ fn reproduces(layouts: u64) {
                 let each: Vec<(f64, f64)> =
                     squares.iter().map(|draws| moments(draws.iter().map(|draw| draw[which]))).collect();
                 let (mean, variance) = moments(each.iter().map(|(mean, _)| *mean));
-                // What the layouts differ by, without what twenty draws do.
+                // The variance between layouts, without that of twenty draws.
                 let between = variance - moments(each.iter().map(|(_, variance)| variance / 20.0)).0;
                 let rms = mean.sqrt();
                 let error = (between.max(0.0) / 20.0).sqrt() / (2.0 * rms);
@@ -202,7 +204,7 @@ fn moments(all: impl ExactSizeIterator<Item = f64> + Clone) -> (f64, f64) {
     (mean, all.map(|one| (one - mean).powi(2)).sum::<f64>() / (n - 1.0))
 }
 
-/// A solver by its name, with a loss behind it where it has one.
+/// A solver by its name, optionally followed by a loss.
 fn build(name: &str) -> Box<dyn seafix_referencing::Solver> {
     let choice = match name.split_once(' ') {
         Some((name, loss)) => Choice::named(name).with("loss", loss),
@@ -211,14 +213,14 @@ fn build(name: &str) -> Box<dyn seafix_referencing::Solver> {
     SOLVERS.build(&choice).expect("a solver")
 }
 
-/// The NEES of a cell: the mean within [5.89, 6.11] where the attitude is known to 1°, else within [5.8, 6.3].
+/// The consistency of a cell: mean NEES within [5.89, 6.11] if the attitude is known to 1°, else within [5.8, 6.3].
 fn is_consistent(found: &Cell) -> bool {
     let range = if found.attitude_sigma <= 1f64.to_radians() { 5.89..=6.11 } else { 5.8..=6.3 };
     range.contains(&found.nees)
 }
 
-/// P46, P47, figures 1 and 4: in every cell with four points and more, m2 and m3 of both solvers that weigh by
-/// covariance are at most 1.05 × the bound, and their NEES is that of χ²₆, over 10 000 draws.
+/// P46, P47, figures 1 and 4: in every cell with at least four points, target registration error and position error of
+/// both weighted solvers are at most 1.05 × the bound, and their NEES is that of χ²₆, over 10 000 draws.
 #[test]
 #[ignore = "long: 96 cells"]
 fn every_cell_reaches_the_bound() {
@@ -245,8 +247,8 @@ fn every_cell_reaches_the_bound() {
     assert!(missed.is_empty(), "{} missed:\n{}", missed.len(), missed.join("\n"));
 }
 
-/// Figure 1 for three points: with several starts at most 1.25 × the bound in every cell, over the layouts for which
-/// the bound is meaningful ([`is_meaningful`]), 10 000 draws.
+/// Figure 1 for three points: several starts reach at most 1.25 × the bound in every cell, over the layouts with a
+/// meaningful bound ([`is_meaningful`]), 10 000 draws.
 #[test]
 #[ignore = "long: 48 cells"]
 fn three_points_in_every_cell() {
@@ -261,8 +263,8 @@ fn three_points_in_every_cell() {
     }
 }
 
-/// The same in two cells, short: one where the bound means something everywhere, and one where it often does not.
-/// Seen to fail when every layout is kept (m3 4.9 × the bound).
+/// The same in two cells, short: one with a bound that is always meaningful, and one where it often is not. Seen to
+/// fail with all layouts (position error 4.9 × the bound).
 #[test]
 fn three_points_reach_the_bound_where_it_is_meaningful() {
     let rig = cameras()[0].1.clone();
@@ -274,13 +276,14 @@ fn three_points_reach_the_bound_where_it_is_meaningful() {
     }
 }
 
-/// Four compact points whose layout may be any: some are seen as tilted either way, and some of their likelihoods are bent.
-/// What another valley explains as well is told apart at a confidence of 0.999 and counted; over the answers covariances hold
-/// all the same, m2 reaches the bound, m3 what the bent likelihood of the exact pixels foresees of it ([`monte_carlo::foreseen`](seafix_proptests::monte_carlo::foreseen)), and
-/// the bound itself where that means something ([`is_meaningful`]). 10 000 draws a seed and distance.
+/// Four compact points of any layout: some are ambiguous in tilt, and some have a nonlinear likelihood. Alternatives at
+/// a confidence of 0.999 are detected and counted. Over the answers covariances are consistent, the target registration
+/// error reaches the bound, and the position error reaches the prediction of the nonlinear likelihood of the exact
+/// pixels ([`monte_carlo::foreseen`](seafix_proptests::monte_carlo::foreseen)), and the bound itself if it is
+/// meaningful ([`is_meaningful`]). 10 000 draws for each seed and distance.
 ///
-/// Seen to fail with first-order covariances (coverage .941 of seeds 8 and 11 at 5 m), and where rivals are not asked for (.915,
-/// NEES 110).
+/// Seen to fail with first-order covariances (coverage 0.941 for seeds 8 and 11 at 5 m), and when alternatives are not
+/// examined (0.915, NEES 110).
 #[test]
 #[ignore = "long: 44 cells"]
 fn four_compact_points_of_any_seed() {
@@ -289,8 +292,8 @@ fn four_compact_points_of_any_seed() {
     assert!(missed.is_empty(), "{} missed:\n{}", missed.len(), missed.join("\n"));
 }
 
-/// Three compact points, of which many layouts are tilted either way as well: what another valley explains as well is told, over
-/// the answers covariances hold, and m2 and m3 are within 1.25 of the bound of all layouts. 10 000 draws a distance.
+/// Three compact points, many of whose layouts are ambiguous in tilt: alternatives are reported, covariances are
+/// consistent over the answers, and errors are within 1.25 of the bound of all layouts. 10 000 draws for each distance.
 #[test]
 #[ignore = "long: 6 cells"]
 fn three_compact_points_report_what_is_as_likely() {
@@ -305,7 +308,7 @@ fn three_compact_points_far_away_are_distinguished_or_known() {
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
-/// What three compact points miss, `draws` of each of twenty layouts.
+/// The failures of three compact points, over `draws` draws of each of twenty layouts.
 #[allow(clippy::print_stdout, reason = "the long form prints its cells")]
 fn three_compact(distance: f64, draws: u64) -> Vec<String> {
     let rig = cameras()[0].1.clone();
@@ -337,19 +340,19 @@ fn three_compact(distance: f64, draws: u64) -> Vec<String> {
     missed
 }
 
-/// Whether covariances hold over the answers of a cell of which other valleys were told: mean NEES, coverage, and how many were
-/// answered in another one. Of fewer draws than the long forms have, three standard errors more are allowed of the mean of so
-/// many χ²₆, and of a share of 0.95.
+/// Whether covariances are consistent over the answers of a cell with reported alternatives: mean NEES, coverage, and
+/// the number of answers in another minimum. With fewer draws than in the long forms, three standard errors more are
+/// allowed for the mean of χ²₆ and for a fraction of 0.95.
 fn is_known(c: &Cell, generated: u64) -> bool {
     let wide = allowance(generated);
     let consistent = (5.8 - wide..=6.3 + wide).contains(&c.nees);
     let covers = (0.9428 - 0.06 * wide..=0.9571 + 0.06 * wide).contains(&c.coverage);
-    // Half of one in a thousand, and three standard errors.
+    // Half of one in a thousand, plus three standard errors.
     let rare = f64::from(c.elsewhere) <= 0.0005 * generated as f64 + 3.0 * (0.0005 * generated as f64).sqrt();
     consistent && covers && rare
 }
 
-/// By how many more three standard errors of a mean NEES of so few draws reach than those of 10 000.
+/// The difference of three standard errors of a mean NEES between this number of draws and 10 000.
 fn allowance(generated: u64) -> f64 {
     (3.0 * ((12.0_f64 / generated as f64).sqrt() - (12.0_f64 / 10_000.0).sqrt())).max(0.0)
 }
@@ -357,14 +360,14 @@ fn allowance(generated: u64) -> f64 {
 /// χ²₁ at 99.9 %.
 const CHI2_1: f64 = 10.827_566_170_662_733;
 
-/// The same of the two seeds with the worst layouts, short.
+/// The same for the two seeds with the worst layouts, short.
 #[test]
 fn four_compact_points_of_bad_layouts_are_distinguished_or_known() {
     let missed: Vec<String> = [8, 11].into_iter().flat_map(|seed| four_compact(seed, 5.0, 50)).collect();
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
-/// What four compact points of this seed miss, `draws` of each of twenty layouts.
+/// The failures of four compact points of this seed, over `draws` draws of each of twenty layouts.
 #[allow(clippy::print_stdout, reason = "the long form prints its cells")]
 fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
     let rig = cameras()[0].1.clone();
@@ -416,10 +419,11 @@ fn three_points(name: &str, solver: &str, settings: &Layout, draws: u64) -> Cell
     c
 }
 
-/// Of few points that hardly determine their attitude no answer is less likely than the truth: χ² of the pixels is nowhere
-/// larger there. Nor is there often none: a start that does not reach its minimum is followed on.
+/// Few points that hardly determine their attitude: no answer is less probable than the truth, that is, has a larger χ²
+/// of the pixels. Rejections are rare: a start that does not reach its minimum is continued.
 ///
-/// Seen to fail when the other starts are believed where the first did not end, in which case two of 10 000 poses were 3.4 m off.
+/// Seen to fail when other starts are accepted although the first did not converge: two of 10 000 poses then had an
+/// error of 3.4 m.
 #[test]
 fn no_answer_is_less_likely_than_the_truth() {
     let mut refused = 0;
@@ -444,11 +448,11 @@ fn no_answer_is_less_likely_than_the_truth() {
     assert!(refused <= 10, "{refused} of 20 000 refused");
 }
 
-/// Figure 4 for every solver: its own covariance holds within ±10 % wherever its attitude errs by less than 5°, and claims no
-/// more than that in weaker cells (unweighted solvers err by 15° in the weakest). As the mean NEES of 10 000 draws of each cell
-/// with thirteen points (1000 for those whose every answer takes a hundred others or a millisecond). `LIMITS_SOLVERS` names
-/// those that are tried (`irls cauchy` is a loss of its own), `LIMITS_POINTS` other numbers of points, `LIMITS_DRAWS` of draws,
-/// `LIMITS_CELLS` what a cell's name has in it (`Compact N 13 3.25 m`).
+/// Figure 4 for every solver: its covariance is consistent within ±10 % in every cell with an attitude error below 5°,
+/// and claims no more in weaker cells (unweighted solvers have errors of 15° in the weakest). The measure is the mean
+/// NEES of 10 000 draws of each cell with thirteen points (1000 for slow solvers). `LIMITS_SOLVERS` selects solvers
+/// (`irls cauchy` is a loss of its own), `LIMITS_POINTS` other numbers of points, `LIMITS_DRAWS` the draws,
+/// `LIMITS_CELLS` cells by a part of their names (`Compact N 13 3.25 m`).
 #[test]
 #[ignore = "long: 15 solvers"]
 fn every_solver_knows_its_error() {
@@ -477,15 +481,15 @@ fn every_solver_knows_its_error() {
     assert!(missed.is_empty(), "{} missed:\n{}", missed.len(), missed.join("\n"));
 }
 
-/// Figure 3, short: 600 draws a cell.
+/// Figure 3, short: 600 draws in each cell.
 ///
-/// Seen to fail when the model's variance is left out of the weights, and when the right image is.
+/// Seen to fail when the model's variance is omitted from the weights, and when the right image is ignored.
 #[test]
 fn model_error_makes_weights_no_worse_than_none() {
     weights_are_no_worse(600);
 }
 
-/// Figure 3, 10 000 draws a cell.
+/// Figure 3, 10 000 draws in each cell.
 #[test]
 #[ignore = "long: 36 cells"]
 fn model_error_in_every_cell() {
@@ -493,9 +497,9 @@ fn model_error_in_every_cell() {
     println!("{cells} cells, two solvers each; nearest to worse: {worst:.1} standard errors");
 }
 
-/// Figure 3: with 1, 3, 5 mm model error drawn afresh each draw, no solver that weighs by covariance errs more than
-/// Kabsch on the same draws: the mean of the paired differences of squared m2 and m3 is not above nought at 99.9 %. How many
-/// cells there are, and the greatest of the differences in standard errors.
+/// Figure 3: with a model error of 1, 3 and 5 mm, drawn anew in each draw, no weighted solver has a larger error than
+/// Kabsch on the same draws: the mean of the paired differences of squared target registration and position errors is
+/// not above zero at 99.9 %. Returns the number of cells and the maximum difference in standard errors.
 fn weights_are_no_worse(draws: u64) -> (usize, f64) {
     let kabsch = build("kabsch");
     let (mut all, mut worst) = (0, f64::NEG_INFINITY);

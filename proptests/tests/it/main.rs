@@ -1,4 +1,4 @@
-//! The laws, one theme a module.
+//! The laws, one module for each theme.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
 

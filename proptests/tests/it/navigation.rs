@@ -1,4 +1,4 @@
-//! Fixes carried along, and what every odometry owes.
+//! Laws of carried fixes and of every odometry.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -21,8 +21,8 @@ fn steps(dive: &[Transform<World, Camera>]) -> Vec<RelativeMotion> {
     dive.windows(2).map(step).collect()
 }
 
-/// P11. A fix at i carried to j by exact odometry, Eq. (6), is the fix at j, to 1e-10 after 2000 steps; with j = i it is
-/// the fix at i bit for bit. By the world, Eq. (2), it is the same.
+/// P11. A fix at i carried to j by exact odometry, Eq. (6), is the fix at j, to 1e-10 after 2000 steps; for j = i it is
+/// the fix at i bit for bit. Eq. (2), through the world, gives the same.
 #[test]
 fn a_fix_is_carried_along() {
     let dive = prop::collection::vec(pose::<World, Camera>(10.0), 2001);
@@ -51,7 +51,7 @@ fn one_step_is_as_good_as_many() {
     });
 }
 
-/// A textured slope seen by a small rig, `step` (m) further along x with each pair.
+/// A textured slope in view of a small rig, `step` (m) further along x with each pair.
 struct Slope {
     rig: StereoRig,
     pairs: Vec<[Image; 2]>,
@@ -71,11 +71,11 @@ fn texture(x: f64, y: f64) -> f64 {
 }
 
 impl Slope {
-    /// The second camera `baseline` from the first.
+    /// The second camera, `baseline` from the first.
     fn new(count: usize, baseline: Vector3<f64>) -> Self {
         let camera = Pinhole::new([240, 180], [200.0; 2], [119.5, 89.5], &[]).unwrap();
         let rig = StereoRig::new(camera, camera, Transform::new(UnitQuaternion::identity(), -baseline)).unwrap();
-        // z = 1.5 + 0.3 y: a slope that tells directions apart.
+        // z = 1.5 + 0.3 y: a slope distinguishes directions.
         let view = |x: f64, y: f64| {
             let value = |i: usize| {
                 let rays = (0..9).map(|k| {
@@ -108,14 +108,14 @@ impl Slope {
     }
 }
 
-/// What the vehicle's sensors say as it goes along x.
+/// The readings of a vehicle that moves along x.
 fn said(stamp_ns: u64) -> [Reading; 2] {
     let reading =
         |device, x| Reading { device, stamp_ns, value: Vector3::new(x, 0.0, 0.0), covariance: Matrix3::zeros() };
     [reading(Device::Doppler, STEP / 0.1), reading(Device::Gyro, 0.0)]
 }
 
-/// The odometries that go by images.
+/// The odometries by images.
 fn by_images() -> impl Iterator<Item = (&'static str, Box<dyn Odometry>)> {
     let built = |name| (name, ODOMETRIES.build(&Choice::named(name)).unwrap());
     ODOMETRIES.names().map(built).filter(|(_, odometry)| !odometry.listens())
@@ -125,7 +125,8 @@ fn paths(trajectory: &OdometryTrajectory) -> Vec<Vector3<f64>> {
     trajectory.waypoints().map(|pose| pose.world_from_camera.translation()).collect()
 }
 
-/// Every odometry finds the way over a slope to 2 %, whichever way the baseline points, and the same with any threads.
+/// Every odometry gives the trajectory over a slope to 2 %, for any direction of the baseline and any number of
+/// threads.
 #[test]
 fn every_odometry_finds_a_short_path() {
     for baseline in [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.1, 0.0)] {
@@ -144,9 +145,9 @@ fn every_odometry_finds_a_short_path() {
     }
 }
 
-/// B15, B16, B59: no odometry by images invents a motion. A stamp that is not the next is refused and changes nothing; an image
-/// that is the one before, or black, is left out by name; a view of somewhere else breaks the way, and the next segment
-/// begins where the last one ended.
+/// B15, B16, B59: no odometry by images invents a motion. A stamp out of order is rejected and changes nothing. An
+/// image that repeats the previous one, or is black, is skipped with its name. A view of another place breaks the
+/// trajectory, and the next segment starts where the last one ended.
 #[test]
 fn no_odometry_by_images_invents_a_motion() {
     let slope = Slope::new(3, Vector3::new(0.1, 0.0, 0.0));
@@ -172,7 +173,7 @@ fn no_odometry_by_images_invents_a_motion() {
         let (_, trajectory) = give(1_400_000_000, images(2));
         assert!(matches!(outcome(&trajectory), OdometryOutcome::Followed { .. }), "{name}: {trajectory:?}");
         assert_eq!(trajectory.segments.len(), 1, "{name}");
-        // The same slope turned upside down is somewhere else.
+        // The same slope upside down is another place.
         let flipped = |image: &Image| Image::new(240, 180, image.pixels().iter().rev().copied().collect()).unwrap();
         let turned: Vec<[Image; 2]> = (0..2).map(|k| [1, 0].map(|side| flipped(&slope.pairs[k][side]))).collect();
         for (k, pair) in turned.iter().enumerate() {

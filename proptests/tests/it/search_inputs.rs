@@ -1,4 +1,4 @@
-//! Every search: bad and absurd input is answered, within the budget and without a panic.
+//! Every search: invalid and extreme input gets an answer within the budget, without a panic.
 
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -19,7 +19,7 @@ use seafix_referencing::{
 
 const BUDGET: i64 = 20_000;
 
-/// Each search once, as it is by default but for its budget.
+/// Each search once, with the defaults except for its budget.
 fn each(budget: i64) -> Vec<Tried> {
     let mut all = searches(budget);
     all.dedup_by_key(|search| search.name.split(' ').next().unwrap_or_default().to_owned());
@@ -30,7 +30,7 @@ fn cube(rng: &mut ChaCha8Rng, half: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| rng.random_range(-half..half))
 }
 
-/// A model and a cloud anywhere in a cube, any cloud point being a candidate of any model point in lists of so many.
+/// Model and cloud anywhere in a cube; any cloud point may be a candidate of any model point, in lists of this length.
 fn clutter(points: usize, list: usize, cloud: usize, delta: f64) -> Planted {
     let mut rng = ChaCha8Rng::seed_from_u64(32);
     let model = (0..points).map(|_| ModelPoint::exact("P", Point::from(cube(&mut rng, 1.0)))).collect();
@@ -47,9 +47,9 @@ fn clutter(points: usize, list: usize, cloud: usize, delta: f64) -> Planted {
     }
 }
 
-/// P32, B35. Fewer than three model points with candidates, no cloud, nothing in any shell: too few, never a pose.
+/// P32, B35. Fewer than three model points with candidates, no cloud, or empty gates: `TooFew`, never a pose.
 ///
-/// Seen to fail when two points are enough.
+/// Seen to fail when two points suffice.
 #[test]
 fn too_few_points_are_no_pose() {
     let searches = searches(BUDGET);
@@ -68,7 +68,7 @@ fn too_few_points_are_no_pose() {
     });
 }
 
-/// Points on a line determine no pose: whatever a search makes of them, the answer is `degenerate`, with the number that failed.
+/// Collinear points determine no pose: with any search the answer is `degenerate`, with the number that failed.
 #[test]
 fn points_on_a_line_are_degenerate() {
     let solver = SOLVERS.build(&Choice::named("mahalanobis")).expect("it is listed");
@@ -93,8 +93,8 @@ fn points_on_a_line_are_degenerate() {
     }
 }
 
-/// P35. Δ = 1e-9 of the extent: with exact coordinates every visible point is identified; with noise fewer are, and nothing
-/// worse happens.
+/// P35. Δ = 1e-9 of the extent: with exact coordinates every visible point is identified; with noise fewer are, without
+/// other effects.
 ///
 /// Seen to fail when the first filter of the association graph compares (A + B − r²)² with 4AB, which cancels.
 #[test]
@@ -131,11 +131,11 @@ fn measured(at: Vector3<f64>, covariance: Matrix3<f64>) -> MeasuredPoint {
     MeasuredPoint { position: UncertainPoint { at: Point::from(at), covariance }, pixels: None }
 }
 
-/// B33, B34. A Δ that is zero, negative or no number finds nothing that is not coherent; one larger than the object makes
-/// everything coherent, and is searched within the budget.
+/// B33, B34. A Δ that is zero, negative or NaN yields coherent sets only; one larger than the object makes everything
+/// coherent, and is searched within the budget.
 ///
-/// Seen to fail when coherence is "not more than Δ", which no number exceeds, when the size of Δ is taken, and when the bound is
-/// the number of pairs, or two.
+/// Seen to fail when coherence is "not more than Δ", which NaN never exceeds, when the absolute value of Δ is used, and
+/// when the bound is the number of pairs, or two.
 #[test]
 fn absurd_tolerances_end() {
     for delta in [0.0, -1.0, f64::NAN, f64::INFINITY, 10.0] {
@@ -162,9 +162,9 @@ fn absurd_tolerances_end() {
     }
 }
 
-/// B36. A cloud of 300 000 points without a shell: an answer, or a refusal with its bound.
+/// B36. A cloud of 300 000 points without a gate: an answer, or a rejection with its bound.
 ///
-/// Seen to fail when the bound of a refusal is two.
+/// Seen to fail when the bound of a rejection is two.
 #[test]
 fn a_huge_cloud_ends() {
     let mut problem = clutter(4, 1, 300_000, 0.001);
@@ -183,9 +183,9 @@ fn a_huge_cloud_ends() {
     }
 }
 
-/// A search whose budget of one test has ended says so: of what it names, as what leaves it undecided, or in its refusal.
+/// A search that has exhausted a budget of one test says so, in its answer or in its rejection.
 ///
-/// Seen to fail where an iteration that the budget ended is taken for the last.
+/// Seen to fail when an iteration ended by the budget counts as the last.
 #[test]
 fn a_spent_budget_is_reported() {
     let problem = clutter(8, 6, 40, 0.3);
@@ -199,7 +199,7 @@ fn a_spent_budget_is_reported() {
     }
 }
 
-/// B37. Fifty model points with a hundred candidates each: the best found and a bound, at the end of the budget.
+/// B37. Fifty model points with a hundred candidates each: the best set found and a bound, at the end of the budget.
 ///
 /// Seen to fail when the bound is the number of pairs.
 #[test]
@@ -222,10 +222,11 @@ fn a_blow_up_ends_at_the_budget() {
     }
 }
 
-/// Covariances that are none (NaN, infinite, not positive definite) and coordinates that are no numbers: no panic, and what
-/// is returned has finite places.
+/// Invalid covariances (NaN, infinite, not positive definite) and NaN coordinates cause no panic, and returned points
+/// have finite coordinates.
 ///
-/// Seen to fail when coherence is "not more than Δ"; not when vertices without a finite place are kept, which agree with nothing.
+/// Seen to fail when coherence is "not more than Δ"; not when vertices without finite coordinates are kept, which agree
+/// with nothing.
 #[test]
 fn numbers_that_are_none_are_survived() {
     let searches = searches(BUDGET);

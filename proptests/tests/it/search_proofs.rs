@@ -1,4 +1,4 @@
-//! Every search: what is called proved is, and strategies that prove agree with each other.
+//! Every search: proved claims are true, and exact searches agree with each other.
 
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseResult;
@@ -14,8 +14,8 @@ use seafix_proptests::{
 use seafix_referencing::{Candidates, Correspondence, Identification, ModelPoint, Problem, Rejected, Tolerance};
 use std::cell::Cell;
 
-/// Whether exact searches that came to their end say the same: size, refusal, and those that name all ties the same
-/// set. The number that did.
+/// Compares finished exact searches: size, rejection, and the set for those that list all ties. Returns the number that
+/// agree.
 fn agree(searches: &[Tried], planted: &Planted) -> Result<u32, TestCaseError> {
     let mut compared = 0;
     for orientation in [true, false] {
@@ -101,19 +101,19 @@ fn bounds_hold(searches: &[Tried], planted: &Planted) -> TestCaseResult {
     Ok(())
 }
 
-/// P33. Where the budget ends a search its answer is not called proved, the set is no larger than the largest, and the bound
-/// no smaller; for budgets from one test on.
+/// P33. An answer at the end of the budget is not called proved, its set is at most the maximum, and its bound at
+/// least; for budgets from one test on.
 ///
-/// Seen to fail when a clique search that was cut short is called complete, and when its bound is the size found.
+/// Seen to fail when a truncated clique search is called complete, and when its bound is the size found.
 #[test]
 fn a_spent_budget_proves_nothing() {
     let all: Vec<Vec<Tried>> = [1, 10, 100, 1_000].map(searches).into();
     law(96, planted(SMALL), |planted| all.iter().try_for_each(|searches| bounds_hold(searches, &planted)));
 }
 
-/// P36. With each coordinate's error at most e and Δ ≥ 2√3 e the true set is coherent: no miss in 100 000 draws.
+/// P36. With an error of each coordinate of at most e and Δ ≥ 2√3 e the true set is coherent: no miss in 100 000 draws.
 ///
-/// Seen to fail with Δ = 1.9√3 e and errors that are all as large as allowed.
+/// Seen to fail with Δ = 1.9√3 e and all errors at their maximum.
 #[test]
 fn a_true_set_is_coherent_by_construction() {
     let mut rng = ChaCha8Rng::seed_from_u64(36);
@@ -126,7 +126,7 @@ fn a_true_set_is_coherent_by_construction() {
         let model = places.map(|at| ModelPoint::exact("", at));
         let along = (places[1] - places[0]).normalize();
         let cloud = [-1.0, 1.0].map(|side| {
-            // The worst: both errors along the distance, as far as the cube of errors allows, or anywhere in it.
+            // The worst case: both errors along the distance, at the boundary of the cube of errors, or anywhere in it.
             let corner = along.map(|x| side * e * x.signum());
             let anywhere = nalgebra::Vector3::from_fn(|_, _| rng.random_range(-e..=e));
             let at =
@@ -141,7 +141,7 @@ fn a_true_set_is_coherent_by_construction() {
     }
 }
 
-/// P37. Pruned branches never contain a better set: with and without the bound backtracking says the same.
+/// P37. Pruned branches contain no better set: backtracking gives the same with and without the bound.
 ///
 /// Seen to fail when the bound is one too small.
 #[test]

@@ -1,4 +1,4 @@
-//! Every search: what changes nothing in a problem changes nothing in the answer.
+//! Every search: irrelevant changes of a problem do not change the answer.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -18,7 +18,7 @@ use seafix_referencing::{
 };
 use std::cell::Cell;
 
-/// Pair tests that leave time for hundreds of cases.
+/// A budget of pair tests for hundreds of cases.
 const BUDGET: i64 = 20_000;
 
 /// An answer without its cost: the set, or the reason.
@@ -35,13 +35,13 @@ fn all_distinct(planted: &Planted) -> bool {
     distinct(planted.model.iter().map(|p| p.at.coords)) && distinct(planted.cloud.iter().map(|c| c.position.at.coords))
 }
 
-/// Cloud points through `change`.
+/// The cloud points, each mapped by `change`.
 fn with_cloud(planted: &Planted, change: impl Fn(&MeasuredPoint) -> MeasuredPoint) -> Planted {
     Planted { cloud: planted.cloud.iter().map(change).collect(), ..planted.clone() }
 }
 
-/// P20. A point outside every shell never changes the result: with 10 000 far points more the answer is the same to the
-/// last bit.
+/// P20. Points outside of every gate do not change the result: with 10 000 distant points more the answer is the same
+/// to the last bit.
 ///
 /// Seen to fail when the size of the cloud counts among the tests.
 #[test]
@@ -60,16 +60,16 @@ fn points_outside_every_gate_change_nothing() {
     });
 }
 
-/// P24. The order of model and cloud changes nothing but the order of the listing; where no two points coincide.
+/// P24. The order of model and cloud changes only the order of the listing, if no two points coincide.
 ///
-/// Seen to fail when vertices are sorted by their numbers.
+/// Seen to fail when vertices are sorted by their indices.
 #[test]
 fn the_order_of_the_points_changes_nothing() {
     let searches = searches(BUDGET);
     let answered = Cell::new(0);
     let cases = law(96, (prop_oneof![planted(SMALL), planted(LARGE)], any::<u64>()), |(planted, seed)| {
         prop_assume!(all_distinct(&planted));
-        // Places by a multiplicative shuffle: new place k holds the old one order[k].
+        // A multiplicative shuffle: the new index k has the old point order[k].
         let order = |count: usize| {
             let mut order: Vec<usize> = (0..count).collect();
             order.sort_by_key(|&i| (i as u64 + 1).wrapping_mul(seed | 1).rotate_left(17).wrapping_mul(0x9E37_79B9));
@@ -105,16 +105,16 @@ fn the_order_of_the_points_changes_nothing() {
     not_idle("answers", answered.get(), cases, 1);
 }
 
-/// Whether a search came to the end of its budget.
+/// Whether a search exhausted its budget.
 fn ended(answer: &Answer) -> bool {
     let why = answer.as_ref().map_or_else(Some, |found| found.undecided.as_ref());
     matches!(why, Some(Rejected::Budget { .. }))
 }
 
-/// P25. A rigid motion of the cloud inside the same candidate lists changes nothing, as distances alone decide, unless
-/// rounding does: the size is the same, and the set where it is the only one of its size.
+/// P25. A rigid motion of the cloud with the same candidate lists changes nothing, since only distances matter, except
+/// by rounding: the size is the same, and so is a unique set of that size.
 ///
-/// Seen to fail when the tolerance of a pair depends on where it lies.
+/// Seen to fail when the tolerance of a pair depends on its position.
 #[test]
 fn a_motion_of_the_cloud_changes_nothing() {
     let searches = searches(BUDGET);
@@ -152,11 +152,12 @@ fn a_motion_of_the_cloud_changes_nothing() {
     });
 }
 
-/// P27. Monotone: of four points or more no fewer are identified when Δ grows, when a candidate is added, or when a
-/// model point is added.
+/// P27. Monotonicity: for four or more points the number of identified points does not decrease with a larger Δ, a
+/// further candidate, or a further model point.
 ///
-/// Seen to fail when model points with more than three candidates are left out as too ambiguous; not by a lost candidate, bounds
-/// one too small, a budget mistaken for an end, or a coherence that also refuses differences below .3 Δ.
+/// Seen to fail when model points with more than three candidates are skipped as ambiguous; not with a lost candidate,
+/// bounds that are one too small, a budget mistaken for completion, or a coherence that also rejects differences below
+/// 0.3 Δ.
 #[test]
 fn more_never_finds_less() {
     let searches = searches(BUDGET);
@@ -198,8 +199,8 @@ fn more_never_finds_less() {
     not_idle("sets of four and more", held.get(), cases, 2);
 }
 
-/// P28. Model, cloud, Δ and covariances scaled by a power of two: exactly the same answer, for searches that have no length
-/// of their own.
+/// P28. Scaling model, cloud, Δ and covariances by a power of two gives exactly the same answer, for searches without a
+/// length of their own.
 ///
 /// Seen to fail when a length of 1 mm is added to Δ.
 #[test]
@@ -225,10 +226,10 @@ fn a_problem_of_another_size_is_the_same_problem() {
     });
 }
 
-/// P30. Cloud points that come twice, with the same coordinates and candidates: the size is the same and the lower
-/// number is chosen, where model points are more than Δ apart.
+/// P30. Duplicate cloud points with the same candidates: the size is the same and the lower index is chosen, for model
+/// points more than Δ apart.
 ///
-/// Seen to fail when vertices of equal coordinates stand by falling number.
+/// Seen to fail when vertices of equal coordinates are sorted by decreasing index.
 #[test]
 fn a_point_that_comes_twice_is_the_first() {
     let searches = searches(BUDGET);
@@ -262,8 +263,8 @@ fn a_point_that_comes_twice_is_the_first() {
     not_idle("sets found twice", held.get(), cases, 2);
 }
 
-/// How many of so many clouds that show nothing but the mirror image of a model of eight to thirty points the default search
-/// takes for the object, by no more than three fifths of its points.
+/// The number of clouds with only the mirror image of a model of eight to thirty points that the default search takes
+/// for the object, with at most three fifths of its points.
 fn mirror_images_fixed(clouds: usize) -> usize {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut fixed = 0;
@@ -289,9 +290,10 @@ fn mirror_images_fixed(clouds: usize) -> usize {
     fixed
 }
 
-/// P26. A few points of a mirror image always lie as the object's do: they are no reason to believe that it is the object.
+/// P26. A few points of a mirror image always fit the object; they do not make a fix.
 ///
-/// Seen to fail, with two of 600, where the model is reflected in one plane only, and with one where eight threes are reflected.
+/// Seen to fail, with two of 600, when the model is reflected in one plane only, and with one when eight triples are
+/// reflected.
 #[test]
 fn a_mirror_image_of_many_points_is_not_fixed() {
     assert_eq!(mirror_images_fixed(100), 0);

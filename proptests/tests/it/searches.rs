@@ -1,4 +1,4 @@
-//! Every search: what it returns is admissible, and nothing larger was there.
+//! Every search: returned sets are admissible and maximum.
 
 use std::cell::Cell;
 
@@ -14,10 +14,10 @@ use seafix_proptests::{
 };
 use seafix_referencing::{Candidates, Correspondence, ModelPoint, Problem, Rejected, SEARCHES, Tolerance};
 
-/// Pair tests that leave time for thousands of cases.
+/// A budget of pair tests for thousands of cases.
 const BUDGET: i64 = 100_000;
 
-/// Seen to fail where a search says nothing of its time.
+/// Seen to fail when a search does not state its time.
 #[test]
 fn every_search_states_what_it_maximises_whether_that_is_exact_and_what_time_it_takes() {
     for listing in SEARCHES.listings() {
@@ -37,21 +37,21 @@ fn every_set_is_admissible(searches: &[Tried], planted: &Planted) -> TestCaseRes
     Ok(())
 }
 
-/// P21. Every returned set, rivals included, is coherent: all q (q − 1)/2 differences ≤ Δ, evaluated
-/// anew from the original coordinates, in closed form; up to 24 points and 108 in the cloud.
+/// P21. Every returned set, alternatives included, is coherent: all q (q − 1)/2 differences ≤ Δ, evaluated from the
+/// original coordinates, in closed form; up to 24 points and 108 in the cloud.
 ///
-/// Seen to fail when the last two pairs of a set are not compared, when orientation is tested only while
-/// a set has two points, and when coherence does not ask for two different cloud points.
+/// Seen to fail when the last two pairs of a set are not compared, when orientation is tested only for sets of two
+/// points, and when coherence does not require two different cloud points.
 #[test]
 fn every_returned_set_is_coherent() {
     let searches = searches(BUDGET);
     law(256, prop_oneof![planted(LARGE), planted(SMALL)], |planted| every_set_is_admissible(&searches, &planted));
 }
 
-/// P31. Sub-set closure: what is left of a returned set without any one of its pairs is admissible, and an exact search
-/// that is given nothing else finds it whole.
+/// P31. Sub-set closure: a returned set without any one of its pairs is admissible, and an exact search that gets only
+/// this subset returns it completely.
 ///
-/// Seen to fail when the last vertex of a graph is forgotten, and when three candidates are too few.
+/// Seen to fail when the last vertex of a graph is omitted, and when three candidates are too few.
 #[test]
 fn what_is_left_of_a_set_is_one() {
     let searches = searches(BUDGET);
@@ -81,8 +81,8 @@ fn what_is_left_of_a_set_is_one() {
     not_idle("sets looked at", looked_at.get(), cases, 1);
 }
 
-/// P21, P22. The bound is closed: a set with a difference of exactly Δ is found whole, and is not found
-/// when Δ is the next smaller number. Whole numbers times a power of two on one axis: no rounding.
+/// P21, P22. The bound is closed: a set with a difference of exactly Δ is found completely, and not found for the next
+/// smaller Δ. Coordinates are integers times a power of two on one axis, so that nothing is rounded.
 ///
 /// Seen to fail when the comparison is < instead of ≤, and when the last two pairs are not compared.
 #[test]
@@ -90,7 +90,7 @@ fn a_difference_of_exactly_delta_is_coherent() {
     let searches = searches(BUDGET);
     let steps = prop::collection::vec((1u32..40, 0u32..4), 3..=5);
     law(128, (steps, 0usize..3, 1u32..4, -6i32..=0), |(steps, axis, scale_error, power)| {
-        // Places along the axis in the model; the cloud's are stretched a little, the last the most.
+        // Positions on the axis in the model; those of the cloud are slightly longer, the last by the maximum.
         let unit = 2f64.powi(power);
         let at = |number: u32| Vector3::ith(axis, f64::from(number) * unit);
         let (mut known, mut seen) = (vec![0], vec![0]);
@@ -127,20 +127,20 @@ fn measured(at: Vector3<f64>) -> MeasuredPoint {
     MeasuredPoint { position: UncertainPoint { at: Point::from(at), covariance: Matrix3::zeros() }, pixels: None }
 }
 
-/// P22, P34. Size optimality against brute force for n ≤ 7 and lists ≤ 4, over admissible sets: coherent,
-/// one-to-one and, where the search refuses mirror images, every four points whose model volume
-/// exceeds 3 σ of the measured volume with the same sign.
+/// P22, P34. Size optimality against brute force for n ≤ 7 and lists ≤ 4, over admissible sets: coherent, one-to-one
+/// and, for searches that reject mirror images, with every four points whose model volume exceeds 3 σ of the measured
+/// volume having the same sign.
 ///
-/// For any search: what it returns is admissible and no larger than brute force; its `consensus_bound` is
-/// no smaller; where it says `optimal` all three are equal; where it says that its rivals are complete
-/// it names all sets of that size; where it refuses for lack of consensus brute force finds fewer than
-/// needed; where it calls the largest coherent set a mirror image brute force finds no admissible four,
-/// and where brute force finds three admissible points at most but four coherent ones, so that every
-/// coherent set of four or more is a mirror image, no answer is given; where its budget ends its bounds enclose brute force. And some search settles every problem.
+/// A returned set is admissible and at most the maximum, and `consensus_bound` is at least that. For `optimal` all
+/// three are equal, and complete alternatives are all sets of that size. After a rejection for lack of consensus brute
+/// force finds too few points. After a rejection as a mirror image brute force finds no admissible four. No answer is
+/// given if brute force finds at most three admissible points but four coherent ones, since every coherent set of four
+/// or more is then a mirror image. Bounds at the end of the budget enclose brute force. Some search solves every
+/// problem.
 ///
-/// Seen to fail when the colouring bound or the n-partite bound is one too small, when orientation is
-/// tested only while a set has two points, when a model point's last candidate is forgotten, and when
-/// what is left of a mirror image is an answer.
+/// Seen to fail when the colouring bound or the n-partite bound is one too small, when orientation is tested only for
+/// sets of two points, when a model point's last candidate is omitted, and when the rest of a mirror image is an
+/// answer.
 #[test]
 fn no_admissible_set_is_larger() {
     let searches = searches(BUDGET);
@@ -180,7 +180,7 @@ fn no_admissible_set_is_larger() {
                             .all(|alternative| alternative.len() == size && *alternative != found.pairs),
                         "{name}"
                     );
-                    // P34: all that tie are named, as long as they are few.
+                    // P34: all ties are listed if they are few.
                     let largest = is_proved_largest(&found);
                     let few = best.sets.len() <= 64 && largest;
                     prop_assert!(!search.claims.ties || !few || found.alternatives_complete, "{name}: ties");
@@ -241,11 +241,10 @@ fn no_admissible_set_is_larger() {
     not_idle("mirror images", mirrored.get(), cases, 50);
 }
 
-/// P22 beyond brute force: no answer that is called optimal is smaller than an admissible set that was
-/// planted, and every bound leaves room for it; up to 24 points.
+/// P22 beyond brute force: no answer with `optimal` is smaller than the planted admissible set, and every bound is at
+/// least its size; up to 24 points.
 ///
-/// Seen to fail when a model point's last candidate is forgotten, and when the orientation test
-/// refuses equal signs.
+/// Seen to fail when a model point's last candidate is omitted, and when the orientation test rejects equal signs.
 #[test]
 fn a_planted_set_is_not_missed() {
     let searches = searches(BUDGET);
@@ -264,7 +263,7 @@ fn a_planted_set_is_not_missed() {
                 Err(Rejected::Budget { bound, .. } | Rejected::NotFound { bound, .. }) => {
                     prop_assert!(bound >= size, "{}: bound {bound}", search.name)
                 }
-                // What others take for a mirror image need not be all there is.
+                // Points that are a mirror image for others need not be the complete set.
                 Err(Rejected::Mirrored { .. }) if !search.claims.exact => {}
                 Err(refusal) => prop_assert!(size <= 3, "{}: {refusal}", search.name),
             }
@@ -292,15 +291,15 @@ fn reflection(
     }
 }
 
-/// P26. Reflection of the cloud: the distance test alone accepts it whole, the orientation test must
-/// refuse it as `Mirrored`, with its size, wherever every four points decide: its triples are admissible,
-/// three points having no orientation, but they are what is left of the image.
+/// P26. Reflection of the cloud: the distance test alone accepts it completely; the orientation test must reject it as
+/// `Mirrored`, with its size, if all sets of four points decide. Its triples are admissible, since three points have no
+/// orientation, but they are the rest of a mirror image.
 ///
-/// Where some fours are too flat to decide, the largest admissible set may have four points or more; then
-/// `Mirrored` is not promised, and admissibility (P21, P22) is all that is held.
+/// If some sets of four are too flat to decide, the maximum admissible set may have four points or more; `Mirrored` is
+/// then not guaranteed, and only admissibility (P21, P22) is tested.
 ///
-/// Seen to fail when the orientation test always passes, when it refuses equal signs, and when a triple of
-/// the image is an answer.
+/// Seen to fail when the orientation test always passes, when it rejects equal signs, and when a triple of the image is
+/// an answer.
 #[test]
 fn a_mirror_image_is_refused() {
     let searches = searches(BUDGET);
@@ -356,10 +355,10 @@ fn a_flat_mirror_image_is_accepted() {
     });
 }
 
-/// P29. Injective: no cloud point serves two model points, no model point appears twice; model points
-/// nearer to each other than Δ and shared lists included.
+/// P29. Injectivity: no cloud point belongs to two model points, and no model point appears twice, also for model
+/// points nearer than Δ and for shared lists.
 ///
-/// Seen to fail when coherence does not ask for two different cloud points.
+/// Seen to fail when coherence does not require two different cloud points.
 #[test]
 fn no_point_serves_twice() {
     let searches = searches(BUDGET);

@@ -1,4 +1,4 @@
-//! Every search: what measured points are other points of the model as well is ambiguous, unless something decides.
+//! Every search: an answer whose points may be other points of the model is ambiguous, unless something decides.
 
 use nalgebra::{Matrix6, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -18,7 +18,7 @@ use seafix_simulation::{Purpose, Stream};
 
 const SIGMA: f64 = 0.002;
 
-/// Models that a motion maps onto themselves: a grid, a long one, a box of points; their edges in metres.
+/// Models with a self-symmetry: a grid, a long grid, a box of points; edges in metres.
 fn models() -> [Vec<Point<Object>>; 3] {
     let grid = |[a, b, c]: [u32; 3], [x, y, z]: [f64; 3]| {
         let steps = |n: u32, step: f64| (0..n).map(move |i| f64::from(i) * step);
@@ -28,7 +28,8 @@ fn models() -> [Vec<Point<Object>>; 3] {
     [grid([4, 4, 1], [0.4, 0.4, 0.0]), grid([5, 2, 1], [0.3, 0.7, 0.0]), grid([2, 2, 2], [1.0, 0.6, 0.8])]
 }
 
-/// What each search answers of a model seen whole, 3 m before the camera and turned by so much, with this prior.
+/// The answer of each search for a completely visible model, 3 m before the camera, rotated by an angle, with this
+/// prior.
 fn answers(
     model: &[ModelPoint],
     turn: Vector3<f64>,
@@ -71,9 +72,9 @@ fn model(points: &[Point<Object>], normal: Option<Vector3<f64>>) -> Vec<ModelPoi
     points.iter().enumerate().map(point).collect()
 }
 
-/// P34. Nothing tells the turned poses of a symmetric model apart: no search may choose one.
+/// P34. Nothing distinguishes the symmetric poses of a model: no search may choose one.
 ///
-/// Seen to fail, by `gnc-tls` first, when the sets of a fix are not read otherwise.
+/// Seen to fail, by `gnc-tls` first, when alternative readings of a fix are not examined.
 #[test]
 fn a_symmetric_model_is_not_fixed_without_a_prior() {
     for points in models() {
@@ -87,7 +88,7 @@ fn a_symmetric_model_is_not_fixed_without_a_prior() {
 
 /// A prior that excludes the other poses decides.
 ///
-/// Seen to fail when a twin counts however unlikely and far from the prior.
+/// Seen to fail when an alternative counts regardless of its probability and its distance from the prior.
 #[test]
 fn a_prior_decides_between_the_poses_of_a_symmetric_model() {
     let turn = Vector3::new(0.1, 0.2, -0.3);
@@ -105,9 +106,9 @@ fn a_prior_decides_between_the_poses_of_a_symmetric_model() {
     }
 }
 
-/// The side from which points can be seen is held against every pose, found with a prior or without.
+/// Every pose is tested for the visible side of its points, with and without a prior.
 ///
-/// Seen to fail when every side counts as visible.
+/// Seen to fail when all sides count as visible.
 #[test]
 fn no_pose_shows_points_from_behind() {
     let solid =
@@ -131,9 +132,9 @@ fn no_pose_shows_points_from_behind() {
     assert!(front.len() > 5 && behind.is_empty(), "{front:?}, {behind:?}");
 }
 
-/// A flat model that a flip maps onto itself: the side from which its points can be seen decides, and nothing else does.
+/// A flat model that a flip maps onto itself: only the visible side of its points decides.
 ///
-/// Seen to fail when every side counts as visible, and when the sets of a fix are not read otherwise.
+/// Seen to fail when all sides count as visible, and when alternative readings of a fix are not examined.
 #[test]
 fn the_visible_side_decides_between_a_flat_model_and_its_flip() {
     let kite = [[0.0, 0.9], [0.4, 0.5], [-0.4, 0.5], [0.0, -0.8], [0.2, -0.1], [-0.2, -0.1]];
@@ -152,7 +153,7 @@ fn the_visible_side_decides_between_a_flat_model_and_its_flip() {
     assert!(!seen.is_empty() && seen.iter().all(|(_, right)| *right), "{seen:?}");
 }
 
-/// A grid of three points a side, 25 cm apart, and what is measured of it, in the same order.
+/// A grid of three points a side, 25 cm apart, and its measurements in the same order.
 fn seen_grid(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>) {
     let steps = || (0..3).map(|i| 0.25 * f64::from(i));
     let grid = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| Point::new(x, y, z))));
@@ -168,7 +169,7 @@ fn seen_grid(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>) {
     (model, cloud)
 }
 
-/// What a search makes of proposed pairs of a grid.
+/// The answer of a search for putative pairs of a grid.
 fn of_grid(rng: &mut ChaCha8Rng, pairs: &[(usize, usize)], name: &str) -> Outcome {
     let (model, cloud) = seen_grid(rng);
     let candidates = Candidates::from_pairs(model.len(), pairs.iter().copied());
@@ -179,10 +180,9 @@ fn of_grid(rng: &mut ChaCha8Rng, pairs: &[(usize, usize)], name: &str) -> Outcom
     compute_fix(&problem, &*search, &Kabsch::default(), &Acceptance::default(), None, &mut rng).outcome
 }
 
-/// The cloud is a grid and so is the model, but which point is which is drawn: whatever pose many pairs agree on by that, no search
-/// may believe it.
+/// Model and cloud are grids, and putative pairs are random: no search may accept the pose on which many pairs agree.
 ///
-/// Seen to fail, with a third of these frames, where chance is asked for the density of partners alone.
+/// Seen to fail, with a third of these frames, when the NFA assumes the density of partners only.
 #[test]
 fn pairs_generated_over_a_grid_are_not_fixed() {
     generated_over_a_grid(5);
@@ -205,11 +205,11 @@ fn generated_over_a_grid(frames: u64) {
     }
 }
 
-/// The same where corners are only taken for corners, edges for edges and faces for faces, as appearance would: every way to put the
-/// grid onto itself is met by half of the points, and the default tells that none stands out. True pairs among as many of these stand
-/// out, and true ones alone are no matter of doubt.
+/// The same with pairs of corners with corners, edges with edges and faces with faces, as appearance would propose.
+/// Half of the points agree with every symmetry of the grid, and the default reports that none is distinguished. Right
+/// pairs among equally many of these are distinguished, and right pairs alone are not in doubt.
 ///
-/// Seen to fail, with one frame in six, where no other pose is asked.
+/// Seen to fail, with one frame in six, when no alternative pose is examined.
 #[test]
 fn pairs_generated_among_alike_points_are_not_fixed() {
     let kind = |i: usize| [i % 3, i / 3 % 3, i / 9].iter().filter(|&&step| step == 1).count();
@@ -234,8 +234,8 @@ fn pairs_generated_among_alike_points_are_not_fixed() {
     assert!(answered[0] == 0 && answered[1] >= 20 && answered[2] == 40, "{answered:?} of 40");
 }
 
-/// Eight points that a half-turn maps onto each other but for one, which is up to five standard deviations off, seen among
-/// twenty of clutter; and where the camera is.
+/// Eight points that a half-turn maps onto each other except for one with an offset of up to five standard deviations,
+/// among twenty points of clutter; and the camera's pose.
 fn nearly_symmetric(stream: &mut Stream) -> View {
     let sigma = 0.01;
     let mut points = Vec::new();
@@ -248,12 +248,12 @@ fn nearly_symmetric(stream: &mut Stream) -> View {
     View::of(stream, exact_model(&points), camera_from_object, 0..8, sigma).among(stream, 20, 3.0, [1.5; 3])
 }
 
-/// A model that is nearly symmetric is the right way round as often as the default search says, and where it may not be with
-/// more than the stated risk, no protection level vouches for it; 500 frames.
+/// The default search's probability of the right orientation of a nearly symmetric model is calibrated, and no
+/// protection level is given if the probability of the wrong one exceeds the stated risk; 500 frames.
 ///
-/// Answers are believed here with a doubt of up to .3, so that there are wrong ones to count.
+/// Answers are accepted here with a doubt of up to 0.3, so that there are wrong ones to count.
 ///
-/// Seen to fail where the level takes no account of other poses: 17 of 445 fixes are beyond it.
+/// Seen to fail when the level ignores alternative poses: 17 of 445 fixes exceed it.
 #[test]
 fn a_nearly_symmetric_model_is_the_right_orientation_as_often_as_is_stated() {
     let frames = u64::from(cases(4000));
@@ -288,15 +288,16 @@ fn a_nearly_symmetric_model_is_the_right_orientation_as_often_as_is_stated() {
         by_default[1]
     );
     assert!(answered > frames / 2 && expected > 4.0, "too few to tell");
-    // Twins are counted by the search and by the reading of the points again: up to twice as often as they are wrong.
+    // Alternatives count in the search and in the reading of the points: up to twice as often as they are wrong.
     let (min, max) = (0.5 * expected - 3.0 * variance.sqrt(), expected + 3.0 * variance.sqrt());
     assert!((min..=max).contains(&(wrong as f64)), "{wrong} wrong, {min:.1} to {max:.1} expected");
     let (min, _) = clopper_pearson(beyond, protected, 0.99);
     assert!(min <= acceptance.risk, "{beyond} of {protected} fixes are beyond their level");
 }
 
-/// A body whose points have twins nearer than the alert limit, of which those of one body are seen among ten of clutter; and where the
-/// camera is: a thin plate, with the points of the one face again on the other, or a wedge, the points again turned a little.
+/// A body whose points have alternatives nearer than the alert limit; the points of one side are in view among ten of
+/// clutter; and the camera's pose. It is a thin plate with the points of one face repeated on the other, or a wedge
+/// with the points repeated and slightly rotated.
 fn near_duplicate(stream: &mut Stream, wedge: bool) -> View {
     let count = stream.rng().random_range(5..9);
     let near: Vec<_> = (0..count).map(|_| anywhere(stream, [0.5, 0.4, if wedge { 0.4 } else { 0.1 }])).collect();
@@ -313,10 +314,10 @@ fn near_duplicate(stream: &mut Stream, wedge: bool) -> View {
     view.among(stream, 10, 3.0, [1.5; 3])
 }
 
-/// Where the points seen may be their twins and the pose is hardly another for it, the fix is given and its level holds of both; 150
-/// frames of a plate and 150 of a wedge.
+/// A fix whose points may be the alternatives with nearly the same pose is given, and its level covers both; 150 frames
+/// of a plate and 150 of a wedge.
 ///
-/// Seen to fail where levels are not raised over poses within the alert limit: 12 of 113 are beyond.
+/// Seen to fail when levels ignore alternatives within the alert limit: 12 of 113 exceed them.
 #[test]
 fn levels_hold_of_symmetric_sets_within_the_alert_limit() {
     let frames = u64::from(cases(1200));
@@ -341,14 +342,14 @@ fn levels_hold_of_symmetric_sets_within_the_alert_limit() {
             "{name}: {answered} of {frames} answered, {copies} of them the twin; {protected} with a level, {beyond} beyond it"
         );
         let (min, _) = clopper_pearson(beyond, protected, 0.99);
-        // The level of the position and that of the attitude are at that risk each.
+        // The levels of position and attitude have that risk each.
         assert!(min <= 2.0 * acceptance.risk, "{name}: {beyond} of {protected} fixes are beyond a level");
         assert!(protected as u64 > frames / 8 && copies > 5, "{name}: too few to tell");
     }
 }
 
-/// A flange of bolts with one point that breaks its symmetry and is not seen, before a rough pose that all of the model fits: a pose
-/// that is drawn evenly among those.
+/// A flange of bolts with an invisible point that breaks its symmetry, and a prior pose within whose bound all of the
+/// model lies: a pose drawn uniformly among those.
 fn bolts(stream: &mut Stream, count: u32, half: f64) -> View {
     let radius = 0.4;
     let bolt = |k: u32| {
@@ -362,10 +363,10 @@ fn bolts(stream: &mut Stream, count: u32, half: f64) -> View {
     view.before(half, || [anywhere(stream, [1.2 * half / radius + 0.1; 3]), anywhere(stream, [half; 3])])
 }
 
-/// A rough pose decides between the ways round of a symmetric object where its bound excludes the others, and not where noise alone
-/// carries a measured point across: 300 frames each of 12 bolts and of 8.
+/// A prior pose decides between the orientations of a symmetric object if its bound excludes the others, and not if
+/// noise alone carries a measured point across: 300 frames each of 12 bolts and of 8.
 ///
-/// Seen to fail, with 4 of 152 answers of 12 bolts, where each point must be a candidate by itself.
+/// Seen to fail, with 4 of 152 answers for 12 bolts, when each point must be a candidate by itself.
 #[test]
 fn noise_at_the_edge_of_a_prior_decides_between_no_poses() {
     let frames = u64::from(cases(2400));
@@ -390,9 +391,9 @@ fn noise_at_the_edge_of_a_prior_decides_between_no_poses() {
     }
 }
 
-/// An object of two modules of eight points, one a metre beside the other, with four points more, of which the second module and two of
-/// the four are seen; and what appearance proposes for the points of the module: the other's with this probability. Twenty pairs more are
-/// drawn.
+/// An object of two modules of eight points, a metre apart, with four points more. The second module and two of the
+/// four are in view. Appearance proposes, for the points of the module, the other module's with this probability, and
+/// twenty random pairs more.
 fn modules(stream: &mut Stream, mistaken: f64) -> (View, Candidates) {
     let first: Vec<_> = (0..8).map(|_| anywhere(stream, [0.3; 3])).collect();
     let second: Vec<_> = first.iter().map(|at| at + Vector3::x()).collect();
@@ -413,10 +414,10 @@ fn modules(stream: &mut Stream, mistaken: f64) -> (View, Candidates) {
     (view, candidates)
 }
 
-/// Proposed pairs of a module that the object has twice, where appearance tells the two apart no better than by chance: no more than one
-/// answer in a hundred takes it for the other. Where it mistakes none, most are answered. 300 frames each.
+/// Putative pairs of a repeated module that appearance cannot distinguish: at most one answer in a hundred takes it for
+/// the other. Most frames without confusion are answered. 300 frames each.
 ///
-/// Seen to fail, with 5 of 61 answers, where points are only read as what is proposed for them.
+/// Seen to fail, with 5 of 61 answers, when alternative readings are limited to proposed points.
 #[test]
 fn proposals_do_not_decide_between_modules_that_look_alike() {
     let frames = u64::from(cases(2400));

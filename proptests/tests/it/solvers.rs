@@ -1,4 +1,4 @@
-//! Every solver: exact on exact data, moving with its frames, never a reflection.
+//! Every solver: exact on exact data, equivariant, never a reflection.
 
 use std::cell::Cell;
 
@@ -16,18 +16,18 @@ use seafix_proptests::{
 };
 use seafix_referencing::{Degenerate, Observation, Observations, SOLVERS, Solver};
 
-/// A solver, and how often it answered where an answer was due.
+/// A solver, with counts of due and given answers.
 struct Asked {
     solver: Variant<dyn Solver>,
-    /// Whether it takes points without pixels.
+    /// Whether it solves points without pixels.
     takes_bare: bool,
     due: Cell<u32>,
     answered: Cell<u32>,
 }
 
 impl Asked {
-    /// The pose of a scene. An answer is due, and counted, wherever the solver has the points it asks for
-    /// and, if it needs them, their pixels: all scenes drawn here are far from a line.
+    /// The pose of a scene. An answer is due if the solver has its required points and pixels: all scenes here are far
+    /// from a line.
     fn solve(&self, scene: &Scene) -> Result<Transform<Object, Camera>, Degenerate> {
         let answer = self.solver.component.solve(&scene.observations());
         if self.has_enough(scene) && (self.takes_bare || scene.rig.is_some()) {
@@ -45,7 +45,7 @@ impl Asked {
         &self.solver.name
     }
 
-    /// What is asked of solvers that answer to rounding error; of others a hundred thousandth (rad, m).
+    /// The tolerance of solvers that answer to rounding error; for others a hundred thousandth (rad, m).
     fn limit(&self, exact: f64) -> f64 {
         if self.solver.component.to_rounding() { exact } else { exact.max(1e-5) }
     }
@@ -53,8 +53,8 @@ impl Asked {
 
 /// Every solver with every value of its switches.
 ///
-/// One that needs pixels refuses the corners of a box without them, and is held to the laws where there are
-/// some; every other answers. One that claims least squares must do without.
+/// A solver that needs pixels rejects the corners of a box without them, and is tested with pixels; every other solver
+/// answers. A solver that claims least squares must not need pixels.
 fn solvers() -> Vec<Asked> {
     let solvers = variants(&SOLVERS, &[]).into_iter().map(|solver| {
         let takes_bare = !solver.component.needs_pixels();
@@ -67,8 +67,8 @@ fn solvers() -> Vec<Asked> {
     solvers.collect()
 }
 
-/// Holds every solver to its answers over `cases` cases: due in at least one of four, given in at least
-/// nine of ten. `pixels`: the scenes had pixels, so no solver is excused.
+/// Requires the answers of every solver over `cases` cases: due in at least one of four, given in at least nine of ten.
+/// `pixels`: the scenes have pixels, so that no solver is exempt.
 fn all_answer(solvers: &[Asked], cases: u32, pixels: bool) {
     for asked in solvers.iter().filter(|asked| pixels || asked.takes_bare) {
         let (due, answered) = (asked.due.get(), asked.answered.get());
@@ -82,12 +82,11 @@ fn all_answer(solvers: &[Asked], cases: u32, pixels: bool) {
     assert!(solvers.iter().any(|asked| asked.answered.get() > 0), "no solver answers");
 }
 
-/// P38. Exact data: pose error (rad, m) ≤ 1e-12 (1 + L), for every solver that takes bare points; each
-/// answers at least nine of ten scenes, none of which is nearer to a line than a second extent of 0.2 of
-/// the first.
+/// P38. Exact data: pose error (rad, m) ≤ 1e-12 (1 + L), for every solver of points without pixels; each answers at
+/// least nine of ten scenes, whose second extent is at least 0.2 of the first.
 ///
-/// Seen to fail when the rotation is transposed, when the determinant's sign is left out (points in a
-/// plane), and when one variant refuses a quarter of all scenes.
+/// Seen to fail when the rotation is transposed, when the determinant's sign is omitted (coplanar points), and when one
+/// variant rejects a quarter of all scenes.
 #[test]
 fn exact_points_give_the_exact_pose() {
     let solvers = solvers();
@@ -105,12 +104,10 @@ fn exact_points_give_the_exact_pose() {
     all_answer(&solvers, cases, false);
 }
 
-/// P38 for points that a rig saw: exact pixels, with the rig and the pixels at hand. Triangulated
-/// points are good to 1e-9 m, so the pose is held to that over the points' extent. Every solver
-/// answers at least nine of ten.
+/// P38 for points of a rig: exact pixels, with rig and pixels given. Triangulated points are accurate to 1e-9 m, which
+/// over the points' extent is the tolerance of the pose. Every solver answers at least nine of ten.
 ///
-/// Seen to fail when the measured points' centroid is left out, when a solver refuses everything, and as
-/// the law above.
+/// Seen to fail when the measured points' centroid is omitted, when a solver rejects everything, and as the law above.
 #[test]
 fn exact_pixels_give_the_exact_pose() {
     let solvers = solvers();
@@ -126,15 +123,14 @@ fn exact_pixels_give_the_exact_pose() {
     all_answer(&solvers, cases, true);
 }
 
-/// P39. Equivariance, camera side. In the paper's rows (y = x H) solve(x A, y) = A⁻¹ solve(x, y): ≤ 1e-10,
-/// for noisy bare points with their covariances; a solver that refuses one refuses both, and answers at
-/// least nine of ten.
+/// P39. Equivariance, camera side. In row vectors (y = x H) solve(x A, y) = A⁻¹ solve(x, y): ≤ 1e-10, for noisy points
+/// without pixels and with covariances; a solver that rejects one rejects both, and answers at least nine of ten.
 ///
-/// Pixels do not move with a camera, so a solver that needs them refuses here and is held to the
-/// object's side alone.
+/// Pixels do not move with a camera, so that a solver that needs them rejects here and is tested on the object side
+/// only.
 ///
-/// Seen to fail when the centroid of the measured points is left out, and when one variant refuses a
-/// quarter of all scenes.
+/// Seen to fail when the centroid of the measured points is omitted, and when one variant rejects a quarter of all
+/// scenes.
 #[test]
 fn moves_with_the_camera() {
     let solvers = solvers();
@@ -163,12 +159,11 @@ fn moves_with_the_camera() {
     all_answer(&solvers, cases, false);
 }
 
-/// P39. Equivariance, object side. In the paper's rows solve(x, y B) = solve(x, y) B: ≤ 1e-10, for noisy
-/// bare points and for noisy pixels with their rig; a solver that refuses one refuses both, and answers
-/// at least nine of ten that it can take.
+/// P39. Equivariance, object side. In row vectors solve(x, y B) = solve(x, y) B: ≤ 1e-10, for noisy points with and
+/// without pixels; a solver that rejects one rejects both, and answers at least nine of ten of its kind.
 ///
-/// Seen to fail when the centroid of the model's points is left out, when points are weighted by their
-/// distance from the object's origin, and when the area of a triangle is measured from there.
+/// Seen to fail when the centroid of the model's points is omitted, when points are weighted by their distance from the
+/// object's origin, and when the area of a triangle is measured from there.
 #[test]
 fn moves_with_the_object() {
     let solvers = solvers();
@@ -198,18 +193,17 @@ fn moves_with_the_object() {
     all_answer(&solvers, cases, false);
 }
 
-/// The solvers that claim the least squares.
+/// The solvers that claim least squares.
 fn claimants(solvers: &[Asked]) -> impl Iterator<Item = &Asked> {
     solvers.iter().filter(|asked| asked.solver.component.least_squares())
 }
 
-/// P40. The sum of squared residuals of every solver that claims the least is the minimum, computed from
-/// Horn's eigenvalue, and no larger than that of 1 000 random perturbations of its own pose (+ 1e-15);
-/// that of no solver is below the minimum. So a claimant's sum is no larger than any other's on the same
-/// points.
+/// P40. The sum of squared residuals of every solver that claims least squares is the minimum, computed from Horn's
+/// eigenvalue, and no larger than that of 1 000 random perturbations of its own pose (+ 1e-15). No solver's sum is
+/// below the minimum. A claimant's sum is thus at most any other's on the same points.
 ///
-/// Seen to fail when points are weighted by their distance from the object's origin, when a centroid
-/// is left out, when the rotation is transposed, and when a second solver claims and is not.
+/// Seen to fail when points are weighted by their distance from the object's origin, when a centroid is omitted, when
+/// the rotation is transposed, and when a second solver claims falsely.
 #[test]
 fn no_motion_has_smaller_squares() {
     let solvers = solvers();
@@ -236,10 +230,10 @@ fn no_motion_has_smaller_squares() {
     all_answer(&solvers, cases, false);
 }
 
-/// P41. det R = +1 always, also for coplanar, noisy and mirrored input: RᵀR = I and det R = 1 to 1e-13, no
-/// NaN. Every solver answers at least nine of ten that it can take.
+/// P41. det R = +1 always, also for coplanar, noisy and mirrored input: RᵀR = I and det R = 1 to 1e-13, no NaN. Every
+/// solver answers at least nine of ten of its kind.
 ///
-/// Seen to fail when a rotation is returned 1e-9 too long, and when a solver refuses what is mirrored.
+/// Seen to fail when a rotation is 1e-9 too long, and when a solver rejects mirrored input.
 #[test]
 fn a_pose_is_never_a_reflection() {
     let solvers = solvers();
@@ -259,11 +253,11 @@ fn a_pose_is_never_a_reflection() {
     all_answer(&solvers, cases, false);
 }
 
-/// P41. Mirrored input leaves a large residual: no rotation does better on a reflection than four times
-/// the least eigenvalue of the points' scatter, and every solver that claims least squares does as well
-/// as that (to 1e-9 of the whole scatter).
+/// P41. Mirrored input has a large residual: no rotation fits a reflection better than four times the minimum
+/// eigenvalue of the points' scatter, and every solver that claims least squares reaches it (to 1e-9 of the total
+/// scatter).
 ///
-/// Seen to fail when the determinant's sign is left out.
+/// Seen to fail when the determinant's sign is omitted.
 #[test]
 fn mirrored_points_leave_a_large_residual() {
     let solvers = solvers();
@@ -286,15 +280,15 @@ fn mirrored_points_leave_a_large_residual() {
     all_answer(&solvers, cases, false);
 }
 
-/// The solvers that come to their pose in one sum and one decomposition: nothing but rounding separates two ways of writing
-/// the same problem. (Not those that leave points out, or that iterate to a ten-billionth of a standard deviation.)
+/// The solvers with one sum and one decomposition: only rounding separates two forms of the same problem. (Solvers that
+/// exclude points, or iterate to a ten-billionth of a standard deviation, are not among them.)
 const CLOSED: [&str; 4] = ["horn", "kabsch", "umeyama", "weighted-kabsch"];
 
-/// P42. The order of the points does not matter: ≤ 1e-13 (1 + L) between a scene and itself reversed for solvers in closed form,
-/// 1e-10 for those that iterate, which end a step apart; for noisy bare points and for noisy pixels. Held wherever the
-/// pose rests on all points, and not for the triad: its frame begins at the first of three.
+/// P42. The order of the points is irrelevant: ≤ 1e-13 (1 + L) between a scene and its reverse for solvers in closed
+/// form, 1e-10 for those that iterate, which end a step apart; for noisy points with and without pixels. It holds for
+/// poses of all points, not for the triad, whose frame starts at the first of three.
 ///
-/// Seen to fail for triads, when they are not left out.
+/// Seen to fail for triads, unless they are excluded.
 #[test]
 fn the_order_of_points_does_not_matter() {
     let solvers = solvers();
@@ -315,7 +309,7 @@ fn the_order_of_points_does_not_matter() {
     assert!(cases > 0);
 }
 
-/// That two poses are one, to what is asked of the solver.
+/// Whether two poses are equal within the tolerance of the solver.
 fn same(solver: &Asked, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> Result<(), TestCaseError> {
     let closed = CLOSED.iter().any(|name| solver.name().starts_with(&format!("{name} ")));
     let exact = if closed { 1e-13 * (1.0 + a.translation().norm()) } else { 1e-10 };
@@ -327,7 +321,7 @@ fn same(solver: &Asked, a: &Transform<Object, Camera>, b: &Transform<Object, Cam
 /// P43. Inverse problem: solve(x, y) = solve(y, x)⁻¹ for equal weights, ≤ 1e-11 (1 + L), for every solver that claims
 /// least squares.
 ///
-/// Seen to fail when points are weighed by their distance from the object's origin.
+/// Seen to fail when points are weighted by their distance from the object's origin.
 #[test]
 fn the_inverse_problem_has_the_inverse_answer() {
     let solvers = solvers();
@@ -347,9 +341,9 @@ fn the_inverse_problem_has_the_inverse_answer() {
     });
 }
 
-/// P42. A weight of nought is a point removed, and weights twice as large for all give the same pose: ≤ 1e-13 (1 + L) for
-/// `weighted-kabsch`, 1e-10 for `mahalanobis`, which iterates. A point whose noise is 1e8 times the others' has a
-/// weight of 1e-16, and noise of half as much is a weight of four.
+/// P42. A weight of zero removes a point, and weights twice as large for all give the same pose: ≤ 1e-13 (1 + L) for
+/// `weighted-kabsch`, 1e-10 for `mahalanobis`, which iterates. A noise of 1e8 times the others' is a weight of 1e-16,
+/// half the noise a weight of four.
 ///
 /// Seen to fail when every weight is larger by one.
 #[test]
@@ -386,7 +380,7 @@ fn a_point_without_weight_is_no_point() {
 
 /// P44. Three exact points: every solver that claims least squares agrees with the triad, ≤ 1e-11 (1 + L).
 ///
-/// Seen to fail when the determinant's sign is left out.
+/// Seen to fail when the determinant's sign is omitted.
 #[test]
 fn three_points_leave_one_answer() {
     let solvers = solvers();
@@ -408,9 +402,10 @@ fn three_points_leave_one_answer() {
     });
 }
 
-/// P45. With all residuals below the threshold truncated squares are least squares, and so is Huber's loss: ≤ 1e-9.
+/// P45. With all residuals below the threshold, truncated least squares equal least squares, and so does Huber's loss:
+/// ≤ 1e-9.
 ///
-/// Seen to fail when Huber's weights fall from nought on.
+/// Seen to fail when Huber's weights decrease from zero on.
 #[test]
 fn robust_solvers_trust_what_is_near() {
     let robust = [
@@ -431,11 +426,11 @@ fn robust_solvers_trust_what_is_near() {
     assert!(robust.iter().all(Result::is_ok));
 }
 
-/// P45. With up to half of the points more than .2 m off their places, in any direction (nearer ones may pass for noise of
-/// a few millimetres, and which set is the largest then hangs by it), and one largest set of points that a rigid motion brings within the
-/// threshold, `gnc-tls` keeps exactly that set. Which sets there are is found by trying all of them.
+/// P45. `gnc-tls` keeps exactly the maximum set of points that a rigid motion brings within the threshold, if the set
+/// is unique. Up to half of the points are more than 0.2 m off in any direction; nearer ones might pass for noise of a
+/// few millimetres and make the maximum set undecided. Complete enumeration gives the sets.
 ///
-/// Seen to fail when no sets of three are tried after the graduation.
+/// Seen to fail when no triples are tried after the graduation.
 #[test]
 fn truncated_squares_keep_the_only_consensus() {
     let solver = SOLVERS.build(&seafix_component::Choice::named("gnc-tls")).expect("it is listed");
@@ -460,8 +455,8 @@ fn truncated_squares_keep_the_only_consensus() {
     not_idle("a unique consensus", compared.get(), cases, 4);
 }
 
-/// The largest set of points within 4.5 standard deviations of their own least-squares pose, by trying all sets; `None` where
-/// there are several.
+/// The maximum set of points within 4.5 standard deviations of their own least-squares pose, by complete enumeration;
+/// `None` if it is not unique.
 fn only_consensus(points: &[Observation]) -> Option<Vec<usize>> {
     let kabsch = SOLVERS.build(&seafix_component::Choice::named("kabsch")).expect("it is listed");
     let mut found: Vec<Vec<usize>> = Vec::new();
@@ -486,10 +481,10 @@ fn only_consensus(points: &[Observation]) -> Option<Vec<usize>> {
     if found.len() == 1 { found.pop() } else { None }
 }
 
-/// Agreement. Optimisers that know nothing of poses and of our derivatives find no better place than
-/// `stereo-reprojection`, and the same one: its own covariance puts theirs within a thousandth of a standard deviation.
+/// General optimisers without knowledge of poses and analytic derivatives find no better minimum than
+/// `stereo-reprojection`, and the same one, within a thousandth of a standard deviation of its covariance.
 ///
-/// Seen to fail when ours stops where the cost can no longer tell.
+/// Seen to fail when the solver stops at the resolution of the cost.
 #[test]
 fn independent_judges_agree() {
     let build = |name: &str| SOLVERS.build(&seafix_component::Choice::named(name)).expect("it is listed");
@@ -513,8 +508,8 @@ fn independent_judges_agree() {
     not_idle("compared", compared.get(), cases, 2);
 }
 
-/// An optimiser that is stopped before its minimum refuses, with its iterations and the distance that is left; nothing that
-/// it answers is further from `stereo-reprojection`'s pose than that allows.
+/// An optimiser that is stopped before its minimum rejects, with its iterations and the remaining distance; its answers
+/// are within that distance of `stereo-reprojection`'s pose.
 ///
 /// Seen to fail when every end counts as a minimum.
 #[test]

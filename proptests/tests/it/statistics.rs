@@ -1,4 +1,4 @@
-//! Intervals and tests: what every statistic owes whoever reads a table.
+//! Intervals and tests: laws of all statistics.
 
 use proptest::prelude::*;
 use seafix_evaluation::{Bootstrap, clopper_pearson, holm, mcnemar, median, quantile, signed_rank};
@@ -18,7 +18,7 @@ fn pairs() -> impl Strategy<Value = Vec<(f64, f64)>> {
     proptest::collection::vec((error(), error()), 0..90)
 }
 
-/// P70: the interval of the mean holds the mean. Seen to fail where blocks begin in the first third alone.
+/// P70: the interval of the mean contains the mean. Seen to fail when blocks start in the first third only.
 #[test]
 fn an_interval_holds_its_estimate() {
     law(128, (values(12..60), 1..5_usize, any::<u64>()), |(values, block, seed)| {
@@ -30,7 +30,7 @@ fn an_interval_holds_its_estimate() {
     });
 }
 
-/// P70: with four times the values the interval is half as wide, within 10 %. Seen to fail where only twenty are drawn.
+/// P70: with four times the values the interval is half as wide, within 10 %. Seen to fail with only twenty draws.
 #[test]
 fn intervals_shrink_with_the_root_of_n() {
     law(48, (values(20..50), any::<u64>()), |(values, seed)| {
@@ -45,8 +45,8 @@ fn intervals_shrink_with_the_root_of_n() {
     });
 }
 
-/// P70: adjusted values are no smaller than the raw ones and at most one; they keep the order.
-/// Seen to fail where a value may fall below the one before.
+/// P70: adjusted values are at least the raw ones and at most one; they keep the order. Seen to fail when a value may
+/// be below the one before.
 #[test]
 fn adjusting_only_raises() {
     law(256, proptest::collection::vec(0.0..=1.0_f64, 1..20), |p| {
@@ -73,7 +73,7 @@ fn equal_samples_have_p_one() {
     });
 }
 
-/// Exchanging the two methods turns the effect round and leaves its chance.
+/// Exchanging the two methods negates the effect and keeps its p-value.
 #[test]
 fn neither_method_is_preferred() {
     law(256, pairs(), |pairs| {
@@ -86,7 +86,7 @@ fn neither_method_is_preferred() {
     });
 }
 
-/// Ranks know no unit (a power of two, so that no tie is rounded away).
+/// Ranks do not depend on the unit (a power of two, so that no tie is rounded away).
 #[test]
 fn ranks_know_no_unit() {
     law(128, pairs(), |pairs| {
@@ -96,7 +96,7 @@ fn ranks_know_no_unit() {
     });
 }
 
-/// A failure is never averaged away: one more among the attempts can only raise the median.
+/// A failure is never averaged away: another one can only raise the median.
 #[test]
 fn a_failure_raises_the_median() {
     law(256, values(1..40), |values| {
@@ -108,7 +108,7 @@ fn a_failure_raises_the_median() {
     });
 }
 
-/// The exact test of two rates and the exact interval of one are the same claim about a coin.
+/// The exact test of two rates agrees with the exact interval of one.
 #[test]
 fn two_rates_agree_with_the_coin() {
     law(512, (0..60_usize, 0..60_usize), |(first, second)| {

@@ -1,4 +1,4 @@
-//! Two cameras and the point both see.
+//! Two cameras and a point in view of both.
 
 use std::cell::Cell;
 
@@ -15,16 +15,16 @@ use seafix_proptests::{
 };
 use seafix_vision::{TRIANGULATORS, Triangulator};
 
-/// The noise of an exact projection (px): rounding.
+/// The error of an exact projection (px): rounding.
 const EXACT: f64 = 1e-9;
 
-/// Every listed way from two pixels to a point, with its name.
+/// All registered triangulators, with names.
 fn triangulators() -> Vec<(&'static str, Box<dyn Triangulator>)> {
     let named = |name| (name, TRIANGULATORS.build(&Choice::named(name)).expect("the defaults are settings"));
     TRIANGULATORS.names().map(named).collect()
 }
 
-/// P48 for one rig and the points at these places; counts those that both cameras see.
+/// P48 for one rig and these points; counts the points in view of both cameras.
 fn returns_to_the_point(rig: &StereoRig, places: &[(f64, f64, f64)], seen: &Cell<u32>) -> TestCaseResult {
     for point in places.iter().filter_map(|&place| point_at(rig, place)) {
         let Some(pixels) = rig.sees(&point, 0.0) else { continue };
@@ -43,11 +43,11 @@ fn returns_to_the_point(rig: &StereoRig, places: &[(f64, f64, f64)], seen: &Cell
     Ok(())
 }
 
-/// P48. Project, then triangulate: ≤ 1e-9 m for Z ≤ 20 m and f b ≥ 50 px m; reprojection ≤ 1e-9 px;
-/// rectified rigs, every listed triangulator.
+/// P48. Projection, then triangulation: ≤ 1e-9 m for Z ≤ 20 m and f b ≥ 50 px m; reprojection ≤ 1e-9 px; rectified
+/// rigs, all triangulators.
 ///
-/// Seen to fail when the right camera is displaced the other way in the ray's closest approach, with the cosine's square
-/// in it, where nearly parallel rays cancel, and with the linear equations solved once.
+/// Seen to fail with the right camera displaced the other way in the ray's closest approach, with the cosine's square
+/// in it, where nearly parallel rays cancel, and with the linear equations solved only once.
 #[test]
 fn triangulation_undoes_projection() {
     let seen = Cell::new(0);
@@ -57,11 +57,10 @@ fn triangulation_undoes_projection() {
     not_idle("points seen", seen.get(), cases, 1);
 }
 
-/// P48 for general rigs: any displacement across the axis, turned cameras, lens distortion of 4, 5
-/// and 8 coefficients.
+/// P48 for general rigs: any displacement across the axis, rotated cameras, lens distortion of 4, 5 and 8 coefficients.
 ///
-/// Seen to fail when the slope of the radial distortion is left out of its derivative, and when
-/// undistorting ends after one step.
+/// Seen to fail when the slope of the radial distortion is omitted from its derivative, and when undistortion ends
+/// after one step.
 #[test]
 fn triangulation_undoes_projection_for_any_rig() {
     let seen = Cell::new(0);
@@ -71,7 +70,7 @@ fn triangulation_undoes_projection_for_any_rig() {
     not_idle("points seen", seen.get(), cases, 1);
 }
 
-/// P49. Exact projections into a rectified pair lie on one row: |v_left − v_right| ≤ 1e-9 px.
+/// P49. Exact projections into a rectified pair are on one row: |v_left − v_right| ≤ 1e-9 px.
 ///
 /// Seen to fail when the right camera's rows are 1e-8 px off.
 #[test]
@@ -88,10 +87,10 @@ fn rectified_projections_lie_on_one_row() {
     not_idle("points seen", seen.get(), cases, 1);
 }
 
-/// P49. Exact projections into any rig meet the epipolar constraint: each undistorted direction lies within 1e-9 px of
-/// the line E x of the other, lines of unit normal, scaled by the mean focal length; so does the Sampson distance.
+/// P49. Exact projections into any rig satisfy the epipolar constraint: each undistorted direction is within 1e-9 px of
+/// the line E x of the other, lines of unit normal, scaled by the mean focal length; so is the Sampson distance.
 ///
-/// Seen to fail when the essential matrix is transposed, and when undistorting ends after two steps.
+/// Seen to fail when the essential matrix is transposed, and when undistortion ends after two steps.
 #[test]
 fn exact_projections_meet_the_epipolar_constraint() {
     let seen = Cell::new(0);
@@ -104,7 +103,7 @@ fn exact_projections_meet_the_epipolar_constraint() {
             let (l, r) = (l.push(1.0), r.push(1.0));
             for (line, at) in [(rig.essential() * l, r), (rig.essential().transpose() * r, l)] {
                 let slope = line.xy().norm();
-                // Beside an epipole every direction is near every line and none is sure.
+                // Near an epipole every direction is near every line, and none is certain.
                 if slope > 1e-3 {
                     within("off the line (px)", rig.mean_focal() * line.dot(&at).abs() / slope, 1e-9)?;
                 }
@@ -118,10 +117,10 @@ fn exact_projections_meet_the_epipolar_constraint() {
     not_idle("points seen", seen.get(), cases, 1);
 }
 
-/// P50. Whatever two pixels are asked for, an accepted point lies before both cameras; of a rectified rig only positive
-/// disparities are accepted, and then Z = f b / d, to 1e-9 of itself, however far apart the rows are.
+/// P50. An accepted point of any two pixels is before both cameras; in a rectified rig only positive disparities are
+/// accepted, and then Z = f b / d, to a relative 1e-9, for any difference of the rows.
 ///
-/// Seen to fail when the test of the sign is left out, and when the baseline is 1e-8 longer.
+/// Seen to fail when the test of the sign is omitted, and when the baseline is 1e-8 longer.
 #[test]
 fn accepted_points_lie_before_the_cameras() {
     let accepted = Cell::new(0);
@@ -150,7 +149,7 @@ fn accepted_points_lie_before_the_cameras() {
     not_idle("points accepted", accepted.get(), cases, 1);
 }
 
-/// P51. In a rectified pair depth grows as disparity falls.
+/// P51. Depth grows with falling disparity in a rectified pair.
 ///
 /// Seen to fail when the inverse of the depth is returned.
 #[test]
@@ -173,8 +172,8 @@ fn depth_grows_as_disparity_falls() {
     not_idle("pairs compared", compared.get(), cases, 2);
 }
 
-/// P51. The σ_Z that triangulation predicts is that of 20 000 draws of pixels with σ = 0.3 px, which is known to 0.5 %, within
-/// 3 %, Z ≤ 5 m, for rectified rigs and any other.
+/// P51. The predicted σ_Z of triangulation agrees with that of 20 000 draws of pixels with σ = 0.3 px, known to 0.5 %,
+/// within 3 %, Z ≤ 5 m, for rectified and general rigs.
 ///
 /// Seen to fail when the covariance is a tenth too small.
 #[test]
@@ -225,10 +224,10 @@ fn predicted_depth_noise_is_that_of_many_draws() {
     assert!(tried.get() >= 4, "{} layouts", tried.get());
 }
 
-/// P52. Undistorting undoes distorting where the lens model grows: a direction returns to itself, and a pixel to
-/// itself, ≤ 1e-9 px; without distortion both are the pinhole's u = f x + c, so that no error can hide in both.
+/// P52. Undistortion inverts distortion where the lens model is monotonic: a direction and a pixel are reproduced, ≤
+/// 1e-9 px; without distortion both are the pinhole's u = f x + c, so that no error can hide in both.
 ///
-/// Seen to fail when undistorting ends after two steps, and when it takes another principal point.
+/// Seen to fail when undistortion ends after two steps, and when it uses another principal point.
 #[test]
 fn undistorting_undoes_distorting() {
     let seen = Cell::new(0);

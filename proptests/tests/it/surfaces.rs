@@ -1,14 +1,14 @@
-//! Errors of an object's surface, and what they owe to each other.
+//! Errors of an object's surface and their relations.
 
 use proptest::prelude::*;
 use seafix_evaluation::{mean_distance, mean_nearest_distance, symmetric_distance};
 use seafix_geometry::{Camera, Object, Transform};
 use seafix_proptests::{law, points::point, poses::pose, within};
 
-/// P69. ADD ≥ ADI; MSSD ≥ ADD where the identity is the only symmetry; MSSD with more symmetries ≤ with fewer; the truth
-/// scores 0.
+/// P69. ADD ≥ ADI; MSSD ≥ ADD if the identity is the only symmetry; MSSD with more symmetries ≤ with fewer; the truth
+/// has the error 0.
 ///
-/// Seen to fail when ADI looks for the farthest point, and when MSSD takes the worst symmetry.
+/// Seen to fail when ADI uses the farthest point, and when MSSD uses the worst symmetry.
 #[test]
 fn errors_of_a_surface_keep_their_order() {
     let poses = (pose::<Object, Camera>(10.0), pose::<Object, Camera>(10.0));

@@ -1,4 +1,4 @@
-//! Errors of trajectories: what must not change them, and what must lessen them.
+//! Errors of trajectories: invariances and inequalities.
 
 use nalgebra::Vector6;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use seafix_proptests::{
     within,
 };
 
-/// The reach of a walk (m).
+/// The extent of a walk (m).
 const REACH: f64 = 100.0;
 
 fn plain(transform: &Transform<World, Camera>) -> Pose {
@@ -22,7 +22,8 @@ fn moved(motion: &Transform<World, World>, path: &[Pose]) -> Vec<Pose> {
     path.iter().map(|pose| motion.then(pose)).collect()
 }
 
-/// A way, and an estimate of it: every pose off by up to 0.2 rad and 2 m an axis, the scale by a tenth.
+/// A trajectory and an estimate of it: every pose has errors of up to 0.2 rad and 2 m on each axis, the scale of a
+/// tenth.
 fn paths() -> impl Strategy<Value = (Vec<Pose>, Vec<Pose>)> {
     let step = (pose::<World, Camera>(REACH), vector(0.2), vector(2.0));
     (proptest::collection::vec(step, 4..40), 0.9..1.1).prop_map(|(steps, scale)| {
@@ -47,7 +48,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// P68. A trajectory has no error against itself: distances exactly 0, turns to rounding.
+/// P68. A trajectory has no error against itself: distances exactly 0, rotations to rounding.
 ///
 /// Seen to fail when the relative pose takes the rotation without its transpose.
 #[test]
@@ -62,9 +63,9 @@ fn a_path_is_at_no_distance_from_itself() {
     });
 }
 
-/// P68. The error after alignment does not change with a rigid motion of the estimate: ≤ 1e-9.
+/// P68. The error after alignment is invariant under a rigid motion of the estimate: ≤ 1e-9.
 ///
-/// Seen to fail when the translation of the alignment forgets the scale.
+/// Seen to fail when the translation of the alignment ignores the scale.
 #[test]
 fn an_alignment_takes_any_motion_back() {
     law(256, (paths(), pose::<World, World>(REACH)), |((reference, estimate), motion)| {
@@ -76,8 +77,7 @@ fn an_alignment_takes_any_motion_back() {
     });
 }
 
-/// P68. Relative errors and drift do not change with a motion of the estimate from the left: ≤ 1e-12
-/// of the reach.
+/// P68. Relative errors and drift are invariant under a motion of the estimate from the left: ≤ 1e-12 of the extent.
 ///
 /// Seen to fail when a relative pose is taken in the frame of the world.
 #[test]
@@ -93,9 +93,9 @@ fn relative_errors_know_no_origin() {
     });
 }
 
-/// P68. What is aligned with more freedom fits better: similarity ≤ rigid ≤ as it is, in root mean square.
+/// P68. Alignment with more degrees of freedom fits better: RMS of similarity ≤ rigid ≤ none.
 ///
-/// Seen to fail when the rotation of the alignment is taken the wrong way round.
+/// Seen to fail when the rotation of the alignment is inverted.
 #[test]
 fn more_freedom_fits_better() {
     law(256, paths(), |(reference, estimate)| {
@@ -107,7 +107,7 @@ fn more_freedom_fits_better() {
     });
 }
 
-/// The first pose laid on the first leaves it without error, whatever the rest does.
+/// Alignment of the first poses leaves the first without error, for any rest.
 ///
 /// Seen to fail when the motion is applied from the right.
 #[test]

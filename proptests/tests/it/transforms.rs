@@ -1,4 +1,4 @@
-//! Rigid motions: composing, inverting, and the ways of writing a rotation.
+//! Rigid motions: composition, inversion, and representations of rotations.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use seafix_proptests::{
     within,
 };
 
-/// The reach of coordinates (m).
+/// Maximum coordinate (m).
 const REACH: f64 = 100.0;
 
 fn off_identity(m: &Matrix4<f64>) -> f64 {
@@ -23,10 +23,10 @@ fn off_orthonormal(r: &Matrix3<f64>) -> f64 {
     (r.transpose() * r - Matrix3::identity()).amax().max((r.determinant() - 1.0).abs())
 }
 
-/// P1. `H_ab H_bc H_ca` = I: max |entry − I| ≤ 1e-12 (1 + L), L the largest translation (m), in the
-/// paper's rows and in columns.
+/// P1. `H_ab H_bc H_ca` = I: max |entry − I| ≤ 1e-12 (1 + L), L the largest translation (m), in row vectors and in
+/// columns.
 ///
-/// Seen to fail when a product of rows multiplies in the other order.
+/// Seen to fail when row products multiply in the other order.
 #[test]
 fn going_round_leads_home() {
     law(512, (pose::<World, Body>(REACH), pose::<World, Camera>(REACH), pose::<World, Object>(REACH)), |(a, b, c)| {
@@ -56,9 +56,9 @@ fn an_inverse_undoes() {
     });
 }
 
-/// P3. The rotation part of everything that makes a motion: |RᵀR − I| ≤ 1e-13 and |det R − 1| ≤ 1e-13.
+/// P3. The rotation of every constructor of a motion: |RᵀR − I| ≤ 1e-13 and |det R − 1| ≤ 1e-13.
 ///
-/// Seen to fail when the quaternion of a matrix taken in is not brought to unit length.
+/// Seen to fail when the quaternion of an input matrix is not normalised.
 #[test]
 fn rotations_stay_rotations() {
     let perturbed = prop::array::uniform9(-1e-9..=1e-9f64);
@@ -114,7 +114,7 @@ fn rows_and_columns_state_the_same() {
 /// P5. Quaternion → matrix → quaternion and matrix → quaternion → matrix: ≤ 1e-14; q and −q give the
 /// same matrix bit for bit.
 ///
-/// Seen to fail when the matrix taken in is transposed.
+/// Seen to fail when the input matrix is transposed.
 #[test]
 fn quaternions_and_matrices_agree() {
     law(1024, rotation(), |q| {
@@ -132,7 +132,7 @@ fn quaternions_and_matrices_agree() {
 
 /// P6. exp(log(R)) = R for angles in \[0, π\]: ≤ 1e-12, and ≤ 1e-7 within 1e-6 of π.
 ///
-/// Seen to fail when the logarithm of −q is taken as it stands: its length passes π.
+/// Seen to fail when the logarithm of −q is used directly: its length exceeds π.
 #[test]
 fn exp_undoes_log() {
     let angles = prop_oneof![
@@ -153,10 +153,10 @@ fn exp_undoes_log() {
     });
 }
 
-/// P6 for whole motions: Exp(Log(T)) = T with rotation ≤ 1e-12 (1e-7 within 1e-6 of π) and
-/// translation as much times (1 + L).
+/// P6 for motions: Exp(Log(T)) = T with rotation ≤ 1e-12 (1e-7 within 1e-6 of π) and translation ≤ the same times (1 +
+/// L).
 ///
-/// Seen to fail when the translation of Exp is not turned by the left Jacobian.
+/// Seen to fail when the translation of Exp is not multiplied by the left Jacobian.
 #[test]
 fn exp_undoes_log_of_motions() {
     law(512, pose::<Object, Camera>(REACH), |t| {
@@ -168,7 +168,7 @@ fn exp_undoes_log_of_motions() {
     });
 }
 
-/// P6. angle(R) ≥ 0, ≤ π, no NaN, when the trace leaves \[−1, 3\] by rounding.
+/// P6. angle(R) ≥ 0, ≤ π, no NaN, also when the trace leaves \[−1, 3\] by rounding.
 ///
 /// Seen to fail when the angle is the arc cosine of the trace.
 #[test]

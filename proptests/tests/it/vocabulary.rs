@@ -1,7 +1,7 @@
-//! The words of `GLOSSARY.md` hold in identifiers, file names and keys: none of the words that they replaced is left.
+//! Replaced words of `GLOSSARY.md` do not occur in identifiers, file names and keys.
 //!
-//! A word is a part of a name between underscores, hyphens and changes of case: `max_pairs` has two. Comments and strings are
-//! prose and are not read here; keys, flags and columns are made of identifiers.
+//! A word is a part of a name between underscores, hyphens and changes of case: `max_pairs` has two. Comments and
+//! strings are prose and are not tested; keys, flags and columns are identifiers.
 
 use std::{
     collections::BTreeMap,
@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Words that have a standard term.
+/// Words with a standard term.
 #[rustfmt::skip]
 const REPLACED: &[&str] = &[
     "astray", "bed", "belief", "beliefs", "bunched", "bunching", "chance", "chances", "considered", "crowd", "crowded",
@@ -23,9 +23,9 @@ const REPLACED: &[&str] = &[
     "voyage", "voyages", "way", "ways", "weighed", "whole", "wholes", "widen", "widened",
 ];
 
-/// Names that stay, and why.
+/// Permitted names, with reasons.
 const EXCEPTIONS: &[(&str, &str)] = &[
-    // Standard terms that hold one of the words.
+    // Standard terms that contain one of the words.
     ("least_squares", "the method"),
     ("three_points_have_the_least_squares_motion", "the method"),
     ("the_covariance_of_kabsch_is_that_of_least_squares", "the method"),
@@ -63,7 +63,7 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("nfa", "the log's schema"),
 ];
 
-/// Keys of files that are not ours to change, and file names.
+/// Keys of unchanged file formats, and file names.
 const KEY_EXCEPTIONS: &[(&str, &str)] =
     &[("bed", "seafix-geometry/1"), ("dead_reckoning", "the method"), ("least_squares", "the method")];
 
@@ -71,7 +71,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace").to_owned()
 }
 
-/// All files below a folder, without what is built or generated.
+/// All files below a folder, except built and generated ones.
 fn files(folder: &Path, all: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
         let name = entry.file_name().unwrap().to_str().unwrap();
@@ -107,7 +107,7 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// The identifiers of a Rust source; comments, strings and characters are left out.
+/// The identifiers of a Rust source, without comments, strings and characters.
 fn identifiers(source: &str) -> Vec<&str> {
     let (mut found, bytes, mut at) = (Vec::new(), source.as_bytes(), 0);
     let ident = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
