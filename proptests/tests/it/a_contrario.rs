@@ -211,7 +211,7 @@ fn the_null_model_is_predicted() {
 /// Every bin of every family is predicted within a factor of two, if it has a hundred sets or more, and so is each bin
 /// over all families. Numbers for the families' own clutter, on edges and floors, are printed too.
 ///
-/// `cargo test --release -p seafix-proptests nfa:: -- --ignored --nocapture`; `CHANCE_FAMILIES` (abcdefg),
+/// `cargo test --release -p seafix-proptests a_contrario:: -- --ignored --nocapture`; `CHANCE_FAMILIES` (abcdefg),
 /// `CHANCE_TIMES` (1) multiplies the frames, `CHANCE_CLUTTER` (null family).
 #[test]
 #[ignore = "long: seven families"]

@@ -77,7 +77,7 @@ fn what_is_solved_depends_on_what_is_believed() {
         (number("ACCEPTANCE_PRESENT", "252"), number("ACCEPTANCE_ABSENT", "252"), number("ACCEPTANCE_SEED", "21"));
     let (max, step) = (number("ACCEPTANCE_PAIRS", "4000000"), number("ACCEPTANCE_STEP", "1"));
     println!(
-        "| family | believed | solved % | wrong of answers | absent frames answered | likeliest right % |\n|---|---|---|---|---|---|"
+        "| family | accepted | solved % | wrong of answers | absent frames answered | most probable right % |\n|---|---|---|---|---|---|"
     );
     for name in variable("ACCEPTANCE_FAMILIES", "abcdefg").chars() {
         let family: Family = name.to_string().parse().expect("a family");
@@ -118,11 +118,11 @@ fn what_is_solved_depends_on_what_is_believed() {
         for one in with.iter().filter(|one| one.defined && !(one.refused.is_none() && one.right)) {
             reasons.entry(one.refused.unwrap_or("answered")).or_default()[usize::from(!one.map_estimate)] += 1;
         }
-        println!("{name}, of {defined} not solved (likeliest pose right, wrong): {reasons:?}");
+        println!("{name}, of {defined} not solved (most probable pose right, wrong): {reasons:?}");
         // The default, or the NFA with a bound of the probability of absence.
         for (nfa, absence) in [(1e-4, 1e-2), (3e-5, 1e-2), (1e-5, 1e-2), (3e-5, 5e-4), (1e-5, 5e-4)] {
             let rare = |one: &Tried| one.nfa <= nfa && one.absent <= absence && one.alike <= 2e-5;
-            row(format!("{nfa:.0e} sets, {absence:.0e}"), &|one| one.refused.is_none() || rare(one));
+            row(format!("NFA {nfa:.0e}, {absence:.0e}"), &|one| one.refused.is_none() || rare(one));
         }
     }
 }

@@ -59,7 +59,7 @@ fn a_fusion_knows_no_origin() {
             let one = fusion.take(&at(known, 0.01), &at(fixed, 0.02));
             let two = fusion.take(&at(moved * known, 0.01), &at(moved * fixed, 0.02));
             let (Ok(one), Ok(two)) = (one, two) else {
-                prop_assert!(false, "{name} rejects what agrees");
+                prop_assert!(false, "{name} rejects a consistent fix");
                 return Ok(());
             };
             let apart = (moved * one.object_from_camera).error_to(&two.object_from_camera);
@@ -183,7 +183,7 @@ fn what_a_model_has_wrong_is_not_learned_from_many_fixes() {
         }
     }
     let (alone, _) = navigated_errors(dives, &EveryFrame::default(), &Fuse::default(), false);
-    println!("taken for independent: NEES {alone:.2}");
+    println!("taken as independent: NEES {alone:.2}");
     assert!(alone > 12.0, "{alone}");
 }
 
@@ -214,7 +214,7 @@ fn shared_errors_do_not_add_up_to_certainty() {
     for shared in [0.0, 0.5, 0.9] {
         let (intersected, fused) = (stayed(dives, "intersect", shared), stayed(dives, "fuse", shared));
         println!(
-            "NEES after a minute, share {shared} of the variance common: intersect {intersected:.1}, fuse {fused:.1}"
+            "NEES after a minute, fraction {shared} of the variance shared: intersect {intersected:.1}, fuse {fused:.1}"
         );
         // Six on average, plus three standard errors.
         assert!(intersected < 6.0 + 3.0 * (12.0 / f64::from(dives)).sqrt(), "{shared}: {intersected}");
@@ -331,7 +331,7 @@ fn dead_reckoning_grows_as_predicted() {
     for i in 0..2 {
         assert!((short[i] / short_said[i] - 1.0).abs() < 0.15 && (long[i] / long_said[i] - 1.0).abs() < 0.15);
     }
-    println!("attitude × {:.3} (√2 = 1.414), place × {:.3} (√8 = 2.828)", long[0] / short[0], long[1] / short[1]);
+    println!("attitude × {:.3} (√2 = 1.414), position × {:.3} (√8 = 2.828)", long[0] / short[0], long[1] / short[1]);
     assert!((long[0] / short[0] - 2f64.sqrt()).abs() < 0.15 && (long[1] / short[1] - 8f64.sqrt()).abs() < 0.3);
 }
 
@@ -481,7 +481,7 @@ fn without_a_third_none_of_two_is_blamed() {
         assert!(disputed == 0 || navigator.is_disputed(0) && navigator.is_disputed(1));
         n_reported += u64::from(disputed == 1);
     }
-    println!("{n_reported} of 200 told once");
+    println!("{n_reported} of 200 reported once");
     assert!(n_reported >= 198);
 }
 

@@ -131,7 +131,7 @@ fn a_set_that_random_gives_is_no_answer() {
             if matches!(attempt.outcome, Outcome::Fix(_)) {
                 answers += 1;
                 let expected = attempt.nfa.expect("a search found it");
-                assert!(expected <= acceptance.max_nfa, "{name} {seed}: {expected} such sets");
+                assert!(expected <= acceptance.max_nfa, "{name} {seed}: NFA {expected}");
             }
         }
         assert!(answers < 12, "{name}: {answers} of 60");
@@ -206,7 +206,7 @@ fn how_often_copies_are_passed_over() {
         for (half, times) in [(Some(0.6), 5), (Some(0.6), 20), (None, 2), (None, 10)] {
             let passed = passed_over((n, seen), times, half, 60);
             println!(
-                "{seen} of {n} points seen, {times} times as many of clutter, half a shell {half:?}: {passed} of 60"
+                "{seen} of {n} points in view, {times} times as many of clutter, half-size of gates {half:?}: {passed} of 60"
             );
         }
     }

@@ -23,7 +23,7 @@ fn believed(family: Family, seed: u64, number: u64, presence: Presence) -> Optio
     let found = RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).ok()?;
     let posterior = found.posterior.expect("it weighs evidence");
     let map_estimate = &posterior.explanations[0].object_from_camera;
-    let truth = Transform::from_rows(&generated.truth.t_cam_obj).expect("it was made of a rigid motion").inverse();
+    let truth = Transform::from_rows(&generated.truth.t_cam_obj).expect("it is a rigid motion").inverse();
     let right = generated.truth.pose_defined && rms_apart(problem.model, map_estimate, &truth) <= LIMIT;
     Some((posterior.probabilities(problem.model, LIMIT), right))
 }
@@ -45,8 +45,8 @@ fn fixed(family: Family, seed: u64, number: u64, presence: Presence) -> bool {
 #[test]
 fn no_pose_is_lost_where_points_stand_in_rows() {
     for number in [19, 217] {
-        let (_, right) = believed(Family::E, 21, number, Presence::Present).expect("something is found");
-        assert!(right, "frame {number}: the likeliest pose is another");
+        let (_, right) = believed(Family::E, 21, number, Presence::Present).expect("the search has an answer");
+        assert!(right, "frame {number}: another pose is most probable");
     }
 }
 
@@ -82,21 +82,21 @@ fn clutter_alone_is_never_fixed() {
     }
     let wrong: Vec<u64> = (0..frames).filter(|&number| fixed(Family::A, 5, number, Presence::Absent)).collect();
     let rate = clopper_pearson(wrong.len(), frames as usize, 0.95);
-    println!("{} of {frames} frames without the object were referenced, {rate:?}: {wrong:?}", wrong.len());
+    println!("{} of {frames} frames without the object have a fix, {rate:?}: {wrong:?}", wrong.len());
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 /// The posterior probability of absence is the frequency of absence, over equally many frames with and without the
 /// object, in bins of the probability. The posterior probability of the best pose is the frequency of its being right.
 ///
-/// `cargo test --release -p seafix-proptests consensus::beliefs_are -- --ignored --nocapture`; `CONSENSUS_FAMILIES` (a),
+/// `cargo test --release -p seafix-proptests consensus::posteriors_are -- --ignored --nocapture`; `CONSENSUS_FAMILIES` (a),
 /// `CONSENSUS_FRAMES` (6000) of each kind.
 #[test]
 #[ignore = "long: 12 000 frames"]
 fn posteriors_are_calibrated() {
     let count = std::env::var("CONSENSUS_FRAMES").map_or(6_000, |n| n.parse().expect("a number"));
     let families = std::env::var("CONSENSUS_FAMILIES").unwrap_or_else(|_| "a".to_owned());
-    println!("| family | what | believed wrong | happened | frames |\n|---|---|---|---|---|");
+    println!("| family | claim | predicted wrong | wrong | frames |\n|---|---|---|---|---|");
     for name in families.chars() {
         let family: Family = name.to_string().parse().expect("a family");
         // The probability of the claim's being wrong, and whether it is.
@@ -122,9 +122,9 @@ fn posteriors_are_calibrated() {
                 posteriors.iter().filter(|(posterior, _)| *posterior <= sure).map(|(_, wrong)| *wrong).collect();
             let missed = said.iter().filter(|&&missed| missed).count();
             let fraction = missed as f64 / said.len().max(1) as f64;
-            println!("{name}, {what}: of {} called wrong with {sure} at most {missed} were", said.len());
+            println!("{name}, {what}: of {} with a probability of at most {sure}, {missed} were wrong", said.len());
             if family == Family::A {
-                assert!(said.len() >= 100, "{what}: {} beliefs are no test", said.len());
+                assert!(said.len() >= 100, "{what}: {} probabilities are too few", said.len());
                 assert!(fraction <= max, "{name}, {what}: {missed} of {} were wrong", said.len());
             } else {
                 // At the scale of a site some minutes give only tens of such probabilities, and in f their true
@@ -157,7 +157,7 @@ fn the_true_pose_is_the_largest_probable() {
             right += u32::from(found);
             let acceptance = Acceptance::default();
             let certain = probabilities.absent <= acceptance.absence && probabilities.elsewhere <= acceptance.doubt;
-            assert!(found || !certain, "number {number}: believed {probabilities:?}");
+            assert!(found || !certain, "number {number}: posterior {probabilities:?}");
         }
     }
     assert!(right * 10 >= defined * 9, "{right} of {defined}");
@@ -212,20 +212,20 @@ fn two_copies_are_ambiguous() {
         };
         alone += u32::from(matches!(outcome(&generated.problem.problem()), Outcome::Fix(_)));
         // Inside the gates, and at least 9 cm away.
-        let half = generated.truth.params.gate.expect("family a has shells");
+        let half = generated.truth.params.gate.expect("family a has gates");
         let by = [0.2 * half + 0.05, -0.2 * half - 0.05, 0.1 * half];
         let twice = outcome(&with_copy(&generated, by, [0.02, 0.03, -0.02]));
         // A copy that extends beyond its gates may be distinguishable.
         if let Outcome::Fix(reference) = &twice {
             let is_true = |pair: &&Correspondence| generated.truth.pairs.contains(&[pair.model, pair.cloud]);
             let right = reference.pairs.iter().filter(is_true).count();
-            assert!(2 * right > reference.pairs.len(), "number {number}: a copy was taken for the object");
+            assert!(2 * right > reference.pairs.len(), "number {number}: the copy got the fix");
         }
         ambiguous += u32::from(matches!(twice, Outcome::Ambiguous(_)));
     }
-    println!("{ambiguous} of {tried} ambiguous; without the copy {alone} referenced");
-    assert!(3 * ambiguous > 2 * alone, "{ambiguous} of {alone} that would be referenced without the copy");
-    assert!(2 * alone > tried, "{alone} of {tried} would be referenced without the copy");
+    println!("{ambiguous} of {tried} ambiguous; without the copy {alone} fixes");
+    assert!(3 * ambiguous > 2 * alone, "{ambiguous} of {alone} fixes without the copy");
+    assert!(2 * alone > tried, "{alone} of {tried} have a fix without the copy");
 }
 
 /// Candidates outside of the gates, and points that are no candidates, change nothing.
@@ -263,7 +263,7 @@ fn a_few_points_far_away_hide_no_object() {
     let mut pair_tests = [0; 2];
     for number in 0..150 {
         let generated = Generated::new(Family::A, 17, number, Presence::Present);
-        let truth = Transform::from_rows(&generated.truth.t_cam_obj).expect("it was made of a rigid motion").inverse();
+        let truth = Transform::from_rows(&generated.truth.t_cam_obj).expect("it is a rigid motion").inverse();
         let file = CoherenceProblem { prior: None, ..generated.problem.problem() };
         let mut fixed = |far: f64| {
             let mut file = file.clone();
@@ -280,7 +280,7 @@ fn a_few_points_far_away_hide_no_object() {
             let Outcome::Fix(fix) = attempt.outcome else { return false };
             pair_tests[usize::from(far > 0.0)] += attempt.pair_tests.expect("the search counts");
             let off = rms_apart(&file.model, &fix.object_from_camera, &truth);
-            assert!(off <= LIMIT, "number {number}, points {far} m away: {off} m off");
+            assert!(off <= LIMIT, "number {number}, points {far} m away: error {off} m");
             true
         };
         if fixed(0.0) {
@@ -288,8 +288,8 @@ fn a_few_points_far_away_hide_no_object() {
             beside.iter_mut().zip([1e2, 1e5, 1e8]).for_each(|(found, far)| *found += u32::from(fixed(far)));
         }
     }
-    println!("{alone} found, of them {beside:?} beside points far away; pair tests {pair_tests:?}");
-    assert!(alone >= 20, "{alone} are too few to tell");
+    println!("{alone} found, of them {beside:?} with distant points; pair tests {pair_tests:?}");
+    assert!(alone >= 20, "{alone} are too few");
     assert!(beside.iter().all(|found| 10 * found >= 9 * alone), "{beside:?} of {alone}");
     // Three times as many frames, with a twelfth more points each: a fifth more pairs.
     assert!(pair_tests[1] < 6 * pair_tests[0], "{pair_tests:?} pair tests");
@@ -320,5 +320,5 @@ fn a_few_points_far_away_make_no_object() {
             wrong.push(number);
         }
     }
-    assert!(wrong.is_empty(), "{} referenced: {wrong:?}", wrong.len());
+    assert!(wrong.is_empty(), "{} fixes: {wrong:?}", wrong.len());
 }

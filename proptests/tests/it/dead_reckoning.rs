@@ -183,7 +183,7 @@ fn no_odometry_by_readings_invents_a_motion() {
                 let (before, after) = (&all.segments[0], &all.segments[1]);
                 assert!(matches!(after.broken, Some(Lost::Silent { .. })) && after.poses[0].local.is_none(), "{name}");
                 let end = before.poses.last().unwrap().world_from_camera;
-                assert_eq!(after.poses[0].world_from_camera, end, "{name}: the motion between is left out");
+                assert_eq!(after.poses[0].world_from_camera, end, "{name}: the motion between is unknown");
                 let poses = before.poses.len();
                 for stamp in [START, START + 99 * 100_000_000] {
                     let pair = StereoPair { stamp_ns: stamp, left: &trajectory.image, right: &trajectory.image };

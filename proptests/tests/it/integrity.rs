@@ -188,7 +188,7 @@ fn million(acceptance: &Acceptance) {
     let all = trial(1_000_000 / DRAWS, acceptance, GATE);
     let fraction = |n: u64| 100.0 * n as f64 / all.generated as f64;
     println!(
-        "{} fixes, {} with a wrong match; {} draws of no fix: referenced {:.2} %, with a level {:.2} %, level within the alert limit {:.2} %; beyond the level: \
+        "{} fixes, {} with a wrong match; {} draws of no fix: accepted {:.2} %, with a level {:.2} %, level within the alert limit {:.2} %; beyond the level: \
          position {}, attitude {}",
         all.generated,
         all.wrong,

@@ -28,7 +28,7 @@ fn table() {
     };
     let draws = numbers("LIMITS_DRAWS", "2000")[0] as u64;
     println!(
-        "camera  shape   N   z    σ_px  σ_mod solver                m2/b   m3/b   bias  NEES   cover  σ_rot° refused m2 mm  m3 mm  µs"
+        "camera  shape   N   z    σ_px  σ_mod solver                tre/b  pos/b  bias  NEES   cover  σ_rot° reject. TRE mm pos mm  µs"
     );
     for (name, rig) in cameras() {
         for shape in [Shape::Spread, Shape::Compact] {
@@ -176,7 +176,7 @@ fn reproduces(layouts: u64) {
             };
             let squares: Vec<Vec<[f64; 3]>> = (0..layouts).map(layout).collect();
             let mut line = format!("{camera:7} {distance} m {solver:19}");
-            for (which, name) in ["m2, other points", "m2, points used", "m3"].iter().enumerate() {
+            for (which, name) in ["TRE, other points", "TRE, points used", "position"].iter().enumerate() {
                 let each: Vec<(f64, f64)> =
                     squares.iter().map(|draws| moments(draws.iter().map(|draw| draw[which]))).collect();
                 let (mean, variance) = moments(each.iter().map(|(mean, _)| *mean));
@@ -230,7 +230,7 @@ fn every_cell_reaches_the_bound() {
             for solver in ["mahalanobis", "stereo-reprojection"] {
                 let c = cell(&*build(solver), &settings, 20, 10_000, true);
                 let line = format!(
-                    "{name} {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4} attitude {:.2}°",
+                    "{name} {solver}: TRE {:.3} position {:.3} NEES {:.3} cover {:.4} attitude {:.2}°",
                     c.tre,
                     c.position,
                     c.nees,
@@ -256,7 +256,7 @@ fn three_points_in_every_cell() {
         for solver in ["p3p-stereo", "stereo-reprojection"] {
             let c = three_points(&name, solver, &settings, 10_000);
             println!(
-                "{name} {solver}: {} of 20 layouts, m2 {:.3} m3 {:.3} NEES {:.3}",
+                "{name} {solver}: {} of 20 layouts, TRE {:.3} position {:.3} NEES {:.3}",
                 c.layouts, c.tre, c.position, c.nees
             );
         }
@@ -319,7 +319,7 @@ fn three_compact(distance: f64, draws: u64) -> Vec<String> {
         let c =
             cell_of(&*build(solver), &settings, &all, &Asked { draws, covariance: true, alternatives: Some(CHI2_1) });
         let line = format!(
-            "{distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere of {}; m3 over \
+            "{distance} m {solver}: TRE {:.3} position {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} rejected, {} elsewhere of {}; position over \
              what the likelihood foresees {:.3}; bent by {:.2} at most",
             c.tre,
             c.position,
@@ -382,9 +382,9 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
         let m = cell_of(&*build(solver), &settings, &meant, &asked);
         let generated = draws * 20;
         let line = format!(
-            "seed {seed} {distance} m {solver}: m2 {:.3} m3 {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} refused, {} elsewhere \
-             of {generated}; m3 over what the likelihood foresees {:.3}; bent by {:.2} at most; of {} layouts where the bound \
-             means something (bent by {:.2} at most) m2 {:.3} m3 {:.3}",
+            "seed {seed} {distance} m {solver}: TRE {:.3} position {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} rejected, {} elsewhere \
+             of {generated}; position over what the likelihood foresees {:.3}; bent by {:.2} at most; of {} layouts where the bound \
+             is meaningful (nonlinearity at most {:.2}) TRE {:.3} position {:.3}",
             c.tre,
             c.position,
             c.nees,
@@ -445,7 +445,7 @@ fn no_answer_is_less_likely_than_the_truth() {
             }
         }
     }
-    assert!(refused <= 10, "{refused} of 20 000 refused");
+    assert!(refused <= 10, "{refused} of 20 000 rejected");
 }
 
 /// Figure 4 for every solver: its covariance is consistent within ±10 % in every cell with an attitude error below 5°,
@@ -470,7 +470,7 @@ fn every_solver_knows_its_error() {
             let c = cell(&*build(name), &settings, 20, draws.unwrap_or(if slow { 1000 } else { 10_000 }), true);
             let turn = c.attitude_rms.to_degrees();
             println!(
-                "{name} {cell_name}: NEES {:.3} cover {:.4}, attitude {turn:.2}°, {} refused",
+                "{name} {cell_name}: NEES {:.3} cover {:.4}, attitude {turn:.2}°, {} rejected",
                 c.nees, c.coverage, c.refused
             );
             if c.nees > 6.6 || turn < 5.0 && c.nees < 5.4 {
@@ -516,7 +516,7 @@ fn weights_are_no_worse(draws: u64) -> (usize, f64) {
                         let z = paired(&*build(name), &*kabsch, &settings, 20, draws);
                         worst = z.iter().fold(worst, |worst, &z| worst.max(z));
                         let cell = format!("{camera} {shape:?} {distance} m {model_sigma} m {name}");
-                        assert!(z.iter().all(|&z| z < 3.09), "{cell}: m2, m3 {z:?}");
+                        assert!(z.iter().all(|&z| z < 3.09), "{cell}: TRE, position {z:?}");
                     }
                 }
             }

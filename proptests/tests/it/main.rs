@@ -1,6 +1,6 @@
 //! The laws, one module for each theme.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and print its measurements")]
 
 mod a_contrario;
 mod acceptance;

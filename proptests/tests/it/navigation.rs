@@ -184,6 +184,6 @@ fn no_odometry_by_images_invents_a_motion() {
         let (before, after) = (&trajectory.segments[0], &trajectory.segments[1]);
         assert!(after.broken.is_some() && after.poses[0].local.is_none(), "{name}");
         let last = before.poses.last().unwrap().world_from_camera;
-        assert_eq!(after.poses[0].world_from_camera, last, "{name}: the motion between is left out");
+        assert_eq!(after.poses[0].world_from_camera, last, "{name}: the motion between is unknown");
     }
 }

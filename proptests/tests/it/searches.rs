@@ -78,7 +78,7 @@ fn what_is_left_of_a_set_is_one() {
         }
         Ok(())
     });
-    not_idle("sets looked at", looked_at.get(), cases, 1);
+    not_idle("examined sets", looked_at.get(), cases, 1);
 }
 
 /// P21, P22. The bound is closed: a set with a difference of exactly Δ is found completely, and not found for the next
@@ -170,7 +170,7 @@ fn no_admissible_set_is_larger() {
                     let mirror = search.refuses_mirrors() && best.size == 3 && coherent.size >= 4;
                     prop_assert!(
                         !mirror || !search.claims.exact,
-                        "{name}: three of a mirror image of {} are no answer",
+                        "{name}: three points of a mirror image of {} are an answer",
                         coherent.size
                     );
                     prop_assert!(
@@ -213,7 +213,7 @@ fn no_admissible_set_is_larger() {
                 Err(Rejected::NotFound { bound, needed }) => {
                     prop_assert!(!search.claims.exact && needed == 3 && best.size <= bound, "{name}: {}", best.size);
                 }
-                Err(Rejected::NoPrior) => prop_assert!(false, "{name} was given one"),
+                Err(Rejected::NoPrior) => prop_assert!(false, "{name} has a prior"),
                 Err(Rejected::Mirrored { best: size, proved }) if !search.claims.exact => {
                     prop_assert!(
                         !proved && search.refuses_mirrors() && size >= 4 && size <= coherent.size,
@@ -232,11 +232,11 @@ fn no_admissible_set_is_larger() {
                 }
             }
         }
-        prop_assert!(proofs > 0, "no search settles this");
+        prop_assert!(proofs > 0, "no search solves this");
         settled.set(settled.get() + proofs);
         Ok(())
     });
-    not_idle("answers that settle a problem", settled.get(), cases, 1);
+    not_idle("answers that solve a problem", settled.get(), cases, 1);
     not_idle("no consensus", refused.get(), cases, 30);
     not_idle("mirror images", mirrored.get(), cases, 50);
 }

@@ -265,7 +265,7 @@ fn a_nearly_symmetric_model_is_the_right_orientation_as_often_as_is_stated() {
         let mut stream = Stream::new(seed, 0, 0, Purpose::View);
         let view = nearly_symmetric(&mut stream);
         let Outcome::Fix(fix) = view.outcome(0.05, &acceptance) else { continue };
-        let misidentified = fix.integrity.misidentified.expect("the search weighs");
+        let misidentified = fix.integrity.misidentified.expect("the search gives it");
         let is_wrong = rms_apart(&view.model, &fix.object_from_camera, &view.truth) > 0.3;
         answered += 1;
         wrong += usize::from(is_wrong);
@@ -281,13 +281,13 @@ fn a_nearly_symmetric_model_is_the_right_orientation_as_often_as_is_stated() {
         beyond += usize::from(off > level.position);
     }
     println!(
-        "{answered} of {frames} answered, {wrong} the wrong way round, {expected:.1} ± {:.1} expected; {protected} with a level, \
+        "{answered} of {frames} answered, {wrong} in the wrong orientation, {expected:.1} ± {:.1} expected; {protected} with a level, \
          {beyond} beyond it; by the default doubt {} right and {} wrong",
         variance.sqrt(),
         by_default[0],
         by_default[1]
     );
-    assert!(answered > frames / 2 && expected > 4.0, "too few to tell");
+    assert!(answered > frames / 2 && expected > 4.0, "too few");
     // Alternatives count in the search and in the reading of the points: up to twice as often as they are wrong.
     let (min, max) = (0.5 * expected - 3.0 * variance.sqrt(), expected + 3.0 * variance.sqrt());
     assert!((min..=max).contains(&(wrong as f64)), "{wrong} wrong, {min:.1} to {max:.1} expected");
@@ -339,12 +339,12 @@ fn levels_hold_of_symmetric_sets_within_the_alert_limit() {
             beyond += usize::from(apart > level.position || turned > level.attitude);
         }
         println!(
-            "{name}: {answered} of {frames} answered, {copies} of them the twin; {protected} with a level, {beyond} beyond it"
+            "{name}: {answered} of {frames} answered, {copies} of them the alternative; {protected} with a level, {beyond} beyond it"
         );
         let (min, _) = clopper_pearson(beyond, protected, 0.99);
         // The levels of position and attitude have that risk each.
         assert!(min <= 2.0 * acceptance.risk, "{name}: {beyond} of {protected} fixes are beyond a level");
-        assert!(protected as u64 > frames / 8 && copies > 5, "{name}: too few to tell");
+        assert!(protected as u64 > frames / 8 && copies > 5, "{name}: too few");
     }
 }
 
@@ -385,8 +385,10 @@ fn noise_at_the_edge_of_a_prior_decides_between_no_poses() {
                 _ => {}
             }
         }
-        println!("{count} bolts: {answered} of {frames} answered, {wrong} the wrong way round, {ambiguous} ambiguous");
-        assert!(answered > frames / 3 && ambiguous > frames / 6, "too few to tell");
+        println!(
+            "{count} bolts: {answered} of {frames} answered, {wrong} in the wrong orientation, {ambiguous} ambiguous"
+        );
+        assert!(answered > frames / 3 && ambiguous > frames / 6, "too few");
         assert_eq!(wrong, 0, "{count} bolts");
     }
 }

@@ -61,7 +61,7 @@ fn solvers() -> Vec<Asked> {
         let answers = solver.component.solve(&corners().observations()).is_ok();
         assert_eq!(answers, takes_bare, "{}: the corners of a box, bare", solver.name);
         let claims = solver.component.least_squares();
-        assert!(takes_bare || !claims, "{} claims least squares and refuses the corners of a box", solver.name);
+        assert!(takes_bare || !claims, "{} claims least squares and rejects the corners of a box", solver.name);
         Asked { solver, takes_bare, due: Cell::new(0), answered: Cell::new(0) }
     });
     solvers.collect()
@@ -270,7 +270,7 @@ fn mirrored_points_leave_a_large_residual() {
         for solver in solvers.iter().filter(|solver| solver.has_enough(&mirrored)) {
             let Ok(pose) = solver.solve(&mirrored) else { continue };
             let squares = mirrored.squares(&pose);
-            within(&format!("{}: below what a rotation can", solver.name()), expected - squares, rounding)?;
+            within(&format!("{}: below the minimum over rotations", solver.name()), expected - squares, rounding)?;
             if solver.solver.component.least_squares() {
                 within(&format!("{}: above the best rotation", solver.name()), squares - expected, rounding)?;
             }
@@ -540,6 +540,6 @@ fn what_has_not_converged_is_refused() {
         }
         Ok(())
     });
-    not_idle("refused", refused.get(), cases, 8);
+    not_idle("rejected", refused.get(), cases, 8);
     not_idle("answered", answered.get(), cases, 16);
 }

@@ -33,7 +33,7 @@ fn returns_to_the_point(rig: &StereoRig, places: &[(f64, f64, f64)], seen: &Cell
             let failed = |error: String| TestCaseError::fail(format!("{name}: {error}"));
             let found = triangulator.point(rig, &exact).map_err(|error| failed(error.to_string()))?;
             within(&format!("{name}: distance (m)"), found.point.distance(&point), 1e-9)?;
-            let again = rig.project(&found.point).ok_or_else(|| failed("not seen again".to_owned()))?;
+            let again = rig.project(&found.point).ok_or_else(|| failed("not in view again".to_owned()))?;
             within(&format!("{name}: left (px)"), again.left.distance(&pixels.left), 1e-9)?;
             within(&format!("{name}: right (px)"), again.right.distance(&pixels.right), 1e-9)?;
             within(&format!("{name}: residual (px)"), found.disagreement.sqrt() * EXACT, 1e-9)?;
@@ -209,7 +209,7 @@ fn predicted_depth_noise_is_that_of_many_draws() {
                         (count, sum, squares) = (count + 1.0, sum + off, squares + off * off);
                     }
                 }
-                prop_assert_eq!(count, f64::from(DRAWS), "every draw is a point");
+                prop_assert_eq!(count, f64::from(DRAWS), "every draw gives a point");
                 let generated = (squares / count - (sum / count) * (sum / count)).sqrt();
                 within(
                     &format!("{name}: σ_Z drawn over predicted, less 1"),
@@ -238,11 +238,11 @@ fn undistorting_undoes_distorting() {
         for &(across, down) in &places {
             let pixel = Pixel { u: across * width, v: down * height };
             let by_hand = [(pixel.u - cx) / fx, (pixel.v - cy) / fy];
-            let straight = plain.normalize(&pixel).ok_or_else(|| TestCaseError::fail("a pinhole sees all"))?;
+            let straight = plain.normalize(&pixel).ok_or_else(|| TestCaseError::fail("a pinhole has no limit"))?;
             within("pinhole (px)", fx * (straight.x - by_hand[0]).hypot(straight.y - by_hand[1]), 1e-9)?;
             let Some(direction) = camera.normalize(&pixel) else { continue };
             let ahead = Point::<Camera>::from(direction.push(1.0) * 2.0);
-            let again = camera.project(&ahead).ok_or_else(|| TestCaseError::fail("not seen again"))?;
+            let again = camera.project(&ahead).ok_or_else(|| TestCaseError::fail("not in view again"))?;
             within("pixel (px)", again.distance(&pixel), 1e-9)?;
             let back = camera.normalize(&again).ok_or_else(|| TestCaseError::fail("no direction"))?;
             within("direction (px)", fx.max(fy) * (back - direction).norm(), 1e-9)?;

@@ -107,7 +107,7 @@ fn rows_and_columns_state_the_same() {
         within("p H − T p", (rows.apply(&p) - object_from_camera * p).amax(), 1e-12)?;
         let column = rows.matrix.transpose() * p.coords.push(1.0);
         within("p H − Hᵀ p", (rows.apply(&p).coords - column.xyz()).amax(), 1e-12)?;
-        within("the way back", (rows.transform().matrix() - object_from_camera.matrix()).amax(), 1e-12)
+        within("inverse conversion", (rows.transform().matrix() - object_from_camera.matrix()).amax(), 1e-12)
     });
 }
 
