@@ -44,7 +44,7 @@ fn main() {
         ("rigid-consensus", Choice::named("rigid-consensus")),
     ];
     for hidden in [0, 1] {
-        println!("\nPoints that were not measured: {hidden}. Pair tests, median time, points found.\n");
+        println!("\nUnmeasured points: {hidden}. Pair tests, median time, points found.\n");
         let head: Vec<&str> = strategies.iter().map(|(name, _)| *name).collect();
         println!("| n | {} |\n|---|{}", head.join(" | "), "---|".repeat(head.len()));
         let mut stopped = [None; 6];
@@ -52,14 +52,14 @@ fn main() {
             let problems: Vec<Planted> = (0..PROBLEMS).map(|seed| Planted::draw(seed, n, hidden)).collect();
             let cells = strategies.iter().zip(&mut stopped).map(|((_, choice), stopped)| {
                 if let Some(at) = stopped {
-                    return format!("not run: stopped at n = {at}");
+                    return format!("not run: budget reached at n = {at}");
                 }
                 let search = SEARCHES.build(&choice.clone().with("budget", BUDGET)).expect("in range");
                 match median(&*search, &problems) {
                     Ok(cell) => cell,
                     Err(Rejected::Budget { .. }) => {
                         *stopped = Some(n);
-                        "stopped at its budget".to_owned()
+                        "budget reached".to_owned()
                     }
                     Err(why) => why.reason().to_owned(),
                 }

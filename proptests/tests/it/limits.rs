@@ -319,8 +319,8 @@ fn three_compact(distance: f64, draws: u64) -> Vec<String> {
         let c =
             cell_of(&*build(solver), &settings, &all, &Asked { draws, covariance: true, alternatives: Some(CHI2_1) });
         let line = format!(
-            "{distance} m {solver}: TRE {:.3} position {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} rejected, {} elsewhere of {}; position over \
-             what the likelihood foresees {:.3}; bent by {:.2} at most",
+            "{distance} m {solver}: TRE {:.3} position {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} rejected, {} elsewhere of {}; position error over \
+             the prediction of the likelihood {:.3}; nonlinearity at most {:.2}",
             c.tre,
             c.position,
             c.nees,
@@ -383,7 +383,7 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
         let generated = draws * 20;
         let line = format!(
             "seed {seed} {distance} m {solver}: TRE {:.3} position {:.3} NEES {:.3} cover {:.4}; {} ambiguous, {} rejected, {} elsewhere \
-             of {generated}; position over what the likelihood foresees {:.3}; bent by {:.2} at most; of {} layouts where the bound \
+             of {generated}; position error over the prediction of the likelihood {:.3}; nonlinearity at most {:.2}; of {} layouts where the bound \
              is meaningful (nonlinearity at most {:.2}) TRE {:.3} position {:.3}",
             c.tre,
             c.position,
