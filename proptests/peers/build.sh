@@ -1,6 +1,6 @@
 #!/bin/sh
-# build.sh SOURCES OUT: the drivers, from clones in SOURCES: teaser, pmc, robin, xenium, atomic_queue, clipper, mac, and kiss (the
-# folder with kiss_matcher/). Needs Eigen, and for MAC PCL 1.13 and igraph; what cannot be built is said and left out.
+# build.sh SOURCES OUT: builds the drivers from clones in SOURCES: teaser, pmc, robin, xenium, atomic_queue, clipper, mac, and kiss (the
+# folder with kiss_matcher/). Needs Eigen, and for MAC PCL 1.13 and igraph; a driver that does not build is reported and skipped.
 set -u
 here=$(cd "$(dirname "$0")" && pwd) from=$(cd "$1" && pwd)
 mkdir -p "$2/parts" && cd "$2/parts" || exit 1

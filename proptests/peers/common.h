@@ -1,4 +1,4 @@
-// One problem as a list of pairs, as pairs.py writes it, and what every driver prints: id, ms, answered or not, cloud_from_model.
+// A problem as a list of pairs from pairs.py, and the output of every driver: id, ms, answered or not, cloud_from_model.
 #pragma once
 
 #include <Eigen/Dense>
@@ -13,7 +13,7 @@ struct Pairs {
   std::string id;
   double delta;                     // bound of the difference of two distances, m
   Eigen::Matrix3Xd model, cloud;    // the points of each pair
-  std::vector<int> of_model, of_cloud;  // and their places in the model and the cloud
+  std::vector<int> of_model, of_cloud;  // and their indices in the model and the cloud
 };
 
 inline Pairs read(const std::string& path) {

@@ -1,7 +1,7 @@
-"""compare.py PROBLEMS PAIRS SEAFIX DRIVERS FAMILY ROUNDS NAME…: times, answers and wrong ones of a family, ours first.
+"""compare.py PROBLEMS PAIRS SEAFIX DRIVERS FAMILY ROUNDS NAME…: times, answers and wrong answers of a family, Seafix first.
 
-In turns: each program through the whole family, so many rounds, one thread each. The median of the rounds, then over the problems
-of at most 6000 pairs; solved and wrong as the problems' README has them.
+Programs alternate: each runs the complete family in every round, on one thread. Times are medians over the rounds, then over the
+problems of at most 6000 pairs; solved and wrong are those of the problems' README.
 """
 
 import json
@@ -39,7 +39,7 @@ def peer(program):
 
 
 def right(name, pose):
-    """Whether the pose is the true one: three times the ideal error, or 5 cm and 2°, 1 cm in d."""
+    """Whether the pose is right: within three times the ideal error, or 5 cm and 2°, 1 cm in d."""
     truth = json.loads((problems / f"{name}.truth.json").read_text())
     model = np.array(json.loads((problems / f"{name}.json").read_text())["model"], float)[:, :3]
     pose, true = np.array(pose), np.array(truth["T_cam_obj"])

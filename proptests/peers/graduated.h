@@ -1,4 +1,4 @@
-// TEASER++'s solver, with no scale, and its clique or none.
+// TEASER++'s solver without scale, with its clique or without.
 #pragma once
 
 #include "common.h"

@@ -1,4 +1,4 @@
-// KISS-Matcher of given pairs: the greatest core of ROBIN's graph, then its own solver with three quarters of the bound.
+// KISS-Matcher on given pairs: the maximum core of ROBIN's graph, then its own solver with three quarters of the bound.
 #include "common.h"
 #include "kiss_matcher/GncSolver.hpp"
 #include "robin/robin.hpp"

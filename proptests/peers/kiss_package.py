@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""kiss_package.py PAIRS…: KISS-Matcher of given pairs by its package (kiss_matcher 1.0.2), where its sources are not at hand.
+"""kiss_package.py PAIRS…: KISS-Matcher on given pairs by its package (kiss_matcher 1.0.2), without its sources.
 
-Prints what every driver prints (common.h). The time holds the handing over of the points: it is no less than the method's own.
+The output is that of every driver (common.h). The time includes the transfer of the points and is thus an upper bound.
 """
 
 import sys

@@ -1,4 +1,4 @@
-// MAC, whose program reads and shows files: here the pairs are given, and what it would show is the answer.
+// MAC on given pairs, without the files and windows of its program.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -31,7 +31,7 @@ int main(int count, char** paths) {
     }
     vector<double> overlaps;
     shown.setZero();
-    // It takes ten times the resolution of the clouds as the bound.
+    // MAC takes ten times the resolution of the clouds as the bound.
     const bool found = registration(source, target, all, overlaps, ".", pairs.delta / 10, 0.9);
     pose = shown;
     return found && !pose.isZero();

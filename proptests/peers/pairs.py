@@ -1,6 +1,6 @@
 """pairs.py PROBLEMS OUT: every problem of the families a–g as a list of pairs, one text file each.
 
-The first line has the id, the number of pairs and Δ; then a line a pair: model point, measured point, and their places.
+The first line has the id, the number of pairs and Δ; then a line for each pair: model point, measured point, and their indices.
 """
 
 import json
@@ -11,7 +11,7 @@ import numpy as np
 
 
 def pairs(problem):
-    """The candidates of a problem: as given, in the prior's shells, or all."""
+    """The candidates of a problem: as given, in the prior's gates, or all."""
     model, cloud = (np.array(problem[key], float)[:, :3] for key in ("model", "cloud"))
     if problem.get("putative"):
         return model, cloud, np.array(problem["putative"], int)

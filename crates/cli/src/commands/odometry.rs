@@ -185,7 +185,7 @@ fn stereo_images(dataset: &Dataset, frame: &DatasetFrame) -> Result<(Image, Imag
 }
 
 impl Trip {
-    /// Stamps of the pairs that were left out, and why, in order of time.
+    /// The stamps of skipped pairs with reasons, in order of time.
     fn left_out(&self) -> Vec<(u64, String)> {
         let skipped = self.given.iter().zip(&self.trajectory.outcomes).filter_map(|(stamp, outcome)| match outcome {
             OdometryOutcome::Skipped(lost) => Some((*stamp, lost.to_string())),
