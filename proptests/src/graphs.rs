@@ -1,12 +1,12 @@
 //! All small association graphs, and points that realise them.
 //!
 //! A search takes points, not a graph. Two pairs agree if the difference D − d of their two distances is within Δ² = k²
-//! nᵀ (Σ_a + Σ_b) n, with n the direction between the cloud points a and b. [`Posts`] chooses the covariances Σ_a = s I
-//! + Σ_b λ_ab n nᵀ: fifteen numbers λ for the fifteen pairs of six cloud points, in which all Δ² are linear. Each Δ² is
-//! thus set five per cent above or below (D − d)², so that any set of pairs of cloud points agrees. The six points are
-//! pairs of posts at the corners of a triangle; the model is a tetrahedron or an octahedron whose opposite corners are
-//! such a pair. All covariances are then positive definite. They are so large that no four points distinguish an image
-//! from its reflection.
+//! nᵀ (Σ_a + Σ_b) n, with n the direction between the cloud points a and b. [`Posts`] chooses the covariances Σ_a =
+//! s·I + Σ_b λ_ab n nᵀ: fifteen numbers λ for the fifteen pairs of six cloud points, in which all Δ² are linear. Each
+//! Δ² is thus set five per cent above or below (D − d)², so that any set of pairs of cloud points agrees. The six
+//! points are pairs of posts at the corners of a triangle; the model is a tetrahedron or an octahedron whose opposite
+//! corners are such a pair. All covariances are then positive definite. They are so large that no four points
+//! distinguish an image from its reflection.
 
 use std::collections::HashSet;
 
