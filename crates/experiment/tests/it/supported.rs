@@ -208,7 +208,7 @@ fn a_joint_fix_states_what_took_part() {
                     assert!(target.detail.starts_with("joint fix over `layout"), "{}", target.detail)
                 }
                 _ => {
-                    assert!(target.detail.starts_with("4 points were identified; 5 are needed"), "{}", target.detail);
+                    assert!(target.detail.starts_with("too few identified points: 4 found, 5 required"), "{}", target.detail);
                     took_part += usize::from(target.detail.ends_with("; 4 points took part in the joint fix"));
                     left_out += usize::from(target.detail.contains("; no part in the joint fix: "));
                 }

@@ -433,7 +433,8 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     let outcome = judged(&seen(7), None, &acceptance, Vec::new()).outcome;
     let Outcome::Rejected(refusal @ RejectionReason::Hinge { rms, .. }) = &outcome else { panic!("{outcome:?}") };
     assert!((rms - 0.036).abs() < 5e-4 && refusal.reason() == "imprecise", "{refusal}");
-    let reported = "the pose hangs on model point `6`: should that be a wrong match, the model points are 0.036 m off";
+    let reported =
+        "pose depends on one point: if model point `6` is a wrong match, the model points have an error of 0.036 m";
     assert!(refusal.to_string().starts_with(reported), "{refusal}");
     let both = judged(&seen(8), None, &acceptance, Vec::new());
     assert!(matches!(both.outcome, Outcome::Fix(_)), "{:?}", both.outcome);
