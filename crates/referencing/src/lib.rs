@@ -1,11 +1,10 @@
-//! The heart: which points of the cloud are the feature points of a known object, and where is the
-//! camera relative to it.
+//! Pose of a stereo camera relative to a known object, from identified feature points.
 //!
-//! The order is the paper's. A [`Site`] tells what there is; a [`Target`] of it is looked for;
-//! [`candidates`] are the cloud points that the prior allows for each model point (Stage 1); a
-//! [`Search`] finds the largest structurally coherent set among them (Stage 2); a [`Solver`]
-//! computes the rigid motion; [`compute_fix()`] puts them in a row and tests the answer before it
-//! believes it. This crate knows no image and no truth.
+//! The steps follow the paper. A [`Site`] describes the known objects, and each search looks for one [`Target`]. Stage
+//! 1, [`candidates()`], selects the cloud points that the prior allows for each model point. Stage 2, a [`Search`],
+//! finds the largest structurally coherent set among them. A [`Solver`] computes the rigid motion. [`compute_fix()`]
+//! runs search and solver, tests the result, and returns a fix or the reason for its rejection. This crate uses neither
+//! images nor ground truth.
 
 mod a_contrario;
 mod accept;

@@ -695,17 +695,21 @@ fn problems_that_cannot_be() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("p.json");
     for (from, to, expected) in [
-        ("[1,0,5]", "[1,\"x\",5]", "`cloud[1][1]` is no number in p.json:3:22: \"x\"; give a number, in metres"),
-        ("[1,0,5]", "[1,NaN,5]", "`cloud[1][1]`: NaN is no JSON number in p.json:3:22; give a number, in metres"),
+        ("[1,0,5]", "[1,\"x\",5]", "`cloud[1][1]` is not a number in p.json:3:22: \"x\"; give a number, in metres"),
+        ("[1,0,5]", "[1,NaN,5]", "`cloud[1][1]`: NaN is not a JSON number in p.json:3:22; give a number, in metres"),
         ("[1,0,5]", "[1,5]", "`cloud[1]` has 2 values in p.json:3:19: [1,5]; give three numbers x y z, in metres"),
-        ("\"delta\": 0.01, ", "", "`delta` is missing in p.json:1:1; give the tolerance of distances"),
+        ("\"delta\": 0.01, ", "", "`delta` is missing in p.json:1:1; give the distance tolerance"),
         ("0.01", "1e300", "`delta` is out of range in p.json:4:26: 1e300; allowed: above 0"),
         (
             "\"putative\": null",
             "\"putative\": [[0,-1]]",
-            "`putative[0][1]` is no index in p.json:4:63: -1; give a whole",
+            "`putative[0][1]` is not an index in p.json:4:63: -1; give a whole",
         ),
-        ("null}", "null}\nmore", "something after the end of the problem in p.json:5:1: more; give one problem a file"),
+        (
+            "null}",
+            "null}\nmore",
+            "trailing characters after the problem in p.json:5:1: more; give one problem per file",
+        ),
     ] {
         assert!(PROBLEM.contains(from), "no {from}");
         fs::write(&file, PROBLEM.replacen(from, to, 1)).unwrap();
@@ -732,11 +736,7 @@ fn problems_that_are_hardly_meant() {
             "the cloud has too few points in p.json: 1 point; a pose needs",
         ),
         ("0.001", "1", "`delta` is far below the noise in p.json: Δ = 0.01 m, σ = 1 m; "),
-        (
-            "\"prior\": null",
-            prior,
-            "the prior puts the whole object behind the camera in p.json: its foremost point has z = -6 m; ",
-        ),
+        ("\"prior\": null", prior, "the prior places the object behind the camera in p.json: its largest z is -6 m; "),
     ] {
         assert!(PROBLEM.contains(from), "no {from}");
         fs::write(&file, PROBLEM.replacen(from, to, 1)).unwrap();

@@ -99,9 +99,7 @@ impl Outcome {
     pub fn explanation(&self) -> Option<String> {
         match self {
             Self::Fix(_) => None,
-            Self::Ambiguous(alternatives) => {
-                Some(format!("{} poses explain the data; narrow the prior", alternatives.len()))
-            }
+            Self::Ambiguous(alternatives) => Some(format!("{} poses fit; narrow the prior", alternatives.len())),
             Self::Rejected(refusal) => Some(refusal.to_string()),
             Self::Degenerate(degenerate) => Some(degenerate.to_string()),
         }
