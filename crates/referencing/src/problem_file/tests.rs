@@ -1,4 +1,4 @@
-//! Problems as files and their answers.
+//! Problem files and their answers.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_component::{Choice, Fault};
 
-/// Five points seen from the origin of a camera 3 m in front of them, as exact numbers.
+/// Five points seen from the origin of a camera 3 m in front of them, without errors.
 const GOOD: &str = r#"{"format": "coherence-problem/1", "id": "x", "family": "t", "seed_set": "own", "seed": 1,
 "model": [[0,0,0],[1,0,0],[0.25,-0.75,0],[0.5,0.5,1],[-0.5,0.25,0.5]],
 "cloud": [[0,0,3],[1,0,3],[0.25,-0.75,3],[0.5,0.5,4],[-0.5,0.25,3.5]],
@@ -65,7 +65,7 @@ fn a_good_problem_is_answered_with_the_keys_of_the_format() {
     assert_eq!(answer["covariance"].as_array().unwrap().len(), 6);
 }
 
-/// A model an eighth too large, under noise that lets it pass: umeyama tells 9/8, the other solvers nothing.
+/// A model an eighth too large, under noise that admits it: umeyama reports 9/8, the other solvers nothing.
 #[test]
 fn the_scale_is_reported_by_the_solver_that_finds_it() {
     let mut problem = parse(&GOOD.replace("0.01", "0.1").replace("0.04", "0.3")).unwrap();
@@ -74,7 +74,7 @@ fn the_scale_is_reported_by_the_solver_that_finds_it() {
     }
     problem.prior = None;
     problem.putative = Some((0..5).map(|k| (k, k)).collect());
-    // What is weak here is let pass: no search is under test.
+    // Wide limits: this test covers no search.
     let acceptance = Acceptance {
         max_nfa: f64::INFINITY,
         alert_limit: 1.0,
@@ -95,7 +95,7 @@ fn the_scale_is_reported_by_the_solver_that_finds_it() {
     assert_eq!(of("kabsch"), None);
 }
 
-/// A file knows no rig: a cloud behind the camera is answered as it is given, and its points are named.
+/// A file has no rig: a cloud behind the camera is answered, and its points are listed.
 #[test]
 fn identified_points_behind_the_camera_are_named() {
     assert!(solved(GOOD).get("behind").is_none());
@@ -134,17 +134,17 @@ fn candidates_come_from_pairs_gates_or_everything() {
 const MODEL: &str = "[[0,0,0],[1,0,0],[0.25,-0.75,0],[0.5,0.5,1],[-0.5,0.25,0.5]]";
 const CLOUD: &str = "[[0,0,3],[1,0,3],[0.25,-0.75,3],[0.5,0.5,4],[-0.5,0.25,3.5]]";
 
-/// What is told of the good problem with these changes.
+/// The warnings about the valid problem with these changes.
 fn warnings(changes: &[(&str, &str)]) -> Vec<String> {
     let text = changes.iter().fold(GOOD.to_owned(), |text, (from, to)| {
         assert!(text.contains(from), "the good problem has no `{from}`");
         text.replacen(from, to, 1)
     });
-    let problem = parse(&text).expect("it is legal");
+    let problem = parse(&text).expect("a valid problem");
     problem.warnings(Path::new("p.json")).iter().map(ToString::to_string).collect()
 }
 
-/// Of so many points, a list with these coordinates.
+/// A JSON list of `count` points.
 fn places(count: usize, of: impl Fn(f64) -> [f64; 3]) -> String {
     serde_json::to_string(&(0..count).map(|k| of(k as f64)).collect::<Vec<_>>()).unwrap()
 }
@@ -172,7 +172,7 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_reported() {
         (vec![(MODEL, "[]")], "the model has too few points in p.json: 0 points; a pose needs at least three"),
         (vec![(MODEL, "[[0,0,0]]")], "the model has too few points in p.json: 1 point; a pose"),
         (vec![(MODEL, "[[0,0,0],[1,0,0],[2,0,0.0005],[3,0,0]]"), no_prior], "collinear model points in p.json: second"),
-        // A half-turn of four, a few millimetres off; of five none.
+        // A half-turn maps four points onto each other within a few millimetres, and no five.
         (
             vec![(MODEL, "[[1,0.5,0],[-1,-0.502,0],[0.2,-0.7,0.6],[-0.201,0.7,0.6]]"), no_prior],
             "the model is symmetric in p.json: after a rotation by 180° each point is within 0.001076 m of another",
@@ -261,7 +261,7 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_reported() {
     }
 }
 
-/// Blunders far away, or a few more points on a line than others, are no reason to warn.
+/// A few distant outliers, or a moderate number of collinear points, cause no warning.
 #[test]
 fn usual_clouds_are_not_warned_of() {
     let no_prior = (GOOD_PRIOR, "null");
@@ -276,7 +276,7 @@ fn usual_clouds_are_not_warned_of() {
     }
 }
 
-/// Shells that hold more pairs than can be listed: they are not listed.
+/// Gates with too many pairs to list are rejected before they are listed.
 #[test]
 fn gates_that_hold_too_much_are_refused() {
     let cloud = places(2001, |k| [k.sin(), (2.0 * k).sin(), k.cos() + 3.0]);
@@ -313,7 +313,7 @@ fn every_fault_names_its_place() {
         ("0.04", "-1", "`delta` is out of range in p.json:4:25: -1; allowed: above 0, at most"),
         ("0.04", "2.0", "`delta` is out of range in p.json:4:25: 2.0; allowed"),
         ("0.04", "1e300", "`delta` is out of range in p.json:4:25: 1e300; allowed"),
-        // The third and the fourth point are 1.6202 m apart, the shell's diagonal is 2.19 m.
+        // The third and the fourth point are 1.6202 m apart, the diagonal of the bounding box is 2.19 m.
         (
             "0.04",
             "0.82",
@@ -352,7 +352,7 @@ fn every_fault_names_its_place() {
     assert!(parse(&GOOD.replacen("0.04", "0.81", 1)).is_ok());
 }
 
-/// What is not what its key holds: the element, where it stands, what is written there, and what to give.
+/// A value of the wrong type is reported with its element, place, text and remedy.
 #[test]
 fn every_value_of_another_kind_is_named() {
     let number = "; give a number, in metres";
@@ -416,7 +416,7 @@ fn every_value_of_another_kind_is_named() {
     }
 }
 
-/// Keys that are missing, unknown or twice, and text that is no JSON.
+/// Missing, unknown and duplicate keys, and invalid JSON.
 #[test]
 fn every_text_that_is_no_problem_is_reported_with_its_place() {
     for (from, to, expected) in [
@@ -456,7 +456,7 @@ fn every_text_that_is_no_problem_is_reported_with_its_place() {
         ),
         ("null}", "null} x", "trailing characters after the problem in p.json:6:19: x; give one problem per file"),
         ("null}", "null", "unexpected end of file in p.json:6:13; the file may be truncated; write it again"),
-        // The first of two faults, and no JSON behind it.
+        // The first of two faults, with invalid JSON behind it.
         ("[0.5,0.5,4],[-0.5,", "[0.5,\"q\",4],[NaN,", "`cloud[3][1]` is not a number in p.json:3:48: q; give a number"),
         (
             "{\"format\"",
@@ -472,7 +472,7 @@ fn every_text_that_is_no_problem_is_reported_with_its_place() {
         ("{}", "`format` is missing in p.json:1:1; give \"coherence-problem/1\""),
         ("{\"model\": [[0,0,0],\n[1,0", "`model[1]`: unexpected end of file in p.json:2:4; the file may"),
     ] {
-        let reported = parse(text).expect_err("it is no problem").to_string();
+        let reported = parse(text).expect_err("an invalid problem").to_string();
         assert!(reported.starts_with(expected), "{expected}\n{reported}");
     }
 }
@@ -490,7 +490,8 @@ fn a_file_that_is_not_there_is_a_line() {
     assert!(serde_json::to_value(&line).unwrap().get("error").is_some());
 }
 
-/// A displaced object: its shells hold nothing, those twice as large hold it, or none do and every point is looked at.
+/// A displaced object: its gates are empty, gates of twice the size contain it, or none do and every point is a
+/// candidate.
 #[test]
 fn a_displaced_object_is_found_in_larger_gates_or_without() {
     let outcome = |x: &str, expand_gates: bool| {
@@ -510,8 +511,8 @@ fn a_displaced_object_is_found_in_larger_gates_or_without() {
     }
 }
 
-/// B36. A cloud of ten million points is refused by the size of its file before a byte of it is read, and one of more points
-/// than are taken by their number.
+/// B36. A cloud of ten million points is rejected by the size of its file before it is read, and one above the maximum
+/// number by its count.
 #[test]
 fn a_cloud_too_large_to_hold_is_refused() {
     let file = std::env::temp_dir().join(format!("seafix-ten-million-{}.json", std::process::id()));

@@ -1,4 +1,4 @@
-//! Hand-worked sites: one good, and every way to break it.
+//! Hand-made sites: a valid one, and its invalid variants.
 
 use std::path::Path;
 
@@ -55,7 +55,7 @@ fn parse(text: &str) -> Result<Site, Vec<Fault>> {
     Site::parse(text, Path::new("site.toml"))
 }
 
-/// The faults of the good site after one replacement, as they are printed.
+/// The messages of the valid site's faults after one replacement.
 fn faults(from: &str, to: &str) -> Vec<String> {
     assert!(GOOD.contains(from), "the good site has no `{from}`");
     parse(&GOOD.replacen(from, to, 1)).expect_err("the site is broken").iter().map(ToString::to_string).collect()
@@ -87,10 +87,10 @@ fn the_full_site_is_one_target_in_its_frame() {
     let [target] = &site.targets(TargetKind::Site).unwrap()[..] else { panic!("one target") };
     let ids: Vec<&str> = target.points.iter().map(|point| point.id.as_str()).collect();
     assert_eq!(ids, ["plate/A", "plate/B", "plate/C", "frame/A", "frame/B", "frame/C", "frame/D"]);
-    assert_eq!(target.points[2].at, Point::new(2.0, 0.0, 0.0), "the frame object's own points are not touched");
+    assert_eq!(target.points[2].at, Point::new(2.0, 0.0, 0.0), "the points of the frame object stay unchanged");
     assert!(target.points[6].at.distance(&Point::new(5.5, 0.5, -1.0)) < 1e-12);
     assert_eq!(target.points[0].sigma, 0.001);
-    // Between the objects both surveys count, the more the farther from the surveyed bases.
+    // Between objects both surveys contribute, more for points farther from the surveyed bases.
     assert!((0.01f64.hypot(0.02)..0.1).contains(&target.points[6].sigma), "{}", target.points[6].sigma);
     assert!((target.diameter() - (6f64 * 6.0 + 1.0).sqrt()).abs() < 1e-12, "plate/B to frame/C");
     let targets = site.targets(TargetKind::Object).unwrap();
@@ -206,7 +206,7 @@ fn survey_and_model_must_agree() {
         found[0].contains("disagree on the distance P1 P3 in site.toml:9: 2.2000 m surveyed, 2.0000 m in the model"),
         "{found:?}"
     );
-    // Within four standard deviations of a distance it is a survey.
+    // A difference within four standard deviations is valid.
     assert!(parse(&GOOD.replacen("[12.0, 20.0, 30.0]", "[12.03, 20.0, 30.0]", 1)).is_ok());
 }
 
