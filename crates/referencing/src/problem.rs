@@ -109,8 +109,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Structural coherence of `a` and `b`: different model points, different cloud points, and | |P_a P_b| − |C_a C_b|
-    /// | ≤ Δ (closed).
+    /// Structural coherence of `a` and `b`: different model points, different cloud points, and a difference of their
+    /// distances in model and cloud of at most Δ (closed).
     pub fn coherent(&self, a: Correspondence, b: Correspondence) -> bool {
         a.model != b.model && a.cloud != b.cloud && self.agrees(a, b, self.measured(a.cloud, b.cloud))
     }

@@ -162,8 +162,8 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_reported() {
     for (changes, expected) in [
         (
             vec![("[1,0,0]", "[0.25,-0.68,0]")],
-            "model points closer than 2Δ in p.json: points 1 and 2, 0.07 m apart, and Δ = 0.04 m; they may be confused; \
-             keep model points at least 2Δ apart",
+            "model points closer than 2Δ in p.json: points 1 and 2, 0.07 m apart, and Δ = 0.04 m; they may be \
+             confused; keep model points at least 2Δ apart",
         ),
         (
             vec![("[1,0,0]", "[1000,0,0]")],
@@ -283,7 +283,8 @@ fn gates_that_hold_too_much_are_refused() {
     let model = places(2001, |k| [k, (3.0 * k).sin(), k.cos()]);
     let changes = [(CLOUD, cloud.as_str()), (MODEL, &model), ("\"shell_half_m\": 0.1", "\"shell_half_m\": 1e9")];
     let reported = warnings(&changes);
-    let many = "too many candidate pairs in p.json: at least 4002000, the limit of `rigid-consensus` is 40000; give a rough pose";
+    let many = "too many candidate pairs in p.json: at least 4002000, the limit of `rigid-consensus` is 40000; give a rough \
+         pose";
     assert!(reported.iter().any(|reported| reported.starts_with(many)), "{reported:?}");
     let sound = changes.map(|(from, to)| (from, if to.ends_with("1e9") { "\"shell_half_m\": 0.1" } else { to }));
     let reported = warnings(&sound);
