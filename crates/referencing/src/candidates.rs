@@ -19,13 +19,15 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gate {
-    /// The paper's shell: a box of this half-size (m) along the camera's axes, equal for every point ("by the known
-    /// navigation error", Sec. 2.2); its faces belong to it.
-    Box(f64),
-    /// The ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ²₃(confidence), with S = J Σ_prior Jᵀ + Σ_triangulation + σ_model² I.
+    /// The paper's shell: a box of this half-size (m) along the camera's axes.
     ///
-    /// J is the derivative of the predicted position by the pose. The true cloud point lies in the ellipsoid with this
-    /// confidence (Bar-Shalom and Fortmann, *Tracking and Data Association*, 1988, Sec. 5.2).
+    /// The size is equal for every point ("by the known navigation error", Sec. 2.2); the faces belong to the box.
+    Box(f64),
+    /// The χ² ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ²₃(confidence).
+    ///
+    /// S = J Σ_prior Jᵀ + Σ_triangulation + σ_model² I, with J the derivative of the predicted position by the pose.
+    /// The true cloud point lies in the ellipsoid with this confidence (Bar-Shalom and Fortmann, *Tracking and Data
+    /// Association*, 1988, Sec. 5.2).
     ChiSquare(f64),
 }
 
@@ -42,7 +44,7 @@ impl Gate {
     ///
     /// A half-size that is not positive and finite, or a confidence outside (0, 1).
     pub fn check(&self) -> Result<(), String> {
-        // The form also rejects a NaN.
+        // A NaN is rejected as well.
         let checked = match *self {
             Self::Box(half) => in_range(half > 0.0 && half.is_finite(), "box", half, "a positive half-size in metres"),
             Self::ChiSquare(confidence) => {

@@ -22,8 +22,9 @@ pub struct Prior {
 pub enum PriorBound {
     /// Gaussian: the covariance of ξ in `T_true = T_prior · Exp(ξ)`.
     Gaussian(Covariance6<Object, Camera>),
-    /// Uniform: each visible model point lies within this distance (m) of its prediction along each camera axis (the
-    /// paper's shell).
+    /// Uniform: each visible model point lies within this distance (m) of its prediction.
+    ///
+    /// The distance holds along each camera axis (the paper's shell).
     Box(f64),
 }
 
@@ -51,7 +52,7 @@ impl Tolerance {
             Self::Fixed(delta) => ("fixed", delta, "a positive number of metres"),
             Self::Sigmas(k) => ("sigmas", k, "a positive number of standard deviations"),
         };
-        // The form also rejects a NaN.
+        // A NaN is rejected as well.
         let positive = value > 0.0 && value.is_finite();
         in_range(positive, name, value, range).map_err(|message| format!("tolerance: {message}"))
     }
@@ -77,12 +78,12 @@ pub struct Problem<'a> {
     pub candidates: &'a Candidates,
     /// The tolerance of the distances.
     pub tolerance: Tolerance,
-    /// The prior, if one is known; it bounds the pose as a whole as well as the candidates.
+    /// The prior, if one is known; it bounds the complete pose as well as the candidates.
     pub prior: Option<&'a Prior>,
 }
 
 impl Problem<'_> {
-    /// The tolerance (m) for the distances between the pairs `a` and `b` in model and cloud.
+    /// The tolerance (m) of the distances of two pairs in model and cloud.
     pub fn delta(&self, a: Correspondence, b: Correspondence) -> f64 {
         match self.tolerance {
             Tolerance::Fixed(delta) => delta,
@@ -115,7 +116,7 @@ impl Problem<'_> {
         a.model != b.model && a.cloud != b.cloud && self.agrees(a, b, self.measured(a.cloud, b.cloud))
     }
 
-    /// The distance test of structural coherence, for different points and a known distance (m) in the cloud.
+    /// The distance test of structural coherence, for different points with a known measured distance (m).
     pub(crate) fn agrees(&self, a: Correspondence, b: Correspondence, measured: f64) -> bool {
         let model = self.model[a.model].at.distance(&self.model[b.model].at);
         (model - measured).abs() <= self.delta(a, b)

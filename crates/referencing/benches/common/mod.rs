@@ -15,7 +15,9 @@ pub(crate) fn rig() -> StereoRig {
     StereoRig::new(camera, camera, right_from_left).expect("a rig")
 }
 
-/// Points over the common field at 3.25 m ± 10 %, with uniform noise of ± 0.35 px (σ 0.2) in each pixel coordinate.
+/// Points over the common field at 3.25 m ± 10 %, with pixel noise.
+///
+/// The noise is uniform within ± 0.35 px (σ 0.2) in each pixel coordinate.
 pub(crate) fn points(rig: &StereoRig, count: usize) -> Vec<Observation> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let pose = Transform::<Object, Camera>::exp(&[0.4, -1.1, 0.7, 1.5, -2.0, 3.0].into());

@@ -38,7 +38,7 @@ impl<'a> Absence<'a> {
         let (min, max) = self.limits();
         let a_contrario = absent - self.probabilities.alike;
         let limit = if min < max && a_contrario > min && self.fills_space() { max } else { min };
-        // The form also rejects a NaN.
+        // A NaN is rejected as well.
         let likely = a_contrario <= limit && absent <= max;
         if (likely && self.a_contrario.at_their_pose() <= limit) || self.is_rare() {
             return None;
@@ -79,7 +79,7 @@ impl<'a> Absence<'a> {
         *self.fills_space.get_or_init(fills)
     }
 
-    /// Whether the NFA is so small that the pose is accepted despite a probability of absence above its limit.
+    /// Whether a small NFA justifies the pose despite a probability of absence above its limit.
     ///
     /// The probability of absence assigns the same prior to every number of visible points, which makes few visible
     /// points of a large model improbable; the NFA makes no such assumption. It is reliable enough only for putative

@@ -79,7 +79,7 @@ impl Acceptance {
     pub fn check(&self) -> Result<(), String> {
         let check = || {
             in_range(self.min_points >= 3, "min-points", self.min_points, "3 or more")?;
-            // The positive form also rejects a NaN.
+            // A NaN is rejected as well.
             let budget = self.max_nfa > 0.0 && self.max_nfa.is_finite();
             in_range(budget, "max-nfa", self.max_nfa, "a positive number")?;
             for (name, value) in [("absence", self.absence), ("rare", self.rare), ("doubt", self.doubt)] {

@@ -29,15 +29,14 @@ const MAX_MISLABELED: usize = 100;
 pub(super) struct Admitted {
     /// The model points by the index of the measured point in the cloud.
     pub(super) models: BTreeMap<usize, Vec<usize>>,
-    /// Whether a source other than the prior proposed the candidates, so that labels may be mistaken.
+    /// Whether a source other than the prior proposed the candidates; labels may then be mistaken.
     pub(super) proposed: bool,
 }
 
 impl Judge<'_> {
-    /// The model points that each measured point of a set may be: its candidates, and those that a prior barely
-    /// excludes.
+    /// The admissible model points of each measured point of a set: candidates, and those that a prior barely excludes.
     ///
-    /// One point outside its gate by noise does not exclude a pose that the prior as a whole allows. If a source other
+    /// One point outside its gate by noise does not exclude a pose that the complete prior allows. If a source other
     /// than the prior proposed the candidates, every model point that the prior allows is admitted, since the proposer
     /// may confuse similar points.
     pub(super) fn admitted(&self, pairs: &[Correspondence]) -> Admitted {

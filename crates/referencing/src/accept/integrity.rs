@@ -55,7 +55,7 @@ pub struct Protection {
 }
 
 impl Protection {
-    /// The radii that errors with this covariance exceed with the given probability each, if all points are correct.
+    /// The fault-free radii: errors with this covariance exceed each with the given probability.
     pub(super) fn quiet(covariance: &Covariance6<Object, Camera>, probability: f64) -> Self {
         let (position, attitude) = semi_axes(covariance);
         let quiet = radius(probability);
@@ -100,9 +100,10 @@ pub struct Integrity {
     /// `None` with fewer than five points, if two points are indispensable, or if [`Acceptance::two_wrong_rate`] is
     /// zero.
     pub solution_separation_two: Option<f64>,
-    /// The posterior probability that the pose is wrong by more than the alert limit, or that the object is absent.
+    /// The posterior probability of a wrong pose or of an absent object.
     ///
-    /// It counts poses with mostly other pairs than the fix. `None` for a search that does not weigh evidence.
+    /// A pose is wrong if it differs from the truth by more than the alert limit; it then has mostly other pairs than
+    /// the fix. `None` for a search that does not weigh evidence.
     pub misidentified: Option<f64>,
     /// The protection levels at [`Acceptance::risk`].
     ///
@@ -158,7 +159,7 @@ pub(super) fn protection(
         return Separation::default();
     }
     let left = acceptance.risk - misidentified;
-    // The positive form leaves nothing for a NaN.
+    // A NaN leaves nothing.
     let identified = left > 0.0;
     let risk = if identified { left } else { acceptance.risk };
     let own = Protection::quiet(covariance, 0.5 * risk);
@@ -193,9 +194,10 @@ struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// Raises the levels for these sets of wrong matches, each with `fraction` as its allotted probability.
+    /// Raises the levels for these sets of wrong matches.
     ///
-    /// Returns the largest shift of the position (m); `None` if one of the sets is indispensable.
+    /// `fraction` is the probability allotted to each set. Returns the largest shift of the position (m); `None` if one
+    /// of the sets is indispensable.
     fn farthest<const N: usize>(&mut self, sets: impl Iterator<Item = [usize; N]>, fraction: f64) -> Option<f64> {
         let k = radius(fraction);
         let mut farthest = Some(0.0_f64);
@@ -236,7 +238,7 @@ impl Watch<'_> {
 fn longer_than(limit: f64, covariance: &Matrix3<f64>) -> Option<f64> {
     /// Upper bound of the rounding of the norm.
     const ROUNDED: f64 = 1.0 + 1e-12;
-    // The negated form includes a NaN.
+    // A NaN is included.
     (!(covariance.norm().sqrt() * ROUNDED <= limit)).then(|| semi_axis(covariance))
 }
 

@@ -54,7 +54,7 @@ impl Judge<'_> {
     /// Whether the NFA of a set of this size is within its limit.
     pub(super) fn rare(&self, size: usize, expected: f64) -> Result<(), RejectionReason> {
         let budget = self.acceptance.max_nfa;
-        // The negated form also rejects a NaN.
+        // A NaN is rejected as well.
         if expected <= budget { Ok(()) } else { Err(RejectionReason::AContrario { size, expected, budget }) }
     }
 
@@ -143,10 +143,10 @@ impl Judge<'_> {
         }
     }
 
-    /// The comparison of a fix with the best pose elsewhere, from pairs that contradict the fix.
+    /// The comparison of a fix with the best contradicting pose elsewhere.
     ///
-    /// It applies if the search returned no alternative. An alternative that passes every test with a score no lower
-    /// than the fix's makes the outcome ambiguous.
+    /// It applies if the search returned no alternative. The other pose consists of pairs that contradict the fix. If
+    /// it passes every test with a score no lower than the fix's, the outcome is ambiguous.
     pub(super) fn against_elsewhere(&self, fix: Box<Fix>) -> (Outcome, Option<Alternative>) {
         let sets = elsewhere(self.problem, &fix.object_from_camera);
         let others = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok());
@@ -209,7 +209,7 @@ impl Judge<'_> {
     pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
         let dof = 3 * hypothesis.pairs.len() - 6;
         let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(dof, self.acceptance.confidence));
-        // The negated form also rejects a NaN.
+        // A NaN is rejected as well.
         if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
     }
 
@@ -218,7 +218,7 @@ impl Judge<'_> {
         let covariance = self.covariance(hypothesis)?;
         let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
         let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
-        // The negated form also rejects a NaN.
+        // A NaN is rejected as well.
         if !(2.0 * rms <= limit) {
             return Err(Fallen::Refused(RejectionReason::Imprecise { rms, limit }));
         }
@@ -269,7 +269,7 @@ impl Judge<'_> {
         Err(Fallen::Refused(RejectionReason::Behind { point, angle: angle(worst), max }))
     }
 
-    /// The distance of the identified model points from their prior positions, relative to the allowed distance.
+    /// The distance of the identified model points from their prior positions, relative to its limit.
     ///
     /// The result is the largest step along a camera axis divided by the half-size of the box plus the allowed noise.
     fn off_box(
@@ -295,14 +295,14 @@ impl Judge<'_> {
         !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
     }
 
-    /// Whether the pose stays within the alert limit if any one of its points is a wrong match.
+    /// Whether the pose stays within the alert limit despite any single wrong match.
     ///
     /// It applies to sets that a search selected. If the visible points of a large model are few, close together or in
     /// a row, many wrong poses are possible; a clutter point near one of them makes a wrong pose look precise. Three
     /// points cannot be tested: each is needed.
     fn without_any_one(&self, hypothesis: &Hypothesis, hinge: Option<(usize, f64)>) -> Result<(), RejectionReason> {
         let Some((place, rms)) = hinge.filter(|_| self.searched) else { return Ok(()) };
-        // The negated form also rejects a NaN.
+        // A NaN is rejected as well.
         if 2.0 * rms <= self.alert_limit {
             return Ok(());
         }
@@ -310,7 +310,7 @@ impl Judge<'_> {
         Err(RejectionReason::Hinge { point, rms, limit: self.alert_limit })
     }
 
-    /// Whether the scale error is insignificant, or its effect on the pose is within the alert limit.
+    /// Whether the scale error is insignificant, or its effect within the alert limit.
     ///
     /// A rig with a relative scale error ε displaces the object by ε of its distance. The significance test uses the
     /// confidence of the other tests.
@@ -342,7 +342,7 @@ impl Judge<'_> {
         likely.for_each(|(_, other)| level.cover(&quiet, &fix.object_from_camera, other));
     }
 
-    /// Raises the protection levels to those at this probability of misidentification; levels raised before are kept.
+    /// Raises the protection levels to this probability of misidentification; levels raised before are kept.
     pub(super) fn protected(&self, fix: &mut Fix, misidentified: f64) {
         let data = self.observations(&fix.pairs);
         let pose = &fix.object_from_camera;
@@ -392,7 +392,7 @@ impl Judge<'_> {
     }
 }
 
-/// Fraction of the risk below which a pose near the fix (relative probability) need not be covered.
+/// Fraction of the risk: poses near the fix with a smaller relative probability need no coverage.
 const COVERED: f64 = 0.01;
 
 /// Number of standard deviations that are added to the scale error.

@@ -8,7 +8,7 @@ use super::{hypothesis::Hypothesis, judge::Judge};
 use crate::{Correspondence, search::fraction};
 
 impl Judge<'_> {
-    /// The probability of the proposed pairs if `other` is correct, divided by that if `own` is correct.
+    /// The likelihood ratio of the proposed pairs: `other` correct over `own` correct.
     ///
     /// `other` assigns the measured points of `own` to other model points. A proposer by appearance confuses similar
     /// model points with an unknown probability μ < ½. Let a points of `own` be proposed for it alone, and let b other

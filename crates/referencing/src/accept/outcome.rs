@@ -34,7 +34,7 @@ pub struct Fix {
 }
 
 impl Fix {
-    /// The standard deviation of the camera's position in the object frame (m), the root of the covariance's trace.
+    /// The standard deviation of the camera's position in the object frame (m), √tr Σ.
     pub fn position_sigma(&self) -> f64 {
         self.covariance.position_sigma()
     }
@@ -132,8 +132,7 @@ pub struct Attempt {
     pub outcome: Outcome,
     /// The set that the search returned, accepted or rejected; empty if it returned none.
     pub identified: Vec<Correspondence>,
-    /// The best pose that differs from the answer by more than the alert limit; it was rejected and serves for
-    /// comparison only.
+    /// The best pose beyond the alert limit from the answer; not accepted, for comparison only.
     pub runner_up: Option<Alternative>,
     /// Whether the search proved that no admissible set is larger; a likelihood search proves that none is more
     /// probable.
@@ -144,7 +143,7 @@ pub struct Attempt {
     pub nfa: Option<f64>,
     /// The number of pair tests of the search; `None` if it does not count them.
     pub pair_tests: Option<u64>,
-    /// Whether the search examined every possible second copy of the object, complete or partial, beside the answer.
+    /// Whether the search examined every possible second copy of the object, complete or partial.
     ///
     /// `None` if the search seeks no copies, or if no pose was probable enough to be accepted.
     pub copies_sought: Option<bool>,

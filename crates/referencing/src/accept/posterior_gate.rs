@@ -32,7 +32,7 @@ impl Judge<'_> {
         if let Err(refusal) = self.rare(found.pairs.len(), a_contrario.sets_as_good()) {
             return (Outcome::Rejected(refusal), runner_up);
         }
-        // The negated form also rejects a NaN.
+        // A NaN is rejected as well.
         if !(probabilities.elsewhere <= self.acceptance.doubt * (1.0 - probabilities.absent)) {
             let all = posterior.explanations.first().into_iter().chain(elsewhere);
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);

@@ -72,8 +72,9 @@ pub enum RejectionReason {
     Hinge {
         /// The identifier of the model point.
         point: String,
-        /// The error of the model points if this point is a wrong match (m, RMS, one sigma); infinite if the other
-        /// points determine no pose.
+        /// The error of the model points for this wrong match (m, RMS, one sigma).
+        ///
+        /// Infinite if the other points determine no pose.
         rms: f64,
         /// The alert limit (m).
         limit: f64,
@@ -106,8 +107,7 @@ pub enum RejectionReason {
         /// The largest angle at which a point is visible (rad).
         max: f64,
     },
-    /// The measured distances disagree with the model's in scale, and the resulting position error may exceed the alert
-    /// limit.
+    /// The scale error between measurement and model may displace the object beyond the alert limit.
     #[error(
         "scale error: measured distances are {:.1} % {} than the model's (one sigma {:.1} %), which may displace the \
          object by {off:.2} m, the alert limit is {limit:.2} m; check baseline, focal length and survey",

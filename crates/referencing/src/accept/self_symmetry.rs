@@ -18,7 +18,7 @@ const MAX_BASES: usize = 1_000_000;
 /// Maximum number of assignments of one set; more are not needed to call it ambiguous.
 const MAX_SYMMETRIC: usize = 64;
 impl Judge<'_> {
-    /// The outcome, ambiguous if the measured points of a fix may be other points of the model.
+    /// The outcome under the model's self-symmetry: ambiguous if other model points fit the measurements.
     ///
     /// If a motion maps the identified model points onto other model points, the poses before and after it explain the
     /// same measurements. Candidates, residuals, precision, prior and visible sides decide between them as between any
@@ -68,7 +68,7 @@ impl Judge<'_> {
         Outcome::Ambiguous(std::iter::once(own).chain(others).map(Hypothesis::alternative).collect())
     }
 
-    /// All sets of the same size that assign the same measured points to other model points.
+    /// All assignments of the same measured points to other model points.
     ///
     /// Alignment (Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990): a wide
     /// triangle of the measured points is placed on every coherent triangle of the model, and each other point must
@@ -125,8 +125,9 @@ impl Judge<'_> {
         (three[0] != three[1] && three[0] != three[2] && three[1] != three[2]).then_some(three)
     }
 
-    /// The set of all measured points of `pairs` that extends these three, if each other point lies at a model point of
-    /// its own.
+    /// The assignment of all measured points of `pairs` that extends these three.
+    ///
+    /// `None` unless each other point lies at a model point of its own.
     fn completed(
         &self,
         three: [Correspondence; 3],
@@ -148,7 +149,7 @@ impl Judge<'_> {
         Some(set)
     }
 
-    /// The admitted model point nearest to a measured point under the pose, and coherent with the three.
+    /// The nearest admitted model point under the pose that is coherent with the three.
     fn nearest(
         &self,
         pose: &Transform<Object, Camera>,

@@ -32,7 +32,9 @@ impl Transfer {
         self.moments.component_mul(&covariance.matrix).sum().sqrt()
     }
 
-    /// The RMS distance (m) between the model points under two poses, one of them near the pose of these moments.
+    /// The RMS distance (m) between the model points under two poses.
+    ///
+    /// One of the poses must be near that of these moments.
     pub(super) fn between(&self, one: &Transform<Object, Camera>, other: &Transform<Object, Camera>) -> f64 {
         let xi = one.error_to(other);
         xi.dot(&(self.moments * xi)).max(0.0).sqrt()

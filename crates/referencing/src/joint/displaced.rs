@@ -72,7 +72,7 @@ pub fn joint_fixes(
         observations_by_frame.iter().map(|g| g.count(object)).max().unwrap_or(0)
     };
     let limit = |fix: &JointFix| chi_square(fix.dof.max(1), confidence);
-    // The negated form also rejects a NaN.
+    // A NaN is rejected as well.
     while !(fix.chi2 <= limit(&fix)) {
         let seen = (0..members.len()).filter(|&o| members[o].placement != Placement::Displaced);
         let (held, weak): (Vec<usize>, Vec<usize>) = seen

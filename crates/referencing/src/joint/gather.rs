@@ -114,7 +114,7 @@ pub fn gather(
             let next = joint_fix(rig, &members, std::slice::from_ref(&more))?;
             let (size, chi2) = (pairs.len(), next.chi2 - fix.chi2);
             let limit = chi_square(4 * size, acceptance.confidence);
-            // The form also rejects a NaN.
+            // A NaN is rejected as well.
             if chi2 <= limit { Ok((more, next)) } else { Err(Unadded::Contradiction { size, chi2, limit }) }
         }) {
             Ok(better) => {
@@ -205,7 +205,7 @@ impl Gates {
         }
         let (size, budget) = (pairs.len(), acceptance.max_nfa);
         let expected = self.expected(size, cloud, free, acceptance.confidence);
-        // The form also rejects a NaN.
+        // A NaN is rejected as well.
         if expected <= budget { Ok(()) } else { Err(Unadded::AContrario { size, expected, budget }) }
     }
 

@@ -48,7 +48,9 @@ pub struct Member {
     pub placement: Placement,
 }
 
-/// The observed points of one instant, each with the index of its object and model coordinates in that object's frame.
+/// The observed points of one instant.
+///
+/// Each has the index of its object, and model coordinates in that object's frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ObjectObservations {
     /// The points.
@@ -105,7 +107,7 @@ impl JointFix {
     }
 }
 
-/// The maximum-likelihood poses of all instants and objects, from the pixels of `rig` and the surveys.
+/// The maximum-likelihood poses of all instants and objects, from pixels and surveys.
 ///
 /// It minimises Σ rᵀ S⁻¹ r + Σ ηᵀ Σ_survey⁻¹ η by the Levenberg–Marquardt method on the dense normal equations. Each
 /// instant starts from the unweighted fit of its points, with the objects at their stated poses; a far displaced object
@@ -113,7 +115,7 @@ impl JointFix {
 ///
 /// # Errors
 ///
-/// [`Degenerate`]: an instant with fewer than three points or with collinear points, points without pixels, a point
+/// [`Degenerate`], for an instant with fewer than three points or with collinear points, points without pixels, a point
 /// behind the camera, or an undetermined motion (a displaced object that no other object relates to the site).
 ///
 /// # Panics

@@ -88,8 +88,9 @@ impl<'a> System<'a> {
         (pixels + 6 * self.surveys.iter().flatten().count()).saturating_sub(6 * self.blocks)
     }
 
-    /// `live` takes weights at the fitted points; otherwise they are those at the measured points, so that costs are
-    /// comparable.
+    /// The normal equations at a state; `live` evaluates the weights at the fitted points.
+    ///
+    /// Otherwise the weights are those at the measured points, so that costs are comparable.
     fn linearize(&self, state: &JointState, live: bool) -> Result<Linearized, Degenerate> {
         let size = 6 * self.blocks;
         let mut all = Linearized { normal: Mat::zeros(size, size), gradient: Mat::zeros(size, 1), cost: 0.0 };
@@ -231,8 +232,9 @@ impl Linearized {
         if decrement.is_finite() { Ok((step, decrement)) } else { Err(self.singular()) }
     }
 
-    /// The error for normal equations without a Cholesky factor, with the smallest eigenvalue after scaling the
-    /// diagonal to ones.
+    /// The error for normal equations without a Cholesky factor.
+    ///
+    /// It states the smallest eigenvalue after scaling the diagonal to ones.
     fn singular(&self) -> Degenerate {
         let rows = self.normal.nrows();
         let root = |i: usize| if self.normal[(i, i)] > 0.0 { 1.0 / self.normal[(i, i)].sqrt() } else { 0.0 };

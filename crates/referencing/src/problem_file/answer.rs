@@ -50,11 +50,12 @@ pub struct Support {
     pub chi2_limit: f64,
     /// The largest shift of the position (m) when one point is excluded.
     pub solution_separation: Option<f64>,
-    /// The largest shift of the position (m) when two points are excluded, if two wrong matches are assumed possible.
+    /// The largest shift of the position (m) when two points are excluded.
+    ///
+    /// Absent if two wrong matches are assumed impossible.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub solution_separation_two: Option<f64>,
-    /// The probability that the pose is wrong by more than the alert limit, or the object absent; null for a counting
-    /// search.
+    /// The probability of a wrong pose or of an absent object; null for a counting search.
     pub misidentified: Option<f64>,
     /// The risk: the probability with which an error may exceed its protection level.
     pub risk: f64,
@@ -123,10 +124,12 @@ pub struct Answer {
     pub covariance: Option<[[f64; 6]; 6]>,
     /// The identified pairs (model, cloud) of a fix.
     pub pairs: Option<Vec<[usize; 2]>>,
-    /// The scale of the model relative to the cloud, for a fix whose solver estimates a similarity.
+    /// The scale of the model relative to the cloud.
+    ///
+    /// Present for a fix whose solver estimates a similarity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// The identified cloud points behind the camera (z ≤ 0) of a fix, if there are any.
+    /// The identified cloud points behind the camera (z ≤ 0), if a fix has any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub behind: Vec<usize>,
     /// The rejected pairs (model, cloud), if there is no fix; after an exhausted budget, the best so far.

@@ -182,9 +182,9 @@ impl CoherenceProblem {
         self.attempt_from(self.prior.as_ref(), (search, solver, acceptance), rng)
     }
 
-    /// One attempt at a fix, repeated with larger gates and then without a prior if the object is not found.
+    /// One attempt at a fix with expanding gates, for an object that may be displaced.
     ///
-    /// It finds a displaced object.
+    /// If the object is not found, the attempt is repeated with larger gates and then without a prior.
     pub fn attempt_with_expanding_gates(
         &self,
         search: &dyn Search,

@@ -272,7 +272,7 @@ fn value_at<'t>(text: &'t str, path: &[&str]) -> Option<&'t str> {
     value_at(value.get(), rest)
 }
 
-/// A visitor that keeps the first value of a key, or the list element of an index, and skips the others.
+/// A visitor for one step of a path: the first value of a key, or a list element.
 struct Step<'p>(&'p str);
 
 impl<'de> Visitor<'de> for Step<'_> {

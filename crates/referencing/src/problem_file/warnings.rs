@@ -21,7 +21,7 @@ const FAR_ABOVE: f64 = 10.0;
 const OUT_OF_VIEW: f64 = 1e6;
 /// The maximum number of model points for the symmetry test; larger models have too many triangles.
 const MAX_CHECKED: usize = 100;
-/// The distance of mapped points, in standard deviations, up to which a motion is indistinguishable from the identity.
+/// Distance of mapped points, in standard deviations, up to which a motion equals the identity.
 const DISTINGUISHED: f64 = 3.0;
 
 /// The warnings about a file.

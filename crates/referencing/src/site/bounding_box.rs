@@ -2,7 +2,9 @@
 
 use seafix_geometry::{Frame, Point};
 
-/// The smallest box along the axes of `F` that contains a set of points (the paper's min–max shell).
+/// The smallest box along the axes of `F` that contains a set of points.
+///
+/// It is the paper's min–max shell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundingBox<F> {
     /// The corner with the smallest coordinates (m).
@@ -31,7 +33,9 @@ impl<F: Frame> BoundingBox<F> {
         self.grown_contains(point, 0.0)
     }
 
-    /// Whether the point lies inside the box enlarged by `margin` (m) on every side, or on its face.
+    /// Whether the point lies in the box enlarged by `margin` (m) on every side.
+    ///
+    /// Its faces belong to the box.
     pub fn grown_contains(&self, point: &Point<F>, margin: f64) -> bool {
         (0..3).all(|axis| {
             point.coords[axis] >= self.min.coords[axis] - margin && point.coords[axis] <= self.max.coords[axis] + margin

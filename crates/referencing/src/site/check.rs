@@ -20,8 +20,9 @@ const COLLINEAR: f64 = 1e-3;
 const NEARLY_COLLINEAR: f64 = 0.1;
 /// The tolerance (m) of base coordinates in the Fig. 2 rule.
 const RULE: f64 = 1e-6;
-/// The range of plausible diameters (m), outside of which millimetres or kilometres are suspected, and the range of
-/// possible ones.
+/// The range of plausible diameters (m), and the range of possible ones.
+///
+/// Millimetres or kilometres are suspected outside of the first.
 pub(crate) const SUSPICIOUS: [f64; 2] = [0.01, 1e3];
 const IMPOSSIBLE: [f64; 2] = [1e-4, 1e5];
 /// The allowed difference of surveyed and model distances, in standard deviations.

@@ -9,7 +9,7 @@ use crate::{Kabsch, Observation, Observations, Solver};
 /// The minimum fraction and the minimum number of points that a motion must map.
 const MIN_FRACTION: f64 = 0.6;
 const MIN_POINTS: usize = 4;
-/// The distance of poses (m, RMS over the points), and its fraction of the diameter, up to which they are one answer.
+/// The distance (m, RMS over the points), also as a fraction of the diameter, below which poses are one answer.
 ///
 /// Half of it is the tolerance of a mapped point.
 const ALERT_LIMIT: f64 = 0.10;
@@ -23,7 +23,7 @@ const MIN_RATIO: f64 = 0.2;
 const MAX_WORK: usize = 300_000_000;
 /// The maximum number of listed motions.
 const MAX_MOTIONS: usize = 200;
-/// The number of points on which a motion of a larger model is tested first, and the number of them that it must map.
+/// The number of points in the first test of a motion of a larger model, and the minimum number mapped.
 const TRIED: usize = 16;
 const TRIED_MAPPED: usize = 5;
 

@@ -22,7 +22,7 @@ pub(crate) use congruence::congruences;
 pub use target::{NoWorld, Target, TargetKind};
 pub(crate) use target::{diameter, nearest_two};
 
-/// The cosine of the angle between normal and line of sight below which a point is invisible.
+/// The cosine of the largest angle between normal and line of sight of a visible point.
 const BACK: f64 = -0.1;
 
 /// A model point: a feature point of an object.
@@ -54,13 +54,14 @@ impl ModelPoint {
         })
     }
 
-    /// The angle (rad, 0 to π) between normal and line of sight to a camera at this position (object frame); `None` for
-    /// a point visible from every side.
+    /// The angle (rad, 0 to π) between normal and line of sight to a camera position.
+    ///
+    /// The position is in the object frame. `None` for a point visible from every side.
     pub fn incidence_angle(&self, camera: &Vector3<f64>) -> Option<f64> {
         self.normal.map(|normal| normal.angle(&(camera - self.at.coords)))
     }
 
-    /// The largest angle (rad) between normal and line of sight at which a point is visible.
+    /// The largest angle (rad) between normal and line of sight of a visible point.
     pub fn max_incidence_angle() -> f64 {
         libm::acos(BACK)
     }

@@ -80,10 +80,10 @@ impl Target {
         Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) })
     }
 
-    /// The index in this target of a point of the site, given as (object, point) indices; `None` if the target excludes
-    /// it.
+    /// The index in this target of a point of the site; `None` if the target excludes it.
     ///
-    /// `index` is the target's own index among the targets of its kind.
+    /// The point is given by its (object, point) indices; `index` is the target's own index among the targets of its
+    /// kind.
     pub fn place_of(&self, index: usize, (object, point): (usize, usize)) -> Option<usize> {
         let place = match self.firsts.is_empty() {
             true => (object == index).then_some(point),
@@ -92,7 +92,7 @@ impl Target {
         place.filter(|&place| place < self.points.len())
     }
 
-    /// The target as a member of a joint fix, with the world as the site's frame.
+    /// The target as a member of a joint fix; the world is the site's frame.
     ///
     /// A target without a survey has an unknown pose, which only the images determine.
     pub fn member(&self) -> Member {

@@ -27,9 +27,10 @@ fn scatter(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> Matri
     scatter
 }
 
-/// A sufficient test, without eigenvalues, that the second extent is at least `min` of the first.
+/// A sufficient test of the ratio of second to first extent, without eigenvalues.
 ///
-/// With the eigenvalues l₁ ≥ l₂ ≥ l₃ of the scatter, l₂/l₁ ≥ (l₁l₂ + l₁l₃ + l₂l₃) / 2(l₁ + l₂ + l₃)².
+/// With the eigenvalues l₁ ≥ l₂ ≥ l₃ of the scatter, l₂/l₁ ≥ (l₁l₂ + l₁l₃ + l₂l₃) / 2(l₁ + l₂ + l₃)²; the ratio is at
+/// least `min` if that bound is.
 fn clearly_wide(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone, min: f64) -> bool {
     let s = scatter(points);
     let minor = |i: usize, j: usize| s[(i, i)] * s[(j, j)] - s[(i, j)] * s[(i, j)];
@@ -60,7 +61,7 @@ pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degen
     noise.map_or(Ok(()), |index| Err(Degenerate::Noise { index }))
 }
 
-/// Rejects as [`finite`] does and, with a rig, points behind it or too far away for it.
+/// Rejects as [`finite`] does and, with a rig, points behind the camera or too far away.
 pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
     // One pass accepts valid points, which are the rule: a number that is not finite leaves no finite sum.
     let (mut sum, mut front) = (0.0, true);
@@ -82,7 +83,7 @@ pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degener
     Ok(())
 }
 
-/// Rejects as [`seen`] does, and points (measured or model) whose second extent is below `min` of the first.
+/// Rejects as [`seen`] does, and collinear points, measured or model: second extent below `min` of the first.
 pub(super) fn check(data: &Observations<'_>, needed: usize, min: f64) -> Result<(), Degenerate> {
     seen(data, needed)?;
     let model = data.points.iter().map(|point| point.model.coords);
@@ -91,7 +92,7 @@ pub(super) fn check(data: &Observations<'_>, needed: usize, min: f64) -> Result<
         return Ok(());
     }
     let ratio = second_ratio(model).min(second_ratio(measured));
-    // The form also rejects a NaN.
+    // A NaN is rejected as well.
     if ratio >= min { Ok(()) } else { Err(Degenerate::Collinear { ratio, min }) }
 }
 

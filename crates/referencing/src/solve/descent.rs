@@ -151,11 +151,11 @@ pub(super) const NEAR: f64 = 1e-4;
 /// valley, in which Gauss–Newton steps are far too short or too long.
 const MAX_STEPS: u64 = 500;
 
-/// The minimum of the cost near `start` by the Levenberg–Marquardt method, until a step is shorter than √`near`
-/// standard deviations.
+/// The minimum of the cost near `start`, by the Levenberg–Marquardt method.
 ///
-/// Returns the pose and its normal equations. The weights of `term` must not depend on the pose, as every step must
-/// lower the cost (Marquardt, *An algorithm for least-squares estimation of nonlinear parameters*, 1963).
+/// It ends at a step shorter than √`near` standard deviations, and returns the pose and its normal equations. The
+/// weights of `term` must not depend on the pose, as every step must lower the cost (Marquardt, *An algorithm for
+/// least-squares estimation of nonlinear parameters*, 1963).
 ///
 /// # Errors
 ///

@@ -14,13 +14,13 @@ use super::{
 };
 use crate::Observations;
 
-/// Least squares min Σ ‖P_k − C_k H‖² by a linearised rotation, for small motions after an initial alignment.
+/// Least squares by a linearised rotation: min Σ ‖P_k − C_k H‖².
 ///
-/// The auxiliary frames of three widely spread points give the initial alignment. R ≈ I + \[φ\]× makes the sum a
-/// quadratic form of (φ, ρ), one 6×6 system gives its minimum, and the exponential restores a rotation; this repeats
-/// until the steps vanish. If the points fit no motion (a mirror image), steps shrink slowly and the iteration may end
-/// short of the minimum, so the solver does not claim least squares. It is the project's own reading of the phrase
-/// "fast computation of the local matrix", whose source was not available.
+/// The method serves motions that are small after an initial alignment by the auxiliary frames of three widely spread
+/// points. R ≈ I + \[φ\]× makes the sum a quadratic form of (φ, ρ), one 6×6 system gives its minimum, and the
+/// exponential restores a rotation; this repeats until the steps vanish. If the points fit no motion (a mirror image),
+/// steps shrink slowly and the iteration may end short of the minimum, so the solver does not claim least squares. It
+/// is the project's own reading of the phrase "fast computation of the local matrix", whose source was not available.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct FastLocalMatrix {

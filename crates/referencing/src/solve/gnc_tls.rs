@@ -49,7 +49,7 @@ impl Component for GncTls {
                                   perception, 2020";
 
     fn check(&self) -> Result<(), String> {
-        // The form also rejects a NaN.
+        // A NaN is rejected as well.
         let positive = self.threshold > 0.0 && self.threshold.is_finite();
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
         let grows = self.growth > 1.0 && self.growth <= 10.0;

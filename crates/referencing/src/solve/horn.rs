@@ -12,7 +12,7 @@ use super::{
 };
 use crate::Observations;
 
-/// Horn's solution of min Σ ‖P_k − C_k H‖² by unit quaternions.
+/// Horn's least squares min Σ ‖P_k − C_k H‖² by unit quaternions.
 ///
 /// The quaternion is the eigenvector to the largest eigenvalue of the symmetric 4×4 matrix N of the sums S_ij = Σ c_i
 /// p_j; it maximises qᵀ N q = tr(Rᵀ M).

@@ -56,7 +56,7 @@ impl Component for Irls {
     const SOURCE: &'static str = "Holland, Welsch, Robust regression using iteratively reweighted least-squares, 1977";
 
     fn check(&self) -> Result<(), String> {
-        // The form also rejects a NaN.
+        // A NaN is rejected as well.
         let positive = self.threshold > 0.0 && self.threshold.is_finite();
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
         fraction("min-ratio", self.min_ratio)

@@ -12,10 +12,10 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// Kabsch's solution of min Σ ‖P_k − C_k H‖² over SE(3): the paper's "standard method", with equal weights.
+/// Kabsch's least squares over rigid motions: min Σ ‖P_k − C_k H‖², with equal weights.
 ///
-/// With a_k = P_k − P̄, b_k = C_k − C̄ and M = Σ a_k b_kᵀ = U S Vᵀ, the rotation is R = U diag(1, 1, det(U Vᵀ)) Vᵀ and
-/// the translation P̄ − R C̄. The determinant excludes reflections.
+/// It is the paper's "standard method". With a_k = P_k − P̄, b_k = C_k − C̄ and M = Σ a_k b_kᵀ = U S Vᵀ, the rotation
+/// is R = U diag(1, 1, det(U Vᵀ)) Vᵀ and the translation P̄ − R C̄. The determinant excludes reflections.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Kabsch {
@@ -64,7 +64,7 @@ pub(crate) fn fit(points: &[Observation]) -> Transform<Object, Camera> {
     fit_weighted(points, |_| 1.0)
 }
 
-/// The motion that minimises Σ w_k ‖P_k − C_k H‖², with w_k = `weight(k)`, not all zero.
+/// The motion that minimises Σ w_k ‖P_k − C_k H‖², w_k = `weight(k)`; some weight must be positive.
 pub(super) fn fit_weighted(points: &[Observation], weight: impl Fn(usize) -> f64) -> Transform<Object, Camera> {
     let (mut model, mut measured, mut all) = (Vector3::zeros(), Vector3::zeros(), 0.0);
     for (k, point) in points.iter().enumerate() {

@@ -12,11 +12,11 @@ use super::{
 };
 use crate::Observations;
 
-/// The pose that minimises Σ rᵀ S⁻¹ r over the pixels of both images, by limited-memory BFGS on six numbers.
+/// Limited-memory BFGS: min Σ rᵀ S⁻¹ r over the pixels of both images.
 ///
-/// The cost is that of `stereo-reprojection`; the method uses the line search of Moré and Thuente and a numerical
-/// gradient. It is an independent check of the project's own minimiser and does not compete in speed. It ends at the
-/// limit of precision of the cost.
+/// The cost is that of `stereo-reprojection`, as a function of six numbers; the method uses the line search of Moré and
+/// Thuente and a numerical gradient. It is an independent check of the project's own minimiser and does not compete in
+/// speed. It ends at the limit of precision of the cost.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct LBfgs {

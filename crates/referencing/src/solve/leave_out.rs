@@ -10,7 +10,7 @@ use super::{
 };
 use crate::Observations;
 
-/// The contribution of each point to the normal equations, so that an exclusion costs one 6×6 solve.
+/// The contribution of each point to the normal equations; an exclusion costs one 6×6 solve.
 pub(crate) struct Deletions<'a> {
     data: &'a Observations<'a>,
     pose: Transform<Object, Camera>,

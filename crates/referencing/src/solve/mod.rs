@@ -156,11 +156,12 @@ pub enum Degenerate {
     },
 }
 
-/// Largest distance from its minimum (standard deviations of the pose) at which an iteration may end; in addition to
-/// the noise it increases the error by 1 in 20 000.
+/// Largest distance (standard deviations of the pose) from the minimum at the end of an iteration.
+///
+/// It adds at most 1 in 20 000 to the error.
 const CONVERGED: f64 = 0.01;
 
-/// Rejects a pose farther from its minimum than [`CONVERGED`], or at a distance that is NaN.
+/// Rejects a pose farther from its minimum than [`CONVERGED`]; a NaN is rejected as well.
 pub(crate) fn converged(steps: u64, off: f64) -> Result<(), Degenerate> {
     if off <= CONVERGED { Ok(()) } else { Err(Degenerate::Unconverged { steps, off, max: CONVERGED }) }
 }
@@ -250,7 +251,7 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// [`Degenerate`]: the geometry determines no pose; the failed test is stated with its number.
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>;
 
-    /// The scale s of the model relative to the measured points, minimising Σ ‖P_k − s C_k H‖².
+    /// The scale s of the model relative to the measured points: min Σ ‖P_k − s C_k H‖².
     ///
     /// It is a diagnostic; a fix is rigid and does not use it. `None` for solvers that do not estimate it, and for
     /// geometry that `solve` rejects.
@@ -266,9 +267,10 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         (0..data.points.len()).collect()
     }
 
-    /// Other local minima whose χ² exceeds that of the answer `at` by at most `max`, outside its covariance.
+    /// Other local minima with a χ² of at most `max` above that of the answer `at`.
     ///
-    /// They occur if few points span a small part of the view. A solver with a single minimum returns none.
+    /// Minima within the covariance of the answer are excluded. Others occur with few points whose extent is small
+    /// relative to their distance. A solver with a single minimum returns none.
     ///
     /// With `max` the quantile of χ²₁ at a confidence, the probability of answering with the wrong one of two minima
     /// alone is at most half of one minus the confidence, for every distance d of the minima: the difference of their

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::Observations;
 
-/// The pose that minimises Σ rᵀ S⁻¹ r over the pixels of both images, by a simplex of seven poses.
+/// Nelder–Mead simplex of seven poses: min Σ rᵀ S⁻¹ r over the pixels of both images.
 ///
 /// The cost is that of `stereo-reprojection`. The simplex is restarted about its own answer until the answer no longer
 /// moves: an independent check that no wrong derivative can mislead. Each simplex is scaled by the standard deviations

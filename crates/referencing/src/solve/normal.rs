@@ -103,7 +103,9 @@ pub(crate) fn inverse(information: &Matrix6<f64>) -> Result<Matrix6<f64>, Degene
     information.cholesky().map(|root| root.inverse()).ok_or_else(|| singular(information))
 }
 
-/// The error for a matrix without a Cholesky factor, with the smallest eigenvalue after scaling the diagonal to ones.
+/// The error for a matrix without a Cholesky factor.
+///
+/// It states the smallest eigenvalue after scaling the diagonal to ones.
 pub(super) fn singular(information: &Matrix6<f64>) -> Degenerate {
     let root = information.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
     let scaled = information.component_mul(&(root * root.transpose()));
@@ -112,8 +114,9 @@ pub(super) fn singular(information: &Matrix6<f64>) -> Degenerate {
     Degenerate::Singular { fraction, min: rounding(6) }
 }
 
-/// The smallest eigenvalue at which a matrix of this size with a unit diagonal certainly has a Cholesky factor (Demmel,
-/// *On floating point errors in Cholesky*, 1989).
+/// The smallest eigenvalue of a unit-diagonal matrix that guarantees a Cholesky factor.
+///
+/// (Demmel, *On floating point errors in Cholesky*, 1989.)
 pub(crate) fn rounding(rows: usize) -> f64 {
     (rows * (rows + 1)) as f64 * f64::EPSILON
 }

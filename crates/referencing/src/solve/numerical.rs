@@ -26,11 +26,11 @@ fn min<const N: usize>(covariance: &SMatrix<f64, N, N>) -> f64 {
     (0..N).map(|i| covariance[(i, i)]).fold(f64::INFINITY, f64::min).max(0.0).sqrt()
 }
 
-/// Σ = Σ_i J_i Σ_i J_iᵀ over every measured point (its covariance) and every model point (σ² I).
+/// The covariance Σ = Σ_i J_i Σ_i J_iᵀ over every measured point and every model point.
 ///
-/// J_i = ∂ξ/∂point_i, with ξ the change of the answer, `solve(moved) = at · Exp(ξ)`. With pixels and a rig, the four
-/// pixel coordinates are the measurement: they are moved one by one, and the triangulated point with them, so that
-/// solvers of pixels and of points are differentiated alike.
+/// A model point has the covariance σ² I. J_i = ∂ξ/∂point_i, with ξ the change of the answer, `solve(moved) = at ·
+/// Exp(ξ)`. With pixels and a rig, the four pixel coordinates are the measurement: they are moved one by one, and the
+/// triangulated point with them, so that solvers of pixels and of points are differentiated alike.
 pub(super) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,

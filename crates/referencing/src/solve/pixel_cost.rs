@@ -82,11 +82,11 @@ impl Best {
     }
 }
 
-/// Σ rᵀ S⁻¹ r at `start · Exp(L x)`, with r the pixel residuals and S = Σ_px + σ_model² J Jᵀ, J at the measured point.
+/// The cost Σ rᵀ S⁻¹ r at `start · Exp(L x)` over the pixel residuals r.
 ///
-/// L Lᵀ is the covariance at the start from small steps of its own, so that x is in standard deviations and the cost is
-/// equally steep in all directions. The function shares nothing with the solvers that it verifies: projections are the
-/// rig's, and the gradient is by central differences.
+/// S = Σ_px + σ_model² J Jᵀ, with J at the measured point. L Lᵀ is the covariance at the start from small steps of its
+/// own, so that x is in standard deviations and the cost is equally steep in all directions. The function shares
+/// nothing with the solvers that it verifies: projections are the rig's, and the gradient is by central differences.
 pub(super) struct PixelCost<'a> {
     rig: &'a StereoRig,
     points: &'a [Observation],

@@ -78,10 +78,10 @@ impl<'a> PixelTerms<'a> {
         Ok(PixelTerm::Seen { at, weight, frozen, model_variance })
     }
 
-    /// The term of the k-th point, S = Σ_px + σ_model² J Jᵀ with J at the position where the pose puts it.
+    /// The term of the k-th point, with weights at the position where the pose puts it.
     ///
-    /// With A = Jᵀ Σ_px⁻¹ J and g = Jᵀ Σ_px⁻¹ r, marginalisation of the model's error gives (I + σ² A)⁻¹ A and (I + σ²
-    /// A)⁻¹ g (Woodbury).
+    /// S = Σ_px + σ_model² J Jᵀ, with J at that position. With A = Jᵀ Σ_px⁻¹ J and g = Jᵀ Σ_px⁻¹ r, marginalisation of
+    /// the model's error gives (I + σ² A)⁻¹ A and (I + σ² A)⁻¹ g (Woodbury).
     #[inline]
     pub(crate) fn live(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
         match &self.all[k] {
@@ -99,9 +99,9 @@ impl<'a> PixelTerms<'a> {
         }
     }
 
-    /// The term of the k-th point with J of the model's error at the measured point.
+    /// The term of the k-th point, with weights at the measured point.
     ///
-    /// Its weights do not depend on the pose, so that costs are comparable.
+    /// The weights do not depend on the pose, so that costs are comparable.
     #[inline]
     pub(crate) fn frozen(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
         match &self.all[k] {

@@ -6,8 +6,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use super::descent::{Linearized, Term, linearize};
 use crate::Observation;
 
-/// Standard deviation of the attitude (rad, three axes together) up to which the likelihood is linear and first order
-/// holds.
+/// Standard deviation of the attitude (rad, three axes together) up to which first order holds.
 const STRAIGHT: f64 = 0.02;
 /// Standard deviation about one axis (rad) up to which a rotation is linear by itself.
 const STIFF: f64 = 0.006;

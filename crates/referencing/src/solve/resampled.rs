@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// The mean of ξξᵀ over answers `at · Exp(ξ)` to the same points with other noise (parametric bootstrap).
+/// The parametric bootstrap covariance: the mean of ξξᵀ over answers `at · Exp(ξ)` to resampled noise.
 ///
 /// It follows Efron and Tibshirani, *An introduction to the bootstrap*, 1993. It includes bias, and the effect of
 /// losses with corners on noise of their size, which no derivative at one draw describes. The draws are rows of
@@ -84,10 +84,10 @@ impl Answer {
     }
 }
 
-/// The mean of ξᵀ Σ⁻¹ ξ / 6 over all answers, with Σ from all draws except ξ and its negative.
+/// The leave-one-out mean of ξᵀ Σ⁻¹ ξ / 6 over all answers.
 ///
-/// `sum` is Σ ξξᵀ of all. With U the two answers of a pair and S their sum without them, Uᵀ S⁻¹ U follows from G, the
-/// same form for all: G (1 − G)⁻¹.
+/// Σ is the covariance of all draws except ξ and its negative, and `sum` is Σ ξξᵀ of all. With U the two answers of a
+/// pair and S their sum without them, Uᵀ S⁻¹ U follows from G, the same form for all: G (1 − G)⁻¹.
 fn left_out(answers: &[[Option<Vector6<f64>>; 2]], sum: &Matrix6<f64>) -> Option<f64> {
     let of_all = sum.cholesky()?;
     let count = answers.iter().flatten().flatten().count() as f64;
@@ -101,7 +101,7 @@ fn left_out(answers: &[[Option<Vector6<f64>>; 2]], sum: &Matrix6<f64>) -> Option
     Some(squares / (6.0 * count))
 }
 
-/// Residual (standard deviations of its point) that noise exceeds once in a million even if it is all along one axis.
+/// Residual (standard deviations of its point) with a probability of 1e-6 for noise along one axis.
 ///
 /// A pose that weights all axes alike leaves residuals across the others that a χ² test would reject.
 const UNLIKELY: f64 = 8.5;

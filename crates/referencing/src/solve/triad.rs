@@ -12,7 +12,9 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// The rule that selects the triad's three points ("the three most reliable", undefined in the paper).
+/// The rule that selects the three points of the triad.
+///
+/// The paper takes "the three most reliable" and does not define them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Choose {
@@ -211,7 +213,7 @@ fn axes(p1: &Vector3<f64>, p2: &Vector3<f64>, p3: &Vector3<f64>) -> Result<Matri
     let (a, b) = (p2 - p1, p3 - p1);
     let normal = a.cross(&b);
     let (length, size, sides) = (b.norm_squared(), normal.norm_squared(), a.norm_squared() * b.norm_squared());
-    // The negated form also rejects a NaN (coincident points).
+    // A NaN (coincident points) is rejected as well.
     if !(size >= MIN_SINE * MIN_SINE * sides && size > 0.0) {
         let ratio = (size / sides).sqrt();
         return Err(Degenerate::Collinear { ratio: if ratio.is_nan() { 0.0 } else { ratio }, min: MIN_SINE });
@@ -235,7 +237,7 @@ fn of_three(data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degene
     pose(&[&data.points[0], &data.points[1], &data.points[2]])
 }
 
-/// The squared sine of the smallest angle, in the model or in the measurement, whichever is smaller.
+/// The squared sine of the smallest angle, the smaller of model and measurement.
 fn min_sine_squared(points: &[&Observation; 3]) -> f64 {
     let of = |p: [Vector3<f64>; 3]| {
         let sides = [(p[1] - p[0]), (p[2] - p[1]), (p[0] - p[2])];
@@ -252,7 +254,7 @@ fn square_area(points: &[&Observation; 3]) -> f64 {
     (points[1].model - points[0].model).cross(&(points[2].model - points[0].model)).norm_squared()
 }
 
-/// The sum over all identified points of their variance (m²) under the pose from these three.
+/// The summed variance (m²) of all identified points under the pose from these three.
 fn predicted_error(points: &[Observation; 3], data: &Observations<'_>) -> Result<f64, Degenerate> {
     let at = pose(&points.each_ref())?;
     let covariance = covariance_of(points, data, &at)?;

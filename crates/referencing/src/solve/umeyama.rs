@@ -12,11 +12,11 @@ use super::{
 };
 use crate::Observations;
 
-/// Umeyama's solution of min Σ ‖P_k − C_k H‖², with the scale of the best similarity as a diagnostic.
+/// Umeyama's least squares min Σ ‖P_k − C_k H‖², with the scale as a diagnostic.
 ///
-/// M = U S Vᵀ, R = U diag(1, 1, det U det V) Vᵀ, and the scale is s = tr(S diag(…)) / Σ‖c_k‖². A fix is rigid, so the
-/// scale is not applied. It differs from one by noise, a wrong focal length, a wrong baseline or a model in other
-/// units; a deviation beyond `max_scale_error` is rejected.
+/// M = U S Vᵀ, R = U diag(1, 1, det U det V) Vᵀ, and the scale of the best similarity is s = tr(S diag(…)) / Σ‖c_k‖². A
+/// fix is rigid, so the scale is not applied. It differs from one by noise, a wrong focal length, a wrong baseline or a
+/// model in other units; a deviation beyond `max_scale_error` is rejected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Umeyama {

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// Kabsch's solution with weights: min Σ w_k ‖P_k − C_k H‖², w_k = 3 / tr(Σ_k + σ_model² I).
+/// Kabsch's least squares with weights: min Σ w_k ‖P_k − C_k H‖², w_k = 3 / tr(Σ_k + σ_model² I).
 ///
 /// Near points have more weight than far ones. A scalar weight cannot express that a far point is precise across the
 /// line of sight; `mahalanobis` uses the full covariance.
