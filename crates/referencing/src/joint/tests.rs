@@ -154,7 +154,7 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
     for _ in 0..draws {
         let truly = said.map(|place| place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 5e-4)));
         let seen = [0, 1].map(|k| object_observations(&rig, &truly, k, 1.0, &mut rng));
-        let fixes = joint_fixes(&rig, &members, &seen, 0.9999).expect("a likely draw");
+        let fixes = joint_fixes(&rig, &members, &seen, 0.9999).expect("a consistent draw");
         assert_eq!(fixes.displaced, Vec::<usize>::new());
         for object in 0..3 {
             let truth = truly[object].inverse() * instant(1);

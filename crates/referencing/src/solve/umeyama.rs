@@ -83,7 +83,7 @@ fn similarity(data: &Observations<'_>) -> (Transform<Object, Camera>, f64) {
         size += c.norm_squared();
     }
     let svd = m.svd(true, true);
-    let (u, v_t) = (svd.u.expect("u was asked for"), svd.v_t.expect("v_t was asked for"));
+    let (u, v_t) = (svd.u.expect("u is requested"), svd.v_t.expect("v_t is requested"));
     let sign = if u.determinant() * v_t.determinant() < 0.0 { -1.0 } else { 1.0 };
     let guard = Vector3::new(1.0, 1.0, sign);
     let rotation = polish(u * Matrix3::from_diagonal(&guard) * v_t, &m);
