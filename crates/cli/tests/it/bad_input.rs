@@ -514,7 +514,7 @@ fn a_fault_is_reported_where_it_stands() {
             &[("do not reach its end, 2; give 1.9 or 2.2", "5:28"), ("too few or too many", "8:37")],
         ),
         (
-            "source = 'virtual-points'\n[pipeline.acceptance]\nleast-points = 1\nconfidence = 2.0\n[pipeline.gate]\nbox = -1.0\n\
+            "source = 'virtual-points'\n[pipeline.acceptance]\nmin-points = 1\nconfidence = 2.0\n[pipeline.gate]\nbox = -1.0\n\
              [[navigation.faults]]\nkind = 'off'\nfrom = 3.0\nto = 1.0\n[navigation.pose-graph.settings]\noverlap = 3.0\n\
              recognition = { solver = 'kabch', draws = 0 }\n",
             &[

@@ -36,7 +36,7 @@ fn a_stretched_walk_has_the_drift_of_its_scale_error() {
     let (code, out, _) = eval(folder.path(), &["truth.tum", "odometry.tum", "--json"]);
     let value: Value = serde_json::from_str(&out).unwrap();
     let number = |pointer: &str| value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer}"));
-    assert_eq!((code, number("/ape/pairs"), number("/rpe/pairs"), number("/matched/share")), (0, 50.0, 49.0, 1.0));
+    assert_eq!((code, number("/ape/pairs"), number("/rpe/pairs"), number("/matched/fraction")), (0, 50.0, 49.0, 1.0));
     let chord = (2.0 * 3.0 * 0.1_f64.sin()).hypot(0.3);
     assert!((number("/rpe/mean") - 0.01 * chord).abs() < 1e-12);
     assert!((number("/end_m") / number("/path_m")) < 0.01);

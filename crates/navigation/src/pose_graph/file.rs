@@ -559,7 +559,7 @@ mod tests {
         assert!(without(5).contains("lines are missing in n.jsonl"), "{}", without(5));
         assert!(without(3).contains("does not stand before it in n.jsonl:4: 1 of 1"), "{}", without(3));
         let with = |from: &str, to: &str| said(&text.replacen(from, to, 1));
-        assert!(with("network/1", "network/9").contains("another format in n.jsonl:1"));
+        assert!(with("pose-graph/2", "pose-graph/9").contains("another format in n.jsonl:1"));
         assert!(with("\"sigma\":0.1", "\"sigma\":-0.1").contains("no standard deviation in n.jsonl:3: -0.1"));
         assert!(with("\"count\":2", "\"count\":3").contains("does not hold what it says in n.jsonl:3"));
         assert!(with("\"stamp_ns\"", "\"stamp\"").contains("unknown field"));

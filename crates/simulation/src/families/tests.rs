@@ -132,7 +132,10 @@ fn an_absent_object_leaves_model_prior_and_size_as_they_are() {
 }
 
 #[test]
-fn families_are_known_by_their_letters() {
+fn families_are_known_by_their_names() {
     assert!(Family::ALL.into_iter().all(|family| family.name().parse() == Ok(family)));
-    assert_eq!("h".parse::<Family>().unwrap_err(), "no family is called `h`; there are a, b, c, d, e, f and g");
+    assert_eq!(
+        "h".parse::<Family>().unwrap_err(),
+        "no family is called `h`; there are paper-scale, site-scale, no-prior, putative, lattice, few-visible, dense-clutter"
+    );
 }
