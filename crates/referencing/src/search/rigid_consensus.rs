@@ -46,7 +46,7 @@ use crate::Problem;
 ///
 /// The posterior holds further hypotheses:
 ///
-/// - A pattern that the object repeats in part continues beyond it, with or without the object ([`RepeatedPattern`](super::RepeatedPattern)).
+/// - A pattern that the object repeats in part continues beyond it, with or without the object: [`RepeatedPattern`].
 /// - Poses elsewhere explain more than uniform clutter would: clutter imitates the object, which may or may not be
 ///   among the imitations ([`StructuredClutter`]).
 /// - Putative pairs confuse points of similar appearance: the model also fits the same places in another order, and
@@ -73,6 +73,8 @@ use crate::Problem;
 /// to two and a half times its work, for structured clutter an eighth. In dense clutter a partly visible object beside
 /// a complete copy of it may therefore be missed; [`Posterior::copies_sought`] is then false. A pose of less than nine
 /// nats is not a copy. The tolerance and the maximum rotation of the prior prune the graph; they do not judge the pose.
+///
+/// [`RepeatedPattern`]: super::RepeatedPattern
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RigidConsensus {
