@@ -131,8 +131,9 @@ impl Parts {
         self.part(point).map_or(0.0, |part| (density(part.count, &self.lengths(part)) - even).max(0.0))
     }
 
-    /// The sides (m) of a box with the proportions of a point's part, which all points fill with the density of that
-    /// part; the box of the cloud if the cloud is denser.
+    /// The sides (m) of a box that all points would fill with the density of one point's part.
+    ///
+    /// The box has the proportions of the part; it is the box of the cloud if the cloud is denser.
     pub(crate) fn as_dense(&self, point: usize) -> Vector3<f64> {
         let full = self.full.lengths();
         let Some(part) = self.part(point).filter(|_| self.ln_excess(point) > 0.0) else { return full };
@@ -144,7 +145,7 @@ impl Parts {
         self.ln_of(&self.full.lengths())
     }
 
-    /// ln of the volume (m³) of all parts that can hold a pose, at most that of the box about all points.
+    /// ln of the volume (m³) of all parts that can hold a pose, limited to the box about all points.
     pub(crate) fn ln_volume(&self) -> f64 {
         let full = self.ln_full();
         let hold = self.parts.iter().filter(|part| part.count >= NEEDED);

@@ -1,4 +1,4 @@
-//! Shuffled partners in a cloud that contains the object's arrangement, as of a grid, whatever the pairs.
+//! Shuffled partners in a cloud that contains the object's own arrangement of points, as a grid does.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Object, Transform};
@@ -10,7 +10,9 @@ use crate::{ModelPoint, Problem, candidates::chi_square};
 /// has 24.
 const ALIKE: f64 = 2.0;
 
-/// The expected number of sets of `size` pairs or more at this pose and its symmetric ones, for shuffled partners.
+/// The expected number of sets of `size` pairs or more at one pose, for shuffled partners.
+///
+/// The pose stands for its symmetric ones too.
 ///
 /// The expectation over all poses assumes that partners are as dense as their neighbours. A shuffle, however, leaves
 /// the cloud unchanged. If a pose puts model point i onto cloud points with the fraction q_i of all partners, one of
@@ -51,8 +53,9 @@ impl<'a> Shuffled<'a> {
         Self { partners, times, all }
     }
 
-    /// The probability m q that one of the m partners of a model point lies at its place under a pose; q is the
-    /// fraction of all partners there.
+    /// The probability m q that a partner of a model point lies at its place under a pose.
+    ///
+    /// m is the number of its partners, and q is the fraction of all partners at that place.
     pub(crate) fn meets(&self, model: usize, place: Vector3<f64>) -> f64 {
         let Problem { model: points, candidates, .. } = self.partners.problem;
         let own = candidates.lists[model].len() as f64;

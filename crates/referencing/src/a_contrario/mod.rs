@@ -57,7 +57,7 @@ use subsets::Subsets;
 const NEGLIGIBLE: f64 = 0.03;
 /// Maximum number of sizes beyond that of the set found.
 const MAX_SIZES: usize = 16;
-/// Number of samples for each model point, their limits, and the maximum number of point pairs in all of them.
+/// Number of samples for each model point, with its limits; maximum number of point pairs in all samples.
 const SAMPLES_A_POINT: usize = 4;
 const MAX_SAMPLES: usize = 250;
 const MIN_SAMPLES: usize = 16;
@@ -70,9 +70,10 @@ const FIRST_SAMPLES: usize = 2;
 /// Confidence of the χ² test that sets must pass.
 const CONFIDENCE: f64 = 0.999;
 
-/// The expected number of one-to-one sets of `found.len()` pairs or more that pass the χ² test if no candidate is true.
+/// The NFA of a set of this size: the expected number of sets that pass the χ² test.
 ///
-/// Infinite below three pairs; NaN for a NaN covariance.
+/// It counts one-to-one sets of `found.len()` pairs or more if no candidate is true. Infinite below three pairs; NaN
+/// for a NaN covariance.
 pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
     if found.len() < 3 {
         return f64::INFINITY;
@@ -110,8 +111,7 @@ impl<'a> AContrario<'a> {
         })
     }
 
-    /// The expected number of sets as large at the pose of these putative pairs and at its symmetric ones; zero for
-    /// other pairs.
+    /// The NFA at the pose of these putative pairs and at its symmetric poses; zero for other pairs.
     pub(crate) fn at_their_pose(&self) -> f64 {
         *self.at_their_pose.get_or_init(|| match self.best() {
             (_, Some(pose)) if shuffled(self.problem) => expected_at(self.problem, self.found.len(), &pose),

@@ -8,7 +8,7 @@ use crate::{Correspondence, Prior, PriorBound, Problem, candidates::chi_square, 
 
 /// Confidence of the gates of a Gaussian prior, the default of [`crate::Gate`].
 const CONFIDENCE: f64 = 0.99;
-/// Number of nearest points that define the cloud's density about a place, and maximum number of points searched.
+/// Number of nearest points that define a local density; maximum number of points searched.
 const NEAREST: usize = 4;
 const MAX_SAMPLED: usize = 200;
 /// Minimum length (m).

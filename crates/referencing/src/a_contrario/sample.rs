@@ -5,7 +5,7 @@ use seafix_geometry::MeasuredPoint;
 
 use super::coordinates;
 
-/// Keeps at most `max` of the points, evenly spaced by their distance from the centroid of all, in this order.
+/// Decimates the points to at most `max`, evenly spaced by distance from their centroid, in this order.
 ///
 /// The sample does not depend on the numbering of the points, nor on a rigid motion of the cloud, except for distances
 /// equal to seven digits (sums in another order may differ in the last), which the coordinates order.

@@ -15,7 +15,7 @@ const FLOOR: f64 = 1e-9;
 /// Number of directions of the errors in a sample of few points; one direction for more points.
 const DIRECTIONS: usize = 2;
 const FEW: usize = 5;
-/// Sine of a rotation below which its second order is small, and the factor by which the search exceeds its end.
+/// Sine of a small rotation, whose second order is negligible; factor by which the search exceeds its end.
 const SMALL_TURN: f64 = 0.6;
 const BEYOND: f64 = 1.25;
 /// Nodes and weights of Gauss–Legendre quadrature on [0, 1].
@@ -135,8 +135,7 @@ impl<'a> Shape<'a> {
         self.estimate(set, motions, sequence)
     }
 
-    /// The estimate from a rotation by which a set fits the cloud's box as barely as its errors permit; zero without a
-    /// box.
+    /// The estimate from a rotation with which a set barely fits the cloud's box; zero without a box.
     pub(super) fn barely_fits(&mut self, set: &[usize], sequence: &mut QuasiRandom) -> f64 {
         if !(matches!(self.null, Null::Box(_)) && self.centre(set)) {
             return 0.0;
@@ -196,8 +195,7 @@ impl<'a> Shape<'a> {
         (0..directions).map(|_| along()).sum::<f64>() / directions as f64
     }
 
-    /// The extent along a random direction of the errors, as a fraction of R, within which all distances keep their
-    /// tolerances.
+    /// The extent along a random error direction, as a fraction of R, within which all distances keep their tolerances.
     fn within_tolerance(&mut self, set: &[usize], turn: &Cholesky<f64, U3>, sequence: &mut QuasiRandom) -> f64 {
         let root = &self.noise.root;
         self.errors.clear();
@@ -246,7 +244,7 @@ fn isotropic(root: &Matrix3<f64>) -> bool {
     root.m11 == root.m22 && root.m22 == root.m33 && root.m21 == 0.0 && root.m31 == 0.0 && root.m32 == 0.0
 }
 
-/// The measure of motions that keep every member in its gate, along one direction of the rotation axis.
+/// The measure of motions that keep every member in its gate, for one rotation axis.
 ///
 /// A rotation by 2ψ about the axis w moves the members by 4 sin²ψ wᵀ I w in all, I their inertia; gates of half-sizes s
 /// permit Σ |s|². The quaternion's vector part v = w sin ψ therefore lies in the ellipsoid vᵀ I v ≤ Σ |s|²/4 and in the
@@ -328,7 +326,7 @@ fn in_box(at: &[Vector3<f64>], lengths: &Vector3<f64>, sequence: &mut QuasiRando
     ALL_TURNS * (lengths - (high - low)).map(|length| length.max(0.0)).product()
 }
 
-/// The measure of motions that bring one member onto a point of the cloud, with the density of the cloud at the others.
+/// The measure of motions that bring one member onto a cloud point, times the density at the others.
 fn among(at: &[Vector3<f64>], cloud: &[&seafix_geometry::MeasuredPoint], sequence: &mut QuasiRandom) -> f64 {
     let turn = turned(sequence);
     let anchor = sequence.below(at.len());

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{association::Association, clique, orientation::Sense};
 use crate::{Correspondence, Observations, Problem, Tolerance, solve::least_squares};
 
-/// Distance from a line, as a fraction of the model's extent, below which points determine no rotation about it.
+/// Distance from a line (fraction of the model's extent) below which points determine no rotation about it.
 const SLIM: f64 = 0.05;
 /// Minimum size of a set with information on the pose; fewer pairs agree everywhere.
 const MIN: usize = 3;

@@ -22,9 +22,9 @@ where
     D: Fn(&Transform<Object, Camera>, Correspondence) -> f64,
     F: Fn(&[Correspondence]) -> Option<Transform<Object, Camera>>,
 {
-    /// Alternates the nearest candidate of each model point and the pose of the nearest of these pairs until the pairs
-    /// no longer change.
+    /// Alternates nearest candidates and pose until the pairs no longer change.
     ///
+    /// Each round takes the nearest candidate of each model point and fits the pose to the nearest of these pairs.
     /// Returns the last pose, all candidate pairs, the number of distances, and whether the budget ended the loop.
     pub(super) fn run(
         &self,

@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use crate::lanes::{LANES, packed};
 
-/// Model place, cloud place and tolerance of every vertex by coordinate, padded to complete words with places that
-/// agree with no distance.
+/// The vertices by column: model place, cloud place and tolerance.
+///
+/// The columns are padded to complete words with places that agree with no distance.
 #[derive(Debug, Default)]
 pub(super) struct Sites {
     /// Model x, y, z and cloud x, y, z.
@@ -50,8 +51,9 @@ impl Sites {
     }
 }
 
-/// For squared distances A and B in model and cloud, |√A − √B| ≤ r ⇔ A + B ≤ r² or (A − B)² ≤ r² (2 (A + B) − r²): no
-/// square root is needed.
+/// Compares distances without a square root.
+///
+/// For squared distances A and B in model and cloud, |√A − √B| ≤ r ⇔ A + B ≤ r² or (A − B)² ≤ r² (2 (A + B) − r²).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn compare(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, comparisons: &mut Vec<EdgeBits>) {
     let [mx, my, mz, cx, cy, cz] = at.map(|column| column[from * LANES..].as_chunks::<LANES>().0);

@@ -44,7 +44,7 @@ impl Component for GncTls {
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the weight of what one pose explains: it minimises Σ min(r², c²) over poses by graduated non-convexity",
+            "the weight of the pairs that one pose explains: it minimises Σ min(r², c²) by graduated non-convexity",
         ),
         ("exact", "no: it follows one minimum"),
         ("time", "O(N) a step, some fifty steps, for N candidate pairs"),

@@ -20,8 +20,10 @@ const BEGINNINGS: usize = 16;
 /// Maximum number of quadruples tested for a set that is too large for all of them.
 const MAX_QUADRUPLES: u64 = 1_000_000;
 
-/// Adds each pair in turn that is coherent with all pairs of the set and forms no rejected quadruple with three of
-/// them. Returns them in the order added.
+/// The admissible set that grows from ranked pairs, in the order added.
+///
+/// Each pair in turn joins if it is coherent with all pairs of the set and forms no rejected quadruple with three of
+/// them.
 pub(super) fn grow(
     problem: &Problem<'_>,
     ranked: &[Correspondence],

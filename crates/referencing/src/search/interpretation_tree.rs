@@ -30,8 +30,9 @@ use crate::{Correspondence, Problem};
 pub(crate) struct InterpretationTree {
     /// Whether mirror images are rejected; `false` leaves them to the model test.
     pub(crate) orientation: bool,
-    /// Fraction of the model points with candidates, above 0 and at most 1, at which an interpretation is accepted at
-    /// once.
+    /// Fraction of the model points at which an interpretation is accepted at once, above 0 and at most 1.
+    ///
+    /// It refers to the model points with candidates; 1 searches for the longest interpretation.
     pub(crate) enough: f64,
     /// Maximum number of pair tests.
     pub(crate) budget: u64,

@@ -27,9 +27,10 @@ pub struct MaximumClique {
     pub orientation: bool,
     /// Maximum number of pair tests beyond the tests that build the graph.
     pub budget: u64,
-    /// Maximum number of other sets of the same size in the answer, those with the fewest common pairs first. It
-    /// applies only if all others are proved to give the same pose as the best; otherwise all sets found are in the
-    /// answer.
+    /// Maximum number of alternatives in the answer, those with the fewest common pairs first.
+    ///
+    /// It applies only if all sets of the same size are proved to give the same pose as the best; otherwise the answer
+    /// holds all sets found.
     pub alternatives: usize,
     /// Maximum number of candidate pairs; more are rejected, since their graph would not fit into memory (40 000 pairs
     /// take 200 MB).
@@ -149,8 +150,9 @@ impl MaximumClique {
         }
     }
 
-    /// A mirror image of the model with more points than the best set, which is then a planar part of that image and no
-    /// fix.
+    /// A mirror image of the model with more points than the best set.
+    ///
+    /// The best set is then a planar part of that image and no fix.
     fn larger_image(&self, size: usize, cliques: &mut clique::Search<'_>) -> Option<Rejected> {
         if !self.orientation {
             return None;

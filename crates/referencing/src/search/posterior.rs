@@ -35,25 +35,32 @@ pub struct Posterior {
     pub explanations: Vec<Explanation>,
     /// Poses that explain points which the best pose does not use, the best first.
     pub beside: Vec<Explanation>,
-    /// Whether the search for second copies of the object, complete or partial, was exhaustive up to the bounds of
-    /// evidence. `None` if none was searched for, since no pose has enough evidence to be accepted.
+    /// Whether the search for second copies of the object was exhaustive, up to the bounds of evidence.
+    ///
+    /// A copy may be complete or partial. `None` if none was searched for, since no pose has enough evidence to be
+    /// accepted.
     pub copies_sought: Option<bool>,
     /// Evidence of a pattern that continues beyond the object; `None` for an object without a pattern.
     pub repeated_pattern: Option<RepeatedPattern>,
     /// The strongest evidence of structured clutter, which imitates the object; `None` without any.
     pub structured_clutter: Option<StructuredClutter>,
-    /// The best pose elsewhere, or, if none was met, the best of the poses that were followed regardless of their
-    /// evidence. The answer is compared with it.
+    /// The best pose elsewhere, for comparison with the answer.
+    ///
+    /// If no pose elsewhere was met, it is the best of the poses that were followed regardless of their evidence.
     pub unlikely: Option<Explanation>,
-    /// Upper bound of the evidence (nats) by which another admissible set exceeds the best pose, under uniform clutter.
-    /// Zero: the best pose is proved optimal. `None`: no proof was requested.
+    /// Upper bound of the evidence (nats) by which another set exceeds the best pose.
+    ///
+    /// It holds for admissible sets under uniform clutter. Zero: the best pose is proved optimal. `None`: no proof was
+    /// requested.
     pub evidence_gap: Option<f64>,
 }
 
-/// Minimum evidence (nats) at which a pose beside the best is a second copy of the object, complete or partial.
+/// Minimum evidence (nats) of a second copy of the object, complete or partial, beside the best pose.
 pub(super) const COPY: f64 = 9.0;
 
-/// Evidence (nats) that clutter alone reaches in at most one frame of twenty, since E Σ Λ = 1 under uniform clutter.
+/// Evidence (nats) that clutter alone reaches in at most one frame of twenty.
+///
+/// Markov's inequality with E Σ Λ = 1 under uniform clutter.
 const ACCIDENT: f64 = 3.0;
 
 /// ln of the prior probability that clutter imitates the object: so small that it matters only with evidence for it.
@@ -119,9 +126,10 @@ impl Posterior {
         of.iter().filter(|other| !near(other)).collect()
     }
 
-    /// The posterior probabilities P_m = Λ_m/(1 + Σ Λ), with evidence Λ and equal priors of presence and absence.
+    /// The posterior probabilities of presence, elsewhere and absence.
     ///
-    /// Poses within `limit` (m, RMS over the model points) of the best count as one with it. Further hypotheses:
+    /// P_m = Λ_m/(1 + Σ Λ), with evidence Λ and equal prior probabilities of presence and absence. Poses within `limit`
+    /// (m, RMS over the model points) of the best count as one with it. Further hypotheses:
     ///
     /// - A repeated pattern, alone or around the object, has the same prior probability.
     /// - A pose beside the best, in points that the best does not use, shows how much evidence clutter of this cloud

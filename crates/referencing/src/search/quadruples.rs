@@ -3,7 +3,7 @@
 use super::{orientation::Sense, volumes::Volumes};
 use crate::lanes::{LANES, ones_of, packed};
 
-/// The test whether a vertex forms a quadruple that contradicts a sense with three members of a set.
+/// The test whether a vertex and three members of a set contradict a sense.
 ///
 /// Two members span a plane with the vertex. If a third does not lie on the same side of it in model and cloud beyond
 /// doubt, the exact test decides. The memory for the planes is reused.
@@ -77,8 +77,9 @@ fn span(places: &[Vec<f64>; 6], normals: &mut [Vec<f64>; 6]) {
     }
 }
 
-/// The mask of the first planes for which a place is beyond doubt on the same side (`sign` 1) in model and cloud, or on
-/// opposite sides (-1).
+/// The mask of the planes for which a place clearly has the orientation `sign`.
+///
+/// It is on the same side (1) in model and cloud, or on opposite sides (-1).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn clear(normals: &[&[f64]; 6], place: &[f64; 6], sign: f64, doubt: f64) -> u64 {
     let [a, b, c, u, v, w] = normals.map(|column| column.first_chunk::<LANES>().expect("complete words"));
@@ -106,11 +107,10 @@ mod tests {
         assert_eq!([0, 1, 2, 3, 4, 39].map(Quadruples::count), [0, 0, 0, 1, 4, 9139]);
     }
 
-    /// The test agrees with a test of each quadruple, for sets of up to forty members, some with a point on the wrong
-    /// side.
+    /// The test agrees with a test of each quadruple.
     ///
-    /// Fails if triples without the third member alone are tested, if a plane is taken for that of other members, and
-    /// with a wrong sign in a normal.
+    /// The sets have up to forty members, some with a point on the wrong side. Fails if triples without the third
+    /// member alone are tested, if a plane is taken for that of other members, and with a wrong sign in a normal.
     #[test]
     fn what_is_refused_makes_a_four_that_contradicts() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);

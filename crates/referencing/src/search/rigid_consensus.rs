@@ -122,13 +122,15 @@ impl Component for RigidConsensus {
 const FLOOR: f64 = 3.0;
 /// Minimum evidence (nats) of a pose that may be accepted; only then are alternatives searched for.
 const STRONG: f64 = 5.0;
-/// Evidence (nats) below the best at which a pose beside it does not matter, unless it is a copy by itself ([`COPY`]).
+/// Evidence (nats) below the best at which a pose beside it does not matter, unless it is a [`COPY`].
 const BESIDE: f64 = 14.0;
-/// Number of points fewer than the best pose at which a pose is only part of a copy. Parts of an object whose pattern
-/// continues are visible beside it anyway and are not searched for.
+/// Number of points below the best pose at which a pose is only part of a copy.
+///
+/// Parts of an object whose pattern continues are visible beside it anyway and are not searched for.
 const LEAD: usize = 4;
-/// Minimum work (words read, a fraction of a millisecond) of the search for parts, and ten times that for structured
-/// clutter, even if the complete object was found at once.
+/// Minimum work (words read) of the search for parts, a fraction of a millisecond.
+///
+/// A tenth of it is the minimum for structured clutter. Both apply even if the complete object was found at once.
 const MIN_EFFORT: u64 = 50_000;
 /// Rounding error (nats) of sums in different order.
 const ROUNDING: f64 = 1e-9;
@@ -303,9 +305,9 @@ mod tests {
         assert!(proved.pair_tests > plain.pair_tests);
     }
 
-    /// The first two points are pushed apart by 44 mm, more than Δ, each to 2.2 σ of its place under the common pose:
-    /// one of them is dropped.
+    /// Two contradicting pairs: one of them is dropped from the answer.
     ///
+    /// The first two points are pushed apart by 44 mm, more than Δ, each to 2.2 σ of its place under the common pose.
     /// Fails if the proof for the pose is taken for a proof of the remaining pairs.
     #[test]
     fn what_is_left_of_pairs_that_contradict_each_other_is_not_optimal() {

@@ -251,8 +251,9 @@ impl<'a> Enumeration<'a> {
         }
     }
 
-    /// Counts `choices` for a sample of `q` points that each end after `pair_tests`, with the first `agree` points in
-    /// agreement.
+    /// Counts `choices` that each end after `pair_tests`.
+    ///
+    /// They belong to a sample of `q` points, the first `agree` of which were in agreement.
     fn count(&mut self, q: usize, pair_tests: u64, choices: u128, agree: usize) -> Result<(), Spent> {
         let drawing = (q * q) as u64 / DRAWING;
         let full = u128::from(self.left() / (drawing + pair_tests)).min(choices);
@@ -299,8 +300,9 @@ impl<'a> Enumeration<'a> {
         Ok(true)
     }
 
-    /// Counts the later samples with the same beginning up to the deepest place examined, without examining them. If
-    /// the budget ends in one of them, that one is examined.
+    /// Counts the later samples with the same beginning, up to the deepest place examined.
+    ///
+    /// They are not examined, except the one in which the budget ends.
     fn pass_over(&mut self, refused: &Refused, sample: &mut [usize]) -> Result<(), Spent> {
         if refused.deepest + 1 == sample.len() {
             return Ok(());
@@ -400,8 +402,9 @@ fn next_combination(sample: &mut [usize], place: usize, n: usize) -> bool {
     true
 }
 
-/// The next ordered sample of `0..n` without repetition, in lexicographic order, that differs at `place` or before;
-/// false after the last.
+/// The next ordered sample of `0..n` without repetition that differs at `place` or before; false after the last.
+///
+/// The order is lexicographic.
 fn next_arrangement(sample: &mut [usize], place: usize, n: usize) -> bool {
     for place in (0..=place).rev() {
         let next = (sample[place] + 1..n).find(|value| !sample[..place].contains(value));
@@ -657,8 +660,10 @@ mod tests {
         (Some(0), pair_tests, best)
     }
 
-    /// The counts equal those of the search test by test, at every budget up to the end of small searches, and at some
-    /// budgets of a search whose samples are long enough for their sampling to count.
+    /// The counts equal those of a search test by test.
+    ///
+    /// They are compared at every budget up to the end of small searches, and at some budgets of a search whose samples
+    /// are long enough for their sampling to count.
     ///
     /// Fails with one test too few after a disagreement, and with the sample itself counted twice.
     #[test]

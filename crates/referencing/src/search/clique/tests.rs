@@ -98,7 +98,7 @@ fn check(problem: &Problem<'_>, graph: &Association, name: &str) {
     assert_eq!(two.all, largest.len() < 2, "{name}: {two:?}");
 }
 
-/// All 33 868 graphs of one to six vertices, each vertex with a model point and a cloud point of its own.
+/// All 33 868 graphs of one to six vertices, each with a model and a cloud point of its own.
 ///
 /// Fails if a bound requires one member more.
 #[test]
@@ -111,8 +111,10 @@ fn the_largest_cliques_of_every_graph_of_six_vertices() {
     }
 }
 
-/// All graphs of five vertices with every partition of consecutive vertices into model points, and of four vertices
-/// with every partition into cloud points besides.
+/// All graphs of four or five vertices with shared points.
+///
+/// Five vertices have every partition of consecutive vertices into model points, four have every partition into cloud
+/// points besides.
 #[test]
 fn vertices_of_one_point_exclude_each_other() {
     let shared = |count: usize, joins: usize| {

@@ -23,7 +23,7 @@ fn held(words: &[u64]) -> u64 {
     held
 }
 
-/// Calls `each` with the index of the first bit and the value of every nonzero word, from bit `from` on.
+/// Calls `each` with first bit index and value of every nonzero word, from bit `from` on.
 #[inline]
 pub(in crate::search) fn each_held(bits: &[u64], from: usize, mut each: impl FnMut(usize, u64)) {
     let first = from / 64;

@@ -66,8 +66,9 @@ impl<'a> Bounds<'a> {
         Self::with((terms, graph), min, of_number)
     }
 
-    /// Strict bounds, with `ln_posterior_volume` (k) an upper bound of the log posterior volume of k pairs relative to
-    /// the prior.
+    /// Strict bounds, from upper bounds of the posterior volumes.
+    ///
+    /// `ln_posterior_volume` (k) is an upper bound of the log posterior volume of k pairs relative to the prior.
     pub(in crate::search) fn proved(
         (terms, graph): (&'a Terms, &'a ConsistencyGraph),
         ln_posterior_volume: &[f64],
@@ -162,7 +163,9 @@ impl<'a> Bounds<'a> {
         (k, if k < min { f64::NEG_INFINITY } else { self.of_set(k, sum) })
     }
 
-    /// The number and contribution of `own` pairs and the best of each model point of `common`, from rank `from` on.
+    /// The number and contribution of `own` pairs with the best pair of each further model point.
+    ///
+    /// The further model points are those of `common` from rank `from` on.
     pub(in crate::search) fn joined(&self, (own, gains): (usize, f64), common: &[u64], from: usize) -> (usize, f64) {
         let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
         each_held(common, self.graph.starts[from], |begin, word| {
@@ -183,8 +186,10 @@ impl<'a> Bounds<'a> {
         (k, sum)
     }
 
-    /// Whether the bound of three pairs or more with their common neighbours in `row`, from a bit on, reaches `enough`.
-    /// The bound grows with every model point, so that the test ends early.
+    /// Whether the bound of some pairs with their common neighbours reaches `enough`.
+    ///
+    /// The pairs are three or more; the neighbours are those in `row` from a bit on. The bound grows with every model
+    /// point, so that the test ends early.
     pub(in crate::search) fn is_enough(
         &self,
         (own, gains): (usize, f64),

@@ -143,6 +143,8 @@ mod tests {
         places.map(|at| excess.about(known, 3, &at))
     }
 
+    /// The excess of uniform clutter and of a clump.
+    ///
     /// Uniform clutter has no excess, even if a pose takes some of it or if the clump belongs to the pose. Clutter that
     /// lies entirely within the second box is eight times as dense, except for the hole that it leaves in the third.
     ///

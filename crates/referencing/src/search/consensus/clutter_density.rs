@@ -34,16 +34,16 @@ pub(in crate::search) struct ClutterDensity {
     counted: Option<Counted>,
     /// The clutter about the predicted places.
     clumped_clutter: Option<ClumpedClutter>,
-    /// A distance (m) and the fraction of candidates with another so near, once two members of a pose are that near.
+    /// A distance (m) and the fraction of candidates with another so near; `None` until it is needed.
     duplicates: Option<(f64, f64)>,
 }
 
 impl ClutterDensity {
-    /// Recomputes the evidence of a mode with the local clutter density about each of its points, or with the density
-    /// about the predicted places of all model points ([`ClumpedClutter`]).
+    /// Recomputes the evidence of a mode with the local clutter density about each of its points.
     ///
-    /// A point in dense clutter may contribute negatively; it is then rather clutter than the object's. The evidence is
-    /// summed over the subsets of members that are the object's ([`ln_visible`]).
+    /// The density is that about the point, or that about the predicted places of all model points
+    /// ([`ClumpedClutter`]). A point in dense clutter may contribute negatively; it is then rather clutter than the
+    /// object's. The evidence is summed over the subsets of members that are the object's ([`ln_visible`]).
     pub(in crate::search) fn weigh(
         &mut self,
         problem: &Problem<'_>,

@@ -144,8 +144,7 @@ fn coherent(columns: &Columns, a: usize, from: usize, row: &mut [u64]) {
     mark::<false>(columns, a, from, 0.0, row);
 }
 
-/// Marks the coherent vertices whose offset from the prediction differs by at most a rotation by `turn` (rad) of the
-/// lever.
+/// Marks the vertices that are coherent and whose offset from the prediction a rotation by `turn` (rad) allows.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn compatible(columns: &Columns, a: usize, from: usize, turn: f32, row: &mut [u64]) {
     mark::<true>(columns, a, from, turn, row);

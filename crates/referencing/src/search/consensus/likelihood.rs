@@ -123,7 +123,7 @@ impl Terms {
     }
 }
 
-/// 3 ln 2π − ½ ln det (P + k H₁) for k = 0…n, with the average information H₁ of one pair.
+/// ln posterior volumes 3 ln 2π − ½ ln det (P + k H₁) for k = 0…n; H₁ is the average information of one pair.
 fn volumes(average: &Matrix6<f64>, prior_terms: &PriorTerms, n: usize) -> Vec<f64> {
     let of = |h: Matrix6<f64>| factor_of(&h).map_or(f64::INFINITY, |chol| ln_volume(&chol));
     match &prior_terms.known {

@@ -65,7 +65,9 @@ impl Fits<'_> {
         Some((cost, LaplacePosterior::of(linear.moved(), linear.factor(), prior_terms)))
     }
 
-    /// Minimum cost of the members under a pose, from the pose of the previous members and from that of three of them.
+    /// Minimum cost of the members under a pose.
+    ///
+    /// The fit starts from the pose of the previous members and from that of three members.
     pub(super) fn min_cost(&self, before: Option<Motion>) -> Option<(f64, LaplacePosterior)> {
         let mut min: Option<(f64, LaplacePosterior)> = None;
         for start in before.into_iter().chain(self.of_any_three()) {

@@ -19,8 +19,7 @@ use crate::{
 
 /// Minimum evidence (nats) of an image over the pose, since a planar object is its own image.
 const MARGIN: f64 = 3.0;
-/// Number of members whose triples are reflected, maximum number of triples, and number of pairs for each triple in
-/// small problems.
+/// Limits of the reflected triples: number of members, number of triples, and number of pairs for each triple.
 const SPREAD: usize = 10;
 const MAX_THREES: usize = 64;
 const PAIRS_A_THREE: usize = 8;
@@ -118,8 +117,9 @@ fn near(
     (best.len() > more_than).then(|| best.into_iter().map(|(_, v)| v).collect())
 }
 
-/// Coordinates of each pair's points in model and cloud by axis, and the squared gate (m²) about a motion; padded to
-/// complete words with entries that are within reach of nothing.
+/// The pairs' coordinates in model and cloud by axis, with their squared gates (m²) about a motion.
+///
+/// The columns are padded to complete words with entries that are within reach of nothing.
 struct Places {
     at: [Vec<f64>; 6],
     reach2: Vec<f64>,

@@ -82,8 +82,7 @@ impl PriorTerms {
         Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
     }
 
-    /// Whether the prior's box holds every model point under a motion, up to the error of a motion with this
-    /// information.
+    /// Whether the prior's box holds every model point under a motion, up to the motion's error.
     pub(in crate::search) fn holds(
         &self,
         model: &[ModelPoint],

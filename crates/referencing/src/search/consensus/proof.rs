@@ -26,7 +26,7 @@ const EQUAL: f64 = 1e-3;
 const CURVED: f64 = 0.2;
 /// Minimum number of pairs that determine a pose.
 const MIN: usize = 3;
-/// Cost of a fit, of each of its members, and of each pair compared with a pose, in words read.
+/// Costs, in words read: a fit, each of its members, each pair compared with a pose.
 const COST_OF_A_FIT: u64 = 512;
 const COST_OF_A_MEMBER: u64 = 64;
 const COST_OF_A_PAIR: u64 = 32;
@@ -295,7 +295,9 @@ impl<'a> Prover<'a> {
         true
     }
 
-    /// Adds the pose and the residual cost of the members, if they determine a pose, and examines the members as a set.
+    /// Adds the pose and the residual cost of the members and examines them as a set.
+    ///
+    /// Nothing is added if they do not determine a pose.
     fn fitted(&mut self, begun: &Begun) -> Begun {
         let Climb { terms, .. } = self.climb;
         let count = self.members.len();
@@ -398,7 +400,7 @@ impl<'a> Prover<'a> {
 
 /// The squared Mahalanobis distance rᵀ Σ⁻¹ r.
 fn distance(covariance: &Matrix3<f64>, r: &Vector3<f64>) -> f64 {
-    // By the adjugate: the matrix is well conditioned, and this is done for every remaining pair.
+    // The adjugate is accurate for this well-conditioned matrix, and fast: every remaining pair needs it.
     let (a, b, c) = (covariance.column(0), covariance.column(1), covariance.column(2));
     let bc = b.cross(&c);
     let across = Vector3::new(r.dot(&bc), r.dot(&c.cross(&a)), r.dot(&a.cross(&b)));
@@ -587,6 +589,8 @@ mod tests {
         assert!(10 * found_again > rounds, "{found_again}");
     }
 
+    /// The proved bound holds for every coherent set of small problems.
+    ///
     /// Fails if members cost twice their cost, if the cost of a further pair ignores the covariance of the pose, if the
     /// posterior volume is smaller, and if pruning bounds are taken for strict ones.
     #[test]

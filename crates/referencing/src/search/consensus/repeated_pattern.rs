@@ -22,7 +22,9 @@ const TELLING: usize = 3;
 /// Sine of the angle between two steps below which they are one direction.
 const SAME: f64 = 0.3;
 
-/// The points of a model that repeat by a translation (a lattice, a ladder, a row of bolts), and their continuation.
+/// The points of a model that repeat by a translation, with their continuation beyond the model.
+///
+/// Examples are a lattice, a ladder and a row of bolts.
 pub(in crate::search) struct Pattern {
     /// Whether a model point belongs to the pattern.
     repeats: Vec<bool>,

@@ -19,8 +19,10 @@ pub struct StructuredClutter {
     /// ln evidence that clutter imitates the object (nats): that of the pose elsewhere, given its pairs that the best
     /// pose explains as the object's, over the places that the best pose leaves free.
     pub ln_evidence: f64,
-    /// ln likelihood ratio (nats) of two hypotheses: the best pose is an imitation too, with one visible fraction of
-    /// the places of both poses, or the object is present with a fraction of its own.
+    /// ln likelihood ratio (nats) of absence over presence, given the imitation.
+    ///
+    /// Absence: the best pose is an imitation too, with one visible fraction for the places of both poses. Presence:
+    /// the object has a visible fraction of its own.
     pub ln_alone: f64,
 }
 

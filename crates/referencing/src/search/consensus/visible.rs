@@ -5,8 +5,8 @@ const MAX_LEFT_OUT: usize = 1024;
 
 /// ln Σ_V B(|V|) Π_{i∈V} r_i over the subsets V of the members of a mode.
 ///
-/// r_i = exp(`gains`[i]) is the likelihood ratio of each member, and B (`ln_fraction`) is the probability of one set of
-/// |V| visible points. A pair that fits is the object's, or clutter that happens to be there. If r ≫ n, nearly all of the
+/// r_i = exp(`gains`[i]) is the likelihood ratio of each member. B (`ln_fraction`) is the probability of one visible
+/// set of this size. A pair that fits is the object's, or clutter that happens to be there. If r ≫ n, nearly all of the
 /// sum is the set of all members; a pair with a ratio of about one has no information either way.
 pub(super) fn ln_visible(gains: &[f64], ln_fraction: &[f64]) -> f64 {
     // Coefficients of Π_i (r_i + z), each factor divided by the greater of its two: z counts the excluded members.

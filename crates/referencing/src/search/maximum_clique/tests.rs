@@ -240,8 +240,9 @@ fn tests_are_those_of_the_graph_and_of_the_proof() {
     }
 }
 
-/// Forty-five points are tested against the first sixteen while the set grows, and completely in the end: five on the
-/// wrong side of a plane are dropped, and with them the proof.
+/// Forty-five points with five on the wrong side of a plane: these are dropped, and with them the proof.
+///
+/// The points are tested against the first sixteen while the set grows, and completely in the end.
 #[test]
 fn large_sets_are_tested_for_mirror_images_as_a_full() {
     let mut places: Vec<[f64; 3]> = scattered(45).iter().map(|[x, y, z]| [*x, *y, z - 1.0]).collect();

@@ -20,8 +20,10 @@ impl Seeds<'_> {
         self
     }
 
-    /// A pose from three pairs that contradict this one and from further pairs that fit it, regardless of its evidence.
-    /// The search starts from the best connected pairs. `None` if no three of them agree.
+    /// A pose that contradicts a known one, regardless of its evidence.
+    ///
+    /// Three pairs that contradict the known pose begin it, and further pairs that fit join. The search starts from the
+    /// best connected pairs. `None` if no three of them agree.
     pub(in crate::search) fn elsewhere(mut self, than: &Mode) -> Option<Mode> {
         let graph = self.climb.graph;
         self.free = contradicting(self.climb.terms, graph, than, true);

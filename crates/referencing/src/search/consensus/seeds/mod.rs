@@ -38,8 +38,7 @@ const KEPT: usize = 256;
 /// Maximum numbers of pairs to follow, and of pairs that lead to parts of sets (12 bytes each).
 const MAX_PAIRS: usize = 8_000_000;
 const MAX_PARTS: usize = 2_000_000;
-/// Cost, in words read, of a pose from three points, of the ascent to its mode, and of each pair compared with a motion
-/// during the ascent.
+/// Costs, in words read: a pose from three points, the ascent to its mode, each pair compared during the ascent.
 const COST_OF_A_POSE: u64 = 16;
 const COST_OF_A_MODE: u64 = 64;
 const COST_OF_A_PAIR: u64 = 4;
@@ -129,7 +128,7 @@ pub(in crate::search) struct Seeds<'a> {
     common: Vec<u64>,
     /// The members of the best modes that hold both vertices of a pair.
     again: Vec<u64>,
-    /// The free neighbours of one or two vertices by words, the choices after each model point, and the neighbours of
+    /// Memory of the search: free neighbours of one or two vertices, choices after each model point, neighbours of
     /// three.
     held: Vec<Held>,
     after: Vec<After>,
@@ -140,8 +139,9 @@ pub(in crate::search) struct Seeds<'a> {
 }
 
 impl<'a> Seeds<'a> {
-    /// A search over the vertices whose cloud point is not `taken`, for sets of at least `min` pairs and the evidence
-    /// `floor` (nats).
+    /// A search over the vertices whose cloud point is not `taken`.
+    ///
+    /// Sets have at least `min` pairs and the evidence `floor` (nats).
     pub(in crate::search) fn new(
         model: &'a [ModelPoint],
         (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
@@ -229,8 +229,9 @@ impl<'a> Seeds<'a> {
         self
     }
 
-    /// The compatible pairs (a, b) that may begin a set of interest, the pairs that may only begin a part, and whether
-    /// they are complete.
+    /// The pairs (a, b) that may begin a set of interest.
+    ///
+    /// Returns the pairs, the pairs that may only begin a part, and whether they are complete.
     fn pairs(&mut self) -> (Vec<Pair>, Vec<Pair>, bool) {
         let graph = self.climb.graph;
         let ranks = graph.starts.len() - 1;
