@@ -190,7 +190,9 @@ pub enum Rejected {
         bound: usize,
     },
     /// A search without a proof found no set, or too small a set.
-    #[error("no pose found: the search met no set of {needed} points that one pose explains; at most {bound} are possible")]
+    #[error(
+        "no pose found: the search met no set of {needed} points that one pose explains; at most {bound} are possible"
+    )]
     NotFound {
         /// Upper bound of the size of a set.
         bound: usize,

@@ -42,7 +42,7 @@ pub struct Posterior {
     pub copies_sought: Option<bool>,
     /// Evidence of a pattern that continues beyond the object; `None` for an object without a pattern.
     pub repeated_pattern: Option<RepeatedPattern>,
-    /// The strongest evidence of structured clutter, which imitates the object; `None` without any.
+    /// The strongest evidence of structured clutter, which resembles the object; `None` without any.
     pub structured_clutter: Option<StructuredClutter>,
     /// The best pose elsewhere, for comparison with the answer.
     ///
@@ -63,7 +63,7 @@ pub(super) const COPY: f64 = 9.0;
 /// Markov's inequality with E Σ Λ = 1 under uniform clutter.
 const ACCIDENT: f64 = 3.0;
 
-/// ln of the prior probability that clutter imitates the object: so small that it matters only with evidence for it.
+/// ln of the prior probability that clutter resembles the object: so small that it matters only with evidence for it.
 const LN_RESEMBLES: f64 = -11.5;
 
 /// The posterior probabilities of the hypotheses.
@@ -134,8 +134,8 @@ impl Posterior {
     /// - A repeated pattern, alone or around the object, has the same prior probability.
     /// - A pose beside the best, in points that the best does not use, shows how much evidence clutter of this cloud
     ///   produces. Without the object, clutter would have produced the best pose with the same probability.
-    /// - Structured clutter ([`StructuredClutter`]): if another pose shows that clutter imitates the object, the best
-    ///   pose is an imitation, or the object stands among imitations.
+    /// - Structured clutter ([`StructuredClutter`]): if another pose shows that clutter resembles the object, the best
+    ///   pose is such clutter too, or the object is present beside such clutter.
     pub fn probabilities(&self, model: &[ModelPoint], limit: f64) -> PosteriorProbabilities {
         let Some(best) = self.explanations.first() else {
             return PosteriorProbabilities { map_estimate: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0, clutter: 0.0 };
@@ -144,7 +144,7 @@ impl Posterior {
             self.repeated_pattern.unwrap_or(RepeatedPattern { alone: f64::NEG_INFINITY, around: f64::NEG_INFINITY });
         let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
         let clutter = if beside > ACCIDENT { beside } else { 0.0 };
-        // The object among imitations, and imitations alone.
+        // The object beside structured clutter, and structured clutter alone.
         let among =
             self.structured_clutter.map_or(f64::NEG_INFINITY, |of| best.ln_evidence + of.ln_evidence + LN_RESEMBLES);
         let imitated = self.structured_clutter.map_or(f64::NEG_INFINITY, |of| among + of.ln_alone);

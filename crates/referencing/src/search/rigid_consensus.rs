@@ -47,8 +47,8 @@ use crate::Problem;
 /// The posterior holds further hypotheses:
 ///
 /// - A pattern that the object repeats in part continues beyond it, with or without the object: [`RepeatedPattern`].
-/// - Poses elsewhere explain more than uniform clutter would: clutter imitates the object, which may or may not be
-///   among the imitations ([`StructuredClutter`]).
+/// - Poses elsewhere explain more than uniform clutter would: clutter resembles the object, which may be present
+///   or absent ([`StructuredClutter`]).
 /// - Putative pairs confuse points of similar appearance: the model also fits the same places in another order, and
 ///   each of these orders is supported by several pairs.
 ///

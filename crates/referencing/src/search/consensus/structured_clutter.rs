@@ -1,4 +1,4 @@
-//! Structured clutter: evidence from the cloud itself that clutter imitates the object.
+//! Structured clutter: evidence from the cloud itself that clutter resembles the object.
 
 use nalgebra::Vector3;
 
@@ -9,19 +9,19 @@ use super::{
 };
 use crate::{Problem, search::alike::slack};
 
-/// The evidence of clutter that imitates the object, from a pose elsewhere.
+/// The evidence of clutter that resembles the object, from a pose elsewhere.
 ///
 /// Uniform clutter shows a pose of evidence Λ in about one of Λ frames. A pose *elsewhere* of that evidence, in places
 /// where the best pose has no point of the object, shows that clutter is not uniform: it repeats the object's own
-/// distances (as a grating that continues beyond a part of it). The best pose may then be such an imitation too.
+/// distances (as a grating that continues beyond a part of it). The best pose may then be such clutter too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructuredClutter {
-    /// ln evidence that clutter imitates the object (nats): that of the pose elsewhere, given its pairs that the best
+    /// ln evidence that clutter resembles the object (nats): that of the pose elsewhere, given its pairs that the best
     /// pose explains as the object's, over the places that the best pose leaves free.
     pub ln_evidence: f64,
-    /// ln likelihood ratio (nats) of absence over presence, given the imitation.
+    /// ln likelihood ratio (nats) of absence over presence, given that clutter resembles the object.
     ///
-    /// Absence: the best pose is an imitation too, with one visible fraction for the places of both poses. Presence:
+    /// Absence: the best pose is such clutter too, with one visible fraction for the places of both poses. Presence:
     /// the object has a visible fraction of its own.
     pub ln_alone: f64,
 }
@@ -31,7 +31,7 @@ pub(in crate::search) struct Occupied<'a> {
     pub(super) best: &'a Mode,
     /// Sorted along the first axis.
     places: Vec<Vector3<f64>>,
-    /// Model points that no clutter imitates: the points outside the pattern of a model with one.
+    /// Model points without a counterpart in clutter: the points outside the pattern of a model with one.
     distinctive: Vec<bool>,
 }
 
@@ -58,8 +58,8 @@ impl<'a> Occupied<'a> {
     ///
     /// Among its k′ pairs those whose cloud point lies at a place of the object are the object's own. Given these,
     /// which determine most of the pose, the other s of f free places have the evidence Λ(all)/Λ(own) with the
-    /// probability B(s, f). With k of n points at the best pose, an imitation shows both with the probability B(k + s,
-    /// n + f), the object with B(k, n)·B(s, f). Points that no clutter imitates count for the object alone.
+    /// probability B(s, f). With k of n points at the best pose, such clutter shows both with the probability B(k + s,
+    /// n + f), the object with B(k, n)·B(s, f). Points without a counterpart in clutter count for the object alone.
     pub(in crate::search) fn structured_clutter(
         &self,
         problem: &Problem<'_>,
