@@ -87,8 +87,7 @@ struct Level {
     held: Vec<Held>,
     after: Vec<After>,
     row: Vec<u64>,
-    /// Cost of each remaining pair by itself beside the members, and its fraction beside all others; empty if not
-    /// computed.
+    /// Cost of each remaining pair by itself beside the members, and its fraction beside all others; may be empty.
     costs: Vec<(f64, f64)>,
     /// Maximum contribution of each model point, less its cost.
     top: Vec<f64>,
@@ -455,8 +454,7 @@ mod tests {
         let starts =
             threes.filter_map(|(i, j, k)| three(i, j, k)).chain(prior_terms.known.as_ref().map(|known| known.motion));
         let at = |start: Motion| {
-            // A fit from a bad start is slow; short of its end the pose is not that of the pairs and has a larger
-            // volume.
+            // A fit from a bad start is slow; short of its end the pose is not that of the pairs.
             let (motion, factor) = fit(terms, prior_terms, members, &start, 60)?;
             let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
             let filled = (prior_terms.ln_peak + ln_volume(&factor)).min(0.0);

@@ -128,8 +128,7 @@ pub(in crate::search) struct Seeds<'a> {
     common: Vec<u64>,
     /// The members of the best modes that hold both vertices of a pair.
     again: Vec<u64>,
-    /// Memory of the search: free neighbours of one or two vertices, choices after each model point, neighbours of
-    /// three.
+    /// Memory: free neighbours of one or two vertices, choices after each model point, neighbours of three.
     held: Vec<Held>,
     after: Vec<After>,
     of_three: Vec<usize>,
@@ -357,8 +356,7 @@ impl<'a> Seeds<'a> {
         self.modes.iter().take(COMPARED).any(|mode| three.iter().all(|&v| mode.holds(v)))
     }
 
-    /// Follows a triple whose distance residual costs `lost` (nats): its pose, the pairs within the gate, and their
-    /// mode.
+    /// Follows a triple with the distance residual `lost` (nats): its pose, the pairs within the gate, their mode.
     fn follow(&mut self, three: [usize; 3], lost: f64) {
         self.spent += COST_OF_A_POSE;
         let Climb { terms, graph, .. } = self.climb;
