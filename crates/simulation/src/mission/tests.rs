@@ -250,7 +250,7 @@ fn numbers_that_make_no_mission_are_refused() {
     assert!(message(Mission { water: water(-1.0), ..small() }).starts_with("water.attenuation = -1; give a number"));
     assert!(message(Mission { frames: 0, ..small() }).starts_with("frames = 0; give"));
     assert!(message(Mission { rate: f64::NAN, ..small() }).starts_with("rate = NaN; give"));
-    assert!(message(Mission { site: "atlantis".into(), ..small() }).starts_with("no site is called `atlantis`"));
+    assert!(message(Mission { site: "atlantis".into(), ..small() }).starts_with("unknown site `atlantis`"));
     let route = Route { object: "tree-z".into(), kind: RouteKind::Orbit, ..Route::default() };
     assert!(message(Mission { route, ..small() }).starts_with("route.object = `tree-z`; give one of "));
     let flat = Port { kind: PortKind::Flat, water: 0.5, ..Port::default() };
