@@ -160,7 +160,10 @@ fn a_gate_is_not_entered_where_it_is_empty() {
     let posts = Written::new("posts", &points, [0.2, -0.2, 0.0], 0.1, &bodies);
     let at = |stand_off| posts.mission(Route { stand_off, altitude: 5.0, ..Route::default() });
     let near = at(1.5).plan(3, 0, Path::new("")).unwrap_err()[0].to_string();
-    assert!(near.contains("no clear view of `posts/gauge`") && near.contains("are within 0.5 m of a shell"), "{near}");
+    assert!(
+        near.contains("no clear view of `posts/gauge`") && near.contains("are within 0.5 m of a bounding box"),
+        "{near}"
+    );
     assert_eq!(looked_at(&at(4.0)), 1);
 }
 
@@ -175,7 +178,7 @@ fn what_cannot_be_examined_is_refused() {
         "{far}"
     );
     let none = said(&mission("random", Route::default()));
-    assert!(none.contains("the site has no point to inspect"), "{none}");
+    assert!(none.contains("the site has no point of interest"), "{none}");
     let unknown = said(&mission("drill-centre", Route { object: "tree-z".into(), ..Route::default() }));
     assert!(unknown.contains("route.object = `tree-z`; give one of "), "{unknown}");
     // One object alone is a shorter way.

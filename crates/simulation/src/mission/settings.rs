@@ -131,12 +131,7 @@ impl Mission {
         within("start", self.start, 0.0, LONGEST)?;
         let end = self.start + if self.rate > 0.0 { self.frames as f64 / self.rate } else { 0.0 };
         in_range(end <= LONGEST, "frames / rate", format!("{end} s"), "a mission of two hours at most")?;
-        in_range(
-            self.rate > 0.0 || self.route.speed > 0.0,
-            "rate",
-            0.0,
-            "a rate above 0 Hz, or a route.speed above 0",
-        )?;
+        in_range(self.rate > 0.0 || self.route.speed > 0.0, "rate", 0.0, "a rate or a route.speed above 0")?;
         within("prior-position", self.prior_position, 0.0, 100.0)?;
         within("prior-attitude-deg", self.prior_attitude_deg, 0.0, 180.0)?;
         within("model-sigma", self.model_sigma, 0.0, 0.05)?;
@@ -168,7 +163,7 @@ impl Mission {
         }
         if !self.site.ends_with(".toml") {
             let names: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
-            let remedy = format!("there are {}, random, and files NAME.site.toml", names.join(", "));
+            let remedy = format!("give {}, random, or a file NAME.site.toml", names.join(", "));
             return Err(vec![
                 Fault::new(format!("unknown site `{}`", self.site), Path::new("source.site")).remedy(remedy),
             ]);

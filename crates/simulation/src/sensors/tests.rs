@@ -223,7 +223,7 @@ fn exact_ranges_report_the_place_that_asks() {
 #[test]
 fn transponders_that_give_no_position_are_refused() {
     let message = |transponders: Vec<[f64; 3]>| Lbl { transponders, ..Lbl::default() }.check().unwrap_err();
-    assert_eq!(message(vec![[0.0; 3]; 2]), "sensors.lbl.transponders = 2; give 3 to 8 places, or none");
+    assert_eq!(message(vec![[0.0; 3]; 2]), "sensors.lbl.transponders = 2; give 3 to 8 positions, or none");
     let twice = message(vec![[0.0; 3], [50.0, 0.0, 0.0], [0.0; 3]]);
     assert!(twice.starts_with("sensors.lbl.transponders[2] = ") && !twice.contains('\n'), "{twice}");
     assert!(message(vec![[f64::NAN; 3]; 3]).contains("= NaN; give a number"));
