@@ -61,7 +61,13 @@ pub(super) fn faults(geometry: &Geometry, site: &Site, text: &str, file: &Path) 
         &["bed", "albedo"],
         "give a fraction from 0 to 1",
     );
-    check.within("rocks", geometry.seabed.rocks as f64, [0.0, 1000.0], &["bed", "rocks"], "give at most 1000 rocks");
+    check.within(
+        "rocks",
+        geometry.seabed.rocks as f64,
+        [0.0, 1000.0],
+        &["bed", "rocks"],
+        "give at most 1000 rocks for an object",
+    );
     for (i, material) in geometry.materials.iter().enumerate() {
         let path = ["material", &i.to_string(), "albedo"];
         check.within("albedo of a material", material.albedo, [0.0, 1.0], &path, "give a fraction from 0 to 1");
