@@ -1,4 +1,4 @@
-//! Laws of the simulated dives and images.
+//! Properties of simulated dives and images.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
 
