@@ -107,7 +107,7 @@ fn on_seabed(
 }
 
 /// [`Rendering::upon`] for many pixels of row `v`, with the same bits.
-#[expect(clippy::too_many_arguments, reason = "a slice of its own each: the compiler knows that none overlap")]
+#[expect(clippy::too_many_arguments, reason = "separate slices, which the compiler knows not to overlap")]
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn on_surface(
     sensor_frame: &SensorFrame<'_>,

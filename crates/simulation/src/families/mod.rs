@@ -10,7 +10,7 @@
 //! | b site-scale | 50 points on a box | M = 500–2000, 12–35 visible, σ 1–3 cm, in part 3σ in depth | gate 0.5 m |
 //! | c no-prior | 20–50 points on a box | M = 100–300, 60 % visible | none |
 //! | d putative | N = 100–10 000 points in a cube | M = N, 50–99 % of them outliers | the pairs (i, i) |
-//! | e lattice | a lattice and four points off it | two thirds visible, continued; near misses, clutter | gate 0.4 m or none |
+//! | e lattice | a lattice and four points off it | 2/3 visible, continued; near misses, clutter | gate 0.4 m or none |
 //! | f few-visible | 50 points on a box | M = 500–2000, 4–9 visible | gate 0.3–0.5 m |
 //! | g dense-clutter | 50 points on a box | M = 500–2000, 6–20 visible, all clutter in gates | gate 0.5 m |
 //!

@@ -136,6 +136,7 @@ fn families_are_known_by_their_letters() {
     assert!(Family::ALL.into_iter().all(|family| family.name().parse() == Ok(family)));
     assert_eq!(
         "h".parse::<Family>().unwrap_err(),
-        "unknown family `h`; give one of paper-scale, site-scale, no-prior, putative, lattice, few-visible, dense-clutter"
+        "unknown family `h`; give one of paper-scale, site-scale, no-prior, putative, lattice, few-visible, \
+         dense-clutter"
     );
 }

@@ -119,7 +119,7 @@ impl Facet {
     }
 
     /// The intersections of rays with the plane; with `BENT`, each ray has its own direction and origin.
-    #[expect(clippy::too_many_arguments, reason = "a slice of its own each: the compiler knows that none overlap")]
+    #[expect(clippy::too_many_arguments, reason = "separate slices, which the compiler knows not to overlap")]
     #[inline(always)]
     fn spots<const BENT: bool>(
         &self,

@@ -144,7 +144,7 @@ fn clip(corners: [Vector3<f64>; 3], edges: [bool; 3], kept: &mut [Corner; 4]) ->
 
 /// A triangle whose sides may bend, subdivided until they are straight to 1/50 px. A side is divided by its own length
 /// alone, so that the triangles on both of its sides stay joined.
-#[expect(clippy::too_many_arguments, reason = "a recursion hands on what it was given")]
+#[expect(clippy::too_many_arguments, reason = "a recursion passes its arguments on")]
 fn curved(
     corners: [Vector3<f64>; 3],
     places: [Option<Pixel>; 3],

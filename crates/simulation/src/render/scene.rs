@@ -70,7 +70,7 @@ struct Side {
 }
 
 impl Studio {
-    #[expect(clippy::too_many_arguments, reason = "each is one thing that does not change")]
+    #[expect(clippy::too_many_arguments, reason = "each is a constant part of the studio")]
     pub(crate) fn new(
         left: RenderCamera,
         right: RenderCamera,

@@ -184,8 +184,8 @@ impl<'a> Ground<'a> {
         let Refused { touching, outside, hidden, under } = refused;
         Err(format!(
             "route: no clear view of `{}` at north {:.2}, east {:.2}, depth {:.2} m from {} m within \
-             {OBLIQUE_DEG}° of its normal: {touching} places around it are within {} m of a bounding box, a body or the \
-             seabed, {outside} have it outside of the images, {hidden} have it occluded, {under} have no clear path \
+             {OBLIQUE_DEG}° of its normal: {touching} viewpoints are within {} m of a bounding box, a body or the seabed, \
+             the point is outside of the images from {outside} and occluded from {hidden}, {under} have no clear path \
              upward; change route.stand-off, route.clearance or rig.ahead-deg",
             point.name, point.at.x, point.at.y, point.at.z, self.route.stand_off, self.route.clearance
         ))
