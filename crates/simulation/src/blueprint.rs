@@ -144,8 +144,9 @@ impl Blueprint {
 }
 
 impl BoxPlan {
-    /// The design-frame position (x, y, height) of a place on the upper face, given from the face's centre along the
-    /// box's axes.
+    /// A place on the upper face in the design frame: x, y, height.
+    ///
+    /// `place` is measured from the face's centre along the box's axes.
     pub fn on_top(&self, place: [f64; 2]) -> [f64; 3] {
         let (sine, cosine) = libm::sincos(self.yaw_deg.to_radians());
         [

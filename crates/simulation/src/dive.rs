@@ -34,12 +34,11 @@ pub struct Dive {
     /// Number of frames, from 1 to 1 000 000; consecutive frames view consecutive objects. The default is ten of each
     /// of the seven objects.
     pub frames: usize,
-    /// Distance from the left camera to the centroid of the object's feature points (m), from 1 to 30.
+    /// Distance from the left camera to the object's centroid (m), from 1 to 30.
     pub distance: f64,
     /// Minimum and maximum angle between optical axis and vertical (degrees), from 0 to 40.
     pub tilt_deg: [f64; 2],
-    /// Maximum offset of the object's centroid from the centre of the common field of view (tangent of the angle), from
-    /// 0 to 1.
+    /// Maximum offset of the object's centroid from the view's centre (tangent of the angle), from 0 to 1.
     pub off_centre: f64,
     /// Number of the object's feature points that a view should show in both images. A view with fewer is taken only if
     /// no random view shows enough.
@@ -296,7 +295,7 @@ impl PlannedDive {
         Stream::new(self.seed, self.dive, frame as u64, purpose)
     }
 
-    /// The first of up to 100 random views that shows enough points of an object, or else the best of them.
+    /// The first random view that shows enough points of an object, or else the best one.
     fn view(&self, object: usize, stream: &mut Stream) -> PlacedRig<'_> {
         let body = &self.scene.bodies[object];
         let wanted = self.settings.min_visible.min(body.points.len());

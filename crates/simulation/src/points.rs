@@ -50,7 +50,7 @@ impl PlacedRig<'_> {
         self.places().iter().all(|from| scene.sees(from, corner)).then_some(pixels)
     }
 
-    /// The pixels of the surface point that the left camera sees at `pixel`, if the right camera sees it too.
+    /// The stereo pixels of the surface point at `pixel` of the left image, if both cameras see it.
     fn project_visible(&self, scene: &VirtualScene, pixel: &Pixel) -> Option<StereoPixels> {
         let [left, right] = self.places();
         let direction = self.rig.left().normalize(pixel)?.push(1.0);

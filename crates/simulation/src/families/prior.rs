@@ -26,7 +26,7 @@ pub(super) fn cube(stream: &mut Stream, half: f64) -> Vector3<f64> {
     Vector3::new(x, y, z)
 }
 
-/// A pose of the object at this distance ahead, with a random rotation and an offset of at most 0.5 m on each axis.
+/// A random pose of the object at this distance, at most 0.5 m off the optical axis on each axis.
 pub(super) fn ahead(stream: &mut Stream, distance: f64) -> Transform<Camera, Object> {
     let rotation = rotation(stream);
     let off = cube(stream, 0.5);

@@ -43,7 +43,7 @@ fn range(k: usize) -> f64 {
     REACH * t * t
 }
 
-/// The integral up to each range of the table along the ray from `from` in the unit direction `unit`.
+/// The integral along a ray up to each range of the table; `unit` is the unit direction.
 pub(crate) fn backscatter(water: &Water, lamps: &[Lamp], from: &Vector3<f64>, unit: &Vector3<f64>) -> [f64; RANGES] {
     let (b, c) = (water.b(), water.c());
     let lamps: Vec<_> = lamps.iter().map(|l| (Vector3::from(l.at), l.axis(), l.exponent(), l.power)).collect();

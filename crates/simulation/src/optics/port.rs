@@ -41,7 +41,7 @@ pub struct Port {
     pub thickness: f64,
     /// Inner radius of a dome (m), from 0.01 to 1.
     pub radius: f64,
-    /// Centre of a dome in the camera's frame (m), at most 0.9 of the radius from the pupil; zero is a centred dome.
+    /// Centre of a dome in the camera's frame (m); zero is centred. It lies within 0.9 of the radius from the pupil.
     pub offset: [f64; 3],
     /// Refractive index of the glass, from 1 to 3. The default is crown glass.
     pub glass: f64,
@@ -151,7 +151,7 @@ impl Port {
     }
 }
 
-/// The refraction of a unit direction in air by planes perpendicular to z, in the medium of index `n`.
+/// The refracted direction in a medium of index `n` behind planes across z.
 fn bent(unit: &Vector3<f64>, n: f64) -> Vector3<f64> {
     let (x, y) = (unit.x / n, unit.y / n);
     Vector3::new(x, y, (1.0 - x * x - y * y).sqrt())

@@ -27,7 +27,7 @@ pub struct Imager {
     pub gain: f64,
     /// Whether exposure time and gain follow the brightness of each pair.
     pub automatic: bool,
-    /// Target of automatic exposure for the brightest 2 % of the pixels, as a fraction of white, from 0.01 to 1.
+    /// Target brightness of automatic exposure as a fraction of white, from 0.01 to 1; 2 % of the pixels exceed it.
     pub target: f64,
     /// Full well capacity (electrons), from 100 to 1 000 000.
     pub full_well: f64,

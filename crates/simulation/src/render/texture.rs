@@ -153,7 +153,7 @@ impl SurfaceTextures {
         Self { surfaces: Default::default(), slow: OnceLock::new(), seed }
     }
 
-    /// The textures of this seed, shared by all dives planned at the same time, because a texture takes 22 MB.
+    /// The textures of this seed, shared by all concurrent dives; a texture takes 22 MB.
     pub(crate) fn shared(seed: u32) -> Arc<Self> {
         static ALL: Mutex<Vec<Weak<SurfaceTextures>>> = Mutex::new(Vec::new());
         let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! The visible facet of each pixel in a strip of rows, at its centre and at samples along edges.
+//! The visible facets of the pixels in a strip of rows, at centres and samples.
 
 use std::ops::Range;
 

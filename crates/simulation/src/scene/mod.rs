@@ -208,7 +208,7 @@ impl Scene {
         point.normal.is_none_or(|normal| normal.dot(&(from - point.at)) > 0.0) && self.clear(from, &point.at)
     }
 
-    /// The distance from a place to the nearest body or to the seabed, if it is below `limit` (m).
+    /// The distance to the nearest surface, if it is below `limit` (m).
     pub(crate) fn distance(&self, place: &Vector3<f64>, limit: f64) -> Option<f64> {
         let body = self.bvh.distance(&self.mesh.triangles, place, limit);
         // The slopes of the seabed are so small that the vertical distance is the distance.

@@ -92,8 +92,9 @@ impl RandomSite {
         }
     }
 
-    /// One object, whose design frame (x forward, y starboard, z down, origin on the seabed) is placed by
-    /// `world_from_design`.
+    /// One object, whose design frame is placed by `world_from_design`.
+    ///
+    /// The design frame is x forward, y starboard, z down, with its origin on the seabed.
     fn object(
         &self,
         index: usize,

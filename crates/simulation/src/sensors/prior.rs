@@ -32,13 +32,13 @@ struct Position {
     at: Vector3<f64>,
     /// Lever arm of that part in the body frame (m).
     lever: Vector3<f64>,
-    /// Variance of the independent noise on each axis (m²), and the covariance of the error that the next position
-    /// shares.
+    /// Variance of the independent noise on each axis (m²).
     noise: Vector3<f64>,
+    /// Covariance of the error that consecutive positions share (m²).
     common: Matrix3<f64>,
 }
 
-/// A pose with its position covariance in the world (m²) and attitude standard deviation of each axis (rad).
+/// A pose with the covariance of its position (world, m²) and the deviation of its attitude (rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SensorPrior {
     pub(crate) world_from_body: Transform<World, Body>,

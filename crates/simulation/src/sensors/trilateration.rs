@@ -12,8 +12,7 @@ const LIMITS: [f64; 6] = [0.0, 10.8, 13.8, 16.3, 18.5, 20.5];
 /// Standard deviation above which a direction counts as undetermined (m).
 const UNKNOWN: f64 = 1e3;
 
-/// A measured length with the standard deviations of its independent noise and of the error that later lengths share
-/// (m).
+/// A measured length with standard deviations of its independent and of its shared error (m).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Length {
     pub(super) value: f64,

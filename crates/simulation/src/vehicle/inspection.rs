@@ -19,7 +19,7 @@ const PLACES: i32 = 24;
 const HEADINGS: i32 = 4;
 /// Minimum distance of the inspected point from the image border, as a fraction of the shorter side.
 const BORDER: f64 = 0.1;
-/// Length of the line of sight before the point that may be occluded by its own relief (m).
+/// Length of the last part of a line of sight that the point's own relief may occlude (m).
 const RELIEF: f64 = 0.01;
 /// Step of the collision check along a leg (m).
 const STEP: f64 = 0.1;
@@ -184,14 +184,14 @@ impl<'a> Ground<'a> {
         let Refused { touching, outside, hidden, under } = refused;
         Err(format!(
             "route: no clear view of `{}` at north {:.2}, east {:.2}, depth {:.2} m from {} m within \
-             {OBLIQUE_DEG}° of its normal: {touching} viewpoints are within {} m of a bounding box, a body or the seabed, \
-             the point is outside of the images from {outside} and occluded from {hidden}, {under} have no clear path \
-             upward; change route.stand-off, route.clearance or rig.ahead-deg",
+             {OBLIQUE_DEG}° of its normal: {touching} viewpoints are within {} m of a bounding box, a body or the \
+             seabed, the point is outside of the images from {outside} and occluded from {hidden}, {under} have no \
+             clear path upward; change route.stand-off, route.clearance or rig.ahead-deg",
             point.name, point.at.x, point.at.y, point.at.z, self.route.stand_off, self.route.clearance
         ))
     }
 
-    /// The best heading of a view from the direction `from`, with the angle of the point from the image centre (rad).
+    /// The best view from the direction `from`, with the point's angle to the optical axis (rad).
     fn stand(&self, point: &Wanted, from: &Vector3<f64>, refused: &mut Refused) -> Option<(f64, Stand)> {
         let at = point.at + from * self.route.stand_off;
         let ahead = -from.xy();

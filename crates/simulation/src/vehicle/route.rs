@@ -27,7 +27,7 @@ pub enum RouteKind {
     Approach,
     /// The polyline through `waypoints`.
     Waypoints,
-    /// A stop at a view of each point of interest of `object` or of the site, from `stand-off`.
+    /// A stop at a view of each point of interest, from `stand-off`.
     Inspection,
 }
 
@@ -53,7 +53,7 @@ pub struct Route {
     pub object: String,
     /// Distance from a point of interest to the left camera (m), from 0.2 to 100.
     pub stand_off: f64,
-    /// Minimum distance of an inspection from bounding boxes and from all other surfaces (m), from 0 to 100.
+    /// Minimum distance of an inspection from bounding boxes and surfaces (m), from 0 to 100.
     pub clearance: f64,
     /// Duration of the stop at each view of an inspection (s), from 0 to 600.
     pub hold: f64,
