@@ -33,7 +33,7 @@ pub enum FaultyDevice {
 pub enum FaultKind {
     /// No reading arrives; images are black.
     Off,
-    /// The last reading before the fault is repeated.
+    /// The last reading before the fault is repeated; images repeat the first frame of the fault.
     Stuck,
     /// Random values arrive.
     Garbage,
@@ -43,7 +43,7 @@ pub enum FaultKind {
     Slow,
     /// Readings arrive `amount` seconds late; images show the view of `amount` seconds ago.
     Delayed,
-    /// Each reading is lost with the probability `amount`.
+    /// Each reading is lost with the probability `amount`; a lost image is black.
     Intermittent,
 }
 
