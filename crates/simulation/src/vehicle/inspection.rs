@@ -21,7 +21,7 @@ const HEADINGS: i32 = 4;
 const BORDER: f64 = 0.1;
 /// Length of the last part of a line of sight that the point's own relief may occlude (m).
 const RELIEF: f64 = 0.01;
-/// Step of the collision check along a leg (m).
+/// Step of the collision check along a segment (m).
 const STEP: f64 = 0.1;
 /// Heights above the altitude that are tried on the path between two views (m).
 const RAISED: [f64; 5] = [0.0, 1.0, 2.0, 4.0, 8.0];
@@ -62,7 +62,7 @@ struct Refused {
 /// Plans the route along the points of interest of all objects, or of one. `scene` is the site as built, which is the
 /// planner's knowledge.
 ///
-/// Nearest neighbour and 2-opt order the views. The vehicle moves from one view to the next straight if that leg is
+/// Nearest neighbour and 2-opt order the views. The vehicle moves from one view to the next straight if that segment is
 /// clear, or else climbs to the route's altitude, crosses and descends.
 pub(super) fn planned(
     route: &Route,
@@ -147,7 +147,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Whether a straight leg from stop to stop is clear at every heading of the vehicle.
+    /// Whether a straight segment from stop to stop is clear at every heading of the vehicle.
     fn clear_along(&self, a: &Stand, b: &Stand) -> bool {
         let mut segment = Along::new(*a, 2.0 * ROUNDING);
         segment.go(*b);
@@ -279,7 +279,7 @@ fn short(views: &[Stand]) -> Vec<usize> {
         let left = (0..n).filter(|k| !order.contains(k));
         order.extend(left.min_by(|&i, &k| far(last, i).total_cmp(&far(last, k))));
     }
-    // Reversing the part i..=k exchanges the two legs at its ends; an end of the path has none.
+    // Reversing the part i..=k exchanges the two segments at its ends; an end of the path has none.
     loop {
         let mut better = false;
         for i in 0..n {
