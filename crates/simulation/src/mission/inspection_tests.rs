@@ -122,8 +122,8 @@ fn looked_at(mission: &Mission) -> usize {
 /// Every point of interest is inspected on all built-in sites, and under a roof that hides it from straight above.
 ///
 /// The roof is 0.3 m wide and 0.6 m above the point, so views from 15° and more to the side are clear. Regression:
-/// accepting views outside of the images, moving on without a stop at the corner of a segment, and accepting occluded views
-/// fail this test.
+/// accepting views outside of the images, moving on without a stop at the corner of a segment, and accepting occluded
+/// views fail this test.
 #[test]
 fn every_point_is_examined_and_no_gate_is_touched() {
     for (site, _) in BUILT_IN {

@@ -5,8 +5,8 @@ const MAX: usize = 8;
 
 /// The area of a pixel inside its sides.
 ///
-/// The pixel is the unit square about the origin. The inside of a side [a, b, c] is a·x + b·y + c ≥ 0; at most
-/// four sides are given. The square is clipped by Sutherland and Hodgman (1974), and the shoelace formula gives the area.
+/// The pixel is the unit square about the origin. The inside of a side [a, b, c] is a·x + b·y + c ≥ 0; at most four
+/// sides are given. The square is clipped by Sutherland and Hodgman (1974), and the shoelace formula gives the area.
 pub(super) fn area(sides: &[[f64; 3]]) -> f64 {
     let mut corners = [[0.0; 2]; MAX];
     corners[..4].copy_from_slice(&[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]);
