@@ -42,7 +42,7 @@ impl Component for Fuse {
                                   Barfoot, Furgale, Associating uncertainty with three-dimensional poses, 2014";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "a probability between 0 and 1")
+        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "a number in (0, 1)")
     }
 }
 

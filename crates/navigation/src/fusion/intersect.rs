@@ -31,12 +31,13 @@ impl Default for Intersect {
 
 impl Component for Intersect {
     const NAME: &'static str = "intersect";
-    const SUMMARY: &'static str = "a consistent fix is combined with the known pose, valid for any correlation of their errors";
+    const SUMMARY: &'static str =
+        "a consistent fix is combined with the known pose, valid for any correlation of their errors";
     const SOURCE: &'static str = "Julier, Uhlmann, A non-divergent estimation algorithm in the presence of unknown \
                                   correlations, American Control Conference 1997";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "a probability between 0 and 1")
+        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "a number in (0, 1)")
     }
 }
 

@@ -32,7 +32,7 @@ impl Component for ProtectionLevel {
 
     fn check(&self) -> Result<(), String> {
         in_range(self.limit > 0.0 && self.limit.is_finite(), "limit", self.limit, "a length above 0 (m)")?;
-        in_range(self.risk > 0.0 && self.risk < 1.0, "risk", self.risk, "a probability between 0 and 1")
+        in_range(self.risk > 0.0 && self.risk < 1.0, "risk", self.risk, "a number in (0, 1)")
     }
 }
 
