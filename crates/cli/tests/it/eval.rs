@@ -82,8 +82,8 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     fs::write(folder.path().join("empty.tum"), "# nothing\n").unwrap();
     for (arguments, code, words) in [
         (&["truth.tum", "later.tum"][..], 3, "only 0 of 50 and 50 poses belong together"),
-        (&["truth.tum", "line.tum", "-a"], 3, "one point, or one line"),
-        (&["truth.tum", "short.tum", "-a"], 3, "2 poses; an alignment takes 3"),
+        (&["truth.tum", "line.tum", "-a"], 3, "a point or a line"),
+        (&["truth.tum", "short.tum", "-a"], 3, "2 poses; an alignment needs at least 3"),
         (&["truth.tum", "few.kitti"], 3, "without stamps"),
         (&["truth.tum", "seven.tum"], 3, "7 columns in seven.tum:1"),
         (&["truth.tum", "empty.tum"], 3, "without poses in empty.tum"),

@@ -1,10 +1,10 @@
-//! Many tests at once.
+//! Correction for multiple tests.
 
-/// p-values adjusted for the size of their family (Holm, A simple sequentially rejective multiple test procedure,
-/// 1979), in the order of `p`.
+/// The p-values adjusted for the size of their family (Holm, A simple sequentially rejective multiple test procedure,
+/// 1979).
 ///
-/// With p₍₁₎ ≤ … ≤ p₍ₘ₎ the adjusted p₍ᵢ₎ is max over j ≤ i of min(1, (m − j + 1) p₍ⱼ₎): below α, with a chance of at most
-/// α of any false claim in the whole family.
+/// They are in the order of `p`. With p₍₁₎ ≤ … ≤ p₍ₘ₎ the adjusted p₍ᵢ₎ is the maximum over j ≤ i of min(1, (m − j + 1)
+/// p₍ⱼ₎). Claims with an adjusted value below α have a probability of at most α of any false claim in the family.
 ///
 /// ```
 /// assert_eq!(seafix_evaluation::holm(&[0.01, 0.04, 0.03]), [0.03, 0.06, 0.06]);
