@@ -133,17 +133,19 @@ pub fn place_at(text: &str, offset: usize) -> (usize, usize) {
     (line_at(text, offset), 1 + before[start..].iter().filter(|&&b| b & 0xC0 != 0x80).count())
 }
 
-/// The line (from 1) of the key at `path` in a TOML text, or of its nearest existing table.
+/// The line (from 1) of the key at `path` in a TOML text.
 ///
-/// Numbers in the path are indices of arrays: `["object", "2", "id"]`.
+/// If the key does not exist, it is the line of the nearest existing table above. Numbers in the path are indices of
+/// arrays: `["object", "2", "id"]`.
 pub fn line_of(text: &str, path: &[&str]) -> Option<usize> {
     place_of(text, path, Part::Key).map(|(_, (line, _))| line)
 }
 
-/// The line and column of the key at `path` or of its value, and the number of steps of `path` that exist.
+/// The position of the key at `path` or of its value, in a TOML text.
 ///
-/// The number is smaller than the path's length if only a table above exists. For a table as value the place is that of
-/// its key. A component given by its bare name counts as having a `name`.
+/// The result is (number of existing steps of `path`, (line, column)). The number is smaller than the path's length if
+/// only a table above exists. The position of a table is that of its key. A component given by its bare name counts as
+/// having a `name`.
 pub fn place_of(text: &str, path: &[&str], part: Part) -> Option<(usize, (usize, usize))> {
     let (document, _) = toml::de::DeTable::parse_recoverable(text);
     let mut place = None;

@@ -12,7 +12,9 @@ pub fn read_text(path: &Path) -> Result<String, Fault> {
     read_long_text(path, 64 << 20)
 }
 
-/// The text of a file of at most `limit` bytes, for files that programs write and that grow with a run.
+/// The text of a file of at most `limit` bytes.
+///
+/// It serves files that programs write and that grow with a run.
 ///
 /// # Errors
 /// As [`read_text`].

@@ -66,13 +66,14 @@ pub fn transfer_bound(
     (sum / model.len() as f64).sqrt()
 }
 
-/// The relative nonlinearity of the projection within the bound (Bates and Watts, *Relative curvature measures of
-/// nonlinearity*, 1980).
+/// The relative nonlinearity of the projection within the bound.
 ///
 /// It is the RMS of the whitened pixel residual that J ξ leaves, relative to that of J ξ, over poses at √6 standard
 /// deviations along twelve directions that span the bound. A small value (0.1) means that the bound's Gaussian
 /// describes the poses nearby; it does not exclude a distant local minimum. `None` if one of these poses does not see a
 /// point.
+///
+/// Source: Bates and Watts, *Relative curvature measures of nonlinearity*, 1980.
 pub fn nonlinearity(
     rig: &StereoRig,
     object_from_camera: &Transform<Object, Camera>,

@@ -66,11 +66,12 @@ pub fn nees(
     Some(error.dot(&information.solve(&error)))
 }
 
-/// The RMS error of a point at distance `arm` (m) from a point with a known error, over all directions of the arm (m).
+/// The RMS error (m) at the distance `arm` (m) from a point with a known error.
 ///
-/// The known point is displaced by `displacement` (m), and the estimate is rotated by `angle` (rad). With E = (R, t)
-/// and a unit vector u, ‖E(c + a·u) − (c + a·u)‖² = ‖E·c − c + a·(R − I)·u‖². Averaged over u the mixed term vanishes,
-/// and the mean of ‖(R − I)·u‖² is tr((R − I)ᵀ(R − I)) / 3 = 8/3·sin²(θ/2).
+/// The known point is displaced by `displacement` (m), and the estimate is rotated by `angle` (rad); the mean is over
+/// all directions of the arm. With E = (R, t) and a unit vector u, ‖E(c + a·u) − (c + a·u)‖² = ‖E·c − c + a·(R −
+/// I)·u‖². Averaged over u the mixed term vanishes, and the mean of ‖(R − I)·u‖² is tr((R − I)ᵀ(R − I)) / 3 =
+/// 8/3·sin²(θ/2).
 pub fn lever_arm_error(displacement: f64, angle: f64, arm: f64) -> f64 {
     (displacement * displacement + 8.0 / 3.0 * (arm * (0.5 * angle).sin()).powi(2)).sqrt()
 }
@@ -109,8 +110,9 @@ mod tests {
         assert!((attitude_error(&pose(0.0, 0.3), &pose(0.0, 0.1)) - 0.2).abs() < 1e-15);
     }
 
-    /// A rotation by 90° moves a point at one metre by √2 m across the axis and by zero along it. The test fails with
-    /// 4/3 for 8/3.
+    /// A rotation by 90° moves a point at one metre by √2 m or, along the axis, not at all.
+    ///
+    /// The test fails with 4/3 for 8/3.
     #[test]
     fn a_lever_arm_shows_the_turn() {
         let (angle, arm) = (std::f64::consts::FRAC_PI_2, 1.0);
@@ -149,8 +151,9 @@ mod tests {
         assert!((n - 1.0).abs() < 1e-12);
     }
 
-    /// A pose with errors of 3° and 5 cm in depth, and an exact direction of the centroid: the rotation does not enter
-    /// the displacement of the centroid.
+    /// A pose with errors of 3° and of 5 cm in depth, and an exact direction of the centroid.
+    ///
+    /// The rotation does not enter the displacement of the centroid.
     #[test]
     fn the_centroid_is_a_point_of_the_object() {
         let estimate = pose(0.0, 0.0);

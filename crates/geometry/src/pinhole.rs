@@ -140,7 +140,9 @@ pub enum BadCamera {
 }
 
 impl Pinhole {
-    /// A camera with this image size, fx, fy, cx, cy (px), and 0, 4, 5 or 8 distortion coefficients.
+    /// A camera with this image size, fx, fy, cx, cy (px) and lens distortion.
+    ///
+    /// The distortion has 0, 4, 5 or 8 coefficients.
     ///
     /// # Errors
     /// A [`BadCamera`] that names the invalid number.

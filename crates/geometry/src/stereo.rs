@@ -86,7 +86,7 @@ impl StereoRig {
         Self { left: self.right, right: self.left, right_from_left, essential }
     }
 
-    /// The rig with the right camera rotated in place by the rotation vector `turn` (rad), in its own frame.
+    /// The rig with the right camera rotated in place by the rotation vector `turn` (rad, its own frame).
     pub fn with_right_turned(&self, turn: &Vector3<f64>) -> Self {
         let turn =
             Transform::<RightCamera, RightCamera>::new(UnitQuaternion::from_scaled_axis(*turn), Vector3::zeros());
@@ -153,8 +153,7 @@ impl StereoRig {
         Some(StereoPixels { left, right })
     }
 
-    /// The projections as in [`project`](Self::project), with the derivative of (u left, v left, u right, v right) by
-    /// the point (px/m).
+    /// The projections of `point` with their derivatives (px/m), in the order of [`StereoPixels::coordinates`].
     pub fn project_with_jacobian(&self, point: &Point<Camera>) -> Option<(StereoPixels, Matrix4x3<f64>)> {
         let (left, by_left) = self.left.project_with_jacobian(point)?;
         let (right, by_right) = self.right.project_with_jacobian(&(self.right_from_left * *point))?;

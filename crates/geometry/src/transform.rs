@@ -176,7 +176,7 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         (self.inverse() * *truth).log()
     }
 
-    /// The same motion between other frames, for a problem that is solved in the role of another one.
+    /// The same motion with other frame types, for a problem solved in the role of another.
     ///
     /// Examples: an earlier cloud of odometry in the role of a model; an object's frame as the frame of the site.
     pub fn relabel<C: Frame, D: Frame>(&self) -> Transform<C, D> {

@@ -8,8 +8,7 @@ use crate::RelativeMotion;
 /// The maximum number of correlated errors.
 pub(crate) const CORRELATED: usize = 10;
 
-/// The cross-covariance of a pose error, or the derivative of a step's error, with respect to the correlated errors:
-/// one column each.
+/// Derivatives by, or cross-covariances with, the correlated errors: one column each.
 pub(crate) type CorrelatedSensitivities = SMatrix<f64, 6, CORRELATED>;
 
 /// The correlated part of an odometry step's error.

@@ -43,7 +43,7 @@ pub enum Event {
     Left,
     /// The fix contradicts the navigated pose; it waits for further fixes that agree with it.
     Doubted(Contradiction),
-    /// The fix and those before it agree with each other, but not with the known pose relative to the same object.
+    /// Several fixes agree with each other, but not with the known pose relative to their object; they replace it.
     Relocated,
     /// The fix and those before it agree with each other, but not with another object. One of the two objects is
     /// displaced, and no third object has shown which. Neither placement is changed.
@@ -62,7 +62,7 @@ pub enum Event {
 pub struct Displacement {
     /// The object, as its index in the site.
     pub object: usize,
-    /// The transform from the new pose of the object to the old one, in the object's own frame.
+    /// The transform from the new to the old pose, in the object's own frame.
     pub old_from_new: Transform<Object, Object>,
     /// The new placement.
     pub place: ObjectPlacement,

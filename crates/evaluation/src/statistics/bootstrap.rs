@@ -16,13 +16,14 @@ const MANY: usize = 20_000;
 /// The last resamples of more than [`MANY`] values: a report requests them repeatedly, from several threads.
 static LAST: Mutex<Option<Arc<Resamples>>> = Mutex::new(None);
 
-/// The percentile bootstrap over blocks of consecutive values (Politis and Romano, A circular block-resampling
-/// procedure for stationary data, 1992).
+/// The circular block bootstrap with percentile intervals (Politis and Romano, 1992).
 ///
 /// Neighbouring frames of a trajectory are not independent. A resample consists of blocks of `block` consecutive
 /// values, drawn with replacement from uniform starts on a circle of n values, until it has n values. `block` 1 is
 /// Efron's bootstrap of independent values. A resample is a list of *indices*, so that a paired statistic uses the same
 /// indices in both samples.
+///
+/// Source: Politis and Romano, *A circular block-resampling procedure for stationary data*, 1992.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bootstrap {
     /// Number of resamples.
@@ -143,7 +144,7 @@ impl Bootstrap {
     }
 }
 
-/// The blocks of all resamples, sorted by their start, so that sums pass through the values in order.
+/// The blocks of all resamples, sorted by their start: sums then read the values in order.
 #[derive(Debug)]
 struct Resamples {
     /// The bootstrap and the number of values of this set.

@@ -30,7 +30,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// A pose as its file stores it: reference from body.
 ///
-/// The rotation remains a matrix. In a KITTI file it is orthonormal to six digits only, and a correction would change
+/// The rotation remains a matrix: KITTI files have it orthonormal to six digits only, and a correction would change
 /// errors relative to other programs.
 /// would change the errors that other programs print.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -80,10 +80,10 @@ fn a_covariance_by_hand() {
     assert_eq!((uneven.matrix[(0, 1)], uneven.matrix[(1, 0)]), (1.0, 1.0));
 }
 
-/// A rotation about z and a translation along x by the same noise a move the point at (0, d, 0) by a (d − 1) along x,
-/// by Exp(−ξ).
+/// A rotation about z and a translation along x by the same noise a may cancel at a point.
 ///
-/// With the sign of either part of J inverted it would be a (d + 1).
+/// The point at (0, d, 0) moves by a (d − 1) along x, by Exp(−ξ). With the sign of either part of J inverted it would
+/// move by a (d + 1).
 #[test]
 fn a_turn_and_a_step_may_cancel_at_a_point() {
     let xi = Vector6::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0);

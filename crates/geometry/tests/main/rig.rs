@@ -223,10 +223,10 @@ fn rays_that_part_meet_behind() {
     }
 }
 
-/// Rays that approach in front of the left camera and behind the right one, with their midpoint in front of both.
+/// Rays that approach in front of the left camera and behind the right one.
 ///
-/// The left ray runs along z from the origin. The right camera is at (0.3, 0, 0); its ray b = (0.1, 0.9, −0.42) is
-/// nearest at u = −0.3 bₓ / (bₓ² + b_y²) of b.
+/// Their midpoint is in front of both cameras. The left ray runs along z from the origin. The right camera is at (0.3,
+/// 0, 0); its ray b = (0.1, 0.9, −0.42) is nearest at u = −0.3 bₓ / (bₓ² + b_y²) of b.
 #[test]
 fn a_ray_is_not_followed_backwards() {
     let b = Vector3::new(0.1, 0.9, -0.42);

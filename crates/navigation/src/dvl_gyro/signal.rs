@@ -15,7 +15,7 @@ pub(super) struct Value {
     pub(super) at: Vector3<f64>,
     /// Spectral density of the reading noise: its contribution to the covariance of the integral per second.
     pub(super) noise: Matrix3<f64>,
-    /// The contribution of a random walk of unit density to the variance of the integral per second, for each axis.
+    /// Spectral density of the integral, for each axis, that a random walk of unit density contributes.
     pub(super) wander: f64,
     /// Whether the value is extrapolated from the last reading; later readings will correct it.
     pub(super) held: bool,

@@ -10,9 +10,10 @@ use crate::Lost;
 
 /// The gate of a partner: the 99 % quantile of χ²₃.
 const GATE: f64 = 11.345;
-/// Minimum ratio of the number of partners to that at wrong positions, half the reach to each side.
+/// Minimum ratio of the number of partners to the number at wrong positions.
 ///
-/// Even a cloud of other ground has slightly more partners at its best position than elsewhere.
+/// The wrong positions are half the reach to each side. Even a cloud of other ground has slightly more partners at its
+/// best position than elsewhere.
 const BEYOND_NFA: usize = 2;
 /// Factor by which the reach narrows at each level, down to the fraction `NARROWEST`.
 const NARROWING: f64 = 0.5;

@@ -55,9 +55,10 @@ fn normal(spread: &Square, units: &Units) -> Square {
     })
 }
 
-/// The conditional distribution of a motion's error ξ and the final correlated errors n′, given the initial ones n:
+/// The conditional distribution of a motion's error ξ and the final correlated errors n′.
 ///
-/// (ξ, n′) = F n + w, with w of information Λ, the Schur complement of their joint covariance.
+/// Given the initial errors n it is (ξ, n′) = F n + w, with w of information Λ (from the Schur complement of the joint
+/// covariance).
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Drift {
     by: SMatrix<f64, BOTH, CORRELATED>,

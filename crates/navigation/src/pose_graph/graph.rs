@@ -546,7 +546,7 @@ impl GraphSolution {
     }
 }
 
-/// The derivative of ξ = β − Ad(B⁻¹ A) α by (α, β), for the motion from A to B.
+/// The derivative of ξ = β − Ad(B⁻¹ A) α by (α, β).
 fn between(motion: &Transform<Camera, Camera>) -> SMatrix<f64, 6, 12> {
     let mut by = SMatrix::<f64, 6, 12>::zeros();
     by.fixed_view_mut::<6, 6>(0, 0).copy_from(&-motion.inverse().adjoint());

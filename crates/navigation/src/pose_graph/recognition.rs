@@ -396,7 +396,7 @@ impl<'a> PlaceRecognizer<'a> {
     }
 }
 
-/// The motion from a key frame as an `ObjectPose`, with the key frame in the place of the object.
+/// The motion from a key frame, with the key frame in the role of the object.
 fn as_object_pose(local: &RelativeMotion) -> ObjectPose {
     ObjectPose::new(local.motion.relabel::<Object, Camera>(), Covariance6::new(local.covariance.matrix))
 }

@@ -187,10 +187,10 @@ fn the_same_appearance_elsewhere_contradict_what_is_known() {
     assert!(recognizer.recognize(&stereo_features, &[at(near), at(near)], NOTHING).is_ok());
 }
 
-/// The result of a simulated dive of forty half-metre steps out and back, with one fix at the start.
+/// The result of a simulated dive of forty half-metre steps out and back.
 ///
-/// It holds the error and covariance of the last pose, by the pose graph and by odometry alone, and the numbers of
-/// added and recognised key frames.
+/// There is one fix, at the start. The result holds the error and covariance of the last pose, by the pose graph and by
+/// odometry alone, and the numbers of added and recognised key frames.
 struct Dived {
     pose_graph: (Vector6<f64>, Matrix6<f64>),
     odometry: (Vector6<f64>, Matrix6<f64>),

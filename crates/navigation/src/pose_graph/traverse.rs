@@ -31,7 +31,9 @@ pub struct PoseGraphSettings {
     /// Minimum path length (m) between adding a key frame and matching it again; over shorter paths odometry is more
     /// accurate.
     pub min_loop_distance: f64,
-    /// Minimum fraction of the view, above 0 and at most 1, that a candidate key frame may cover.
+    /// Minimum coverage of the view by a candidate key frame, above 0 and at most 1.
+    ///
+    /// The coverage is the largest one within the position uncertainty.
     pub min_overlap: f64,
     /// Minimum time (s) between two visits of an object or key frame.
     ///
@@ -127,7 +129,7 @@ struct Pass {
     seconds: f64,
 }
 
-/// Maximum ratio of standard deviations at which a fix or loop replaces the best one of its visit or pass.
+/// Maximum ratio of standard deviations at which a fix or loop replaces the best one so far.
 const CLEARLY: f64 = 0.8;
 
 /// A dive along a pose graph.

@@ -26,7 +26,7 @@ pub(crate) struct Rules {
 }
 
 impl Rules {
-    /// The distance (px) beyond which a point counts as being at another position, not as a bad measurement.
+    /// The distance (px) beyond which a point has moved, as opposed to a bad measurement.
     pub(crate) fn elsewhere(&self) -> f64 {
         3.0 * self.px
     }
@@ -107,7 +107,7 @@ pub(crate) fn is_still(best: &Consensus, data: &Observations<'_>, rig: &StereoRi
     still as f64 >= STILL * best.inliers.len() as f64
 }
 
-/// The number of inliers of the best competing motion, among points far from the prediction of the first one.
+/// The number of inliers of the best motion among points that contradict the first one.
 pub(crate) fn competitor(
     best: &Consensus,
     data: &Observations<'_>,

@@ -141,7 +141,7 @@ fn expect(
     Some([one(0)?, one(1)?])
 }
 
-/// Whether the border of a patch moves by less than 0.02 px, so that no deformation is needed.
+/// Whether the border of a patch moves by less than 0.02 px; no deformation is needed then.
 fn nearly_still(shape: &Matrix2<f64>) -> bool {
     (shape - Matrix2::identity()).abs().max() * 8.0 < 0.02
 }

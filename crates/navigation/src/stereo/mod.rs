@@ -79,7 +79,7 @@ pub struct Stereo {
     pub landmarks: usize,
     /// Minimum distance of a new landmark from others (px).
     pub apart_px: f64,
-    /// Fraction of the last key frame's landmarks, 0 to 1, below which a pair becomes a key frame.
+    /// Fraction of the last key frame's landmarks below which a pair becomes a key frame, 0 to 1.
     pub keyframe_fraction: f64,
     /// Number of key frames in the bundle adjustment, 1 to 100; 1 disables it.
     pub window: usize,

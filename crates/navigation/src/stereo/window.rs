@@ -14,11 +14,11 @@ const STEPS: usize = 10;
 /// Convergence threshold: relative decrease of the cost.
 const MIN_GAIN: f64 = 1e-4;
 
-/// Robust bundle adjustment of the key frames from `first` on and of all landmarks that two of them observe.
+/// Robust bundle adjustment of the key frames from `first` on and of their common landmarks.
 ///
-/// It minimises Σ ρ(rᵀ S⁻¹ r) over all observations with the Cauchy loss ρ. The landmarks are eliminated first (Schur
-/// complement). Key frames before `first` are fixed and define the gauge. Observations that are outliers at the end are
-/// dropped.
+/// It minimises Σ ρ(rᵀ S⁻¹ r) over all observations of landmarks that at least two key frames observe, with the Cauchy
+/// loss ρ. The landmarks are eliminated first (Schur complement). Key frames before `first` are fixed and define the
+/// gauge. Observations that are outliers at the end are dropped.
 pub(super) fn adjust(rig: &StereoRig, frames: &mut [WindowKeyFrame], landmarks: &mut [Landmark], first: usize) {
     let count = frames.len() - first;
     let active: Vec<usize> = (0..landmarks.len())
