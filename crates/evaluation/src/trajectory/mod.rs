@@ -32,7 +32,6 @@ use nalgebra::{Matrix3, Vector3};
 ///
 /// The rotation remains a matrix: KITTI files have it orthonormal to six digits only, and a correction would change
 /// errors relative to other programs.
-/// would change the errors that other programs print.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// The axes of the body in the reference frame, as columns.

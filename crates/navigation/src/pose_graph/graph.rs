@@ -129,7 +129,6 @@ impl FactorGraph {
     ///
     /// # Errors
     /// [`NoCovariance`] if the covariance is not positive definite.
-    /// [`NoCovariance`].
     pub fn between(
         &mut self,
         from: usize,

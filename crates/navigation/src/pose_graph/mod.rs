@@ -73,7 +73,6 @@ pub struct PriorPose {
 /// A pose graph: pose nodes, the measurements between them, and the objects of the site.
 ///
 /// A later run may extend the graph of an earlier one: objects and key frames that both have seen connect them.
-/// again, joins them in one graph.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PoseGraph {
     /// Names and placements of the objects.
