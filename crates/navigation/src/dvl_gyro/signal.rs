@@ -24,8 +24,8 @@ pub(super) struct Value {
 impl Signal {
     /// Inserts a reading in order of time.
     ///
-    /// A second reading of the same instant is ignored. So is a noisy reading with the same value as its neighbour, bit for
-    /// bit: the device repeats an old output.
+    /// A second reading of the same instant is ignored. So is a noisy reading with the same value as its neighbour, bit
+    /// for bit: the device repeats an old output.
     pub(super) fn insert(&mut self, reading: Reading) {
         let place = self.readings.partition_point(|other| other.stamp_ns < reading.stamp_ns);
         let next = self.readings.get(place);
