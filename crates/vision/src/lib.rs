@@ -1,13 +1,18 @@
-//! From two images to a cloud of measured points.
+//! The stereo front end: from a pair of images to a cloud of measured points.
 //!
-//! [`Filter`]s prepare the images, where that is asked for. A [`Detector`] finds corners in each
-//! image, a [`Locator`] says where exactly they are, a [`Descriptor`] describes their surroundings, a
-//! [`Matcher`] pairs left with right, a [`Refinement`] aligns each pair between the views and leaves out those that do not
-//! align, and a [`Triangulator`] turns the pairs that pass the epipolar test into
-//! [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
+//! The stages, in order:
 //!
-//! The centre of the first pixel is (0, 0); brightness is linear in the stored values, 0 is black
-//! and 255 the white of an 8-bit image.
+//! 1. [`Filter`]s prepare the images (optional).
+//! 2. A [`Detector`] finds key points in each image.
+//! 3. A [`Locator`] moves them to exact corners.
+//! 4. A [`Descriptor`] describes their surroundings.
+//! 5. A [`Matcher`] pairs left key points with right ones.
+//! 6. A [`Refinement`] aligns each pair to a fraction of a pixel and rejects pairs that do not align.
+//! 7. A [`Triangulator`] turns the pairs that pass the epipolar test into
+//!    [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
+//!
+//! [`FrontEnd`] runs them all. The centre of the first pixel is (0, 0). Brightness is linear in the stored values: 0 is
+//! black and 255 is the white of an 8-bit image.
 
 mod align;
 mod describe;

@@ -1,4 +1,4 @@
-//! Detectors: where in an image there is something to find again.
+//! Detectors of key points.
 
 mod corners;
 mod dog;
@@ -29,18 +29,18 @@ pub use tensor::Window;
 
 use crate::{Image, Workspace};
 
-/// A place in an image that can be found again.
+/// A key point: a pixel that can be detected again in another image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keypoint {
-    /// Where, to a fraction of a pixel.
+    /// The position (px), with subpixel resolution.
     pub at: Pixel,
-    /// How strong, in the detector's own measure; larger is stronger.
+    /// The strength in the detector's own measure; larger is stronger.
     pub response: f32,
-    /// The size of the structure (px): the standard deviation of the Gaussian it was found at.
+    /// The size of the structure (px): the standard deviation of the Gaussian of its detection.
     pub scale: f32,
 }
 
-/// Finds the key points of an image.
+/// A detector of key points.
 pub trait Detector: Send + Sync + std::fmt::Debug {
     /// Replaces `found` by the image's key points, strongest first.
     fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>);
