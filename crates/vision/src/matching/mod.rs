@@ -1,4 +1,4 @@
-//! Matchers: which key point of the right image is which of the left.
+//! Matchers of left and right key points.
 
 mod along;
 pub(crate) mod correlate;
@@ -26,31 +26,31 @@ pub use zncc_band::ZnccBand;
 
 use crate::{Descriptors, Image, Keypoint, Workspace};
 
-/// One image and what was found in it.
+/// One image with its key points and descriptors.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// The image.
     pub image: &'a Image,
-    /// Its key points.
+    /// The key points.
     pub keypoints: &'a [Keypoint],
-    /// Their descriptors, in the same order.
+    /// The descriptors, in the order of the key points.
     pub descriptors: &'a Descriptors,
 }
 
-/// A key point of the left image and the place in the right image that looks the same.
+/// A match: a left key point and its pixel in the right image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Match {
-    /// Index among the left key points.
+    /// The index of the left key point.
     pub left: usize,
-    /// The place in the right image: a key point's, or wherever the matcher found it.
+    /// The pixel in the right image: a right key point's or any other.
     pub right: Pixel,
-    /// How unlike they are, in the matcher's own measure; smaller is more alike.
+    /// The dissimilarity in the matcher's own measure; smaller is more similar.
     pub distance: f32,
 }
 
-/// Finds the key points of the left view again in the right one; no key point and no place is in two pairs.
+/// A matcher: pairs left key points with pixels of the right image, each at most once.
 pub trait Matcher: Send + Sync + std::fmt::Debug {
-    /// Replaces `found` by the pairs, in the order of the left key points.
+    /// Replaces `found` by the matches, in the order of the left key points.
     fn match_into(
         &self,
         left: &View<'_>,
@@ -60,12 +60,12 @@ pub trait Matcher: Send + Sync + std::fmt::Debug {
         found: &mut Vec<Match>,
     );
 
-    /// Whether it compares descriptors; a matcher that looks at the images alone needs none to be made.
+    /// Whether the matcher compares descriptors; otherwise none are computed.
     fn compares_descriptors(&self) -> bool {
         true
     }
 
-    /// The pairs of two views, in the order of the left key points.
+    /// The matches of two views, in the order of the left key points.
     fn matches(&self, left: &View<'_>, right: &View<'_>, rig: &StereoRig) -> Vec<Match> {
         let mut found = Vec::new();
         self.match_into(left, right, rig, &mut Workspace::default(), &mut found);
