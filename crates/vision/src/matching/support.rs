@@ -383,7 +383,7 @@ mod tests {
         let [left, right] = lattice();
         let mut candidates = of_rows([&left, &right], alike);
         let alone = believed(&candidates);
-        assert_eq!((0..COUNT).filter(|&i| alone[i].0 == i).count(), COUNT - COUNT / 3, "descriptors alone mislead a third");
+        assert_eq!((0..COUNT).filter(|&i| alone[i].0 == i).count(), COUNT - COUNT / 3, "a third is not misled");
         assert!(alone.iter().all(|(_, clearly)| !clearly), "descriptors alone decide nothing");
         candidates.support(&left, COUNT, 12);
         let together = believed(&candidates);

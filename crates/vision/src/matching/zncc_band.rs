@@ -55,7 +55,8 @@ impl Default for ZnccBand {
 
 impl Component for ZnccBand {
     const NAME: &'static str = "zncc-band";
-    const SUMMARY: &'static str = "area-based matching by ZNCC at every pixel of the epipolar band, with left-right check";
+    const SUMMARY: &'static str =
+        "area-based matching by ZNCC at every pixel of the epipolar band, with left-right check";
     const SOURCE: &'static str =
         "Fua, A parallel stereo algorithm that produces dense depth maps and preserves image features, 1993";
 
