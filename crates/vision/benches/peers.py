@@ -177,7 +177,7 @@ def photograph(request):
     """A photograph of scikit-image's wheel, grey, 8 bits; none is fetched from elsewhere."""
     import skimage
 
-    path = os.path.join(os.path.dirname(skimage._file), "data", request["name"])
+    path = os.path.join(os.path.dirname(skimage.__file__), "data", request["name"])
     return {"image": encode(cv2.imread(path, cv2.IMREAD_GRAYSCALE))}
 
 
@@ -201,12 +201,12 @@ def calibrate(request):
 
 
 def versions(_):
-    return {"opencv": cv2._version, "python": sys.version.split()[0]}
+    return {"opencv": cv2.__version__, "python": sys.version.split()[0]}
 
 
-TIMED = {f._name: f for f in [
+TIMED = {f.__name__: f for f in [
     clahe, corner_sub_pix, corners, describe, fast, features, lucas_kanade, nearest_two, pair]}
-PLAIN = {f._name: f for f in [calibrate, keep, photograph, picture, versions]}
+PLAIN = {f.__name__: f for f in [calibrate, keep, photograph, picture, versions]}
 
 
 def answer(request):
@@ -227,5 +227,5 @@ for line in sys.stdin:
     try:
         reply = answer(json.loads(line))
     except Exception as error:  # said to the bench, which says it to the person
-        reply = {"error": "%s: %s" % (type(error)._name, error)}
+        reply = {"error": "%s: %s" % (type(error).__name__, error)}
     print(json.dumps(reply), flush=True)
