@@ -21,8 +21,9 @@ pub(super) struct Sectors {
     centres: [[f32; 2]; SECTORS],
 }
 
-/// The number of points within the circle; then the same with padding to blocks of 16.
+/// The number of points within the circle.
 const WITHIN: usize = 113;
+/// The number of points with padding to blocks of 16.
 const PLACES: usize = WITHIN.next_multiple_of(16);
 /// The number of points along the diameter.
 const ACROSS: usize = 13;

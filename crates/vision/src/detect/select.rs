@@ -117,11 +117,13 @@ fn rank_by_distance(sorted: &[Keypoint], size: [usize; 2], scratch: &mut Scratch
 /// A grid of points for nearest-neighbour queries.
 #[derive(Debug, Default)]
 struct Near {
-    /// The side of a cell (px); then the numbers of cells along x and y.
+    /// The side of a cell (px).
     side: f64,
+    /// The numbers of cells along x and y.
     cells: [usize; 2],
-    /// The last point of each cell; then, for each point, the previous one of its cell.
+    /// The last point of each cell.
     last: Vec<usize>,
+    /// Each point with the index of the previous one of its cell.
     points: Vec<(Pixel, usize)>,
 }
 

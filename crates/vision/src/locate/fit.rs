@@ -52,19 +52,22 @@ impl CornerFit {
 pub(super) struct Fitter {
     pixels: Pixels,
     middle: [usize; 2],
-    /// The mean, which is subtracted from the values; then the sum of their squares.
+    /// The mean, which is subtracted from the values.
     mean: f64,
+    /// The sum of the squared values after that.
     variation: f64,
 }
 
 /// The maximum number of steps of the fit in all windows.
 const STEPS: usize = 20;
-/// The early-exit limits, as multiples of the unexplained variance that an accepted fit may have.
+/// The early-exit limit of the sharp-edged first guess.
 ///
-/// Most key points lie in texture and would take most of the time. The limits apply to the sharp-edged first guess, to
-/// the linear model's prediction for the first step, and to that for later steps.
+/// Most key points lie in texture and would take most of the time. A candidate is abandoned if its unexplained variance
+/// exceeds that of an acceptable fit by this factor.
 const SHARP: f64 = 9.0;
+/// The early-exit factor of the linear model's prediction for the first step, as [`SHARP`].
 const FIRST: f64 = 2.5;
+/// The early-exit factor of the linear model's prediction for later steps, as [`SHARP`].
 const LATER: f64 = 1.5;
 /// The contrast factor of a first guess: blur lowers the contrast below that of the fit.
 const PALE: f64 = 0.5;
@@ -72,9 +75,9 @@ const PALE: f64 = 0.5;
 const WORSE: f64 = 0.7;
 /// The step length (px) that ends the fit: the next would be a small part of it.
 const SHORT: f64 = 3e-3;
-/// The offset (px) of the corner from the window's centre from which on the window moves, once steps are shorter than
-/// this; the second constant limits the number of moves.
+/// The offset (px) of the corner beyond which the window moves to it, once steps are shorter than this.
 const ASIDE: f64 = 0.5;
+/// The maximum number of moves of the window.
 const MOVES: usize = 3;
 /// The range of the blur's standard deviation (px).
 const BLUR: [f64; 2] = [0.3, 3.0];
