@@ -31,6 +31,44 @@ pub use zncc_parabola::ZnccParabola;
 ///
 /// Detection errors are independent in the two images; the refinement removes them from the disparity, hence from the
 /// depth.
+///
+/// ```
+/// # use nalgebra::{UnitQuaternion, Vector3};
+/// # use seafix_geometry::{Pinhole, Transform};
+/// use seafix_geometry::{Pixel, StereoPixels, StereoRig, UncertainPixels};
+/// use seafix_vision::{Image, Pair, Refinement, UncertainPixel, Workspace};
+///
+/// /// Accepts each pair unchanged, with independent errors of 0.2 px.
+/// #[derive(Debug)]
+/// struct Unchanged;
+///
+/// impl Refinement for Unchanged {
+///     fn refine_into(
+///         &self,
+///         pairs: &[Pair],
+///         _: &Image,
+///         _: &Image,
+///         _: &StereoRig,
+///         _: &mut Workspace,
+///         pixels: &mut Vec<UncertainPixels>,
+///     ) {
+///         pixels.clear();
+///         pixels.extend(pairs.iter().map(|pair| {
+///             let at = StereoPixels { left: pair.left.at, right: pair.right.at };
+///             UncertainPixels::independent(at, 0.2)
+///         }));
+///     }
+/// }
+///
+/// # let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[]).unwrap();
+/// # let right_from_left = Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0));
+/// # let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
+/// let image = Image::new(1024, 768, vec![0.0; 1024 * 768]).unwrap();
+/// let pixel = |u| UncertainPixel::independent(Pixel { u, v: 300.0 }, 0.5);
+/// let pair = Pair { left: pixel(500.0), right: pixel(460.0) };
+/// let refined = Unchanged.refine(&[pair], &image, &image, &rig);
+/// assert_eq!(refined[0].at.right, Pixel { u: 460.0, v: 300.0 });
+/// ```
 pub trait Refinement: Send + Sync + std::fmt::Debug {
     /// Replaces `pixels` by the refined pixels of `pairs`, in their order, with their joint covariance; rejected pairs
     /// are

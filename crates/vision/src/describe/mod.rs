@@ -149,6 +149,28 @@ impl Descriptors {
 }
 
 /// A descriptor: describes the surroundings of key points.
+///
+/// ```
+/// use seafix_geometry::Pixel;
+/// use seafix_vision::{Descriptor, Descriptors, Image, Keypoint, Workspace};
+///
+/// /// The grey level of the nearest pixel, for key points inside the image.
+/// #[derive(Debug)]
+/// struct Grey;
+///
+/// impl Descriptor for Grey {
+///     fn describe_into(&self, image: &Image, keypoints: &[Keypoint], _: &mut Workspace, described: &mut Descriptors) {
+///         let numbers = described.numbers_mut(keypoints.len(), 1);
+///         for (number, keypoint) in numbers.iter_mut().zip(keypoints) {
+///             *number = image.row(keypoint.at.v.round() as usize)[keypoint.at.u.round() as usize];
+///         }
+///     }
+/// }
+///
+/// let image = Image::new(2, 1, vec![10.0, 20.0]).unwrap();
+/// let keypoint = Keypoint { at: Pixel { u: 1.0, v: 0.0 }, response: 1.0, scale: 1.0 };
+/// assert_eq!(Grey.describe(&image, &[keypoint]).numbers().unwrap().row(0), [20.0]);
+/// ```
 pub trait Descriptor: Send + Sync + std::fmt::Debug {
     /// Replaces `described` by one descriptor for each key point, in their order.
     fn describe_into(&self, image: &Image, keypoints: &[Keypoint], work: &mut Workspace, described: &mut Descriptors);

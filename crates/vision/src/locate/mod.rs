@@ -53,6 +53,36 @@ pub struct Pair {
 }
 
 /// A locator: moves key points to exact corners.
+///
+/// ```
+/// use seafix_geometry::Pixel;
+/// use seafix_vision::{Image, Keypoint, Locator, UncertainPixel, Workspace};
+///
+/// /// The nearest pixel centre, with the standard deviation of rounding, 1/√12 px.
+/// #[derive(Debug)]
+/// struct Rounded;
+///
+/// impl Locator for Rounded {
+///     fn locate_into(
+///         &self,
+///         _: &Image,
+///         keypoints: &[Keypoint],
+///         _: &mut Workspace,
+///         places: &mut Vec<Option<UncertainPixel>>,
+///     ) {
+///         places.clear();
+///         places.extend(keypoints.iter().map(|keypoint| {
+///             let at = Pixel { u: keypoint.at.u.round(), v: keypoint.at.v.round() };
+///             Some(UncertainPixel::independent(at, 1.0 / 12f64.sqrt()))
+///         }));
+///     }
+/// }
+///
+/// let image = Image::new(16, 16, vec![0.0; 256]).unwrap();
+/// let keypoint = Keypoint { at: Pixel { u: 10.3, v: 6.8 }, response: 1.0, scale: 1.0 };
+/// let places = Rounded.locate(&image, &[keypoint]);
+/// assert_eq!(places[0].unwrap().at, Pixel { u: 10.0, v: 7.0 });
+/// ```
 pub trait Locator: Send + Sync + std::fmt::Debug {
     /// Replaces `places` by the corner at each key point, in their order.
     ///

@@ -49,6 +49,47 @@ pub struct Match {
 }
 
 /// A matcher: pairs left key points with pixels of the right image, each at most once.
+///
+/// ```
+/// # use nalgebra::{UnitQuaternion, Vector3};
+/// # use seafix_geometry::{Pinhole, Transform};
+/// use seafix_geometry::{Pixel, StereoRig};
+/// use seafix_vision::{Descriptors, Image, Keypoint, Match, Matcher, View, Workspace};
+///
+/// /// Pairs key points of equal index.
+/// #[derive(Debug)]
+/// struct SameIndex;
+///
+/// impl Matcher for SameIndex {
+///     fn match_into(
+///         &self,
+///         left: &View<'_>,
+///         right: &View<'_>,
+///         _: &StereoRig,
+///         _: &mut Workspace,
+///         found: &mut Vec<Match>,
+///     ) {
+///         found.clear();
+///         let pairs = left.keypoints.iter().zip(right.keypoints).enumerate();
+///         found.extend(pairs.map(|(left, (_, right))| Match { left, right: right.at, distance: 0.0 }));
+///     }
+///
+///     fn compares_descriptors(&self) -> bool {
+///         false
+///     }
+/// }
+///
+/// # let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[]).unwrap();
+/// # let right_from_left = Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0));
+/// # let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
+/// let image = Image::new(1024, 768, vec![0.0; 1024 * 768]).unwrap();
+/// let descriptors = Descriptors::default();
+/// let keypoint = |u| Keypoint { at: Pixel { u, v: 300.0 }, response: 1.0, scale: 1.0 };
+/// let (left, right) = ([keypoint(500.0)], [keypoint(460.0)]);
+/// let left = View { image: &image, keypoints: &left, descriptors: &descriptors };
+/// let right = View { image: &image, keypoints: &right, descriptors: &descriptors };
+/// assert_eq!(SameIndex.matches(&left, &right, &rig)[0].right, Pixel { u: 460.0, v: 300.0 });
+/// ```
 pub trait Matcher: Send + Sync + std::fmt::Debug {
     /// Replaces `found` by the matches, in the order of the left key points.
     fn match_into(

@@ -11,6 +11,37 @@ use seafix_geometry::{MeasuredPoint, StereoRig, Triangulation, UncertainPixels, 
 use serde::Deserializer;
 
 /// A triangulator: computes a point from a matched pair of pixels.
+///
+/// ```
+/// # use nalgebra::{UnitQuaternion, Vector3};
+/// # use seafix_geometry::{Pinhole, Transform};
+/// use seafix_geometry::{Point, StereoRig, Triangulation, UncertainPixels, Untriangulable};
+/// use seafix_vision::{PointRules, Triangulator};
+///
+/// /// The maximum-likelihood point.
+/// #[derive(Debug, Default)]
+/// struct MaximumLikelihood {
+///     rules: PointRules,
+/// }
+///
+/// impl Triangulator for MaximumLikelihood {
+///     fn rules(&self) -> &PointRules {
+///         &self.rules
+///     }
+///
+///     fn point(&self, rig: &StereoRig, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable> {
+///         rig.triangulate(seen)
+///     }
+/// }
+///
+/// # let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[]).unwrap();
+/// # let right_from_left = Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0));
+/// # let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
+/// let pixels = rig.project(&Point::new(0.3, -0.2, 3.0)).unwrap();
+/// let mut cloud = Vec::new();
+/// MaximumLikelihood::default().triangulate_into(&[UncertainPixels::independent(pixels, 0.1)], &rig, &mut cloud);
+/// assert!((cloud[0].position.at.coords.z - 3.0).abs() < 1e-6);
+/// ```
 pub trait Triangulator: Send + Sync + std::fmt::Debug {
     /// The pixels' errors and the acceptance criteria.
     fn rules(&self) -> &PointRules;
