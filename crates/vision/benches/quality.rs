@@ -138,7 +138,7 @@ impl Peers {
     fn described(&mut self, keypoints: &[[f32; 5]], upright: bool, extended: bool) -> Value {
         let keypoints = floats(&[keypoints.len(), 5], keypoints.as_flattened());
         let request = json!({"do": "describe", "image": "image", "keypoints": keypoints});
-        let mut request = request.as_object().expect("made above").clone();
+        let mut request = request.as_object().expect("a JSON object").clone();
         request.extend([("upright".to_owned(), upright.into()), ("extended".to_owned(), extended.into())]);
         self.surf.ask(&request.into())
     }

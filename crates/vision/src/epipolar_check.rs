@@ -11,7 +11,7 @@ pub struct EpipolarCheck {
     pub matches: usize,
     /// The number of matches within [`NEAR`](Self::NEAR) of their epipolar lines.
     pub near: usize,
-    /// The RMS distance to the epipolar lines (px) of the nearest three quarters of the matches; the rest may be false.
+    /// The RMS distance (px) to the epipolar lines of the nearest three quarters of matches; the rest may be false.
     pub rms_px: f64,
 }
 

@@ -4,7 +4,7 @@ use seafix_geometry::StereoRig;
 
 use crate::{Descriptor, Detector, EpipolarBand, Harris, Image, Match, Surf, View, Workspace};
 
-/// The numbers of matches of a pair of images in the given and in the exchanged order.
+/// The numbers of matches of two images in the given and in the exchanged order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sides {
     /// The number of matches in the given order.

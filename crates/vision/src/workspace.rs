@@ -21,7 +21,7 @@ pub enum Threads {
     /// The calling thread alone.
     #[default]
     One,
-    /// All threads of the rayon pool that the call is made in; the results are the same.
+    /// All threads of the current rayon pool; the results are the same as on one thread.
     Pool,
 }
 

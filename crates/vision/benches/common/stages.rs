@@ -199,7 +199,7 @@ impl Scene {
 
     /// The two nearest neighbours of each descriptor, by the matcher without geometry.
     ///
-    /// That matcher also matches in the other direction and applies the ratio test.
+    /// The matcher also works in the other direction and applies the ratio test.
     fn matchers(&self) -> Vec<Stage<'_>> {
         let names = ["2-NN, 64 floats, 1000²", "2-NN, 64 floats, 3000²"];
         let stages = names.into_iter().enumerate().map(|(i, name)| {

@@ -73,8 +73,8 @@ impl Slant {
 
 /// The slant at the end of an alignment by translation; `None` if the window is noise alone.
 ///
-/// With g the gradient of the four parameters and G their information, u = g_s − G_sm G_mm⁻¹ g_m is the slant's own
-/// part.
+/// The slant's own part is u = g_s − G_sm G_mm⁻¹ g_m, with g the gradient of the four parameters and G their
+/// information.
 /// Its covariance is σ² (1/s_T² + 1/s_I²) T (Σ w² J̃ᵀJ̃) Tᵀ with T = (−G_sm G_mm⁻¹, 1).
 pub(super) fn slant(normal: &Normal<4>, gradient: &Vector4<f64>, residual: &Residual) -> Option<Slant> {
     let block = |all: &Matrix4<f64>, i, j| all.fixed_view::<2, 2>(i, j).into_owned();

@@ -33,7 +33,7 @@ struct Memory {
 const PIECE: usize = 32;
 
 impl Direct {
-    /// Replaces `found` by the positions in `to` of the `expected` points of `from`, in their order.
+    /// Replaces `found` by the positions in `to` of the `expected` points of `from`, in order.
     ///
     /// `None` marks a point that is not visible or does not align. The alignment is that of a stereo pair with a given
     /// relation

@@ -91,7 +91,7 @@ pub trait Refinement: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All refinements.
+/// The registry of refinements.
 pub static REFINEMENTS: Registry<dyn Refinement> =
     Registry::new("refinement", &[entry!(Direct), entry!(Unrefined), entry!(ZnccParabola)]);
 

@@ -12,14 +12,14 @@ use crate::{
     matching::correlate::{Template, WIDEST},
 };
 
-/// The vertex of the paraboloid through nine correlations at integer pixels, the refinement of most stereo programs.
+/// The vertex of the paraboloid through nine correlations at integer pixels, as in most stereo programs.
 ///
 /// The window around the left pixel is compared with those around the integer pixels near the right one, by
 /// zero-normalised cross-correlation c. The right pixel becomes the vertex of the paraboloid through the nine
 /// correlations
 /// around the maximum.
 ///
-/// With n pixels in the window and H = −∂²c the covariance is 2 (1 − c) / n · H⁻¹, as of any least-squares fit, plus
+/// The covariance, for n pixels in the window and H = −∂²c, is that of a least-squares fit, 2 (1 − c) / n · H⁻¹, plus
 /// `floor-px`². The latter covers a bias: correlations are no paraboloid, which pulls the vertex towards integer
 /// pixels, and
 /// windows are not deformed, whatever the rig. That error is the same in every frame and does not average out.
@@ -37,7 +37,7 @@ pub struct ZnccParabola {
     pub reach: usize,
     /// Minimum zero-normalised cross-correlation.
     pub min_correlation: f64,
-    /// Standard deviation of the paraboloid's bias (px), for surfaces as slanted as those of boxes and walls.
+    /// Standard deviation of the paraboloid's bias (px); the default is for the slants of boxes and walls.
     pub floor_px: f64,
     /// Treatment of a pair whose refinement fails.
     pub unaligned: Unaligned,

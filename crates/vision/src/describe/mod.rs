@@ -183,6 +183,6 @@ pub trait Descriptor: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All descriptors.
+/// The registry of descriptors.
 pub static DESCRIPTORS: Registry<dyn Descriptor> =
     Registry::new("descriptor", &[entry!(Brief), entry!(Orb), entry!(Sift), entry!(Surf), entry!(ZnccPatch)]);

@@ -33,7 +33,7 @@ use crate::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sift {
-    /// Whether the window stays upright, for the two views of one instant, or rotates with the image.
+    /// Whether the window is upright, for the two views of one instant, or rotated with the image.
     pub upright: bool,
     /// Whether to take the square roots of the numbers (RootSIFT).
     ///

@@ -101,7 +101,7 @@ impl Octave<'_> {
     fn peak(&self, near: &[[&[f32]; 3]; 3], layer: usize, x: usize, y: usize) -> Option<Keypoint> {
         let at = |dl: usize, dy: usize, dx: usize| near[dl][dy][x + dx - 1];
         let response = at(1, 1, 1);
-        // Of equal values the first counts.
+        // The first of equal values counts.
         let is_greatest = (0..27).all(|i| {
             let other = at(i / 9, i / 3 % 3, i % 3);
             i == 13 || if i < 13 { other < response } else { other <= response }

@@ -76,7 +76,7 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All detectors.
+/// The registry of detectors.
 pub static DETECTORS: Registry<dyn Detector> = Registry::new(
     "detector",
     &[

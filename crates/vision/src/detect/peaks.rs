@@ -43,7 +43,7 @@ impl Peaks {
     /// Replaces `found` by the maxima in row-major order: positive pixels of at least `min` that none within the radius
     /// exceeds.
     ///
-    /// Of equal pixels within the radius the first counts. Border pixels are never maxima.
+    /// The first of equal pixels within the radius counts. Border pixels are never maxima.
     pub(super) fn find(
         &self,
         response: &[f32],

@@ -14,7 +14,7 @@ pub enum Selection {
     /// The strongest of each square cell, then the second of each cell, and so on.
     #[default]
     Balanced,
-    /// Those with the largest distance to a clearly stronger point, 0.9 Rⱼ > Rᵢ: adaptive non-maximal suppression.
+    /// The points with the largest distance to a clearly stronger one, 0.9 Rⱼ > Rᵢ: adaptive non-maximal suppression.
     ///
     /// Unlike cells, it does not depend on the position of a grid. Source: Brown, Szeliski and Winder, *Multi-image
     /// matching

@@ -46,6 +46,6 @@ pub trait Filter: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All filters.
+/// The registry of filters.
 pub static FILTERS: Registry<dyn Filter> =
     Registry::new("filter", &[entry!(Clahe), entry!(Guided), entry!(Illumination), entry!(Median)]);

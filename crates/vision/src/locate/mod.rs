@@ -104,6 +104,6 @@ pub trait Locator: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All locators.
+/// The registry of locators.
 pub static LOCATORS: Registry<dyn Locator> =
     Registry::new("locator", &[entry!(Corner), entry!(Junction), entry!(LCorner), entry!(Peak), entry!(XCorner)]);

@@ -8,7 +8,7 @@ use crate::{Image, Keypoint, Workspace};
 
 /// Keeps each key point at the peak of the detector's response.
 ///
-/// That is right for texture, and 1 to 2 px inside the corner of a box.
+/// The position is right for texture, and 1 to 2 px inside the corner of a box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Peak {}

@@ -24,9 +24,9 @@ pub(super) struct Test {
 }
 
 impl Along {
-    /// Calls `accept` with the mutual nearest neighbours that pass the ratio test, and the squared distance of their
-    /// descriptors, in the order of the left key points.
+    /// Calls `accept` with the mutual nearest neighbours that pass the ratio test.
     ///
+    /// Its arguments are both indices and the squared distance of the descriptors, in the order of the left key points.
     /// Only the pairs compete that `visit(i, ..)` names for left key point `i`. The distance is that of the
     /// descriptors. With
     /// neighbours it is the inverse of a pair's supported weight, and ambiguous pairs are rejected unless `patterns` is

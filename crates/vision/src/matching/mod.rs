@@ -114,6 +114,6 @@ pub trait Matcher: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All matchers.
+/// The registry of matchers.
 pub static MATCHERS: Registry<dyn Matcher> =
     Registry::new("matcher", &[entry!(EpipolarBand), entry!(LucasKanade), entry!(MutualRatio), entry!(ZnccBand)]);

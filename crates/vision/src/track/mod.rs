@@ -119,7 +119,7 @@ impl Tracker {
         });
     }
 
-    /// The tracks of `places` from the first image to the second, with the same pixel as the initial position.
+    /// The tracks of `places` from the first image to the second, from the same initial pixels.
     pub fn track_all(&self, from: &Image, to: &Image, places: &[Pixel]) -> Vec<Option<Track>> {
         let pyramids = [from, to].map(|image| Pyramid::new(image, self.levels));
         let places: Vec<[Pixel; 2]> = places.iter().map(|place| [*place; 2]).collect();

@@ -75,7 +75,7 @@ pub trait Triangulator: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All triangulators.
+/// The registry of triangulators.
 pub static TRIANGULATORS: Registry<dyn Triangulator> =
     Registry::new("triangulator", &[entry!(Linear), entry!(Midpoint), entry!(Optimal)]);
 

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointRules {
-    /// Standard deviation (px) of the repeatability of a key point between images, without a fitted corner.
+    /// Standard deviation (px) of a key point without a fitted corner, from image to image.
     pub sigma_px: f64,
-    /// Standard deviation (px) of the offset of such a key point from its true corner, common to both images.
+    /// Standard deviation (px) of the offset of a key point without a fitted corner from its true corner.
     ///
-    /// It affects directions and not disparities. Harris' maxima of 130 corners in 60 rendered pairs of a dive had an
+    /// The offset is common to both images, so it affects directions and not disparities. Harris' maxima of 130 corners in 60 rendered pairs of a dive had an
     /// RMS offset
     /// of 0.87 px an axis and a disparity error of 0.13 px; fitted corners had 0.16 and 0.05
     /// (`cargo test -p seafix-experiment located:: -- --ignored --nocapture`).
@@ -24,7 +24,7 @@ pub struct PointRules {
     pub calibration_px: f64,
     /// Maximum distance from the epipolar line (px, Sampson distance).
     pub epipolar_px: f64,
-    /// Fraction of good pairs that pass the χ² test of their disagreement across the epipolar line; 1: no test.
+    /// Fraction of good pairs that pass the χ² test of their epipolar disagreement; 1: no test.
     ///
     /// The test has one degree of freedom, so 0.997 is three standard deviations. It needs correct covariances.
     pub confidence: f64,

@@ -108,7 +108,7 @@ fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
         every(window, |name, detector| {
             let mut image = shown(name, width, height);
             if window == "gaussian" {
-                // Of equals the first counts, and the first changes with the rotation, so no two values may be equal.
+                // The first of equals counts and changes with the rotation, so no two values may be equal.
                 let pixels = image.pixels_mut().iter_mut().enumerate();
                 pixels.for_each(|(i, pixel)| *pixel += (hash(i, 1) % 1024) as f32 / 1024.0);
             }
